@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from tests.support import synthetic
+from tolstat.common.channels import CHANNELS
 from tolstat.common.columns import RESULT_COLUMNS
-from tolstat.common.load_kinds import CHANNELS, KIND, LOAD_KINDS, SPAN, measure_of
+from tolstat.common.load_kinds import KIND, LOAD_KINDS, SPAN, measure_of
 from tolstat.common.loads import LOADS, largest, of_kind, put_largest
 from tolstat.common.tables import KERNEL_RESULT, RESULT, RESULT_FIELDS, Options, Status, for_kernels, without_results
 from tolstat.kernel.mechanics import dynamics, ideal_loads, loads

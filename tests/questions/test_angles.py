@@ -10,8 +10,10 @@ from tests.support import synthetic
 from tolstat import study
 from tolstat.campaign import run as campaign
 from tolstat.cli import app
+from tolstat.common.channels import CHANNELS
 from tolstat.common.errors import InputError, StoreError
-from tolstat.common.loads import SHOWN_LOADS
+from tolstat.common.load_kinds import BUSHINGS
+from tolstat.common.loads import LOADS, SHOWN_LOADS
 from tolstat.display.asked import Asked
 from tolstat.questions.causes.angles import against_angle
 from tolstat.questions.causes.section import sections
@@ -37,9 +39,13 @@ def stores(tmp_path_factory):
     return found
 
 
-def forces(found):
-    """Moduli of the bushing forces, (m, k, 8)."""
-    return np.linalg.norm(found.loads[..., :3], axis=-1)
+FORCES = [f"{place}.F" for place in BUSHINGS]
+SHAFTS = ["input.f_x", "output.lateral", "output.moment", "output.axial", "input.drive"]
+
+
+def of(found, names):
+    """Values of several channels, (m, k, names)."""
+    return np.stack([found.loads[name] for name in names], axis=-1)
 
 
 def test_loads_are_the_same_wherever_they_are_from(stores):
@@ -47,30 +53,36 @@ def test_loads_are_the_same_wherever_they_are_from(stores):
     found = {}
     for kind, path in stores.items():
         with Reader.open(path) as store:
-            found[kind] = revolutions.read(store, rows, 180)
-            largest = store.results()["F_max"][rows]
+            found[kind] = revolutions.read(store, rows, FORCES + SHAFTS, 180)
+            results = store.results()[rows]
     assert [found[kind].origin for kind in stores] == ["stored", "harmonics", "simulated again"]
     assert found["none"].apart == 0.0
-    assert forces(found["full"]).max(axis=1) == pytest.approx(largest, rel=1e-4)  # between the samples
-    assert np.array_equal(found["full"].loads, found["none"].loads)
-    np.testing.assert_allclose(forces(found["harmonics"]), forces(found["full"]), rtol=0.02)
+    largest = results["F_max"]
+    assert of(found["full"], FORCES).max(axis=1) == pytest.approx(largest, rel=1e-4)  # between the samples
+    for name in SHAFTS[1:]:
+        top = found["full"].loads[name].max(axis=1)
+        own, scale = LOADS[name].of(results), largest.max() if LOADS[name].unit == "N" else results["T_max"].max()
+        assert top == pytest.approx(own, abs=2e-3 * scale), name
+    assert all(np.array_equal(found["full"].loads[name], found["none"].loads[name]) for name in FORCES + SHAFTS)
+    np.testing.assert_allclose(of(found["harmonics"], FORCES), of(found["full"], FORCES), rtol=0.02)
+    scale = largest.max()  # shafts' forces are small differences of bushing forces
+    np.testing.assert_allclose(of(found["harmonics"], SHAFTS), of(found["full"], SHAFTS), atol=0.01 * scale)
     assert found["full"].angles[1] == pytest.approx(np.radians(2.0))
     with Reader.open(stores["none"]) as store:
-        coarse = revolutions.read(store, rows, 60)
-    assert np.array_equal(coarse.loads, found["none"].loads[:, ::3])
+        coarse = revolutions.read(store, rows, SHAFTS, 60)
+    assert np.array_equal(of(coarse, SHAFTS), of(found["none"], SHAFTS)[:, ::3])
 
 
 @pytest.fixture
 def known(tmp_path, monkeypatch):
     """Campaign whose load cross2.F is made by one error at 0 and by another one at 90 degrees."""
 
-    def invented(store, slots, most_angles=60):
+    def invented(store, slots, names, most_angles=60):
         theta = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
         errors = store.errors()[slots]
         one, other = (errors[name][:, None] / SIGMA for name in ("pin1.offset_t", "pin3.offset_z"))
         load = 600.0 + 20.0 * one * np.cos(theta) + 10.0 * other * np.sin(theta)
-        loads = np.zeros((*load.shape, 8, 6))
-        loads[..., 0], loads[..., 3] = load[:, :, None], 0.1 * load[:, :, None]
+        loads = {name: load if CHANNELS[name].unit == "N" else 0.1 * load for name in names}
         return Revolutions(theta, loads, "stored", 0.0)
 
     monkeypatch.setattr(revolutions, "read", invented)
@@ -142,6 +154,13 @@ def test_page_draws_loads_over_the_revolution(known):
     lines = ax.get_lines()[:3]
     assert [line.get_label() for line in lines] == [f"row {joint.row}" for joint in worst.joints]
     assert [line.get_ydata()[0] for line in lines] == pytest.approx(600.0 + 20.0 * errors / SIGMA)
+
+
+def test_components_and_loads_of_shafts_have_shares_in_their_unit(known):
+    with Reader.open(known) as store:
+        found = against_angle(store.view(), ["fork1.T_e", "output.moment", "output.f_x"], 400)
+    assert [angle.unit for angle in found] == ["N*m", "N*m", "N"]
+    assert all(angle.names[0] == "pin1.offset_t" for angle in found)
 
 
 def test_what_has_no_shares_is_refused(known, tmp_path):

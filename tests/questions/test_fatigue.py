@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 from tests.support import naive
 from tolstat.analysis import cycles, damage
 from tolstat.analysis.cycles import Cycles
-from tolstat.common.load_kinds import CHANNELS
+from tolstat.common.channels import BUSHING_LOADS, SHAFT_LOADS, channels_of
+from tolstat.common.load_kinds import SHAFTS
 from tolstat.solver import rainflow
 
 ASTM = [-2, 1, -3, 5, -1, 3, -4, 4]
@@ -132,9 +133,10 @@ def test_a_joints_channels_are_its_components_and_moduli():
     rng = np.random.default_rng(5)
     loads = rng.normal(size=(40, 8, 6)) + np.arange(6)
     loads[:, 7] *= 1e-6  # cycles below the gate, but not those of the modulus
-    counted = rainflow.count(loads)
-    assert list(CHANNELS)[5:9] == ["cross1.T_z", "cross1.F", "cross1.T", "cross2.F_e"]
-    for c, name in enumerate(CHANNELS):
+    counted = rainflow.count({"loads": loads})
+    names = [channel.name for channel in channels_of(BUSHING_LOADS)]
+    assert names[5:9] == ["cross1.T_z", "cross1.F", "cross1.T", "cross2.F_e"]
+    for c, name in enumerate(names):
         b, i = divmod(c, 8)
         signal = loads[:, b, i] if i < 6 else np.linalg.norm(loads[:, b, 3 * i - 18 : 3 * i - 15], axis=1)
         kind = slice(0, 3) if "F" in name else slice(3, 6)
@@ -147,7 +149,35 @@ def test_a_joints_channels_are_its_components_and_moduli():
     assert (counted["cycle_count"][:56] > 0).all()
     assert not counted["cycle_count"][56:].any()
     loads[3, 2, 1] = np.nan
-    assert np.isnan(rainflow.count(loads)["cycles"]).all()
+    assert np.isnan(rainflow.count({"loads": loads})["cycles"]).all()
+
+
+def test_cycles_of_shafts_are_counted_from_a_fraction_of_the_largest_bushing_load_on():
+    rng = np.random.default_rng(8)
+    loads, shafts = 1e3 * rng.normal(size=(60, 8, 6)), rng.normal(size=(60, 2, 6))
+    shafts[:, 0] *= 0.02  # some of its cycles are below the gate
+    counted = rainflow.count({"loads": loads, "shafts": shafts})
+    assert {name: values.shape for name, values in counted.items()} == {
+        name: spec.shape for name, spec in rainflow.specs().items()
+    }
+    largest = {"N": np.linalg.norm(loads[..., :3], axis=-1).max(), "N*m": np.linalg.norm(loads[..., 3:], axis=-1).max()}
+    expected = {}
+    for i, shaft in enumerate(SHAFTS):
+        x, y, z, m_x, m_y, m_z = shafts[:, i].T
+        own = {"f_x": x, "f_y": y, "f_z": z, "m_x": m_x, "m_y": m_y, "m_z": m_z}
+        own |= {"axial": np.abs(z), "lateral": np.hypot(x, y), "moment": np.hypot(m_x, m_y)}
+        own |= {"drive": np.abs(m_z)} if shaft == "input" else {}
+        expected |= {f"{shaft}.{name}": signal for name, signal in own.items()}
+    channels = channels_of(SHAFT_LOADS)
+    assert [channel.name for channel in channels] == list(expected)
+    for c, channel in enumerate(channels):
+        signal, gate = expected[channel.name], rainflow.GATE * largest[channel.unit]
+        ranges, _ = rainflow.periodic(signal, gate)
+        assert counted["shaft_cycle_count"][c] == len(ranges), channel.name
+        kept = min(len(ranges), rainflow.KEPT)
+        np.testing.assert_allclose(counted["shaft_cycles"][c, :kept, 0], ranges[:kept], rtol=1e-6)
+    whole = [len(rainflow.periodic(signal)[0]) for signal in expected.values()]
+    assert (counted["shaft_cycle_count"] < whole).any()  # the gate leaves some out
 
 
 def test_equivalent_load_and_damage_of_constant_amplitude():

@@ -16,8 +16,8 @@ from tests.questions.test_fatigue import needs
 from tests.support import synthetic
 from tests.support.environment import ROOT
 from tolstat.analysis import damage
+from tolstat.common.channels import CHANNELS
 from tolstat.common.errors import InputError, StoreError
-from tolstat.common.load_kinds import CHANNELS
 from tolstat.display.asked import Asked
 from tolstat.display.blocks import Panels, Table, Text
 from tolstat.questions.fatigue import pylife, rendering
@@ -86,7 +86,7 @@ def load_cycles(files, shares=(1.0,), names=None, samples=None):
 def test_the_same_cycles_from_worker_and_histories(campaign):
     counted, status = cycles(campaign("cycles"))
     with Reader.open(campaign("cycles")) as store:
-        assert set(store.history_specs) == set(rainflow.SPECS)
+        assert set(store.history_specs) == set(rainflow.specs())
     assert (status != tolstat.Status.OK).any()
     assert np.isnan(counted.number[status != tolstat.Status.OK]).all()
     valid = status == tolstat.Status.OK
@@ -94,7 +94,7 @@ def test_the_same_cycles_from_worker_and_histories(campaign):
     both, _ = cycles(campaign("harmonics+cycles"))
     np.testing.assert_array_equal(both.ranges, counted.ranges)
     load = damage.equivalent_load(counted, 4.0)[valid]
-    torque = np.array([unit != "N" for unit in CHANNELS.values()])
+    torque = np.array([CHANNELS[name].unit != "N" for name in counted.channels])
     scale = np.where(torque, load[:, torque].max(), load[:, ~torque].max())
     for histories, tolerance in (("full", 1e-6), ("harmonics", 5e-3)):
         other, _ = cycles(campaign(histories))
@@ -102,6 +102,40 @@ def test_the_same_cycles_from_worker_and_histories(campaign):
         assert difference.max() < tolerance
         if histories == "harmonics":
             assert difference.max() > 1e-6  # truncation shows: the comparison sees a difference
+
+
+def test_cycles_of_shafts_are_evaluated_where_they_are_asked_for(campaign, tmp_path):
+    asked = ["output.moment", "input.f_x", "cross1.F_t", "output.axial"]
+    found = {kind: load_cycles([campaign(kind)], names=asked) for kind in ("cycles", "full", "harmonics")}
+    whole = {kind: damage.equivalent_load(loading.cycles, 4.0) for kind, loading in found.items()}
+    valid = found["cycles"].status == tolstat.Status.OK
+    assert (whole["cycles"][valid] > 0).all()
+    np.testing.assert_allclose(whole["full"][valid], whole["cycles"][valid], rtol=1e-5)
+    with Reader.open(campaign("full")) as store:
+        settled = np.flatnonzero(store.status() == tolstat.Status.OK)
+        m_x, m_y = store.histories("shafts", settled)[..., 1, 3:5].astype(float).transpose(2, 0, 1)
+    moment = [rainflow.periodic(own)[0].max() for own in np.hypot(m_x, m_y)]
+    with Reader.open(campaign("full")) as store:
+        assert cycles_of(store, settled, ["output.moment"]).ranges[:, 0, 0] == pytest.approx(moment)
+    assert not set(load_cycles([campaign()]).cycles.channels) & set(asked[:2])
+
+    source, out = tmp_path / "line.toml", tmp_path / "line.h5"
+    text = STUDY.format(histories="cycles", alpha=15, seed=1)
+    source.write_text(text + 'line."output.moment" = { m = 5, S0 = "20 N*m", N0 = 2e6 }\n', encoding="utf-8")
+    tolstat.run(tolstat.load(source), out, workers=1)
+    loading = load_cycles([out])
+    line = damage.Line(5.0, 20.0, 2e6)
+    sums = damage.damage(found["cycles"].cycles.of("output.moment"), line, 1e7)[:, 0]
+    row = fatigue.damages(loading).set_index("channel").loc["output.moment"]
+    assert row["median"] == pytest.approx(np.quantile(sums[valid], 0.5, method="inverted_cdf"))
+
+
+def test_a_file_without_cycles_of_shafts_says_so(campaign):
+    with Reader.open(campaign("cycles")) as store:
+        del store.history_specs["shaft_cycles"]
+        with pytest.raises(StoreError, match="holds no shaft_cycles\n  hint: run the campaign again"):
+            cycles_of(store, np.arange(store.n), ["output.moment"])
+        assert cycles_of(store, np.arange(store.n), ["cross1.F_t"]).ranges.shape[1] == 1
 
 
 @pytest.mark.slow

@@ -195,6 +195,21 @@ def test_of_several_points_an_amplitude_is_the_largest_and_an_orbit_that_of_the_
     assert found.apart == 0.0
 
 
+def test_joints_of_a_sweep_are_simulated_again_each_at_its_own_operating_point(tmp_path):
+    alpha = '"operation.alpha" = { from = "5 deg", to = "25 deg"'
+    text = synthetic.SWEEP.replace('"pin*.diameter" = { from = "-0.1 mm", to = "0.1 mm"', alpha)
+    (tmp_path / "sweep.toml").write_text(text.replace("points = 11", "points = 3"), encoding="utf-8")
+    tolstat.run(tolstat.load(tmp_path / "sweep.toml"), tmp_path / "sweep.h5", workers=1)
+    with Reader.open(tmp_path / "sweep.h5") as store:
+        found = orders_of(store.view())
+        own = store.results()["lateral_max"]
+    assert (found.origin, found.apart) == ("simulated again", 0.0)
+    assert found.table["q95_upper"].isna().all()
+    for orbit in found.orbits:
+        size = np.linalg.norm(orbit.force, axis=1).max()
+        assert size == pytest.approx(own[orbit.row, SHAFTS.index(orbit.shaft)], rel=1e-2, abs=1e-3)
+
+
 @pytest.mark.parametrize(
     ("change", "asked"),
     [

@@ -11,8 +11,10 @@ from typer.testing import CliRunner
 from tests.support import synthetic
 from tolstat import cli, sampling, study
 from tolstat.analysis import exceedance
+from tolstat.common.channels import CHANNELS
 from tolstat.common.errors import InputError, StoreError
-from tolstat.common.load_kinds import CHANNELS
+from tolstat.common.load_kinds import BUSHINGS, SHAFTS
+from tolstat.common.loads import LOADS
 from tolstat.common.tables import Options, Simulation
 from tolstat.questions.time_above import rendering
 from tolstat.questions.time_above.query import time_above
@@ -32,6 +34,16 @@ def wave(tops):
     return loads
 
 
+def turning(tops):
+    """Loads of shafts: a lateral force of the output shaft that turns, and swings about 500 N up to `tops`."""
+    shafts = np.zeros((len(tops), SAMPLES, 2, 6), np.float32)
+    angle = 2 * np.pi * np.arange(SAMPLES) / SAMPLES
+    modulus = 500.0 + (np.asarray(tops) - 500.0)[:, None] * np.sin(angle)
+    shafts[:, :, 1, 0], shafts[:, :, 1, 1] = modulus * np.cos(3 * angle), modulus * np.sin(3 * angle)
+    shafts[:, :, 1, 2] = -modulus
+    return shafts
+
+
 def time_of(level, tops):
     return np.arccos(np.clip((level - 500.0) / (np.asarray(tops) - 500.0), -1, 1)) / np.pi
 
@@ -42,10 +54,12 @@ def path(tmp_path_factory):
     source = folder / "waves.toml"
     source.write_text(TEXT, encoding="utf-8")
     plan = study.load(source)
-    specs = {"loads": history_specs(Options(steps_per_rev=SAMPLES), "full", 0)["loads"]}
+    specs = history_specs(Options(steps_per_rev=SAMPLES), "full", 0)
+    specs = {name: specs[name] for name in ("loads", "shafts")}
     with ResultStore.create(folder / "waves.h5", plan, sampling.draw(plan), specs) as store:
         rows = np.arange(plan.rows)
-        store.write(rows, Simulation(synthetic.results(plan.rows, failed=2), {"loads": wave(tops(plan.rows))}))
+        histories = {"loads": wave(tops(plan.rows)), "shafts": turning(tops(plan.rows))}
+        store.write(rows, Simulation(synthetic.results(plan.rows, failed=2), histories))
         store.finish()
     return folder / "waves.h5"
 
@@ -60,12 +74,12 @@ def run(*arguments):
 
 def test_times_of_known_waves_and_joints_told_apart_from_them(path):
     with Reader.open(path) as store:
-        found = time_above(store.view(), ["cross1.F", "cross1.F_t"], ["0.75 kN"])
+        found = time_above(store.view(), ["cross1.F", "cross1.F_t", "output.lateral", "output.axial"], ["0.75 kN"])
     own = tops(201)[1:-2]  # row 0 is the nominal joint, the last two have failed
     expected = time_of(750.0, own)
     assert (found.joints, found.left_out) == (198, 2)
     for row in found.table.to_dict("records"):
-        assert row["time"] == pytest.approx(expected.mean(), abs=1e-3)
+        assert row["time"] == pytest.approx(expected.mean(), abs=1e-3), row["load"]
         assert row["time_90"] == pytest.approx(np.quantile(expected, 0.9, method="inverted_cdf"), abs=1e-3)
         assert row["joints_above"] == pytest.approx(np.mean(own > 750.0))
         assert row["time_lower"] < row["time"] < row["time_upper"] < row["joints_above"]
@@ -88,11 +102,27 @@ def test_the_mean_time_is_covered_where_few_joints_exceed_a_level_and_students_i
 
 
 def test_channels_are_components_and_moduli():
-    loads = np.random.default_rng(1).normal(size=(2, 5, 8, 6))
+    rng = np.random.default_rng(1)
+    loads = {"loads": rng.normal(size=(2, 5, 8, 6)), "shafts": rng.normal(size=(2, 5, 2, 6))}
     for name in CHANNELS:
         assert CHANNELS[name].of(loads).shape == (2, 5)
-    np.testing.assert_array_equal(CHANNELS["fork2.T_t"].of(loads), loads[:, :, 5, 4])
-    np.testing.assert_allclose(CHANNELS["cross3.T"].of(loads) ** 2, (loads[:, :, 2, 3:] ** 2).sum(axis=-1))
+    np.testing.assert_array_equal(CHANNELS["fork2.T_t"].of(loads), loads["loads"][:, :, 5, 4])
+    np.testing.assert_allclose(CHANNELS["cross3.T"].of(loads) ** 2, (loads["loads"][:, :, 2, 3:] ** 2).sum(axis=-1))
+    output = loads["shafts"][:, :, 1]
+    np.testing.assert_array_equal(CHANNELS["output.m_z"].of(loads), output[..., 5])
+    np.testing.assert_array_equal(CHANNELS["output.axial"].of(loads), np.abs(output[..., 2]))
+    np.testing.assert_allclose(CHANNELS["output.lateral"].of(loads), np.hypot(output[..., 0], output[..., 1]))
+    np.testing.assert_allclose(CHANNELS["output.moment"].of(loads), np.hypot(output[..., 3], output[..., 4]))
+    np.testing.assert_array_equal(CHANNELS["input.drive"].of(loads), np.abs(loads["shafts"][:, :, 0, 5]))
+    assert "output.drive" not in CHANNELS
+
+
+def test_every_load_at_an_instant_of_a_bushing_or_shaft_is_a_channel():
+    """By name and unit, with no list of them: the kinds that have one value at each place at an instant."""
+    for name, load in LOADS.items():
+        at_instant = not load.kind.orders and not load.kind.parts and load.place.name in {*BUSHINGS, *SHAFTS}
+        assert (name in CHANNELS) == at_instant, name
+        assert not at_instant or CHANNELS[name].unit == load.unit
 
 
 @pytest.mark.slow
@@ -129,7 +159,7 @@ def test_faults_are_told_together_and_files_without_histories_refused(path, tmp_
     with Reader.open(path) as store:
         with pytest.raises(InputError) as found:
             time_above(store.view(), ["psi", "fork1.F"], ["700 mm"])
-        for words in ("'psi' is no load of a bushing", "'700 mm' cannot be a value in N"):
+        for words in ("'psi' is no load over the input angle", "'700 mm' cannot be a value in N"):
             assert words in str(found.value)
         with pytest.raises(InputError, match="neither a level nor a limit"):
             time_above(store.view(), ["fork1.F"])
@@ -139,6 +169,10 @@ def test_faults_are_told_together_and_files_without_histories_refused(path, tmp_
             ("cross1.F", 1.0),
             ("cross1.T", 1.0),
         ]
+    with Reader.open(path) as store:
+        del store.history_specs["shafts"]
+        with pytest.raises(StoreError, match="holds no histories of shafts\n  hint: run the campaign again"):
+            time_above(store.view(), ["output.moment"], ["1 N*m"])
     with Reader.open(synthetic.store(tmp_path)) as store, pytest.raises(StoreError, match="no load histories"):
         time_above(store.view())
     done = run(synthetic.store(tmp_path, synthetic.SWEEP, "sweep"))

@@ -167,9 +167,9 @@ def test_joints_are_simulated_again_once_in_any_number_of_processes(path, tmp_pa
     assert pages[0] == pages[1]
 
 
-def drawn(store, slots, most_angles=60):
+def drawn(store, slots, names, most_angles=60):
     """Stands for `revolutions.read`: loads without a simulation."""
-    loads = 600.0 + np.random.default_rng(5).normal(size=(len(slots), most_angles, 8, 6))
+    loads = {name: 600.0 + np.random.default_rng(5).normal(size=(len(slots), most_angles)) for name in names}
     angles = 2.0 * np.pi * np.arange(most_angles) / most_angles
     return revolutions.Revolutions(angles, loads, "simulated again", 0.0)
 

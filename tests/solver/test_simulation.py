@@ -18,7 +18,8 @@ from tolstat.joint import ideal
 from tolstat.kernel.mechanics import dynamics
 from tolstat.kernel.mechanics.work import FORCE, make_work
 from tolstat.solver import simulation
-from tolstat.solver.simulation import restore, simulate_rows
+from tolstat.solver.harmonics import restore
+from tolstat.solver.simulation import simulate_rows
 
 OPTIONS = Options()
 TWIST = {"pin1__tilt_z": 0.005, "pin3__offset_t": 3e-5, "hole2__tilt_t": -0.004, "hole4__offset_e": 4e-5}

@@ -25,7 +25,7 @@ class Cycles(NamedTuple):
     Attributes
     ----------
     channels : tuple of str
-        Names of the loads, keys of `load_kinds.CHANNELS`.
+        Names of the loads, keys of `channels.CHANNELS`.
     ranges, means : ndarray, shape (n, channels, k)
         Range and mean of each cycle, N or N m; a range of 0 marks an empty place, NaN a joint without results.
     number : ndarray, shape (n, channels)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -11,7 +12,8 @@ from numpy.typing import NDArray
 
 from tolstat.campaign.remedy import remedy
 from tolstat.common import loads
-from tolstat.common.load_kinds import BUSHINGS, COMPONENTS, CONTACTS, PINS, SHAFT_COMPONENTS, SHAFTS
+from tolstat.common.channels import BUSHING_LOADS, SHAFT_LOADS, LoadHistory
+from tolstat.common.load_kinds import CONTACTS, PINS
 from tolstat.common.shown import shown
 from tolstat.common.tables import Motion, Options, Simulation, Status
 from tolstat.solver.compilation import warm_up
@@ -105,18 +107,24 @@ class CaseResult(NamedTuple):
             "tau": tau,
             "Psi": (tau - speed_ratio(theta, self.alpha)) / tau,
         }
-        for b, bushing in enumerate(BUSHINGS):
-            for k, load in enumerate(COMPONENTS):
-                columns[f"{bushing}.{load}"] = histories["loads"][:, b, k]
+        columns |= _components(BUSHING_LOADS, histories)
         for p, pin in enumerate(PINS):
             for i, of in enumerate(CONTACTS):
                 columns[f"{pin}.contact_{of}"] = histories["contact"][:, p, i]
-        for s, shaft in enumerate(SHAFTS):
-            for k, load in enumerate(SHAFT_COMPONENTS):
-                columns[f"{shaft}.{load}"] = histories["shafts"][:, s, k]
+        columns |= _components(SHAFT_LOADS, histories)
         for p, pin in enumerate(PINS):
             columns[f"{pin}.mode"] = histories["mode"][:, p]
         return pd.DataFrame(columns)
+
+
+def _components(history: LoadHistory, histories: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """Columns of the components at each place of a history."""
+    values = histories[history.name]
+    return {
+        f"{place}.{component}": values[:, i, k]
+        for i, place in enumerate(history.places)
+        for k, component in enumerate(history.components)
+    }
 
 
 def simulate_case(case: Case) -> CaseResult:

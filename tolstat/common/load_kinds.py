@@ -1,4 +1,4 @@
-"""Registry of the loads: kinds, the places that have them, and the loads over the input angle.
+"""Registry of the loads: kinds, and the places that have them.
 
 A kind is one entry: columns of the result file, arrays of the kernels, limits, reports, histories and drawings follow
 from it. `kernel.mechanics.loads` computes its values.
@@ -9,9 +9,6 @@ from __future__ import annotations
 import math
 from itertools import accumulate
 from typing import NamedTuple
-
-import numpy as np
-from numpy.typing import NDArray
 
 from tolstat.common.fields import Field
 
@@ -55,8 +52,6 @@ def _places(*groups: str) -> tuple[str, ...]:
 
 
 BUSHINGS, PINS, SHAFTS = _places("cross", "fork"), _places("pin"), _places("shaft")
-SHAFT_COMPONENTS = ("f_x", "f_y", "f_z", "m_x", "m_y", "m_z")
-"""Components of a shaft's load in histories: force, and moment about the joint's centre."""
 CONTACTS = ("outer", "inner", "resultant")
 """Contact forces of a pin: normal force of its outermost and of its innermost station, and the resultant of all."""
 OUTER, INNER, RESULTANT = range(3)
@@ -210,6 +205,7 @@ LOAD_KINDS = (
         SHAFTS,
         measure="F",
         decides=True,
+        components=("f_z",),
     ),
     Kind(
         "lateral",
@@ -221,6 +217,7 @@ LOAD_KINDS = (
         measure="F",
         decides=True,
         modulus=True,
+        components=("f_x", "f_y"),
     ),
     Kind(
         "moment",
@@ -232,6 +229,7 @@ LOAD_KINDS = (
         measure="T",
         decides=True,
         modulus=True,
+        components=("m_x", "m_y"),
     ),
     Kind(
         "drive",
@@ -242,6 +240,7 @@ LOAD_KINDS = (
         ("input",),
         measure="T",
         decides=True,
+        components=("m_z",),
     ),
     *(
         Kind(
@@ -273,65 +272,3 @@ SPAN = {kind.key: slice(_ENDS[i], _ENDS[i + 1]) for i, kind in enumerate(LOAD_KI
 def measure_of(kind: Kind) -> Kind:
     """Kind whose largest value errors and changes of a load are relative to."""
     return KIND[kind.measure] if kind.measure else kind
-
-
-class Channel(NamedTuple):
-    """A bushing's load over the input angle, whose cycles are counted: a component or the modulus.
-
-    Attributes
-    ----------
-    name : str
-        ``cross1.F_e``, ``cross1.F``.
-    kind : Kind
-        Kind of the load.
-    place : str
-        The bushing.
-    components : slice
-        Its components among `COMPONENTS`.
-    """
-
-    name: str
-    kind: Kind
-    place: str
-    components: slice
-
-    @property
-    def unit(self) -> str:
-        """SI unit."""
-        return self.kind.unit
-
-    @property
-    def is_modulus(self) -> bool:
-        """Whether it is the modulus of several components."""
-        return bool(self.components.stop - self.components.start > 1)
-
-    def of(self, loads: NDArray[np.floating]) -> NDArray[np.float64]:
-        """Values (...,), N or N m, of the components of all bushings, (..., 8, 6)."""
-        own: NDArray[np.float64] = loads[..., BUSHINGS.index(self.place), self.components].astype(float)
-        return np.asarray(np.linalg.norm(own, axis=-1) if self.is_modulus else own[..., 0])
-
-
-FOLLOWED = tuple(kind for kind in LOAD_KINDS if kind.components and kind.places == BUSHINGS)
-"""Kinds of the bushings' loads that histories and cycles hold."""
-COMPONENTS = tuple(name for kind in FOLLOWED for name in kind.components)
-"""Components of a bushing's load in histories."""
-
-
-def _channels() -> list[Channel]:
-    ends = [*accumulate((len(kind.components) for kind in FOLLOWED), initial=0)]
-    spans = [slice(ends[i], ends[i + 1]) for i in range(len(FOLLOWED))]
-    found = []
-    for place in BUSHINGS:
-        for kind, span in zip(FOLLOWED, spans, strict=True):
-            for i, component in enumerate(kind.components, span.start):
-                found.append(Channel(f"{place}.{component}", kind, place, slice(i, i + 1)))
-        found += [
-            Channel(f"{place}.{kind.symbol}", kind, place, span) for kind, span in zip(FOLLOWED, spans, strict=True)
-        ]
-    return found
-
-
-CHANNELS = {channel.name: channel for channel in _channels()}
-"""Loads over the input angle whose cycles are counted, by name: components, then moduli, of each bushing."""
-UNIT_OF_CHANNEL = {name: channel.unit for name, channel in CHANNELS.items()}
-"""SI unit of each channel."""

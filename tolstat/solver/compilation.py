@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tolstat.common.channels import LOAD_HISTORIES
 from tolstat.common.cores import available_cores
 from tolstat.common.tables import PARAM, RESULT, Options
 from tolstat.solver import rainflow, refinement, simulation
@@ -62,7 +63,7 @@ def _count_steps(options: Options) -> None:
 
 
 def _rainflow(options: Options) -> None:
-    rainflow.count(np.zeros((2, 8, 6)))
+    rainflow.count({history.name: np.zeros((2, *history.shape)) for history in LOAD_HISTORIES})
 
 
 class Kernel(NamedTuple):

@@ -6,12 +6,15 @@ four-point method gives the same cycles when its residue is appended to itself a
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from functools import cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tolstat.common.load_kinds import CHANNELS
+from tolstat.common.channels import BUSHING_LOADS, CHANNELS, LOAD_HISTORIES, MEASURING, LoadHistory, channels_of
+from tolstat.common.load_kinds import measure_of
 from tolstat.common.tables import HistorySpec
 
 KEPT = 16
@@ -23,20 +26,22 @@ MIN_SAMPLES = 90
 """Minimum number of samples a revolution where tolstat chooses the steps: errors of peaks of a load with four cycles
 are within 1 %."""
 
-SPECS = {
-    "cycles": HistorySpec(
-        (len(CHANNELS), KEPT, 2),
-        "f4",
-        "N, N*m",
-        "range and mean of the largest rainflow cycles of the last revolution, descending, 0 where there are none; of "
-        "bushings cross 1-4, fork 1-4 in turn: force e, t, z, torque e, t, z, modulus of force, of torque",
-        ("channel", "cycle", "of_cycle"),
-    ),
-    "cycle_count": HistorySpec(
-        (len(CHANNELS),), "u2", "1", "rainflow cycles of the last revolution, those not kept included", ("channel",)
-    ),
-}
-"""What `count` gives for a joint, as histories of a result file."""
+
+def specs() -> dict[str, HistorySpec]:
+    """Describe what `count` gives for a joint, as histories of a result file."""
+    found: dict[str, HistorySpec] = {}
+    for history in LOAD_HISTORIES:
+        n, channel = len(channels_of(history)), f"{history.prefix}channel"
+        text = (
+            "range and mean of the largest rainflow cycles of the last revolution, descending, 0 where there are none"
+        )
+        found |= {
+            f"{history.prefix}cycles": HistorySpec((n, KEPT, 2), "f4", "N, N*m", text, (channel, "cycle", "of_cycle")),
+            f"{history.prefix}cycle_count": HistorySpec(
+                (n,), "u2", "1", "rainflow cycles of the last revolution, those not kept included", (channel,)
+            ),
+        }
+    return found
 
 
 def periodic(signal: ArrayLike, gate: float = 0.0) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -76,27 +81,58 @@ def periodic(signal: ArrayLike, gate: float = 0.0) -> tuple[NDArray[np.float64],
     return ranges[:n], means[:n]
 
 
-def count(loads: NDArray[Any]) -> dict[str, NDArray[Any]]:
+def count(loads: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
     """Rainflow cycles of all channels of a joint.
 
     Parameters
     ----------
-    loads : ndarray, shape (samples, 8, 6)
-        Force (N) and torque (N m) along e, t, z of the bushings over one revolution.
+    loads : mapping of str to ndarray
+        By name of `LOAD_HISTORIES`, (samples, places, components) each, N and N m, over one revolution. Those of
+        bushings are needed: cycles of all loads are counted from a fraction of their largest ones on.
 
     Returns
     -------
     dict
-        By name of `SPECS`: ``cycles`` (64, KEPT, 2), N and N m, and ``cycle_count`` (64,); the channels are
-        those of `load_kinds.CHANNELS`. NaN and 0 when a load is not finite.
+        By name of `specs`, for each history given: ``cycles`` (channels, KEPT, 2), N and N m, and ``cycle_count``
+        (channels,); the channels are `channels_of` the history. NaN and 0 when a load is not finite.
     """
     from tolstat.kernel.revolution import rainflow
 
-    counted = {name: spec.blank(1)[0] for name, spec in SPECS.items()}
-    if np.isfinite(loads).all():
-        ranges, means = np.empty((2, len(CHANNELS), KEPT))
-        cycles = np.empty(len(CHANNELS), np.int64)
-        rainflow.count_joint(np.ascontiguousarray(loads, dtype=float), GATE, ranges, means, cycles)
-        counted["cycles"][...] = np.stack([ranges, means], axis=-1)
-        counted["cycle_count"][...] = cycles
+    described = specs()
+    counted: dict[str, NDArray[Any]] = {}
+    finite = all(np.isfinite(values).all() for values in loads.values())
+    for history in (history for history in LOAD_HISTORIES if history.name in loads):
+        names = [f"{history.prefix}{name}" for name in ("cycles", "cycle_count")]
+        table, number = (described[name].blank(1)[0] for name in names)
+        if finite:
+            ranges, means = np.empty((2, len(number), KEPT))
+            own, cycles = np.ascontiguousarray(loads[history.name], dtype=float), np.empty(len(number), np.int64)
+            gates = GATE * _sizes(loads[BUSHING_LOADS.name])[_measures(history)]
+            rainflow.count_joint(own, _signals(history), gates, ranges, means, cycles)
+            table[...], number[...] = np.stack([ranges, means], axis=-1), cycles
+        counted |= dict(zip(names, (table, number), strict=True))
     return counted
+
+
+def _sizes(bushing: NDArray[Any]) -> NDArray[np.float64]:
+    """Largest force and torque of the bushings, the measures of all loads in the order of `MEASURING`."""
+    spans = [CHANNELS[f"{BUSHING_LOADS.places[0]}.{kind.symbol}"].components for kind in MEASURING]
+    return np.array([np.linalg.norm(bushing[..., span].astype(float), axis=-1).max() for span in spans])
+
+
+@cache
+def _measures(history: LoadHistory) -> NDArray[np.intp]:
+    """Index in `MEASURING` of what each channel of a history is measured against."""
+    return np.array([MEASURING.index(measure_of(channel.kind)) for channel in channels_of(history)])
+
+
+@cache
+def _signals(history: LoadHistory) -> NDArray[np.int64]:
+    """Place, first component and end, and whether it is a modulus, of each channel of a history, (channels, 4)."""
+    return np.array(
+        [
+            (history.places.index(channel.place), channel.components.start, channel.components.stop, channel.is_modulus)
+            for channel in channels_of(history)
+        ],
+        dtype=np.int64,
+    )

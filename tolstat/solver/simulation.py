@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.common import progress_memory
+from tolstat.common.channels import BUSHING_LOADS, SHAFT_LOADS, LoadHistory
 from tolstat.common.load_kinds import CONTACTS, SPAN
 from tolstat.common.tables import (
     KERNEL_RESULT,
@@ -26,7 +27,7 @@ from tolstat.common.tables import (
     iterations_allowed,
 )
 from tolstat.joint import ideal
-from tolstat.solver import rainflow, refinement, stationary
+from tolstat.solver import harmonics, rainflow, refinement, stationary
 
 if TYPE_CHECKING:
     from tolstat.kernel.lanes.batch import Batch
@@ -67,62 +68,24 @@ def history_specs(options: Options, histories: Histories, n_harmonics: int) -> d
     dict of str to HistorySpec
     """
     n = options.steps_per_rev
-    loads = "force e, t, z (N), torque e, t, z (N m) of bushings cross 1-4, fork 1-4 on the lump, in base marker axes"
     if histories == "full":
         contact = "contact force of pins 1-4: of the outermost station, of the innermost one, resultant of all stations"
-        shafts = (
-            "force x, y, z (N) and moment x, y, z (N m) about O that the joint exerts on input and output shaft, in "
-        )
-        shafts += "axes that do not turn: z along the shaft, y along the fork's pins at theta = 90 deg"
         modes = "contact mode of pins 1-4: 0 none, 1 one-point, 2 two-point, 3 uniform"
         return {
-            "loads": HistorySpec((n, 8, 6), "f4", "N, N*m", loads, ("theta", "bushing", "component")),
+            "loads": _of_samples(BUSHING_LOADS, n),
             "contact": HistorySpec((n, 4, len(CONTACTS)), "f4", "N", contact, ("theta", "pin", "contact_force")),
-            "shafts": HistorySpec((n, 2, 6), "f4", "N, N*m", shafts, ("theta", "shaft", "shaft_component")),
+            "shafts": _of_samples(SHAFT_LOADS, n),
             "mode": HistorySpec((n, 4), "u1", "1", modes, ("theta", "pin")),
             "tau": HistorySpec((n,), "f8", "1", "speed ratio", ("theta",)),
         }
-    specs = dict(rainflow.SPECS) if "cycles" in histories else {}
+    specs = rainflow.specs() if "cycles" in histories else {}
     if "harmonics" in histories:
-        axes = ("bushing", "component", "harmonic")
-        shape = (8, 6, min(n_harmonics, (n - 1) // 2) + 1)
-        text = f"part of the Fourier coefficients c_h: {loads}; load(theta) = Re(c_0 + 2 sum c_h exp(i h theta))"
-        error = "largest deviation of the load so restored, relative to the largest |F| and |T| of the joint"
-        specs |= {
-            "coefficients_real": HistorySpec(shape, "f4", "N, N*m", f"real {text}", axes),
-            "coefficients_imag": HistorySpec(shape, "f4", "N, N*m", f"imaginary {text}", axes),
-            "harmonics_error": HistorySpec((2,), "f8", "1", error, ("load",)),
-        }
+        specs |= harmonics.specs(min(n_harmonics, (n - 1) // 2) + 1)
     return specs
 
 
-def restore(real: NDArray[Any], imag: NDArray[Any], samples: int) -> NDArray[np.float64]:
-    """Restore load histories from their harmonics.
-
-    Parameters
-    ----------
-    real, imag : ndarray, shape (..., harmonics + 1)
-        Fourier coefficients as stored, N and N m.
-    samples : int
-        Number of equally spaced input angles, from zero.
-
-    Returns
-    -------
-    ndarray, shape (samples, ...)
-    """
-    spectrum = np.zeros((*real.shape[:-1], samples // 2 + 1), complex)
-    kept = min(real.shape[-1], spectrum.shape[-1])
-    spectrum[..., :kept] = real[..., :kept] + 1j * imag[..., :kept].astype(np.float64)
-    return np.moveaxis(np.fft.irfft(spectrum * samples, samples), -1, 0)
-
-
-def _harmonics(loads: NDArray[np.float64], kept: int) -> dict[str, NDArray[Any]]:
-    spectrum = np.moveaxis(np.fft.rfft(loads, axis=0) / len(loads), 0, -1)[..., :kept]
-    real, imag = spectrum.real.astype("f4"), spectrum.imag.astype("f4")
-    difference = np.abs(restore(real, imag, len(loads)) - loads).max(axis=(0, 1))
-    size = [np.linalg.norm(loads[..., k : k + 3], axis=-1).max() for k in (0, 3)]
-    error = [difference[k : k + 3].max() / s if s > 0 else 0.0 for k, s in zip((0, 3), size, strict=True)]
-    return {"coefficients_real": real, "coefficients_imag": imag, "harmonics_error": np.array(error)}
+def _of_samples(history: LoadHistory, n: int) -> HistorySpec:
+    return HistorySpec((n, *history.shape), "f4", "N, N*m", history.meaning, ("theta", *history.axes))
 
 
 @cache
@@ -393,8 +356,11 @@ def _sample(samples: NDArray[np.void], histories: Histories, specs: dict[str, Hi
         held = {name: samples["loads"][:, span] for name, span in SPAN.items()}
         held |= {name: samples[name] for name in samples.dtype.names or ()} | {"loads": samples["components"]}
         return {name: held[name].reshape(spec.shape) for name, spec in specs.items()}
-    loads = np.ascontiguousarray(samples["components"])
+    loads = {
+        BUSHING_LOADS.name: np.ascontiguousarray(samples["components"]),
+        SHAFT_LOADS.name: np.ascontiguousarray(samples["shafts"]),
+    }
     sample = rainflow.count(loads) if "cycles" in histories else {}
     if "harmonics" in histories:
-        sample |= _harmonics(loads, specs["coefficients_real"].shape[-1])
+        sample |= harmonics.of_loads(loads, specs["coefficients_real"].shape[-1])
     return sample

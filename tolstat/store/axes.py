@@ -8,19 +8,26 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.load_kinds import BUSHINGS, CHANNELS, COMPONENTS, CONTACTS, FOLLOWED, PINS, SHAFT_COMPONENTS, SHAFTS
+from tolstat.common.channels import BUSHING_LOADS, MEASURING, SHAFT_LOADS, LoadHistory, channels_of
+from tolstat.common.load_kinds import BUSHINGS, CONTACTS, PINS, SHAFTS
 from tolstat.common.tables import HistorySpec
 from tolstat.store.result_file import put_attributes
 
+
+def _names(history: LoadHistory) -> tuple[str, ...]:
+    return tuple(channel.name for channel in channels_of(history))
+
+
 NAMES: dict[str, tuple[tuple[str, ...], str]] = {
     "bushing": (BUSHINGS, "bushing"),
-    "component": (COMPONENTS, "force F (N) and torque T (N m) along e, t and z"),
+    "component": (BUSHING_LOADS.components, "force F (N) and torque T (N m) along e, t and z"),
     "pin": (PINS, "pin"),
     "contact_force": (CONTACTS, "contact force of the outermost station, of the innermost one, resultant of all"),
     "shaft": (SHAFTS, "shaft"),
-    "shaft_component": (SHAFT_COMPONENTS, "force f (N) and moment m (N m) about O, in axes that do not turn"),
-    "load": (tuple(kind.key for kind in FOLLOWED), "force and torque"),
-    "channel": (tuple(CHANNELS), "load whose cycles are counted: component or modulus"),
+    "shaft_component": (SHAFT_LOADS.components, "force f (N) and moment m (N m) about O, in axes that do not turn"),
+    "load": (tuple(kind.key for kind in MEASURING), "force and torque"),
+    "channel": (_names(BUSHING_LOADS), "load whose cycles are counted: component or modulus"),
+    "shaft_channel": (_names(SHAFT_LOADS), "load of a shaft whose cycles are counted: component or modulus"),
     "of_cycle": (("range", "mean"), "range and mean of a cycle"),
 }
 """Names along an axis, and what they name, by axis."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -10,14 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.common.aside import Aside
+from tolstat.common.channels import BUSHING_LOADS, CHANNELS, LOAD_HISTORIES, MEASURING, LoadHistory, histories_of
 from tolstat.common.errors import Fault, StoreError
-from tolstat.common.load_kinds import BUSHINGS, COMPONENTS, FOLLOWED
 from tolstat.common.shown import shown
 from tolstat.common.tables import Options
 from tolstat.joint import perturb
 from tolstat.solver.compilation import is_compiled, warm_up
-from tolstat.solver.simulation import restore, simulate_rows
-from tolstat.store.recorded import joint_of, options_of, parameters
+from tolstat.solver.harmonics import restore
+from tolstat.solver.simulation import simulate_rows
+from tolstat.store.recorded import joint_of, operation_of, options_of
 from tolstat.store.result_file import RUN_AGAIN, pick
 
 if TYPE_CHECKING:
@@ -28,24 +29,26 @@ ANGLES = 60
 """Default number of input angles per revolution to read, if the histories have as many samples."""
 JOINTS_PER_BLOCK = 256
 """Maximum number of joints whose loads are read at a time: 9 MB at 180 samples per revolution."""
-LARGEST = [f"{kind.key}_max" for kind in FOLLOWED]
+LARGEST = [f"{kind.key}_max" for kind in MEASURING]
 """Fields of the results that joints simulated again are compared in."""
 
 FloatArray = NDArray[np.float64]
-Again = tuple[NDArray[np.float32], FloatArray]
-"""Loads of joints, (m, samples, 8, 6), and the largest relative difference of each from the stored values, (m,)."""
+Loads = dict[str, NDArray[Any]]
+"""Loads of m joints by name of `LOAD_HISTORIES`, (m, samples, places, components), N and N m."""
+Again = tuple[Loads, FloatArray]
+"""Loads of joints, and the largest relative difference of each joint's from the stored values, (m,)."""
 
 
 @shown
 class Revolutions(NamedTuple):
-    """Bushing loads of some joints over the last revolution.
+    """Loads of some joints over the last revolution.
 
     Attributes
     ----------
     angles : ndarray, shape (k,)
         Input angles, rad.
-    loads : ndarray, shape (m, k, 8, 6)
-        Components of force (N) and torque (N m) as `load_kinds.Channel.of` takes them; NaN for joints without results.
+    loads : dict of str to ndarray, shape (m, k)
+        Values of each channel, N or N m; NaN for joints without results.
     origin : str
         Source of the loads: ``"stored"``, ``"harmonics"`` or ``"simulated again"``.
     apart : float
@@ -54,20 +57,18 @@ class Revolutions(NamedTuple):
     """
 
     angles: FloatArray
-    loads: NDArray[Any]
+    loads: dict[str, FloatArray]
     origin: str
     apart: float
 
 
-def held(store: Reader) -> str:
-    """Kind of histories that a file holds, ``"stored"`` or ``"harmonics"``; empty if it holds no loads."""
-    return (
-        "stored"
-        if "loads" in store.history_specs
-        else "harmonics"
-        if "coefficients_real" in store.history_specs
-        else ""
-    )
+def held(store: Reader, histories: Sequence[LoadHistory] = (BUSHING_LOADS,)) -> str:
+    """Kind of histories that a file holds of loads, ``"stored"`` or ``"harmonics"``; empty if it lacks any of them."""
+    if all(history.name in store.history_specs for history in histories):
+        return "stored"
+    if all(f"{history.prefix}coefficients_real" in store.history_specs for history in histories):
+        return "harmonics"
+    return ""
 
 
 def blocks(n: int) -> Iterator[slice]:
@@ -76,15 +77,17 @@ def blocks(n: int) -> Iterator[slice]:
         yield slice(first, min(first + JOINTS_PER_BLOCK, n))
 
 
-def read(store: Reader, slots: NDArray[np.intp], max_angles: int = ANGLES) -> Revolutions:
+def read(store: Reader, slots: NDArray[np.intp], names: Sequence[str], max_angles: int = ANGLES) -> Revolutions:
     """Return the loads of joints over the input angle.
 
     Parameters
     ----------
     store : Reader
-        A campaign whose joints are drawn from tolerances.
+        A result file, at one operating point.
     slots : ndarray of int, shape (m,)
-        File slots, ascending; none pending.
+        File slots, ascending; none pending. Of one variant: of a sweep one joint at a time.
+    names : sequence of str
+        Channels to return, keys of `channels.CHANNELS`.
     max_angles : int
         Approximate number of samples per revolution to keep; the samples are thinned evenly.
 
@@ -97,35 +100,40 @@ def read(store: Reader, slots: NDArray[np.intp], max_angles: int = ANGLES) -> Re
     InputError
         When a joint has to be simulated again and this version cannot read the file's joint or options.
     """
-    origin = held(store) or AGAIN
+    histories = histories_of(names)
+    origin = held(store, histories) or AGAIN
     steps = int(store.options["steps_per_rev"])
     every = max(1, steps // max_angles)
     angles = 2.0 * np.pi * np.arange(0, steps, every) / steps
-    loads = np.empty((len(slots), angles.size, len(BUSHINGS), len(COMPONENTS)))
+    loads = {name: np.empty((len(slots), angles.size)) for name in names}
     apart = 0.0
-    for part, found, difference in of_components(store, slots):
+    for part, found, difference in of_components(store, slots, histories):
         apart = max(apart, difference)
-        loads[part] = found[:, ::every]
+        thinned = {name: values[:, ::every] for name, values in found.items()}
+        for name, own in loads.items():
+            own[part] = CHANNELS[name].of(thinned)
     return Revolutions(angles, loads, origin, apart)
 
 
-def of_components(store: Reader, slots: NDArray[np.intp]) -> Iterator[tuple[slice, NDArray[Any], float]]:
-    """Yield the bushing loads of joints part by part: the part of `slots`, its `loads`, and `Revolutions.apart`.
+def of_components(
+    store: Reader, slots: NDArray[np.intp], histories: Sequence[LoadHistory]
+) -> Iterator[tuple[slice, Loads, float]]:
+    """Yield the loads of joints part by part: the part of `slots`, its `loads`, and `Revolutions.apart`.
 
-    Arguments and exceptions as in `read`; joints are simulated again where the file holds no loads.
+    Arguments and exceptions as in `read`; joints are simulated again where the file lacks any of the histories.
     """
-    again = not held(store)
+    again = not held(store, histories)
     if again and len(slots) and store.ahead is None:
         warm_up()
     for part in blocks(len(slots)):
         if again:
             yield part, *_again(store, slots[part])
         else:
-            yield part, loads(store, slots[part]), 0.0
+            yield part, loads(store, slots[part], histories), 0.0
 
 
-def loads(store: Reader, slots: NDArray[np.intp]) -> NDArray[Any]:
-    """Bushing loads of joints over a revolution.
+def loads(store: Reader, slots: NDArray[np.intp], histories: Sequence[LoadHistory]) -> Loads:
+    """Loads of joints over a revolution.
 
     Parameters
     ----------
@@ -133,60 +141,30 @@ def loads(store: Reader, slots: NDArray[np.intp]) -> NDArray[Any]:
         The campaign.
     slots : ndarray of int, shape (m,)
         File slots.
-
-    Returns
-    -------
-    ndarray, shape (m, samples, 8, 6)
-        Force and torque of each bushing along e, t, z, N and N m, from full histories or restored from harmonics.
+    histories : sequence of LoadHistory
+        What to read: from full histories, or restored from harmonics.
 
     Raises
     ------
     StoreError
-        When the file holds neither.
+        When the file holds neither of any of them.
     """
-    if "loads" in store.history_specs:
-        return store.histories("loads", slots)
-    if "coefficients_real" not in store.history_specs:
-        remedy = f'write histories = "harmonics" or "full" in [output] of the study, and {RUN_AGAIN}'
-        raise StoreError(str(Fault(str(store.path), "holds no load histories", remedy)))
-    real, imag = (store.histories(f"coefficients_{part}", slots) for part in ("real", "imag"))
+    return {history.name: _loads(store, slots, history) for history in histories}
+
+
+def _loads(store: Reader, slots: NDArray[np.intp], history: LoadHistory) -> NDArray[Any]:
+    origin = held(store, [history])
+    if origin == "stored":
+        return store.histories(history.name, slots)
+    if not origin:
+        if held(store):
+            found, remedy = f"holds no histories of {history.name}", RUN_AGAIN
+        else:
+            found = "holds no load histories"
+            remedy = f'write histories = "harmonics" or "full" in [output] of the study, and {RUN_AGAIN}'
+        raise StoreError(str(Fault(str(store.path), found, remedy)))
+    real, imag = (store.histories(f"{history.prefix}coefficients_{part}", slots) for part in ("real", "imag"))
     return np.moveaxis(restore(real, imag, int(store.options["steps_per_rev"])), 0, 1)
-
-
-def on_shafts(store: Reader, slots: NDArray[np.intp]) -> tuple[list[FloatArray], str, float]:
-    """Return the loads on the shafts of a few joints of any campaign over the input angle.
-
-    Parameters
-    ----------
-    store : Reader
-        A result file, at one operating point.
-    slots : ndarray of int, shape (m,)
-        File slots; none pending. Without full histories each is simulated again, one after the other.
-
-    Returns
-    -------
-    loads : list of ndarray, shape (k, 2, 6)
-        Of each joint force (N) and moment about O (N m) on input and output shaft, components
-        `load_kinds.SHAFT_COMPONENTS`, in axes that do not turn, at k equally spaced input angles from zero.
-    origin : str
-    apart : float
-        As in `Revolutions`.
-
-    Raises
-    ------
-    InputError
-        When a joint has to be simulated again and this version cannot read the file's joint or options.
-    """
-    if "shafts" in store.history_specs:
-        return list(store.histories("shafts", slots).astype(float)), "stored", 0.0
-    if len(slots):
-        warm_up()
-    loads, apart = [], 0.0
-    for i, slot in enumerate(slots.tolist()):
-        found = simulate_rows(parameters(store, slots[i : i + 1]), options_of(store, slot), "full")
-        loads.append(found.histories["shafts"][0].astype(float))
-        apart = max(apart, float(_apart(found.results, store.results(slice(slot, slot + 1)))[0]))
-    return loads, AGAIN, apart
 
 
 class Ahead(NamedTuple):
@@ -211,7 +189,10 @@ class Ahead(NamedTuple):
         found = [part.result() for part in self.parts]
         pieces = [found[i % len(found)][i // len(found)] for i in range(sum(map(len, found)))]
         block, own = np.divmod(place, JOINTS_PER_BLOCK)
-        loads = np.stack([pieces[b][0][k] for b, k in zip(block, own, strict=True)])
+        loads = {
+            history.name: np.stack([pieces[b][0][history.name][k] for b, k in zip(block, own, strict=True)])
+            for history in LOAD_HISTORIES
+        }
         return loads, np.array([pieces[b][1][k] for b, k in zip(block, own, strict=True)])
 
 
@@ -240,8 +221,8 @@ def _all(store: Reader, parts: list[NDArray[np.intp]]) -> list[Again]:
     return [_simulated(store, part) for part in parts]
 
 
-def _again(store: Reader, slots: NDArray[np.intp]) -> tuple[NDArray[np.float32], float]:
-    """Loads of joints that are simulated again, (m, samples, 8, 6), and `Revolutions.apart`."""
+def _again(store: Reader, slots: NDArray[np.intp]) -> tuple[Loads, float]:
+    """Loads of joints that are simulated again, all histories, and `Revolutions.apart`."""
     found = None if store.ahead is None else store.ahead.of(slots)
     loads, off = found or _simulated(store, slots)
     return loads, float(np.max(off, initial=0.0))
@@ -249,7 +230,8 @@ def _again(store: Reader, slots: NDArray[np.intp]) -> tuple[NDArray[np.float32],
 
 def _simulated(store: Reader, slots: NDArray[np.intp]) -> Again:
     """Read from the file what it takes to simulate joints again, and do so."""
-    params = perturb(joint_of(store, int(slots[0])), store.operation, pick(store.errors, slots))
+    first = int(slots[0])
+    params = perturb(joint_of(store, first), operation_of(store, first), pick(store.errors, slots))
     attempts = pick(store.attempt, slots)
     stored = pick(store.results, slots)[LARGEST].copy()
     settings = [(here, options_of(store, int(slots[here[0]]))) for here in _alike(attempts)]
@@ -263,20 +245,16 @@ def _alike(attempts: NDArray[np.int32]) -> list[NDArray[np.intp]]:
 def _simulate(
     params: NDArray[np.void], settings: list[tuple[NDArray[np.intp], Options]], stored: NDArray[np.void], steps: int
 ) -> Again:
-    loads, apart = np.empty((len(params), steps, 8, 6), np.float32), np.zeros(len(params))
+    loads = {h.name: np.empty((len(params), steps, *h.shape), np.float32) for h in LOAD_HISTORIES}
+    apart = np.zeros(len(params))
     for here, options in settings:
         found = simulate_rows(params[here], options, "full")
-        samples = found.histories["loads"]
-        loads[here] = samples[:, :: max(1, samples.shape[1] // steps)]
-        apart[here] = _apart(found.results, stored[here])
+        for name, values in loads.items():
+            samples = found.histories[name]
+            values[here] = samples[:, np.arange(steps) * samples.shape[1] // steps]
+        for name in LARGEST:
+            with np.errstate(invalid="ignore", divide="ignore"):
+                off = np.abs(found.results[name] / stored[name][here] - 1.0)
+            largest = off.max(axis=1, initial=0.0, where=np.isfinite(off))
+            apart[here] = np.maximum(apart[here], largest)
     return loads, apart
-
-
-def _apart(now: NDArray[np.void], stored: NDArray[np.void]) -> FloatArray:
-    """Largest relative difference of the fields `LARGEST` from the stored values of each joint, (m,)."""
-    apart = np.zeros(len(stored))
-    for name in LARGEST:
-        with np.errstate(invalid="ignore", divide="ignore"):
-            off = np.abs(now[name] / stored[name] - 1.0)
-        apart = np.maximum(apart, off.max(axis=1, initial=0.0, where=np.isfinite(off)))
-    return apart

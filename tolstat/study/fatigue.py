@@ -10,8 +10,8 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, Field, model_validator
 
 from tolstat.common import strict, units
+from tolstat.common.channels import UNIT_OF_CHANNEL
 from tolstat.common.errors import Fault, InputError, gather
-from tolstat.common.load_kinds import UNIT_OF_CHANNEL
 from tolstat.common.strict import Strict, read_section, refuse
 from tolstat.study import stress_point
 from tolstat.study.selection import Assignments, Entry, entries, quantity, resolve

@@ -97,36 +97,32 @@ def count(x, gate, points, ranges, means):
 
 
 @njit
-def count_joint(loads, relative_gate, ranges, means, cycles):
-    """Rainflow cycles of all channels of a joint.
+def count_joint(loads, signals, gates, ranges, means, cycles):
+    """Rainflow cycles of the channels of a joint.
 
     Parameters
     ----------
-    loads : (n, 8, 6) array
-        Force (N) and torque (N m) along e, t, z of each bushing over one revolution, finite.
-    relative_gate : float
-        Cycles up to this fraction of the joint's largest force or torque are not counted.
-    ranges, means : (64, k) arrays
-        Written, see `count`. For each bushing in turn force e, t, z, torque e, t, z, and the moduli of both.
-    cycles : (64,) array of int
+    loads : (n, places, components) array
+        Components at each place over one revolution, finite.
+    signals : (channels, 4) array of int
+        Place, first component, end of the components, and whether a channel is their modulus.
+    gates : (channels,) array
+        Cycles up to this range are not counted.
+    ranges, means : (channels, k) arrays
+        Written, see `count`.
+    cycles : (channels,) array of int
         Written: number of cycles.
     """
     n = loads.shape[0]
-    moduli = np.empty((n, 8, 2))
     x, points = np.empty(n), np.empty(n + 1)
-    for kind in (0, 1):
-        largest = 0.0
+    for c in range(len(signals)):
+        place, first, end, is_modulus = signals[c]
         for s in range(n):
-            for b in range(8):
+            if is_modulus:
                 square = 0.0
-                for i in range(3):
-                    square += loads[s, b, 3 * kind + i] ** 2
-                moduli[s, b, kind] = math.sqrt(square)
-                largest = max(largest, moduli[s, b, kind])
-        gate = relative_gate * largest
-        for b in range(8):
-            for i in range(4):
-                for s in range(n):
-                    x[s] = moduli[s, b, kind] if i == 3 else loads[s, b, 3 * kind + i]
-                c = 8 * b + (6 + kind if i == 3 else 3 * kind + i)
-                cycles[c] = count(x, gate, points, ranges[c], means[c])
+                for i in range(first, end):
+                    square += loads[s, place, i] ** 2
+                x[s] = math.sqrt(square)
+            else:
+                x[s] = loads[s, place, first]
+        cycles[c] = count(x, gates[c], points, ranges[c], means[c])

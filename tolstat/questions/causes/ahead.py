@@ -7,8 +7,8 @@ from contextlib import suppress
 import numpy as np
 from numpy.typing import NDArray
 
+from tolstat.common.channels import CHANNELS, histories_of
 from tolstat.common.errors import Fault, StoreError, TolstatError
-from tolstat.common.load_kinds import CHANNELS
 from tolstat.common.tables import Status
 from tolstat.display.asked import Asked
 from tolstat.questions.causes.tail import worst_samples
@@ -25,11 +25,12 @@ DRAWN = 3
 
 def begin(view: View, asked: Asked) -> None:
     """Begin to simulate again the joints whose loads over the revolution the page shows; see `revolutions.ahead`."""
-    if not asked.replay or len(view.points) > 1 or view.method == "sweep" or revolutions.held(view.store):
+    if not asked.replay or len(view.points) > 1 or view.method == "sweep":
         return
     with suppress(TolstatError):  # the sections say what is wrong
-        slots = [view.slots(drawn(view, load)) for load in view.leading if load in CHANNELS]
-        if slots:
+        followed = [load for load in view.leading if load in CHANNELS]
+        slots = [view.slots(drawn(view, load)) for load in followed]
+        if slots and not revolutions.held(view.store, histories_of(followed)):
             with suppress(TolstatError):
                 nominal, samples = evaluated(view, asked.replay)
                 slots += [nominal, view.slots(samples)]

@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from tolstat import sampling
 from tolstat.analysis import sensitivity
 from tolstat.analysis.sensitivity import FirstOrder
+from tolstat.common.channels import CHANNELS
 from tolstat.common.errors import Fault, InputError
-from tolstat.common.load_kinds import CHANNELS
-from tolstat.common.loads import UNIT_OF_LOAD
 from tolstat.common.shown import shown
 from tolstat.common.strict import did_you_mean
 from tolstat.questions.causes.ahead import JOINTS, evaluated
@@ -36,7 +35,7 @@ class AgainstAngle(NamedTuple):
     Attributes
     ----------
     load, unit : str
-        ``cross1.F``: the modulus of the bushing's force at an angle, not its largest over the revolution; SI unit.
+        ``cross1.F``: the load at an angle, not its largest over the revolution; SI unit.
     joints : int
         Number of joints evaluated.
     origin, apart
@@ -89,14 +88,14 @@ class AgainstAngle(NamedTuple):
 def against_angle(
     view: View, loads: Sequence[str], joints: int = JOINTS, logarithmic: Container[str] = ()
 ) -> list[AgainstAngle]:
-    """Find which errors make bushing loads scatter at which shaft angle.
+    """Find which errors make loads scatter at which shaft angle.
 
     Parameters
     ----------
     view : View
         A campaign whose joints are drawn from tolerances, all of the same weight.
     loads : sequence of str
-        ``cross1.F`` to ``fork4.T``.
+        Keys of `channels.CHANNELS`: ``cross1.F``, ``output.moment``.
     joints : int
         Number of joints evaluated, the first settled ones. Without stored histories they are simulated again.
     logarithmic : container of str
@@ -110,7 +109,7 @@ def against_angle(
     Raises
     ------
     InputError
-        When a name is not the load of a bushing.
+        When a name is not a load over the input angle.
     StoreError
         When the joints are not drawn from tolerances, differ in weight or form a pick-freeze design, or fewer than
         `MIN_JOINTS` have settled.
@@ -119,22 +118,17 @@ def against_angle(
         if name not in CHANNELS:
             raise InputError([Fault(name, "is not a load over the shaft angle", did_you_mean(name, list(CHANNELS)))])
     nominal, samples = evaluated(view, joints)
-    found = revolutions.read(view.store, np.concatenate([nominal, view.slots(samples)]))
+    found = revolutions.read(view.store, np.concatenate([nominal, view.slots(samples)]), loads)
     errors = view.errors(samples, sampling.columns(view.study))
     x = scattering(sampling.components(view.study, errors))
     return [_of_load(x, found, len(nominal), name, view.iid, name in logarithmic) for name in loads]
-
-
-def load_of(found: Revolutions, load: str) -> FloatArray:
-    """One load over the revolution, (m, k), SI."""
-    return CHANNELS[load].of(found.loads)
 
 
 def _of_load(
     errors: dict[str, FloatArray], found: Revolutions, nominal: int, name: str, iid: bool, log: bool
 ) -> AgainstAngle:
     """Indices of one load; the first `nominal` (0 or 1) joints of `found` are the nominal joint."""
-    values = load_of(found, name)
+    values = found.loads[name]
     y = values[nominal:]
     names = list(errors)
     first, overall = sensitivity.over_revolution(
@@ -143,7 +137,7 @@ def _of_load(
     order = np.argsort(-overall.estimate, kind="stable")
     return AgainstAngle(
         load=name,
-        unit=UNIT_OF_LOAD[name],
+        unit=CHANNELS[name].unit,
         joints=len(y),
         origin=found.origin,
         apart=found.apart,

@@ -12,8 +12,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from tolstat.common.aside import mapped
+from tolstat.common.channels import CHANNELS
 from tolstat.common.errors import TolstatError
-from tolstat.common.load_kinds import CHANNELS
 from tolstat.common.loads import unit_text
 from tolstat.common.tables import VALID
 from tolstat.display import drawing, style, text
@@ -64,10 +64,10 @@ def _causes(
         for load, job, found in zip(view.leading, jobs, tried, strict=True):
             with asked.noting(f"no causes of {load}"):
                 causes.append(found or job())  # which raises what it raised before
-        bushings = [load for load in view.leading if load in CHANNELS]
-        if asked.replay and bushings and not is_design:
+        followed = [load for load in view.leading if load in CHANNELS]
+        if asked.replay and followed and not is_design:
             with asked.noting("nothing against the shaft angle"):
-                against = against_angle(view, bushings, asked.replay, logarithmic)
+                against = against_angle(view, followed, asked.replay, logarithmic)
     return causes, against
 
 

@@ -10,13 +10,13 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from tolstat.analysis.exceedance import FloatArray
-from tolstat.common.load_kinds import CHANNELS
+from tolstat.common.channels import CHANNELS
 from tolstat.common.loads import unit_text
 from tolstat.display import drawing, style, text
 from tolstat.display.blocks import Block, Panel, Panels, Section, Table, Text
 from tolstat.questions.causes import angles_figure
 from tolstat.questions.causes.ahead import DRAWN
-from tolstat.questions.causes.angles import AgainstAngle, load_of
+from tolstat.questions.causes.angles import AgainstAngle
 from tolstat.questions.causes.tail import Tail, worst_joints
 from tolstat.store import revolutions
 from tolstat.store.view import View
@@ -67,7 +67,7 @@ def section(view: View, loads: Sequence[str], against: Sequence[AgainstAngle], h
     against : sequence of AgainstAngle
         Loads of all joints against the shaft angle, drawn with those of the worst joints.
     histories : bool
-        Whether to draw bushing loads over the revolution; without stored histories the joints are simulated again.
+        Whether to draw loads over the revolution; without stored histories the joints are simulated again.
     """
     tails = [worst_joints(view, load, JOINTS) for load in loads]
     panels = [_history_panel(_histories(view, tail, against)) for tail in tails if histories and tail.by in CHANNELS]
@@ -91,9 +91,9 @@ def _table(tail: Tail) -> Table:
 
 def _histories(view: View, tail: Tail, against: Sequence[AgainstAngle]) -> _Histories:
     ascending, place = np.unique(tail.samples[:DRAWN], return_inverse=True)
-    found = revolutions.read(view.store, view.slots(ascending), ANGLES)
+    found = revolutions.read(view.store, view.slots(ascending), [tail.by], ANGLES)
     all_joints = next((angle for angle in against if angle.load == tail.by), None)
-    return _Histories(tail, found.angles, load_of(found, tail.by)[place], all_joints, view.limits.get(tail.by))
+    return _Histories(tail, found.angles, found.loads[tail.by][place], all_joints, view.limits.get(tail.by))
 
 
 def _history_panel(found: _Histories) -> Panel:

@@ -9,20 +9,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.analysis.cycles import Cycles
+from tolstat.common.channels import BUSHING_LOADS, CHANNELS, LoadHistory, channels_of, histories_of
 from tolstat.common.errors import Fault, InputError, StoreError
-from tolstat.common.load_kinds import CHANNELS
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import SIMULATED
 from tolstat.solver import rainflow
-from tolstat.store.revolutions import blocks, loads
+from tolstat.store.result_file import RUN_AGAIN
+from tolstat.store.revolutions import blocks, held, loads
 from tolstat.study.selection import select
 
 if TYPE_CHECKING:
     from tolstat.store.reader import Reader
 
 
+SHOWN = tuple(channel.name for channel in CHANNELS.values() if channel.kind.shown)
+"""Channels that are evaluated unless others are asked for: those of the loads that every report shows."""
+
+
 def channels(patterns: Sequence[str]) -> tuple[str, ...]:
-    """Names of the channels that any of the patterns selects, in the order of `load_kinds.CHANNELS`.
+    """Names of the channels that any of the patterns selects, in the order of `channels.CHANNELS`.
 
     Raises
     ------
@@ -53,7 +58,7 @@ def cycles_of(store: Reader, slots: NDArray[np.intp], names: Sequence[str] | Non
     slots : ndarray of int, shape (m,)
         File slots, ascending.
     names : sequence of str, optional
-        Channels to keep; by default all 64: some 8 kB per joint.
+        Channels to keep; by default those `SHOWN`, 64 of bushings: some 8 kB per joint.
 
     Returns
     -------
@@ -68,13 +73,18 @@ def cycles_of(store: Reader, slots: NDArray[np.intp], names: Sequence[str] | Non
     if not store.history_specs:
         remedy = 'set histories = "cycles" in [output] of the study and run it anew'
         raise StoreError(str(Fault(str(store.path), "holds neither cycles nor load histories", remedy)))
-    names = tuple(CHANNELS) if names is None else tuple(names)
-    place = [list(CHANNELS).index(name) for name in names]
+    names = SHOWN if names is None else tuple(names)
+    histories = histories_of(names)
+    order = [channel.name for history in histories for channel in channels_of(history)]
+    place = [order.index(name) for name in names]
+    lacking = [name for h in histories if (name := f"{h.prefix}cycles") not in store.history_specs]
+    if lacking and "cycles" in store.history_specs and not held(store, histories):
+        raise StoreError(str(Fault(str(store.path), f"holds no {', '.join(lacking)}", RUN_AGAIN)))
     table = np.empty((len(slots), len(names), rainflow.KEPT, 2), np.float32)
     number = np.empty((len(slots), len(names)))
     for part in blocks(len(slots)):
-        counted = _count(store, slots[part])
-        table[part], number[part] = counted["cycles"][:, place], counted["cycle_count"][:, place]
+        cycles, counts = _count(store, slots[part], histories)
+        table[part], number[part] = cycles[:, place], counts[:, place]
     status = store.status(slice(int(slots.max(initial=-1)) + 1))[slots]
     without = ~np.isin(status, SIMULATED)
     table[without], number[without] = np.nan, np.nan
@@ -83,9 +93,16 @@ def cycles_of(store: Reader, slots: NDArray[np.intp], names: Sequence[str] | Non
     return Cycles.of_revolution(names, table[..., 0], table[..., 1], number)
 
 
-def _count(store: Reader, slots: NDArray[np.intp]) -> dict[str, NDArray[Any]]:
-    """Cycles of a few joints, by name of `rainflow.SPECS`."""
-    if "cycles" in store.history_specs:
-        return {name: store.histories(name, slots) for name in rainflow.SPECS}
-    joints = [rainflow.count(load) for load in loads(store, slots)]
-    return {name: np.stack([joint[name] for joint in joints]) for name in rainflow.SPECS}
+def _count(
+    store: Reader, slots: NDArray[np.intp], histories: Sequence[LoadHistory]
+) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Cycles of a few joints, and their numbers, as `rainflow.count` gives them; history after history."""
+    names = [[f"{history.prefix}{name}" for history in histories] for name in ("cycles", "cycle_count")]
+    if set(names[0]) <= set(store.history_specs):
+        counted = {name: store.histories(name, slots) for own in names for name in own}
+    else:
+        found = loads(store, slots, [BUSHING_LOADS, *(h for h in histories if h != BUSHING_LOADS)])
+        joints = [rainflow.count({name: own[i] for name, own in found.items()}) for i in range(len(slots))]
+        counted = {name: np.stack([joint[name] for joint in joints]) for own in names for name in own}
+    cycles, counts = (np.concatenate([counted[name] for name in own], axis=1) for own in names)
+    return cycles, counts

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tolstat.common.load_kinds import CHANNELS
+from tolstat.common.channels import CHANNELS
 from tolstat.questions.fatigue.counting import cycles_of
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ def pylife_series(
     view : View
         A campaign that keeps cycles or load histories.
     channels : sequence of str, optional
-        Channels to keep, keys of `load_kinds.CHANNELS`.
+        Channels to keep, keys of `channels.CHANNELS`; by default those of bushings.
     bins : int
         Number of classes of the range (from 0 to the largest) and of the mean (between its extremes); one set of
         classes for all forces, one for all torques.

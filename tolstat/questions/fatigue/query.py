@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 from tolstat.analysis import cycles, damage, exceedance, prediction, quantile, sorted_loads
 from tolstat.analysis.cycles import Cycles, FloatArray
 from tolstat.analysis.prediction import DELIVERY
-from tolstat.common.load_kinds import CHANNELS, PLACES, Channel, Kind
+from tolstat.common.channels import CHANNELS, Channel
+from tolstat.common.load_kinds import PLACES, Kind
 from tolstat.common.loads import PANELS
 from tolstat.common.shown import shown
 from tolstat.common.tables import Status
 from tolstat.questions.fatigue import duty
-from tolstat.questions.fatigue.counting import cycles_of
+from tolstat.questions.fatigue.counting import SHOWN, cycles_of
 from tolstat.store.view import View
 from tolstat.study.fatigue import Fatigue, of_text
 
@@ -83,7 +84,8 @@ def load_cycles(
         Share of the revolutions in each of several campaigns; the sum is 1. Those of the operating points of one
         campaign follow from their shares of the time and their speeds, see `worst.shares_of_revolutions`.
     names : sequence of str, optional
-        Channels to keep, keys of `load_kinds.CHANNELS`; by default all 64: some 8 kB per joint.
+        Channels to keep, keys of `channels.CHANNELS`; by default those of bushings and those with an S–N line, some
+        8 kB per joint.
     samples : int, optional
         Number of samples, from the first; by default all.
 
@@ -97,6 +99,10 @@ def load_cycles(
     name = " + ".join(view.name for view in views)
     views, shares = duty.members(views, shares)
     first = views[0]
+    # the section alone, like limits: it is at hand even where the study refers to files that are not
+    settings = of_text(first.store.study_text, str(first.path))
+    if names is None:
+        names = tuple(name for name in CHANNELS if name in SHOWN or name in settings.lines)
     parts = [_cycles_of(view, names, samples) for view in views]
     # the nominal joint of a duty cycle has settled at all operating points, or it has no row
     rows = slice(min(len(nominal.number) for _, nominal in parts))
@@ -106,13 +112,12 @@ def load_cycles(
         status=duty.status(views, samples),
         nominal=cycles.duty_cycle([nominal.rows(rows) for _, nominal in parts], shares),
         iid=first.iid,
-        # the section alone, like limits: it is at hand even where the study refers to files that are not
-        settings=of_text(first.store.study_text, str(first.path)),
+        settings=settings,
         duty=duty.described(views, shares),
     )
 
 
-def _cycles_of(view: View, names: Sequence[str] | None, samples: int | None) -> tuple[Cycles, Cycles]:
+def _cycles_of(view: View, names: Sequence[str], samples: int | None) -> tuple[Cycles, Cycles]:
     """Cycles of the first samples, and of the nominal joint (no rows if there is none that settled)."""
     n = view.n if samples is None else min(samples, view.n)
     first, end = map(int, view.slots([0, n]))
@@ -240,7 +245,7 @@ def spectra(
 
 
 def most_loaded(table: pd.DataFrame) -> list[str]:
-    """Channel with the largest equivalent load for each bushing's force and torque, from `equivalent_loads`.
+    """Channel with the largest equivalent load for each kind of loads at each place, from `equivalent_loads`.
 
     Evaluated at the middle exponent and the highest share. Moduli, whose cycles are not those of a component, are used
     only if the table has nothing else. Empty if no joint has a valid result.

@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from tolstat.analysis.cycles import FloatArray
-from tolstat.common.load_kinds import CHANNELS
+from tolstat.common.channels import CHANNELS
 from tolstat.common.loads import unit_text
 from tolstat.display import style, text
 from tolstat.display.table import Column, Row

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.analysis.cycles import Cycles, FloatArray, duty_cycle
+from tolstat.common.channels import BUSHING_LOADS
 from tolstat.common.errors import Fault, InputError
-from tolstat.common.load_kinds import BUSHINGS
 from tolstat.common.shown import shown
 from tolstat.common.tables import Status
 from tolstat.questions.fatigue import duty
@@ -150,8 +150,8 @@ def stresses_of(store: Reader, slots: NDArray[np.intp], points: Sequence[StressP
     low, high = np.zeros((2, len(slots), len(points)))
     counted: list[tuple[FloatArray, FloatArray]] = []
     apart = 0.0
-    for part, loads, difference in revolutions.of_components(store, slots):
-        apart = max(apart, difference)
+    for part, found, difference in revolutions.of_components(store, slots, [BUSHING_LOADS]):
+        apart, loads = max(apart, difference), found[BUSHING_LOADS.name]
         signals, noise = zip(*(_signal(loads, point) for point in points), strict=True)
         low[part], high[part] = (np.stack([end(s, axis=1) for s in signals], axis=1) for end in (np.min, np.max))
         for joint in range(len(loads)):
@@ -167,7 +167,7 @@ def stresses_of(store: Reader, slots: NDArray[np.intp], points: Sequence[StressP
 
 def _signal(loads: NDArray[np.floating], point: StressPoint) -> tuple[FloatArray, FloatArray]:
     """Stress over the revolution, (m, samples), and the range up to which cycles may be numerical noise, (m,), Pa."""
-    own, factors = loads[:, :, BUSHINGS.index(point.bushing)].astype(float), np.array(point.per_load)
+    own, factors = loads[:, :, BUSHING_LOADS.places.index(point.bushing)].astype(float), np.array(point.per_load)
     return own @ factors, rainflow.GATE * np.max(np.abs(own) @ np.abs(factors), axis=1)
 
 

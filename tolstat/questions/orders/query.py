@@ -91,7 +91,7 @@ def orders_of(view: View, orbits: bool = True, confidence: float = CONFIDENCE) -
     view : View
         A campaign.
     orbits : bool
-        Whether to read the orbits of lateral forces, too; without full histories their joints are simulated again.
+        Whether to read the orbits of lateral forces, too; without histories of them their joints are simulated again.
     confidence : float
         Confidence level of the intervals.
 
@@ -145,18 +145,24 @@ def _amplitude(view: View, name: str, confidence: float) -> dict[str, Any]:
 def _orbits(view: View) -> tuple[list[Orbit], str, float]:
     """Orbits of each shaft whose lateral force is kept, their source, and how far from the stored values."""
     found, origin, apart = [], "", 0.0
-    for index, shaft in enumerate(SHAFTS):
+    for shaft in SHAFTS:
         name = f"{shaft}.lateral"
         if name not in view.kept_loads or not view.load(name).valid.size:
             continue
         at = view.at(point_of(view, name))
-        joints = _near(at, name)
-        slots = np.array(list(joints.values()), np.intp)
-        loads, origin, off = revolutions.on_shafts(at.store, slots)
-        apart = max(apart, off)
-        for near, slot, own in zip(joints, slots, loads, strict=True):
-            found.append(Orbit(shaft, near, int(at.store.row(slot)), at.points[0], own[:, index, :2]))
+        for near, slot in _near(at, name).items():
+            force, origin, off = _force(at, slot, shaft)
+            apart = max(apart, off)
+            found.append(Orbit(shaft, near, int(at.store.row(slot)), at.points[0], force))
     return found, origin, apart
+
+
+def _force(view: View, slot: int, shaft: str) -> tuple[NDArray[np.float64], str, float]:
+    """Lateral force on a shaft, (k, 2), its source, and how far the joint is from the stored values."""
+    names = [f"{shaft}.f_x", f"{shaft}.f_y"]
+    samples = int(view.store.options["steps_per_rev"])
+    found = revolutions.read(view.store, np.array([slot]), names, samples)
+    return np.column_stack([found.loads[name][0] for name in names]), found.origin, found.apart
 
 
 def _near(view: View, name: str) -> dict[str, int]:

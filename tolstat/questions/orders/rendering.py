@@ -41,7 +41,8 @@ LOOKS: dict[str, tuple[str, style.Dash]] = {
 """Colour and dash of the orbits, by `Orbit.near`."""
 ORIGIN = {
     "stored": "from the histories in the file",
-    revolutions.AGAIN: "simulated again, since the file holds no full histories",
+    "harmonics": "restored from the harmonics in the file",
+    revolutions.AGAIN: "simulated again, since the file holds no histories of them",
 }
 
 

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from tolstat.analysis import cycles, exceedance, quantile, sorted_loads
 from tolstat.analysis.exceedance import FloatArray
+from tolstat.common.channels import CHANNELS, histories_of
 from tolstat.common.errors import Fault, InputError, StoreError, gather
-from tolstat.common.load_kinds import CHANNELS
 from tolstat.common.shown import shown
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import Status
@@ -67,7 +67,8 @@ def time_above(
     view : View
         A campaign with load histories, in full or as harmonics.
     by : sequence of str
-        Loads of bushings, `load_kinds.CHANNELS`: ``cross1.F``, ``fork2.T_e``; by default those that have a limit.
+        Loads over the input angle, `channels.CHANNELS`: ``cross1.F``, ``fork2.T_e``, ``output.moment``; by default
+        those that have a limit.
     levels : sequence of str
         ``"700 N"``; by default the load's limit. A level applies to all loads of its unit.
     curves : bool
@@ -106,9 +107,9 @@ def _levels(view: View, by: Sequence[str], levels: Sequence[str]) -> dict[str, F
     faults: list[Fault] = []
     names = list(by) or [name for name in view.limits if name in CHANNELS]
     if not names:
-        faults.append(Fault("--by", "the study limits no load of a bushing", "name one: --by cross1.F"))
+        faults.append(Fault("--by", "the study limits no load over the input angle", "name one: --by cross1.F"))
     faults += [
-        Fault("--by", f"{name!r} is no load of a bushing", did_you_mean(name, list(CHANNELS)))
+        Fault("--by", f"{name!r} is no load over the input angle", did_you_mean(name, list(CHANNELS)))
         for name in names
         if name not in CHANNELS
     ]
@@ -146,7 +147,7 @@ def _shares(
     ends = dict.fromkeys(levels, (np.inf, -np.inf))
     slots = view.slots(samples)
     for part in revolutions.blocks(len(slots)):
-        loads = revolutions.loads(view.store, slots[part])
+        loads = revolutions.loads(view.store, slots[part], histories_of(levels))
         for name, own in levels.items():
             load = CHANNELS[name].of(loads)
             ends[name] = min(ends[name][0], float(load.min())), max(ends[name][1], float(load.max()))

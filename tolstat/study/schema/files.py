@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 from tolstat.analysis.process import LEAST_PARTS, MOST_PARTS
 from tolstat.common import json_schema, loads, strict
+from tolstat.common.channels import UNIT_OF_CHANNEL
 from tolstat.common.files import data_dir
-from tolstat.common.load_kinds import UNIT_OF_CHANNEL
 from tolstat.common.loads import UNIT_OF_LOAD
 from tolstat.common.units import EXAMPLES
 from tolstat.joint import Joint, Operation

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from tests.support import naive
+from tolstat.analysis.cycles import share_of_revolution_above
+from tolstat.common.channels import CHANNELS, SHAFT_LOADS, channels_of
 from tolstat.common.load_kinds import ORDERS, SPAN
 from tolstat.common.loads import LOADS
 from tolstat.common.tables import RESULT, Options, Status, for_kernels
@@ -14,6 +16,7 @@ from tolstat.kernel.mechanics.topology import INPUT_SHAFT
 from tolstat.kernel.mechanics.work import make_work
 from tolstat.kernel.revolution.orders import write_orders
 from tolstat.kernel.revolution.settle import make_samples, write_shaft
+from tolstat.solver.harmonics import restore
 from tolstat.solver.simulation import simulate_rows
 
 RPM = np.pi / 30
@@ -39,6 +42,32 @@ def test_ideal_joint_carries_secondary_couples_and_no_force(params, fidelity: in
     for shaft in ("input", "output"):
         assert of(f"{shaft}.axial", found) < 1e-3
         assert of(f"{shaft}.lateral", found) < 1e-3
+
+
+@pytest.mark.parametrize("fidelity", range(3))
+def test_channels_of_the_ideal_joint_are_its_closed_form_over_the_angle(params, fidelity: int) -> None:
+    """Couple T |tan gamma| and driving torque T tau at each angle; their cycles; the time above a level."""
+    alpha, level = np.radians(25.0), 105.0
+    rows, options = params(alpha=alpha, speed=RPM), Options(fidelity=fidelity)
+    histories = {name: own[0] for name, own in simulate_rows(rows, options, "full").histories.items()}
+    sine = np.sin(alpha) * np.cos(2 * np.pi * np.arange(180) / 180)
+    moment, drive = (CHANNELS[name].of(histories) for name in ("output.moment", "input.drive"))
+    np.testing.assert_allclose(moment, TORQUE * np.abs(sine) / np.sqrt(1 - sine**2), atol=1e-3)
+    np.testing.assert_allclose(drive, TORQUE * np.cos(alpha) / (1 - sine**2), rtol=5e-4)
+    np.testing.assert_allclose(CHANNELS["output.m_z"].of(histories), TORQUE, rtol=5e-4)
+
+    above = 2 / np.pi * np.arccos(np.sqrt(1 - np.cos(alpha) * TORQUE / level) / np.sin(alpha))
+    assert share_of_revolution_above([drive], level)[0] == pytest.approx(above, abs=2e-3)
+
+    kept = simulate_rows(rows, options, "harmonics+cycles", 89).histories
+    names = [channel.name for channel in channels_of(SHAFT_LOADS)]
+    swings = {"output.moment": TORQUE * np.tan(alpha), "input.drive": TORQUE * (1 / np.cos(alpha) - np.cos(alpha))}
+    for name, swing in swings.items():
+        assert kept["shaft_cycle_count"][0, names.index(name)] == 2
+        assert kept["shaft_cycles"][0, names.index(name), :2, 0] == pytest.approx(swing, rel=2e-4)
+    parts = (kept[f"shaft_coefficients_{part}"][0] for part in ("real", "imag"))
+    np.testing.assert_allclose(restore(*parts, 180), histories["shafts"], atol=2e-3)
+    assert kept["shaft_harmonics_error"].max() < 1e-5
 
 
 @pytest.mark.parametrize("fidelity", range(3))

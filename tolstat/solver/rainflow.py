@@ -32,9 +32,8 @@ def specs() -> dict[str, HistorySpec]:
     found: dict[str, HistorySpec] = {}
     for history in LOAD_HISTORIES:
         n, channel = len(channels_of(history)), f"{history.prefix}channel"
-        text = (
-            "range and mean of the largest rainflow cycles of the last revolution, descending, 0 where there are none"
-        )
+        text = "range and mean of the largest rainflow cycles of the last revolution, descending, 0 where there are "
+        text += f"none; {history.channels}"
         found |= {
             f"{history.prefix}cycles": HistorySpec((n, KEPT, 2), "f4", "N, N*m", text, (channel, "cycle", "of_cycle")),
             f"{history.prefix}cycle_count": HistorySpec(

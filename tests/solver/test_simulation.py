@@ -12,6 +12,7 @@ import pytest
 from tests.conftest import REFERENCE, REFERENCE_CASES, with_law
 from tolstat import joint, study
 from tolstat.campaign import trace
+from tolstat.campaign.remedy import Reason, remedy
 from tolstat.common.load_kinds import RESULTANT
 from tolstat.common.tables import RESULT, SIMULATED, Fidelity, Method, Mode, Options, Start, Status, iterations_allowed
 from tolstat.joint import ideal
@@ -281,6 +282,16 @@ def test_failure_of_newton_is_said_and_nothing_invented(params):
     row = simulate_rows(par, OPTIONS).results[0]
     assert row["status"] == Status.NEWTON_FAILED
     assert np.isnan(row["F_max"]).all()
+
+
+def test_without_an_equilibrium_the_remedy_is_dynamic(params):
+    par = params(alpha=0.3)
+    par.hub_mass[0] = np.nan
+    row = simulate_rows(par, OPTIONS._replace(fidelity=Fidelity.QUASISTATIC)).results[0]
+    said = remedy(row, OPTIONS._asdict())
+    assert "no equilibrium" in said
+    again = Reason(Status(int(row["status"])), 1, 1, said).retry
+    assert again == "--retry newton_failed --set solver.fidelity=dynamic"
 
 
 @pytest.mark.slow

@@ -82,7 +82,7 @@ class Reason(NamedTuple):
     @property
     def retry(self) -> str:
         """Options of `tolstat run` that simulate these joints again as the remedy says; empty if it names none."""
-        setting = re.search(r"(solver\.\w+) = ([\w.e-]+)", self.remedy)
+        setting = re.search(r'(solver\.\w+) = "?([\w.e-]+)', self.remedy)
         if setting:
             return f"--retry {self.status.label} --set {setting[1]}={setting[2].rstrip('.')}"
         return f"--retry {self.status.label}" if "--retry" in self.remedy else ""
@@ -161,6 +161,8 @@ def _more_revs(options: Mapping[str, Any]) -> int:
 
 
 def _of_newton_failure(row: np.void, options: Mapping[str, Any]) -> str:
+    if row["failed_step"] < 0:
+        return 'at an input angle no equilibrium was found: try solver.fidelity = "dynamic"'
     place, steps = _place(row), _more_steps(options)
     if row["newton_iterations"] == iterations_allowed(options["steps_per_rev"], options["max_revs"]):
         spent = f"all {row['newton_iterations']} iterations that a joint may take were spent at {place}"

@@ -56,7 +56,7 @@ def note(verification: Verification, limits: Iterable[str] = ()) -> str:
     total = [row for row in distribution_rows(verification) if row["error"] == TOTAL]
     shown = [row for row in total if row["load"] in kinds or KIND[row["load"]].shown] or total
     words = [
-        f"{row['load']} {_small(row['median'])}, at worst {_small(row['worst'])}"
+        f"{_called(row['load'])} {_small(row['median'])}, at worst {_small(row['worst'])}"
         for row in shown
         if not np.isnan(row["worst"])
     ]
@@ -64,6 +64,12 @@ def note(verification: Verification, limits: Iterable[str] = ()) -> str:
     said = f"{noun}, {basis(verification)}: {'; '.join(words) or 'unknown'}"
     unknown = joints_without_error(verification)
     return f"{said}; {unknown}" if unknown else said
+
+
+def _called(key: str) -> str:
+    """Kind of loads in a sentence: its symbol, or what a load is called where several kinds share the symbol."""
+    kind = KIND[key]
+    return kind.symbol if kind.symbol == key else kind.noun
 
 
 def joints_without_error(verification: Verification) -> str:

@@ -47,8 +47,8 @@ def test_operations_are_those_of_the_structure(these):
     product, dot = 6 * 6 * 2, 11  # of a block with six numbers, of six with six
     inverse = 6 * (1 + 6 + 5 * 6 * 2)
     chain = 2 * inverse + 2 * 6 * product + 2 * 6 * product
-    output = 3 * product + 6 * dot + (2 * dot + 2) + product + 6 * (dot + 1)
-    last = inverse + product + dot + 2
+    output = 2 * (3 * product + 6 * dot + product + 6 * (dot + 1)) + 4 * (2 * dot + 2)  # psi and s
+    last = inverse + 2 * product + 4 * (dot + 1) + 5
     for count in counts:
         assert count["elimination"] == 4 * chain + 2 * output + last
         assert count["contact"] < count["residual"]

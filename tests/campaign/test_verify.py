@@ -81,7 +81,7 @@ def force_and_torque(base, other):
 
 @pytest.mark.slow
 def test_estimate_is_of_the_size_of_the_error(coarse):
-    """What the solver's own checks give is within a factor of two of the distance to the reference, in each joint.
+    """What the solver's own checks give is at least half and at most 2.5 times the distance to the reference.
 
     Where the error passes through zero at these steps, the estimate cannot know it and is above.
     """
@@ -91,7 +91,7 @@ def test_estimate_is_of_the_size_of_the_error(coarse):
     crossing = true < 0.1 * np.median(true, axis=0)
     assert crossing.sum() <= 3
     assert (ratio > 1 / 2).all()
-    assert (ratio[~crossing] < 2).all()
+    assert (ratio[~crossing] < 2.5).all()
 
 
 @pytest.mark.slow
@@ -233,7 +233,8 @@ def test_report_moves_every_load_by_the_numerical_error(tmp_path):
         assert limits[f"total_{end}"] == pytest.approx(accuracy_end(int(count), 60)[0 if end == "lower" else 1])
     assert limits["numerical_lower"] < limits["estimate"] < limits["numerical_upper"]
     done = call("report", path)
-    verdict, _, head, *_ = done.stdout.splitlines()
+    verdict, *lines = done.stdout.splitlines()
+    (head,) = (line for line in lines if line.startswith("load "))
     assert verdict.startswith("No verdict")
     assert head.split()[-2:] == ["total", "interval"]
     assert "measured on 2 of 2 joints against a tight reference: F 2.0e-01" in done.stderr

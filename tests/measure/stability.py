@@ -1,9 +1,9 @@
 """``python -m tests.measure.stability``: does any joint's motion grow from a disturbance that the steps damp?
 
 Two looks at joints of a study, each at torques and contact laws of one's own. Frozen eigenvalues: the equations of
-motion, all 110 of first order, linearised at angles of the settled revolution. Exponents: a neighbour of the joint is
-carried along at fine steps and brought back to its distance after each revolution (Benettin et al. 1980), which shows
-parametric growth, too.
+motion, 110 or 112 of first order, linearised at angles of the settled revolution. Exponents: a neighbour of the joint
+is carried along at fine steps and brought back to its distance after each revolution (Benettin et al. 1980), which
+shows parametric growth, too.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from tolstat.joint.contact import PREDEFINED
 from tolstat.kernel.integrators import first_order
 from tolstat.kernel.integrators.integrate import reset
 from tolstat.kernel.integrators.state import CV_FACTORISED, H_OLD, make_state_record
-from tolstat.kernel.mechanics.topology import N_DOF
+from tolstat.kernel.mechanics.topology import N_DOF, S
 from tolstat.kernel.mechanics.work import WORK
 from tolstat.kernel.revolution.resolve import APART, radius_of
 from tolstat.kernel.revolution.settle import grid_step
@@ -81,7 +81,8 @@ def growths(params: Table, options: Options) -> list[Growth | None]:
             state = np.concatenate([samples["q"][s], samples["v"][s]])
             row = params[i : i + 1].view(np.recarray)
             first_order.jacobian_of_row(period * (1 + s / n), state, row, options, works, column, matrix)
-        found.append(_growth(np.linalg.eigvals(matrices), period))
+        moving = np.delete(np.arange(2 * N_DOF), [] if params["slides"][i] else [S, N_DOF + S])
+        found.append(_growth(np.linalg.eigvals(matrices[:, moving][:, :, moving]), period))
     return found
 
 

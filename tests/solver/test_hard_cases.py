@@ -69,11 +69,16 @@ def test_all_hard_cases_end_in_a_result_or_a_status(hard: Path) -> None:
     rings = case == "tilt of 5 deg"  # for ever, by a few thousandths of the loads
     assert (results["status"][rings] == Status.STATIONARY).all()
     assert (results["closure"][rings] < 1e-2).all()
-    results, family = results[~rings], family[~rings]
+    stiff = case == "E x 1e3"  # finer steps take more iterations than are allowed
+    assert (results["status"][stiff] == Status.NOT_RESOLVED).all()
+    results, family = results[~rings & ~stiff], family[~rings & ~stiff]
     ended = {name: {Status(s).label for s in results["status"][family == name]} for name in family}
     assert ended.pop("85 deg") == {"newton_failed"}
-    for name in ("20000 rpm", "20000 rpm, 60 revolutions"):  # the same every three revolutions
-        assert ended.pop(name) == {"stationary"}
+    for name in (
+        "20000 rpm",
+        "20000 rpm, 60 revolutions",
+    ):  # the same every three revolutions, with a tilt nearly in each
+        assert ended.pop(name) == {"stationary", "ok"}
     assert set().union(*ended.values()) == {"ok"}, ended
 
 

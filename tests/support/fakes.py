@@ -115,6 +115,11 @@ class Study:
         """Operating point of the only joint."""
         return (self.operation,)
 
+    @property
+    def has_axial_force(self) -> bool:
+        """No axial force moves the output shaft."""
+        return False
+
     def at(self, name: str) -> Study:
         """Return the study at one of its points."""
         own = next(point for point in self.points if point.name == name)

@@ -38,7 +38,7 @@ Run = Callable[..., Iterator[tuple[int, NDArray[np.void]]]]
 Histories = Literal["none", "cycles", "harmonics", "harmonics+cycles", "full"]
 
 MAX_KEPT_SAMPLES = 12_000
-"""Maximum number of samples in memory at a time, some 1.5 kB each: the last revolution of 66 joints at 180 steps."""
+"""Maximum number of samples in memory at a time, some 1.7 kB each: the last revolution of 66 joints at 180 steps."""
 
 NEARLY_REVERSING = 0.8
 """Torque that reverses the load (`ideal.reversal_torque`), relative to a joint's own, above which explicit steps cost

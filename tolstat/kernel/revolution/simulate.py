@@ -56,8 +56,8 @@ EARLY_CLOSURE, EARLY_SUMS, EARLY_STEP_ERROR = 0.1, 0.2, 0.02
 """A joint whose motion at one twelfth to two twelfths of a revolution is repeated a revolution later has settled: the
 start is forgotten within the first twelfth. The first number is the closure error of bushing loads there, in units of
 ``settle_tol``, the second that of all loads, since a shaft carries the sum of two of them, the third the step error, up
-to which that holds. Of 12 000 joints (docs/notes/steps.md) none is settled by it
-that would not be at the end of the second revolution."""
+to which that holds. Of 12 000 joints none was settled by bushing loads alone that would not have been at the end of the
+second revolution (docs/notes/steps.md)."""
 
 residual, acceleration = dynamics.residual, dynamics.acceleration
 assemble, eliminate, solve = tangent.assemble, linsolve.factorise, linsolve.solve

@@ -38,11 +38,11 @@ if TYPE_CHECKING:
     from tolstat.sampling import draw as draw
     from tolstat.solver.integrate import integrate as integrate
     from tolstat.solver.simulation import simulate_rows as simulate_rows
-    from tolstat.store import Reader
+    from tolstat.store import ResultFile
     from tolstat.study import load as load
     from tolstat.study import load_case as load_case
 
-    open = Reader.open
+    open = ResultFile.open
 
 __version__ = "0.1.0"
 
@@ -57,7 +57,7 @@ _HOMES = {
     "integrate": "tolstat.solver.integrate:integrate",
     "load": "tolstat.study:load",
     "load_case": "tolstat.study:load_case",
-    "open": "tolstat.store:Reader.open",
+    "open": "tolstat.store:ResultFile.open",
     "perturb": "tolstat.joint:perturb",
     "quantile": "tolstat.analysis.quantile:quantile",
     "run": "tolstat.campaign.run:run",

@@ -13,9 +13,9 @@ from tolstat.campaign import blocks
 from tolstat.campaign.blocks import Execution
 from tolstat.campaign.executors import Lost, Work, kept_workers, map_in_processes, map_serially
 from tolstat.campaign.supervised import supervised
+from tolstat.common.counts import Counts
 from tolstat.common.solver_options import to_names
 from tolstat.common.tables import RESULT, Fidelity, Method, Options, Simulation, Start, Status, without_results
-from tolstat.store import Counts
 from tolstat.store.verification import Check
 
 QUICK_CHECKS = ("half_step", "newton", "settling")

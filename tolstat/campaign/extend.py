@@ -12,14 +12,15 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tolstat.common.counts import Counts
 from tolstat.common.draw_records import columns
 from tolstat.common.errors import Fault, InputError
 from tolstat.sampling import draw_blocks, origin_blocks
-from tolstat.store import Counts, Reader, ResultStore, what_if
-from tolstat.store.assembly import DifferingResults, assemble, check_free
+from tolstat.store import Reader, Writer, what_if
+from tolstat.store.assembly import DifferingResults, assemble
+from tolstat.store.hdf5 import BLOCK
 from tolstat.store.provenance import differing_code
-from tolstat.store.recall import differing_keys, recall
-from tolstat.store.result_file import BLOCK
+from tolstat.store.recorded import differing_keys, recall
 from tolstat.store.what_if import Altered
 
 if TYPE_CHECKING:
@@ -63,7 +64,7 @@ def extend(path: Path, n: int, study_path: Path | None = None) -> Study:
     Parameters
     ----------
     path : Path
-        Result file of a whole campaign; with histories, no row may be pending. A new file replaces it when complete.
+        Result file of a whole campaign. A new file replaces it when complete.
     n : int
         New number of joints, without the nominal joint.
     study_path : Path, optional
@@ -81,7 +82,7 @@ def extend(path: Path, n: int, study_path: Path | None = None) -> Study:
     StoreError
         When the file cannot be used or replaced.
     """
-    with ResultStore.open_to_write(path) as store:
+    with Writer.open(path) as store:
         _check_extendable(store, n)
         study = recall(store, n, study_path)
         more = range(store.n, study.rows)
@@ -94,12 +95,12 @@ def extend(path: Path, n: int, study_path: Path | None = None) -> Study:
 def _keep(path: Path, altered: Mapping[str, Altered]) -> None:
     """Write joints with other tolerances to the new file of a campaign: they are samples of that campaign."""
     if altered:
-        with ResultStore.open_to_write(path) as store:
+        with Writer.open(path) as store:
             what_if.write(store, altered)
 
 
 def grow(
-    store: ResultStore,
+    store: Writer,
     study: Study,
     errors: Iterable[NDArray[np.void]],
     origin: Iterable[NDArray[np.void]] | None = None,
@@ -108,7 +109,7 @@ def grow(
 
     Parameters
     ----------
-    store : ResultStore
+    store : Writer
         The file, open for writing; not usable afterwards.
     study : Study
         The study of the larger campaign.
@@ -120,15 +121,15 @@ def grow(
     StoreError
         When the file cannot be replaced.
     """
-    sampling = study.sampling.model_dump(mode="json") | {"dimensions": store.sampling["dimensions"]}
-    changed = {"identity": study.identity(), "sampling": sampling}
-    attrs = store.attributes() | {name: json.dumps(value, allow_nan=False) for name, value in changed.items()}
-    attrs["campaign_rows"] = study.rows
-    if store.stop:  # the looks of a stop rule stay looks
-        attrs["stop"] = json.dumps({"reached": False, "looks": store.stop["looks"]})
+    held = store.metadata.changed(
+        identity=json.loads(json.dumps(study.identity())),
+        sampling=study.sampling.model_dump(mode="json") | {"dimensions": store.sampling["dimensions"]},
+        stop={"reached": False, "looks": store.stop["looks"]} if store.stop else {},  # looks of a rule stay looks
+        campaign_rows=study.rows,
+        n=study.rows,
+    )
     drawn = None if origin is None else chain(_blocks(store, store.origin), origin)
-    whole = chain(_blocks(store, store.errors), errors)
-    assemble(store.path, attrs, study.rows, [store], whole, overwrite=True, origin=drawn)
+    assemble(store.path, held, [store], chain(_blocks(store, store.errors), errors), origin=drawn, overwrite=True)
 
 
 def merge(paths: Sequence[Path], out: Path) -> Merged:
@@ -155,25 +156,24 @@ def merge(paths: Sequence[Path], out: Path) -> Merged:
     StoreError
         When a file cannot be used, or `out` cannot be created.
     """
-    check_free(out)
     with ExitStack() as opened:
         stores = [opened.enter_context(Reader.open(path)) for path in paths]
         stores.sort(key=lambda store: (store.rows[0], store.rows.stop))
         _check_one_campaign(stores)
-        attrs = stores[0].attributes()
-        attrs.pop("stop", None)
+        rows = stores[0].campaign_rows
+        held = stores[0].metadata.changed(stop={}, first_row=0, n=rows)
         design = np.concatenate([s.design()[a:] for s, a in _shares(stores)]) if stores[0].variants else None
         errors = (block for store, begin in _shares(stores) for block in _blocks(store, store.errors, begin))
         origin = (block for store, begin in _shares(stores) for block in _blocks(store, store.origin, begin))
         drawn = origin if columns(stores[0].sampling) else None
         try:
-            assemble(out, attrs, stores[0].campaign_rows, stores, errors, design, origin=drawn)
+            assemble(out, held, stores, errors, design, drawn)
         except DifferingResults as error:
             holding = [str(store.path) for store in stores if error.row in store.rows]
             found = f"hold different results of row {error.row}: {error.column} differs"
             remedy = f"find the file that is wrong, and leave it out: tolstat replay {holding[0]} --row {error.row}"
             raise InputError([Fault(" and ".join(holding), found, remedy)]) from None
-        twice = sum(len(store.rows) for store in stores) - stores[0].campaign_rows
+        twice = sum(len(store.rows) for store in stores) - rows
         altered, dropped = what_if.common(what_if.read(store) for store in stores)
     _keep(out, altered)
     with Reader.open(out) as store:
@@ -194,8 +194,6 @@ def _check_extendable(store: Reader, n: int) -> None:
     if not store.whole:
         found = f"holds only rows {store.rows[0]}:{store.rows.stop} of the campaign"
         faults.append(Fault(place, found, "merge all slices first: tolstat merge SLICE... --out FILE"))
-    elif store.history_specs and not store.complete:
-        faults.append(_unfinished(store))
     if other := differing_code(store.versions):
         remedy = f"extend it with {code_of(store)}, or run its study into another file: tolstat run STUDY --n {n} --out"
         faults.append(Fault(place, "\n    ".join([OTHER_CODE, *other]), f"{remedy} OTHER.h5"))
@@ -229,16 +227,8 @@ def _check_one_campaign(stores: Sequence[Reader]) -> None:
         listed = ", ".join(f"{part.start}:{part.stop}" for part in missing)
         remedy = f"simulate them: tolstat run STUDY --rows {missing[0].start}:{missing[0].stop} --out FILE"
         faults.append(Fault("merge", f"no slice holds rows {listed} of {first.campaign_rows}", remedy))
-    if first.history_specs:
-        faults += [_unfinished(store) for store in stores if not store.complete]
     if faults:
         raise InputError(faults)
-
-
-def _unfinished(store: Reader) -> Fault:
-    """Return the fault of a campaign with histories that has pending joints."""
-    remedy = f"simulate them first: tolstat run STUDY --out {store.path}"
-    return Fault(str(store.path), "has pending joints, whose load histories are missing", remedy)
 
 
 def _missing(stores: Sequence[Reader]) -> list[range]:

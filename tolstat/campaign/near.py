@@ -16,7 +16,7 @@ from tolstat.common import selected_results
 from tolstat.common.errors import Fault, InputError, StoreError
 from tolstat.common.loads import LOADS, Limit, load_of, split
 from tolstat.common.tables import Status
-from tolstat.store import Reader, ResultStore, recorded, verification, worst
+from tolstat.store import Reader, Writer, recorded, verification, worst
 from tolstat.store.verification import Check, Verification
 from tolstat.study import rule
 
@@ -79,7 +79,7 @@ def check_near(
     if number is None or number < LEAST_NEAR:
         found = f"{joints} joints do not tell the numerical error near a limit"
         raise InputError([Fault("--joints", found, f"give {LEAST_NEAR} or more")])
-    with ResultStore.open_to_write(path) as store:
+    with Writer.open(path) as store:
         limit = rule.limit_of(text, store.limits, "--near", EXAMPLE)
         lacking = [name for name in limit.loads if not selected_results.holds(store.columns, load_of(name).name)]
         if lacking:

@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import h5py
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,17 +19,12 @@ from tolstat.common.loads import load_of, split
 from tolstat.common.tables import FAILED, RESULT, UNSETTLED, Options, Simulation, Status
 from tolstat.display import text
 from tolstat.joint import ideal, perturb
-from tolstat.sampling import dimensions, draw, origin_blocks, streams
+from tolstat.sampling import dimensions, draw, streams
 from tolstat.solver import refinement
 from tolstat.solver.compilation import warm_up
 from tolstat.solver.simulation import history_specs, simulate_rows
-from tolstat.store import worst
-from tolstat.store.axes import attach_scales
-from tolstat.store.histories import create_dataset, create_group
-from tolstat.store.integrity import seal
-from tolstat.store.new_file import attributes, fill
+from tolstat.store import layout, metadata, worst
 from tolstat.store.recorded import perturbed, settings, variants
-from tolstat.store.result_file import place_of
 from tolstat.study import swept
 from tolstat.study.points import names_of
 from tolstat.study.tolerances import meaning
@@ -239,7 +233,6 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT, stage: Te
     iid = study.sampling.method == "random" and study.sampling.joints_per_lot == 1
     valid = slice(study.first_sample, None)
     status = worst.together(list(results.values()))["status"]
-    simulation = next(iter(timed.values()))[0]
     return Plan(
         rows=study.rows,
         points=list(at),
@@ -252,7 +245,7 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT, stage: Te
         workers=workers,
         stages=stages,
         process_bytes=_process_bytes(),
-        file_bytes=_file_bytes(study, errors, simulation, settings(study.solver, choice), choice),
+        file_bytes=_file_bytes(study, settings(study.solver, choice), choice),
         widths={share: _width(share, study.samples) for share in SHARES} if iid else {},
         limits=_limits(study, {name: own[valid] for name, own in results.items()}) if iid else [],
         wilks={share: quantile.wilks(share, CONFIDENCE) for share in QUANTILES},
@@ -351,33 +344,10 @@ def _limits(study: Study, results: Mapping[str, NDArray[np.void]]) -> list[Limit
     return plans
 
 
-def _file_bytes(
-    study: Study, errors: NDArray[np.void], simulation: Simulation, options: Options, choice: Mapping[str, Any]
-) -> int:
-    """Predict the size of the result file from one in memory with the pilot's joints."""
+def _file_bytes(study: Study, options: Options, choice: Mapping[str, Any]) -> int:
     specs = history_specs(options, study.output.histories, study.output.harmonics)
-    n = len(errors)
-    design = study.design[:n] if study.variants else None
-    origin = origin_blocks(study, range(n))
-    with h5py.File("pilot", "w", driver="core", backing_store=False, block_size=512) as file:
-        fill(file, attributes(study, specs, dimensions(), options, choice), range(n), [errors], design, origin)
-        seal(file)
-        for point in study.points if specs else ():
-            group = create_group(file[place_of(point.name)])
-            for name, spec in specs.items():
-                dataset = create_dataset(group, name, n, spec)
-                dataset[...] = simulation.histories[name]
-                attach_scales(dataset, file["row"], spec)
-        file.flush()
-        sizes: list[int] = []
-
-        def add(_: str, item: h5py.HLObject) -> None:  # called once for each dataset, also where groups share it
-            if isinstance(item, h5py.Dataset) and item.shape[:1] == (n,):
-                sizes.append(item.id.get_storage_size())
-
-        file.visititems(add)
-        by_row = sum(sizes) / n
-        return int(file.id.get_filesize() + by_row * (study.rows - n))
+    held = metadata.of_study(study, range(study.rows), specs, dimensions(), options, choice)
+    return layout.size_of(held) + len(held.model_dump_json())
 
 
 def _process_bytes() -> int:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Protocol, Self
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
 
-    from tolstat.store import Counts
+    from tolstat.common.counts import Counts
 
 LINE_INTERVAL_S = 60.0
 """Time between two lines if stderr is not a terminal, s."""

@@ -14,7 +14,7 @@ from tolstat.common.solver_options import to_names
 from tolstat.common.tables import HistorySpec, Options, Status
 from tolstat.joint.ideal import NO_CLOSED_FORM
 from tolstat.solver import fidelity
-from tolstat.store import ResultStore
+from tolstat.store import Writer
 from tolstat.study.rewriting import given
 
 if TYPE_CHECKING:
@@ -98,12 +98,12 @@ def _setting(text: str) -> tuple[str, Any]:
     return key.strip(), given(value)
 
 
-def begin(store: ResultStore, retry: Retry, specs: Mapping[str, HistorySpec], tell: Callable[[str], None]) -> None:
+def begin(store: Writer, retry: Retry, specs: Mapping[str, HistorySpec], tell: Callable[[str], None]) -> None:
     """Mark the joints of a retry as pending, unless the same retry is already under way in the file.
 
     Parameters
     ----------
-    store : ResultStore
+    store : Writer
         Open for writing.
     retry : Retry
         Which joints, and how.
@@ -122,7 +122,7 @@ def begin(store: ResultStore, retry: Retry, specs: Mapping[str, HistorySpec], te
     entry = json.loads(json.dumps(retry.entry()))
     number = len(store.retries)
     each = store.each()
-    if store.retries[-1:] == [entry] and any(np.any(one.attempt()[one.pending()] == number) for one in each):
+    if store.retries[-1:] == (entry,) and any(np.any(one.attempt()[one.pending()] == number) for one in each):
         return
     if dict(specs) != store.history_specs:
         found = "these settings give load histories another number of samples than those in the file"

@@ -30,13 +30,13 @@ from tolstat.campaign.extend import NOT_EXTENDABLE, OTHER_CODE, code_of
 from tolstat.campaign.progress import JOINTS, Reporter, Tell, kernels, note, silent
 from tolstat.campaign.retry import Retry, begin
 from tolstat.campaign.supervised import Supervised, supervised
+from tolstat.common.counts import Counts
 from tolstat.common.errors import Fault, InputError, StoreError
 from tolstat.common.tables import Status
 from tolstat.solver import fidelity, rainflow
-from tolstat.store import Counts, Reader, ResultStore
+from tolstat.store import Reader, Writer
 from tolstat.store.provenance import differing_code
-from tolstat.store.recall import differing_keys
-from tolstat.store.recorded import perturbed, settings
+from tolstat.store.recorded import differing_keys, perturbed, settings
 
 if TYPE_CHECKING:
     from tolstat.study import Study
@@ -163,9 +163,7 @@ def run(
                 again = Supervised(work, compile_kernels, execution.kind)
                 verify.check_few(store, partial(_rows_of, study, stages), again)
             store.finish()
-            store.end_session()
         except KeyboardInterrupt:
-            store.end_session()
             raise Interrupted(path, store.counts(), stop.number) from None
         except WorkerDied as error:
             held = store.counts()
@@ -177,7 +175,7 @@ def run(
 
 
 def _write_blocks(
-    store: ResultStore, finished: Iterable[Finished], counts: Counts, progress: Reporter | None, tell: Tell
+    store: Writer, finished: Iterable[Finished], counts: Counts, progress: Reporter | None, tell: Tell
 ) -> Counts:
     """Write blocks to the file as they are finished; return the numbers of joints by status after the last one."""
     if progress:
@@ -212,7 +210,7 @@ def _own_stages() -> Stages:
 
 def _create_or_resume(
     study: Study, path: Path, stages: Stages, rows: range | None, execution: Execution, tell: Callable[[str], None]
-) -> ResultStore:
+) -> Writer:
     rows = range(study.rows) if rows is None else rows
     _check_part(rows, study.rows)
     if not path.exists():
@@ -223,8 +221,8 @@ def _create_or_resume(
         histories = stages.history_specs(options, *_history_options(study))
         errors = stages.draw(study, rows)
         origin = stages.origins(study, rows)
-        return ResultStore.create(path, study, errors, histories, stages.dimensions(), rows, options, choice, origin)
-    store = ResultStore.open_to_write(path)
+        return Writer.create(path, study, errors, histories, stages.dimensions(), rows, options, choice, origin)
+    store = Writer.open(path)
     try:
         _check_same(store, study, rows)
         store.update_study(study)
@@ -313,9 +311,6 @@ def _of_number(store: Reader, held: int, asked: int) -> Fault:
         return Fault(str(path), found, f"read it as it is: tolstat report {path}, or give another file: --out OTHER.h5")
     if method in NOT_EXTENDABLE:
         return Fault(str(path), found, f"give another file: --out OTHER.h5; {NOT_EXTENDABLE[method]}")
-    if store.history_specs and not store.complete:
-        resumed = f"finish it: the same command with --n {held}, then: tolstat extend {path} --n {asked}"
-        return Fault(str(path), found, resumed)
     return Fault(str(path), found, f"simulate more of its joints: tolstat extend {path} --n {asked}")
 
 

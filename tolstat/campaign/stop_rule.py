@@ -16,8 +16,8 @@ from tolstat.campaign.executors import kept_workers
 from tolstat.common import selected_results
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import Limit, load_of
-from tolstat.store import Reader, ResultStore, worst
-from tolstat.store.result_file import BLOCK
+from tolstat.store import Reader, Writer, worst
+from tolstat.store.hdf5 import BLOCK
 from tolstat.study import rule as rules
 
 if TYPE_CHECKING:
@@ -131,7 +131,7 @@ def run_until(study: Study, out: Path, rule: rules.Statement, run: Callable[[int
     valid = max(look.joints - look.n_unresolved, 1)
     look = look._replace(estimate=scheme.estimate(number, look.above) * look.joints / valid)
     outcome = Outcome(reached, look, scheme.looks, scheme.confidence)
-    with ResultStore.open_to_write(out) as store:
+    with Writer.open(out) as store:
         store.record_stop(outcome.record(rule))
     return outcome
 

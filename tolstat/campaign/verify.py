@@ -23,7 +23,7 @@ from tolstat.campaign.checks import (
 from tolstat.common import selected_results
 from tolstat.common.errors import Fault, InputError, StoreError, gather
 from tolstat.common.tables import Status
-from tolstat.store import Reader, ResultStore, recorded, verification, worst
+from tolstat.store import Reader, Writer, recorded, verification, worst
 from tolstat.store.provenance import differing_code
 from tolstat.store.verification import Verification
 
@@ -106,7 +106,7 @@ def few(rows: int) -> int:
 
 
 def check_few(
-    store: ResultStore, parameters: Callable[[ResultStore, NDArray[np.intp]], NDArray[np.void]], simulate: Simulate
+    store: Writer, parameters: Callable[[Writer, NDArray[np.intp]], NDArray[np.void]], simulate: Simulate
 ) -> None:
     """Check a few joints of a campaign at each operating point at which it is complete, and store the checks.
 
@@ -187,7 +187,7 @@ def check_file(
         When `joints` is neither a positive integer nor ``"all"``.
     """
     number = parse_joints(joints)
-    with ResultStore.open_to_write(path) as store:
+    with Writer.open(path) as store:
         check_version(store)
         seed = int(store.sampling["seed"]) if seed is None else seed
         if not any((one.status() == Status.OK).any() for one in store.each()):

@@ -15,12 +15,13 @@ from tolstat import sampling
 from tolstat.campaign import blocks, supervised
 from tolstat.campaign.block import Block, BlockWork, Timed
 from tolstat.campaign.blocks import JOINT_TIMEOUT_S, Execution
+from tolstat.common.counts import Counts
 from tolstat.common.loads import LOADS
 from tolstat.common.tables import VALID, Options, Status
 from tolstat.joint import perturb
 from tolstat.solver.compilation import warm_up
 from tolstat.solver.simulation import simulate_rows
-from tolstat.store import Counts, ResultStore, what_if, worst
+from tolstat.store import Writer, what_if, worst
 from tolstat.store.recorded import settings
 from tolstat.store.what_if import Altered
 from tolstat.study import axes, widths
@@ -114,7 +115,7 @@ def missing(held: Mapping[str, Altered], wanted: Wanted, names: Sequence[str]) -
     return range(max(own.end, wanted.numbers.start), max(own.end, wanted.numbers.stop))
 
 
-def options_of(study: Study, store: ResultStore) -> Options:
+def options_of(study: Study, store: Writer) -> Options:
     """Solver options of the campaign's joints."""
     return settings(study.solver, store.fidelity)
 
@@ -129,7 +130,7 @@ def seconds_per_joint(study: Study, options: Options, joints: int, points: Seque
 
 def simulate(
     study: Study,
-    store: ResultStore,
+    store: Writer,
     wanted: Sequence[Wanted],
     asked: Asked,
     workers: int,
@@ -142,7 +143,7 @@ def simulate(
     ----------
     study : Study
         The study of the campaign.
-    store : ResultStore
+    store : Writer
         Its file.
     wanted : sequence of Wanted
         Changes and joints, in the order in which they are simulated.

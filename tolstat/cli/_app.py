@@ -88,7 +88,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
-ResultFile = Annotated[Path, typer.Argument(metavar="FILE", help="Result file (HDF5) of a campaign.")]
+ResultPath = Annotated[Path, typer.Argument(metavar="FILE", help="Result file (HDF5) of a campaign.")]
 Wide = Annotated[bool, typer.Option("--wide", help="Print all columns; default: those that fit 80 characters.")]
 Workers = Annotated[
     int | None,

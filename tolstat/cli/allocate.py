@@ -12,7 +12,7 @@ from tolstat.cli._app import (
     AsJson,
     AtPoints,
     Delivery,
-    ResultFile,
+    ResultPath,
     StudyOption,
     Wide,
     as_text,
@@ -23,7 +23,7 @@ from tolstat.cli._talk import progress, say
 
 
 def allocate(
-    file: ResultFile,
+    file: ResultPath,
     target: Annotated[
         list[str],
         typer.Option(
@@ -74,12 +74,12 @@ def allocate(
     from tolstat.display import text
     from tolstat.questions.allocate import rendering
     from tolstat.questions.allocate.query import allocated
-    from tolstat.store import Reader, error_budget
+    from tolstat.store import ResultFile, error_budget
     from tolstat.study.scaling import line
 
     if out is not None:
         check_target(out, file)
-    with progress("search for the cheapest tolerances"), Reader.open(file) as store:
+    with progress("search for the cheapest tolerances"), ResultFile.open(file) as store:
         found = allocated(store.view(study_file).at(point or ""), target, costs, keep or (), delivery=delivery)
         unknown = "" if found.limits["numerical"].all() else error_budget.command(file)
     if out is not None:

@@ -6,11 +6,11 @@ import textwrap
 
 import typer
 
-from tolstat.cli._app import AsJson, ResultFile, Wide, as_text, print_table
+from tolstat.cli._app import AsJson, ResultPath, Wide, as_text, print_table
 from tolstat.cli._talk import progress, say
 
 
-def bearing_life(file: ResultFile, wide: Wide = False, as_json: AsJson = False) -> None:
+def bearing_life(file: ResultPath, wide: Wide = False, as_json: AsJson = False) -> None:
     """Print the rating life of the pins' bearings.
 
     Prints the life that 50, 90 and 99 % of the joints reach, for each bearing and for all four together, the share of
@@ -26,9 +26,9 @@ def bearing_life(file: ResultFile, wide: Wide = False, as_json: AsJson = False) 
     from tolstat.display.table import WIDTH
     from tolstat.questions.bearing_life import query, rendering
     from tolstat.questions.bearing_life.lives import lives_of
-    from tolstat.store import Reader
+    from tolstat.store import ResultFile
 
-    with progress("lives"), Reader.open(file) as store:
+    with progress("lives"), ResultFile.open(file) as store:
         view = store.view()
         lives = lives_of(view)
         if as_json:

@@ -7,13 +7,13 @@ from typing import Annotated
 import typer
 
 from tolstat.analysis.prediction import DELIVERY
-from tolstat.cli._app import AsJson, AtPoints, Delivery, ResultFile, Wide, as_text, print_table
+from tolstat.cli._app import AsJson, AtPoints, Delivery, ResultPath, Wide, as_text, print_table
 from tolstat.cli._talk import progress, say, warn, wrapped
 from tolstat.common.errors import Fault, InputError, StoreError
 
 
 def capability(
-    file: ResultFile,
+    file: ResultPath,
     one_in: Annotated[
         list[float] | None,
         typer.Option("--one-in", metavar="N", min=1, help="Print the load that one in N joints exceeds; repeatable."),
@@ -37,9 +37,9 @@ def capability(
     """
     from tolstat.display import text
     from tolstat.questions.capability import query, rendering
-    from tolstat.store import Reader, error_budget
+    from tolstat.store import ResultFile, error_budget
 
-    with progress("capability"), Reader.open(file) as store:
+    with progress("capability"), ResultFile.open(file) as store:
         view = store.view().at(point or "")
         if not view.limits or view.method in ("sweep", "cases"):
             remedy = 'give the result file of a study with [limits] and sampling.method "random", "sobol" or "lhs"'

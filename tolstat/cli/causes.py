@@ -141,14 +141,14 @@ def causes(
     from tolstat.questions.causes.query import causes_of
     from tolstat.questions.what_if import rendering as whatifs
     from tolstat.questions.what_if.query import what_if
-    from tolstat.store import Reader
+    from tolstat.store import ResultFile
 
     if points is not None:
         file = _run_design(file, points, groups, out, workers)
     elif out is not None:
         remedy = "add --pick-freeze 1024, or --against-angle"
         raise InputError([Fault("--out", "is used with --pick-freeze or --against-angle only", remedy)])
-    with progress("causes"), Reader.open(file) as store:
+    with progress("causes"), ResultFile.open(file) as store:
         view = store.view(study_file).at(point or "")
         load = by or view.decisive
         lines = what_if(view, load) if view.altered else None
@@ -210,12 +210,12 @@ def _against_angle(
     from tolstat.common.files import check_target
     from tolstat.questions.causes import angles_figure
     from tolstat.questions.causes.angles import against_angle
-    from tolstat.store import Reader, revolutions
+    from tolstat.store import ResultFile, revolutions
 
     if out is not None:
         for path in (out, out.with_suffix(".png")):
             check_target(path, file)
-    with progress("causes over the input angle"), Reader.open(file) as store:
+    with progress("causes over the input angle"), ResultFile.open(file) as store:
         view = store.view(study_file).at(point or "")
         view, load = view.narrowed(by or view.most_exceeded)
         if not revolutions.held(store):

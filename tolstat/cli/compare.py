@@ -36,9 +36,9 @@ def compare(
     from tolstat.display import text
     from tolstat.questions.compare import rendering
     from tolstat.questions.compare.query import compared
-    from tolstat.store import Reader
+    from tolstat.store import ResultFile
 
-    with progress("comparison"), Reader.open(a) as one, Reader.open(b) as other:
+    with progress("comparison"), ResultFile.open(a) as one, ResultFile.open(b) as other:
         found = compared(one.view(), other.view(), by or ())
     if as_json:
         tables = {key: text.records(getattr(found, key)) for key in ("shares", "loads", "switched")}

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tolstat.cli._app import Accept, AtPoints, ResultFile, as_text, output_file, parse_share
+from tolstat.cli._app import Accept, AtPoints, ResultPath, as_text, output_file, parse_share
 from tolstat.cli._talk import progress, say
 from tolstat.common.errors import Fault, InputError
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 def export(
-    file: ResultFile,
+    file: ResultPath,
     out: Annotated[
         str | None,
         typer.Option("--csv", metavar="OUT", help="Write errors and results as CSV; - for standard output."),
@@ -85,7 +85,8 @@ def export(
     """
     from tolstat.common.files import check_target
     from tolstat.report import workbook as excel
-    from tolstat.store import Reader
+    from tolstat.store import ResultFile
+    from tolstat.store.result_file import to_pandas
 
     given = {"--csv": out, "--pylife": cycles, "--parquet": parquet, "--xlsx": workbook, "--statistics": statistics}
     targets = {option: target for option, target in given.items() if target is not None}
@@ -94,7 +95,7 @@ def export(
     for target in targets.values():
         if target != "-":
             check_target(Path(target), file)
-    with progress("export"), Reader.open(file) as opened:
+    with progress("export"), ResultFile.open(file) as opened:
         view = opened.view().at(point or "")
         store = view.store
         if workbook is not None:
@@ -107,7 +108,7 @@ def export(
             _write_csv(store, nominal, out)
         if parquet is None and workbook is None:
             return
-        frame = store.to_pandas(nominal)
+        frame = to_pandas(store, nominal)
         if workbook is not None:
             with output_file(Path(workbook)) as temporary:
                 excel.write(store, frame, temporary)
@@ -170,7 +171,7 @@ def _write_parquet(frame: pd.DataFrame, path: Path) -> None:
 
 def _write_csv(store: Reader, nominal: bool, out: str) -> None:
     """Write errors and results block by block; damage is found before anything goes to standard output."""
-    from tolstat.store.frame import in_blocks
+    from tolstat.store.result_file import in_blocks
 
     if out == "-":
         for _ in in_blocks(store, nominal):

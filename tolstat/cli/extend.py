@@ -7,13 +7,13 @@ from typing import Annotated
 import typer
 
 from tolstat.cli import run
-from tolstat.cli._app import ResultFile, StudyOption, Wide, Workers
+from tolstat.cli._app import ResultPath, StudyOption, Wide, Workers
 from tolstat.cli._shortage import check_memory
 from tolstat.cli._talk import progress, say
 
 
 def extend(
-    file: ResultFile,
+    file: ResultPath,
     n: Annotated[int, typer.Option("--n", metavar="N", min=1, help="New number of joints, without the nominal joint.")],
     study_file: StudyOption = None,
     workers: Workers = None,

@@ -70,7 +70,7 @@ def fatigue(
     from tolstat.questions.fatigue import parts, parts_rendering, query, rendering
     from tolstat.questions.fatigue.counting import channels
     from tolstat.questions.fatigue.stress import load_stresses
-    from tolstat.store import Reader
+    from tolstat.store import ResultFile
     from tolstat.store.revolutions import held
     from tolstat.study.fatigue import of_text
 
@@ -78,7 +78,7 @@ def fatigue(
         check_target(out, *files)
     names = channels(by) if by else None
     with ExitStack() as stack:
-        views = [stack.enter_context(Reader.open(file)).view().at(point or "") for file in files]
+        views = [stack.enter_context(ResultFile.open(file)).view().at(point or "") for file in files]
         parts_named = of_text(views[0].store.study_text, str(files[0])).points
         stressed = loading = None
         if parts_named:

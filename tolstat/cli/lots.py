@@ -58,7 +58,7 @@ def lots(
     from tolstat.cli import run
     from tolstat.display import text
     from tolstat.questions.lots import query, rendering
-    from tolstat.store import Reader, error_budget
+    from tolstat.store import ResultFile, error_budget
 
     if delivery < from_lots:
         raise InputError([Fault("--from-lots", f"{from_lots} lots of {delivery} joints", "give fewer lots")])
@@ -71,7 +71,7 @@ def lots(
         raise InputError([Fault(str(source), "holds its lots already", remedy)])
     else:
         path = source
-    with progress("lots"), Reader.open(path) as store:
+    with progress("lots"), ResultFile.open(path) as store:
         view = store.view().at(point or "")
         found, unknown = query.lots_of(view, delivery, from_lots, accepted), error_budget.unknown(view)
     if as_json:

@@ -7,12 +7,12 @@ from typing import Annotated
 
 import typer
 
-from tolstat.cli._app import AsJson, AtPoints, ResultFile, Wide, as_text, make_folder, output_folder, print_table
+from tolstat.cli._app import AsJson, AtPoints, ResultPath, Wide, as_text, make_folder, output_folder, print_table
 from tolstat.cli._talk import progress, say
 
 
 def orders(
-    file: ResultFile,
+    file: ResultPath,
     out: Annotated[
         Path | None,
         typer.Option("--out", metavar="DIR", help="Write pictures and CSV to this folder, created if missing."),
@@ -31,9 +31,9 @@ def orders(
     """
     from tolstat.display import text
     from tolstat.questions.orders import query, rendering
-    from tolstat.store import Reader
+    from tolstat.store import ResultFile
 
-    with progress("orders"), Reader.open(file) as store:
+    with progress("orders"), ResultFile.open(file) as store:
         found = query.orders_of(store.view().at(point or ""), orbits=out is not None)
     if as_json:
         summary = {"joints": found.joints, "left_out": found.left_out, "orders": text.records(found.table)}

@@ -155,9 +155,9 @@ def _read_study(source: Path, limit: str | None, point: str | None, given: dict[
 
 def _recall(source: Path, study_file: Path | None, given: list[Any]) -> Study:
     from tolstat.common.errors import StoreError
-    from tolstat.store import Reader
+    from tolstat.store import ResultFile
 
-    with Reader.open(source) as store:
+    with ResultFile.open(source) as store:
         if store.sampling["method"] != "subset":
             found = "is not a result file of tolstat rare"
             remedy = 'give the study: tolstat rare STUDY --limit "cross1.F > 900 N" --out FILE'

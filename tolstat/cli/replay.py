@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tolstat.cli._app import AsJson, AtPoint, ResultFile, announce_compilation, as_text
+from tolstat.cli._app import AsJson, AtPoint, ResultPath, announce_compilation, as_text
 from tolstat.cli._talk import progress, say
 from tolstat.cli.simulate import case_text, warn_unless_ok, write_trace
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def replay(
-    file: ResultFile,
+    file: ResultPath,
     row: Annotated[int, typer.Option("--row", metavar="I", min=0, help="Row of the joint in the campaign, from 0.")],
     out: Annotated[
         Path | None,
@@ -35,12 +35,12 @@ def replay(
     """
     from tolstat.campaign import replay as replays
     from tolstat.common.files import check_target
-    from tolstat.store import Reader
+    from tolstat.store import ResultFile
 
     if out is not None:
         check_target(out, file)
     announce_compilation()
-    with progress("simulation"), Reader.open(file) as store:
+    with progress("simulation"), ResultFile.open(file) as store:
         again = replays.replay(store.at(point) if point else store, row)
     summary = {"row": row, "equal": not again.differences, "differing": [d.name for d in again.differences]}
     summary |= again.result.summary()

@@ -11,7 +11,7 @@ import typer
 from tolstat.cli._app import (
     Accept,
     AtPoints,
-    ResultFile,
+    ResultPath,
     Wide,
     announce_compilation,
     make_folder,
@@ -26,7 +26,7 @@ PAGES = (".html", ".htm")
 
 
 def report(
-    file: ResultFile,
+    file: ResultPath,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -64,11 +64,11 @@ def report(
         return
     from tolstat.common.cores import available_cores
     from tolstat.report import build
-    from tolstat.store import Reader, recorded, viewed
+    from tolstat.store import ResultFile, recorded, viewed
 
     accepted = math.nan if accept is None else parse_share(accept)
     if out is not None:
-        Reader.open(file).close()  # check the file before the folder is created
+        ResultFile.open(file).close()  # check the file before the folder is created
         make_folder(out)
     with viewed(file) as view:
         with progress("report") as shown:
@@ -80,10 +80,10 @@ def report(
 
 def _page(file: Path, out: Path, accept: str | None, again: int | None, point: str) -> None:
     from tolstat.common.cores import available_cores
+    from tolstat.common.draw_records import DRAWN
     from tolstat.common.files import check_target
     from tolstat.report import page
     from tolstat.store import revolutions, viewed
-    from tolstat.store.methods import DRAWN
 
     faults: list[Fault] = []
     with gather(faults):

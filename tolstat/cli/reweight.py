@@ -12,7 +12,7 @@ from tolstat.cli._app import (
     AsJson,
     AtPoints,
     Delivery,
-    ResultFile,
+    ResultPath,
     StudyOption,
     Wide,
     as_text,
@@ -23,7 +23,7 @@ from tolstat.cli._talk import progress, say
 
 
 def reweight(
-    file: ResultFile,
+    file: ResultPath,
     settings: Annotated[
         list[str],
         typer.Option(
@@ -55,11 +55,11 @@ def reweight(
     from tolstat.display import text
     from tolstat.questions.reweight import rendering
     from tolstat.questions.reweight.query import reweighted
-    from tolstat.store import Reader, error_budget
+    from tolstat.store import ResultFile, error_budget
 
     if out is not None:
         check_target(out, file)
-    with progress("reweighting"), Reader.open(file) as store:
+    with progress("reweighting"), ResultFile.open(file) as store:
         view = store.view(study_file).at(point or "")
         found, unknown = reweighted(view, settings, delivery=delivery), error_budget.unknown(view)
     if out is not None:

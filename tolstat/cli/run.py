@@ -19,7 +19,8 @@ from tolstat.common.cores import available_cores
 from tolstat.common.errors import Fault, InputError, gather
 
 if TYPE_CHECKING:
-    from tolstat.store import Counts, Reader
+    from tolstat.common.counts import Counts
+    from tolstat.store import Reader
     from tolstat.study import Study
 
 SECONDS_PER_UNIT = {"s": 1.0, "min": 60.0, "h": 3600.0}
@@ -231,9 +232,9 @@ def conclude(path: Path, report: bool, wide: bool, study: str = "STUDY") -> None
     `study` is the study file as the user gave it, with its settings.
     """
     from tolstat.campaign.remedy import reasons
-    from tolstat.store import Reader
+    from tolstat.store import ResultFile
 
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         if report:
             with progress("report") as shown:
                 from tolstat.report import build
@@ -267,7 +268,7 @@ def _campaign(plan: Study, path: Path, **choices: Any) -> Counts:
 def _campaign_until(text: str, plan: Study, path: Path, **choices: Any) -> Counts:
     from tolstat.campaign import run as campaign
     from tolstat.campaign import stop_rule
-    from tolstat.store import Reader
+    from tolstat.store import ResultFile
 
     rule = stop_rule.parse(text, plan.limits)
     with progress() as shown:
@@ -281,5 +282,5 @@ def _campaign_until(text: str, plan: Study, path: Path, **choices: Any) -> Count
         f"{look.lower:.5f} to {look.upper:.5f} (failed and unsettled joints: below at its lower end, above at its "
         "upper end), valid after any number of looks; shares and intervals in the report are not corrected"
     )
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         return store.counts()

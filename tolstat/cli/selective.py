@@ -45,7 +45,7 @@ def selective(
     from tolstat.cli import run
     from tolstat.display import style, text
     from tolstat.questions.selective import query, rendering
-    from tolstat.store import Reader
+    from tolstat.store import ResultFile
 
     plans = [query.study_of(study_file, number, n) for number in sorted(set(classes or query.CLASSES))]
     make_folder(out)
@@ -55,7 +55,7 @@ def selective(
         paths.append(out / f"{study_file.stem}_k{plan.sampling.selective.classes}.h5")
         run.simulate(plan, paths[-1], execution=Execution(workers=workers))
     with progress("selective assembly"), ExitStack() as opened:
-        found = query.assembled([opened.enter_context(Reader.open(path)).view() for path in paths])
+        found = query.assembled([opened.enter_context(ResultFile.open(path)).view() for path in paths])
     with output_folder(out), style.settings():
         figure = Figure(figsize=(7.0, 3.6), layout="constrained")
         rendering.draw(figure.add_subplot(), found)

@@ -7,12 +7,12 @@ from typing import Annotated
 
 import typer
 
-from tolstat.cli._app import AsJson, AtPoints, ResultFile, StudyOption, Wide, as_text, print_table
+from tolstat.cli._app import AsJson, AtPoints, ResultPath, StudyOption, Wide, as_text, print_table
 from tolstat.cli._talk import progress
 
 
 def sorting(
-    file: ResultFile,
+    file: ResultPath,
     costs: Annotated[
         Path | None,
         typer.Option(
@@ -39,9 +39,9 @@ def sorting(
     from tolstat.display import text
     from tolstat.questions.sorting import rendering
     from tolstat.questions.sorting.query import sorted_joints
-    from tolstat.store import Reader
+    from tolstat.store import ResultFile
 
-    with progress("yield and cost"), Reader.open(file) as store:
+    with progress("yield and cost"), ResultFile.open(file) as store:
         found = sorted_joints(store.view(study_file).at(point or ""), costs)
     if as_json:
         typer.echo(as_text({"parts": text.records(found.parts), "stages": text.records(found.stages)}))

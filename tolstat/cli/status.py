@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from tolstat.cli._app import AsJson, ResultFile, Wide, as_text, print_table
+from tolstat.cli._app import AsJson, ResultPath, Wide, as_text, print_table
 from tolstat.cli._talk import progress, wrapped
 
 if TYPE_CHECKING:
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from tolstat.store import Reader
 
 
-def status(file: ResultFile, wide: Wide = False, as_json: AsJson = False) -> None:
+def status(file: ResultPath, wide: Wide = False, as_json: AsJson = False) -> None:
     """Print the number of joints by status.
 
     Prints the number of joints, why joints have no valid load and what to do, and the share of joints above each limit
@@ -28,9 +28,9 @@ def status(file: ResultFile, wide: Wide = False, as_json: AsJson = False) -> Non
     Example: tolstat status iso2768_f.h5
     """
     from tolstat.campaign.remedy import reasons
-    from tolstat.store import Reader
+    from tolstat.store import ResultFile
 
-    with progress("reading the file"), Reader.open(file) as store:
+    with progress("reading the file"), ResultFile.open(file) as store:
         summary, states = _summary(store)
         why = reasons(store, states)
     if as_json:
@@ -88,7 +88,7 @@ def _summary(store: Reader) -> tuple[dict[str, Any], dict[str, NDArray[np.uint8]
     from tolstat.common.loads import load_of, split
     from tolstat.common.tables import Status
     from tolstat.store import worst
-    from tolstat.store.result_file import BLOCK
+    from tolstat.store.hdf5 import BLOCK
     from tolstat.study.points import names_of
 
     each = {one.point or "": one for one in store.each()}

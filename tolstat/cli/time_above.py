@@ -7,12 +7,12 @@ from typing import Annotated
 
 import typer
 
-from tolstat.cli._app import AsJson, AtPoint, ResultFile, Wide, as_text, make_folder, output_folder, print_table
+from tolstat.cli._app import AsJson, AtPoint, ResultPath, Wide, as_text, make_folder, output_folder, print_table
 from tolstat.cli._talk import progress, say
 
 
 def time_above(
-    file: ResultFile,
+    file: ResultPath,
     by: Annotated[
         list[str] | None,
         typer.Option(
@@ -43,9 +43,9 @@ def time_above(
     """
     from tolstat.display import text
     from tolstat.questions.time_above import query, rendering
-    from tolstat.store import Reader
+    from tolstat.store import ResultFile
 
-    with progress("time above the levels"), Reader.open(file) as store:
+    with progress("time above the levels"), ResultFile.open(file) as store:
         found = query.time_above(store.view().at(point or ""), by or (), level or (), curves=out is not None)
     if as_json:
         summary = {"joints": found.joints, "left_out": found.left_out, "loads": text.records(found.table)}

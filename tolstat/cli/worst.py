@@ -6,12 +6,12 @@ from typing import Annotated
 
 import typer
 
-from tolstat.cli._app import AsJson, AtPoints, ByOne, ResultFile, StudyOption, Wide, as_text, print_table
+from tolstat.cli._app import AsJson, AtPoints, ByOne, ResultPath, StudyOption, Wide, as_text, print_table
 from tolstat.cli._talk import progress, say
 
 
 def worst(
-    file: ResultFile,
+    file: ResultPath,
     by: ByOne = None,
     top: Annotated[int, typer.Option("--top", metavar="N", min=1, help="Number of joints to list.")] = 10,
     point: AtPoints = None,
@@ -28,9 +28,9 @@ def worst(
     """
     from tolstat.questions.causes import rendering
     from tolstat.questions.causes.tail import worst_joints
-    from tolstat.store import Reader
+    from tolstat.store import ResultFile
 
-    with progress("worst joints"), Reader.open(file) as store:
+    with progress("worst joints"), ResultFile.open(file) as store:
         view = store.view(study_file).at(point or "")
         found = worst_joints(view, by or view.most_exceeded, top)
     if as_json:

@@ -1,4 +1,4 @@
-"""Tables of how each joint was drawn, for the sampling methods that need one (`importance`, `subset`).
+"""Sampling methods, and tables of how each joint was drawn for those that need one (`importance`, `subset`).
 
 The result file keeps them in the group ``origin``; row i is joint i.
 """
@@ -26,6 +26,18 @@ SUBSET_FIELDS = (
 FIELDS: dict[str, tuple[Field, ...]] = {"importance": IMPORTANCE_FIELDS, "subset": SUBSET_FIELDS}
 """Columns of the table by sampling method; other methods have no such table."""
 IMPORTANCE, SUBSET = dtype_of(IMPORTANCE_FIELDS), dtype_of(SUBSET_FIELDS)
+
+METHODS = {
+    "random": "random sampling",
+    "sobol": "Sobol' points",
+    "lhs": "Latin hypercube",
+    "sweep": "sweep",
+    "importance": "importance sampling",
+    "pick_freeze": "pick-freeze design",
+}
+"""Sampling methods in words."""
+DRAWN = ("random", "sobol", "lhs")
+"""Sampling methods that draw every joint from the tolerances, all with the same weight."""
 
 
 def columns(sampling: Mapping[str, Any]) -> tuple[Column, ...]:

@@ -18,7 +18,7 @@ from tolstat.common.fields import Field, dtype_of
 from tolstat.common.load_kinds import JOINT, LOAD_KINDS, OVER, PINS
 from tolstat.common.parameters import PARAM_FIELDS
 
-SCHEMA_VERSION = 8
+SCHEMA_VERSION = 9
 """Version of the result file: raise it with every change of its layout, and so of the fields of errors and results."""
 HOLES = tuple(f"hole{i}" for i in (1, 2, 3, 4))
 STEPS_PER_ITERATION = 5
@@ -276,7 +276,6 @@ RESULT_FIELDS = (
     Field("newton_iterations", "1", "Newton iterations", "i4"),
     Field("halvings", "1", "times that a step was halved; quasistatic: angles that Newton's iteration missed", "i4"),
     Field("factorisations", "1", "times that the tangent was factorised", "i4"),
-    # the order of the columns enters the checksums of rows
     *(field for kind in LOAD_KINDS if kind.places != JOINT for field in kind.statistics().values()),
     Field(
         "mode_share",
@@ -313,11 +312,8 @@ DESIGN_FIELDS = (
 
 LEDGER_FIELDS = (
     Field("attempt", "1", "what gave the results: 0 the study's settings, k those of entry k - 1 of `retries`", "i4"),
-    Field("errors_check", "1", "checksum of the joint's row, errors and design", "u8"),
-    Field("attempt_check", "1", "checksum of `errors_check` and `attempt`: also pending joints have it", "u8"),
-    Field("results_check", "1", "checksum of `errors_check`, `attempt` and the joint's results, status included", "u8"),
 )
-"""Origin of each joint's results, and checksums of its rows."""
+"""Origin of each joint's results."""
 
 DESIGN = dtype_of(DESIGN_FIELDS)
 ERROR = dtype_of(ERROR_FIELDS)

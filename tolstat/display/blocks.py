@@ -143,7 +143,7 @@ class Panels:
 
 
 @dataclass(frozen=True)
-class Reader:
+class ResultFile:
     """Interactive tool that shows the exceedance at a chosen load.
 
     Attributes
@@ -176,7 +176,7 @@ class Listing:
     text: str
 
 
-Block = Text | Decision | Table | Panels | Reader | Facts | Listing
+Block = Text | Decision | Table | Panels | ResultFile | Facts | Listing
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ from tolstat.display.asked import silent
 from tolstat.display.table import WIDTH
 from tolstat.joint.mounting import in_words
 from tolstat.solver import fidelity
-from tolstat.store import Reader, recorded, viewed
+from tolstat.store import Reader, ResultFile, known_parts, recorded, viewed
 from tolstat.store.view import View
 
 
@@ -44,7 +44,7 @@ class Report(NamedTuple):
     files: list[Path]
 
 
-def write_report(source: str | Path | Reader | View, out_dir: str | Path | None = None) -> list[Path]:
+def write_report(source: str | Path | ResultFile | View, out_dir: str | Path | None = None) -> list[Path]:
     """Write the report of a result file; see `build`.
 
     Returns
@@ -56,7 +56,7 @@ def write_report(source: str | Path | Reader | View, out_dir: str | Path | None 
 
 
 def build(
-    source: str | Path | Reader | View,
+    source: str | Path | ResultFile | View,
     out_dir: str | Path | None = None,
     width: int | None = WIDTH,
     stage: Callable[[str], None] = silent,
@@ -74,7 +74,7 @@ def build(
 
     Parameters
     ----------
-    source : str, Path, Reader or View
+    source : str, Path, ResultFile or View
         The result file: its path, what `tolstat.open` returns, or a view.
     out_dir : str or Path, optional
         Folder, made if missing; by default that of the file.
@@ -180,7 +180,7 @@ def _numbers(view: View, stem: Path, width: int | None, accepted: float) -> Repo
         if points := query.point_rows(view):
             shown += f"\n\n{rendering.AT_POINTS}\n{table.as_text(rendering.at_points(view), points, width)}"
     shown = _headed(shown, view.store, width, verdict.sentence if verdict else "")
-    if verdict and verdict.answer and not view.weighted and view.known is None and view.count(*VALID):
+    if verdict and verdict.answer and not view.weighted and known_parts.of(view) is None and view.count(*VALID):
         kept = capabilities.together(capability.limit_rows(view))
         shown += f"\n\nyield: {kept.value} {kept.words}"
     notes = [*(verdict.notes if verdict else ()), more, view.head(), rendering.note(view), _accuracy(view)]

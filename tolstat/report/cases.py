@@ -28,7 +28,7 @@ def table(store: Reader) -> pd.DataFrame:
 
     Parameters
     ----------
-    store : Reader
+    store : ResultFile
         File of a study whose method is ``cases``.
 
     Returns
@@ -69,7 +69,7 @@ def reference(store: Reader) -> dict[str, object]:
 
     Parameters
     ----------
-    store : Reader
+    store : ResultFile
         File of the study.
 
     Returns

@@ -16,8 +16,9 @@ from tolstat.questions.capability import query as capability
 from tolstat.questions.capability import rendering as capabilities
 from tolstat.questions.exceedance import query as exceedance
 from tolstat.questions.joints import query as joints
+from tolstat.store import known_parts
+from tolstat.store.points import point_of
 from tolstat.store.view import View
-from tolstat.store.worst import point_of
 
 WORDS = {
     "yes": "kept",
@@ -231,7 +232,7 @@ def _limit(view: View, row: Row) -> str:
 def _yield(view: View, records: Sequence[Row]) -> Headline:
     """Without an accepted share: share of the joints that keep all limits; of weighted joints, that exceed any."""
     notes: tuple[str, ...] = () if view.has_intervals else (without_interval(view.method),)
-    if view.weighted or view.known is not None:
+    if view.weighted or known_parts.of(view) is not None:
         row, worst = _decisive(view, records), exceedance.most_exceeded(view, records)
         if np.isnan(row["estimate"]):
             known = [own for own in records if not np.isnan(own["estimate"])]
@@ -266,10 +267,11 @@ def _reason(view: View, records: Sequence[Row]) -> str:
     if poor:
         trust = view.load(poor[0]["load"]).trust(poor[0]["level"])
         return f"few joints have most of the weight above {text.limit(poor[0])} (Pareto k {trust.k:.2f}, 0.7 allowed)"
-    if view.known is not None and np.isnan(ends(records[0])[0]):
+    known = known_parts.of(view)
+    if known is not None and np.isnan(ends(records[0])[0]):
         unsupported = text.percent(records[0]["unsupported"])
         found = f"the joints do not support {unsupported} of the processes that the measured parts leave open"
-        return f"{found}. {view.known.remedy}"
+        return f"{found}. {known.remedy}"
     if _matter(records):
         what = "valid result" if view.count(*UNSETTLED) else "result"
         return f"{text.percent(lost / n)} of the joints have no {what} ({lost} of {n})"

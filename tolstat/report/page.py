@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,6 +10,7 @@ import numpy as np
 
 from tolstat import questions
 from tolstat.common.errors import Fault, StoreError
+from tolstat.common.tables import SCHEMA_VERSION
 from tolstat.display.asked import Asked, silent
 from tolstat.display.blocks import Facts, Listing, Page, Section
 from tolstat.display.text import sentence
@@ -18,10 +18,8 @@ from tolstat.joint.mounting import in_words
 from tolstat.questions.causes import ahead
 from tolstat.solver import fidelity
 from tolstat.store import recorded, viewed
-from tolstat.store.integrity import DIGEST
+from tolstat.store.points import point_of
 from tolstat.store.recorded import joint_of
-from tolstat.store.result_file import BLOCK
-from tolstat.store.worst import point_of
 
 if TYPE_CHECKING:
     from tolstat.store.reader import Reader
@@ -32,7 +30,7 @@ REPLAYED = 1000
 
 
 def write_page(
-    source: str | Path | Reader | View,
+    source: str | Path | ResultFile | View,
     out: str | Path,
     accepted: float = np.nan,
     replay: int = REPLAYED,
@@ -44,7 +42,7 @@ def write_page(
 
     Parameters
     ----------
-    source : str, Path, Reader or View
+    source : str, Path, ResultFile or View
         The result file of a study that draws its joints or sweeps: its path, what `tolstat.open` returns, or a view.
     out : str or Path
         HTML file to write.
@@ -126,7 +124,6 @@ def _stopped(view: View) -> str:
 
 def _facts(store: Reader) -> Iterator[tuple[str, str]]:
     """Provenance of the numbers, as names and values."""
-    attributes = store.attributes()
     yield "Study", store.study_name
     rows = f"{store.n}" if store.whole else f"{store.rows[0]} to {store.rows[-1]} of {store.campaign_rows}"
     yield "Rows of the campaign", rows
@@ -136,19 +133,8 @@ def _facts(store: Reader) -> Iterator[tuple[str, str]]:
     yield "Begun", store.created
     yield "Versions", ", ".join(f"{name} {value}" for name, value in store.versions.items() if name != "sources")
     yield "Code", f"{store.git_commit or 'no commit known'}; sources {store.versions.get('sources', 'unknown')}"
-    digest = attributes.get(DIGEST)
-    yield "Result file", f"schema {attributes['schema_version']}, attributes {digest or 'without checksum'}"
-    if digest:
-        yield "Checksum of the results", results_digest(store)
+    yield "Result file", f"schema {SCHEMA_VERSION}"
+    yield "Checksum of the results", store.results_checksum() or "none while a run is under way, or was killed"
     yield "Solver", ", ".join(f"{name} {value}" for name, value in store.options.items())
     for k, retry in enumerate(store.retries, 1):
         yield f"Retry {k}", ", ".join(f"{name} {value}" for name, value in retry.get("settings", {}).items())
-
-
-def results_digest(store: Reader) -> str:
-    """SHA-256 over the checksums of all rows, point by point: equal for files with the same joints and results."""
-    digest = hashlib.sha256()
-    for one in store.each():
-        for first in range(0, store.n, BLOCK):
-            digest.update(one.column("ledger", "results_check", slice(first, first + BLOCK)).tobytes())
-    return digest.hexdigest()

@@ -8,6 +8,7 @@ from functools import partial
 import numpy as np
 from matplotlib.axes import Axes
 
+from tolstat.common.draw_records import METHODS
 from tolstat.common.loads import load_of
 from tolstat.common.tables import VALID
 from tolstat.display import drawing, style, text
@@ -22,7 +23,7 @@ from tolstat.questions.exceedance.curves_figure import LIMIT_DASH
 from tolstat.questions.exceedance.rendering import AT_POINTS, LIMITS, above, at_points
 from tolstat.questions.show import section as show
 from tolstat.report.headline import WORDS, Headline, ends, headline, share_of, verdict
-from tolstat.store.methods import METHODS
+from tolstat.store import known_parts
 from tolstat.store.view import View
 
 
@@ -75,7 +76,7 @@ def _points(view: View) -> list[Table]:
     for part in view.parts:
         point = part.store.points[part.points[0]]
         row = {"point": point.name, "operation": point._replace(share=np.nan).in_words, "share": point.share}
-        if part.sampled and not part.weighted and part.known is None and part.limits and part.count(*VALID):
+        if part.sampled and not part.weighted and known_parts.of(part) is None and part.limits and part.count(*VALID):
             found = capabilities.together(capability.limit_rows(part))
             row |= {"kept": found.value if found.decides else WORDS["none"]}
         rows.append(row)
@@ -113,7 +114,7 @@ def _answer(view: View, found: Headline | None) -> Card:
 def _cards(view: View, found: Headline | None) -> list[Card]:
     """Unless the verdict says it, the yield and the limit exceeded most; next delivery, number of joints, errors."""
     cards = []
-    if found is not None and not view.weighted and view.known is None and view.count(*VALID):
+    if found is not None and not view.weighted and known_parts.of(view) is None and view.count(*VALID):
         rows = capability.limit_rows(view)
         if found.answer:
             together = capabilities.together(rows)
@@ -161,7 +162,7 @@ def _how(view: View, asked: Asked) -> list[str]:
         "Grey: the total interval. Failed and unsettled joints are counted below the limit at its lower end and above "
         "it at its upper end; it covers the numerical error, too, where it is known.",
     ]
-    if view.known is not None:
+    if known_parts.of(view) is not None:
         paragraphs.append("Grey covers what the measured parts leave open of the process, too.")
     if len(view.points) > 1:
         paragraphs.append("A limit that names no operating point is about the largest load over all of them.")

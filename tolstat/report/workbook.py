@@ -14,12 +14,12 @@ from tolstat.common.loads import load_of
 from tolstat.display.text import cell
 from tolstat.questions.exceedance.query import limits
 from tolstat.store import Reader
-from tolstat.store.frame import described
+from tolstat.store.result_file import described
+from tolstat.store.view import View
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from tolstat.store.view import View
 
 MAX_ROWS = 1_048_575
 """Number of joints that a sheet of Excel can hold below its heading."""
@@ -49,10 +49,10 @@ def write(store: Reader, frame: pd.DataFrame, path: Path) -> None:
 
     Parameters
     ----------
-    store : Reader
+    store : ResultFile
         The campaign.
     frame : DataFrame
-        Its joints, as `Reader.to_pandas` returns them: sheet ``joints``, SI units.
+        Its joints, as `ResultFile.to_pandas` returns them: sheet ``joints``, SI units.
     path : Path
         File to write. Sheet ``limits`` has the share of the joints with a valid load above each limit, and its
         interval (empty unless joints are independent samples); sheet ``units`` has unit and meaning of each column.
@@ -62,7 +62,7 @@ def write(store: Reader, frame: pd.DataFrame, path: Path) -> None:
     book, columns = Workbook(write_only=True), described(store)
     joints = zip(frame.index.tolist(), *(frame[name].tolist() for name in frame), strict=True)
     _sheet(book, "joints", ["row", *map(str, frame.columns)], joints)
-    _sheet(book, "limits", LIMITS, _limits(store.view()))
+    _sheet(book, "limits", LIMITS, _limits(View(store)))
     meanings = {name: column.description for name, column in columns.items()}
     units = ((name, unit, meanings.get(name, "")) for name, unit in frame.attrs["units"].items())
     _sheet(book, "units", ("column", "unit", "meaning"), units)

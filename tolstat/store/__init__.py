@@ -1,8 +1,8 @@
 """The result file of a campaign: stores tables, contains no physics."""
 
-from tolstat.store.counts import Counts
 from tolstat.store.reader import Reader
-from tolstat.store.result_store import ResultStore
-from tolstat.store.sources import viewed
+from tolstat.store.result_file import ResultFile, viewed
+from tolstat.store.view import View
+from tolstat.store.writer import Writer
 
-__all__ = ["Counts", "Reader", "ResultStore", "viewed"]
+__all__ = ["Reader", "ResultFile", "View", "Writer", "viewed"]

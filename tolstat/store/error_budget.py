@@ -5,19 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tolstat.analysis import prediction
 from tolstat.analysis.accuracy import LEAST_NEAR, OBSERVABLES, corrected, corrections, size
 from tolstat.common.loads import ALL_LIMITS, ANY_LIMIT, LOADS, FloatArray
-from tolstat.store.once import once
-from tolstat.store.sample_load import SampleLoad, frozen
-from tolstat.store.several_loads import largest_of, together
-
-if TYPE_CHECKING:
-    from tolstat.store.view import View
+from tolstat.common.once import once
+from tolstat.store.sample_load import SampleLoad, frozen, largest_of
+from tolstat.store.view import View
 
 
 def shifted(view: View, load: SampleLoad) -> tuple[SampleLoad, SampleLoad] | None:
@@ -97,7 +93,7 @@ def _together(
 
 def unknown(view: View) -> str:
     """Words on the numerical error near the limits of the study if it is not known; empty if it is."""
-    if not view.limits or near(view, together(view)) is not None:
+    if not view.limits or near(view, view.together) is not None:
         return ""
     return command(view.path)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,23 +13,23 @@ from tolstat.analysis.known_share import Event, KnownShare, Mixture
 from tolstat.analysis.process import Known, Sums
 from tolstat.analysis.weighted import Split
 from tolstat.common.loads import ALL_LIMITS
+from tolstat.common.once import once
 from tolstat.common.tables import Status
 from tolstat.store import error_budget
-from tolstat.store.recall import mentions
+from tolstat.store.recorded import mentions
+from tolstat.store.sample_load import SampleLoad
+from tolstat.store.view import View
 from tolstat.study import known
 from tolstat.study.axes import streams_of
 from tolstat.study.known import KnownEntry
 from tolstat.study.proposal import Proposal
 from tolstat.study.tolerances.distributions import score
 
-if TYPE_CHECKING:
-    from tolstat.store.sample_load import SampleLoad
-    from tolstat.store.view import View
-
 KEYS = ("known_from", "law")
 """Keys of an entry of ``[tolerances]`` that is known from measured parts."""
 
 
+@once
 def of(view: View) -> KnownParts | None:
     """Read what a file's study knows of its processes; None if it takes its tolerances as exact."""
     if not (view.sampled and view.limits and mentions(view.store, KEYS, "tolerances")):

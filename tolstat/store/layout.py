@@ -1,184 +1,327 @@
-"""Layout of a result file: each object is reached by hard links and stored as this package writes it.
-
-Checked before anything is read, so that no link leads to another file, no filter or virtual dataset enlarges what is
-read, and no length that a file states is used to allocate memory before the file is known to hold that many bytes. The
-functions of HDF5 are called directly: a file has some 200 datasets, and h5py's objects would take a second for them.
-"""
+"""Layout of a result file (docs/result_format.md): its datasets, which follow from the metadata, and a new file."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from typing import NamedTuple, TypeAlias
+import re
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from enum import IntEnum
+from typing import Any, NamedTuple
 
 import h5py
 import numpy as np
-from h5py import h5a, h5d, h5f, h5g, h5l, h5o, h5t, h5z
+from h5py import h5d, h5ds, h5p, h5s, h5t
+from numpy.typing import NDArray
 
-ObjectID: TypeAlias = h5d.DatasetID | h5g.GroupID
+from tolstat.common import draw_records, selected_results
+from tolstat.common.channels import BUSHING_LOADS, MEASURING, SHAFT_LOADS, LoadHistory, channels_of
+from tolstat.common.columns import DESIGN_COLUMNS, ERROR_COLUMNS, LEDGER_COLUMNS, Column
+from tolstat.common.load_kinds import BUSHINGS, CONTACTS, PINS, SHAFTS
+from tolstat.common.tables import SCHEMA_VERSION, HistorySpec, Mode, Motion, Status
+from tolstat.store import metadata as documents
+from tolstat.store.hdf5 import BLOCK, put, put_attributes, put_text
+from tolstat.store.metadata import Metadata
 
-FILTERS = [h5z.FILTER_SHUFFLE, h5z.FILTER_DEFLATE]
-"""Filters of histories, in their order; other datasets have none."""
-MAX_COMPRESSION = 1100
-"""Largest compression ratio accepted (deflate cannot exceed 1032): a dataset that claims more is incomplete."""
-MAX_OBJECTS = 100_000
-"""Largest number of links in a file: each operating point of a campaign has some 200."""
-MAX_LEVELS = 6
-"""Largest number of groups inside each other: ``points/NAME/verify/CHECK`` has four."""
-OF_SCALES = (b"DIMENSION_LIST", b"REFERENCE_LIST")
-"""Attributes in which HDF5 itself keeps references, for dimension scales; nothing follows them."""
-HISTORIES = "histories"
-"""Name of the groups whose datasets are compressed; there are texts among them, the names along an axis."""
-WHAT_IF = "what_if"
-"""Group whose sets have the names of their loads as texts."""
+FILETYPE = "tolstat campaign"
+COLUMN_OVERHEAD = 800
+"""Bytes that HDF5 needs per column beside its values."""
+ABOUT = "Monte Carlo campaign of Cardan joints: row i is joint i in every dataset, SI units throughout"
+"""Description of the whole file."""
+GROUPS = {
+    "design": "which of the listed joints each row is",
+    "origin": "how each joint was drawn, where not from the tolerances alone",
+    "errors": "errors of each joint, those of the operating point among them, drawn before anything was simulated",
+    "points": "results of the same joints at each operating point",
+    "results": "status, diagnostics and loads of each joint; NaN where there are none",
+    "ledger": "what gave the results of each joint",
+    "histories": "loads of each joint over its last revolution, or what follows from them; NaN where there are none",
+    "session": "the run under way",
+    "what_if": "largest loads of joints with other tolerances, drawn with the seed of the campaign",
+}
+"""Description of each group; `what_if` comes later, the others are in a new file if it needs them."""
+AT_POINTS = ("results", "ledger", "histories")
+"""Groups that a file has once for each operating point."""
+SESSION = {
+    "number": ("i8", "1", "odd from the first write of a run until it has written the checksums of the results"),
+    "started": ("f8", "seconds since 1970-01-01 00:00:00", "start of the run under way; NaN where none is"),
+    "done": ("i8", "1", "joints that were done when it started"),
+}
+"""Type, unit and description of each dataset of the group ``session``."""
+LINKED = ("row", "nominal")
+"""Datasets of the file that every group with joints has as links: number of each row, mark of the nominal joint."""
 
 
 class Stored(NamedTuple):
-    """Shape and HDF5 type of a dataset."""
+    """A dataset with a row for each joint: its path in the file, type and shape."""
 
+    path: str
+    dtype: np.dtype[Any]
     shape: tuple[int, ...]
-    type: h5t.TypeID
 
-    def __str__(self) -> str:
-        return f"{self.shape} of {self.type.dtype}"
-
-
-class Layout(NamedTuple):
-    """What one walk through a file finds.
-
-    Attributes
-    ----------
-    values : list of (str, str, str)
-        What `values` returns.
-    datasets : dict of str to Stored
-        Datasets by path, such as ``/results/status``.
-    """
-
-    values: list[tuple[str, str, str]]
-    datasets: dict[str, Stored]
+    @property
+    def row_bytes(self) -> int:
+        """Bytes of a row."""
+        return self.dtype.itemsize * math.prod(self.shape[1:])
 
 
-def check(file: h5py.File, compressed: str = HISTORIES) -> Layout:
-    """Check the layout of a whole file; its attributes are read in the same walk.
+def place_of(point: str) -> str:
+    """Path of the group that holds `AT_POINTS` of an operating point: the root for the one without a name."""
+    return f"points/{point}" if point else ""
+
+
+def path_of(point: str, group: str, name: str) -> str:
+    """Path of a dataset; `point` matters for the groups `AT_POINTS` only."""
+    place = place_of(point) if group in AT_POINTS else ""
+    return "/".join(part for part in (place, group, name) if part)
+
+
+def is_at_point(path: str) -> bool:
+    """Whether a dataset belongs to an operating point: to results, ledger or histories."""
+    return path.split("/")[-2] in AT_POINTS
+
+
+def columns(metadata: Metadata) -> dict[str, tuple[Column, ...]]:
+    """Columns of each group that a file has, by group."""
+    own = {"errors": ERROR_COLUMNS}
+    if metadata.design.variants:
+        own["design"] = DESIGN_COLUMNS
+    if drawn := draw_records.columns(metadata.sampling):
+        own["origin"] = drawn
+    return own | {"results": selected_results.columns(metadata.identity), "ledger": LEDGER_COLUMNS}
+
+
+def datasets(metadata: Metadata) -> list[Stored]:
+    """All datasets with a checksum: first those that are complete in a new file, then those of each operating point."""
+    n, held = metadata.n, columns(metadata)
+    at_points = {group: held.pop(group) for group in AT_POINTS if group in held}
+    found = [Stored(path_of("", g, c.name), np.dtype(c.dtype), (n,)) for g, own in held.items() for c in own]
+    for point in metadata.points:
+        found += [
+            Stored(path_of(point, g, c.name), np.dtype(c.dtype), (n,)) for g, own in at_points.items() for c in own
+        ]
+        found += [
+            Stored(path_of(point, "histories", name), np.dtype(spec.dtype), (n, *spec.shape))
+            for name, spec in metadata.histories.items()
+        ]
+    return found
+
+
+def size_of(metadata: Metadata) -> int:
+    """Approximate upper bound on the size of a new file, bytes, without its metadata."""
+    stored = datasets(metadata)
+    return sum(one.shape[0] * one.row_bytes for one in stored) + COLUMN_OVERHEAD * len(stored)
+
+
+def create(
+    file: h5py.File,
+    metadata: Metadata,
+    errors: Iterable[NDArray[np.void]],
+    design: NDArray[np.void] | None = None,
+    origin: Iterable[NDArray[np.void]] | None = None,
+) -> None:
+    """Fill an empty file, all rows pending; the checksums are not in it yet.
 
     Parameters
     ----------
     file : h5py.File
         The file.
-    compressed : str
-        Name of the groups whose datasets may be compressed; empty for the root.
-
-    Raises
-    ------
-    ValueError
-        With the first object that is linked from elsewhere, or stored otherwise than this package does.
+    metadata : Metadata
+        What it says of itself.
+    errors : iterable of table ERROR
+        Errors of its rows, in consecutive blocks.
+    design : (n,) table DESIGN, optional
+        Variant, case and group of each row, for a study that lists its joints.
+    origin : iterable of tables, optional
+        How each row was drawn, in consecutive blocks, for methods that have `draw_records.columns`.
     """
-    size = file.id.get_filesize()
-    found = Layout([], {})
-    for path, held in objects(file):
-        if isinstance(held, h5d.DatasetID):
-            parts = path.split("/")
-            inside = parts[-2] == compressed
-            named = inside or (parts[1], parts[-1]) == (WHAT_IF, "load")
-            found.datasets[path] = _check_dataset(path, held, size, inside, named)
-        for name, attribute in _attributes(held):
-            stored = attribute.get_type()
-            if stored.get_class() not in (h5t.STRING, h5t.INTEGER, h5t.FLOAT):
-                raise ValueError(f"attribute {name} of {path} is neither text nor number")
-            found.values.append((path, name, _value(attribute, stored)))
-    return found
+    n, first, codes, held = metadata.n, metadata.first_row, meanings_of(metadata), columns(metadata)
+    put_attributes(file, {"filetype": FILETYPE, "schema_version": SCHEMA_VERSION, "description": ABOUT})
+    documents.write(file, metadata)
+    row = file.create_dataset("row", (n,), "i8", dcpl=_allocated(None))
+    for begin in range(0, n, BLOCK):
+        row[begin : begin + BLOCK] = np.arange(first + begin, first + min(begin + BLOCK, n))
+    row.make_scale("row")
+    put_attributes(row, {"units": "1", "description": "row of the campaign: the joint's number"})
+    marked = int(bool(metadata.sampling["nominal_first"]) and first == 0)
+    nominal = file.create_dataset("nominal", data=np.arange(n) < marked, dtype="u1")
+    nominal.dims[0].attach_scale(row)
+    put_attributes(nominal, {"units": "1", "description": "1 for the nominal joint, which is no sample"})
+    put_meanings(nominal, MEANINGS["nominal"])
+    given = {"errors": errors, "design": None if design is None else [design], "origin": origin}
+    for group, blocks in given.items():
+        if (group in held) != (blocks is not None):
+            raise ValueError(f"{group} must be given for the campaigns that have it, only")
+        if blocks is not None:
+            create_table(file, group, held[group], n, blocks, codes)
+    for point in metadata.points:
+        place = file.require_group(place_of(point) or "/")
+        for group in ("results", "ledger"):
+            create_table(place, group, held[group], n, codes=codes)
+        if metadata.histories:
+            _create_histories(place, metadata)
+    session = file.create_group("session")
+    for name, (dtype, unit, description) in SESSION.items():
+        blank = np.nan if dtype == "f8" else int(name == "number")
+        dataset = session.create_dataset(name, data=np.array(blank, dtype))  # written now, so that its place is fixed
+        put_attributes(dataset, {"units": unit, "description": description})
+    for group in (file, *(file[place_of(point) or "/"] for point in metadata.points)):
+        for name in GROUPS.keys() & group.keys():
+            put_attributes(group[name], {"description": GROUPS[name]})
 
 
-def values(file: h5py.File) -> list[tuple[str, str, str]]:
-    """Path, name and value as text of each attribute of a file, in an order that does not depend on how it was made."""
-    return [
-        (path, name, _value(attribute, attribute.get_type()))
-        for path, held in objects(file)
-        for name, attribute in _attributes(held)
-    ]
+def create_table(
+    holder: h5py.Group,
+    name: str,
+    columns: tuple[Column, ...],
+    n: int,
+    blocks: Iterable[NDArray[np.void]] | None = None,
+    codes: Mapping[str, Mapping[int, str]] | None = None,
+    scale: h5py.Dataset | None = None,
+) -> None:
+    """Create a table: one contiguous dataset per column, which can be overwritten in place.
 
-
-def objects(holder: h5py.Group) -> Iterator[tuple[str, ObjectID]]:
-    """Yield path and identifier of a group and of everything in it, sorted by path; each link must be a hard one.
-
-    Raises
-    ------
-    ValueError
-        For another link, a group with two links, or more objects or levels than a campaign has.
+    Parameters
+    ----------
+    holder : h5py.Group
+        Group that the table is made in, of a file with ``row`` and ``nominal``.
+    name : str
+        Group of the datasets.
+    columns : tuple of Column
+        Columns of the table.
+    n : int
+        Number of rows.
+    blocks : iterable of structured array, optional
+        Values, in consecutive blocks of rows; without them floats are NaN and integers 0.
+    codes : mapping, optional
+        Meanings of the columns that hold codes, by name; `MEANINGS` without it.
+    scale : h5py.Dataset, optional
+        Dimension scale of the rows; ``row`` of the file without it, which the group then has with ``nominal``.
     """
-    yield "/", holder.id
-    yield from _inside(holder.id, "", 0, {h5o.get_info(holder.id).addr}, [0])
+    group, row = holder.create_group(name), scale or holder.file["row"]
+    for link in LINKED if scale is None else ():
+        group[link] = holder.file[link]
+    if scale is not None:
+        group[scale.name.rpartition("/")[2]] = scale
+    extent, codes = h5s.create_simple((n,)), MEANINGS if codes is None else codes
+    blank = blocks is None
+    types = {c.dtype: (h5t.py_create(np.dtype(c.dtype), logical=True), _allocated(c.dtype, blank)) for c in columns}
+    for c in columns:
+        held = h5d.create(group.id, c.name.encode(), types[c.dtype][0], extent, types[c.dtype][1])
+        h5ds.attach_scale(held, row.id, 0)
+        put_text(held, "units", c.unit)
+        put_text(held, "description", c.description)
+        if c.name in codes:
+            put_meanings(h5py.Dataset(held), codes[c.name])
+    first = 0
+    for block in blocks or ():
+        put(group, np.arange(first, first + len(block)), {c.name: c.of(block) for c in columns})
+        first += len(block)
+    if blocks is not None and first != n:
+        raise ValueError(f"{first} rows of {name} given, {n} expected")
 
 
-def _inside(
-    group: h5g.GroupID, above: str, level: int, seen: set[int], count: list[int]
-) -> Iterator[tuple[str, ObjectID]]:
-    for name in sorted(group):
-        path = f"{above}/{name.decode('utf-8')}"
-        count[0] += 1
-        if count[0] > MAX_OBJECTS or level > MAX_LEVELS:
-            raise ValueError(f"{path} is one of more groups and datasets than a campaign has")
-        if group.links.get_info(name).type != h5l.TYPE_HARD:
-            raise ValueError(f"{path} is a link to another place")
-        held = h5o.open(group, name)
-        if not isinstance(held, (h5d.DatasetID, h5g.GroupID)):
-            raise ValueError(f"{path} is neither a dataset nor a group")
-        yield path, held
-        if isinstance(held, h5g.GroupID):
-            address = h5o.get_info(held).addr
-            if address in seen:
-                raise ValueError(f"{path} is a second link to a group")
-            seen.add(address)
-            yield from _inside(held, path, level + 1, seen, count)
+def _create_histories(place: h5py.Group, metadata: Metadata) -> None:
+    """Create the datasets of all histories at full size: a full disk is told before the first joint."""
+    group, row = place.create_group("histories"), place.file["row"]
+    for link in LINKED:
+        group[link] = place.file[link]
+    for name, spec in metadata.histories.items():
+        shape = (metadata.n, *spec.shape)
+        dataset = group.create_dataset(name, shape, spec.dtype, dcpl=_allocated(spec.dtype, blank=True))
+        put_attributes(dataset, {"units": spec.unit, "description": spec.description})
+        if name in MEANINGS:
+            put_meanings(dataset, MEANINGS[name])
+        attach_scales(dataset, row, spec)
 
 
-def _attributes(held: ObjectID | h5f.FileID) -> Iterator[tuple[str, h5a.AttrID]]:
-    """Yield the attributes of an object by name, sorted, but for those of dimension scales."""
-    names: list[bytes] = []
-    h5a.iterate(held, names.append)
-    for name in sorted(names):
-        if name not in OF_SCALES:
-            yield name.decode("utf-8"), h5a.open(held, name)
+def _allocated(dtype: str | None, blank: bool = False) -> h5p.PropDCID:
+    """Creation properties of a dataset that takes its space at once; with `blank`, floats are NaN and integers 0."""
+    properties = h5p.create(h5p.DATASET_CREATE)
+    properties.set_obj_track_times(False)  # as h5py has it: the same file has the same bytes
+    properties.set_alloc_time(h5d.ALLOC_TIME_EARLY)
+    properties.set_fill_time(h5d.FILL_TIME_ALLOC if blank else h5d.FILL_TIME_NEVER)
+    if blank:
+        properties.set_fill_value(np.array(np.nan if np.dtype(dtype).kind == "f" else 0, dtype))
+    return properties
 
 
-def _value(attribute: h5a.AttrID, stored: h5t.TypeID) -> str:
-    """Value of an attribute as text, independent of how HDF5 stores it: texts of fixed and variable length agree."""
-    if stored.get_class() == h5t.STRING and not stored.is_variable_str() and stored.get_strpad() == h5t.STR_NULLPAD:
-        # nearly all attributes: their bytes are read as they are, since h5py takes as long again to make a dtype
-        held = np.zeros(attribute.shape, f"S{stored.get_size()}")
-        attribute.read(held, mtype=stored)
-    else:
-        held = np.empty(attribute.shape, dtype=attribute.dtype)
-        attribute.read(held)
-    plain = held.tolist()
-    if isinstance(plain, bytes):
-        return plain.rstrip(b"\0").decode("utf-8")
-    return plain if isinstance(plain, str) else repr(plain)
+def _names(history: LoadHistory) -> tuple[str, ...]:
+    return tuple(channel.name for channel in channels_of(history))
 
 
-def _check_dataset(path: str, held: h5d.DatasetID, size: int, compressed: bool, texts: bool) -> Stored:
-    made = held.get_create_plist()
-    layout = made.get_layout()
-    if made.get_external_count() or layout == h5d.VIRTUAL:
-        raise ValueError(f"{path} has its data in another file")
-    filters = [made.get_filter(k)[0] for k in range(made.get_nfilters())]
-    stored_type = held.get_type()
-    itemsize = stored_type.get_size()  # h5py takes ten times as long to make a dtype
-    found = Stored(held.shape, stored_type)
-    nbytes = itemsize * math.prod(found.shape)
-    if compressed and layout == h5d.CHUNKED:
-        if filters != FILTERS:
-            raise ValueError(f"{path} is not compressed as histories are")
-        chunk = itemsize * math.prod(made.get_chunk())
-        if max(nbytes, chunk) > MAX_COMPRESSION * held.get_storage_size():
-            raise ValueError(f"{path} is incomplete")
-        return found
-    if layout != h5d.CONTIGUOUS or filters:
-        raise ValueError(f"{path} is not stored contiguously")
-    kind = stored_type.get_class()
-    if kind not in (h5t.INTEGER, h5t.FLOAT) and not (texts and kind == h5t.STRING):
-        raise ValueError(f"{path} does not hold numbers")
-    offset, stored = held.get_offset(), held.get_storage_size()
-    if offset is None or stored < nbytes or offset + stored > size:
-        raise ValueError(f"{path} reaches beyond the end of the file")
-    return found
+AXES: dict[str, tuple[tuple[str, ...], str]] = {
+    "bushing": (BUSHINGS, "bushing"),
+    "component": (BUSHING_LOADS.components, "force F (N) and torque T (N m) along e, t and z"),
+    "pin": (PINS, "pin"),
+    "contact_force": (CONTACTS, "contact force of the outermost station, of the innermost one, resultant of all"),
+    "shaft": (SHAFTS, "shaft"),
+    "shaft_component": (SHAFT_LOADS.components, "force f (N) and moment m (N m) about O, in axes that do not turn"),
+    "load": (tuple(kind.key for kind in MEASURING), "force and torque"),
+    "channel": (_names(BUSHING_LOADS), "load whose cycles are counted: component or modulus"),
+    "shaft_channel": (_names(SHAFT_LOADS), "load of a shaft whose cycles are counted: component or modulus"),
+    "of_cycle": (("range", "mean"), "range and mean of a cycle"),
+}
+"""Names along an axis of a history, and what they name, by axis."""
+
+
+def attach_scales(dataset: h5py.Dataset, row: h5py.Dataset, spec: HistorySpec) -> None:
+    """Attach dimension scales to a history: `row` to the first axis, those named in `spec` to the others."""
+    dataset.dims[0].attach_scale(row)
+    name = dataset.name.rpartition("/")[2]
+    given = spec.axes or tuple(f"{name}_axis{k}" for k in range(1, dataset.ndim))
+    for k, (axis, size) in enumerate(zip(given, spec.shape, strict=True), 1):
+        if axis not in dataset.parent:
+            values, unit, description = scale_of(axis, size)
+            text = h5py.string_dtype() if values.dtype.kind == "O" else None
+            scale = dataset.parent.create_dataset(axis, data=values, dtype=text)
+            scale.make_scale(axis)
+            put_attributes(scale, {"units": unit, "description": description})
+        dataset.dims[k].attach_scale(dataset.parent[axis])
+
+
+def scale_of(axis: str, size: int) -> tuple[NDArray[Any], str, str]:
+    """Values along an axis of a history, their unit and their description."""
+    if axis in AXES and len(AXES[axis][0]) == size:
+        return np.array(AXES[axis][0], dtype=object), "1", AXES[axis][1]
+    if axis == "theta":
+        return 2.0 * np.pi * np.arange(size) / size, "rad", "input angle"
+    if axis == "harmonic":
+        return np.arange(size, dtype="i4"), "1", "multiple of the input speed"
+    return np.arange(size, dtype="i4"), "1", "index along this axis, from 0"
+
+
+def _labels(codes: type[IntEnum]) -> dict[int, str]:
+    return {code.value: code.name.lower() for code in codes}
+
+
+MAX_MEANINGS = 1000
+"""Largest number of meanings that a column carries: attributes of HDF5 are small."""
+MEANINGS: dict[str, Mapping[int, str]] = {
+    "status": _labels(Status),
+    "motion": _labels(Motion),
+    "settled": {0: "not_settled", 1: "settled"},
+    "nominal": {0: "joint_with_errors", 1: "nominal_joint"},
+    "mode": _labels(Mode),
+}
+"""Meanings of codes that are the same in every file, by column or history; CF has them as ``flag_meanings``."""
+
+
+def meanings_of(metadata: Metadata) -> dict[str, Mapping[int, str]]:
+    """Meanings of all columns of a file that hold codes."""
+    proposals = range(1, len(metadata.identity.get("proposal", ())) + 1)
+    families = [variant.family for variant in metadata.design.variants]
+    shared = {family for family, number in Counter(families).items() if number > 1}
+    return MEANINGS | {
+        "case": dict(enumerate(metadata.design.cases)),
+        "variant": {k: f"{name}_{k}" if name in shared else name for k, name in enumerate(families)},
+        "component": {-1: "nominal_joint", 0: "tolerances"} | {k: f"proposal_{k}" for k in proposals},
+    }
+
+
+def put_meanings(dataset: h5py.Dataset, meanings: Mapping[int, str]) -> None:
+    """Write the meanings of a column's codes to its attributes; blanks inside a meaning become underscores."""
+    if len(meanings) <= MAX_MEANINGS:
+        dataset.attrs["flag_values"] = np.array([*meanings], dataset.dtype)
+        words = (re.sub(r"[^\w.+@-]+", "_", meaning) or "_" for meaning in meanings.values())
+        put_attributes(dataset, {"flag_meanings": " ".join(words)})

@@ -1,270 +1,164 @@
-"""Attributes of a result file that are JSON, read through models as strict as those of a study.
-
-A result file may come from anybody, and its checksums can be made by anybody: what a file states is checked before
-memory is taken or files are opened because of it.
-"""
+"""Metadata of a result file: one JSON document in the dataset ``metadata``, with its SHA-256 beside it."""
 
 from __future__ import annotations
 
+import hashlib
 import json
-import math
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from datetime import UTC, datetime
+from typing import TYPE_CHECKING, Any
 
 import h5py
-from pydantic import (
-    AfterValidator,
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Field,
-    JsonValue,
-    TypeAdapter,
-    ValidationError,
-    create_model,
-)
+import numpy as np
+from pydantic import BaseModel, ConfigDict
 
-from tolstat.common import units
-from tolstat.common.loads import LOADS, split
-from tolstat.common.solver_options import CODES
-from tolstat.common.strict import MAX_DEPTH, Strict, depth, dotted
-from tolstat.common.tables import FINEST_STEPS, Options
-from tolstat.store.result_file import text
-from tolstat.study.model import Sampling, Solver, Subset
-from tolstat.study.points import check_name
-from tolstat.study.widths import STEPS
+from tolstat.common.solver_options import to_names
+from tolstat.common.tables import HistorySpec, Options, Variant
+from tolstat.store.hdf5 import put_attributes, text
+from tolstat.store.provenance import git_commit, versions
 
-MAX_TEXT_BYTES = 64_000_000
-"""Largest size of a JSON attribute that is read, bytes."""
-MAX_SHOWN = 5
-"""Most faults of an attribute that a message lists."""
+if TYPE_CHECKING:
+    from tolstat.study import Study
+
+DATASET, CHECKSUM = "metadata", "sha256"
+"""Dataset that holds the document as UTF-8, and its attribute with the checksum."""
 
 
-def _load(name: str) -> str:
-    if split(name)[0] not in LOADS:
-        raise ValueError("is not a load")
-    return name
+class Design(BaseModel):
+    """Joints that a study lists."""
+
+    cases: tuple[str, ...]
+    variants: tuple[Variant, ...]
 
 
-def _point(name: str) -> str:
-    return check_name(name) if name else name  # also a group and a folder of histories have this name
+class Metadata(BaseModel):
+    """All that a reader needs beyond the tables.
+
+    Attributes
+    ----------
+    study_name, study : str
+        Name of the study, and the TOML that it was read from.
+    limits : dict of str to float
+        Limit of each load, SI.
+    points : dict of str to dict
+        Values of each operating point by its name, see `study.points.Point.values`.
+    joint : dict
+        Nominal joint, as a study gives it.
+    identity : dict
+        All settings that determine results, by dotted key.
+    options, fidelity, sampling, versions : dict
+        Solver options; what ``solver.fidelity = "auto"`` chose; sampling with ``dimensions``; software versions.
+    design : Design
+        Joints that the study lists.
+    histories : dict of str to HistorySpec
+        Load histories that the campaign keeps.
+    retries : tuple of dict
+        Settings of each retry, in chronological order, see `campaign.retry.Retry.entry`.
+    stop : dict
+        Stop rule and its outcome, see `campaign.stop_rule.Outcome.record`; empty without one.
+    campaign_rows, first_row, n : int
+        Number of rows of the campaign, first one in the file, number of them in the file.
+    created, git_commit : str
+        Time of creation (UTC), and commit of the code, if known.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    study_name: str
+    study: str
+    limits: dict[str, float]
+    points: dict[str, dict[str, float | None]]
+    joint: dict[str, Any]
+    identity: dict[str, Any]
+    options: dict[str, Any]
+    fidelity: dict[str, Any]
+    sampling: dict[str, Any]
+    versions: dict[str, str]
+    design: Design
+    histories: dict[str, HistorySpec]
+    retries: tuple[dict[str, Any], ...] = ()
+    stop: dict[str, Any] = {}
+    campaign_rows: int
+    first_row: int
+    n: int
+    created: str
+    git_commit: str
+
+    def changed(self, **values: Any) -> Metadata:
+        """Return the metadata with other values."""
+        return self.model_copy(update=values)
 
 
-def _points(found: dict[str, Any]) -> dict[str, Any]:
-    if len(found) > 1 and "" in found:
-        raise ValueError("has a point without a name among others")
-    return found
-
-
-class _File(Strict):
-    """Base of what a file states: no text for a number, nothing infinite."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
-
-
-Count = Annotated[int, Field(ge=0)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-LoadName = Annotated[str, AfterValidator(_load)]
-PointName = Annotated[str, AfterValidator(_point)]
-Step: Any = Literal[STEPS]
-Steps = Annotated[int, Field(ge=12, le=max(20_000, 2 * FINEST_STEPS))]
-
-
-def _no_text(value: object) -> object:
-    if isinstance(value, str):
-        raise ValueError("is not a number")
-    return value
-
-
-def _option(name: str) -> Any:
-    if name in CODES:
-        return Literal[tuple(code.name.lower() for code in CODES[name])]
-    if name in Solver.model_fields:
-        known = Solver.model_fields[name]
-        return Annotated[(known.annotation, *known.metadata, BeforeValidator(_no_text))]
-    return Annotated[float, Field(ge=0, lt=1)]  # rtol, atol
-
-
-_OPTIONS: dict[str, Any] = {name: (_option(name), ...) for name in Options._fields}
-SolverOptions: Any = create_model("SolverOptions", __base__=_File, **_OPTIONS)
-"""Options of the solver, with the bounds of a study's ``[solver]``."""
-
-
-class PointRecord(_File):
-    """An operating point, with the bounds of a study's ``[operation]``, see `study.points.Point.values`."""
-
-    alpha: Annotated[float, Field(gt=-math.pi / 2, lt=math.pi / 2)]
-    speed: Annotated[float, AfterValidator(units.not_zero)]
-    torque: float
-    axial_force: float
-    share: Annotated[float, Field(gt=0, le=1)] | None
-
-
-class RungRecord(_File):
-    """A rung of the pilot of ``solver.fidelity = "auto"``."""
-
-    fidelity: Literal["ideal", "quasistatic", "dynamic"]
-    steps_per_rev: Steps
-    worst: float | None
-    q95: float | None
-    errors: dict[LoadName, float | None]
-    cost: float
-    differing: Count
-
-
-class FidelityRecord(_File):
-    """What ``solver.fidelity = "auto"`` chose, see `solver.fidelity.Choice`."""
-
-    fidelity: Literal["ideal", "quasistatic", "dynamic"]
-    steps_per_rev: Steps
-    met: bool
-    reason: str
-    budget: float
-    margin: float
-    joints: Count
-    loads: list[LoadName]
-    table: list[RungRecord]
-
-
-class LooksRecord(_File):
-    """Looks of a stop rule at a campaign that was extended since."""
-
-    reached: Literal[False]
-    looks: list[Count]
-
-
-class StopRecord(_File):
-    """Why a campaign ended early, see `campaign.stop_rule.Outcome.record`."""
-
-    rule: str
-    reached: bool
-    joints: Count
-    n_unresolved: Count
-    above: Count
-    estimate: float
-    lower: float
-    upper: float
-    confidence: Annotated[float, Field(gt=0, lt=1)]
-    confidence_of_a_look: Annotated[float, Field(gt=0, lt=1)]
-    looks: list[Count]
-
-
-class RetryRecord(_File):
-    """Settings of a retry, see `campaign.retry.Retry.entry`."""
-
-    status: list[str]
-    settings: dict[str, str | float | bool]
-    options: SolverOptions
-
-
-class VariantRecord(_File):
-    """A joint that the study lists."""
-
-    family: str
-    values: dict[str, JsonValue]
-    note: str
-
-
-class DesignRecord(_File):
-    """The joints that the study lists."""
-
-    cases: list[str]
-    variants: list[VariantRecord]
-
-
-class DistributionRecord(_File):
-    """Distribution of a changed tolerance; only its factor is read."""
-
-    model_config = ConfigDict(extra="allow")
-
-    factor: float
-
-
-class WidthRecord(_File):
-    """Tolerances made wider or narrower, see `campaign.what_if`."""
-
-    kind: Literal["width"]
-    label: str
-    step: Step
-    words: str
-    seed: Count
-    tolerances: Annotated[dict[str, DistributionRecord], Field(min_length=1)]
-
-
-class ExchangeRecord(_File):
-    """Errors of other samples."""
-
-    kind: Literal["exchange"]
-    label: str
-    seed: Count
-    names: list[str]
-
-
-class AsDrawnRecord(_File):
-    """Further samples, nothing changed."""
-
-    kind: Literal["as drawn"]
-    label: str
-    seed: Count
-
-
-Dimensions = dict[str, Annotated[int, Field(ge=0, le=10_000)]]
-MODELS: dict[str, TypeAdapter[Any]] = {
-    "limits": TypeAdapter(dict[LoadName, Positive]),
-    "points": TypeAdapter(Annotated[dict[PointName, PointRecord], Field(min_length=1), AfterValidator(_points)]),
-    "joint": TypeAdapter(dict[str, Any]),
-    "identity": TypeAdapter(dict[str, Any]),
-    "options": TypeAdapter(SolverOptions),
-    "sampling": TypeAdapter(create_model("SamplingRecord", __base__=Sampling, dimensions=(Dimensions, ...))),
-    "subset": TypeAdapter(create_model("SubsetRecord", __base__=Subset, dimensions=(Dimensions, ...))),
-    "fidelity": TypeAdapter(FidelityRecord),
-    "versions": TypeAdapter(dict[str, str]),
-    "retries": TypeAdapter(list[RetryRecord]),
-    "stop": TypeAdapter(StopRecord | LooksRecord),
-    "design": TypeAdapter(DesignRecord),
-    "histories": TypeAdapter(dict[str, list[Any]]),
-    "change": TypeAdapter(Annotated[WidthRecord | ExchangeRecord | AsDrawnRecord, Field(discriminator="kind")]),
-}
-"""Model of each attribute that is JSON; ``sampling`` of a subset simulation has its own."""
-
-
-def read(file: h5py.Group, name: str, default: object = None) -> Any:
-    """Read an attribute that is JSON.
+def of_study(
+    study: Study,
+    rows: range,
+    histories: Mapping[str, HistorySpec],
+    dimensions: Mapping[str, int],
+    options: Options | None = None,
+    fidelity: Mapping[str, Any] | None = None,
+) -> Metadata:
+    """Metadata of a new campaign, or of a slice of it.
 
     Parameters
     ----------
-    file : h5py.Group
-        The file, or the group that has the attribute.
-    name : str
-        Name of the attribute, one of `MODELS`.
-    default : object, optional
-        What a missing or empty attribute means.
+    study : Study
+        The study.
+    rows : range
+        Rows of the campaign that the file holds.
+    histories : mapping of str to HistorySpec
+        Histories that the campaign keeps.
+    dimensions : mapping of str to int
+        Dimension of the sampling sequence that each error is drawn from.
+    options, fidelity : Options and mapping, optional
+        Settings that ``solver.fidelity = "auto"`` chose, and the record of that choice.
+    """
+    return Metadata(
+        **editable(study),
+        identity=json.loads(json.dumps(study.identity())),
+        options=to_names(options or study.solver.options()),
+        fidelity=dict(fidelity or {}),
+        sampling=study.sampling.model_dump(mode="json") | {"dimensions": dict(dimensions)},
+        versions=versions(),
+        design=Design(cases=tuple(study.case_names), variants=tuple(study.variants)),
+        histories=dict(histories),
+        campaign_rows=study.rows,
+        first_row=rows.start,
+        n=len(rows),
+        created=datetime.now(UTC).isoformat(timespec="seconds"),
+        git_commit=git_commit(),
+    )
+
+
+def editable(study: Study) -> dict[str, Any]:
+    """Return the values that affect no result and may change between two runs of a campaign."""
+    return {
+        "study_name": study.name,
+        "study": study.text,
+        "limits": dict(study.limits),
+        "points": {point.name: point.values() for point in study.points},
+        "joint": study.joint.given("json"),
+    }
+
+
+def read(file: h5py.File) -> Metadata:
+    """Read the metadata of a file.
 
     Raises
     ------
-    KeyError
-        When it is missing and there is no default.
-    ValueError
-        With its faults, when it does not fit its model.
+    KeyError, ValueError
+        When they are missing or damaged.
     """
-    if default is not None and name not in file.attrs:
-        return default
-    if file.attrs.get_id(name).get_storage_size() > MAX_TEXT_BYTES:
-        raise ValueError(f"attribute {name} is too long")
-    held = text(file.attrs, name)
-    value = json.loads(held)
-    if default is not None and not value and type(value) is type(default):
-        return default
-    if depth(value) > MAX_DEPTH:
-        raise ValueError(f"attribute {name} is nested deeper than {MAX_DEPTH}")
-    subset = name == "sampling" and isinstance(value, Mapping) and value.get("method") == "subset"
-    try:
-        found = MODELS["subset" if subset else name].validate_json(held, strict=True)
-    except ValidationError as error:
-        # the location alone names the value: values of a file that is not trusted are not quoted
-        faults = [f"{dotted(one['loc'])} {one['msg']}".strip()[:200] for one in error.errors(include_url=False)]
-        more = [f"and {len(faults) - MAX_SHOWN} more"] if len(faults) > MAX_SHOWN else []
-        raise ValueError(f"attribute {name}: {'; '.join(faults[:MAX_SHOWN] + more)}") from None
-    if isinstance(found, BaseModel) and (missing := sorted(set(found.model_dump()) - set(value))):
-        raise ValueError(f"attribute {name}: missing key {missing[0]}")  # a study may leave it out, a file never does
-    return value
+    document = bytes(file[DATASET][()])
+    if hashlib.sha256(document).hexdigest() != text(file[DATASET].attrs, CHECKSUM):
+        raise ValueError("its metadata do not match their checksum")
+    return Metadata.model_validate_json(document)
+
+
+def write(file: h5py.File, metadata: Metadata) -> None:
+    """Write the metadata to a file, in the place of those that it has."""
+    document = json.dumps(metadata.model_dump(), allow_nan=False).encode()
+    if DATASET in file:
+        del file[DATASET]
+    held = file.create_dataset(DATASET, data=np.bytes_(document))
+    about = "study, joint and settings of the campaign as JSON in UTF-8"
+    put_attributes(held, {"description": about, CHECKSUM: hashlib.sha256(document).hexdigest()})

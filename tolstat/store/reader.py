@@ -1,99 +1,79 @@
-"""Reading a result file: its attributes, its tables and the status of its joints."""
+"""Reader of a result file: its metadata, its tables and the status of its joints; numbers are checked as they are read.
+
+Damaged errors refuse the file. Damaged results make the joints of their block (`checksums.ROWS`) pending.
+"""
 
 from __future__ import annotations
 
+import logging
 import math
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from copy import copy
-from functools import cached_property
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, NamedTuple, Self, TypeVar
 
 import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common import selected_results
-from tolstat.common.errors import StoreError
-from tolstat.common.loads import limits_in_words
-from tolstat.common.shown import table
-from tolstat.common.tables import Status, Variant
-from tolstat.store import checks, integrity, left_out, metadata, session
-from tolstat.store.checked_tables import CheckedTables
-from tolstat.store.counts import Counts
-from tolstat.store.frame import to_pandas, to_xarray
-from tolstat.store.histories import HistoryParts, parts_folder
-from tolstat.store.named_loads import NamedLoads
-from tolstat.store.result_file import (
-    BLOCK,
-    RUN_AGAIN,
-    Handle,
-    campaign_digest,
-    is_locked,
-    open_hdf5,
-    store_error,
-    text,
-)
-from tolstat.store.view import View
-from tolstat.study.points import only_one
+from tolstat.common import draw_records, selected_results, tables
+from tolstat.common.columns import DESIGN_COLUMNS, ERROR_COLUMNS, Column
+from tolstat.common.counts import Counts
+from tolstat.common.errors import Fault, StoreError
+from tolstat.common.tables import SCHEMA_VERSION, Motion, Status
+from tolstat.joint import Operation
+from tolstat.store import layout, metadata
+from tolstat.store.checksums import ROWS, CheckedFile, Integrity
+from tolstat.store.hdf5 import BLOCK, RUN_AGAIN, is_locked, open_hdf5, store_error, told_as_damage
+from tolstat.store.layout import FILETYPE
+from tolstat.study.points import Point, only_one
 
-if TYPE_CHECKING:
-    import pandas as pd
-    import xarray
-
-    from tolstat.joint import Operation
-    from tolstat.store.revolutions import Ahead
+LOG = logging.getLogger("tolstat.store")
+RESTORE = f"restore a copy of the file, or {RUN_AGAIN}"
+TOGETHER = 2048
+"""Rows that lie between two others in a block of so many are read with them: a read takes as long as some 4000 rows."""
+MAX_TOLD = 5
+"""Most blocks of damaged rows that a warning lists."""
+Number = TypeVar("Number", int, NDArray[np.intp])
 
 
-class Reader(CheckedTables):
+class Session(NamedTuple):
+    """A run under way: when it started (Unix time, s), and how many joints were done by then."""
+
+    started: float
+    done: int
+
+
+class Reader:
     """A result file that is open for reading, also while a campaign writes it; close it, or use a ``with`` block.
 
     Attributes
     ----------
     path : Path
         The file.
+    metadata : Metadata
+        All that it says of itself beyond the tables; the following attributes are from it.
     n : int
         Number of joints in the file.
     rows : range
         Rows of the campaign in the file: all of them, unless the file holds a slice. File slot i (row i of every
         table) is row ``rows[i]`` of the campaign.
-    campaign_rows : int
-        Number of rows of the campaign.
-    study_name, study_text : str
-        Name of the study and the TOML that it was read from.
-    identity : dict
-        All settings that determine results, by dotted key.
     columns : tuple of Column
         Columns of the results that the campaign keeps, in the order of the table.
-    joint, options, sampling, versions : dict
-        Nominal joint with all values resolved, solver options, sampling (with ``dimensions``), software versions.
     points : dict of str to Point
         Operating points by name; one without a name unless the study has several.
     point : str or None
         Operating point whose results are read; None where there are several and none is chosen, see `at`.
-    limits : dict of str to float
-        Limits of the study in SI units, ``{"cross1.F": 700.0}``; those of some operating points only are named
-        ``cross1.F at cruise``.
-    case_names : tuple of str
-        Cases of a study that lists its joints, ``"ideal"`` first; empty for other methods.
-    variants : tuple of Variant
-        Family and values (dotted key to SI value or word) of each joint that the study lists; else empty.
-    created, git_commit : str
-        Time of creation (UTC) and commit of the code, if known.
-    stop : dict
-        Stop rule and its outcome, if the precision asked for was reached before all rows were simulated; else empty.
-    retries : list of dict
-        Settings of each retry, in chronological order; see `attempt`.
-    history_specs : dict of str to HistorySpec
-        Histories that the campaign keeps; empty if none.
-    ahead : Ahead or None
+    ahead : object
         Joints that are simulated again for all who ask for their loads over the revolution; see `revolutions.ahead`.
     """
 
-    ahead: Ahead | None = None
+    ahead: Any = None
 
     @classmethod
-    def open(cls, path: str | Path) -> Reader:
+    def open(cls, path: str | Path) -> Self:
         """Open a result file for reading, also while a campaign writes it.
 
         Parameters
@@ -101,71 +81,42 @@ class Reader(CheckedTables):
         path : str or Path
             The file.
 
-        Returns
-        -------
-        Reader
-            Has no method that writes; close it, or use it in a ``with`` block.
-
         Raises
         ------
         StoreError
             When it is not a result file of this schema version, or is damaged.
-
-        Examples
-        --------
-        >>> with tolstat.open("iso2768_f.h5") as store:  # doctest: +SKIP
-        ...     store.loads["cross1.F"].describe()
         """
-        return Reader._opened(Path(path), "r")
+        return cls._opened(Path(path), "r")
 
     @classmethod
     def _opened(cls, path: Path, mode: str) -> Self:
         file = open_hdf5(path, mode)
         try:
-            return cls(path, file)
+            with told_as_damage(path):
+                _check_schema(path, file)
+                return cls(path, file)
         except StoreError:
             file.close()
             raise
-        except checks.DAMAGE_ERRORS as error:
-            file.close()
-            raise store_error(path, f"is damaged: {error}", RUN_AGAIN) from error
 
     def __init__(self, path: Path, file: h5py.File) -> None:
         self.path = path
-        self._handle = Handle(file)
-        attrs = file.attrs
-        held = checks.check_schema(path, file)
-        self._read_study_attributes()
-        self.created = text(attrs, "created")
-        self.git_commit = text(attrs, "git_commit")
-        self.identity: dict[str, Any] = metadata.read(file, "identity")
-        self.columns = selected_results.columns(self.identity)
-        self.options: dict[str, Any] = metadata.read(file, "options")
-        self.sampling: dict[str, Any] = metadata.read(file, "sampling")
-        self.fidelity: dict[str, Any] = metadata.read(file, "fidelity", {})
-        self.versions: dict[str, str] = metadata.read(file, "versions")
-        self.retries: list[dict[str, Any]] = metadata.read(file, "retries")
-        self.stop: dict[str, Any] = metadata.read(file, "stop", {})
-        design = metadata.read(file, "design")
-        self.case_names: tuple[str, ...] = tuple(design["cases"])
-        self.variants = tuple(Variant(**variant) for variant in design["variants"])
-        self.history_specs = checks.history_specs(file)
-        self.n = checks.check_tables(file, held, self.columns, self.history_specs)
-        self._left_out = np.zeros(self.n, bool)
-        first = checks.integer(file, "first_row", 0)
-        self.rows = range(first, first + self.n)
-        self.campaign_rows = checks.integer(file, "campaign_rows", self.n)
-        if self.rows.stop > self.campaign_rows:
-            raise ValueError(f"rows {first}:{self.rows.stop} of a campaign of {self.campaign_rows}")
-        checks.check_number(self.sampling, self.campaign_rows)
+        self._describe(metadata.read(file))
+        self._checked = CheckedFile(path, file, self.metadata)
+        self._left_out: set[int] = set()
         self.point = next(iter(self.points)) if len(self.points) == 1 else None
-        self._campaign = campaign_digest(file)
 
-    @cached_property
-    def _parts(self) -> HistoryParts:
-        self._held()
-        folder = parts_folder(self.path) / (self.point or "")
-        return HistoryParts(folder, self.n, self.history_specs, self._campaign)
+    def _describe(self, held: metadata.Metadata) -> None:
+        self.metadata = held
+        self.study_name, self.study_text, self.joint, self.limits = held.study_name, held.study, held.joint, held.limits
+        self.identity, self.options, self.fidelity = held.identity, held.options, held.fidelity
+        self.sampling, self.versions, self.history_specs = held.sampling, held.versions, held.histories
+        self.retries, self.stop, self.created, self.git_commit = held.retries, held.stop, held.created, held.git_commit
+        self.case_names, self.variants = held.design.cases, held.design.variants
+        self.n, self.campaign_rows = held.n, held.campaign_rows
+        self.rows = range(held.first_row, held.first_row + held.n)
+        self.columns = selected_results.columns(held.identity)
+        self.points = {name: _point(name, values) for name, values in held.points.items()}
 
     def at(self, point: str) -> Self:
         """Return the file at one of its operating points; both are closed together.
@@ -176,11 +127,9 @@ class Reader(CheckedTables):
             When there is no such point.
         """
         only_one(point, list(self.points), str(self.path))
-        found = copy(self)
-        for kept in ("_parts", "loads"):
-            found.__dict__.pop(kept, None)
-        found.point = point
-        return found
+        other = copy(self)
+        other.point = point
+        return other
 
     def each(self) -> list[Self]:
         """Return the file at each of its operating points, or at the one that it is at."""
@@ -195,29 +144,20 @@ class Reader(CheckedTables):
         StoreError
             When the file has several and none is chosen.
         """
-        self._held()
-        return self.points[self.point or ""].operation
+        return self.points[self._point()].operation
 
-    def __repr__(self) -> str:
-        if not self._file:
-            return f"<result file {self.path.name!r}, closed>"
-        joints = f"{self.n - self.first_sample} joints"
-        progress = [f"{one.point}: {one._progress()}" if one.point else one._progress() for one in self.each()]
-        return f"<result file {self.path.name!r}: {joints} ({'; '.join(progress)})>"
+    def _point(self) -> str:
+        if self.point is None:
+            first = next(iter(self.points))
+            remedy = f"give one of them: --point {first}, or store.at({first!r})"
+            found = f"has results at several operating points: {', '.join(self.points)}"
+            raise store_error(self.path, found, remedy)
+        return self.point
 
-    def _repr_html_(self) -> str:
-        entries: list[tuple[str, object]] = [("study", self.study_name), ("file", str(self.path))]
-        entries += [("sampling", self.sampling["method"]), ("created", self.created)]
-        entries.append(("limits", limits_in_words(self.limits)))
-        if self._file:
-            entries.append(("loads", ", ".join(self.loads)))
-        return table(repr(self)[1:-1], entries)
-
-    def _progress(self) -> str:
-        """Numbers of joints by status, the nominal joint not counted; states as the file has them, unchecked."""
-        codes, numbers = np.unique(self.column("results", "status", slice(self.first_sample, None)), return_counts=True)
-        labels = {status.value: status.label for status in Status}
-        return ", ".join(f"{n} {labels.get(code, 'damaged')}" for code, n in zip(codes.tolist(), numbers, strict=True))
+    @property
+    def is_open(self) -> bool:
+        """Whether the file has not been closed."""
+        return bool(self._checked.file)
 
     def __enter__(self) -> Self:
         return self
@@ -229,27 +169,46 @@ class Reader(CheckedTables):
 
     def close(self) -> None:
         """Close the file; joints that were left out because their results are damaged are told as a warning."""
-        if self._file and self._file.mode == "r":
-            left_out.tell(self, "are left out", f"simulate these joints again: tolstat run STUDY --out {self.path}")
-        self._file.close()
+        if self.is_open:
+            self._tell("are left out", f"simulate these joints again: tolstat run STUDY --out {self.path}")
+        self._checked.file.close()
 
-    def view(self, study_path: Path | None = None) -> View:
-        """View of the file that questions read, while the file is open.
+    def _tell(self, done: str, remedy: str) -> None:
+        """Warn of the blocks that were found damaged so far, once."""
+        rows = [self._rows_of(block) for block in sorted(self._left_out)]
+        if rows:
+            listed = ", ".join(rows[:MAX_TOLD]) + ", ..." * (len(rows) > MAX_TOLD)
+            found = f"the results of rows {listed} are damaged and {done}"
+            LOG.warning("warning: %s", Fault(str(self.path), found, remedy))
+            self._left_out.clear()
 
-        Parameters
-        ----------
-        study_path : Path, optional
-            Study file to read if the text in the result file can no longer be read.
-        """
-        return View(self, study_path)
+    def _rows_of(self, block: int) -> str:
+        rows = self.rows[block * ROWS : (block + 1) * ROWS]
+        return f"{rows.start}:{rows.stop}"
 
-    @cached_property
-    def loads(self) -> NamedLoads:
-        """Largest loads of the joints by name, as pandas Series: ``store.loads["cross1.F"]``.
+    def row(self, slot: Number) -> Number:
+        """Row of the campaign in a file slot; also of many, (m,)."""
+        return slot + self.rows.start
 
-        They are read when first used, and kept: open the file anew to see more of a campaign under way.
-        """
-        return NamedLoads(self.view())
+    def slot(self, row: Number) -> Number:
+        """File slot of a row of the campaign; also of many, (m,)."""
+        return row - self.rows.start
+
+    @property
+    def first_sample(self) -> int:
+        """File slot of the first random joint: 1 if slot 0 holds the nominal joint, else 0."""
+        return int(bool(self.sampling["nominal_first"]) and self.rows.start == 0)
+
+    @property
+    def samples(self) -> range:
+        """Numbers of the random joints of this file among those of the campaign; from 0 unless it is a slice."""
+        nominal = int(self.sampling["nominal_first"])
+        return range(max(0, self.rows.start - nominal), self.rows.stop - nominal)
+
+    @property
+    def whole(self) -> bool:
+        """Whether the file holds all rows of its campaign, not a slice."""
+        return self.rows == range(self.campaign_rows)
 
     @property
     def heaviest(self) -> float:
@@ -257,19 +216,9 @@ class Reader(CheckedTables):
         return 1.0 / (1.0 - math.fsum(share for share, _ in self.identity.get("proposal", ())))
 
     @property
-    def nominal(self) -> pd.Series[float]:
-        """Largest loads of the nominal joint by name, SI; NaN where the file has none or its results are not valid."""
-        return self.loads.nominal()
-
-    @property
     def complete(self) -> bool:
         """Whether no row is pending, at any operating point."""
         return all(next(one.pending_blocks(), None) is None for one in self.each())
-
-    @property
-    def whole(self) -> bool:
-        """Whether the file holds all rows of its campaign, not a slice."""
-        return self.rows == range(self.campaign_rows)
 
     def counts(self) -> Counts:
         """Count the joints of the file by status; each at every operating point."""
@@ -280,11 +229,115 @@ class Reader(CheckedTables):
                 counts = counts.after(one.status(slice(first, first + BLOCK)))
         return counts
 
-    def session(self) -> session.Session | None:
-        """Return the run under way; None if no process is writing the file."""
-        if "session" not in self._file or not is_locked(self.path):
+    def session(self) -> Session | None:
+        """Return the run under way; None if no process is writing the file, or its record means nothing."""
+        if not is_locked(self.path):
             return None
-        return session.read(self._file["session"], len(self.points) * self.n)
+        with told_as_damage(self.path):
+            started, done = (float(self._checked.file["session"][name][()]) for name in ("started", "done"))
+        valid = 0 < started <= time.time() and 0 <= done <= len(self.points) * self.n
+        return Session(started, int(done)) if valid else None
+
+    def status(self, slots: slice = slice(None)) -> NDArray[np.uint8]:
+        """Status of the joints, (n,), or of a slice of file slots; joints whose results are damaged are PENDING.
+
+        Raises
+        ------
+        StoreError
+            When a status is unknown to this version.
+        """
+        found = self._codes(np.array(self.column("results", "status", slots)), Status)
+        if found.any():  # PENDING is 0
+            found[self._damaged(slots)] = Status.PENDING
+        return found
+
+    def pending(self) -> NDArray[np.intp]:
+        """File slots still to be simulated, ascending."""
+        return np.concatenate([np.empty(0, np.intp), *self.pending_blocks()])
+
+    def pending_blocks(self) -> Iterator[NDArray[np.intp]]:
+        """Yield the file slots still to be simulated, ascending, in non-empty arrays of at most `BLOCK`."""
+        for first in range(0, self.n, BLOCK):
+            found = np.flatnonzero(self.status(slice(first, first + BLOCK)) == Status.PENDING)
+            if found.size:
+                yield found + first
+
+    def results(self, slots: slice = slice(None), fields: Sequence[str] | None = None) -> NDArray[np.void]:
+        """Results of every joint, (n,) table RESULT, or of a slice of file slots.
+
+        A joint whose results are damaged is PENDING. Results of pending joints are NaN (integers 0), as are columns
+        that the campaign does not keep. With `fields` the table has these only.
+
+        Raises
+        ------
+        StoreError
+            When a code is unknown to this version.
+        """
+        names = tables.RESULT.names if fields is None else fields
+        status = self.status(slots)  # first: the values that it declares valid were written before it
+        table = self._table("results", self.columns, tables.RESULT, slots, names or ())
+        pending = status == Status.PENDING
+        for field in tables.RESULT_FIELDS:
+            if field.name in (names or ()):
+                table[field.name][pending] = np.nan if np.dtype(field.dtype).kind == "f" else 0
+        for name, codes in (("status", status), ("motion", None)):
+            if name in (names or ()):
+                table[name] = self._codes(table[name], Motion) if codes is None else codes
+        return table
+
+    def attempt(self, slots: slice = slice(None)) -> NDArray[np.int32]:
+        """Attempt that each joint's results belong to, (n,): 0 for the study's settings, k for ``retries[k - 1]``.
+
+        Raises
+        ------
+        StoreError
+            When there was no such attempt.
+        """
+        found = np.array(self.column("ledger", "attempt", slots))
+        found[self._damaged(slots)] = 0
+        wrong = (found < 0) | (found > len(self.retries))
+        if wrong.any():
+            row = self.row(slots.indices(self.n)[0] + int(np.argmax(wrong)))
+            raise store_error(self.path, f"is damaged: row {row} has an attempt that never was", RESTORE)
+        return found
+
+    def errors(self, slots: slice = slice(None), fields: Sequence[str] | None = None) -> NDArray[np.void]:
+        """Errors of every joint, (n,) table ERROR, or of a slice of file slots; with `fields` these only.
+
+        Raises
+        ------
+        StoreError
+            When the errors are damaged.
+        """
+        return self._table("errors", ERROR_COLUMNS, tables.ERROR, slots, fields or tables.ERROR.names or ())
+
+    def design(self) -> NDArray[np.void]:
+        """Variant, case and group of every joint, (n,) table DESIGN.
+
+        Raises
+        ------
+        StoreError
+            When all rows have the study's joint, or the table is damaged.
+        """
+        if not self.variants:
+            remedy = 'give the result file of a study with sampling.method = "cases", or of a sweep of dimensions'
+            raise store_error(self.path, "has no list of variants", remedy)
+        return self._table("design", DESIGN_COLUMNS, tables.DESIGN, slice(None), tables.DESIGN.names or ())
+
+    def origin(self, slots: slice = slice(None)) -> NDArray[np.void]:
+        """How every joint was drawn, (n,) table with the columns `draw_records.columns`, or of a slice of file slots.
+
+        Raises
+        ------
+        StoreError
+            When the sampling method has no such table, or it is damaged.
+        """
+        columns = draw_records.columns(self.sampling)
+        if not columns:
+            remedy = 'give a result file with sampling.method = "importance", or of tolstat rare'
+            raise store_error(self.path, "has no record of how its joints were drawn", remedy)
+        dtype = draw_records.dtype(self.sampling)
+        return self._table("origin", columns, dtype, slots, dtype.names or ())
 
     def histories(self, name: str, slots: NDArray[np.intp] | None = None) -> NDArray[Any]:
         """Read the histories of one kind.
@@ -299,96 +352,124 @@ class Reader(CheckedTables):
         Returns
         -------
         (m, ...) array
-            NaN for joints that are pending or have no results.
+            NaN (integers 0) for joints that are pending or have no results.
 
         Raises
         ------
         StoreError
-            When the file holds no such histories, or those of finished joints are missing or damaged.
+            When the file holds no such histories, or they are damaged.
         """
         if name not in self.history_specs:
             held = ", ".join(self.history_specs) or "none"
             remedy = f'write histories = "full" or "harmonics" in [output] of the study, and {RUN_AGAIN}'
             raise store_error(self.path, f"holds no histories {name!r} (it holds: {held})", remedy)
         slots = np.arange(self.n) if slots is None else np.asarray(slots, dtype=np.intp)
-        if "histories" not in self._held():
-            done = self.status()[slots] != Status.PENDING  # read first: histories are written before the status
-            try:
-                values = self._parts.read(name, slots, done)
-                self._check_history(name, slots, values, done)
-                return values
-            except StoreError:
-                if not self._reopen():
-                    raise
-        unique, back = np.unique(slots, return_inverse=True)
-        values = np.asarray(self.column("histories", name, unique))
-        self._check_history(name, unique, values, np.ones(len(unique), bool))
-        return values[back]
+        values = self.history_specs[name].blank(len(slots))
+        wanted, back = np.unique(slots, return_inverse=True)
+        if not wanted.size:
+            return values
+        pending = pick(self.status, wanted) == Status.PENDING  # first: histories are written before the status
+        read = pick(lambda part: self.column("histories", name, part), wanted)
+        read[pending] = self.history_specs[name].blank(1)
+        return np.asarray(read[back])
 
-    def to_pandas(self, nominal: bool = False) -> pd.DataFrame:
-        """Export errors and results as one DataFrame, one row per joint, pending and failed joints included.
-
-        Parameters
-        ----------
-        nominal : bool
-            Include the nominal joint, and a column ``nominal`` that marks it.
-
-        Returns
-        -------
-        pandas.DataFrame
-            Index ``row``: row of the campaign. Columns: case, variant, family and group for a study that lists its
-            joints; how each joint was drawn, where that is recorded; errors; kept results, ``status`` and ``motion``
-            as text. ``attrs["units"]`` has the SI unit of each column.
-        """
-        return to_pandas(self, nominal)
-
-    def to_xarray(self, nominal: bool = False) -> xarray.Dataset:
-        """Export errors and results along ``row``, with units and descriptions.
-
-        Parameters
-        ----------
-        nominal : bool
-            As in `to_pandas`.
+    def column(self, group: str, name: str, slots: slice) -> NDArray[Any]:
+        """Read a slice of file slots of a dataset; its rows may be damaged if it is one of the results.
 
         Raises
         ------
-        InputError
-            Without xarray.
+        StoreError
+            When it cannot be read, or is damaged and no result.
         """
-        return to_xarray(self, nominal)
+        path = layout.path_of(self._point() if group in layout.AT_POINTS else "", group, name)
+        if group not in ("results", "ledger"):
+            first, last, _ = slots.indices(self.n)
+            self._refuse(path, self._checked.damaged((path,), first, last))
+        dataset = self._checked.dataset(path)
+        with told_as_damage(self.path):
+            return np.asarray(dataset[slots])
 
-    def attributes(self) -> dict[str, str | int]:
-        """All attributes of the file as integers or text; JSON is not parsed."""
-        attrs = self._file.attrs
-        return {
-            name: int(value) if isinstance(value, (int, np.integer)) else text(attrs, name)
-            for name, value in attrs.items()
-        }
+    def group(self, name: str, at_point: bool = True) -> h5py.Group | None:
+        """Group that a file may have beside its tables, at the operating point or in the whole file."""
+        with told_as_damage(self.path):
+            path = "/".join(part for part in (layout.place_of(self._point()) if at_point else "", name) if part)
+            return self._checked.file.get(path)
 
-    def _read_study_attributes(self) -> None:
-        attrs = self._file.attrs
-        self.study_name = text(attrs, "study_name")
-        self.study_text = text(attrs, "study")
-        self.points = checks.points(self._file)
-        self.limits = checks.limits(self._file, self.points)
-        self.joint = checks.joint(self._file)
+    def check(self) -> Integrity:
+        """Compare everything that has a checksum with it, histories included."""
+        return self._checked.check()
 
-    def _reopen(self) -> bool:
-        """Switch to the file that has replaced this one and includes the histories; return whether there is one."""
-        if self._file.mode != "r":
-            return False
-        file = open_hdf5(self.path, "r")
-        if "histories" not in file[self._held().name] or campaign_digest(file) != self._campaign:
-            file.close()
-            return False
-        self._file.close()
-        self._handle.file = file
-        return True
+    def results_checksum(self) -> str:
+        """Number that is equal for files with the same joints and results; empty while they have no checksums."""
+        if self._checked.number % 2:
+            return ""
+        return self._checked.digest([path for path in self._checked.stored if path.split("/")[-2] == "results"])
 
-    def _check_history(self, name: str, slots: NDArray[np.intp], values: NDArray[Any], done: NDArray[np.bool_]) -> None:
-        held = self.column("ledger", f"{name}_check", slice(None))[slots[done]]
-        wrong = integrity.history_checks(values[done], self.row(slots[done])) != held
-        if wrong.any():
-            row = self.rows[slots[done][np.argmax(wrong)]]
-            found = f"is damaged: the history {name} of row {row} does not match its checksum"
-            raise store_error(self.path, found, f"restore a copy of the file, or {RUN_AGAIN}")
+    def _table(
+        self, group: str, columns: tuple[Column, ...], dtype: np.dtype[np.void], slots: slice, fields: Sequence[str]
+    ) -> NDArray[np.void]:
+        """Selected fields of a table, in the order asked for if not all are; columns that the file lacks are NaN."""
+        first, last, _ = slots.indices(self.n)
+        whole = tuple(fields) == dtype.names
+        table = np.zeros(max(0, last - first), dtype if whole else [(name, dtype[name]) for name in fields])
+        if group == "results":
+            for name in set(fields) & set(selected_results.OPTIONAL_FIELDS):
+                table[name] = np.nan
+        for c in columns:
+            if c.field in fields:
+                c.of(table)[:] = self.column(group, c.name, slice(first, last))
+        return table
+
+    def _codes(self, found: NDArray[np.uint8], codes: type[Status] | type[Motion]) -> NDArray[np.uint8]:
+        if found.size and found.max() > max(codes):
+            name = codes.__name__.lower()
+            raise store_error(self.path, f"is damaged: a joint has the unknown {name} {found.max()}", RUN_AGAIN)
+        return found
+
+    def _damaged(self, slots: slice) -> NDArray[np.bool_]:
+        """Whether rows are in a block of which a result is damaged, (m,)."""
+        first, last, _ = slots.indices(self.n)
+        groups = [layout.path_of(self._point(), group, "") for group in ("results", "ledger")]
+        paths = tuple(path for path in self._checked.stored if path.rpartition("/")[0] in groups)
+        blocks = self._checked.damaged(paths, first, last)
+        self._left_out.update(blocks.tolist())
+        return np.isin(np.arange(first, max(first, last)) // ROWS, blocks)
+
+    def _refuse(self, path: str, blocks: NDArray[np.intp]) -> None:
+        if blocks.size:
+            found = f"is damaged: {path} of rows {self._rows_of(int(blocks[0]))} does not match its checksum"
+            again = f"simulate these joints again: tolstat run STUDY --out {self.path}"
+            raise store_error(self.path, found, again if layout.is_at_point(path) else RESTORE)
+
+
+def pick(read: Callable[[slice], NDArray[Any]], slots: NDArray[np.intp]) -> NDArray[Any]:
+    """Read file slots, (m,) and ascending, of a table that is read by slices: one for each block of `TOGETHER`."""
+    runs = np.split(slots, np.flatnonzero(np.diff(slots // TOGETHER)) + 1)
+    return np.concatenate([read(slice(int(run[0]), int(run[-1]) + 1))[run - run[0]] for run in runs])
+
+
+def _check_schema(path: Path, file: h5py.File) -> None:
+    """Refuse another kind of file, or another version of it, in one sentence.
+
+    Raises
+    ------
+    StoreError
+        With what it is.
+    """
+    filetype = file.attrs.get("filetype")
+    filetype = filetype.decode(errors="replace") if isinstance(filetype, bytes) else filetype
+    if filetype != FILETYPE:
+        found = f"is HDF5, but of type {filetype!r} instead of {FILETYPE!r}"
+        raise store_error(path, found, "give a result file made by tolstat run")
+    version = int(file.attrs["schema_version"])
+    if version != SCHEMA_VERSION:
+        newer = version > SCHEMA_VERSION
+        remedy = "use a newer tolstat" if newer else "run its study again: tolstat run STUDY --out OTHER.h5"
+        raise store_error(path, f"has schema version {version}, this tolstat reads {SCHEMA_VERSION}", remedy)
+
+
+def _point(name: str, values: Mapping[str, float | None]) -> Point:
+    own = dict(values)
+    share = own.pop("share")
+    operation = Operation.model_construct(None, **own)
+    return Point(name, operation, math.nan if share is None else share)

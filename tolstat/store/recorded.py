@@ -1,28 +1,29 @@
-"""Parameters and solver options of a campaign's joints, from its study or from its result file alone."""
+"""Study, joints, operating points and solver options of a campaign, from its result file."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+import json
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tolstat.common.errors import Fault, InputError, StoreError
 from tolstat.common.solver_options import from_names
-from tolstat.common.strict import validate
+from tolstat.common.strict import read_section, validate
 from tolstat.common.tables import PARAM, Options
 from tolstat.joint import Joint, Operation, operating, perturb, varied
 from tolstat.joint.derived import get
 from tolstat.joint.sections import RIGID
 from tolstat.solver import fidelity
-from tolstat.study import mounting
+from tolstat.store.reader import Reader
+from tolstat.study import Study, load, mounting, subset_of
 from tolstat.study.design import nested
 from tolstat.study.model import Solver
 from tolstat.study.swept import KEYS
-
-if TYPE_CHECKING:
-    from tolstat.store.reader import Reader
-    from tolstat.study import Study
 
 _OPERATION = tuple(f"operation.{name}" for name in Operation.model_fields)
 
@@ -149,3 +150,98 @@ def variants(study: Study, rows: NDArray[np.intp]) -> NDArray[np.integer]:
 def _values(store: Reader, row: int) -> dict[str, Any]:
     """Values that define the variant of file slot `row`; empty if all rows have the study's joint."""
     return store.variants[store.design()["variant"][row]].values if store.variants else {}
+
+
+def recall(store: Reader, n: int | None = None, path: Path | None = None) -> Study:
+    """Read the study that a result file was made from.
+
+    Parameters
+    ----------
+    store : Reader
+        The file, which holds the text of its study and the nominal joint. Relative paths in the text, of measured data
+        or of a joint file with variants, are resolved from the result file's folder.
+    n : int, optional
+        Number of joints instead of the campaign's.
+    path : Path, optional
+        The study file to read instead of the text.
+
+    Returns
+    -------
+    Study
+
+    Raises
+    ------
+    InputError
+        When the study can no longer be read.
+    StoreError
+        When the study does not have the identity of the campaign in the file.
+    """
+    held = store.sampling["n"]
+    source = path if path is not None else store.path.parent / f"{Path(store.study_name).name}.toml"
+    text = None if path is not None else store.study_text
+    joint = None if path is not None or store.variants else joint_of(store, 0)
+    try:
+        study = load(source, n=held, text=text, joint=joint)
+    except InputError as error:
+        if path is not None:
+            raise
+        own = [fault for fault in error.faults if fault.place.startswith(f"{source}: ")]
+        found = "holds the text of this study; what the text names is looked for in the folder of the result file"
+        remedy = "give the study file, if the command has this option: --study STUDY"
+        raise InputError([*own, Fault(str(store.path), found, remedy)]) from error
+    if store.sampling["method"] == "subset":
+        study = subset_of(study, {key: value for key, value in store.sampling.items() if key != "dimensions"})
+    if path is None:
+        study = replace(study, solver=_solver(store, study))
+    study = _at_point(store, study)
+    differing = differing_keys(store.identity, json.loads(json.dumps(study.identity())))
+    if differing:
+        lines = ["does not match the study that was read for it", *differing]
+        found = "\n    ".join(lines)
+        raise StoreError(str(Fault(str(store.path), found, "give the study file of the campaign: --study STUDY")))
+    if n is None:
+        return study
+    larger = load(source, n=n, text=text, joint=joint)
+    return replace(_at_point(store, larger), solver=study.solver)
+
+
+def mentions(store: Reader, keys: Collection[str], section: str) -> bool:
+    """Whether a section of a file's study, as it is written, has one of some keys; the study itself is not read."""
+    return _has_key(read_section(store.path, store.study_text, section), keys)
+
+
+def _has_key(table: Mapping[str, Any], keys: Collection[str]) -> bool:
+    return any(key in keys or (isinstance(inner, Mapping) and _has_key(inner, keys)) for key, inner in table.items())
+
+
+def _at_point(store: Reader, study: Study) -> Study:
+    """Study at the point of a file with one operating point that was made from a study with several."""
+    if len(study.points) > 1 and len(store.points) == 1:
+        own = next((point for point in study.points if point.operation == store.operation), None)
+        return study if own is None else study.at(own.name)
+    return study
+
+
+def differing_keys(held: Mapping[str, Any], wanted: Mapping[str, Any]) -> list[str]:
+    """Compare two identities of studies.
+
+    Returns
+    -------
+    list of str
+        ``"solver.steps_per_rev: 90 in the file, 180 in the study"`` for every key that differs.
+    """
+    lines = []
+    for key in sorted(held.keys() | wanted.keys()):
+        if key not in wanted or key not in held or held[key] != wanted[key]:
+            sides = (f"{side[key]!r}" if key in side else "nothing" for side in (held, wanted))
+            lines.append("{}: {} in the file, {} in the study".format(key, *sides))
+    return lines
+
+
+def _solver(store: Reader, study: Study) -> Solver:
+    """Solver settings of the file; they differ from those in the study's text in campaigns at two fidelities."""
+    held = {key.removeprefix("solver."): value for key, value in store.identity.items() if key.startswith("solver.")}
+    own = study.solver.model_dump()
+    changed = {key: value for key, value in held.items() if key in own and own[key] != value}
+    given = study.solver.model_dump(exclude_unset=True) | changed
+    return validate(Solver, given, f"{store.path}: solver") if changed else study.solver

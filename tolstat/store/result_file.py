@@ -1,299 +1,278 @@
-"""Result files as HDF5: open one, replace one by a changed copy, read and write columns and attributes."""
+"""A result file as users open it: loads by name as pandas Series, tables for pandas and xarray."""
 
 from __future__ import annotations
 
-import errno
-import hashlib
-import json
-import os
-from collections.abc import Callable, Mapping
-from contextlib import ExitStack
-from functools import lru_cache
-from itertools import pairwise
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import h5py
 import numpy as np
-from h5py import h5a, h5d, h5f, h5g, h5p, h5s, h5t
 from numpy.typing import NDArray
 
-from tolstat.common import draw_records, tables
-from tolstat.common.columns import DESIGN_COLUMNS, Column
-from tolstat.common.errors import Fault, StoreError
-from tolstat.common.files import atomic_write, check_disk_space
-from tolstat.store.integrity import seal
+from tolstat.common import draw_records
+from tolstat.common.columns import ERROR_COLUMNS, Column
+from tolstat.common.errors import Fault, InputError
+from tolstat.common.loads import LOADS, limits_in_words
+from tolstat.common.shown import table
+from tolstat.common.tables import Motion, Status
+from tolstat.store import recorded
+from tolstat.store.reader import Reader
+from tolstat.store.view import View
 
-FILETYPE = "tolstat campaign"
-MAX_FIXED_TEXT = 32_000
-"""Largest size of a text stored as an attribute of fixed length, bytes: HDF5 allows some 64 kB."""
-LINKED = ("row", "nominal")
-"""Datasets of the file that every group with joints has as links: number of each row, mark of the nominal joint."""
-BLOCK = 1 << 16
-"""Rows read or written at a time, so that no table of a large campaign need be in memory."""
-TOGETHER = 2048
-"""Rows that lie between two others in a block of so many are read with them: a read takes as long as some 4000 rows."""
-RUN_AGAIN = "run the campaign again: tolstat run STUDY --out OTHER.h5"
-"""Remedy for a file that cannot be repaired."""
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray
+
+AT_ONCE = 8192
+"""Maximum number of rows of a block of `in_blocks`."""
+LABELS = {
+    "status": {status.value: status.label for status in Status},
+    "motion": {motion.value: motion.name.lower() for motion in Motion},
+}
+"""Columns that an export holds as text: label of each code."""
+OPERATING = {
+    "operation.alpha": "misalignment of the shafts",
+    "operation.speed": "angular velocity of the input shaft",
+    "operation.torque": "resisting torque on the output shaft",
+    "operation.axial_force": "axial force on the output shaft",
+}
+"""Meaning of the columns that an export holds as the joint's own values instead of deviations."""
 
 
-POINT_GROUPS = ("results", "ledger", "histories", "verify", "near")
-"""Groups that a file has once for each operating point."""
+class ResultFile(Reader):
+    """A result file that is open for reading, as `tolstat.open` gives it; close it, or use a ``with`` block."""
 
+    def at(self, point: str) -> ResultFile:
+        """Return the file at one of its operating points; both are closed together."""
+        other = super().at(point)
+        other.__dict__.pop("loads", None)
+        return other
 
-class Handle:
-    """An open result file; readers of its operating points share it, so that all follow when it is replaced."""
+    def __repr__(self) -> str:
+        if not self.is_open:
+            return f"<result file {self.path.name!r}, closed>"
+        joints = f"{self.n - self.first_sample} joints"
+        progress = [f"{one.point}: {one._progress()}" if one.point else one._progress() for one in self.each()]
+        return f"<result file {self.path.name!r}: {joints} ({'; '.join(progress)})>"
 
-    def __init__(self, file: h5py.File) -> None:
-        self.file = file
+    def _repr_html_(self) -> str:
+        entries: list[tuple[str, object]] = [("study", self.study_name), ("file", str(self.path))]
+        entries += [("sampling", self.sampling["method"]), ("created", self.created)]
+        entries.append(("limits", limits_in_words(self.limits)))
+        if self.is_open:
+            entries.append(("loads", ", ".join(self.loads)))
+        return table(repr(self)[1:-1], entries)
+
+    def _progress(self) -> str:
+        """Numbers of joints by status, the nominal joint not counted."""
+        codes, numbers = np.unique(self.status(slice(self.first_sample, None)), return_counts=True)
+        return ", ".join(f"{n} {Status(code).label}" for code, n in zip(codes.tolist(), numbers, strict=True))
+
+    def view(self, study_path: Path | None = None) -> View:
+        """View of the file that questions read, while the file is open.
+
+        Parameters
+        ----------
+        study_path : Path, optional
+            Study file to read if the text in the result file can no longer be read.
+        """
+        return View(self, study_path)
+
+    @cached_property
+    def loads(self) -> NamedLoads:
+        """Largest loads of the joints by name, as pandas Series: ``store.loads["cross1.F"]``.
+
+        They are read when first used, and kept: open the file anew to see more of a campaign under way.
+        """
+        return NamedLoads(self.view())
 
     @property
-    def file(self) -> h5py.File:
-        """The file."""
-        return self._file
+    def nominal(self) -> pd.Series[float]:
+        """Largest loads of the nominal joint by name, SI; NaN where the file has none or its results are not valid."""
+        return self.loads.nominal()
 
-    @file.setter
-    def file(self, file: h5py.File) -> None:
-        self._file = file
-        self._datasets: dict[str, h5py.Dataset] = {}
+    def to_pandas(self, nominal: bool = False) -> pd.DataFrame:
+        """Export errors and results as one DataFrame, one row per joint, pending and failed joints included.
 
-    def dataset(self, path: str) -> h5py.Dataset:
-        """Look up a dataset; in a file open for reading once, since that takes longer than reading 65 536 numbers."""
-        found = self._datasets.get(path)
-        if found is None:
-            found = self._file[path]
-            if self._file.mode == "r":
-                self._datasets[path] = found
-        return found
+        Parameters
+        ----------
+        nominal : bool
+            Include the nominal joint, and a column ``nominal`` that marks it.
 
+        Returns
+        -------
+        pandas.DataFrame
+            Index ``row``: row of the campaign. Columns: case, variant, family and group for a study that lists its
+            joints; how each joint was drawn, where that is recorded; errors; kept results, ``status`` and ``motion``
+            as text. ``attrs["units"]`` has the SI unit of each column.
+        """
+        return to_pandas(self, nominal)
 
-def place_of(point: str) -> str:
-    """Path of the group that holds `POINT_GROUPS` of an operating point: the root for the one without a name."""
-    return f"/points/{point}" if point else "/"
+    def to_xarray(self, nominal: bool = False) -> xarray.Dataset:
+        """Export errors and results along ``row``, with units and descriptions.
 
+        Parameters
+        ----------
+        nominal : bool
+            As in `to_pandas`.
 
-def campaign_digest(file: h5py.File) -> str:
-    """Hash that identifies a campaign: the study's identity, the software versions, and the rows in the file."""
-    texts = [text(file.attrs, name) for name in ("identity", "versions")]
-    if "first_row" in file.attrs:
-        texts.append(f"{int(file.attrs['first_row'])} {file['row'].shape[0]}")
-    return hashlib.sha256("\n".join(texts).encode()).hexdigest()[:16]
-
-
-def put_attributes(holder: h5py.Group | h5py.Dataset, values: Mapping[str, str | int | float]) -> None:
-    """Write attributes; texts are fixed-length UTF-8, which MATLAB and Fortran can read, except very long ones."""
-    for name, value in values.items():
-        if isinstance(value, str) and len(value.encode()) <= MAX_FIXED_TEXT:
-            put_text(holder.id, name, value)
-        else:
-            holder.attrs.create(name, value)
-
-
-def put_text(held: h5d.DatasetID | h5g.GroupID, name: str, value: str) -> None:
-    """Write a text of at most `MAX_FIXED_TEXT` bytes as an attribute, without h5py's objects: each column has two."""
-    data, own = value.encode(), name.encode()
-    size = max(1, len(data))
-    stored = _text_type(size)
-    if h5a.exists(held, own):
-        h5a.delete(held, own)
-    h5a.create(held, own, stored, h5s.create(h5s.SCALAR)).write(np.array(data, f"S{size}"), mtype=stored)
-
-
-@lru_cache(256)
-def _text_type(size: int) -> h5t.TypeID:
-    return h5t.py_create(h5py.string_dtype("utf-8", size), logical=True)
-
-
-def link_rows(file: h5py.Group, group: h5py.Group) -> None:
-    """Link ``row`` and ``nominal`` of a file into one of its groups, so that it can be read on its own."""
-    for name in LINKED:
-        group[name] = file.file[name]
-
-
-def text(attrs: h5py.AttributeManager, name: str) -> str:
-    """Read a text attribute of fixed or variable length.
-
-    Raises
-    ------
-    KeyError
-        When there is no attribute of that name.
-    ValueError
-        When it is not a text in UTF-8.
-    """
-    value = attrs[name]
-    if isinstance(value, bytes):
-        return value.decode("utf-8")
-    if isinstance(value, str):
-        return value
-    raise ValueError(f"attribute {name} is not a text")
-
-
-def check_column(history: str) -> Column:
-    """Column of the ledger with the checksums of a history."""
-    return Column(f"{history}_check", "1", f"CRC-32 of the joint's {history}", "u4", f"{history}_check", ())
-
-
-def descriptions(file: h5py.File) -> dict[str, tuple[tuple[Column, ...], np.dtype[np.void]]]:
-    """Columns and dtypes of the tables that describe joints beside their errors, by HDF5 group.
-
-    ``design`` has variant, case and group of each joint, ``origin`` how it was drawn; most campaigns have neither.
-    """
-    held = {"design": (DESIGN_COLUMNS, tables.DESIGN)} if "design" in file else {}
-    if "origin" in file:
-        sampling = json.loads(text(file.attrs, "sampling"))
-        held["origin"] = (draw_records.columns(sampling), draw_records.dtype(sampling))
-    return held
-
-
-def get(dataset: h5py.Dataset, rows: NDArray[np.intp]) -> NDArray[Any]:
-    """Values of the `rows` of a column, (m,)."""
-    begin = rows.min()
-    return np.asarray(dataset[begin : rows.max() + 1][rows - begin])
-
-
-def put(group: h5py.Group, rows: NDArray[np.intp], columns: Mapping[str, NDArray[Any]]) -> None:
-    """Overwrite the `rows` of columns of a group with values, (m,) each; consecutive rows are written in one piece.
-
-    The functions of HDF5 are called directly: a block of joints has a hundred columns, and h5py's objects would take
-    most of the time.
-    """
-    if not (len(rows) and columns):
-        return
-    opened = [(h5d.open(group.id, name.encode()), values) for name, values in columns.items()]
-    there = opened[0][0].get_space()  # columns of a group have one length
-    ends = [*(np.flatnonzero(np.diff(rows) != 1) + 1), len(rows)]
-    for begin, end in pairwise([0, *ends]):
-        some = h5s.create_simple((end - begin,))
-        there.select_hyperslab((int(rows[begin]),), (end - begin,))
-        for held, values in opened:
-            held.write(some, there, np.ascontiguousarray(values[begin:end]))
-
-
-def open_hdf5(path: Path, mode: str) -> h5py.File:
-    """Open an HDF5 file.
-
-    Raises
-    ------
-    StoreError
-        When the file is missing, not HDF5, damaged, not permitted or locked by a writer; the message says which.
-    """
-    if path.is_dir():
-        raise store_error(path, "is a folder", "give the path of a file")
-    if path.exists() and not path.is_file():
-        raise store_error(path, "is a pipe or a device, not a file", "give a result file made by tolstat run")
-    if mode != "r" and path.is_file() and not h5py.is_hdf5(path):
-        # h5py would turn an empty file that it opens for writing into an HDF5 file
-        raise store_error(path, "is not an HDF5 file", "give a result file made by tolstat run")
-    try:
-        file = _for_reading(path) if mode == "r" else h5py.File(path, mode, locking="best-effort")
-    except OSError as error:
-        if not path.is_file():
-            raise store_error(
-                path, "does not exist", f"check the path, or create it: tolstat run STUDY --out {path}"
-            ) from error
-        if error.errno in (errno.EAGAIN, errno.EWOULDBLOCK) or "unable to lock" in str(error):
-            raise store_error(
-                path, "is being written by another process", "wait until that process ends, or stop it"
-            ) from error
-        if "already open" in str(error) or "don't match" in str(error):
-            raise store_error(path, "is open in this process in another mode", "close it first") from error
-        if not os.access(path, os.R_OK if mode == "r" else os.R_OK | os.W_OK):
-            raise store_error(
-                path, "cannot be opened: no permission", f"change its permissions: chmod u+rw {path}"
-            ) from error
-        if not h5py.is_hdf5(path):
-            raise store_error(path, "is not an HDF5 file", "give a result file made by tolstat run") from error
-        raise store_error(path, f"is damaged: {error}", RUN_AGAIN) from error
-    if mode != "r" and not is_at(file, path):
-        # another process replaced the file between opening and locking: the open file is not at `path`
-        file.close()
-        raise store_error(path, "is being written by another process", "wait until that process ends, or stop it")
-    return file
-
-
-def _for_reading(path: Path) -> h5py.File:
-    """Open a file, also while a campaign writes it.
-
-    It takes no lock, since a writer only changes numbers in place, and has no sieve buffer: with one, HDF5 would read
-    a dataset that stays open from its memory, as it was before.
-    """
-    access = h5p.create(h5p.FILE_ACCESS)
-    access.set_fclose_degree(h5f.CLOSE_STRONG)
-    access.set_file_locking(False, False)
-    access.set_sieve_buf_size(0)
-    return h5py.File(h5f.open(os.fsencode(path), h5f.ACC_RDONLY, access))
-
-
-def is_at(file: h5py.File, path: Path) -> bool:
-    """Whether an open file is the one now at `path`."""
-    return path.exists() and os.path.samestat(os.fstat(file.id.get_vfd_handle()), path.stat())
-
-
-def copy_open(file: h5py.File, path: Path) -> None:
-    """Copy an open file to `path`, even if its own name has been deleted."""
-    file.flush()
-    handle = file.id.get_vfd_handle()
-    with open(path, "wb") as copy:
-        offset = 0
-        while chunk := os.pread(handle, 1 << 20, offset):
-            copy.write(chunk)
-            offset += len(chunk)
-
-
-def is_locked(path: Path) -> bool:
-    """Whether a process has locked the file for writing; tested by a shared lock that is released at once."""
-    try:
-        import fcntl
-    except ImportError:  # a system without file locks: unknown, taken as not locked
-        return False
-    with open(path, "rb") as file:
+        Raises
+        ------
+        InputError
+            Without xarray.
+        """
         try:
-            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
-        except OSError as error:
-            return error.errno in (errno.EAGAIN, errno.EWOULDBLOCK)
-    return False
+            import xarray
+        except ImportError as error:
+            remedy = "install it with: pip install xarray, or use to_pandas()"
+            raise InputError([Fault(str(self.path), "xarray is not installed", remedy)]) from error
+        frame, columns = self.to_pandas(nominal), described(self)
+        attrs = {name: {"units": c.unit, "description": c.description} for name, c in columns.items()}
+        data = {name: ("row", frame[name].to_numpy(), attrs.get(str(name), {})) for name in frame}
+        return xarray.Dataset(data, coords={"row": frame.index.to_numpy()}, attrs={"study": self.study_name})
 
 
-def replace(path: Path, held: h5py.File, change: Callable[[h5py.File], None], growth: int = 0) -> h5py.File:
-    """Change the structure of a file by way of a copy; a kill leaves either the old or the changed file.
-
-    No other process can write in between: `held` stays open and locked until the copy is locked and at `path`.
+class NamedLoads:
+    """Loads of the joints by name: ``loads["cross1.F"]``, ``list(loads)``, ``dict(loads)``, ``"psi" in loads``.
 
     Parameters
     ----------
-    path : Path
+    view : View
         The file.
-    held : h5py.File
-        The same file, open for writing; closed afterwards.
-    change : callable
-        Called with the copy, open for writing.
-    growth : int
-        Approximate number of bytes by which `change` enlarges the copy.
-
-    Returns
-    -------
-    h5py.File
-        The file now at `path`, open for writing.
     """
-    check_disk_space(path, held.id.get_filesize() + growth)
-    with ExitStack() as opened:
-        with atomic_write(path) as temporary:
-            copy_open(held, temporary)
-            with open_hdf5(temporary, "r+") as file:
-                change(file)
-                seal(file)
-            copy = opened.enter_context(open_hdf5(temporary, "r+"))
-        opened.pop_all()
-    held.close()
-    return copy
+
+    def __init__(self, view: View) -> None:
+        self._view = view
+
+    def __getitem__(self, name: str) -> pd.Series[float]:
+        """Largest load over the revolution of each joint, SI.
+
+        Parameters
+        ----------
+        name : str
+            ``cross1.F``; one of `keys`.
+
+        Returns
+        -------
+        pandas.Series
+            Index ``row``: row of the campaign; the nominal joint is not among them. NaN for a joint without a valid
+            load: pending, failed or not settled. ``attrs["units"]`` is the SI unit.
+
+        Raises
+        ------
+        InputError, StoreError
+            When the file has no such load for a sample of joints; see `View.load`.
+        """
+        import pandas as pd
+
+        load, store = self._view.load(name), self._view.store
+        index = pd.RangeIndex(store.rows[store.first_sample :], name="row")
+        series = pd.Series(load.valid_or_nan, index, name=name)
+        series.attrs["units"] = load.unit
+        return series
+
+    def nominal(self) -> pd.Series[float]:
+        """Loads of the nominal joint by name, SI; see `Reader.nominal`."""
+        import pandas as pd
+
+        held = self._view.nominal
+        values = [float(LOADS[name].of(held)[0]) if len(held) else np.nan for name in self.keys()]
+        series = pd.Series(values, pd.Index(self.keys(), name="load"), dtype=float, name="nominal")
+        series.attrs["units"] = {name: LOADS[name].unit for name in self.keys()}
+        return series
+
+    def keys(self) -> tuple[str, ...]:
+        """Names of the loads that the study keeps."""
+        return self._view.kept_loads
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.keys())
+
+    def __len__(self) -> int:
+        return len(self.keys())
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.keys()
+
+    def _ipython_key_completions_(self) -> tuple[str, ...]:
+        return self.keys()
+
+    def __repr__(self) -> str:
+        names = self.keys()
+        named = ", ".join(names) if len(names) <= 3 else f"{names[0]}, {names[1]}, ..., {names[-1]}"
+        return f"<{len(names)} loads of {self._view.n} joints: {named}>"
+
+    def _repr_html_(self) -> str:
+        return table(repr(self)[1:-1], [("load", ", ".join(self.keys()))])
 
 
-def pick(read: Callable[[slice], NDArray[Any]], slots: NDArray[np.intp]) -> NDArray[Any]:
-    """Read file slots, (m,) and ascending, of a table that is read by slices: one for each block of `TOGETHER`."""
-    runs = np.split(slots, np.flatnonzero(np.diff(slots // TOGETHER)) + 1)
-    return np.concatenate([read(slice(int(run[0]), int(run[-1]) + 1))[run - run[0]] for run in runs])
+def described(store: Reader) -> dict[str, Column]:
+    """Columns with unit and description that an export has, by name; see `to_pandas` for the others."""
+    own = [c._replace(description=OPERATING.get(c.name, c.description)) for c in ERROR_COLUMNS]
+    return {c.name: c for c in (*draw_records.columns(store.sampling), *own, *store.columns)}
 
 
-def store_error(path: Path, found: str, remedy: str) -> StoreError:
-    """Return the error of a file: what is wrong, and the remedy."""
-    return StoreError(str(Fault(str(path), found, remedy)))
+def to_pandas(store: Reader, nominal: bool) -> pd.DataFrame:
+    """Export a campaign to one DataFrame, see `ResultFile.to_pandas`."""
+    return _frame(store, slice(0 if nominal else store.first_sample, store.n), nominal, _listed(store))
+
+
+def in_blocks(store: Reader, nominal: bool) -> Iterator[pd.DataFrame]:
+    """Yield the rows of `to_pandas` in blocks of at most `AT_ONCE`, one at least."""
+    first, listed = 0 if nominal else store.first_sample, _listed(store)
+    for begin in range(first, max(store.n, first + 1), AT_ONCE):
+        yield _frame(store, slice(begin, min(begin + AT_ONCE, store.n)), nominal, listed)
+
+
+def _frame(store: Reader, rows: slice, nominal: bool, listed: Mapping[str, NDArray[Any]]) -> pd.DataFrame:
+    """Rows of a campaign; `listed` as from `_listed`."""
+    import pandas as pd
+
+    errors, results = store.errors(rows), store.results(rows)
+    data: dict[str, NDArray[Any]] = {}
+    if nominal:
+        data["nominal"] = np.arange(rows.start, rows.stop) < store.first_sample
+    data |= {name: values[rows] for name, values in listed.items()}
+    drawn = draw_records.columns(store.sampling)
+    if drawn:
+        origin = store.origin(rows)
+        data |= {c.name: c.of(origin) for c in drawn}
+    data |= {c.name: c.of(errors) for c in ERROR_COLUMNS}
+    data |= {f"operation.{name}": values for name, values in recorded.operating_points(store, rows).items()}
+    data |= {c.name: c.of(results) for c in store.columns}
+    if store.retries:
+        data["attempt"] = store.attempt(rows)
+    for name, labels in LABELS.items():
+        data[name] = np.array([labels[code] for code in data[name].tolist()], dtype=object)
+    frame = pd.DataFrame(data, index=pd.RangeIndex(store.rows[rows], name="row"))
+    columns = described(store)
+    frame.attrs["units"] = {name: columns[name].unit if name in columns else "1" for name in data}
+    return frame
+
+
+def _listed(store: Reader) -> dict[str, NDArray[Any]]:
+    """Columns of joints that the study lists: case and family by name, variant and group by index; or of a sweep."""
+    if not store.case_names:
+        return recorded.swept(store) if store.variants else {}
+    design = store.design()
+    families = np.array([variant.family for variant in store.variants], dtype=object)
+    return {
+        "case": np.array(store.case_names, dtype=object)[design["case"]],
+        "variant": design["variant"],
+        "family": families[design["variant"]],
+        "group": design["group"],
+    }
+
+
+@contextmanager
+def viewed(source: str | Path | Reader | View) -> Iterator[View]:
+    """View of a result file: of its path, which is opened and closed, or of the open file; a view stays as it is."""
+    if isinstance(source, View):
+        yield source
+    elif isinstance(source, Reader):
+        yield View(source)
+    else:
+        with Reader.open(source) as store:
+            yield View(store)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,11 +18,9 @@ from tolstat.joint import perturb
 from tolstat.solver.compilation import is_compiled, warm_up
 from tolstat.solver.harmonics import restore
 from tolstat.solver.simulation import simulate_rows
+from tolstat.store.hdf5 import RUN_AGAIN
+from tolstat.store.reader import Reader, pick
 from tolstat.store.recorded import joint_of, operation_of, options_of
-from tolstat.store.result_file import RUN_AGAIN, pick
-
-if TYPE_CHECKING:
-    from tolstat.store.reader import Reader
 
 AGAIN = "simulated again"
 ANGLES = 60

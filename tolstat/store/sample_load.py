@@ -258,3 +258,30 @@ class SampleLoad:
             lots=None if self.lots is None else self.lots[samples],
             parts=tuple(part.only(samples) for part in self.parts),
         )
+
+
+def largest_of(name: str, parts: Sequence[SampleLoad], of_ratios: bool = False) -> SampleLoad:
+    """Largest of several loads of the same joints, whose limits are equal, or largest ratio of load to limit.
+
+    Computed load by load, and ratios are not kept, to save memory.
+    """
+    joints = np.unique(np.concatenate([part.intervals.joints for part in parts]))
+    loads = replace(parts[0], parts=tuple(parts), of_ratios=of_ratios).each()
+    first = next(loads)
+    values, nominal = first.values.copy(), first.nominal
+    lower, upper = first.intervals.ends_of(joints, first.values)
+    for load in loads:
+        own = load.intervals.ends_of(joints, load.values)
+        lower, upper = np.maximum(lower, own[0]), np.maximum(upper, own[1])
+        np.maximum(values, load.values, out=values)
+        nominal = max(nominal, load.nominal)
+    intervals = Intervals.of(values[joints], (lower, upper)).among(joints)
+    return replace(
+        first,
+        name=name,
+        nominal=nominal,
+        values=frozen(values),
+        intervals=intervals,
+        parts=tuple(parts),
+        of_ratios=of_ratios,
+    )

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import h5py
 import numpy as np
@@ -13,15 +14,11 @@ from numpy.typing import NDArray
 from tolstat.common import selected_results, tables
 from tolstat.common.columns import Column
 from tolstat.common.shown import shown
-from tolstat.store import metadata
-from tolstat.store.checks import DAMAGE_ERRORS
-from tolstat.store.integrity import seal_values, sealed_values
-from tolstat.store.new_file import create_table
-from tolstat.store.result_file import pick, put_attributes, store_error, text
-
-if TYPE_CHECKING:
-    from tolstat.store.reader import Reader
-    from tolstat.store.result_store import ResultStore
+from tolstat.store import layout
+from tolstat.store.hdf5 import DAMAGE_ERRORS, put_attributes, store_error, text
+from tolstat.store.metadata import CHECKSUM
+from tolstat.store.reader import Reader, pick
+from tolstat.store.writer import Writer
 
 VERIFY, NEAR = "verify", "near"
 """Groups of joints: chosen at random, and those nearest to limits."""
@@ -70,50 +67,52 @@ class Verification(NamedTuple):
 
 def read(store: Reader, name: str = VERIFY) -> Verification | None:
     """Read the verification of a group from a result file; None if it holds none."""
-    held = store._held()
-    if name not in held:
+    group = store.group(name)
+    if group is None:
         return None
     try:
-        rows, checks = _read(held[name], store)
-        seed = int(held[name].attrs["seed"])
+        return _read(group, store)
     except DAMAGE_ERRORS as error:
         found = f"is damaged: its verification cannot be used: {error}"
         again = f"tolstat verify {store.path}" + (" --near LIMIT" if name == NEAR else "")
         raise store_error(store.path, found, f"make it anew: {again}") from error
-    return Verification(seed, rows, pick(store.results, np.asarray(store.slot(rows))), checks)
 
 
-def _read(group: h5py.Group, store: Reader) -> tuple[NDArray[np.intp], dict[str, Check]]:
-    values = sealed_values(group)
-    if not values:
+def _read(group: h5py.Group, store: Reader) -> Verification:
+    if text(group.attrs, CHECKSUM) != _checksum(group):
         raise ValueError("its values do not match their checksum")
-    rows = np.asarray(values["/rows"], np.intp)
-    if rows.ndim != 1 or not len(rows) <= store.n:
-        raise ValueError(f"its rows have the shape {rows.shape}")
-    if np.any(np.diff(rows) <= 0) or not np.isin(rows[[0, -1]] if len(rows) else rows, store.rows).all():
-        raise ValueError("its rows are no ascending rows of the campaign")
+    rows = np.asarray(group["rows"][:], np.intp)
     checks = {}
     for check in text(group.attrs, "checks").split():
         table = np.empty(len(rows), tables.RESULT)
         selected_results.blank_others(table, store.columns)
         for c in store.columns:
-            held = values[f"/{check}/{c.name}"]
-            if held.shape != rows.shape or held.dtype != np.dtype(c.dtype):
-                raise ValueError(f"{check}/{c.name} is {held.shape} of {held.dtype}")
-            c.of(table)[:] = held
-        if table["status"].size and table["status"].max() > max(tables.Status):
-            raise ValueError(f"{check} has an unknown status")
-        options = metadata.read(group[check], "options", {})
-        checks[check] = Check(text(group[check].attrs, "description"), options, table)
-    return rows, checks
+            c.of(table)[:] = group[check][c.name][:]
+        attrs = group[check].attrs
+        checks[check] = Check(text(attrs, "description"), json.loads(text(attrs, "options")), table)
+    base = pick(store.results, np.asarray(store.slot(rows)))
+    return Verification(int(group.attrs["seed"]), rows, base, checks)
 
 
-def write(store: ResultStore, verification: Verification, name: str = VERIFY) -> None:
+def _checksum(group: h5py.Group) -> str:
+    """SHA-256 of the rows of a verification and of the results of its checks, names and descriptions included."""
+    digest = hashlib.sha256(np.asarray(group["rows"][:]).tobytes())
+    names = text(group.attrs, "checks")
+    digest.update(f"{group.attrs['seed']} {names}".encode())
+    for check in names.split():
+        attrs = group[check].attrs
+        digest.update(f"{check} {text(attrs, 'description')} {text(attrs, 'options')}".encode())
+        for name in sorted(group[check]):
+            digest.update(name.encode() + np.asarray(group[check][name][:]).tobytes())
+    return digest.hexdigest()
+
+
+def write(store: Writer, verification: Verification, name: str = VERIFY) -> None:
     """Write a verification to a group of a result file, replacing an earlier one; otherwise as `write_all`."""
     write_all([(store, verification)], name)
 
 
-def write_all(found: Sequence[tuple[ResultStore, Verification]], name: str = VERIFY) -> None:
+def write_all(found: Sequence[tuple[Writer, Verification]], name: str = VERIFY) -> None:
     """Write verifications at operating points of one file, replacing earlier ones; the file is replaced once for all.
 
     Raises
@@ -121,14 +120,12 @@ def write_all(found: Sequence[tuple[ResultStore, Verification]], name: str = VER
     StoreError
         When there is no room for a second copy of the file.
     """
-    places = [(store._held().name, verification) for store, verification in found]
-    store = found[0][0]
 
     def change(file: h5py.File) -> None:
-        for where, verification in places:
-            _write(file[where], name, verification, store.columns)
+        for store, verification in found:
+            _write(file[layout.place_of(store.point or "") or "/"], name, verification, store.columns)
 
-    store._replace(change)
+    found[0][0].replace(change)
 
 
 def _write(holder: h5py.Group, place: str, verification: Verification, columns: tuple[Column, ...]) -> None:
@@ -142,8 +139,7 @@ def _write(holder: h5py.Group, place: str, verification: Verification, columns: 
     rows.make_scale("rows")
     put_attributes(rows, {"units": "1", "description": "rows of the joints in the campaign, counted from 0"})
     for name, check in verification.checks.items():
-        create_table(group, name, columns, len(rows), [check.results], scale=rows)
-        put_attributes(
-            group[name], {"description": check.description, "options": json.dumps(check.options, allow_nan=False)}
-        )
-    seal_values(group)
+        layout.create_table(group, name, columns, len(rows), [check.results], scale=rows)
+        options = json.dumps(check.options, allow_nan=False)
+        put_attributes(group[name], {"description": check.description, "options": options})
+    put_attributes(group, {CHECKSUM: _checksum(group)})

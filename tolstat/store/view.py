@@ -14,27 +14,24 @@ from numpy.typing import ArrayLike, NDArray
 from tolstat.analysis import accuracy
 from tolstat.analysis.exceedance import FloatArray
 from tolstat.common import selected_results
-from tolstat.common.draw_records import check_equal_weights
+from tolstat.common.counts import Counts
+from tolstat.common.draw_records import DRAWN, METHODS, check_equal_weights
 from tolstat.common.errors import Fault, InputError, StoreError
-from tolstat.common.loads import ALL_LIMITS, LOADS, SHOWN_LOADS, limits_in_words, split
+from tolstat.common.loads import ALL_LIMITS, LOADS, SHOWN_LOADS, Limit, limits_in_words, split
 from tolstat.common.shown import table
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import ERROR, Status
-from tolstat.store import first_pass, known_parts, verification, what_if, worst
-from tolstat.store.counts import Counts
-from tolstat.store.first_pass import FirstPass
-from tolstat.store.known_parts import KnownParts
-from tolstat.store.methods import DRAWN, METHODS
-from tolstat.store.recall import recall
-from tolstat.store.result_file import BLOCK
-from tolstat.store.sample_load import SampleLoad, frozen
-from tolstat.store.several_loads import leading, together
+from tolstat.store import verification, what_if, worst
+from tolstat.store.hdf5 import BLOCK
+from tolstat.store.reader import Reader
+from tolstat.store.recorded import recall
+from tolstat.store.sample_load import SampleLoad, frozen, largest_of
 from tolstat.store.verification import Verification
 from tolstat.store.what_if import Altered
+from tolstat.store.worst import FirstPass
 from tolstat.study.points import limits_at, names_of
 
 if TYPE_CHECKING:
-    from tolstat.store.reader import Reader
     from tolstat.study import Study
 
 
@@ -148,11 +145,6 @@ class View:
             return None
         return frozen(self.store.origin()["weight"][self.store.first_sample :].copy())
 
-    @cached_property
-    def known(self) -> KnownParts | None:
-        """What the study knows of its processes from measured parts; None if it takes its tolerances as exact."""
-        return known_parts.of(self)
-
     @property
     def results(self) -> dict[str, NDArray[Any]]:
         """Columns `LOAD_FIELDS` of the results, (n, ...) each."""
@@ -179,7 +171,7 @@ class View:
 
     @property
     def first_without_load(self) -> NDArray[np.void]:
-        """Complete results of the first `first_pass.MAX_LISTED` joints that failed or did not settle, RESULT (m,)."""
+        """Complete results of the first `worst.MAX_LISTED` joints that failed or did not settle, RESULT (m,)."""
         return self._tables.without_load
 
     @property
@@ -190,13 +182,13 @@ class View:
     @cached_property
     def _tables(self) -> FirstPass:
         if len(self.parts) > 1:
-            return first_pass.of_points([part._tables for part in self.parts], [part.store for part in self.parts])
-        return first_pass.read(self.store, self.weights)
+            return worst.of_points([part._tables for part in self.parts], [part.store for part in self.parts])
+        return worst.first_pass(self.store, self.weights)
 
     def load(self, name: str) -> SampleLoad:
         """Largest load over the revolution of every joint, by its name; ``"cross1.F at cruise"`` at that point only.
 
-        ``"all limits"`` is the largest ratio of load to limit of each joint, see `several_loads.together`.
+        ``"all limits"`` is the largest ratio of load to limit of each joint, see `together`.
 
         Its limit is the one of that name or, without it, the one that holds at these points.
 
@@ -210,7 +202,7 @@ class View:
         if name not in self._loads:
             check_equal_weights(self.store.sampling, self.path, weighted=True)
             if name == ALL_LIMITS and self.limits:
-                return self._loads.setdefault(name, together(self))
+                return self._loads.setdefault(name, self.together)
             view, plain = self.narrowed(name)
             if view is not self:
                 own = view.load(plain)
@@ -250,10 +242,37 @@ class View:
         """Loads that tables show: the bushing loads or, if the study keeps none, all others that it keeps."""
         return self.bushing_loads or self.kept_loads
 
+    def load_of(self, limit: Limit) -> SampleLoad:
+        """Load that a limit is about; of several loads their maximum, or the maximum of load/level if levels differ.
+
+        Its limit is the level. Raises as `load`.
+        """
+        levels = zip(limit.loads, limit.levels, strict=True)
+        loads = [replace(self.load(name), limit=level) for name, level in levels]
+        return loads[0] if limit.loads == (limit.name,) else largest_of(limit.name, loads, not limit.has_one_level)
+
+    @property
+    def together(self) -> SampleLoad:
+        """Largest ratio of load to limit of each joint over all limits of the study; above 1, a limit is exceeded."""
+        return self.load_of(Limit(ALL_LIMITS, tuple(self.limits), tuple(self.limits.values())))
+
     @cached_property
     def leading(self) -> tuple[str, ...]:
-        """Leading load of each kind (force, torque, ...); see `several_loads.leading`."""
-        return leading(self)
+        """Leading load of each kind (force, torque, ...).
+
+        Candidates are the loads with limits or, without limits, those of `loads.SHOWN_LOADS` kept. The leading load is
+        the one whose limit the largest share of the joints exceeds; ties are decided by the 99 % quantile over the
+        limit (without limits by the 99 % quantile).
+        """
+        found: dict[str, tuple[tuple[float, float], str]] = {}
+        for load in self.loads(list(self.limits) or self.bushing_loads):
+            if load.valid.size:
+                limit = 1.0 if load.limit is None else load.limit
+                share = 0.0 if load.limit is None else load.above(limit).estimate
+                rank = (share, float(load.valid[int(0.99 * (load.valid.size - 1))]) / limit)
+                kind = LOADS[split(load.name)[0]].kind.key
+                found[kind] = max(found.get(kind, (rank, load.name)), (rank, load.name), key=lambda item: item[0])
+        return tuple(name for _, name in found.values())
 
     @property
     def decisive(self) -> str:

@@ -5,22 +5,17 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.loads import LOADS, split
 from tolstat.common.shown import shown
-from tolstat.common.tables import Status
-from tolstat.store import meanings, metadata
-from tolstat.store.new_file import GROUPS
-from tolstat.store.result_file import put_attributes, text
-
-if TYPE_CHECKING:
-    from tolstat.store.reader import Reader
-    from tolstat.store.result_store import ResultStore
+from tolstat.store.hdf5 import DAMAGE_ERRORS, put_attributes, text
+from tolstat.store.layout import GROUPS, MEANINGS, put_meanings
+from tolstat.store.reader import Reader
+from tolstat.store.writer import Writer
 
 GROUP = "what_if"
 DATASETS = {
@@ -78,33 +73,26 @@ def key(about: Mapping[str, Any]) -> str:
 
 def read(store: Reader) -> dict[str, Altered]:
     """Read all sets, by the digest of their change; sets whose checksum is wrong are left out, and so run again."""
-    file = store._file
+    held = store.group(GROUP, at_point=False)
     found: dict[str, Altered] = {}
-    for name, group in file[GROUP].items() if GROUP in file else ():
-        attrs = group.attrs
+    for name, group in {} if held is None else held.items():
         try:
             one = Altered(
-                metadata.read(group, "change"),
+                json.loads(text(group.attrs, "change")),
                 int(group["sample"][0]),
                 tuple(group["load"].asstr()[:].tolist()),
                 np.asarray(group["loads"][:], float),
                 np.asarray(group["status"][:], np.uint8),
             )
-            sound = _fits(one) and text(attrs, "check") == _check(one) and key(one.about) == name
-        except (KeyError, ValueError, IndexError, TypeError, AttributeError):  # not what `write` writes
+            sound = text(group.attrs, "check") == _check(one) and key(one.about) == name
+        except DAMAGE_ERRORS:  # not what `write` writes
             sound = False
         if sound:
             found[name] = one
     return found
 
 
-def _fits(one: Altered) -> bool:
-    """Whether shapes, states and names are such as `write` writes."""
-    shaped = one.first >= 0 and one.loads.shape == (len(one.status), len(one.names))
-    return shaped and one.status.max(initial=0) <= max(Status) and {split(own)[0] for own in one.names} <= LOADS.keys()
-
-
-def write(store: ResultStore, sets: Mapping[str, Altered]) -> None:
+def write(store: Writer, sets: Mapping[str, Altered]) -> None:
     """Write sets to a result file; those it has of the same changes are replaced.
 
     Raises
@@ -113,7 +101,7 @@ def write(store: ResultStore, sets: Mapping[str, Altered]) -> None:
         When there is no room for a second copy of the file.
     """
     growth = sum(one.loads.nbytes + one.status.nbytes for one in sets.values())
-    store._replace(lambda file: _write(file, sets), growth)
+    store.replace(lambda file: _write(file, sets), growth)
 
 
 def common(files: Iterable[Mapping[str, Altered]]) -> tuple[dict[str, Altered], int]:
@@ -163,7 +151,7 @@ def _write(file: h5py.File, sets: Mapping[str, Altered]) -> None:
                 continue
             for k, scale in enumerate(list(columns)[: dataset.ndim]):
                 dataset.dims[k].attach_scale(own[scale])
-        meanings.put(own["status"], meanings.FIXED["status"])
+        put_meanings(own["status"], MEANINGS["status"])
 
 
 def _check(one: Altered) -> str:

@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.analysis.sorted_loads import Intervals
-from tolstat.common.errors import Fault, InputError
 from tolstat.common.load_kinds import SPAN
 from tolstat.common.loads import LOAD_FIELDS, LOADS, FloatArray, Limit, Load, Results, split
-from tolstat.common.tables import FAILED, RESULT, UNSETTLED, Status, without_results
+from tolstat.common.tables import FAILED, RESULT, UNSETTLED, VALID, Status, without_results
+from tolstat.store.reader import Reader
 from tolstat.store.sample_load import frozen
 from tolstat.store.verification import Verification
 
-if TYPE_CHECKING:
-    from tolstat.store.view import View
-
+AT_ONCE = 16_384
+"""Rows read at once. They are written to a table column by column, faster where it fits the processor's cache."""
+MAX_LISTED = 12
+"""Number of joints without a valid load whose complete results are kept."""
 _SEVERITY = np.zeros(max(Status) + 1, np.uint8)
 for _rank, _states in enumerate(((Status.STATIONARY,), UNSETTLED, FAILED, (Status.PENDING,)), 1):
     _SEVERITY[[int(state) for state in _states]] = _rank
@@ -113,32 +114,6 @@ def limit_of(parts: Mapping[str, NDArray[np.void]], limit: Limit) -> tuple[Float
     return np.maximum.reduce(found), np.choose(deciding(states), states)
 
 
-def point_of(view: View, name: str) -> str:
-    """Operating point at which a load matters most: where most joints exceed its limit, else where it is largest.
-
-    Parameters
-    ----------
-    view : View
-        A campaign.
-    name : str
-        A load, ``cross1.F`` or ``cross1.F at cruise+start``.
-
-    Returns
-    -------
-    str
-        Name of the point; empty if the file has one without a name.
-    """
-    at, plain = view.narrowed(name)
-    limit = view.load(name).limit
-
-    def rank(part: View) -> tuple[float, float]:
-        load = part.load(plain)
-        share = 0.0 if limit is None else float(np.nan_to_num(load.above(limit).estimate))
-        return share, float(load.valid[int(0.99 * (load.valid.size - 1))]) if load.valid.size else 0.0
-
-    return max(at.parts, key=rank).points[0]
-
-
 def nominal(parts: Sequence[NDArray[np.void]]) -> NDArray[np.void]:
     """Largest loads of the nominal joint, RESULT (1,), from its rows; (0,) unless it is valid at all points."""
     if not all(len(part) for part in parts):
@@ -166,27 +141,62 @@ def checks(parts: Sequence[Verification | None]) -> Verification | None:
     )
 
 
-def shares_of_time(view: View) -> FloatArray:
-    """Share of the service time at each operating point of a view, (points,); their sum is 1.
+class FirstPass(NamedTuple):
+    """What is kept of the results after one pass over them.
 
-    Raises
-    ------
-    InputError
-        When the study does not give the shares of several points.
+    Attributes
+    ----------
+    results : dict of str to ndarray, shape (n, ...)
+        Columns `LOAD_FIELDS` of the samples; the values of one load lie side by side.
+    nominal : ndarray of RESULT, shape (1,) or (0,)
+        The nominal joint, if the file has one and its results are valid.
+    without_load : ndarray of RESULT, shape (m,)
+        The first `MAX_LISTED` joints that failed or did not settle.
+    mode_share : ndarray, shape (4, 4)
+        Weighted mean over the valid joints; NaN if none is valid or the study does not keep it.
     """
-    shares = np.array([view.store.points[name].share for name in view.points] if len(view.parts) > 1 else [1.0])
-    if np.isnan(shares).any():
-        remedy = "write share = ... in each [[operation]] and run the study again, which simulates nothing anew"
-        remedy += f"; or look at one point: --point {view.points[0]}"
-        raise InputError([Fault(str(view.path), "has operating points without a share of the time", remedy)])
-    return np.asarray(shares / shares.sum())
+
+    results: dict[str, NDArray[Any]]
+    nominal: NDArray[np.void]
+    without_load: NDArray[np.void]
+    mode_share: FloatArray
 
 
-def shares_of_revolutions(view: View) -> FloatArray:
-    """Share of the revolutions at each operating point: share of the time times speed, (points,); their sum is 1.
+def first_pass(store: Reader, weights: FloatArray | None) -> FirstPass:
+    """Read the results of a file at one operating point; `weights` are those of its samples, if they differ."""
+    skip, n = store.first_sample, store.n - store.first_sample
+    nominal = np.empty(0, RESULT)
+    results = {name: np.empty((n, *RESULT[name].shape), RESULT[name].base, "F") for name in LOAD_FIELDS}
+    kept, total, shares = [np.empty(0, RESULT)], 0.0, np.zeros((4, 4))
+    for first in range(0, store.n, AT_ONCE):
+        block = store.results(slice(first, first + AT_ONCE))
+        if first == 0 and skip:
+            nominal, block = block[:1][np.isin(block["status"][:1], VALID)].copy(), block[1:]
+        begin = max(0, first - skip)
+        for name in LOAD_FIELDS:
+            results[name][begin : begin + len(block)] = block[name]
+        if sum(map(len, kept)) < MAX_LISTED:
+            kept.append(block[np.isin(block["status"], (*FAILED, *UNSETTLED))][:MAX_LISTED])
+        valid = np.isin(block["status"], VALID)
+        weight = np.ones(len(block)) if weights is None else weights[begin : begin + len(block)]
+        shares += np.tensordot(weight[valid], block["mode_share"][valid], 1)
+        total += float(weight[valid].sum())
+    mean = shares / total if total else np.full((4, 4), np.nan)
+    return FirstPass(_frozen(results), frozen(nominal), frozen(np.concatenate(kept)[:MAX_LISTED]), frozen(mean))
 
-    Raises `InputError` as `shares_of_time`.
-    """
-    speeds = np.array([abs(view.store.points[name].operation.speed) for name in view.points])
-    turns = shares_of_time(view) * speeds
-    return np.asarray(turns / turns.sum())
+
+def of_points(parts: Sequence[FirstPass], stores: Sequence[Reader]) -> FirstPass:
+    """Combine what was read at several operating points; `stores` are the file at each. There is no ``mode_share``."""
+    results = together([part.results for part in parts])
+    samples = np.flatnonzero(np.isin(results["status"], (*FAILED, *UNSETTLED)))[:MAX_LISTED]
+    points = deciding([part.results["status"][samples] for part in parts])
+    without = [np.empty(0, RESULT)]
+    for sample, number in zip(samples.tolist(), points.tolist(), strict=True):
+        slot = sample + stores[number].first_sample
+        without.append(stores[number].results(slice(slot, slot + 1)))
+    none, at_all = np.full((4, 4), np.nan), nominal([part.nominal for part in parts])
+    return FirstPass(_frozen(results), frozen(at_all), frozen(np.concatenate(without)), frozen(none))
+
+
+def _frozen(columns: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    return {name: frozen(column) for name, column in columns.items()}

@@ -20,7 +20,6 @@ from tolstat.common.shown import shown
 from tolstat.common.tables import Status
 from tolstat.questions.allocate.ratios import DensityRatios, Entries
 from tolstat.store import error_budget
-from tolstat.store.several_loads import load_of
 from tolstat.store.view import View
 from tolstat.study import Study, axes, costs, rule, scaling, selection
 from tolstat.study.costs import Cost
@@ -252,13 +251,13 @@ def _read_request(view: View, limits: Sequence[str], cost_file: Path | None, kee
 
 def _above(view: View, statement: Statement) -> NDArray[np.bool_]:
     """Which joints are above the level in any load of a statement, or have no valid load, (n,)."""
-    load = load_of(view, statement.limit)
+    load = view.load_of(statement.limit)
     return np.asarray(~load.is_valid | (load.values > statement.limit.level))
 
 
 def _ends_above(view: View, statement: Statement, samples: NDArray[np.intp]) -> list[NDArray[np.bool_]]:
     """As `_above` with both ends of the numerical error near the limit, for some samples; empty if it is not known."""
-    ends = error_budget.near(view, load_of(view, statement.limit)) or ()
+    ends = error_budget.near(view, view.load_of(statement.limit)) or ()
     return [(~load.is_valid | (load.values > statement.limit.level))[samples] for load in ends]
 
 

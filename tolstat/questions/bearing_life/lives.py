@@ -18,7 +18,7 @@ from tolstat.common.shown import shown
 from tolstat.common.tables import LIFE_EXPONENT, VALID
 from tolstat.joint import Bearing, operating
 from tolstat.joint.bearing import FOR_LIFE
-from tolstat.store import worst
+from tolstat.store import points
 from tolstat.store.recorded import joint_of
 from tolstat.store.sample_load import SampleLoad
 from tolstat.store.view import View
@@ -141,7 +141,7 @@ def lives_of(view: View) -> Lives:
     if not keeps_loads(view):
         remedy = 'add "pin*.equivalent_load" to [output] results of the study'
         raise StoreError(str(Fault(str(view.path), "does not keep the equivalent loads of the bearings", remedy)))
-    duty = worst.shares_of_time(view).tolist()
+    duty = points.shares_of_time(view).tolist()
     samples = np.arange(view.n)
     operation = [
         operating(

@@ -15,7 +15,7 @@ from tolstat.common.tables import LIFE_EXPONENT, Mode
 from tolstat.display import text
 from tolstat.joint.bearing import FOR_LIFE
 from tolstat.questions.bearing_life.lives import PLACES, Lives, bearing_of, keeps_loads, lives_of
-from tolstat.store import worst
+from tolstat.store import points
 from tolstat.store.error_budget import total_interval
 from tolstat.store.sample_load import SampleLoad
 from tolstat.store.view import View
@@ -138,7 +138,7 @@ def contacts(view: View, confidence: float = 0.95) -> pd.DataFrame:
     if sum(column.field == "mode_share" for column in view.columns) < len(PINS) * len(Mode):
         return pd.DataFrame()
     modes = [part.read_results(("mode_share",))["mode_share"] for part in view.parts]
-    spent = np.tensordot(worst.shares_of_revolutions(view), np.stack(modes), 1)
+    spent = np.tensordot(points.shares_of_revolutions(view), np.stack(modes), 1)
     rows = []
     for place in (*PINS, ANY):
         own = spent[:, [PINS.index(place)]] if place in PINS else spent

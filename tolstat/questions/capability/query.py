@@ -10,9 +10,9 @@ import numpy as np
 from tolstat.analysis import capability, exceedance, extreme
 from tolstat.analysis.prediction import DELIVERY
 from tolstat.common.loads import ALL_LIMITS
+from tolstat.common.once import once
 from tolstat.display import text
 from tolstat.store import error_budget
-from tolstat.store.once import once
 from tolstat.store.view import View
 
 if TYPE_CHECKING:

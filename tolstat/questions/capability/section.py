@@ -13,6 +13,7 @@ from tolstat.display.asked import Asked
 from tolstat.display.blocks import Block, Section, Text
 from tolstat.display.table import as_block
 from tolstat.questions.capability import query, rendering
+from tolstat.store import known_parts
 from tolstat.store.view import View
 
 ONE_IN = (1e3, 1e4, 1e5)
@@ -27,7 +28,7 @@ def sections(view: View, asked: Asked) -> list[Section]:
         table = query.limits(view)
         blocks.append(as_block("Against each limit, and all of them together", rendering.LIMITS, table))
         blocks += [Text(text.sentence(line), small=True) for line in rendering.note(table).splitlines()]
-    if view.known is not None:
+    if known_parts.of(view) is not None:
         blocks.append(Text("For the tolerances as stated: what measured parts leave open is not in these.", small=True))
     blocks += _rare(view, min(asked.processes, 2))
     title = "Capability and rare loads" if view.limits else "Rare loads"

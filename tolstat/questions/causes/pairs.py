@@ -19,7 +19,7 @@ from tolstat.common.errors import Fault, StoreError
 from tolstat.common.load_kinds import PINS
 from tolstat.common.shown import shown
 from tolstat.joint import HOLE_OF_PIN, perturb
-from tolstat.store import worst
+from tolstat.store import points
 from tolstat.store.view import View
 
 MOST = 4000
@@ -104,7 +104,7 @@ def pairs_of(view: View, by: str) -> Pairs:
         found = f"has {samples.size} joints with a valid {by} that scatters"
         raise StoreError(str(Fault(str(view.path), found, f"run {FEWEST} joints or more")))
     errors, values = view.errors(samples), load.values[samples]
-    point = worst.point_of(view, by)
+    point = points.point_of(view, by)
     chosen, seen = slice(None, None, 2), slice(1, None, 2)
     # what is taken of the parameters, clearances and stations, is the same at every operating point
     used = combinations(errors, perturb(view.study.joint, view.at(point).store.operation, errors))

@@ -12,15 +12,14 @@ from numpy.typing import NDArray
 
 from tolstat.analysis import difference
 from tolstat.analysis.exceedance import FloatArray
+from tolstat.common.counts import Counts
+from tolstat.common.draw_records import DRAWN
 from tolstat.common.errors import Fault, InputError, StoreError
 from tolstat.common.loads import ALL_LIMITS
 from tolstat.common.shown import shown
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import Status
-from tolstat.store.counts import Counts
-from tolstat.store.methods import DRAWN
 from tolstat.store.sample_load import SampleLoad
-from tolstat.store.several_loads import together
 from tolstat.store.view import View
 
 SHARES = (0.5, 0.9, 0.99)
@@ -243,7 +242,7 @@ def _share(sides: Sides, name: str, level: float, confidence: float) -> dict[str
 
 def _together(sides: Sides, confidence: float) -> dict[str, object]:
     """Joints above any limit of their own study: one less the yields."""
-    a, b = (together(side.view).only(side.samples).valid_or_nan for side in (sides.a, sides.b))
+    a, b = (side.view.together.only(side.samples).valid_or_nan for side in (sides.a, sides.b))
     found = difference.shares(a, b, [1.0], sides.paired, confidence, sides.iid)
     values = {key: value if key == "n" else value[0] for key, value in found._asdict().items()}
     return {"load": ALL_LIMITS, "unit": "1", "level": 1.0, **values}

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from tolstat.analysis import exceedance
 from tolstat.common.loads import ALL_LIMITS, SHOWN_LOADS, load_of, unit_text
+from tolstat.common.once import once
 from tolstat.display import text
-from tolstat.store import error_budget
-from tolstat.store.once import once
+from tolstat.store import error_budget, known_parts
 from tolstat.store.sample_load import SampleLoad
 from tolstat.store.view import View
 
@@ -92,8 +92,9 @@ def _above_limit(view: View, load: SampleLoad, confidence: float) -> dict[str, A
     row = {**head, **vars(load.above(level, confidence)), "confidence": confidence, **budget}
     top = (ends or (load, load))[1]  # the load with its numerical error, where that is known
     row["unsearched_upper"] = max(one.unsearched(level, confidence) for one in (load, top))
-    if view.known is not None:
-        known = view.known.share(load.name, confidence)
+    parts = known_parts.of(view)
+    if parts is not None:
+        known = parts.share(load.name, confidence)
         row |= {"both_lower": known.lower, "both_upper": known.upper}
         row |= {name: getattr(known, name) for name in KNOWN}
     return row if load.supports(level) else row | dict.fromkeys(WITHHELD, np.nan)

@@ -14,7 +14,7 @@ from tolstat.common.loads import LOADS, PANELS, QUANTITY, load_of, names_of
 from tolstat.common.tables import VALID
 from tolstat.display import drawing, style, text
 from tolstat.display.asked import Asked
-from tolstat.display.blocks import Block, Panel, Panels, Reader, Section, Table, Text
+from tolstat.display.blocks import Block, Panel, Panels, ResultFile, Section, Table, Text
 from tolstat.display.table import Rows, as_block
 from tolstat.questions.exceedance import curves_figure, query, rendering, sweep
 from tolstat.store.recorded import joint_of
@@ -34,7 +34,7 @@ def sections(view: View, asked: Asked) -> list[Section]:
     blocks: list[Block] = [Panels([_leading_panel(view, name) for name in view.leading])] if view.leading else []
     blocks.append(Text(_note(view), small=True))
     limits = query.limit_rows(view)
-    blocks.append(Reader(query.readings(view), _read_first(view, limits)))
+    blocks.append(ResultFile(query.readings(view), _read_first(view, limits)))
     blocks.append(_quantiles(view))
     if view.limits and view.sampled and view.numerical_error:
         title = "What makes the shares above limits uncertain, in per cent of the joints"

@@ -14,7 +14,7 @@ from tolstat.common.errors import Fault, InputError, StoreError
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import SIMULATED
 from tolstat.solver import rainflow
-from tolstat.store.result_file import RUN_AGAIN
+from tolstat.store.hdf5 import RUN_AGAIN
 from tolstat.store.revolutions import blocks, held, loads
 from tolstat.study.selection import select
 
@@ -53,7 +53,7 @@ def cycles_of(store: Reader, slots: NDArray[np.intp], names: Sequence[str] | Non
 
     Parameters
     ----------
-    store : Reader
+    store : ResultFile
         The campaign.
     slots : ndarray of int, shape (m,)
         File slots, ascending.

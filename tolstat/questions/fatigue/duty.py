@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.tables import ERROR_FIELDS
-from tolstat.store import worst
+from tolstat.store import points, worst
 from tolstat.store.view import View
 
 
@@ -65,7 +65,7 @@ def _of_points(views: Sequence[View], shares: Sequence[float] | None) -> tuple[l
     if shares is not None:
         remedy = "leave --share out: the study gives share in [[operation]]"
         raise InputError([Fault(place, "has several operating points", remedy)])
-    return view.parts, worst.shares_of_revolutions(view).tolist()
+    return view.parts, points.shares_of_revolutions(view).tolist()
 
 
 def _check_same_joints(view: View, first: View) -> None:

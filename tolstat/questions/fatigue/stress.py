@@ -140,7 +140,7 @@ def stresses_of(store: Reader, slots: NDArray[np.intp], points: Sequence[StressP
 
     Parameters
     ----------
-    store : Reader
+    store : ResultFile
         The campaign.
     slots : ndarray of int, shape (m,)
         File slots, ascending.

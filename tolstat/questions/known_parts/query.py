@@ -7,6 +7,7 @@ from typing import Any
 import pandas as pd
 
 from tolstat.common.loads import ALL_LIMITS
+from tolstat.store import known_parts
 from tolstat.store.view import View
 
 
@@ -30,9 +31,10 @@ def intervals(view: View, confidence: float = 0.95) -> pd.DataFrame:
     """
     rows: list[dict[str, Any]] = []
     for load in view.loads([*view.limits, *([ALL_LIMITS] if len(view.limits) > 1 else [])]):
-        if view.known is None or load.limit is None:
+        known = known_parts.of(view)
+        if known is None or load.limit is None:
             continue
-        found, own = view.known.share(load.name, confidence), load.above(load.limit, confidence)
+        found, own = known.share(load.name, confidence), load.above(load.limit, confidence)
         row = {"load": load.name, "unit": load.unit, "level": load.limit}
         row |= {"estimate": own.estimate, "lower": own.lower, "upper": own.upper, "expected": found.expected}
         row |= {"parts_lower": found.parts_lower, "parts_upper": found.parts_upper}

@@ -11,6 +11,7 @@ from tolstat.display.asked import Asked
 from tolstat.display.blocks import Block, Panel, Panels, Section, Text
 from tolstat.display.table import as_block
 from tolstat.questions.known_parts import query, rendering
+from tolstat.store import known_parts
 from tolstat.store.view import View
 
 DRAWN = 6
@@ -19,7 +20,7 @@ DRAWN = 6
 
 def sections(view: View, asked: Asked) -> list[Section]:
     """Three intervals of each share; none where the tolerances are taken as exact."""
-    known = view.known
+    known = known_parts.of(view)
     if known is None or not view.counts.done:
         return []
     table = query.intervals(view)
@@ -46,8 +47,9 @@ def sections(view: View, asked: Asked) -> list[Section]:
 
 
 def _how(view: View) -> list[str]:
-    assert view.known is not None
-    entries = ", ".join(f"{entry.pattern} from {entry.parts}" for entry in view.known.entries)
+    known = known_parts.of(view)
+    assert known is not None
+    entries = ", ".join(f"{entry.pattern} from {entry.parts}" for entry in known.entries)
     return [
         f"Mean and deviation are estimated from measured parts: {entries}.",
         "Joints: the tolerances are as stated, and the joints are a sample. Parts: the process may be any that the "

@@ -24,7 +24,7 @@ from tolstat.common.strict import did_you_mean, validate
 from tolstat.joint import perturb
 from tolstat.joint.ideal import NO_CLOSED_FORM
 from tolstat.sampling import draw, draw_blocks
-from tolstat.store import Reader, ResultStore
+from tolstat.store import ResultFile, Writer
 from tolstat.store.recorded import perturbed
 from tolstat.store.sample_load import SampleLoad
 from tolstat.study import Study
@@ -207,7 +207,7 @@ def _simulate(
     """Simulate the pending joints of a file, a new one with the joints of the pilot; return its number of joints."""
     n = plan.pilot
     if plan.path.exists():
-        with Reader.open(plan.path) as store:
+        with ResultFile.open(plan.path) as store:
             n = store.n - store.first_sample
     stage(f"{name} fidelity")
     campaign.run(_sized(plan.study, n), plan.path, execution=Execution(workers=workers), check=False, progress=progress)
@@ -217,7 +217,7 @@ def _simulate(
 def _extend(plan: _Plan, n: int) -> None:
     """Extend a file to `n` joints; the new ones are pending."""
     study = _sized(plan.study, n)
-    with ResultStore.open_to_write(plan.path) as store:
+    with Writer.open(plan.path) as store:
         more = range(store.n, study.rows)
         if more:
             grow(store, study, draw_blocks(plan.study, more))
@@ -254,7 +254,7 @@ def _read(plans: tuple[_Plan, _Plan], names: Sequence[str], costs: tuple[float, 
     """Read loads of both files."""
     found = []
     for plan in plans:
-        with Reader.open(plan.path) as store:
+        with ResultFile.open(plan.path) as store:
             view = store.view()
             found.append({load.name: load for load in view.loads(names)})
     high, low = found

@@ -14,9 +14,9 @@ from tolstat.common.loads import LOADS, load_of
 from tolstat.common.shown import shown
 from tolstat.common.tables import VALID
 from tolstat.store import revolutions
+from tolstat.store.points import point_of
 from tolstat.store.sample_load import CONFIDENCE
 from tolstat.store.view import View
-from tolstat.store.worst import point_of
 
 if TYPE_CHECKING:
     import pandas as pd

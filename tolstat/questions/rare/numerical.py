@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from tolstat.analysis import accuracy
 from tolstat.common.loads import LOADS, Limit
 from tolstat.common.tables import VALID
-from tolstat.store import Reader, verification
+from tolstat.store import ResultFile, verification
 
 
 def factors(path: Path, limit: Limit, last: NDArray[np.intp]) -> tuple[float, float] | None:
@@ -31,7 +31,7 @@ def factors(path: Path, limit: Limit, last: NDArray[np.intp]) -> tuple[float, fl
         Share of the last level above the limit with the loads corrected by what verified joints near it lack, over the
         share as simulated: least and largest, 1 included. None with fewer than `accuracy.LEAST_NEAR` such joints.
     """
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         near = verification.read(store, verification.NEAR)
         if near is None:
             return None

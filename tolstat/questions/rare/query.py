@@ -32,8 +32,8 @@ from tolstat.common.errors import Fault, StoreError
 from tolstat.common.loads import Limit
 from tolstat.common.shown import shown
 from tolstat.questions.rare import numerical
-from tolstat.store import Reader, ResultStore
-from tolstat.store.recall import differing_keys
+from tolstat.store import ResultFile, Writer
+from tolstat.store.recorded import differing_keys
 from tolstat.study import Study, rule, subset_of
 from tolstat.study.model import Subset
 
@@ -307,7 +307,7 @@ def _rows(out: Path) -> int:
     """Number of rows of the file, 0 if there is none."""
     if not out.exists():
         return 0
-    with Reader.open(out) as store:
+    with ResultFile.open(out) as store:
         return store.n
 
 
@@ -315,7 +315,7 @@ def _is_done(plan: Study, out: Path) -> bool:
     """Whether the file has all rows of the study simulated."""
     if not out.exists():
         return False
-    with Reader.open(out) as store:
+    with ResultFile.open(out) as store:
         differing = differing_keys(store.identity, json.loads(json.dumps(plan.identity())))
         return store.complete and not differing
 
@@ -345,7 +345,7 @@ def _append(plan: Study, out: Path, stage: range, joints: Candidates) -> None:
     """Append the joints of a stage to the file, as pending rows."""
     origin = np.empty(len(stage), SUBSET)
     origin["level"], origin["parent"] = joints.level, joints.parent + plan.first_sample
-    with ResultStore.open_to_write(out) as store:
+    with Writer.open(out) as store:
         grow(store, _sized(plan, stage.stop), [sampling.from_scores(plan, joints.scores)], [origin])
 
 
@@ -356,7 +356,7 @@ def _loads(plan: Study, settings: Subset, out: Path, stage: range, joints: Candi
     stage are its file slots.
     """
     slots = slice(stage.start, stage.stop)
-    with Reader.open(out) as store:
+    with ResultFile.open(out) as store:
         results, origin = store.results(slots), store.origin(slots)
     parent = np.where(joints.parent < 0, -1, joints.parent + plan.first_sample)
     if (origin["level"] != joints.level).any() or (origin["parent"] != parent).any():

@@ -23,7 +23,6 @@ from tolstat.common.shown import shown
 from tolstat.common.tables import Status
 from tolstat.store import error_budget
 from tolstat.store.sample_load import SampleLoad
-from tolstat.store.several_loads import together
 from tolstat.store.view import View
 from tolstat.study import Study
 from tolstat.study.axes import columns_of
@@ -157,7 +156,7 @@ def reweighted(view: View, settings: Sequence[str], confidence: float = 0.95, de
         found = f"holds no joint with a valid load: {', '.join(lacking)}"
         raise StoreError(str(Fault(str(view.path), found, f"see why: tolstat status {view.path}")))
     if view.limits:
-        rows = [_share_above(view, load, done, ratios, confidence, delivery) for load in (*loads, together(view))]
+        rows = [_share_above(view, load, done, ratios, confidence, delivery) for load in (*loads, view.together)]
     else:
         rows = [_quantile(load.only(done), ratios, share, confidence) for load in loads for share in SHARES]
     table = pd.DataFrame([row if row["usable"] else row | dict.fromkeys(WITHHELD & row.keys(), np.nan) for row in rows])

@@ -14,7 +14,7 @@ from tolstat.common.loads import ALL_LIMITS
 from tolstat.common.shown import shown
 from tolstat.joint.perturbation import HOLE_OF_PIN
 from tolstat.store import error_budget
-from tolstat.store.result_file import BLOCK
+from tolstat.store.hdf5 import BLOCK
 from tolstat.store.view import View
 from tolstat.study import Study, load
 from tolstat.study.rewriting import with_keys

@@ -15,9 +15,9 @@ from tolstat.display.asked import Asked
 from tolstat.display.blocks import Panel, Panels, Section, Text
 from tolstat.display.joint_drawing import sheets
 from tolstat.questions.show import query
+from tolstat.store.points import point_of
 from tolstat.store.recorded import joint_of
 from tolstat.store.view import View
-from tolstat.store.worst import point_of
 
 LEGEND = (
     "The joint from its own dimensions. Marked: the bushings, pins and shafts of the leading loads. Loads of cross1–4 "

@@ -13,7 +13,7 @@ from tolstat import study
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.strict import read_toml
 from tolstat.joint import Joint
-from tolstat.store import Reader
+from tolstat.store import ResultFile
 from tolstat.store.recorded import joint_of, operation_of
 
 ALPHA = float(np.radians(15.0))
@@ -61,7 +61,7 @@ def read(source: str | Path, row: int | None = None, alpha: float | None = None)
     path = Path(source)
     if path.is_file() and path.suffix != ".toml":
         _refuse(alpha)
-        with Reader.open(path) as store:
+        with ResultFile.open(path) as store:
             return _of_file(store, row)
     if row is not None:
         raise InputError([Fault(str(source), "has no rows, which --row asks for", "give a result file: FILE.h5")])
@@ -94,7 +94,7 @@ def _refuse(alpha: float | None) -> None:
         raise InputError([Fault("--alpha", "is used with a joint file only", "leave it out: the study has its own")])
 
 
-def _of_file(store: Reader, row: int | None) -> Shown:
+def _of_file(store: ResultFile, row: int | None) -> Shown:
     """Joint of a result file, of its first slot or of a row; of several operating points at the first."""
     at = store.each()[0]
     where = f", at {at.point}" if at.point else ""

@@ -9,7 +9,7 @@ from tolstat.display.asked import Asked
 from tolstat.display.blocks import Block, Panel, Panels, Section, Text
 from tolstat.display.table import as_block
 from tolstat.questions.sorting import query, rendering
-from tolstat.store.recall import mentions
+from tolstat.store.recorded import mentions
 from tolstat.store.view import View
 
 

@@ -13,11 +13,12 @@ from tolstat.campaign.executors import kept_workers
 from tolstat.campaign.progress import clock, silent
 from tolstat.campaign.what_if import Asked, Wanted
 from tolstat.common.cores import available_cores
+from tolstat.common.counts import Counts
 from tolstat.common.errors import Fault, StoreError
 from tolstat.common.loads import ALL_LIMITS, split
 from tolstat.questions.what_if import query
 from tolstat.solver.compilation import warm_up
-from tolstat.store import Counts, ResultStore, what_if
+from tolstat.store import Writer, what_if
 from tolstat.store.provenance import versions
 from tolstat.store.view import View
 from tolstat.study import widths
@@ -118,8 +119,8 @@ def simulate(
         When the file cannot be used, or was made by other code.
     """
     workers = workers or available_cores()
-    with ResultStore.open_to_write(path) as store, kept_workers():
-        view = store.view()
+    with Writer.open(path) as store, kept_workers():
+        view = View(store)
         load = _checked(view, by)
         lines = query.find_lines(view, each, list(groups))
         if not lines:
@@ -152,7 +153,7 @@ class _Run:
 
     def __init__(
         self,
-        store: ResultStore,
+        store: Writer,
         view: View,
         lines: Sequence[Line],
         load: str,

@@ -1,0 +1,204 @@
+"""Checksums that detect numbers that changed after they were written: one for each column and block of rows.
+
+They find accidents, such as a flipped bit of a disk; they are no signatures. Columns that are complete when the file is
+created (errors, how joints were drawn) have theirs from then on. Those of results and histories hold while ``session/
+number`` is even: a run makes it odd before its first write, and even again once it has written the checksums. A run
+that was killed leaves it odd, and the results unchecked.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import zlib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import h5py
+import numpy as np
+from h5py import h5d, h5s
+from numpy.typing import NDArray
+
+from tolstat.store import layout
+from tolstat.store.hdf5 import put_attributes, told_as_damage
+from tolstat.store.layout import Stored
+from tolstat.store.metadata import Metadata
+
+GROUP = "checksums"
+ROWS = 4096
+"""Rows of a block that have one checksum a column."""
+READ_BYTES = 1 << 22
+"""Approximate number of bytes read at a time."""
+KNOWN = 1 << 32
+"""Added to each CRC-32, so that zero stands for a checksum that was never written."""
+
+
+UNKNOWN, SOUND, DAMAGED = 0, 1, 2
+"""What is known of a block."""
+
+
+class Integrity(NamedTuple):
+    """What the checksums of a whole file say.
+
+    Attributes
+    ----------
+    checked : bool
+        Whether results and histories have checksums: not while a run is under way, nor after one that was killed.
+    damaged : dict of str to ndarray
+        Blocks that do not match their checksum, ascending, by dataset.
+    """
+
+    checked: bool
+    damaged: dict[str, NDArray[np.intp]]
+
+
+class CheckedFile:
+    """An open result file whose blocks are compared with their checksums when they are first asked for.
+
+    Readers at its operating points share it, also when another file takes its place.
+    """
+
+    def __init__(self, path: Path, file: h5py.File, metadata: Metadata) -> None:
+        self.path = path
+        self.use(file, metadata)
+
+    def use(self, file: h5py.File, metadata: Metadata) -> None:
+        """Use another file in the place of the one before."""
+        self.file = file
+        self.stored = {stored.path: stored for stored in layout.datasets(metadata)}
+        self._index = {path: k for k, path in enumerate(self.stored)}
+        self._datasets: dict[str, h5py.Dataset] = {}
+        self._known: dict[tuple[str, ...], NDArray[np.uint8]] = {}
+        self._number = -1
+
+    def dataset(self, path: str) -> h5py.Dataset:
+        """Look up a dataset with a row for each joint; its type and shape must be those that the metadata imply."""
+        found = self._datasets.get(path)
+        if found is None:
+            with told_as_damage(self.path):
+                found, stored = self.file[path], self.stored[path]
+                if found.shape != stored.shape or found.dtype != stored.dtype:
+                    raise ValueError(f"{path} is {found.shape} of {found.dtype}, not {stored.shape} of {stored.dtype}")
+            self._datasets[path] = found
+        return found
+
+    @property
+    def number(self) -> int:
+        """Session number: odd while results have no checksums."""
+        with told_as_damage(self.path):
+            return int(self.file["session"]["number"][()])
+
+    def damaged(self, paths: tuple[str, ...], begin: int, end: int) -> NDArray[np.intp]:
+        """Blocks of the rows from `begin` to `end` in which one of some datasets does not match its checksum.
+
+        The datasets are all of results and histories, or none is.
+        """
+        blocks, number = np.arange(begin // ROWS, blocks_of(max(begin, end))), self.number
+        changes = layout.is_at_point(paths[0])
+        if changes and number % 2:
+            return blocks[:0]
+        if number != self._number:
+            self._known = {own: known for own, known in self._known.items() if not layout.is_at_point(own[0])}
+            self._number = number
+        known = self._known.setdefault(paths, np.full(blocks_of(self.stored[paths[0]].shape[0]), UNKNOWN, np.uint8))
+        new = blocks[known[blocks] == UNKNOWN]
+        if new.size:
+            wrong = self._differ(paths, new)
+            if changes and self.number != number:  # a run has begun meanwhile
+                return blocks[:0]
+            known[new] = np.where(wrong, DAMAGED, SOUND)
+        return np.asarray(blocks[known[blocks] == DAMAGED])
+
+    def _differ(self, paths: tuple[str, ...], blocks: NDArray[np.intp]) -> NDArray[np.bool_]:
+        """Whether one of the datasets does not match its checksum, (blocks,)."""
+        for path in paths:
+            self.dataset(path)
+        with told_as_damage(self.path):
+            held = self.file[GROUP]["crc"][:, blocks[0] : blocks[-1] + 1][[self._index[path] for path in paths]]
+            found = computed(self.file, [self.stored[path] for path in paths], blocks)
+            return np.asarray((held[:, blocks - blocks[0]] != found).any(axis=0))
+
+    def check(self) -> Integrity:
+        """Compare everything that has a checksum with it, histories included."""
+        checked, n = self.number % 2 == 0, next(iter(self.stored.values())).shape[0]
+        paths = [path for path in self.stored if checked or not layout.is_at_point(path)]
+        found = {path: self.damaged((path,), 0, n) for path in paths}
+        return Integrity(checked, {path: blocks for path, blocks in found.items() if blocks.size})
+
+    def digest(self, paths: Sequence[str]) -> str:
+        """SHA-256 of the checksums of some datasets."""
+        with told_as_damage(self.path):
+            return hashlib.sha256(
+                self.file[GROUP]["crc"][:][[self._index[path] for path in paths]].tobytes()
+            ).hexdigest()
+
+
+def blocks_of(n: int) -> int:
+    """Number of blocks of `n` rows."""
+    return -(-n // ROWS)
+
+
+def create(file: h5py.File, metadata: Metadata) -> None:
+    """Create the group of the checksums in a file that is complete but for them; those of errors are known then."""
+    stored, blocks = layout.datasets(metadata), np.arange(0, metadata.n, ROWS)
+    group = file.create_group(GROUP)
+    crc = group.create_dataset("crc", data=np.zeros((len(stored), len(blocks)), "u8"))
+    put_attributes(group, {"description": "CRC-32 of each column and block of rows, plus 2^32; 0 if never computed"})
+    put_attributes(crc, {"units": "1", "description": "of path, type, shape and first slot as text, then the bytes"})
+    scales = {
+        "column": (np.array([one.path.encode() for one in stored]), "path of the dataset in this file"),
+        "block": (blocks, "first file slot of the block"),
+    }
+    for k, (name, (values, about)) in enumerate(scales.items()):
+        scale = group.create_dataset(name, data=values)
+        scale.make_scale(name)
+        put_attributes(scale, {"units": "1", "description": about})
+        crc.dims[k].attach_scale(scale)
+    update(file, metadata, False, np.arange(len(blocks)))
+
+
+def update(file: h5py.File, metadata: Metadata, at_points: bool, blocks: NDArray[np.intp]) -> None:
+    """Write the checksums of some blocks, ascending, as they are now: of all results and histories, or all others."""
+    each = list(enumerate(layout.datasets(metadata)))
+    own = {k: one for k, one in each if layout.is_at_point(one.path) == at_points}  # consecutive
+    if own and blocks.size:
+        file[GROUP]["crc"][min(own) : max(own) + 1, blocks] = computed(file, list(own.values()), blocks)
+
+
+def computed(file: h5py.File, stored: Sequence[Stored], blocks: NDArray[np.intp]) -> NDArray[np.uint64]:
+    """Checksums of some blocks of datasets, (datasets, blocks), from what is in the file now."""
+    found = np.empty((len(stored), len(blocks)), np.uint64)
+    runs = np.split(np.arange(len(blocks)), np.flatnonzero(np.diff(blocks) != 1) + 1) if len(blocks) else []
+    for k, own in enumerate(stored):
+        dataset = h5d.open(file.id, own.path.encode())
+        for run in runs:
+            found[k, run] = _of_run(dataset, own, int(blocks[run[0]]), int(blocks[run[-1]]) + 1)
+    return found
+
+
+def _of_run(dataset: h5d.DatasetID, stored: Stored, first: int, last: int) -> list[int]:
+    """Checksums of consecutive blocks; several are read together, or one in pieces if it is large."""
+    n, stop = stored.shape[0], min(last * ROWS, stored.shape[0])
+    step = (
+        1 << ((READ_BYTES // stored.row_bytes) or 1).bit_length() - 1
+    )  # a power of two, as ROWS: one divides the other
+    found, crc = [], 0
+    for begin in range(first * ROWS, stop, step):
+        values = _read(dataset, stored, begin, min(begin + step, stop))
+        for start in range(begin, begin + len(values), ROWS):
+            if start % ROWS == 0:
+                shape = (min(start + ROWS, n) - start, *stored.shape[1:])
+                crc = zlib.crc32(f"{stored.path} {stored.dtype.str} {shape} {start}".encode())
+            end = min(start + ROWS, begin + len(values))
+            crc = zlib.crc32(values[start - begin : end - begin].data, crc)
+            if end % ROWS == 0 or end == n:
+                found.append(crc + KNOWN)
+    return found
+
+
+def _read(dataset: h5d.DatasetID, stored: Stored, begin: int, end: int) -> NDArray[Any]:
+    values = np.empty((end - begin, *stored.shape[1:]), stored.dtype)
+    there = dataset.get_space()
+    there.select_hyperslab((begin, *(0,) * (len(stored.shape) - 1)), values.shape)
+    dataset.read(h5s.create_simple(values.shape), there, values)
+    return values

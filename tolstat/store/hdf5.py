@@ -1,0 +1,222 @@
+"""HDF5 as a result file uses it: open and lock a file, replace it by a changed copy, write columns in place."""
+
+from __future__ import annotations
+
+import errno
+import os
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from functools import lru_cache
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from h5py import h5a, h5d, h5f, h5g, h5p, h5s, h5t
+from numpy.typing import NDArray
+
+from tolstat.common.errors import Fault, StoreError
+from tolstat.common.files import atomic_write, check_disk_space
+
+BLOCK = 1 << 16
+"""Rows read or written at a time, so that no table of a large campaign need be in memory."""
+MAX_FIXED_TEXT = 32_000
+"""Largest size of a text stored as an attribute of fixed length, bytes: HDF5 allows some 64 kB."""
+RUN_AGAIN = "run the campaign again: tolstat run STUDY --out OTHER.h5"
+"""Remedy for a file that cannot be repaired."""
+DAMAGE_ERRORS = (KeyError, ValueError, TypeError, AttributeError, IndexError, RuntimeError, OSError)
+"""Exceptions that h5py, or code that relies on what a file states, raises where the file is damaged."""
+
+
+def store_error(path: Path, found: str, remedy: str) -> StoreError:
+    """Return the error of a file: what is wrong, and the remedy."""
+    return StoreError(str(Fault(str(path), found, remedy)))
+
+
+@contextmanager
+def told_as_damage(path: Path) -> Iterator[None]:
+    """Turn what a damaged file raises into one sentence."""
+    try:
+        yield
+    except StoreError:
+        raise
+    except DAMAGE_ERRORS as error:
+        raise store_error(path, f"is damaged or no tolstat result file: {error}", RUN_AGAIN) from error
+
+
+def open_hdf5(path: Path, mode: str) -> h5py.File:
+    """Open an HDF5 file, ``"r"`` without a lock, ``"r+"`` with one.
+
+    Raises
+    ------
+    StoreError
+        When the file is missing, not HDF5, damaged, not permitted or locked by a writer; the message says which.
+    """
+    if path.is_dir():
+        raise store_error(path, "is a folder", "give the path of a file")
+    if path.exists() and not path.is_file():
+        raise store_error(path, "is a pipe or a device, not a file", "give a result file made by tolstat run")
+    if mode != "r" and path.is_file() and not h5py.is_hdf5(path):
+        # h5py would turn an empty file that it opens for writing into an HDF5 file
+        raise store_error(path, "is not an HDF5 file", "give a result file made by tolstat run")
+    try:
+        file = _for_reading(path) if mode == "r" else h5py.File(path, mode, locking="best-effort")
+    except OSError as error:
+        raise _not_opened(path, mode, error) from error
+    if mode != "r" and not is_at(file, path):
+        # another process replaced the file between opening and locking: the open file is not at `path`
+        file.close()
+        raise store_error(path, "is being written by another process", "wait until that process ends, or stop it")
+    return file
+
+
+def _not_opened(path: Path, mode: str, error: OSError) -> StoreError:
+    if not path.is_file():
+        return store_error(path, "does not exist", f"check the path, or create it: tolstat run STUDY --out {path}")
+    if error.errno in (errno.EAGAIN, errno.EWOULDBLOCK) or "unable to lock" in str(error):
+        return store_error(path, "is being written by another process", "wait until that process ends, or stop it")
+    if "already open" in str(error) or "don't match" in str(error):
+        return store_error(path, "is open in this process in another mode", "close it first")
+    if not os.access(path, os.R_OK if mode == "r" else os.R_OK | os.W_OK):
+        return store_error(path, "cannot be opened: no permission", f"change its permissions: chmod u+rw {path}")
+    if not h5py.is_hdf5(path):
+        return store_error(path, "is not an HDF5 file", "give a result file made by tolstat run")
+    return store_error(path, f"is damaged or no tolstat result file: {error}", RUN_AGAIN)
+
+
+def _for_reading(path: Path) -> h5py.File:
+    """Open a file, also while a campaign writes it.
+
+    It takes no lock, since a writer only changes numbers in place, and has no sieve buffer: with one, HDF5 would read
+    a dataset that stays open from its memory, as it was before.
+    """
+    access = h5p.create(h5p.FILE_ACCESS)
+    access.set_fclose_degree(h5f.CLOSE_STRONG)
+    access.set_file_locking(False, False)
+    access.set_sieve_buf_size(0)
+    return h5py.File(h5f.open(os.fsencode(path), h5f.ACC_RDONLY, access))
+
+
+def is_at(file: h5py.File, path: Path) -> bool:
+    """Whether an open file is the one now at `path`."""
+    return path.exists() and os.path.samestat(os.fstat(file.id.get_vfd_handle()), path.stat())
+
+
+def is_locked(path: Path) -> bool:
+    """Whether a process has locked the file for writing; tested by a shared lock that is released at once."""
+    try:
+        import fcntl
+    except ImportError:  # a system without file locks: unknown, taken as not locked
+        return False
+    with open(path, "rb") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except OSError as error:
+            return error.errno in (errno.EAGAIN, errno.EWOULDBLOCK)
+    return False
+
+
+def copy_open(file: h5py.File, path: Path) -> None:
+    """Copy an open file to `path`, even if its own name has been deleted."""
+    file.flush()
+    handle = file.id.get_vfd_handle()
+    with open(path, "wb") as copy:
+        offset = 0
+        while chunk := os.pread(handle, 1 << 20, offset):
+            copy.write(chunk)
+            offset += len(chunk)
+
+
+def replace(path: Path, held: h5py.File, change: Callable[[h5py.File], None], growth: int = 0) -> h5py.File:
+    """Change the structure of a file by way of a copy; a kill leaves either the old or the changed file.
+
+    No other process can write in between: `held` stays open and locked until the copy is locked and at `path`.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    held : h5py.File
+        The same file, open for writing; closed afterwards.
+    change : callable
+        Called with the copy, open for writing.
+    growth : int
+        Approximate number of bytes by which `change` enlarges the copy.
+
+    Returns
+    -------
+    h5py.File
+        The file now at `path`, open for writing.
+    """
+    check_disk_space(path, held.id.get_filesize() + growth)
+    with ExitStack() as opened:
+        with atomic_write(path) as temporary:
+            copy_open(held, temporary)
+            with open_hdf5(temporary, "r+") as file:
+                change(file)
+            copy = opened.enter_context(open_hdf5(temporary, "r+"))
+        opened.pop_all()
+    held.close()
+    return copy
+
+
+def put(group: h5py.Group, rows: NDArray[np.intp], columns: Mapping[str, NDArray[Any]]) -> None:
+    """Overwrite the `rows` of datasets of a group, (m, ...) each; consecutive rows are written in one piece.
+
+    The functions of HDF5 are called directly: a block of joints has a hundred columns, and h5py's objects would take
+    most of the time.
+    """
+    if not (len(rows) and columns):
+        return
+    opened = [(h5d.open(group.id, name.encode()), values) for name, values in columns.items()]
+    ends = [*(np.flatnonzero(np.diff(rows) != 1) + 1), len(rows)]
+    for begin, end in pairwise([0, *ends]):
+        for held, values in opened:
+            own = np.ascontiguousarray(values[begin:end])
+            there = held.get_space()
+            zeros = (0,) * (own.ndim - 1)
+            there.select_hyperslab((int(rows[begin]), *zeros), own.shape)
+            held.write(h5s.create_simple(own.shape), there, own)
+
+
+def put_attributes(holder: h5py.Group | h5py.Dataset, values: Mapping[str, str | int | float]) -> None:
+    """Write attributes; texts are fixed-length UTF-8, which MATLAB and Fortran can read, except very long ones."""
+    for name, value in values.items():
+        if isinstance(value, str) and len(value.encode()) <= MAX_FIXED_TEXT:
+            put_text(holder.id, name, value)
+        else:
+            holder.attrs.create(name, value)
+
+
+def put_text(held: h5d.DatasetID | h5g.GroupID, name: str, value: str) -> None:
+    """Write a text of at most `MAX_FIXED_TEXT` bytes as an attribute, without h5py's objects: each column has two."""
+    data, own = value.encode(), name.encode()
+    size = max(1, len(data))
+    stored = _text_type(size)
+    if h5a.exists(held, own):
+        h5a.delete(held, own)
+    h5a.create(held, own, stored, h5s.create(h5s.SCALAR)).write(np.array(data, f"S{size}"), mtype=stored)
+
+
+@lru_cache(256)
+def _text_type(size: int) -> h5t.TypeID:
+    return h5t.py_create(h5py.string_dtype("utf-8", size), logical=True)
+
+
+def text(attrs: h5py.AttributeManager, name: str) -> str:
+    """Read a text attribute of fixed or variable length.
+
+    Raises
+    ------
+    KeyError
+        When there is no attribute of that name.
+    ValueError
+        When it is not a text in UTF-8.
+    """
+    value = attrs[name]
+    if isinstance(value, bytes):
+        return value.decode("utf-8")
+    if isinstance(value, str):
+        return value
+    raise ValueError(f"attribute {name} is not a text")

@@ -15,8 +15,8 @@ from tolstat.common import draw_records, tables
 from tolstat.common.columns import DESIGN_COLUMNS, ERROR_COLUMNS, LEDGER_COLUMNS, RESULT_COLUMNS, Column
 from tolstat.joint.contact import LAWS
 from tolstat.joint.derived import DERIVED
-from tolstat.store import axes
-from tolstat.store.new_file import SESSION
+from tolstat.store import layout
+from tolstat.store.layout import SESSION
 
 DOCS = Path(__file__).parent.parent / "docs"
 FORMAT, MODEL, STUDY = DOCS / "result_format.md", DOCS / "model.md", DOCS / "study.md"
@@ -54,12 +54,12 @@ def session_table() -> str:
 def axis_table() -> str:
     """Markdown table of the axes of histories."""
     lines = ["| axis | values | unit | meaning |", "|---|---|---|---|"]
-    for name, (values, text) in axes.NAMES.items():
+    for name, (values, text) in layout.AXES.items():
         held = [f"`{value}`" for value in values]
         told = held if len(held) <= 8 else [*held[:2], "...", held[-1]]
         lines.append(f"| `{name}` | {', '.join(told)} | 1 | {text} |")
     for name, values in {"theta": "2 pi k / steps_per_rev", "harmonic": "0, 1, 2, ..."}.items():
-        _, unit, text = axes.scale_of(name, 4)
+        _, unit, text = layout.scale_of(name, 4)
         lines.append(f"| `{name}` | {values} | {unit} | {text} |")
     return "\n".join(lines)
 

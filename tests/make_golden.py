@@ -12,7 +12,7 @@ import h5py
 import numpy as np
 
 from tests.support import fakes
-from tolstat.store import Reader, ResultStore, integrity
+from tolstat.store import ResultFile, Writer, metadata
 
 FOLDER = Path(__file__).parent / "golden"
 PRESENT, BEFORE = "schema.h5", "schema_before.h5"
@@ -26,14 +26,13 @@ def make(folder: Path) -> Path:
     errors["operation.alpha"] = [0.5, 2.5, -0.5]
     path = folder / PRESENT
     rows = np.arange(3)
-    with ResultStore.create(path, study, errors, fakes.specs_of("full"), {"pin1.offset_e": 0}) as store:
+    with Writer.create(path, study, [errors], fakes.specs_of("full"), {"pin1.offset_e": 0}) as store:
         params = fakes.perturb(study.joint, study.operation, errors)
         store.write(rows, fakes.simulate(params, fakes.Options(), "full", 0))
         store.finish()
     with h5py.File(path, "r+") as file:
-        file.attrs["git_commit"] = ""
-        integrity.seal(file)
-    with Reader.open(path) as store:
+        metadata.write(file, metadata.read(file).changed(git_commit=""))
+    with ResultFile.open(path) as store:
         store.to_pandas(nominal=True).to_csv(path.with_suffix(".csv"), lineterminator="\n")
     return path
 

@@ -12,7 +12,7 @@ from studies.cirelli2021 import tables as paper
 from studies.cirelli2021.evidence import Evidence
 from tolstat.common.tables import Status
 from tolstat.joint import Joint, Operation, operating, rccc
-from tolstat.store import Reader
+from tolstat.store import ResultFile
 from tolstat.store.recorded import operation_of
 
 Array = NDArray[np.float64]
@@ -95,7 +95,7 @@ class Main:
         )
 
 
-def read(store: Reader, joint: Joint, rows: NDArray[np.intp], gamma: Array) -> Main:
+def read(store: ResultFile, joint: Joint, rows: NDArray[np.intp], gamma: Array) -> Main:
     """Take rows of one variant, whose joint is `joint`, from the file; `gamma` is that of all rows of the file."""
     errors, loads = store.errors()[rows], store.histories("loads", rows).astype(np.float64)
     operation = operation_of(store, int(rows[0]))

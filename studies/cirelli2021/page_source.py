@@ -20,7 +20,7 @@ from tolstat.analysis.gamma import gamma as relative_errors
 from tolstat.common.columns import RESULT_COLUMNS
 from tolstat.common.tables import Status, Variant
 from tolstat.joint import Joint, operating, varied
-from tolstat.store import Reader
+from tolstat.store import ResultFile
 from tolstat.store.recorded import operating_points
 
 Array = NDArray[np.float64]
@@ -158,7 +158,7 @@ class PaperStudy:
         return paper_statics.Loads(force, torque, resisting, joint.cross.r_b)
 
 
-def matching(store: Reader) -> bool:
+def matching(store: ResultFile) -> bool:
     """Whether a file is a complete study of the paper's cases with all results and with what the page draws."""
     if store.columns != RESULT_COLUMNS or not store.case_names or not store.complete:
         return False
@@ -182,7 +182,7 @@ def _kept(design: NDArray[np.void], alpha: Array) -> NDArray[np.intp]:
     return np.concatenate(rows)
 
 
-def read(store: Reader) -> PaperStudy:
+def read(store: ResultFile) -> PaperStudy:
     """Take the study from its file; see `matching`."""
     design, results = store.design(), store.results()
     alpha = operating_points(store)["alpha"]

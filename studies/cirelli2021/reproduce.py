@@ -23,9 +23,9 @@ def build(result: Path, stem: Path) -> str:
     """
     from studies.cirelli2021 import page, page_source
     from tolstat.display import text
-    from tolstat.store import Reader
+    from tolstat.store import ResultFile
 
-    with Reader.open(result) as store:
+    with ResultFile.open(result) as store:
         if not page_source.matching(store):
             raise ValueError(f"{result} does not hold the paper's cases: give a file of {STUDY.name}")
         study = page_source.read(store)

@@ -18,7 +18,7 @@ from tolstat.campaign.blocks import Execution
 from tolstat.common.errors import InputError
 from tolstat.common.tables import RESULT, Simulation, Status
 from tolstat.questions.causes.query import causes_of
-from tolstat.store import Reader
+from tolstat.store import ResultFile
 
 SEEDS = 500
 LEAST = 0.95 - 3.0 * np.sqrt(0.95 * 0.05 / SEEDS)
@@ -177,7 +177,7 @@ def test_a_command_runs_the_design_of_a_study_and_tells_the_indices(tmp_path, mo
     assert "from a pick-freeze design" in done.stderr
     assert "in all" in done.stdout
     assert "rank" not in done.stdout
-    with Reader.open("design_causes.h5") as store:
+    with ResultFile.open("design_causes.h5") as store:
         table = causes_of(store.view(), "cross1.F").table.set_index("error")
     assert {row[0] for row in lines[1:]} == set(table.index)
     # pin and hole are normal with these deviations: y = pin + 2 hole + 0.3 pin hole

@@ -24,11 +24,12 @@ from tolstat.campaign import blocks as execution
 from tolstat.campaign import progress, signals
 from tolstat.campaign import run as campaign
 from tolstat.common import tables
+from tolstat.common.counts import Counts
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.tables import Options
 from tolstat.solver import simulation
-from tolstat.store import Counts, Reader, ResultStore
-from tolstat.store.recall import differing_keys
+from tolstat.store import ResultFile, Writer
+from tolstat.store.recorded import differing_keys
 
 
 def datasets(path: Path) -> dict[str, bytes]:
@@ -89,7 +90,7 @@ def test_interrupted_in_progress_and_resumed(tmp_path: Path, reference, workers:
         fakes.run(study, path, workers, 4, progress=interrupt)
     assert caught.value.counts.done == 12
     assert caught.value.path == path
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         assert store.pending().size == 28
     fakes.run(study, path, 3 - workers, 5)
     assert datasets(path) == expected
@@ -179,7 +180,7 @@ def test_a_request_to_stop_keeps_finished_blocks(tmp_path: Path, workers: int, n
     signal_group(process, number)
     said, _ = process.communicate(timeout=60)
     assert process.returncode == 128 + number
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         counts = store.counts()
     assert said.startswith(f"stopped: {path} holds the results of {counts.done} of 40 joints\n  hint: to resume")
     assert 2 <= counts.done < 40
@@ -198,7 +199,7 @@ def test_second_ctrl_c_waits_for_nothing(tmp_path: Path) -> None:
         signal_group(process, signal.SIGINT)
         time.sleep(0.1)
     assert process.returncode in (130, -signal.SIGINT)  # the last one may hit Python's own end
-    with ResultStore.open_to_write(path) as store:
+    with Writer.open(path) as store:
         assert 1 <= store.counts().done < 40
 
 
@@ -223,7 +224,7 @@ def test_kill_loses_at_most_the_blocks_in_work(tmp_path: Path, long_reference, m
     time.sleep(random.Random(moment).uniform(0, 0.3))
     process.kill()
     process.communicate()
-    with ResultStore.open_to_write(path) as store:
+    with Writer.open(path) as store:
         done = np.flatnonzero(store.status())
         results = store.results()
     assert block <= done.size < study.n
@@ -276,7 +277,7 @@ def test_edited_limits_are_taken_over_and_nothing_is_simulated_again(tmp_path: P
     before, stages = datasets(path), fakes.stages(fakes.simulate_and_raise)
     same = fakes.Study(limits={"fork1.T": 40.0}, text="# another comment", name="moved")
     assert fakes.run(same, path, 1, stages=stages).done == 40
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         assert (store.limits, store.study_text, store.study_name) == ({"fork1.T": 40.0}, "# another comment", "moved")
     assert datasets(path) == before
 
@@ -378,7 +379,7 @@ def test_real_joints_give_the_same_bytes(tmp_path: Path, kind: str) -> None:
         counts = campaign.run(plan, tmp_path / f"{name}.h5", workers, block)
         assert counts.done == 7
     assert datasets(tmp_path / "a.h5") == datasets(tmp_path / "b.h5")
-    with Reader.open(tmp_path / "a.h5") as store:
+    with ResultFile.open(tmp_path / "a.h5") as store:
         # A row can be run again from the file alone, in any company.
         again = simulation.simulate_rows(
             joint.perturb(plan.joint, plan.operation, store.errors()[[4, 2]]),

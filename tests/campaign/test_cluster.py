@@ -22,9 +22,10 @@ from tests.support import fakes
 from tolstat.campaign import run as campaign
 from tolstat.campaign.blocks import Execution
 from tolstat.campaign.executors import Work, WorkerDied
+from tolstat.common.counts import Counts
 from tolstat.common.errors import InputError
 from tolstat.common.tables import Options, Simulation, Status
-from tolstat.store import Counts, Reader
+from tolstat.store import ResultFile
 
 pytest.importorskip("distributed")
 
@@ -88,7 +89,7 @@ def test_a_cluster_of_this_machine_finds_bad_joints(tmp_path: Path) -> None:
     bad = fakes.stages(partial(fakes.simulate_badly, kills=values[17], hangs=values[30]))
     execution = Execution("dask", workers=2, block=5, joint_timeout=1.0)
     assert campaign.run(study, path, stages=bad, execution=execution).done == 40
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         assert store.status()[[17, 30]].tolist() == [Status.CRASHED, Status.TIMEOUT]
 
 
@@ -98,7 +99,7 @@ def test_the_first_blocks_that_fail_are_no_fault_of_the_cluster(tmp_path: Path) 
     study, path, bad = fakes.Study(n=12), tmp_path / "a.h5", [0, 4, 8]
     stages = fakes.stages(partial(simulate_or_raise, bad=fakes.draw(study)["pin1.offset_t"][bad]))
     campaign.run(study, path, stages=stages, check=False, execution=Execution("dask", workers=1, block=3))
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         assert np.flatnonzero(store.status() == Status.CRASHED).tolist() == bad
 
 

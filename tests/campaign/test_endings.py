@@ -24,7 +24,7 @@ from tolstat.campaign.blocks import Execution
 from tolstat.campaign.executors import Lost, Work, kept_workers, map_in_processes
 from tolstat.common import progress_memory
 from tolstat.common.tables import Fidelity, Options, Simulation, Status
-from tolstat.store import Reader, verification
+from tolstat.store import ResultFile, verification
 
 LIMIT_S = 0.05
 
@@ -108,7 +108,7 @@ def test_a_campaign_in_which_no_joint_comes_through_ends(tmp_path: Path, workers
     execution = Execution("processes", workers, 2, joint_timeout=LIMIT_S)
     counts = campaign.run(study, path, stages=stages, execution=execution, tell=lambda _: None)
     assert (counts.done, counts.failed) == (3, 3)
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         assert (store.status() == Status.TIMEOUT).all()
 
 
@@ -120,7 +120,7 @@ def test_a_joint_that_hangs_in_a_campaign_of_one_block_is_given_up_alone(tmp_pat
     stages = fakes.stages(partial(fakes.simulate_badly, kills=values[1], hangs=values[2]))
     execution = Execution(workers=1, block=3, joint_timeout=LIMIT_S)
     campaign.run(study, path, stages=stages, execution=execution, tell=lambda _: None)
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         first, *others = store.status()
     assert others == [Status.CRASHED, Status.TIMEOUT]
     assert first in (Status.OK, Status.NOT_SETTLED, Status.NEWTON_FAILED)
@@ -132,7 +132,7 @@ def test_joints_that_kill_or_hang_in_the_check_of_a_run_do_not_end_it(tmp_path: 
     study, path = fakes.Study(n=3, solver=fakes.Solver(Options().steps_per_rev)), tmp_path / "a.h5"
     execution = Execution(workers=1, block=3, joint_timeout=LIMIT_S)
     assert campaign.run(study, path, stages=fakes.stages(simulate_checks_badly), execution=execution).done == 3
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         found = verification.read(store)
     assert found is not None
     status = {name: check.results["status"].tolist() for name, check in found.checks.items()}

@@ -25,7 +25,7 @@ from tolstat.campaign import run as campaign
 from tolstat.common import files, tables
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.tables import Options, Simulation, Status
-from tolstat.store import Reader, ResultStore, provenance
+from tolstat.store import ResultFile, Writer, provenance
 from tolstat.study import Study
 
 KINDS = ("none", "full")
@@ -168,7 +168,7 @@ def test_equal_overlaps_are_merged_and_different_ones_refused(tmp_path: Path, ma
     parts = slices(study, tmp_path, 0, 30, 61) + slices(study, tmp_path, 10, 40)
     assert extend.merge(parts, tmp_path / "c.h5").twice == 30
     assert datasets(tmp_path / "c.h5") == datasets(run(study, tmp_path / "whole.h5"))
-    with ResultStore.open_to_write(parts[2]) as store:
+    with Writer.open(parts[2]) as store:
         results = store.results(slice(7, 8))
         results["T_max"][0, 1] += 1e-13
         store.write(np.array([7]), Simulation(results, {}))
@@ -218,7 +218,7 @@ def test_rows_of_a_slice_are_those_of_the_campaign(tmp_path: Path, make: Make) -
 
     study = make(60)
     (part,) = slices(study, tmp_path, 5, 20)
-    with Reader.open(part) as store:
+    with ResultFile.open(part) as store:
         assert (store.rows, store.n, store.campaign_rows, store.whole) == (range(5, 20), 15, 61, False)
         assert store.to_pandas().index.tolist() == list(range(5, 20))
         assert store.errors().tobytes() == sampling.draw(study)[5:20].tobytes()
@@ -274,7 +274,7 @@ def test_a_file_away_from_its_study_and_joint_file_is_extended(tmp_path: Path) -
     identity = studies.load(study, n=6).identity()
     joint_file.unlink()
     assert extend.extend(path, 6).identity() == identity
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         assert store.n == 7
 
 

@@ -13,8 +13,7 @@ from tolstat.common.errors import InputError
 from tolstat.common.tables import Status
 from tolstat.questions.capability import query as capability
 from tolstat.questions.reweight import query as reweight
-from tolstat.store import Reader, error_budget
-from tolstat.store.several_loads import together
+from tolstat.store import ResultFile, error_budget
 from tolstat.store.verification import Check, Verification
 
 LIMIT, SEEDS, JOINTS = 1.3, 300, 2000
@@ -54,7 +53,7 @@ def path(tmp_path, monkeypatch):
 @pytest.mark.slow
 def test_the_joints_nearest_to_the_limits_are_verified_once(path):
     found = near.check_near(path, "cross1.F > 720 N")
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         view = store.view()
         load = view.load("cross1.F")
         distance = np.abs(load.values - 720.0)
@@ -68,16 +67,16 @@ def test_the_joints_nearest_to_the_limits_are_verified_once(path):
     more = near.check_near(path, "any limit")
     assert set(found.rows) < set(more.rows)
     assert (np.diff(more.rows) > 0).all()
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         view = store.view()
-        assert error_budget.near(view, together(view)) is not None
+        assert error_budget.near(view, view.together) is not None
         assert error_budget.unknown(view) == ""
 
 
 @pytest.mark.slow
 def test_ppm_and_reweighting_carry_it(path):
     def tables():
-        with Reader.open(path) as store:
+        with ResultFile.open(path) as store:
             view = store.view()
             other = reweight.reweighted(view, ["pin1.offset_t.cpk=1.05"]).table
             return capability.limits(view).set_index("load"), other.set_index("load")

@@ -21,7 +21,7 @@ from tolstat.campaign import run as campaign
 from tolstat.common.errors import InputError
 from tolstat.common.loads import LOADS, Limit
 from tolstat.common.tables import Status
-from tolstat.store import Reader, ResultStore
+from tolstat.store import ResultFile, Writer
 
 RULE = "P(cross1.F > 0.5 N) width < 0.4"
 """Nearly one in five of the fake joints is unresolved, and counts at both ends of the interval."""
@@ -92,7 +92,7 @@ def test_a_campaign_stops_where_the_rule_holds(tmp_path: Path) -> None:
     assert outcome.reached
     assert outcome.looks == sequential.looks(0.4, 399)
     assert look.joints in outcome.looks[:-1]
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         status, loads = store.status(), store.results()["F_max"][:, 0]
         assert (status[: look.joints + 1] != Status.PENDING).all()
         assert (status[look.joints + 1 :] == Status.PENDING).all()
@@ -129,7 +129,7 @@ def test_too_few_joints_are_all_simulated(tmp_path: Path) -> None:
     outcome = stopped(tmp_path / "a.h5", n=30)
     assert not outcome.reached
     assert outcome.look.joints == 29
-    with Reader.open(tmp_path / "a.h5") as store:
+    with ResultFile.open(tmp_path / "a.h5") as store:
         assert store.complete
         assert not store.stop["reached"]
 
@@ -145,7 +145,7 @@ def test_until_is_for_independent_samples(tmp_path: Path) -> None:
 def test_the_report_says_that_the_campaign_was_stopped(tmp_path: Path) -> None:
     path = synthetic.store(tmp_path, simulated=40)
     look = stop_rule.Look(39, 0, 4, 0.1, 0.02, 0.25)
-    with ResultStore.open_to_write(path) as store:
+    with Writer.open(path) as store:
         store.record_stop(stop_rule.Outcome(True, look, [20, 39, 60], 0.96).record(stop_rule.parse(RULE, {})))
     notes = report.build(path).notes
     assert f"stopped by {RULE} at 39 joints: 0.10000, 95 % interval 0.02000 to 0.25000, valid after 2 looks" in notes
@@ -207,7 +207,7 @@ def test_a_plan_is_what_the_campaign_takes(tmp_path: Path, small: study.Study) -
     assert made.widths[0.1] == upper - lower
     campaign.run(small, tmp_path / "a.h5", 1, check=False)
     assert made.file_bytes == pytest.approx((tmp_path / "a.h5").stat().st_size, rel=0.05)
-    with Reader.open(tmp_path / "a.h5") as store:
+    with ResultFile.open(tmp_path / "a.h5") as store:
         results = store.results()[1:]
     for limit in made.limits:
         found = exceedance.exceedance(LOADS[limit.load].of(results), results["status"], limit.level)
@@ -268,7 +268,7 @@ def test_a_plan_simulates_variants_as_they_are(tmp_path: Path, monkeypatch: pyte
     found = plan.plan(loaded, workers=1)
     assert (found.rows, found.pilot, found.failed, found.unsettled) == (6, 6, 0, 0)
     campaign.run(loaded, tmp_path / "v.h5", 1, check=False)
-    with Reader.open(tmp_path / "v.h5") as store:
+    with ResultFile.open(tmp_path / "v.h5") as store:
         np.testing.assert_array_equal(made[0].results["F_max"], store.results()["F_max"])
 
 
@@ -280,7 +280,7 @@ def test_a_plan_chooses_the_fidelity_that_the_campaign_chooses(tmp_path: Path) -
     made = plan.plan(loaded, workers=1)
     assert made.fidelity.startswith("auto: ")
     campaign.run(loaded, tmp_path / "a.h5", 1, tell=told.append)
-    with Reader.open(tmp_path / "a.h5") as store:
+    with ResultFile.open(tmp_path / "a.h5") as store:
         assert store.fidelity["reason"] == made.fidelity
     assert told[0].startswith(made.fidelity)
 

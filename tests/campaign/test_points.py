@@ -18,7 +18,7 @@ from tolstat.common.errors import InputError, StoreError
 from tolstat.common.tables import Options, Status
 from tolstat.joint import Operation
 from tolstat.questions.fatigue.query import load_cycles
-from tolstat.store import Reader, ResultStore
+from tolstat.store import ResultFile, Writer
 from tolstat.study.points import Point
 
 ALPHAS = {"low": 0.0, "mid": 0.4, "high": -0.7}
@@ -73,7 +73,7 @@ def test_a_campaign_at_three_points_equals_three_campaigns_bit_for_bit(tmp_path,
         expected = tables(alone)
         assert len(expected) > 50
         assert tables(whole, f"/points/{point.name}") == expected
-    with Reader.open(whole) as store:
+    with ResultFile.open(whole) as store:
         loads = [store.at(name).results()["F_max"] for name in ALPHAS]
         assert np.ptp(store.errors()["operation.alpha"]) > 1
     assert (loads[0] != loads[1]).any()
@@ -82,7 +82,7 @@ def test_a_campaign_at_three_points_equals_three_campaigns_bit_for_bit(tmp_path,
 def test_an_interrupted_campaign_goes_on_at_all_points(tmp_path, whole):
     path = tmp_path / "stopped.h5"
     run(fake(), path, until_row=20)
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         assert [one.pending().tolist() for one in store.each()] == 3 * [list(range(20, 40))]
         assert store.counts()[:2] == (120, 60)
         assert store.view().counts[:2] == (39, 19)
@@ -106,7 +106,7 @@ def test_slices_merge_to_the_whole(tmp_path, whole):
 def test_a_file_grows_at_all_points(tmp_path, whole):
     path = tmp_path / "grown.h5"
     run(fake(n=12), path)
-    with ResultStore.open_to_write(path) as store:
+    with Writer.open(path) as store:
         extend.grow(store, fake(), [fakes.draw(fake())[12:]])
     run(fake(), path)
     assert all(results(path, name) == results(whole, name) for name in ALPHAS)
@@ -115,12 +115,12 @@ def test_a_file_grows_at_all_points(tmp_path, whole):
 def test_a_retry_simulates_the_points_that_failed(tmp_path, whole):
     path = tmp_path / "again.h5"
     shutil.copy(whole, path)
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         failed = {one.point: np.flatnonzero(one.status() == Status.NEWTON_FAILED).tolist() for one in store.each()}
     assert failed["mid"]
     assert failed["low"] != failed["mid"]
     run(fake(), path, retry=Retry((Status.NEWTON_FAILED,), {}, Options(steps_per_rev=30)))
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         assert {one.point: np.flatnonzero(one.attempt()).tolist() for one in store.each()} == failed
         assert len(store.retries) == 1
         used = settings_in_use(fake(), store)  # the file holds names of methods, kernels take numbers
@@ -136,7 +136,7 @@ def test_shares_and_limits_may_be_edited_after_the_run(tmp_path, whole):
     shutil.copy(whole, path)
     shared = tuple(point._replace(share=share) for point, share in zip(POINTS, (0.5, 0.3, 0.2), strict=True))
     run(replace(fake(), points=shared, limits={"cross1.F at mid": 600.0}), path)
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         assert [point.share for point in store.points.values()] == [0.5, 0.3, 0.2]
         assert store.view().limits == {"cross1.F at mid": 600.0}
         assert store.view().at("mid").limits == {"cross1.F": 600.0}
@@ -147,7 +147,7 @@ def test_a_duty_cycle_of_one_file_is_that_of_a_file_for_each_point(tmp_path, who
     points = [p._replace(share=t, operation=p.operation.model_copy(update={"speed": s}))
               for p, t, s in zip(POINTS, times, speeds, strict=True)]  # fmt: skip
     run(fake(tuple(points)), path)
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         view, chosen = store.view(), ["cross1.F_t", "fork2.T"]
         one = load_cycles([view], names=chosen, samples=3)
         several = load_cycles(view.parts, [0.5 / 1.9, 0.6 / 1.9, 0.8 / 1.9], chosen, samples=3)
@@ -158,12 +158,15 @@ def test_a_duty_cycle_of_one_file_is_that_of_a_file_for_each_point(tmp_path, who
     np.testing.assert_allclose([share for _, share in one.duty], [0.5 / 1.9, 0.6 / 1.9, 0.8 / 1.9])
     np.testing.assert_array_equal(one.cycles.ranges, several.cycles.ranges)
     np.testing.assert_allclose(one.cycles.weights, several.cycles.weights)
-    with Reader.open(whole) as store, pytest.raises(InputError, match=r"without a share of the time\n.*--point low"):
+    with (
+        ResultFile.open(whole) as store,
+        pytest.raises(InputError, match=r"without a share of the time\n.*--point low"),
+    ):
         load_cycles([store.view()])
 
 
 def test_what_needs_one_point_asks_for_it(whole):
-    with Reader.open(whole) as store:
+    with ResultFile.open(whole) as store:
         for ask in (store.results, store.status, store.to_pandas, lambda: store.histories("loads")):
             with pytest.raises(StoreError, match=r"several operating points: low, mid, high\n.*--point low"):
                 ask()
@@ -189,7 +192,7 @@ def test_a_name_of_a_point_is_no_path(tmp_path, whole):
         file.attrs["points"] = text.replace(b'"low"', b'"../x"') if isinstance(text, bytes) else text
         seal(file)
     with pytest.raises(StoreError, match="damaged"):
-        Reader.open(path)
+        ResultFile.open(path)
 
 
 STUDY = """
@@ -231,6 +234,6 @@ def test_simulated_joints_at_three_points_equal_those_of_three_studies(tmp_path:
     whole = simulated("all", "".join(f'[[operation]]\nname = "{n}"\n{keys}' for n, keys in OPERATIONS.items()))
     for name, keys in OPERATIONS.items():
         assert tables(whole, f"/points/{name}") == tables(simulated(name, f"[operation]\n{keys}"))
-    with Reader.open(whole) as store:
+    with ResultFile.open(whole) as store:
         assert not replay.replay(store.at("start"), 2).differences
         assert store.view().study.points == study.load(tmp_path / "all.toml").points

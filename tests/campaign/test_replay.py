@@ -23,7 +23,7 @@ from tolstat.common.errors import InputError, StoreError
 from tolstat.common.files import data_dir
 from tolstat.common.tables import RESULT, Simulation, Status
 from tolstat.questions.causes.tail import worst_joints
-from tolstat.store import Reader, ResultStore, integrity, recorded
+from tolstat.store import ResultFile, Writer, integrity, recorded
 from tolstat.study.tolerances import distributions
 from tolstat.study.tolerances.radial import Rayleigh
 
@@ -83,7 +83,7 @@ def file(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactor
 
 
 def test_every_row_comes_out_as_it_is_stored(file: Path) -> None:
-    with Reader.open(file) as store:
+    with ResultFile.open(file) as store:
         for row in range(store.n):
             again = replay.replay(store, row)
             assert (again.differences, again.code, again.stored) == ([], [], Status.OK)
@@ -110,7 +110,7 @@ def test_differences_are_found_and_named(file: Path, tmp_path: Path) -> None:
         name = next(name for name in ("coefficients_imag", "loads") if name in changed["histories"])
         changed[f"histories/{name}"][3, 1, 1, 1] += 0.25
         check_anew(changed, 3)
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         again = replay.replay(store, 3)
         assert [d.name for d in again.differences] == ["fork2.T_mean", f"histories/{name}"]
         assert again.differences[0].relative == pytest.approx(1e-12, rel=1e-3)
@@ -149,7 +149,7 @@ def test_pending_rows_are_refused(file: Path, tmp_path: Path) -> None:
     shutil.copy(file, path)
     with h5py.File(path, "r+") as changed:
         changed["results/status"][2] = Status.PENDING
-    with Reader.open(path) as store, pytest.raises(InputError, match="row 2 is pending"):
+    with ResultFile.open(path) as store, pytest.raises(InputError, match="row 2 is pending"):
         replay.replay(store, 2)
 
 
@@ -182,7 +182,7 @@ def test_the_tail_is_told_with_its_errors(tmp_path: Path) -> None:
         "[sampling]", '"hole2.offset_radial" = { sigma = "0.1 mm", distribution = "rayleigh" }\n[sampling]'
     )
     path = synthetic.store(tmp_path, text, failed=2, unsettled=3)
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         found = worst_joints(store.view(), "cross1.F", 4)
         errors, results = store.errors(), store.results()
         contact = worst_joints(store.view(), "pin1.contact", 100)
@@ -210,9 +210,9 @@ def test_the_tail_of_a_subset_simulation_is_told_too(tmp_path: Path) -> None:
     plan = study.load(tmp_path / "plan.toml")
     subset = study.subset_of(plan, {"load": "cross1.F", "levels": {"cross1.F": 700.0}, "per_level": 60, "p0": 0.1})
     results, origin = synthetic.results(61), np.zeros(61, SUBSET)
-    with ResultStore.create(tmp_path / "subset.h5", subset, sampling.draw(plan), origin=[origin]) as store:
+    with Writer.create(tmp_path / "subset.h5", subset, [sampling.draw(plan)], origin=[origin]) as store:
         store.write(np.arange(61), Simulation(results, None))
-    with Reader.open(tmp_path / "subset.h5") as store:
+    with ResultFile.open(tmp_path / "subset.h5") as store:
         view = store.view()
         assert [joint.row for joint in worst_joints(view, "cross1.F", 1).joints] == [np.argmax(results["F_max"][:, 0])]
         with pytest.raises(StoreError, match="no random sample"):

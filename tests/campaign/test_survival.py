@@ -28,10 +28,11 @@ from tolstat.campaign import run as campaign
 from tolstat.campaign.block import without_simulation
 from tolstat.campaign.blocks import MAX_BLOCK, Execution, Pace
 from tolstat.campaign.retry import Retry, parse
+from tolstat.common.counts import Counts
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.tables import SIMULATED, Fidelity, Options, Simulation, Status
 from tolstat.joint import Operation
-from tolstat.store import Counts, Reader
+from tolstat.store import ResultFile
 from tolstat.study.model import Solver
 
 LONG = bool(os.environ.get("TOLSTAT_LONG"))
@@ -65,7 +66,7 @@ def test_a_joint_that_kills_and_one_that_hangs_are_marked(
     execution = Execution("processes", workers, block, joint_timeout=0.1)
     counts = fakes.run(study, path, stages=fakes.stages(bad), execution=execution, tell=told.append)
     assert counts.done == 40
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         assert store.status()[[17, 30]].tolist() == [Status.CRASHED, Status.TIMEOUT]
         assert np.isnan(store.results()["F_max"][[17, 30]]).all()
     hung = "row 30: timeout: made no progress in 0.1 s of processor time"
@@ -81,7 +82,7 @@ def test_parameters_that_are_no_numbers_are_not_simulated(
     path = tmp_path / "a.h5"
     stages = fakes.stages()._replace(perturb=perturb_badly)
     fakes.run(fakes.Study(), path, workers, 4, stages=stages)
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         bad = np.flatnonzero(store.errors()["operation.alpha"] > 1.5)
         assert bad.size
         assert (store.status()[bad] == Status.INVALID_INPUT).all()
@@ -112,7 +113,7 @@ def test_all_processes_killed_again_and_again(tmp_path: Path, expected: dict[str
         os.killpg(process.pid, signal.SIGKILL)
         process.communicate()
         kills += 1
-        with Reader.open(path) as store:
+        with ResultFile.open(path) as store:
             if not store.pending().size:
                 break
     assert kills
@@ -173,7 +174,7 @@ def test_a_file_that_is_deleted_meanwhile_is_put_back(
     with pytest.raises(StoreError, match=f"during the campaign\n  hint: {tmp_path}.* holds all finished joints"):
         fakes.run(fakes.Study(), path, 1, 5, progress=remove)
     kept = tmp_path / "a.saved.h5" if replaced else path
-    with Reader.open(kept) as store:
+    with ResultFile.open(kept) as store:
         assert store.counts().done == 15
     fakes.run(fakes.Study(), kept, 1)
     assert datasets(kept) == expected
@@ -188,7 +189,7 @@ def test_a_torn_block_is_simulated_again(tmp_path: Path, expected: dict[str, byt
     with h5py.File(path, "r+") as file:
         file["results/fork2.F_mean"][5:9] = np.nan
         file["results/status"][20] = Status.OUTSIDE_MODEL
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         assert store.damaged().tolist() == [5, 6, 7, 8, 20]
         assert store.pending().tolist() == [5, 6, 7, 8, 20]
         assert store.to_pandas()["status"].loc[[4, 5, 20]].tolist() == ["ok", "pending", "pending"]
@@ -203,7 +204,7 @@ def test_what_cannot_be_simulated_again_is_refused(tmp_path: Path) -> None:
     with h5py.File(path, "r+") as file:
         file["errors/pin1.offset_t"][7] += 1e-9
         file["histories/mode"][3, 4, 1] += 1
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         with pytest.raises(StoreError, match="is damaged: the errors of row 7 do not match"):
             store.errors()
         with pytest.raises(StoreError, match="is damaged: the history mode of row 3 does not match"):
@@ -212,12 +213,12 @@ def test_what_cannot_be_simulated_again_is_refused(tmp_path: Path) -> None:
     with h5py.File(path, "r+") as file:
         file.attrs["created"] = "yesterday"
     with pytest.raises(StoreError, match="is damaged: its attributes do not match"):
-        Reader.open(path)
+        ResultFile.open(path)
 
 
 def everything(path: Path) -> list[tuple[str, bytes]]:
     """All that a result file says of its joints, row by row, and of itself."""
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         errors, results = store.errors(), store.results()
         histories = [store.histories(name) for name in store.history_specs]
         about = (store.study_name, store.study_text, store.identity, store.joint, store.options, store.sampling)
@@ -261,7 +262,7 @@ def test_a_corrupted_file_gives_an_error_or_the_right_data(tmp_path: Path, histo
 def test_a_campaign_under_way_can_be_looked_at(tmp_path: Path, expected: dict[str, bytes]) -> None:
     path = tmp_path / "a.h5"
     process = start(path, 2, 2, seconds=0.05)
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         session, begun = store.session(), store.counts().done
         assert session is not None
         assert (session.done, store.damaged().size) == (0, 0)
@@ -272,7 +273,7 @@ def test_a_campaign_under_way_can_be_looked_at(tmp_path: Path, expected: dict[st
         assert store.counts().done > begun
     process.communicate(timeout=60)
     assert process.returncode == 0
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         assert store.session() is None
     assert datasets(path) == expected
 
@@ -297,7 +298,7 @@ def test_failed_joints_are_simulated_again_with_other_settings(tmp_path: Path, h
     stages = fakes.stages(simulate_finely)
     fakes.run(study, path, 1, stages=stages)
     before = datasets(path)
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         failed = np.flatnonzero(store.status() == Status.NEWTON_FAILED)
 
     def interrupt(counts: Counts) -> None:
@@ -309,7 +310,7 @@ def test_failed_joints_are_simulated_again_with_other_settings(tmp_path: Path, h
     fakes.run(study, path, 2, 1, stages=stages)  # the rows to come know their settings
     assert fakes.run(study, path, 1, stages=stages, retry=AGAIN, tell=told.append).failed == 0
     assert told == [f"{failed.size} joints are simulated again", "0 joints are simulated again"]
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         assert store.retries == [json.loads(json.dumps(AGAIN.entry()))]
         assert np.flatnonzero(store.attempt() == 1).tolist() == failed.tolist()
         assert (store.results()["steps"][failed] == 60).all()
@@ -441,7 +442,7 @@ def test_a_folder_that_can_only_be_read(read_only: Path, tmp_path: Path, expecte
     with pytest.raises(StoreError, match=r"a\.h5: cannot be opened: no permission\n  hint: change its permissions"):
         fakes.run(fakes.Study(), read_only / "a.h5", 1)
     assert [path.name for path in read_only.iterdir()] == ["a.h5"]
-    with Reader.open(read_only / "a.h5") as store:  # looking at it goes on
+    with ResultFile.open(read_only / "a.h5") as store:  # looking at it goes on
         assert store.counts().done == 20
         assert store.session() is None
     moved = tmp_path / "a.h5"
@@ -458,7 +459,7 @@ def test_a_full_disk(small_disk: Path, tmp_path: Path) -> None:
     moved = tmp_path / "a.h5"
     shutil.copy(path, moved)
     shutil.copytree(f"{path}.parts", f"{moved}.parts")
-    with Reader.open(moved) as store:
+    with ResultFile.open(moved) as store:
         assert 0 < store.counts().done <= 40
     fakes.run(study, moved, 1)
     fakes.run(study, tmp_path / "b.h5", 1)

@@ -18,7 +18,7 @@ from tolstat.campaign.blocks import Execution
 from tolstat.campaign.retry import parse
 from tolstat.common.errors import InputError
 from tolstat.common.tables import FAILED, Status
-from tolstat.store import Reader
+from tolstat.store import ResultFile
 
 STUDY = (
     HEAD
@@ -100,7 +100,7 @@ def of_stand_ins(folder: Path) -> Path:
 
 @pytest.mark.slow
 def test_a_campaign_reaches_every_state_of_the_kernel(path: Path) -> None:
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         family = [store.variants[number].family for number in store.design()["variant"]]
         ended = {name: Status(s).label for name, s in zip(family, store.status(), strict=True)}  # the last one counts
         results = store.results()
@@ -120,7 +120,7 @@ def test_a_campaign_reaches_every_state_of_the_kernel(path: Path) -> None:
 
 @pytest.mark.slow
 def test_a_campaign_reaches_every_state_of_the_supervisor(tmp_path: Path) -> None:
-    with Reader.open(of_stand_ins(tmp_path)) as store:
+    with ResultFile.open(of_stand_ins(tmp_path)) as store:
         assert store.status()[[2, 5, 7]].tolist() == [Status.CRASHED, Status.TIMEOUT, Status.PENDING]
         assert (store.results()["failed_step"][[2, 5]] == -1).all()
 

@@ -24,7 +24,7 @@ from tolstat.common.tables import Method, Options, Simulation, Start, Status
 from tolstat.questions.accuracy import query as tables
 from tolstat.questions.accuracy import rendering
 from tolstat.questions.exceedance import query as exceedance
-from tolstat.store import Reader, ResultStore, provenance, recorded, verification
+from tolstat.store import ResultFile, Writer, provenance, recorded, verification
 from tolstat.store.verification import Check, Verification
 
 REAL = """
@@ -166,7 +166,7 @@ def test_errors_are_relative_to_the_largest_of_the_kind():
 def test_a_run_checks_a_few_joints_and_a_file_gives_them_back(tmp_path):
     path = tmp_path / "a.h5"
     campaign.run(fakes.Study(n=900), path, 1, stages=fakes.stages())
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         found = verification.read(store)
         assert found is not None
         assert found.rows.tolist() == verify.choose(np.flatnonzero(store.status()[1:] == Status.OK) + 1, 2, 7).tolist()
@@ -178,7 +178,7 @@ def test_a_run_checks_a_few_joints_and_a_file_gives_them_back(tmp_path):
         expected["steps"] *= 2 if name == "half_step" else 1
         assert np.array_equal(check.results, expected)
         assert from_names(check.options) == checks.options_of_check(Options(steps_per_rev=30), name)
-    with ResultStore.open_to_write(path) as store:
+    with Writer.open(path) as store:
         verification.write(store, found._replace(rows=found.rows[:1], checks={}))
         again = verification.read(store)
     assert again is not None
@@ -187,19 +187,19 @@ def test_a_run_checks_a_few_joints_and_a_file_gives_them_back(tmp_path):
 
 def test_a_run_can_do_without(tmp_path):
     campaign.run(fakes.Study(), tmp_path / "a.h5", 1, stages=fakes.stages(), check=False)
-    with Reader.open(tmp_path / "a.h5") as store:
+    with ResultFile.open(tmp_path / "a.h5") as store:
         assert verification.read(store) is None
 
 
 def test_a_slice_keeps_the_rows_of_the_campaign(tmp_path):
     (tmp_path / "plan.toml").write_text(synthetic.STUDY, encoding="utf-8")
     plan, rows, results = study.load(tmp_path / "plan.toml"), range(20, 30), synthetic.results(61)[20:30]
-    with ResultStore.create(tmp_path / "b.h5", plan, sampling.draw(plan, rows), rows=rows) as store:
+    with Writer.create(tmp_path / "b.h5", plan, [sampling.draw(plan, rows)], rows=rows) as store:
         store.write(np.arange(10), Simulation(results, None))
         solve = lambda slots, *_, **__: Simulation(results[slots], None)  # noqa: E731
         checked = verify.check_campaign(store, lambda slots: slots, ("newton",), 3, 7, solve)
         verification.write(store, checked)
-    with Reader.open(tmp_path / "b.h5") as store:
+    with ResultFile.open(tmp_path / "b.h5") as store:
         found = verification.read(store)
     assert set(found.rows.tolist()) <= set(rows)
     np.testing.assert_array_equal(found.base, results[found.rows - 20])
@@ -207,7 +207,7 @@ def test_a_slice_keeps_the_rows_of_the_campaign(tmp_path):
 
 def off_by(path, factor, rows=(5, 9)):
     """Keep a reference in a file that has every load `factor` times as large."""
-    with ResultStore.open_to_write(path) as store:
+    with Writer.open(path) as store:
         base = store.results()[list(rows)]
         true = base.copy()
         for name in ("F_max", "T_max", "contact_max", "psi_max"):
@@ -219,10 +219,10 @@ def off_by(path, factor, rows=(5, 9)):
 @pytest.mark.slow
 def test_report_moves_every_load_by_the_numerical_error(tmp_path):
     path = synthetic.store(tmp_path)
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         assert exceedance.limits(store.view())["numerical_lower"].isna().all()
     off_by(path, 1.25)
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         limits = exceedance.limits(store.view()).set_index("load").loc["cross1.F"]
         results = store.results()[1:]
     assert limits["numerical_error"] == pytest.approx(0.2)
@@ -255,7 +255,7 @@ def test_an_error_that_is_not_known_is_null_in_json():
 def test_checks_that_fail_are_counted_and_not_measured(tmp_path):
     path = synthetic.store(tmp_path)
     off_by(path, 1.25)
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         found = verification.read(store)
     assert found is not None
     found.checks["reference"].results["status"][0] = Status.NOT_SETTLED
@@ -277,7 +277,7 @@ def test_command_checks_the_joints_of_a_file(tmp_path):
     assert found["loads"]["half_step"]["cross1.T"]["worst"] > 0
     table = pd.read_csv(out)
     assert len(table) == 2 * len(checks.ALL_CHECKS) * len(accuracy.OBSERVABLES)
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         kept = verification.read(store)
         assert kept is not None
         assert (kept.seed, kept.rows.tolist()) == (5, found["rows"])
@@ -297,7 +297,7 @@ def test_parameters_and_settings_come_back_from_the_file_alone(tmp_path):
     )
     listed = study.load(written(tmp_path, text))
     errors = sampling.draw(listed)
-    with ResultStore.create(tmp_path / "a.h5", listed, errors) as store:
+    with Writer.create(tmp_path / "a.h5", listed, [errors]) as store:
         found = recorded.parameters(store, np.array([0, 3]))
         settings = [recorded.options_of(store, row) for row in (0, 3)]
     for k, row in enumerate((0, 3)):

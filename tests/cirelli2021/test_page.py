@@ -19,7 +19,7 @@ from studies.cirelli2021.page import context
 from tolstat import report, study
 from tolstat.campaign import run as campaign
 from tolstat.common.tables import Status
-from tolstat.store import Reader
+from tolstat.store import ResultFile
 
 VARIANTS = """
 [[variant]]
@@ -60,7 +60,7 @@ def result(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="module")
 def small(result) -> paper_source.PaperStudy:
-    with Reader.open(result) as store:
+    with ResultFile.open(result) as store:
         assert paper_source.matching(store)
         return paper_source.read(store)
 
@@ -223,7 +223,7 @@ def test_another_joint_is_shown_beside_printed_constants(result, tmp_path):
     own = 'joint.cross.r_b = "30 mm"\njoint.bushing.fork.k_x = "1e9 N/m"\njoint.contact.k1u = "5e7 N/mm^2"\n'
     (tmp_path / "own.toml").write_text(f'{head}[[variant]]\nname = "own"\n{own}', encoding="utf-8")
     campaign.run(study.load(tmp_path / "own.toml"), tmp_path / "own.h5", workers=1)
-    with Reader.open(tmp_path / "own.h5") as store:
+    with ResultFile.open(tmp_path / "own.h5") as store:
         own_study = paper_source.read(store)
     assert own_study.joint.cross.r_b == 0.03
     assert own_study.base.cross.r_b == 0.03641

@@ -25,7 +25,7 @@ from tolstat.common.load_kinds import BUSHINGS
 from tolstat.common.tables import Simulation, Status
 from tolstat.display import text
 from tolstat.questions import QUESTIONS
-from tolstat.store import Reader
+from tolstat.store import ResultFile
 
 COMMANDS = (
     *(name.replace("_", "-") for names in cli.COMMANDS.values() for name in names),
@@ -209,7 +209,7 @@ def test_export_has_a_row_for_every_joint_and_units_in_the_second_line(tmp_path)
     table = pd.read_csv(out, header=[0, 1], index_col=0)
     assert list(table.columns) == [(c.name, c.unit) for c in ERROR_COLUMNS + RESULT_COLUMNS]
     assert list(table.index) == list(range(1, 61))
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         errors, results = store.errors()[1:], store.results()[1:]
     assert np.array_equal(table["pin1.offset_t", "m"], errors["pin1.offset_t"])
     assert np.array_equal(table["cross1.F_max", "N"][:49], results["F_max"][:49, 0], equal_nan=True)
@@ -243,7 +243,7 @@ def test_export_of_listed_joints_says_first_what_each_is(tmp_path):
     names = ["case", "variant", "family", "group"]
     assert list(table.columns[:5]) == [*((name, "1") for name in names), (ERROR_COLUMNS[0].name, "m")]
     assert table.columns[-1] == (RESULT_COLUMNS[-1].name, RESULT_COLUMNS[-1].unit)
-    with Reader.open(tmp_path / "small.h5") as store:
+    with ResultFile.open(tmp_path / "small.h5") as store:
         assert list(store.to_pandas().columns[:4]) == names
         assert table[names].to_numpy().tolist() == [
             [store.case_names[joint["case"]], joint["variant"], store.variants[joint["variant"]].family, joint["group"]]
@@ -379,7 +379,7 @@ def test_run_ends_with_the_report_and_resumes(study):
     assert head.startswith("load")
     assert "small.h5: 61 joints, 0 failed, 0 not settled" in done.stderr
     assert done.stderr.endswith("next: tolstat report small.h5 --out small.html\n")
-    with Reader.open("small.h5") as store:
+    with ResultFile.open("small.h5") as store:
         assert store.complete
     again = call("run", study, "--executor", "serial")
     assert (again.exit_code, again.stdout) == (0, done.stdout)
@@ -388,7 +388,7 @@ def test_run_ends_with_the_report_and_resumes(study):
 def test_run_says_why_joints_have_no_load_and_how_to_try_again(study, monkeypatch):
     """As `run` sees a finished campaign with two kinds of joints without a load."""
     path = synthetic.store(study.parent, failed=3, unsettled=1)
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         counts = store.counts()
     monkeypatch.setattr(campaign, "run", lambda *_, **__: counts)
     first, *told = unwrapped(call("run", "small.toml", "--no-report").stderr).splitlines()
@@ -448,7 +448,7 @@ def test_another_number_of_joints_is_an_extension_of_the_file(study):
 
 def test_interrupted_run_says_how_to_resume(study, monkeypatch):
     path = synthetic.store(study.parent, simulated=20)
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         counts = store.counts()
 
     def stopped(*_, **__):

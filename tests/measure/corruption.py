@@ -15,9 +15,9 @@ import tempfile
 from pathlib import Path
 
 import h5py
+from tolstat.store.histories import parts_folder
 
 from tests.support import corruption
-from tolstat.store.histories import parts_folder
 
 READING = (
     ("status", "FILE", "--json"),

@@ -10,7 +10,7 @@ import numpy as np
 
 from tolstat.common.tables import Status
 from tolstat.joint import ideal, operating, perturb
-from tolstat.store import Reader
+from tolstat.store import ResultFile
 from tolstat.store.recorded import joint_of
 
 mpl.use("Agg")
@@ -21,7 +21,7 @@ def draw(source: Path, target: Path) -> None:
     """Draw shares of joints that are ok, or stationary, by speed and torque, and where the torque reverses."""
     from matplotlib import pyplot as plt
 
-    with Reader.open(source) as store:
+    with ResultFile.open(source) as store:
         errors, status = store.errors(), store.status()
         rows = np.arange(store.first_sample, len(errors))
         errors, status = errors[rows], status[rows]

@@ -20,8 +20,9 @@ import numpy as np
 from tests.support import synthetic
 from tolstat import joint, sampling, study
 from tolstat.campaign import run as campaign
+from tolstat.common.counts import Counts
 from tolstat.common.tables import RESULT, HistorySpec, Options, Simulation, Status
-from tolstat.store import Counts, Reader
+from tolstat.store import ResultFile
 
 
 def simulate(params: np.ndarray, options: Options, **rest: object) -> Simulation:
@@ -70,7 +71,7 @@ def measure(n: int, folder: Path, block: int = 4096, results: Sequence[str] = ()
     times.append(time.perf_counter())
     campaign.run(plan, path, progress=note_begin, **small)
     times.append(time.perf_counter())
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         assert store.complete
         last = store.results(slice(n, n + 1))["F_max"][0, 0]
     params = joint.perturb(plan.joint, plan.operation, sampling.draw(plan, range(n, n + 1)))

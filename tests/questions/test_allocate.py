@@ -15,7 +15,7 @@ from tolstat.cli import app
 from tolstat.common.errors import InputError
 from tolstat.questions.allocate import query as allocate
 from tolstat.questions.allocate.ratios import DensityRatios
-from tolstat.store import Reader
+from tolstat.store import ResultFile
 from tolstat.study import costs, scaling
 
 TWO = synthetic.STUDY.replace("n = 60", "n = 12000").replace(
@@ -37,7 +37,7 @@ def share_of(factor):
 
 
 def test_a_proposal_keeps_its_limit_in_a_fresh_campaign(path, tmp_path):
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         found = allocate.allocated(store.view(), [LIMIT])
     assert found.aim == "interval"
     row, table = found.limits.iloc[0], found.tolerances.set_index("tolerance")
@@ -59,7 +59,7 @@ def test_a_proposal_keeps_its_limit_in_a_fresh_campaign(path, tmp_path):
 
 
 def test_where_a_limit_leaves_room_tolerances_become_wider(path):
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         found = allocate.allocated(store.view(), ["P(cross1.F > 700 N) < 0.25"])
     table = found.tolerances.set_index("tolerance")
     assert table.loc["pin[12].offset_t", "factor"] > 1.1
@@ -68,7 +68,7 @@ def test_where_a_limit_leaves_room_tolerances_become_wider(path):
 
 
 def test_what_the_joints_cannot_show_needs_new_runs(path):
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         found = allocate.allocated(store.view(), ["P(cross1.F > 700 N) < 1e-6"])
     assert not found.holds
     assert found.verdict.startswith("needs new runs")
@@ -84,7 +84,7 @@ def test_costs_decide_between_two_tolerances_with_the_same_effect(path, tmp_path
     file = campaign(tmp_path, text, "each")
     table = tmp_path / "costs.csv"
     table.write_text("tolerance,cost,fixed,power,most\npin1.offset_t,10,2,1,\npin2.offset_t,1,,2,0.1 mm\n")
-    with Reader.open(file) as store:
+    with ResultFile.open(file) as store:
         found = allocate.allocated(store.view(), [LIMIT], table)
     rows = found.tolerances.set_index("tolerance")
     assert list(rows.index) == ["pin1.offset_t", "pin2.offset_t"]  # the tilt has no cost, and is kept
@@ -124,7 +124,7 @@ def test_a_mean_off_centre_moves_with_its_band(tmp_path):
     for factor in (0.25, 0.8, 2.0):
         found = tolerance.distribution(tolerance.scaled(factor))
         assert (found.mean, found.sigma) == pytest.approx((factor * 4.5e-5, factor * 5.5e-5 / 2.4))
-    with Reader.open(campaign(tmp_path, text, "off")) as store:
+    with ResultFile.open(campaign(tmp_path, text, "off")) as store:
         found = allocate.allocated(store.view(), ["P(cross1.F > 700 N) < 0.5"])
     row = found.tolerances.set_index("tolerance").loc["pin*.offset_t"]
     assert 0.5 < row["factor"] < 1.0
@@ -181,7 +181,7 @@ def test_faults_of_limits_costs_and_names_are_told_together(path, tmp_path):
     table = tmp_path / "costs.toml"
     table.write_text('"pin[12].offset_t" = { cost = 1, fixed = 2 }\n"pin4.tilt_t" = { least = "1 mm" }\npin9.x = {}\n')
     bad = ["P(cros1.F > 7 N) < 0.1", "P(cross1.F > 700 mm) < 2", "often"]
-    with Reader.open(path) as store, pytest.raises(InputError) as found:
+    with ResultFile.open(path) as store, pytest.raises(InputError) as found:
         allocate.allocated(store.view(), bad, table, ["pin7.*"])
     for words in (
         "did you mean 'cross1.F'",
@@ -194,7 +194,7 @@ def test_faults_of_limits_costs_and_names_are_told_together(path, tmp_path):
     ):
         assert words in str(found.value)
     assert "selects no error" in str(found.value)
-    with Reader.open(path) as store, pytest.raises(InputError, match="no tolerance that may change"):
+    with ResultFile.open(path) as store, pytest.raises(InputError, match="no tolerance that may change"):
         allocate.allocated(store.view(), [LIMIT], keep=["pin*.offset_t", "pin*.tilt_t"])
 
 

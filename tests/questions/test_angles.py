@@ -18,7 +18,7 @@ from tolstat.display.asked import Asked
 from tolstat.questions.causes.angles import against_angle
 from tolstat.questions.causes.section import sections
 from tolstat.questions.causes.tail import worst_joints
-from tolstat.store import Reader, revolutions
+from tolstat.store import ResultFile, revolutions
 from tolstat.store.revolutions import Revolutions
 
 TEXT = synthetic.STUDY.replace("n = 60", "n = 900").replace("offset_t", "offset_[tz]")
@@ -52,7 +52,7 @@ def test_loads_are_the_same_wherever_they_are_from(stores):
     rows = np.array([0, 2, 4])
     found = {}
     for kind, path in stores.items():
-        with Reader.open(path) as store:
+        with ResultFile.open(path) as store:
             found[kind] = revolutions.read(store, rows, FORCES + SHAFTS, 180)
             results = store.results()[rows]
     assert [found[kind].origin for kind in stores] == ["stored", "harmonics", "simulated again"]
@@ -68,7 +68,7 @@ def test_loads_are_the_same_wherever_they_are_from(stores):
     scale = largest.max()  # shafts' forces are small differences of bushing forces
     np.testing.assert_allclose(of(found["harmonics"], SHAFTS), of(found["full"], SHAFTS), atol=0.01 * scale)
     assert found["full"].angles[1] == pytest.approx(np.radians(2.0))
-    with Reader.open(stores["none"]) as store:
+    with ResultFile.open(stores["none"]) as store:
         coarse = revolutions.read(store, rows, SHAFTS, 60)
     assert np.array_equal(of(coarse, SHAFTS), of(found["none"], SHAFTS)[:, ::3])
 
@@ -90,7 +90,7 @@ def known(tmp_path, monkeypatch):
 
 
 def test_each_error_has_its_share_where_it_acts(known):
-    with Reader.open(known) as store:
+    with ResultFile.open(known) as store:
         found = against_angle(store.view(), ["cross2.F"], 800)[0]
     assert (found.joints, found.names[:2]) == (800, ("pin1.offset_t", "pin3.offset_z"))
     assert found.nominal == pytest.approx(np.full(12, 600.0))
@@ -129,7 +129,7 @@ def test_command_writes_shares_and_picture(known, tmp_path):
 
 def test_page_draws_loads_over_the_revolution(known):
     asked = Asked(known, replay=800)
-    with Reader.open(known) as store:
+    with ResultFile.open(known) as store:
         view = store.view()
         found = sections(view, asked)
         bushings = [name for name in view.leading if name in SHOWN_LOADS]
@@ -157,7 +157,7 @@ def test_page_draws_loads_over_the_revolution(known):
 
 
 def test_components_and_loads_of_shafts_have_shares_in_their_unit(known):
-    with Reader.open(known) as store:
+    with ResultFile.open(known) as store:
         found = against_angle(store.view(), ["fork1.T_e", "output.moment", "output.f_x"], 400)
     assert [angle.unit for angle in found] == ["N*m", "N*m", "N"]
     assert all(angle.names[0] == "pin1.offset_t" for angle in found)
@@ -165,8 +165,8 @@ def test_components_and_loads_of_shafts_have_shares_in_their_unit(known):
 
 def test_what_has_no_shares_is_refused(known, tmp_path):
     few, sweep = synthetic.store(tmp_path), synthetic.store(tmp_path, synthetic.SWEEP, "sweep")
-    with Reader.open(known) as store, pytest.raises(InputError, match="is not a load over the shaft angle"):
+    with ResultFile.open(known) as store, pytest.raises(InputError, match="is not a load over the shaft angle"):
         against_angle(store.view(), ["pin1.contact"])
     for path, text in ((few, "100 are needed"), (sweep, "not drawn from tolerances")):
-        with Reader.open(path) as store, pytest.raises(StoreError, match=text):
+        with ResultFile.open(path) as store, pytest.raises(StoreError, match=text):
             against_angle(store.view(), ["cross1.F"])

@@ -18,7 +18,7 @@ from tolstat.questions.capability import query as capability
 from tolstat.questions.causes import query, rendering, tail_section
 from tolstat.questions.causes.query import causes_of
 from tolstat.questions.causes.section import sections
-from tolstat.store import Reader, ResultStore, view
+from tolstat.store import ResultFile, Writer, view
 
 N = 3000
 TEXT = synthetic.STUDY.replace("n = 60", f"n = {N}").replace('"pin*.offset_t"', '"pin*.offset_[tz]"')
@@ -32,7 +32,7 @@ def path(tmp_path_factory):
 def made(folder, text, name="known"):
     """Campaign in which cross1.F rises with one error, and with the size of another."""
     file = synthetic.store(folder, text, name, simulated=0)
-    with ResultStore.open_to_write(file) as store:
+    with Writer.open(file) as store:
         results, errors = synthetic.results(store.n, failed=3, unsettled=2), store.errors()
         sigma = 1e-4 / 3
         load = 640.0 + 20.0 * errors["pin1.offset_t"] / sigma + 10.0 * (errors["pin2.offset_z"] / sigma) ** 2
@@ -46,7 +46,7 @@ def run(*arguments):
 
 
 def test_known_causes_are_found_with_their_shares(path):
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         found = causes_of(store.view(), "cross1.F")
     assert (found.joints, found.without_load, found.level) == (N - 5, 5, 700.0)
     table = found.table.set_index("error")
@@ -59,7 +59,7 @@ def test_known_causes_are_found_with_their_shares(path):
     assert abs(table.loc["pin2.offset_z", "srrc"]) < 0.1
     assert table.loc["pin1.offset_t", "direction_p"] < 1e-6 < 0.05 < table.loc["pin2.offset_z", "direction_p"]
     assert table.loc["pin2.offset_z", "size_p"] < 1e-6
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         relative = causes_of(store.view(), "cross1.F", log=True)
     assert relative.std == pytest.approx(found.std / 650, rel=0.05)
     others = table.drop(["pin1.offset_t", "pin2.offset_z"])
@@ -70,7 +70,7 @@ def test_known_causes_are_found_with_their_shares(path):
 def test_of_many_joints_the_first_are_taken_and_all_of_a_thin_tail(path, monkeypatch):
     monkeypatch.setattr(query, "MAX_JOINTS", 1000)
     monkeypatch.setattr(view, "BLOCK", 700)
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         found = causes_of(store.view(), "cross1.F")
         errors, loads = store.errors()[1:1001], store.results()["F_max"][1:-5, 0]
     assert (found.joints, found.used) == (N - 5, 1000)
@@ -121,7 +121,7 @@ def test_what_has_no_causes_is_refused(tmp_path, path):
 
 
 def test_of_the_first_samples_only_these_count(path):
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         found = causes_of(store.view(), "cross1.F", joints=1000)
         errors, loads = store.errors()[1:1001], store.results()["F_max"][1:1001, 0]
     assert (found.joints, found.used, found.without_load) == (1000, 1000, 0)
@@ -136,7 +136,7 @@ PAGE = synthetic.STUDY.replace("n = 60", "n = 400").replace("40 N*m", "18 N*m").
 def shown(path):
     """Sections of the page by key, the notes, and the leading loads of a result file."""
     asked = Asked(path)
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         view = store.view()
         found = {section.key: section.blocks for section in sections(view, asked)}
         return found, asked.notes, view.loads(view.leading)
@@ -188,7 +188,7 @@ def test_page_leaves_out_what_a_file_cannot_tell(tmp_path):
 
 
 def test_capability_of_each_limit_and_of_all_together(path):
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         known = store.view()
         table = capability.limits(known).set_index("load")
         loads = known.loads(list(known.limits))

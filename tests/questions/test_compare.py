@@ -15,7 +15,7 @@ from tolstat.cli import app
 from tolstat.common.errors import InputError
 from tolstat.common.tables import Simulation, Status
 from tolstat.questions.compare import query as compare
-from tolstat.store import Reader, ResultStore
+from tolstat.store import ResultFile, Writer
 
 SEEDS = 500
 LEAST = 0.95 - 3.0 * np.sqrt(0.95 * 0.05 / SEEDS)
@@ -96,7 +96,7 @@ def test_joints_without_a_load_are_bounds_and_dependent_samples_have_no_interval
 def campaign(folder, name, text=synthetic.STUDY, n=400, factor=1.0):
     """Campaign whose load cross1.F follows one error; its last joint has failed."""
     path = synthetic.store(folder, text.replace("n = 60", f"n = {n}"), name, simulated=0)
-    with ResultStore.open_to_write(path) as store:
+    with Writer.open(path) as store:
         results = synthetic.results(store.n, failed=1)
         results["F_max"][:-1, 0] = 640.0 + factor * 1e6 * np.abs(store.errors()["pin1.offset_t"][:-1])
         store.write(np.arange(store.n), Simulation(results, None))
@@ -110,7 +110,7 @@ def run(*arguments):
 def test_joints_of_one_seed_are_paired_by_sample_and_changes_are_put_together(tmp_path):
     wide = synthetic.STUDY.replace("0.1 mm", "0.12 mm").replace("n = 60", "n = 60\nnominal_first = false")
     a, b = campaign(tmp_path, "a"), campaign(tmp_path, "b", wide, n=300)
-    with Reader.open(a) as one, Reader.open(b) as other:
+    with ResultFile.open(a) as one, ResultFile.open(b) as other:
         found = compare.compared(one.view(), other.view(), ["cross1.F"])
         loads = [source_of(store)[k : k + 299] for store, k in ((one, 1), (other, 0))]
     assert found.sides.paired
@@ -137,7 +137,7 @@ def test_other_seeds_are_not_paired(tmp_path):
         campaign(tmp_path, "a"),
         campaign(tmp_path, "b", synthetic.STUDY.replace("seed = 2021", "seed = 5"), factor=1.2),
     )
-    with Reader.open(a) as one, Reader.open(b) as other:
+    with ResultFile.open(a) as one, ResultFile.open(b) as other:
         found = compare.compared(one.view(), other.view())
     assert not found.sides.paired
     assert found.switched.empty
@@ -174,14 +174,14 @@ def test_what_cannot_be_compared_is_refused(tmp_path):
     done = run("compare", a, a)
     assert done.exit_code == 2
     assert "hint: give another folder" in done.stderr
-    with Reader.open(a) as one, pytest.raises(InputError, match=r"did you mean 'cross1\.F'") as refused:
+    with ResultFile.open(a) as one, pytest.raises(InputError, match=r"did you mean 'cross1\.F'") as refused:
         compare.compared(one.view(), one.view(), ["cros1.F", "nothing"])
     assert len(refused.value.faults) == 2
 
 
 def test_pending_joints_are_not_compared(tmp_path):
     a, b = campaign(tmp_path, "a", n=60), synthetic.store(tmp_path, simulated=31, name="b")
-    with Reader.open(a) as one, Reader.open(b) as other:
+    with ResultFile.open(a) as one, ResultFile.open(b) as other:
         found = compare.compared(one.view(), other.view())
     assert len(found.sides.rows) == 30
     assert (found.sides.b.load("cross1.F").status == Status.OK).all()

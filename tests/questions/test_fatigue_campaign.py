@@ -25,7 +25,7 @@ from tolstat.questions.fatigue import query as fatigue
 from tolstat.questions.fatigue.counting import channels, cycles_of
 from tolstat.questions.fatigue.section import sections
 from tolstat.solver import rainflow
-from tolstat.store import Reader
+from tolstat.store import ResultFile
 from tolstat.study.fatigue import Fatigue, read
 
 STUDY = """
@@ -72,20 +72,20 @@ def campaign(tmp_path_factory):
 
 def cycles(path):
     """Cycles of all joints of a file, the nominal joint included, and their status."""
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         return cycles_of(store, np.arange(store.n)), store.status()
 
 
 def load_cycles(files, shares=(1.0,), names=None, samples=None):
     with ExitStack() as stack:
-        views = [stack.enter_context(Reader.open(file)).view() for file in files]
+        views = [stack.enter_context(ResultFile.open(file)).view() for file in files]
         return fatigue.load_cycles(views, shares, names, samples)
 
 
 @pytest.mark.slow
 def test_the_same_cycles_from_worker_and_histories(campaign):
     counted, status = cycles(campaign("cycles"))
-    with Reader.open(campaign("cycles")) as store:
+    with ResultFile.open(campaign("cycles")) as store:
         assert set(store.history_specs) == set(rainflow.specs())
     assert (status != tolstat.Status.OK).any()
     assert np.isnan(counted.number[status != tolstat.Status.OK]).all()
@@ -111,11 +111,11 @@ def test_cycles_of_shafts_are_evaluated_where_they_are_asked_for(campaign, tmp_p
     valid = found["cycles"].status == tolstat.Status.OK
     assert (whole["cycles"][valid] > 0).all()
     np.testing.assert_allclose(whole["full"][valid], whole["cycles"][valid], rtol=1e-5)
-    with Reader.open(campaign("full")) as store:
+    with ResultFile.open(campaign("full")) as store:
         settled = np.flatnonzero(store.status() == tolstat.Status.OK)
         m_x, m_y = store.histories("shafts", settled)[..., 1, 3:5].astype(float).transpose(2, 0, 1)
     moment = [rainflow.periodic(own)[0].max() for own in np.hypot(m_x, m_y)]
-    with Reader.open(campaign("full")) as store:
+    with ResultFile.open(campaign("full")) as store:
         assert cycles_of(store, settled, ["output.moment"]).ranges[:, 0, 0] == pytest.approx(moment)
     assert not set(load_cycles([campaign()]).cycles.channels) & set(asked[:2])
 
@@ -131,7 +131,7 @@ def test_cycles_of_shafts_are_evaluated_where_they_are_asked_for(campaign, tmp_p
 
 
 def test_a_file_without_cycles_of_shafts_says_so(campaign):
-    with Reader.open(campaign("cycles")) as store:
+    with ResultFile.open(campaign("cycles")) as store:
         del store.history_specs["shaft_cycles"]
         with pytest.raises(StoreError, match="holds no shaft_cycles\n  hint: run the campaign again"):
             cycles_of(store, np.arange(store.n), ["output.moment"])
@@ -221,7 +221,7 @@ def test_every_fault_of_the_section_is_told():
 
 
 def test_pylife_series_holds_every_cycle_and_survives_a_file(campaign, tmp_path):
-    with Reader.open(campaign()) as store:
+    with ResultFile.open(campaign()) as store:
         series = tolstat.pylife_series(store.view(), revolutions=10.0, nominal=True)
         samples = tolstat.pylife_series(store.view())
         counted = cycles_of(store, np.arange(store.n))
@@ -251,7 +251,7 @@ def test_the_lines_of_the_document_read_the_export(campaign, tmp_path, monkeypat
     code = next(code for code in found if "cycles.csv" in code).split("# with pyLife")[0]
     names: dict[str, object] = {}
     exec(code, names)
-    with Reader.open(campaign()) as store:
+    with ResultFile.open(campaign()) as store:
         pd.testing.assert_series_equal(names["series"], tolstat.pylife_series(store.view()))
 
 
@@ -260,7 +260,7 @@ def test_pylifes_own_damage(campaign):
     import pylife.strength.fatigue
     import pylife.stress.collective  # noqa: F401
 
-    with Reader.open(campaign()) as store:
+    with ResultFile.open(campaign()) as store:
         series = tolstat.pylife_series(store.view(), ["cross1.F_t"], bins=2000, revolutions=1e7, nominal=True)
         sums = damage.damage(cycles_of(store, np.arange(store.n), ["cross1.F_t"]), LINE, 1e7)[:, 0]
     curve = pd.Series({"k_1": LINE.m, "ND": LINE.N0, "SD": LINE.S0 / 2})  # amplitudes
@@ -310,7 +310,7 @@ def test_spectra_fall_and_the_figure_shows_four_panels(campaign):
 
 def test_the_section_shows_what_is_loaded_most(campaign, tmp_path):
     asked = Asked(tmp_path / "c.h5")
-    with Reader.open(campaign()) as store:
+    with ResultFile.open(campaign()) as store:
         found = sections(store.view(), asked)
         store.study_text = store.study_text.replace("exponents = [4]", "exponents = [0]")
         assert sections(store.view(), asked) == []
@@ -332,7 +332,7 @@ def test_the_section_shows_what_is_loaded_most(campaign, tmp_path):
     assert note == Text(f"{rendering.notes(loading, table)}.", small=True)
     assert [text.split(":")[0] for text in asked.notes] == ["load cycles are left out"]
     for path in (campaign("none"), synthetic.store(tmp_path, synthetic.SWEEP, "sweep")):
-        with Reader.open(path) as store:
+        with ResultFile.open(path) as store:
             assert sections(store.view(), asked) == []
     assert len(asked.notes) == 1
 
@@ -343,7 +343,7 @@ def test_a_slice_of_a_campaign_has_the_rows_of_the_campaign(campaign, tmp_path):
     assert load_cycles([part]).status.tolist() == load_cycles([campaign()]).status[3:8].tolist()
     joints = []
     for path in (campaign(), part):
-        with Reader.open(path) as store:
+        with ResultFile.open(path) as store:
             joints.append(set(tolstat.pylife_series(store.view()).index.get_level_values("joint")))
     assert joints[1] == joints[0] & set(range(4, 9))
     assert joints[1]

@@ -23,7 +23,7 @@ from tolstat.questions.fatigue import parts, parts_rendering
 from tolstat.questions.fatigue.section import sections
 from tolstat.questions.fatigue.stress import Stresses, load_stresses
 from tolstat.solver import rainflow
-from tolstat.store import Reader
+from tolstat.store import ResultFile
 from tolstat.study.fatigue import Fatigue, of_text
 from tolstat.study.stress_point import StressPoint
 
@@ -83,7 +83,7 @@ def campaign(tmp_path_factory):
 
 def stresses(files, shares=(1.0,), samples=None):
     with ExitStack() as stack:
-        views = [stack.enter_context(Reader.open(file)).view() for file in files]
+        views = [stack.enter_context(ResultFile.open(file)).view() for file in files]
         return load_stresses(views, shares, samples)
 
 
@@ -110,7 +110,7 @@ def test_stress_is_formed_before_cycles_are_counted(campaign):
     assert found.own.cycles.channels == NAMES
     assert found.valid.any()
     assert not found.valid.all()
-    with Reader.open(campaign()) as store:
+    with ResultFile.open(campaign()) as store:
         loads = store.histories("loads", np.arange(store.n)).astype(float)
     for p, own in enumerate(settings.points):
         at = loads[:, :, BUSHINGS.index(own.bushing)]
@@ -290,14 +290,14 @@ def test_the_command_prints_loads_below_the_parts(campaign):
 
 
 def test_a_study_without_points_says_so(campaign, tmp_path):
-    with Reader.open(campaign("none")) as store:
+    with ResultFile.open(campaign("none")) as store:
         store.study_text = store.study_text.split("[fatigue]")[0]
         with pytest.raises(InputError, match="names no point of a part\n  hint: add"):
             load_stresses([store.view()])
 
 
 def test_the_page_shows_parts_before_loads(campaign, tmp_path):
-    with Reader.open(campaign("none")) as store:
+    with ResultFile.open(campaign("none")) as store:
         assert sections(store.view(), Asked(tmp_path / "a.h5")) == []
         found = sections(store.view(), Asked(tmp_path / "a.h5", replay=1000))
     panels, table, *notes = found[0].blocks

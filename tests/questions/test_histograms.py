@@ -6,7 +6,7 @@ import pytest
 from tests.support import synthetic
 from tests.support.views import view
 from tolstat.questions.histograms import query
-from tolstat.store import Reader
+from tolstat.store import ResultFile
 
 TOLERANCES = """
 "pin[12].offset_t" = { plus_minus = "0.1 mm", distribution = "normal", cpk = 0.5 }
@@ -20,7 +20,7 @@ def drawn(folder, change=lambda text: text):
         '"pin*.offset_t" = { plus_minus = "0.1 mm", distribution = "normal", cpk = 1.0 }\n', ""
     )
     text = change(text.replace("[tolerances]", f"[tolerances]{TOLERANCES}"))
-    with Reader.open(synthetic.store(folder, text)) as store:
+    with ResultFile.open(synthetic.store(folder, text)) as store:
         made = store.view()
         return query.drawn(made), made.errors(np.arange(made.n)), made.weights
 

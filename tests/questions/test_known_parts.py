@@ -10,7 +10,7 @@ from tolstat.analysis.process import Known
 from tolstat.campaign import extend, run
 from tolstat.questions.known_parts import query
 from tolstat.report import headline, page
-from tolstat.store import Reader
+from tolstat.store import ResultFile
 
 PLAN = (
     synthetic.STUDY.replace("[sampling]\nn = 60", '[sampling]\nmethod = "importance"\nn = 400')
@@ -42,7 +42,7 @@ def test_weights_are_ratios_to_the_mixture_and_rows_depend_on_their_number_only(
 
 def test_more_parts_later_narrow_the_verdict_and_too_few_are_refused(stored, tmp_path):
     spans, answers = [], []
-    with Reader.open(stored) as store:
+    with ResultFile.open(stored) as store:
         own = stored.with_suffix(".toml")
         for parts in (6, 30, 3000):
             text = PLAN.replace("known_from = 30", f"known_from = {parts}")
@@ -58,7 +58,7 @@ def test_more_parts_later_narrow_the_verdict_and_too_few_are_refused(stored, tmp
 
 
 def test_random_joints_do_not_support_what_few_parts_leave_open_and_the_remedy_is_told(tmp_path):
-    with Reader.open(synthetic.store(tmp_path, RANDOM.replace("known_from = 30", "known_from = 8"))) as store:
+    with ResultFile.open(synthetic.store(tmp_path, RANDOM.replace("known_from = 30", "known_from = 8"))) as store:
         found = headline.headline(store.view(), 0.5)
     assert found.answer == "none"
     assert 'parts = { "pin*.offset_t" = 8 }' in found.words
@@ -85,8 +85,8 @@ def test_the_file_is_the_same_for_blocks_slices_and_interruptions(tmp_path):
     run.run(plan, tmp_path / "stopped.h5", workers=1, block=7, until_row=20, check=False)
     other = load(tmp_path, PLAN.replace("known_from = 30", "known_from = 300"), n=40)  # the same study: it resumes
     run.run(other, tmp_path / "stopped.h5", workers=2, block=5, check=False)
-    with Reader.open(whole) as first:
+    with ResultFile.open(whole) as first:
         for name in ("merged", "stopped"):
-            with Reader.open(tmp_path / f"{name}.h5") as second:
+            with ResultFile.open(tmp_path / f"{name}.h5") as second:
                 for read in ("errors", "results", "origin"):
                     assert getattr(first, read)().tobytes() == getattr(second, read)().tobytes(), (name, read)

@@ -18,8 +18,8 @@ from tolstat.cli import app
 from tolstat.common.errors import InputError
 from tolstat.common.tables import RESULT, Fidelity, Simulation, Status
 from tolstat.questions.multifidelity import query as multifidelity
-from tolstat.store import Reader
-from tolstat.store.recall import recall
+from tolstat.store import ResultFile
+from tolstat.store.recorded import recall
 
 SEEDS, M, N = 500, 120, 1500
 SIGMA = math.hypot(2.2, 0.5)
@@ -145,7 +145,7 @@ def test_two_files_of_the_same_joints_stopped_and_gone_on_with(tmp_path, plan):
     found = rows["cross1.F", "mean"]
     assert found["gain"] > 1.5
     assert found["upper"] - found["lower"] < found["alone_upper"] - found["alone_lower"]
-    with Reader.open(tmp_path / "plan_high.h5") as high, Reader.open(tmp_path / "plan_low.h5") as low:
+    with ResultFile.open(tmp_path / "plan_high.h5") as high, ResultFile.open(tmp_path / "plan_low.h5") as low:
         np.testing.assert_array_equal(high.errors(), low.errors(slice(0, high.n)))
         assert recall(low).solver.fidelity == "quasistatic"
     simulated.clear()

@@ -19,7 +19,7 @@ from tolstat.display.asked import Asked
 from tolstat.questions.orders import query, rendering, section
 from tolstat.questions.orders.query import orders_of
 from tolstat.solver.simulation import history_specs
-from tolstat.store import Reader, ResultStore
+from tolstat.store import ResultFile, Writer
 
 ASKED = synthetic.STUDY.replace("[limits]", '[limits]\n"output.lateral_1x" = "200 N"')
 OTHERS = "'*.[FT]_max', 'pin1.contact_*', 'psi_max'"
@@ -72,7 +72,7 @@ def slow(tmp_path_factory):
 
 
 def test_quantiles_of_each_amplitude_with_their_order_statistics(invented):
-    with Reader.open(invented) as store:
+    with ResultFile.open(invented) as store:
         found = orders_of(store.view(), orbits=False)
         own = store.results(slice(1, 58))  # row 0 is the nominal joint, the last three have failed
         nominal = store.results(slice(0, 1))
@@ -95,7 +95,7 @@ def test_ideal_joint_has_the_even_orders_of_its_closed_forms(tmp_path):
     path = tmp_path / "ideal.toml"
     path.write_text(SLOW.replace("quasistatic", "ideal").replace("n = 24", "n = 2"), encoding="utf-8")
     tolstat.run(tolstat.load(path), tmp_path / "ideal.h5", workers=1)
-    with Reader.open(tmp_path / "ideal.h5") as store:
+    with ResultFile.open(tmp_path / "ideal.h5") as store:
         table = orders_of(store.view(), orbits=False).table.set_index("load")
     alpha = np.radians(25.0)
     below = 1.0 - (np.sin(alpha) * np.cos(THETA)) ** 2
@@ -115,7 +115,7 @@ def test_ideal_joint_has_the_even_orders_of_its_closed_forms(tmp_path):
 def test_orbits_simulated_again_are_those_of_the_histories_and_have_the_stored_orders(slow):
     found = []
     for path in slow:
-        with Reader.open(path) as store:
+        with ResultFile.open(path) as store:
             found.append(orders_of(store.view()))
             load = {shaft: store.view().load(f"{shaft}.lateral") for shaft in SHAFTS}
             stored = {name: LOADS[name].of(store.results(slice(0, None))) for name in LOADS if "lateral_" in name}
@@ -149,10 +149,10 @@ def test_a_force_that_turns_and_one_that_swings_have_orbits_with_the_same_semi_a
     plan = study.load(source)
     specs = {"shafts": history_specs(Options(steps_per_rev=SAMPLES), "full", 0)["shafts"]}
     results = synthetic.results(plan.rows)
-    with ResultStore.create(tmp_path / "known.h5", plan, sampling.draw(plan), specs) as store:
+    with Writer.create(tmp_path / "known.h5", plan, [sampling.draw(plan)], specs) as store:
         store.write(np.arange(plan.rows), Simulation(results, {"shafts": known(plan.rows)}))
         store.finish()
-    with Reader.open(tmp_path / "known.h5") as store:
+    with ResultFile.open(tmp_path / "known.h5") as store:
         orbits = orders_of(store.view()).orbits
     for orbit in orbits:
         axes = np.linalg.svd(orbit.force - orbit.force.mean(axis=0))[1] * np.sqrt(2 / SAMPLES)
@@ -175,7 +175,7 @@ def test_of_several_points_an_amplitude_is_the_largest_and_an_orbit_that_of_the_
     text = before + "".join(f'[[operation]]\nname = "{name}"{own}' for name, own in points) + rest
     (tmp_path / "two.toml").write_text(text.replace("n = 24", "n = 8"), encoding="utf-8")
     tolstat.run(tolstat.load(tmp_path / "two.toml"), tmp_path / "two.h5", workers=1)
-    with Reader.open(tmp_path / "two.h5") as store:
+    with ResultFile.open(tmp_path / "two.h5") as store:
         view = store.view()
         found, bent, flat = (orders_of(part) for part in (view, view.at("bent"), view.at("flat")))
     tables = {name: one.table.set_index("load") for name, one in (("all", found), ("bent", bent), ("flat", flat))}
@@ -200,7 +200,7 @@ def test_joints_of_a_sweep_are_simulated_again_each_at_its_own_operating_point(t
     text = synthetic.SWEEP.replace('"pin*.diameter" = { from = "-0.1 mm", to = "0.1 mm"', alpha)
     (tmp_path / "sweep.toml").write_text(text.replace("points = 11", "points = 3"), encoding="utf-8")
     tolstat.run(tolstat.load(tmp_path / "sweep.toml"), tmp_path / "sweep.h5", workers=1)
-    with Reader.open(tmp_path / "sweep.h5") as store:
+    with ResultFile.open(tmp_path / "sweep.h5") as store:
         found = orders_of(store.view())
         own = store.results()["lateral_max"]
     assert (found.origin, found.apart) == ("simulated again", 0.0)
@@ -222,7 +222,7 @@ def test_joints_of_a_sweep_are_simulated_again_each_at_its_own_operating_point(t
 )
 def test_the_page_shows_orders_where_the_study_asks_for_loads_of_the_shafts(tmp_path, change, asked):
     path = synthetic.store(tmp_path, synthetic.STUDY.replace(*change))
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         assert query.are_asked(store.view()) == asked
         remarks = Asked(path)
         found = section.sections(store.view(), remarks)
@@ -232,7 +232,7 @@ def test_the_page_shows_orders_where_the_study_asks_for_loads_of_the_shafts(tmp_
 
 
 def test_panels_are_of_each_quantity_and_shaft(slow):
-    with Reader.open(slow[1]) as store:
+    with ResultFile.open(slow[1]) as store:
         panels = rendering.panels(orders_of(store.view()))
     quantities = ["input-lateral", "output-lateral", "input-moment", "output-moment", "input-drive", "psi"]
     assert [panel.key for panel in panels] == [
@@ -259,5 +259,5 @@ def test_command_prints_a_table_writes_files_and_refuses_files_without_amplitude
     table = pd.read_csv(tmp_path / "out" / "full_orders.csv")
     assert [row["q95"] for row in found["orders"]] == table["q95"].tolist()
     few = synthetic.store(tmp_path, synthetic.STUDY.replace("[limits]", f"[output]\nresults = [{OTHERS}]\n[limits]"))
-    with Reader.open(few) as store, pytest.raises(StoreError, match="no amplitudes of orders"):
+    with ResultFile.open(few) as store, pytest.raises(StoreError, match="no amplitudes of orders"):
         orders_of(store.view())

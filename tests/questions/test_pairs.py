@@ -16,7 +16,7 @@ from tolstat.display.asked import Asked
 from tolstat.joint import HOLE_OF_PIN, load, perturb
 from tolstat.questions.causes import pairs_section
 from tolstat.questions.causes.pairs import MISSED, combinations
-from tolstat.store import Reader, ResultStore
+from tolstat.store import ResultFile, Writer
 
 TEXT = (
     synthetic.HEAD
@@ -45,13 +45,13 @@ def path(tmp_path):
     results = synthetic.results(plan.rows)
     use = combinations(errors, perturb(plan.joint, plan.operation, errors))[MISSED]
     results["F_max"][:, 0] = 640.0 + 800.0 * use + np.random.default_rng(1).normal(0.0, 5.0, plan.rows)
-    with ResultStore.create(tmp_path / "made.h5", plan, errors) as store:
+    with Writer.create(tmp_path / "made.h5", plan, [errors]) as store:
         store.write(np.arange(plan.rows), Simulation(results, None))
     return tmp_path / "made.h5"
 
 
 def test_the_cause_is_found_on_one_half_and_shown_on_the_other(path):
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         found = tolstat.pairs_of(store.view(), "cross1.F")
     assert found.name == MISSED
     assert found.correlation > 0.95 > 0.5 > found.single
@@ -86,7 +86,7 @@ def test_equal_tilts_of_pin_and_hole_use_no_clearance():
 
 
 def test_the_page_shows_the_scatter_with_the_limit(path):
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         (section,) = pairs_section.sections(store.view(), Asked(path))
     assert [block.kind for block in section.blocks] == ["text", "panels", "table", "text"]
     assert MISSED in section.blocks[0].text
@@ -103,10 +103,10 @@ def test_of_several_points_the_load_is_that_of_the_worst_and_the_page_names_it(t
     errors, tables = sampling.draw(plan), {name: synthetic.results(plan.rows) for name in ("low", "high")}
     use = combinations(errors, perturb(plan.joint, plan.at("low").operation, errors))[MISSED]
     tables["low"]["F_max"][:, 0], tables["high"]["F_max"][:, 0] = 640.0, 640.0 + 800.0 * use
-    with ResultStore.create(tmp_path / "points.h5", plan, errors) as store:
+    with Writer.create(tmp_path / "points.h5", plan, [errors]) as store:
         for name, table in tables.items():
             store.at(name).write(np.arange(plan.rows), Simulation(table, None))
-    with Reader.open(tmp_path / "points.h5") as store:
+    with ResultFile.open(tmp_path / "points.h5") as store:
         found = tolstat.pairs_of(store.view(), "cross1.F")
         at_one = tolstat.pairs_of(store.view(), "cross1.F at high")
         (section,) = pairs_section.sections(store.view(), Asked(tmp_path / "points.h5"))
@@ -118,5 +118,5 @@ def test_of_several_points_the_load_is_that_of_the_worst_and_the_page_names_it(t
 
 def test_too_few_joints_are_refused(tmp_path):
     file = synthetic.store(tmp_path)
-    with Reader.open(file) as store, pytest.raises(StoreError, match="60 joints"):
+    with ResultFile.open(file) as store, pytest.raises(StoreError, match="60 joints"):
         tolstat.pairs_of(store.view(), "cross1.F")

@@ -25,8 +25,8 @@ from tolstat.common.errors import InputError, StoreError
 from tolstat.common.tables import PARAM, RESULT, Simulation, Status
 from tolstat.questions.rare import query as rare
 from tolstat.questions.rare import rendering
-from tolstat.store import Reader, ResultStore, provenance
-from tolstat.store.recall import recall
+from tolstat.store import ResultFile, Writer, provenance
+from tolstat.store.recorded import recall
 
 SEEDS = 500
 RHO = 0.6
@@ -165,7 +165,7 @@ def test_a_campaign_finds_the_probability_of_correlated_errors(whole):
     assert found.estimate.lower < norm.sf(2.5) < found.estimate.upper
     assert found.reached
     assert found.joints == sum(level.joints for level in found.levels)
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         errors, origin, loads = store.errors(), store.origin(), store.results()["F_max"][:, 0]
         assert recall(store).identity() == rare._sized(plan, store.n).identity()
     assert origin["level"][:101].tolist() == [-1, *[0] * 100]
@@ -197,7 +197,7 @@ def test_the_example_of_the_function_is_right(tmp_path):
 def test_level_0_is_the_random_campaign(whole):
     plan, _, path = whole
     drawn = load(plan.path.parent, PLAN.replace("n = 60", "n = 100"), "random")
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         np.testing.assert_array_equal(store.errors(slice(0, 101)), sampling.draw(drawn))
 
 
@@ -247,7 +247,7 @@ def test_a_file_of_another_question_or_other_loads_is_refused(tmp_path, whole):
     plan, _, path = whole
     with pytest.raises(StoreError, match=r"sampling.levels.cross1.F: 950.0 in the file, 960.0 in the study"):
         rare.run(asked(load(tmp_path), 2.6), path)
-    with ResultStore.open_to_write(path) as store:
+    with Writer.open(path) as store:
         results = store.results()
         results["F_max"][:, 0] *= -1.0
         store.write(np.arange(store.n), Simulation(results, {}))

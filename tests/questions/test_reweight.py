@@ -17,7 +17,7 @@ from tolstat.cli import app
 from tolstat.common.errors import InputError
 from tolstat.common.tables import Simulation, Status
 from tolstat.questions.reweight import query as campaigns
-from tolstat.store import Reader, ResultStore
+from tolstat.store import ResultFile, Writer
 from tolstat.study.change import changed, rewritten
 from tolstat.study.tolerances import density_ratio
 from tolstat.study.tolerances.distributions import (
@@ -203,7 +203,7 @@ def campaign(folder, text=CORRELATED, name="many"):
     path = synthetic.store(folder, text, name, simulated=0)
     from tolstat.common.tables import Simulation
 
-    with ResultStore.open_to_write(path) as store:
+    with Writer.open(path) as store:
         results = synthetic.results(store.n)
         results["F_max"][:, 0] = load_of(store.errors())
         store.write(np.arange(store.n), Simulation(results, None))
@@ -217,7 +217,7 @@ def load_of(errors):
 def test_reweighted_campaign_agrees_with_a_fresh_one(tmp_path):
     path = campaign(tmp_path)
     settings = ["pin[12].offset_t.plus_minus=0.08 mm"]
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         found = campaigns.reweighted(store.view(), settings)
     plan = load(tmp_path, CORRELATED.replace("n = 4000", "n = 40000").replace("seed = 2021", "seed = 5"))
     fresh = load_of(sampling.draw(replace(plan, tolerances=changed(plan, settings)))[1:])
@@ -231,7 +231,7 @@ def test_reweighted_campaign_agrees_with_a_fresh_one(tmp_path):
 
 def test_errors_where_no_joint_was_drawn_need_new_runs(tmp_path):
     path = campaign(tmp_path, synthetic.STUDY.replace('"normal", cpk = 1.0', '"uniform"'), "band")
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         with pytest.raises(InputError, match=r"0\.17 of the new errors lie where the study draws none") as found:
             campaigns.reweighted(store.view(), ["pin*.offset_t.plus_minus=0.12 mm"])
         assert len(found.value.faults) == 4
@@ -255,7 +255,7 @@ def test_command_prints_a_table_and_json(tmp_path):
 
 def test_a_campaign_without_a_valid_load_is_refused(tmp_path):
     path = campaign(tmp_path)
-    with ResultStore.open_to_write(path) as store:
+    with Writer.open(path) as store:
         results = store.results()
         results["status"] = Status.NEWTON_FAILED
         store.write(np.arange(store.n), Simulation(results, {}))
@@ -268,7 +268,7 @@ def test_a_campaign_without_a_valid_load_is_refused(tmp_path):
 
 def test_a_study_without_limits_has_quantiles(tmp_path):
     path = campaign(tmp_path, CORRELATED.replace("[limits]", "[errors]").replace(LIMITS, ""), "free")
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         found = campaigns.reweighted(store.view(), ["pin1.offset_t.plus_minus=0.08 mm"])
     row = found.table.query("load == 'cross1.F' and share == 0.9").iloc[0]
     assert row["lower"] <= row["estimate"] <= row["upper"] < row["before"] + 20.0
@@ -278,7 +278,7 @@ def test_a_study_without_limits_has_quantiles(tmp_path):
 def test_a_table_that_needs_new_runs_has_no_estimates(tmp_path):
     text = synthetic.STUDY.replace("n = 60", "n = 400")
     path = campaign(tmp_path, text, "few")
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         found = campaigns.reweighted(store.view(), ["pin*.offset_t.plus_minus=0.01 mm"])
     assert not found.usable
     assert found.table[["estimate", "lower", "upper", "bound_lower", "bound_upper"]].isna().all(axis=None)

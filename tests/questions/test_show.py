@@ -28,7 +28,7 @@ from tolstat.joint import nominal_errors, perturb
 from tolstat.kernel.mechanics import bushing
 from tolstat.kernel.mechanics.topology import ARM, ARM_OF_PIN, BUSHING_BASE, FRAME, PIN, TRIAD
 from tolstat.questions.show import query, rendering, section, source
-from tolstat.store import Reader
+from tolstat.store import ResultFile
 
 ALPHA = 0.3
 OPERATION = joints.Operation.model_construct(alpha=ALPHA, speed=50.0, torque=100.0)
@@ -245,7 +245,7 @@ def test_row_prints_the_errors_of_the_file(here):
     assert done.exit_code == 0, done.stderr
     assert (here / "row17.svg").read_text(encoding="utf-8").startswith("<?xml")
     lines = {line.split()[0]: line.split()[1:] for line in done.stdout.splitlines()[1:]}
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         errors = store.errors(slice(17, 18))
         shown = source.read(path, 17)
     assert shown.errors == errors
@@ -280,7 +280,7 @@ def test_what_cannot_be_drawn_is_exit_code_2_and_writes_nothing(here, args, said
 
 
 def test_page_marks_the_leading_loads_and_draws_the_worst_joints(tmp_path):
-    with Reader.open(synthetic.store(tmp_path)) as store:
+    with ResultFile.open(synthetic.store(tmp_path)) as store:
         view, asked = store.view(), Asked(store.path)
         marked = section.worst(view, "fork2.T", asked)
         part, joint = section.sections(view, asked)

@@ -14,7 +14,7 @@ from tolstat.cli import app
 from tolstat.common.errors import InputError, StoreError
 from tolstat.questions.sorting import query, section
 from tolstat.report import page
-from tolstat.store import Reader
+from tolstat.store import ResultFile
 
 ENTRY = '"pin*.offset_t" = { plus_minus = "0.1 mm", distribution = "normal", cpk = 0.4, gauge = "GAUGE" }'
 PLAN = (
@@ -41,7 +41,7 @@ def test_a_gauge_accepts_what_it_measures_inside():
 
 
 def test_an_exact_gauge_gives_what_counting_the_joints_that_are_kept_gives(stored):
-    with Reader.open(stored) as store:
+    with ResultFile.open(stored) as store:
         view = store.view()
         found = query.sorted_joints(view)
         errors, force = view.errors(np.arange(view.n)), view.load("cross1.F").values
@@ -64,7 +64,7 @@ def test_an_exact_gauge_gives_what_counting_the_joints_that_are_kept_gives(store
 def test_a_cost_table_prices_parts_and_joints(stored, tmp_path):
     table = tmp_path / "costs.toml"
     table.write_text('"pin*.offset_t" = { cost = 5.0, fixed = 1.0, at = "0.2 mm" }\n', encoding="utf-8")
-    with Reader.open(stored) as store:
+    with ResultFile.open(stored) as store:
         found = query.sorted_joints(store.view(), table)
     cross = found.parts.iloc[0]
     assert cross["cost"] == pytest.approx(4 * (1.0 + 4.0 * 2.0))
@@ -99,7 +99,7 @@ def test_every_fault_is_told(tmp_path, changed, found):
 
 
 def test_a_study_that_sorts_nothing_has_no_section_and_no_answer(tmp_path):
-    with Reader.open(synthetic.store(tmp_path)) as store:
+    with ResultFile.open(synthetic.store(tmp_path)) as store:
         view = store.view()
         assert section.sections(view, None) == []
         with pytest.raises(StoreError, match="sorts nothing"):

@@ -19,7 +19,7 @@ from tolstat.common.tables import Options, Simulation
 from tolstat.questions.time_above import rendering
 from tolstat.questions.time_above.query import time_above
 from tolstat.solver.simulation import history_specs
-from tolstat.store import Reader, ResultStore
+from tolstat.store import ResultFile, Writer
 
 SEEDS = 500
 SAMPLES = 720
@@ -56,7 +56,7 @@ def path(tmp_path_factory):
     plan = study.load(source)
     specs = history_specs(Options(steps_per_rev=SAMPLES), "full", 0)
     specs = {name: specs[name] for name in ("loads", "shafts")}
-    with ResultStore.create(folder / "waves.h5", plan, sampling.draw(plan), specs) as store:
+    with Writer.create(folder / "waves.h5", plan, sampling.draw(plan), specs) as store:
         rows = np.arange(plan.rows)
         histories = {"loads": wave(tops(plan.rows)), "shafts": turning(tops(plan.rows))}
         store.write(rows, Simulation(synthetic.results(plan.rows, failed=2), histories))
@@ -73,7 +73,7 @@ def run(*arguments):
 
 
 def test_times_of_known_waves_and_joints_told_apart_from_them(path):
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         found = time_above(store.view(), ["cross1.F", "cross1.F_t", "output.lateral", "output.axial"], ["0.75 kN"])
     own = tops(201)[1:-2]  # row 0 is the nominal joint, the last two have failed
     expected = time_of(750.0, own)
@@ -145,7 +145,7 @@ def test_command_prints_limits_and_writes_curves(path, tmp_path):
 
 
 def test_shares_have_their_unit_with_intervals_and_without(path):
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         table = time_above(store.view(), ["cross1.F"], ["700 N"]).table
     without = table.assign(**{name: np.nan for name in table if name.endswith(("_lower", "_upper"))})
     cells = []
@@ -156,7 +156,7 @@ def test_shares_have_their_unit_with_intervals_and_without(path):
 
 
 def test_faults_are_told_together_and_files_without_histories_refused(path, tmp_path):
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         with pytest.raises(InputError) as found:
             time_above(store.view(), ["psi", "fork1.F"], ["700 mm"])
         for words in ("'psi' is no load over the input angle", "'700 mm' cannot be a value in N"):
@@ -169,11 +169,11 @@ def test_faults_are_told_together_and_files_without_histories_refused(path, tmp_
             ("cross1.F", 1.0),
             ("cross1.T", 1.0),
         ]
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         del store.history_specs["shafts"]
         with pytest.raises(StoreError, match="holds no histories of shafts\n  hint: run the campaign again"):
             time_above(store.view(), ["output.moment"], ["1 N*m"])
-    with Reader.open(synthetic.store(tmp_path)) as store, pytest.raises(StoreError, match="no load histories"):
+    with ResultFile.open(synthetic.store(tmp_path)) as store, pytest.raises(StoreError, match="no load histories"):
         time_above(store.view())
     done = run(synthetic.store(tmp_path, synthetic.SWEEP, "sweep"))
     assert done.exit_code == 2

@@ -32,7 +32,7 @@ from tolstat.questions.what_if.section import sections
 from tolstat.report.headline import headline
 from tolstat.solver import stationary
 from tolstat.solver.simulation import simulate_rows
-from tolstat.store import Reader, ResultStore, what_if
+from tolstat.store import ResultFile, Writer, what_if
 from tolstat.study import widths
 from tolstat.study.widths import COARSER, EXACT, FINER, HALF, Line
 
@@ -86,7 +86,7 @@ def made(folder, text=TEXT):
     plan = loaded(folder, text)
     errors = sampling.draw(plan)
     file = folder / "made.h5"
-    with ResultStore.create(file, plan, errors) as store:
+    with Writer.create(file, plan, errors) as store:
         store.write(np.arange(plan.rows), stand_in(perturb(plan.joint, plan.operation, errors), None))
     return file
 
@@ -175,7 +175,7 @@ def test_an_unchanged_line_gives_the_joints_of_the_campaign(tmp_path):
 def test_shares_are_those_of_a_campaign_of_the_changed_study(path, tmp_path):
     done = runner.simulate(path, budget=60.0, workers=1)
     assert (done.simulated > 0, done.each >= 400, done.settled) == (True, True, True)
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         found = query.what_if(store.view(), "cross1.F")
     assert list(dict.fromkeys(found.table["line"])) == ["pin*.tilt_t", "pin*.offset_z", "hole*.diameter"]
     row = found.table.set_index(["line", "step"]).loc[("pin*.tilt_t", HALF)]
@@ -208,7 +208,7 @@ def test_shares_are_those_of_a_campaign_of_the_changed_study(path, tmp_path):
 @pytest.mark.usefixtures("quick")
 def test_fewer_changed_joints_move_the_share_of_all(path):
     runner.simulate(path, budget=60.0, workers=1)
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         view = store.view()
         whole = query.what_if(view, "cross1.F")
         view.altered = {
@@ -241,12 +241,12 @@ def test_interrupted_it_goes_on_and_ends_with_the_same_sets(path, tmp_path, monk
     monkeypatch.setattr(sets, "simulate_rows", failing)
     with pytest.raises(KeyboardInterrupt):
         runner.simulate(path, budget=60.0, workers=1)
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         begun = what_if.read(store)
     assert 0 < sum(len(one.status) for one in begun.values()) < 9 * sets.BLOCK
     monkeypatch.setattr(sets, "simulate_rows", stand_in)
     runner.simulate(path, budget=60.0, workers=1)
-    with Reader.open(path) as store, Reader.open(whole) as other:
+    with ResultFile.open(path) as store, ResultFile.open(whole) as other:
         found, expected = what_if.read(store), what_if.read(other)
     assert found.keys() == expected.keys()
     for name, one in found.items():
@@ -271,7 +271,7 @@ def test_a_joint_that_kills_its_process_has_no_results(tmp_path, monkeypatch):
     params = perturb(plan.joint, plan.operation, sets.as_drawn(plan).draw(range(4)))
     monkeypatch.setattr(sets, "simulate_rows", partial(killing, tilt=params["pin_axis"][2, 0, 2]))
     monkeypatch.setattr(sets, "warm_up", fakes.warm_up)
-    with ResultStore.open_to_write(path) as store, kept_workers():
+    with Writer.open(path) as store, kept_workers():
         options, wanted = sets.options_of(plan, store), [sets.Wanted(sets.as_drawn(plan), range(4))]
         assert 0 < sets.seconds_per_joint(plan, options, 4, [""]) < 1
         asked = sets.Asked(["cross1.F"], [""])
@@ -285,7 +285,7 @@ def test_a_damaged_set_is_not_used(path):
     with h5py.File(path, "r+") as file:
         name = next(iter(file["what_if"]))
         file[f"what_if/{name}/loads"][3, 0] += 1.0
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         assert name not in what_if.read(store)
         assert len(what_if.read(store)) > 5
 
@@ -293,10 +293,10 @@ def test_a_damaged_set_is_not_used(path):
 @pytest.mark.usefixtures("quick")
 def test_a_longer_campaign_keeps_them(path):
     runner.simulate(path, budget=60.0, workers=1)
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         before = what_if.read(store)
     extend(path, N + 50)
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         assert what_if.read(store).keys() == before.keys()
         assert query.what_if(store.view(), "cross1.F").n == max(N, *(one.end for one in before.values()))
 
@@ -310,7 +310,7 @@ def test_the_budget_ends_it(path):
 @pytest.mark.usefixtures("quick")
 def test_groups_and_features_are_lines_of_their_own(path):
     runner.simulate(path, groups=["all = pin*.tilt_t, pin*.offset_z"], each="feature", budget=60.0, workers=1)
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         found = query.what_if(store.view(), "cross1.F")
     lines = list(dict.fromkeys(found.table["line"]))
     assert lines[0] == "all"
@@ -354,7 +354,7 @@ def test_command_and_page(path, monkeypatch):
 
     shown = run("--top", "2")
     assert "--run" in shown.stderr
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         (section,) = sections(store.view(), Asked(path))
     assert f"tolstat causes {path.name} --run; then this page again: tolstat report" in section.blocks[0].text
     monkeypatch.setattr(runner, "available_cores", lambda: 1)
@@ -367,7 +367,7 @@ def test_command_and_page(path, monkeypatch):
     told = json.loads(run("--json").stdout)["what_if"]
     assert told["load"] == "cross1.F"
     assert len(told["table"]) == 12
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         (section,) = sections(store.view(), Asked(path, accepted=0.01))
     assert [block.kind for block in section.blocks] == ["text", "panels", "table", "table", "text"]
     assert "Halving a single line is not enough: halving the tilt tolerance of the pins" in section.blocks[0].text
@@ -388,7 +388,7 @@ def test_of_all_limits_the_largest_ratio_counts():
 def test_of_several_limits_verdict_command_and_page_are_about_all_together(tmp_path, monkeypatch):
     path = made(tmp_path, TEXT.replace('"cross1.F" = "700 N"', '"cross1.F" = "800 N"\n"cross2.F" = "700 N"'))
     runner.simulate(path, budget=60.0, workers=1)
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         view = store.view()
         both, second = (query.what_if(view, by) for by in ("all limits", "cross2.F"))  # the first is never reached
         np.testing.assert_array_equal(both.table["share"], second.table["share"])
@@ -414,7 +414,7 @@ def test_of_several_limits_verdict_command_and_page_are_about_all_together(tmp_p
 @pytest.mark.usefixtures("quick")
 def test_whiskers_and_bands_are_the_intervals_of_the_table(path):
     runner.simulate(path, budget=60.0, workers=1)
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         found = query.what_if(store.view(), "cross1.F")
     table = rendering.rows(found)
     ax = Figure().subplots()
@@ -446,7 +446,7 @@ def written(folder, text):
     """Campaign of two points; at the second, loads are larger in proportion to the torque."""
     plan = loaded(folder, text)
     errors, file = sampling.draw(plan), folder / "two.h5"
-    with ResultStore.create(file, plan, errors) as store:
+    with Writer.create(file, plan, errors) as store:
         for point in plan.points:
             found = stand_in(perturb(plan.joint, point.operation, errors), None)
             if point.name == "cruise":
@@ -459,7 +459,7 @@ def written(folder, text):
 def test_changed_joints_are_simulated_at_all_points(tmp_path):
     path = written(tmp_path, TWO)
     runner.simulate(path, budget=60.0, workers=1)
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         view = store.view()
         one = next(own for own in view.altered.values() if own.about["kind"] == "width")
         assert {"cross1.F at cruise", "cross1.F at start"} < set(one.names)
@@ -482,7 +482,7 @@ def test_changed_joints_are_simulated_at_all_points(tmp_path):
 def test_points_without_a_limit_are_simulated_when_they_are_asked_for(tmp_path):
     path = written(tmp_path, OWN)
     done = runner.simulate(path, budget=60.0, workers=1)
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         view = store.view()
         assert all(name.endswith(" at start") for one in view.altered.values() for name in one.names)
         assert query.what_if(view, "cross1.F at start") is not None
@@ -492,7 +492,7 @@ def test_points_without_a_limit_are_simulated_when_they_are_asked_for(tmp_path):
     more = runner.simulate(path, by="cross1.F at cruise", budget=60.0, workers=1)
     assert more.simulated >= done.simulated
     assert runner.simulate(path, budget=60.0, workers=1).simulated == 0  # what it has since then stays
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         after = query.what_if(store.view(), "cross1.F at start")
         assert query.what_if(store.view(), "cross1.F") is not None
     np.testing.assert_array_equal(before.table["share"], after.table["share"])
@@ -508,7 +508,7 @@ def test_a_joint_that_fails_at_one_point_has_no_worst_load(tmp_path, monkeypatch
     path = written(tmp_path, TWO)
     monkeypatch.setattr(sets, "simulate_rows", failing)
     runner.simulate(path, budget=60.0, workers=1)
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         for one in what_if.read(store).values():
             assert one.status[5] == Status.NOT_SETTLED
             assert np.isfinite(one.valid(["cross1.F at cruise"])[5])
@@ -525,7 +525,7 @@ def test_command_and_page_name_the_point(tmp_path, monkeypatch):
     assert "joints to simulate at start, " in shown.stderr
     assert shown.stdout.startswith("cross1.F at start > 700 N: ")
     assert max(map(len, shown.stdout.splitlines())) <= 80
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         found = headline(store.view(), 0.01)
         (section,) = sections(store.view(), Asked(path, accepted=0.01))
     assert "700 N on cross1.F at start" in found.sentence
@@ -539,22 +539,22 @@ def test_merged_files_keep_what_they_agree_on(path, tmp_path):
     other, out = tmp_path / "other.h5", [tmp_path / f"out{k}.h5" for k in range(3)]
     other.write_bytes(path.read_bytes())
     runner.simulate(path, budget=60.0, workers=1)
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         held = what_if.read(store)
     assert merge([path, other], out[0]).dropped == 0
     name, one = next(iter(held.items()))
-    with ResultStore.open_to_write(other) as store:  # the same joints, fewer of them
+    with Writer.open(other) as store:  # the same joints, fewer of them
         what_if.write(store, {name: one._replace(loads=one.loads[:50], status=one.status[:50])})
     assert merge([other, path], out[1]).dropped == 0
-    with ResultStore.open_to_write(other) as store:
+    with Writer.open(other) as store:
         what_if.write(store, {name: one._replace(loads=1.01 * one.loads)})
     for target, expected in zip(out[:2], (held, held), strict=True):
-        with Reader.open(target) as store:
+        with ResultFile.open(target) as store:
             assert what_if.read(store).keys() == expected.keys()
             np.testing.assert_array_equal(what_if.read(store)[name].loads, one.loads)
     shown = CliRunner().invoke(app, ["merge", str(path), str(other), "--out", str(out[2])])
     assert "left out: joints of 1 changes of what_if" in shown.stderr
-    with Reader.open(out[2]) as store:
+    with ResultFile.open(out[2]) as store:
         assert what_if.read(store).keys() == held.keys() - {name}
 
 
@@ -562,5 +562,5 @@ def test_files_that_are_no_sample_are_refused(tmp_path):
     file = synthetic.store(tmp_path, synthetic.SWEEP)
     with pytest.raises(StoreError, match="not drawn from tolerances"):
         runner.simulate(file)
-    with Reader.open(file) as store, pytest.raises(StoreError, match="not drawn from tolerances"):
+    with ResultFile.open(file) as store, pytest.raises(StoreError, match="not drawn from tolerances"):
         tolstat.what_if(store.view(), "cross1.F")

@@ -12,7 +12,7 @@ from tolstat.common.errors import InputError
 from tolstat.common.tables import Simulation
 from tolstat.questions.causes.query import causes_of
 from tolstat.questions.reweight.query import _block_log_ratios
-from tolstat.store import ResultStore
+from tolstat.store import Writer
 from tolstat.study import scaling
 from tolstat.study.change import changed
 
@@ -95,7 +95,7 @@ def test_zones_are_scaled_as_written(tmp_path):
 
 def test_causes_name_the_components_of_a_zone(tmp_path):
     path = synthetic.store(tmp_path, ENTRIES.replace("n = 20000", "n = 500"), simulated=0)
-    with ResultStore.open_to_write(path) as store:
+    with Writer.open(path) as store:
         results, errors = synthetic.results(store.n), store.errors()
         results["F_max"][:, 0] = 640.0 + 1e6 * (errors["pin1.offset_t"] - 0.018 * errors["pin1.tilt_z"])
         store.write(np.arange(store.n), Simulation(results, None))

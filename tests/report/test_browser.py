@@ -12,7 +12,7 @@ from tests.report.test_page import TEXT
 from tests.support import synthetic
 from tolstat.analysis import exceedance
 from tolstat.report import html, page
-from tolstat.store import Reader
+from tolstat.store import ResultFile
 
 BROWSER = next(
     (found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))), ""
@@ -88,7 +88,7 @@ def made(tmp_path_factory):
     folder = tmp_path_factory.mktemp("browser")
     path = synthetic.store(folder, TEXT, failed=15, unsettled=12)
     page.write_page(path, folder / "page.html", accepted=0.05, replay=0)
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         view = store.view()
         view.loads(view.shown_loads)  # read while the file is open
     return folder / "page.html", view

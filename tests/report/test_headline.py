@@ -18,7 +18,7 @@ from tolstat.common.tables import RESULT, Simulation, Status
 from tolstat.display.asked import Asked
 from tolstat.questions.exceedance import query as exceedance
 from tolstat.report import headline, page, summary
-from tolstat.store import Reader, ResultStore
+from tolstat.store import ResultFile, Writer
 from tolstat.store.sample_load import SampleLoad
 from tolstat.study import load
 
@@ -39,7 +39,7 @@ def interfering(folder):
         if RESULT[name].base.kind == "f":
             results[name][1:37] = np.nan
     results["status"][1:37], results["settled"][1:37] = Status.OUTSIDE_MODEL, 0
-    with ResultStore.open_to_write(path) as store:
+    with Writer.open(path) as store:
         store.write(np.arange(62), Simulation(results, None))
     return path
 
@@ -52,7 +52,7 @@ def failed_at_one_point(folder):
     source = folder / "points.toml"
     source.write_text(text, encoding="utf-8")
     plan = load(source)
-    with ResultStore.create(folder / "points.h5", plan, sampling.draw(plan)) as store:
+    with Writer.create(folder / "points.h5", plan, [sampling.draw(plan)]) as store:
         for name, failed in (("cruise", 0), ("start", 40)):
             store.at(name).write(np.arange(61), Simulation(synthetic.results(61, failed=failed), None))
     return folder / "points.h5"
@@ -86,7 +86,7 @@ def _without_pictures(monkeypatch):
 def everywhere(path, accepted):
     """Sentence of the verdict in text, JSON and first card of the page."""
     text = report.build(path, width=None, accepted=accepted)
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         made = store.view()
         json_ = summary.statistics(made, accepted=accepted)["verdict"]
         first = page.compose(made, Asked(path, accepted)).sections[0]
@@ -157,7 +157,7 @@ def test_a_limit_that_is_not_kept_leads_with_its_share(tmp_path):
 
 def test_the_page_predicts_the_next_delivery(tmp_path):
     path = synthetic.store(tmp_path)
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         cards = page.compose(store.view(), Asked(path, 0.05)).sections[0].blocks[0].cards
     low, high = prediction.of_counts(20, 20, 60, 1000)
     (found,) = (card for card in cards if card.label.startswith("of the next"))

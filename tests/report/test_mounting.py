@@ -17,7 +17,7 @@ from tolstat.campaign import run as campaign
 from tolstat.cli import app
 from tolstat.common.tables import Simulation
 from tolstat.report import page, summary
-from tolstat.store import Reader
+from tolstat.store import ResultFile
 from tolstat.store.recorded import mountings, note_on_mounting, swept
 
 RIGID = "shafts rigid along their axes; contact law mode"
@@ -65,7 +65,7 @@ def test_run_report_page_and_json_begin_with_it(tmp_path: Path, text: str, said:
     header = re.search(r"<header>.*?</header>", html, flags=re.DOTALL)
     assert header is not None
     assert f"{mounted} 60 joints (random sampling), 0 failed, 0 not settled." in header[0]
-    with Reader.open(Path("small.h5")) as store:
+    with ResultFile.open(Path("small.h5")) as store:
         assert json.loads(json.dumps(summary.statistics(store.view())))["joint"] == said
 
 
@@ -80,7 +80,7 @@ def test_a_note_where_rigid_shafts_meet_errors_along_them(tmp_path: Path) -> Non
     for text in (LOOSE, synthetic.STUDY):
         path = synthetic.store(tmp_path, text, name="other")
         assert "note:" not in call("report", str(path)).stderr
-        with Reader.open(path) as store:
+        with ResultFile.open(path) as store:
             assert note_on_mounting(store) == ""
         path.unlink()
 
@@ -94,7 +94,7 @@ def test_the_command_of_the_note_does_what_it_says(tmp_path: Path) -> None:
     again = [*printed[1].split(), "--no-verify"]
     assert unwrapped(call(*again).stdout).find("Output shaft free along its axis") > 0
     call(*again)
-    with Reader.open(Path("small_free.h5")) as free, Reader.open(Path("small.h5")) as rigid:
+    with ResultFile.open(Path("small_free.h5")) as free, ResultFile.open(Path("small.h5")) as rigid:
         assert mountings(free) == (["free"], ["mode"])
         assert free.errors().tobytes() == rigid.errors().tobytes()
         assert 'axial = "free"' in free.study_text
@@ -120,5 +120,5 @@ def test_several_variants_are_counted(tmp_path: Path) -> None:
     path = synthetic.store(tmp_path, SWEPT, name="swept")
     said = "Shafts rigid along their axes in 1 of 5 variants, output shaft held with 1e+06 to 1e+08 N/m along its axis "
     assert unwrapped(report.build(path).table).startswith(f"{said}in 4 of 5 variants; contact law mode. shaft.axial")
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         np.testing.assert_array_equal(swept(store)["shaft.axial"], [np.nan, 1e6, 3.4e7, 6.7e7, 1e8])

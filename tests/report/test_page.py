@@ -26,9 +26,9 @@ from tolstat.questions.joints import query as joints
 from tolstat.report import headline as verdict
 from tolstat.report import html as writer
 from tolstat.report import page
-from tolstat.store import Reader, revolutions
-from tolstat.store.first_pass import MAX_LISTED
-from tolstat.store.recall import recall
+from tolstat.store import ResultFile, revolutions
+from tolstat.store.recorded import recall
+from tolstat.store.worst import MAX_LISTED
 
 HEAD = '# Question: how often is too much\n#   too much?\n# Run time: none.\n# <script>alert("no")</script>\n'
 TEXT = HEAD + synthetic.STUDY.replace("n = 60", "n = 400").replace("40 N*m", "18 N*m").replace(
@@ -44,7 +44,7 @@ def path(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def view(path):
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         yield store.view()
 
 
@@ -121,18 +121,18 @@ def test_every_picture_has_a_title_and_a_description(html):
 @pytest.mark.parametrize("replay", [pytest.param(0, marks=pytest.mark.slow), 100])
 def test_each_value_of_the_file_is_read_once_for_a_page(path, tmp_path, monkeypatch, replay):
     """Reads of each dataset, in rows; joints that the page draws over the revolution are simulated again."""
-    read, plain = Counter(), Reader.column
+    read, plain = Counter(), ResultFile.column
 
     def counting(self, group, name, rows):
         values = plain(self, group, name, rows)
         read[f"{group}/{name}"] += len(values)
         return values
 
-    monkeypatch.setattr(Reader, "column", counting)
+    monkeypatch.setattr(ResultFile, "column", counting)
     monkeypatch.setattr(revolutions, "read", drawn)
     monkeypatch.setattr(revolutions, "ahead", lambda *_: None)
-    opened = mock.Mock(side_effect=Reader.open)
-    monkeypatch.setattr(Reader, "open", opened)
+    opened = mock.Mock(side_effect=ResultFile.open)
+    monkeypatch.setattr(ResultFile, "open", opened)
     recalled = mock.Mock(side_effect=recall)
     monkeypatch.setattr("tolstat.store.view.recall", recalled)
     page.write_page(path, tmp_path / "page.html", accepted=0.05, replay=replay)
@@ -195,7 +195,7 @@ def test_other_bushings_and_the_band_of_the_whole_curve_are_drawn_on_switches(vi
 def test_a_section_that_leads_stands_below_the_verdict(path, monkeypatch):
     found = [Section("one", "One"), Section("what-if", "What if", lead=True)]
     monkeypatch.setattr("tolstat.questions.sections", lambda view, asked: found)
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         made = page.compose(store.view(), Asked(path, 0.05))
     assert [section.key for section in made.sections] == ["verdict", "what-if", "limits", "one", "provenance"]
 
@@ -247,7 +247,7 @@ def test_a_small_numerical_error_is_not_given_in_digits():
 def test_same_file_same_bytes(path, tmp_path):
     contents = []
     for k in (0, 1):
-        with Reader.open(path) as store:
+        with ResultFile.open(path) as store:
             made = page.compose(store.view(), Asked(path, 0.05))
         some = [part for part in made.sections if part.key in ("capability", "modes", "provenance")]
         writer.write(replace(made, sections=some), tmp_path / f"{k}.html")
@@ -299,7 +299,7 @@ def test_reader_begins_with_the_limit_that_the_verdict_names(tmp_path, limits, n
     lines = "".join(f'"{load}" = "{limit} N"\n' for load, limit in ({"cross1.F": 700} | limits).items())
     text = re.sub(r"(?<=\[limits\]\n)[^\[]*", f"{lines}\n", TEXT)
     path = synthetic.store(tmp_path, text)
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         assert verdict.headline(store.view(), 0.05).load == name
     page.write_page(path, tmp_path / "page.html", accepted=0.05, replay=0)
     assert f"<option selected>{name}</option>" in (tmp_path / "page.html").read_text(encoding="utf-8")
@@ -325,7 +325,7 @@ def test_leading_load_is_the_one_whose_limit_most_joints_exceed(view):
 
 def words(path, accepted=np.nan):
     """Sections of a page, and its paragraphs and cells, without drawing it."""
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         made = page.compose(store.view(), Asked(path, accepted))
     found = [made.subtitle]
     for block in (block for section in made.sections for block in section.blocks):
@@ -344,7 +344,7 @@ def test_a_campaign_under_way_has_a_page_that_says_so(tmp_path, simulated):
         assert page.write_page(path, tmp_path / "page.html", replay=0) == tmp_path / "page.html"
         text = (tmp_path / "page.html").read_text(encoding="utf-8")
         assert said in text
-        with Reader.open(path) as store:
+        with ResultFile.open(path) as store:
             assert page.write_page(store.view(), tmp_path / "b.html", replay=0).read_text(encoding="utf-8") == text
 
 
@@ -417,7 +417,7 @@ def test_joints_of_different_weight_are_counted_by_it_and_told_so(tmp_path):
     sections = Reading(html).sections
     assert among(sections, ["verdict", "exceedance", "worst", "modes", "failed", "provenance"])
     assert not {"capability", "causes"} & set(sections)
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         weights, results = store.origin()["weight"][1:], store.results()[1:]
     valid = results["status"] == Status.OK
     above = (results["F_max"][:, 0] > 700.0) & valid

@@ -23,7 +23,7 @@ from tolstat.questions.exceedance import curves_figure, query, sweep
 from tolstat.questions.exceedance import rendering as exceedance
 from tolstat.questions.exceedance.swept_axes import swept_axes
 from tolstat.report import joint_values
-from tolstat.store import Reader
+from tolstat.store import ResultFile
 
 
 def texts(figure):
@@ -208,9 +208,9 @@ def test_two_processes_write_the_same_files(tmp_path):
 def test_numbers_need_neither_pandas_nor_matplotlib(tmp_path):
     path = synthetic.store(tmp_path)
     code = (
-        "import sys, pathlib; from tolstat import report; from tolstat.store import Reader\n"
+        "import sys, pathlib; from tolstat import report; from tolstat.store import ResultFile\n"
         "path = pathlib.Path(sys.argv[1])\n"
-        "with Reader.open(path) as store:\n"
+        "with ResultFile.open(path) as store:\n"
         "    found = report._numbers(store.view(), path.with_suffix(''), 80, float('nan'))\n"
         "print(len(found.files), 'pandas' in sys.modules, 'matplotlib' in sys.modules)"
     )
@@ -271,7 +271,7 @@ def test_same_file_same_bytes(tmp_path):
     path = synthetic.store(tmp_path)
     first = [file.read_bytes() for file in report.write_report(path)]
     assert [file.read_bytes() for file in report.write_report(path)] == first
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         for source in (store, store.view()):
             assert [file.read_bytes() for file in report.write_report(source)] == first
 

@@ -20,7 +20,7 @@ from tolstat.common.tables import Simulation, Status
 from tolstat.questions.exceedance import query as exceeded
 from tolstat.questions.reweight import query as reweighting
 from tolstat.report import headline
-from tolstat.store import Reader, ResultStore
+from tolstat.store import ResultFile, Writer
 from tolstat.store.sample_load import SampleLoad
 from tolstat.study.proposal import Proposal, component, weights
 
@@ -142,7 +142,7 @@ def campaign(folder, text=PLAN, name="plan", n=None):
     """Campaign whose load cross1.F is a sum of its errors, in sigma."""
     plan, path = load(folder, text, name, n=n), folder / f"{name}.h5"
     invented_campaign()(plan, path, workers=1, check=False)
-    with ResultStore.open_to_write(path) as store:
+    with Writer.open(path) as store:
         results = synthetic.results(store.n)
         results["F_max"][:, 0] = 700.0 + 100.0 * (3e4 * (store.errors()["pin1.offset_t"]) - 3.0)
         store.write(np.arange(store.n), Simulation(results, None))
@@ -155,7 +155,7 @@ def stored(tmp_path_factory):
 
 
 def test_the_file_keeps_weights_and_reports_go_by_them(stored):
-    with Reader.open(stored) as store:
+    with ResultFile.open(stored) as store:
         view = store.view()
         found = view.load("cross1.F").above(700.0)
         frame = store.to_pandas()
@@ -179,18 +179,18 @@ def test_statistics_that_count_joints_alike_are_refused(stored):
 def test_slices_and_extensions_have_the_weights_of_one_run(tmp_path, stored):
     few = campaign(tmp_path, name="few", n=1000)
     extend.extend(few, 1200)
-    with Reader.open(stored) as whole, Reader.open(few) as grown:
+    with ResultFile.open(stored) as whole, ResultFile.open(few) as grown:
         np.testing.assert_array_equal(grown.origin(), whole.origin(slice(0, 1201)))
     parts = []
     for rows in (range(600), range(600, 1201)):
         parts.append(tmp_path / f"part{rows.start}.h5")
         invented_campaign()(load(tmp_path, n=1200), parts[-1], workers=1, rows=rows, check=False)
     extend.merge(parts, tmp_path / "merged.h5")
-    with Reader.open(stored) as whole, Reader.open(tmp_path / "merged.h5") as merged:
+    with ResultFile.open(stored) as whole, ResultFile.open(tmp_path / "merged.h5") as merged:
         np.testing.assert_array_equal(merged.origin(), whole.origin(slice(0, 1201)))
     with h5py.File(parts[0], "r+") as file:
         file["origin/weight"][7] *= 2.0
-    with Reader.open(parts[0]) as store, pytest.raises(StoreError, match="errors of row 7 do not match"):
+    with ResultFile.open(parts[0]) as store, pytest.raises(StoreError, match="errors of row 7 do not match"):
         store.origin()
 
 
@@ -249,7 +249,7 @@ def test_a_verdict_is_kept_only_if_nothing_that_is_missed_could_change_it():
 
 @pytest.mark.slow
 def test_the_report_of_importance_sampling_has_both_ends(stored):
-    with Reader.open(stored) as store:
+    with ResultFile.open(stored) as store:
         row = exceeded.limits(store.view()).iloc[0]
         own = store.origin()["component"][1:] == 0
         count = (store.results()["F_max"][1:, 0][own] > 700.0).sum()

@@ -17,7 +17,7 @@ from tolstat.joint import ideal
 from tolstat.solver import fidelity
 from tolstat.solver.fidelity import Rung
 from tolstat.solver.simulation import simulate_rows
-from tolstat.store import Reader
+from tolstat.store import ResultFile
 
 IDEAL = Options(fidelity=int(Fidelity.IDEAL))
 STATIC = Options(fidelity=int(Fidelity.QUASISTATIC))
@@ -288,7 +288,7 @@ def test_campaign_keeps_its_choice(tmp_path, monkeypatch):
     monkeypatch.setattr(fidelity, "choose", lambda *args: pytest.fail("chosen again"))
     campaign.run(plan, path, 1, 3, tell=said.append)
     assert len(said) == 1
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         assert store.fidelity["met"]
         assert store.options["fidelity"] == "quasistatic"
         assert store.options["steps_per_rev"] == store.fidelity["steps_per_rev"]
@@ -304,7 +304,7 @@ def test_histories_have_the_steps_that_were_chosen(tmp_path, kind, least):
     (tmp_path / "auto.toml").write_text(text, encoding="utf-8")
     plan = study.load(tmp_path / "auto.toml")
     campaign.run(plan, tmp_path / "auto.h5", 1)
-    with Reader.open(tmp_path / "auto.h5") as store:
+    with ResultFile.open(tmp_path / "auto.h5") as store:
         assert store.options["steps_per_rev"] >= least
         assert store.histories("coefficients_real").shape == (7, 8, 6, 21)
 
@@ -312,7 +312,7 @@ def test_histories_have_the_steps_that_were_chosen(tmp_path, kind, least):
 def test_other_fidelities_choose_nothing(tmp_path, monkeypatch):
     monkeypatch.setattr(fidelity, "choose", lambda *args: pytest.fail("chosen"))
     campaign.run(fakes.Study(), tmp_path / "a.h5", 1, stages=fakes.stages())
-    with Reader.open(tmp_path / "a.h5") as store:
+    with ResultFile.open(tmp_path / "a.h5") as store:
         assert store.fidelity == {}
 
 

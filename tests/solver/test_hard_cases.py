@@ -17,7 +17,7 @@ from tolstat.common.load_kinds import LOAD_KINDS
 from tolstat.common.tables import FAILED, RESULT, RESULT_FIELDS, SIMULATED, Motion, Options, Status
 from tolstat.report import build, cases
 from tolstat.solver.simulation import simulate_rows
-from tolstat.store import Reader, ResultStore, verification
+from tolstat.store import ResultFile, Writer, verification
 from tolstat.store.verification import Check, Verification
 
 pytestmark = pytest.mark.slow
@@ -61,7 +61,7 @@ def hard(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_all_hard_cases_end_in_a_result_or_a_status(hard: Path) -> None:
-    with Reader.open(hard) as store:
+    with ResultFile.open(hard) as store:
         results, design = store.results(), store.design()
         family = np.array([v.family for v in store.variants])[design["variant"]]
         case = np.array(store.case_names)[design["case"]]
@@ -83,7 +83,7 @@ def test_all_hard_cases_end_in_a_result_or_a_status(hard: Path) -> None:
 
 
 def test_the_setting_that_the_message_names_solves_the_case(hard: Path) -> None:
-    with Reader.open(hard) as store:
+    with ResultFile.open(hard) as store:
         results, design = store.results(), store.design()
         family = [store.variants[i].family for i in design["variant"]]
     dear = results[family.index("85 deg")]
@@ -163,7 +163,7 @@ def test_rows_are_simulated_with_the_settings_of_their_variant(tmp_path: Path) -
     assert counts.done == 6
     rows = np.split(sampling.draw(s), 6)
     params = np.concatenate([joint.perturb(s.joint, s.operations[i // 2], row) for i, row in enumerate(rows)])
-    with Reader.open(tmp_path / "s.h5") as store:
+    with ResultFile.open(tmp_path / "s.h5") as store:
         results = store.results()
         assert store.variants == s.variants
     for i in range(6):
@@ -188,7 +188,7 @@ def test_joints_are_verified_with_the_settings_of_their_variant(tmp_path: Path) 
 
 def test_the_table_holds_the_errors_against_the_reference(tmp_path: Path) -> None:
     campaign.run(load(tmp_path), tmp_path / "s.h5", workers=1, check=False)
-    with ResultStore.open_to_write(tmp_path / "s.h5") as store:
+    with Writer.open(tmp_path / "s.h5") as store:
         before = cases.table(store)
         rows = np.array([0, 1, 2, 3, 4])
         true = store.results()[rows]

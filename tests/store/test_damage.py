@@ -19,8 +19,8 @@ from tests.store.test_store import new_store, simulation
 from tests.support import corruption, fakes, synthetic
 from tolstat import cli
 from tolstat.common.errors import InputError, StoreError
-from tolstat.store import Reader, ResultStore, integrity, result_file, verification
-from tolstat.store.recall import recall
+from tolstat.store import ResultFile, Writer, integrity, result_file, verification
+from tolstat.store.recorded import recall
 
 N = 12
 
@@ -60,13 +60,13 @@ def place(path: Path, name: str, row: int = 0) -> int:
 @pytest.mark.parametrize("name", ["cross1.F_max", "status", "steps"])
 def test_a_flipped_bit_of_a_verification_is_found(path: Path, name: str) -> None:
     flip(path, place(path, f"verify/newton/{name}", 2))
-    with Reader.open(path) as store, pytest.raises(StoreError, match="make it anew: tolstat verify"):
+    with ResultFile.open(path) as store, pytest.raises(StoreError, match="make it anew: tolstat verify"):
         verification.read(store)
 
 
 def test_a_flipped_row_number_of_a_verification_is_found(path: Path) -> None:
     flip(path, place(path, "verify/rows", 2))
-    with Reader.open(path) as store, pytest.raises(StoreError, match="do not match their checksum"):
+    with ResultFile.open(path) as store, pytest.raises(StoreError, match="do not match their checksum"):
         verification.read(store)
 
 
@@ -77,7 +77,7 @@ def test_a_hostile_verification_takes_no_memory(path: Path) -> None:
         file["verify"].create_dataset("rows", (1 << 33,), "i8")
         integrity.seal(file)
     with pytest.raises(StoreError, match="beyond the end of the file"):
-        Reader.open(path)
+        ResultFile.open(path)
 
 
 @pytest.mark.parametrize(
@@ -89,7 +89,7 @@ def test_rows_of_a_verification_are_rows_of_the_file(path: Path, rows: list[int]
         file["verify"].create_dataset("rows", data=np.arange(1, 1 + rows) if isinstance(rows, int) else rows)
         integrity.seal_values(file["verify"])
         integrity.seal(file)
-    with Reader.open(path) as store, pytest.raises(StoreError, match=found):
+    with ResultFile.open(path) as store, pytest.raises(StoreError, match=found):
         verification.read(store)
 
 
@@ -97,21 +97,21 @@ def test_attributes_of_columns_have_a_checksum(path: Path) -> None:
     with h5py.File(path, "r+") as file:
         result_file.put_attributes(file["results/cross1.F_max"], {"units": "kN"})
     with pytest.raises(StoreError, match="attributes do not match their checksum"):
-        Reader.open(path)
+        ResultFile.open(path)
 
 
 def test_a_flipped_attempt_is_found_before_joints_are_simulated_with_other_settings(path: Path) -> None:
-    with ResultStore.open_to_write(path) as store:
+    with Writer.open(path) as store:
         store.begin_retry({"": np.array([3])}, {"status": ["ok"], "settings": {}, "options": store.options})
     flip(path, place(path, "ledger/attempt", 3), 0)
-    with Reader.open(path) as store, pytest.raises(StoreError, match="attempt of row 3 does not match"):
+    with ResultFile.open(path) as store, pytest.raises(StoreError, match="attempt of row 3 does not match"):
         store.attempt()
 
 
 def test_readers_tell_of_damaged_rows(path: Path, caplog: pytest.LogCaptureFixture) -> None:
     for row in (4, 7):
         flip(path, place(path, "results/cross1.F_max", row))
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         assert store.counts().done == N - 2
     (said,) = [record.getMessage() for record in caplog.records if record.levelno == logging.WARNING]
     assert "the results of 2 joints are damaged and are left out: row 4, 7\n  hint: simulate these joints again" in said
@@ -119,21 +119,21 @@ def test_readers_tell_of_damaged_rows(path: Path, caplog: pytest.LogCaptureFixtu
     assert done.exit_code == 0
     assert done.stdout.count("pending") == 2
     assert done.stderr == said + "\n"
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         store.errors()
     assert len(caplog.records) <= 2, "who reads no results is told nothing"
 
 
 def test_who_writes_is_told_which_rows_are_pending_again(path: Path, caplog: pytest.LogCaptureFixture) -> None:
     flip(path, place(path, "results/cross1.F_max", 4))
-    with ResultStore.open_to_write(path) as store:
+    with Writer.open(path) as store:
         assert store.pending().tolist() == [4]
     assert "the results of 1 joint are damaged and pending again: row 4\n" in caplog.text
 
 
 @pytest.mark.parametrize(("started", "done"), [(1e300, 3), (np.inf, 3), (5.0, -1), (5.0, 1 << 40), (np.nan, 0)])
 def test_an_impossible_session_is_no_session(path: Path, started: float, done: int) -> None:
-    with ResultStore.open_to_write(path) as store:
+    with Writer.open(path) as store:
         store.begin_session(3)
         session = store.session()
         assert session is not None
@@ -186,7 +186,7 @@ def test_nothing_but_the_own_layout_is_read_anywhere_in_a_file(path: Path, chang
             with contextlib.suppress(ValueError):  # what cannot be walked cannot be sealed by these means
                 integrity.seal(file)
     with pytest.raises(StoreError, match=r"a\.h5: is damaged: .*\n  hint: "):
-        Reader.open(path)
+        ResultFile.open(path)
 
 
 POINT = {"alpha": 0.1, "speed": 1.0, "torque": 1.0, "axial_force": 0.0, "share": None}
@@ -244,7 +244,7 @@ def test_contents_of_attributes_are_checked_although_their_checksum_is_right(pat
             file.attrs[name] = json.dumps(value)
             integrity.seal(file)
         with pytest.raises(StoreError, match=r"a\.h5: is damaged: .*\n  hint: run the campaign again"):
-            Reader.open(path)
+            ResultFile.open(path)
         with h5py.File(path, "r+") as file:
             file.attrs[name] = before
 
@@ -282,11 +282,11 @@ def test_a_result_file_names_regular_files_of_its_own_folder_only(measured: Path
     (measured.parent / "link.csv").symlink_to("../secret.csv")
     with (measured.parent / "huge.csv").open("wb") as file:
         file.truncate(1 << 40)
-    with Reader.open(measured) as store:
+    with ResultFile.open(measured) as store:
         assert recall(store).tolerances
     put_study(measured, MEASURED.replace("FILE", named))
     begun = time.monotonic()
-    with Reader.open(measured) as store, pytest.raises(InputError, match="cannot be read: ") as raised:
+    with ResultFile.open(measured) as store, pytest.raises(InputError, match="cannot be read: ") as raised:
         recall(store)
     assert time.monotonic() - begun < 5
     assert "hunter2" not in str(raised.value)
@@ -306,7 +306,7 @@ def test_a_study_that_is_no_study_ends_in_one_message(tmp_path: Path, text: str,
 
 def test_contents_of_files_that_a_result_file_names_are_not_quoted(measured: Path) -> None:
     (measured.parent / "a.csv").write_text("hunter2\nhunter3\n", encoding="utf-8")
-    with Reader.open(measured) as store, pytest.raises(InputError) as raised:
+    with ResultFile.open(measured) as store, pytest.raises(InputError) as raised:
         recall(store)
     assert "hunter" not in str(raised.value)
     assert "--study STUDY" in str(raised.value)
@@ -315,6 +315,6 @@ def test_contents_of_files_that_a_result_file_names_are_not_quoted(measured: Pat
 def test_pipes_and_devices_are_no_result_files(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.h5")
     for path in (tmp_path / "pipe.h5", Path("/dev/zero")):
-        for read in (Reader.open, ResultStore.open_to_write):
+        for read in (ResultFile.open, Writer.open):
             with pytest.raises(StoreError, match="is a pipe or a device"):
                 read(path)

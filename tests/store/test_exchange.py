@@ -16,7 +16,7 @@ from tolstat.common.loads import SHOWN_LOADS
 from tolstat.questions.capability import query as capability
 from tolstat.questions.exceedance import query as exceedance
 from tolstat.report import summary
-from tolstat.store import Reader, frame
+from tolstat.store import ResultFile
 
 
 def export(*arguments):
@@ -28,7 +28,7 @@ def test_json_has_all_statistics_as_the_reports_have_them(tmp_path):
     done = export(path, "--statistics", out, "--by", "cross1.F")
     assert done.exit_code == 0
     found = json.loads(out.read_text(encoding="utf-8"))
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         view = store.view()
         tables = (("limits", exceedance.limits(view)), ("capability", capability.limits(view)))
         assert found["provenance"]["versions"] == store.versions
@@ -44,7 +44,7 @@ def test_json_has_all_statistics_as_the_reports_have_them(tmp_path):
 
 def test_statistics_are_of_a_sample(tmp_path):
     path = synthetic.store(tmp_path, synthetic.SWEEP, "sweep")
-    with Reader.open(path) as store, pytest.raises(StoreError, match="no sample of a production"):
+    with ResultFile.open(path) as store, pytest.raises(StoreError, match="no sample of a production"):
         summary.statistics(store.view())
     done = export(synthetic.store(tmp_path), "--csv", "x.csv", "--by", "cross1.F")
     assert done.exit_code == 2
@@ -59,7 +59,7 @@ def test_what_is_not_installed_is_said_before_anything_is_written(tmp_path, monk
     assert done.exit_code == 2
     assert "pip install pyarrow" in done.stderr
     assert not out.exists()
-    with Reader.open(path) as store, pytest.raises(InputError, match="pip install xarray"):
+    with ResultFile.open(path) as store, pytest.raises(InputError, match="pip install xarray"):
         store.to_xarray()
 
 
@@ -74,7 +74,7 @@ def test_tables_are_written_block_by_block(tmp_path, monkeypatch):
         assert written[7] == written[10**6]
         found = pd.read_csv(out, header=[0, 1], index_col=0)
         found.columns = found.columns.get_level_values(0)
-        with Reader.open(source) as store:
+        with ResultFile.open(source) as store:
             pd.testing.assert_frame_equal(found, store.to_pandas(nominal=True), check_dtype=False, check_names=False)
 
 
@@ -94,7 +94,7 @@ def test_parquet_has_columns_units_and_rows(tmp_path):
     path, out = synthetic.store(tmp_path, failed=2), tmp_path / "x.parquet"
     assert export(path, "--parquet", out).exit_code == 0
     frame = pd.read_parquet(out)
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         pd.testing.assert_frame_equal(frame, store.to_pandas(), check_like=False, check_index_type=False)
     assert frame.attrs["units"]["cross1.T_max"] == "N*m"
 
@@ -107,7 +107,7 @@ def test_excel_has_sheets_for_joints_limits_and_units(tmp_path):
     book = openpyxl.load_workbook(out)
     assert book.sheetnames == ["joints", "limits", "units"]
     joints = pd.read_excel(out, sheet_name="joints", index_col="row")
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         view, frame = store.view(), store.to_pandas()
         share = view.load("cross1.F").above(700.0)
         nominal = store.nominal["cross1.F"]
@@ -147,7 +147,7 @@ def test_the_nominal_joint_is_exported_if_asked_for(tmp_path):
 
 def test_xarray_has_units_and_descriptions(tmp_path):
     pytest.importorskip("xarray")
-    with Reader.open(synthetic.store(tmp_path, failed=2)) as store:
+    with ResultFile.open(synthetic.store(tmp_path, failed=2)) as store:
         data, frame = store.to_xarray(), store.to_pandas()
     assert data.sizes == {"row": 60}
     assert data["cross1.F_max"].attrs["units"] == "N"

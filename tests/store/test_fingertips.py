@@ -15,11 +15,11 @@ from tolstat.analysis.sorted_loads import Intervals
 from tolstat.common.errors import InputError
 from tolstat.common.loads import LOADS
 from tolstat.common.shown import short, shown
-from tolstat.store import Reader, ResultStore
-from tolstat.store.several_loads import largest_of
+from tolstat.store import ResultFile, Writer
+from tolstat.store.sample_load import largest_of
 
 MAX_REPR = 250
-WRITING = {name for name in vars(ResultStore) if not name.startswith("_")}
+WRITING = {name for name in vars(Writer) if not name.startswith("_")}
 
 
 @pytest.fixture(scope="module")
@@ -55,7 +55,7 @@ def test_a_slice_without_the_nominal_joint(tmp_path):
     source = tmp_path / "a.toml"
     source.write_text(synthetic.STUDY, encoding="utf-8")
     study = tolstat.load(source)
-    ResultStore.create(tmp_path / "a.h5", study, tolstat.draw(study, range(20, 30)), rows=range(20, 30)).close()
+    Writer.create(tmp_path / "a.h5", study, [tolstat.draw(study, range(20, 30))], rows=range(20, 30)).close()
     with tolstat.open(tmp_path / "a.h5") as opened:
         assert opened.loads["psi"].index.tolist() == list(range(20, 30))
         assert opened.loads["psi"].isna().all()
@@ -65,7 +65,7 @@ def test_a_slice_without_the_nominal_joint(tmp_path):
 
 
 def test_what_is_opened_for_reading_cannot_write(store):
-    assert type(store) is Reader
+    assert type(store) is ResultFile
     assert {"create", "write", "finish", "update_study", "begin_retry"} <= WRITING
     assert not WRITING & set(dir(store))
     assert store._file.mode == "r"

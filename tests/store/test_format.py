@@ -23,14 +23,14 @@ from tests.support import fakes
 from tolstat.common.columns import ERROR_COLUMNS, RESULT_COLUMNS
 from tolstat.common.errors import StoreError
 from tolstat.common.tables import SCHEMA_VERSION, Mode, Motion, Status
-from tolstat.store import Reader, ResultStore, axes, histories, integrity, meanings, result_file, verification, what_if
+from tolstat.store import ResultFile, Writer, axes, histories, integrity, meanings, result_file, verification, what_if
 
 GOLDEN, BEFORE = make_golden.FOLDER / make_golden.PRESENT, make_golden.FOLDER / make_golden.BEFORE
 
 
 def read_all(path: Path) -> int:
     """Read everything that a result file holds; number of its joints."""
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         store.counts()
         store.errors()
         store.results()
@@ -43,7 +43,7 @@ def read_all(path: Path) -> int:
 
 def test_a_released_file_is_read() -> None:
     expected = pd.read_csv(GOLDEN.with_suffix(".csv"), index_col="row")
-    with Reader.open(GOLDEN) as store:
+    with ResultFile.open(GOLDEN) as store:
         frame = store.to_pandas(nominal=True)
         assert (store.n, store.rows, store.campaign_rows, store.whole) == (3, range(3), 3, True)
         assert store.limits == {"cross1.F": 700.0}
@@ -107,7 +107,7 @@ CHANGE = {"kind": "width", "label": "pin*.tilt_t", "step": "half", "words": "hal
 
 
 def verify(path: Path) -> None:
-    with ResultStore.open_to_write(path) as store:
+    with Writer.open(path) as store:
         check = verification.Check("finer Newton", {}, store.results()[1:3])
         verification.write(store, verification.Verification(1, np.arange(1, 3), check.results, {"newton": check}))
         loads, status = np.arange(6.0).reshape(3, 2), np.ones(3, np.uint8)
@@ -158,7 +158,7 @@ def test_axes_of_histories_have_names(tmp_path: Path) -> None:
 def test_xarray_reads_values_as_the_store_does(whole: Path) -> None:
     xarray = pytest.importorskip("xarray")
     pytest.importorskip("h5netcdf")
-    with Reader.open(whole) as store:
+    with ResultFile.open(whole) as store:
         results, loads = store.results(), store.histories("loads")
     with xarray.open_dataset(whole, engine="h5netcdf", group="results") as opened:
         assert opened.sizes == {"row": 6}
@@ -363,13 +363,13 @@ def test_no_pickle_but_in_the_cache_of_the_kernels() -> None:
 
 
 def test_a_released_file_lacks_nothing_that_is_asked_for() -> None:
-    with Reader.open(GOLDEN) as store:
+    with ResultFile.open(GOLDEN) as store:
         assert set(store.to_pandas().columns) >= {c.name for c in ERROR_COLUMNS + RESULT_COLUMNS}
 
 
 def test_the_file_of_the_schema_before_is_refused() -> None:
     with pytest.raises(StoreError, match=rf"this tolstat reads {SCHEMA_VERSION}\n.*run its study again"):
-        Reader.open(BEFORE)
+        ResultFile.open(BEFORE)
 
 
 @pytest.mark.parametrize(("further", "remedy"), [(-1, "run its study again"), (1, "use a newer tolstat")])
@@ -381,7 +381,7 @@ def test_another_schema_is_refused_in_one_sentence(tmp_path: Path, further: int,
         file.attrs["schema_version"] = version
         integrity.seal(file)
     with pytest.raises(StoreError, match=rf"schema version {version}, this tolstat reads {SCHEMA_VERSION}\n.*{remedy}"):
-        Reader.open(path)
+        ResultFile.open(path)
 
 
 def test_a_copy_of_a_file_is_not_changed_by_reading(tmp_path: Path) -> None:

@@ -10,12 +10,12 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from tolstat.store.histories import HistoryParts
 
 from tests.store.test_store import in_another_process, new_store, simulation
 from tests.support import fakes
 from tolstat.common.errors import StoreError
-from tolstat.store import Reader, ResultStore
-from tolstat.store.histories import HistoryParts
+from tolstat.store import ResultFile, Writer
 from tolstat.store.result_file import text
 
 
@@ -63,7 +63,7 @@ def test_rows_that_lost_their_histories_are_pending_again(tmp_path: Path, study:
         store.write(rows[:4], simulation(study, rows[:4]))
         store.write(rows[4:], simulation(study, rows[4:]))
     (tmp_path / "a.h5.parts" / "00000000.h5").unlink()
-    with ResultStore.open_to_write(tmp_path / "a.h5") as store:
+    with Writer.open(tmp_path / "a.h5") as store:
         assert np.flatnonzero(store.status()).tolist() == [4, 5]
 
 
@@ -71,7 +71,7 @@ def test_rows_that_lost_their_histories_are_pending_again(tmp_path: Path, study:
 def test_a_reader_finds_the_histories_in_the_file_that_replaced_its_own(tmp_path: Path, study: fakes.Study) -> None:
     path = tmp_path / "a.h5"
     expected = complete_store(path, study)
-    with Reader.open(path) as early, Reader.open(path) as reader:
+    with ResultFile.open(path) as early, ResultFile.open(path) as reader:
         np.testing.assert_array_equal(early.histories("loads"), expected)
         assert in_another_process(path, "store.finish(); print('finished')") == "finished\n"
         assert not (tmp_path / "a.h5.parts").exists()
@@ -84,14 +84,14 @@ def test_histories_that_are_gone_are_an_error(tmp_path: Path, study: fakes.Study
     expected = complete_store(path, study)
     lost = r"a.h5.parts: lacks the histories of 5 finished joints\n  hint: restore the folder"
     before = path.read_bytes()
-    with ResultStore.open_to_write(path) as store:
+    with Writer.open(path) as store:
         (tmp_path / "a.h5.parts" / "00000000.h5").unlink()
         with pytest.raises(StoreError, match=lost):
             store.finish()
         np.testing.assert_array_equal(store.histories("loads", np.arange(5, 12)), expected[5:])
     assert path.read_bytes() == before
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a.h5", "a.h5.parts"]
-    with Reader.open(path) as store, pytest.raises(StoreError, match=lost):
+    with ResultFile.open(path) as store, pytest.raises(StoreError, match=lost):
         store.histories("loads")
 
 
@@ -109,7 +109,7 @@ def test_no_second_writer_while_histories_are_taken_in(
             done(*args)
 
         monkeypatch.setattr(HistoryParts, step, watched)
-    with ResultStore.open_to_write(path) as store:
+    with Writer.open(path) as store:
         store.finish()
         answers.append(in_another_process(path, "print('opened')"))
     assert [answer.split("\n")[0] for answer in answers] == [f"{path}: is being written by another process"] * 3
@@ -132,8 +132,8 @@ def test_a_file_replaced_while_it_is_opened_is_not_written(
 
     monkeypatch.setattr(h5py, "File", late)
     with pytest.raises(StoreError, match="is being written by another process"):
-        ResultStore.open_to_write(path)
-    ResultStore.open_to_write(path).close()
+        Writer.open(path)
+    Writer.open(path).close()
 
 
 def test_parts_of_another_campaign_are_refused(tmp_path: Path, study: fakes.Study) -> None:
@@ -141,7 +141,7 @@ def test_parts_of_another_campaign_are_refused(tmp_path: Path, study: fakes.Stud
     complete_store(tmp_path / "b.h5", dataclasses.replace(study, seed=8))
     shutil.rmtree(tmp_path / "a.h5.parts")
     (tmp_path / "b.h5.parts").rename(tmp_path / "a.h5.parts")
-    for opened in (Reader.open, ResultStore.open_to_write):
+    for opened in (ResultFile.open, Writer.open):
         with pytest.raises(StoreError, match=r"00000000.h5: holds histories of another campaign"):
             opened(tmp_path / "a.h5").histories("loads")
 
@@ -152,4 +152,4 @@ def test_a_damaged_part_is_named(tmp_path: Path, study: fakes.Study) -> None:
     part = tmp_path / "a.h5.parts" / "00000000.h5"
     part.write_bytes(b"nothing")
     with pytest.raises(StoreError, match=r"00000000.h5: is damaged\n  hint: delete it"):
-        ResultStore.open_to_write(tmp_path / "a.h5")
+        Writer.open(tmp_path / "a.h5")

@@ -27,7 +27,7 @@ from tolstat.questions.accuracy import query as accuracy_tables
 from tolstat.questions.accuracy import rendering
 from tolstat.questions.causes.tail import worst_joints
 from tolstat.questions.exceedance import curves_figure, query, sweep
-from tolstat.store import Reader, integrity, new_file, result_file, verification
+from tolstat.store import ResultFile, integrity, new_file, result_file, verification
 
 CROSS_F = [f"cross{i}.F_max" for i in (1, 2, 3, 4)]
 COURSE = [c.name for c in RESULT_COLUMNS if c.field not in kept.OPTIONAL_FIELDS]
@@ -102,7 +102,7 @@ def test_the_file_holds_what_is_asked_for_and_no_more(tmp_path: Path) -> None:
     with h5py.File(path) as file:
         assert set(file["results"]) == {*COURSE, *CROSS_F, "row", "nominal"}
         assert set(file["verify/half_step"]) == {*COURSE, *CROSS_F, "rows"}
-    with Reader.open(path) as store, Reader.open(everything) as whole:
+    with ResultFile.open(path) as store, ResultFile.open(everything) as whole:
         found, expected = store.results(), whole.results()
         for c in RESULT_COLUMNS:
             if c.name in [*COURSE, *CROSS_F]:
@@ -127,7 +127,7 @@ def test_the_checksum_covers_what_is_stored(tmp_path: Path) -> None:
         with h5py.File(path, "r+") as file:
             before = file[f"results/{name}"][5]
             file[f"results/{name}"][5] = before + 1
-        with Reader.open(path) as store:
+        with ResultFile.open(path) as store:
             assert store.damaged().tolist() == [5]
             assert store.status()[5] == Status.PENDING
         campaign.run(fake(), path, 1, stages=fakes.stages(), check=False)
@@ -150,18 +150,18 @@ def test_lost_and_unknown_columns_are_damage(tmp_path: Path) -> None:
         held = file["results/cross2.F_max"][:]
         del file["results/cross2.F_max"]
     with pytest.raises(StoreError, match="its attributes do not match their checksum"):
-        Reader.open(path)
+        ResultFile.open(path)
     with h5py.File(path, "r+") as file:
         integrity.seal(file)
     with pytest.raises(StoreError, match=r"cross2\.F_max is missing"):
-        Reader.open(path)
+        ResultFile.open(path)
     with h5py.File(path, "r+") as file:
         file["results"].create_dataset("cross2.F_max", data=held)
         identity = json.loads(result_file.text(file.attrs, "identity"))
         result_file.put_attributes(file, {"identity": json.dumps(identity | {kept.KEY: ["cross5.F_max"]})})
         integrity.seal(file)
     with pytest.raises(StoreError, match=r"not a list of columns"):
-        Reader.open(path)
+        ResultFile.open(path)
 
 
 @pytest.mark.slow
@@ -190,7 +190,7 @@ REAL = PLAIN.replace("n = 60", "n = 3") + "\n[solver]\nsteps_per_rev = 24\n"
 def test_replay_and_verify_compare_what_is_stored(tmp_path: Path) -> None:
     path = tmp_path / "s.h5"
     campaign.run(loaded(tmp_path, text("cross*.F_max", body=REAL)), path, 1)
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         assert replay.replay(store, 2).differences == []
         ledger = [store.column("ledger", name, [2]) for name in ("errors_check", "attempt")]
         changed = store.results(slice(2, 3))
@@ -199,10 +199,10 @@ def test_replay_and_verify_compare_what_is_stored(tmp_path: Path) -> None:
     with h5py.File(path, "r+") as file:
         file["results/cross2.F_max"][2] = changed["F_max"][0, 1]
         file["ledger/results_check"][2] = check[0]
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         assert [d.name for d in replay.replay(store, 2).differences] == ["cross2.F_max"]
     found = verify.check_file(path, 2, names=("half_step", "newton", "settling"))
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         held = verification.read(store)
     assert held is not None
     table = accuracy_tables.distribution(held)  # from the file as from the run
@@ -282,7 +282,7 @@ def test_reports_of_cases(tmp_path: Path) -> None:
 
 def test_what_is_not_kept_cannot_be_asked_for(tmp_path: Path) -> None:
     path = synthetic.store(tmp_path, text("cross*.F_max", body=PLAIN))
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         assert len(worst_joints(store.view(), "cross1.F", 3).joints) == 3
         assert len(worst_joints(store.view(), "closure", 3).joints) == 3
         for by in ("fork1.T", "fork1.T_max", "psi"):

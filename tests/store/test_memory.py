@@ -7,7 +7,7 @@ from typer.testing import CliRunner
 from tests.questions.test_causes import TEXT, made
 from tolstat.cli import app
 from tolstat.common.loads import LOAD_FIELDS
-from tolstat.store import Reader, checked_tables, first_pass, view
+from tolstat.store import ResultFile, checked_tables, first_pass, view
 
 BLOCK = 256
 
@@ -33,7 +33,7 @@ def read(monkeypatch):
         return wrapper
 
     for name in ("_errors", "_results"):
-        monkeypatch.setattr(Reader, name, recording(getattr(Reader, name)))
+        monkeypatch.setattr(ResultFile, name, recording(getattr(ResultFile, name)))
     return rows
 
 
@@ -60,7 +60,7 @@ def test_no_command_reads_a_whole_table(path, read, tmp_path, monkeypatch, comma
 
 def test_only_loads_and_the_first_errors_are_held(path, monkeypatch):
     monkeypatch.setattr(view, "BLOCK", BLOCK)
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         whole, part = store.results()[1:], store.view()
         assert tuple(part.results) == LOAD_FIELDS
         for field in LOAD_FIELDS:
@@ -71,7 +71,7 @@ def test_only_loads_and_the_first_errors_are_held(path, monkeypatch):
 def test_errors_of_some_joints_are_those_rows(path, monkeypatch):
     monkeypatch.setattr(view, "BLOCK", BLOCK)
     samples = np.array([0, 3, 254, 255, 256, 1499])
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         errors, made = store.errors()[1:], store.view()
         found = made.errors(samples, ["pin2.offset_z"])
         assert found.dtype.names == ("pin2.offset_z",)

@@ -4,7 +4,7 @@ import gc
 import weakref
 
 from tests.support.views import view
-from tolstat.store.once import once
+from tolstat.common.once import once
 
 
 def test_a_result_is_computed_once_for_each_view_and_arguments():

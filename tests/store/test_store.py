@@ -21,9 +21,10 @@ from tests.support import fakes
 from tolstat.campaign import run as campaign
 from tolstat.common import tables
 from tolstat.common.columns import ERROR_COLUMNS, RESULT_COLUMNS
+from tolstat.common.counts import Counts
 from tolstat.common.errors import StoreError
 from tolstat.common.tables import Motion, Simulation, Status
-from tolstat.store import Counts, Reader, ResultStore, provenance
+from tolstat.store import ResultFile, Writer, provenance
 from tolstat.store.result_file import text
 
 
@@ -32,9 +33,9 @@ def simulation(study: fakes.Study, rows: np.ndarray) -> Simulation:
     return fakes.simulate(params, study.solver.options(), study.output.histories, study.output.harmonics)
 
 
-def new_store(path: Path, study: fakes.Study) -> ResultStore:
+def new_store(path: Path, study: fakes.Study) -> Writer:
     specs = fakes.specs_of(study.output.histories)
-    return ResultStore.create(path, study, fakes.draw(study), specs, {"pin1.offset_e": 3})
+    return Writer.create(path, study, [fakes.draw(study)], specs, {"pin1.offset_e": 3})
 
 
 @pytest.fixture
@@ -48,7 +49,7 @@ def test_what_is_written_is_read(tmp_path: Path, study: fakes.Study) -> None:
     with new_store(path, study) as store:
         assert store.pending().tolist() == list(range(12))
         store.write(rows, simulation(study, rows))
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         assert store.pending().tolist() == [0, 4, 5, 6, 10, 11]
         assert store.errors().tobytes() == fakes.draw(study).tobytes()
         written, expected = store.results(), simulation(study, rows)
@@ -78,7 +79,7 @@ def test_attributes_tell_where_the_numbers_come_from(tmp_path: Path, study: fake
 def test_long_study_text_fits(tmp_path: Path) -> None:
     study = fakes.Study(n=2, text="# ü\n" * 100_000)
     new_store(tmp_path / "a.h5", study).close()
-    with Reader.open(tmp_path / "a.h5") as store:
+    with ResultFile.open(tmp_path / "a.h5") as store:
         assert store.study_text == study.text
 
 
@@ -135,7 +136,7 @@ def test_writing_moves_no_structure_of_the_file(tmp_path: Path) -> None:
     study, path = fakes.Study(n=500), tmp_path / "a.h5"
     new_store(path, study).close()
     before = np.fromfile(path, np.uint8)
-    with ResultStore.open_to_write(path) as store:
+    with Writer.open(path) as store:
         for rows in np.array_split(np.random.default_rng(1).permutation(study.n), 9):
             store.write(rows, simulation(study, rows))
         assert store.complete
@@ -153,8 +154,8 @@ def test_writing_moves_no_structure_of_the_file(tmp_path: Path) -> None:
 def in_another_process(path: Path, code: str) -> str:
     """Run code on a result file opened for writing as `store`; gives what it prints, or why it cannot be opened."""
     program = (
-        "from tolstat.common.errors import StoreError\nfrom tolstat.store import Reader, ResultStore\n"
-        f"try:\n    with ResultStore.open_to_write({str(path)!r}) as store: {code}\n"
+        "from tolstat.common.errors import StoreError\nfrom tolstat.store import ResultFile, Writer\n"
+        f"try:\n    with Writer.open({str(path)!r}) as store: {code}\n"
         "except StoreError as error: print(error)"
     )
     python, environment = [sys.executable, "-c", program], fakes.environment()
@@ -173,17 +174,17 @@ def test_limits_are_replaced_whole_or_not_at_all(
     def full(*args: object) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    with ResultStore.open_to_write(path) as store, monkeypatch.context() as patch:
+    with Writer.open(path) as store, monkeypatch.context() as patch:
         patch.setattr("os.replace", full)
         store.update_study(study)
         with pytest.raises(StoreError, match=r"cannot be replaced: No space left on device\n  hint: free disk space"):
             store.update_study(other)
         assert store.limits == study.limits
     assert path.read_bytes() == before
-    with ResultStore.open_to_write(path) as store:
+    with Writer.open(path) as store:
         store.update_study(other)
         assert (store.limits, store.study_text, store.study_name) == (other.limits, "# edited", "b")
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         assert (store.limits, store.study_text, store.study_name) == (other.limits, "# edited", "b")
         assert store.identity == study.identity()
         assert store.errors().tobytes() == fakes.draw(study).tobytes()
@@ -206,7 +207,7 @@ def test_other_files_are_refused(tmp_path: Path, study: fakes.Study, change: dic
     new_store(path, study).close()
     with h5py.File(path, "r+") as file:
         file.attrs.update(change)
-    for opened in (Reader.open, ResultStore.open_to_write):
+    for opened in (ResultFile.open, Writer.open):
         with pytest.raises(StoreError, match=message):
             opened(path)
 
@@ -215,37 +216,37 @@ def test_unreadable_files_are_refused(tmp_path: Path, study: fakes.Study) -> Non
     plain = tmp_path / "text.h5"
     plain.write_text("not HDF5")
     with pytest.raises(StoreError, match=r"text.h5: is not an HDF5 file\n  hint: give a result file"):
-        Reader.open(plain)
+        ResultFile.open(plain)
     with pytest.raises(StoreError, match=r"none.h5: does not exist"):
-        Reader.open(tmp_path / "none.h5")
+        ResultFile.open(tmp_path / "none.h5")
     with pytest.raises(StoreError, match="is a folder"):
-        Reader.open(tmp_path)
+        ResultFile.open(tmp_path)
     empty = tmp_path / "empty.h5"
     empty.touch()
     with pytest.raises(StoreError, match=r"empty.h5: is not an HDF5 file"):
-        ResultStore.open_to_write(empty)
+        Writer.open(empty)
     assert empty.stat().st_size == 0
     foreign = tmp_path / "foreign.h5"
     h5py.File(foreign, "w").close()
     with pytest.raises(StoreError, match="of type None"):
-        Reader.open(foreign)
+        ResultFile.open(foreign)
     cut = tmp_path / "cut.h5"
     new_store(cut, study).close()
     cut.write_bytes(cut.read_bytes()[:5000])
     with pytest.raises(StoreError, match="is damaged"):
-        Reader.open(cut)
+        ResultFile.open(cut)
     poor = tmp_path / "poor.h5"
     new_store(poor, study).close()
     with h5py.File(poor, "r+") as file:
         del file["results"]
     with pytest.raises(StoreError, match="is damaged"):
-        Reader.open(poor)
+        ResultFile.open(poor)
 
 
 @pytest.mark.slow
 def test_one_writer_and_any_readers(tmp_path: Path, study: fakes.Study) -> None:
     path = tmp_path / "a.h5"
-    code = f"from tolstat.store import Reader, ResultStore\nprint(Reader.open({str(path)!r}).counts().done)"
+    code = f"from tolstat.store import ResultFile, Writer\nprint(ResultFile.open({str(path)!r}).counts().done)"
     with new_store(path, study) as store:
         store.write(np.arange(5), simulation(study, np.arange(5)))
         python, environment = [sys.executable, "-c", code], fakes.environment()

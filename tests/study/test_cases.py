@@ -14,7 +14,7 @@ from tolstat import joint, sampling, study
 from tolstat.campaign import run as campaign
 from tolstat.common.errors import InputError, StoreError
 from tolstat.solver import simulation
-from tolstat.store import Reader, ResultStore, recorded
+from tolstat.store import ResultFile, Writer, recorded
 from tolstat.study import Study
 
 PAPER = ROOT / "studies" / "cirelli2021" / "cirelli2021.toml"
@@ -144,7 +144,7 @@ def test_other_methods_have_one_joint(tmp_path: Path) -> None:
     assert s.joints == (s.joint,)
     assert (s.variants, s.case_names) == ((), ())
     assert s.design.tolist() == s.rows * [(0, 0, 0)]
-    with ResultStore.create(tmp_path / "a.h5", s, sampling.draw(s)) as store:
+    with Writer.create(tmp_path / "a.h5", s, sampling.draw(s)) as store:
         assert (store.variants, store.case_names) == ((), ())
         with pytest.raises(StoreError, match="has no list of variants"):
             store.design()
@@ -204,7 +204,7 @@ def test_variants_can_have_stations_of_their_own(tmp_path: Path) -> None:
     )
     s = load(tmp_path, text=head.replace('contact.z = "20 mm"\n', "") + cases + variants)
     assert campaign.run(s, tmp_path / "a.h5", workers=1, block=4).unsettled == 0
-    with Reader.open(tmp_path / "a.h5") as store:
+    with ResultFile.open(tmp_path / "a.h5") as store:
         results, variant = store.results(), store.design()["variant"]
         params = recorded.parameters(store, np.arange(s.rows))
     assert params["n_stations"].tolist() == [3 if v != 1 else 2 for v in variant]
@@ -217,7 +217,7 @@ def test_variants_can_have_stations_of_their_own(tmp_path: Path) -> None:
 def test_each_row_runs_with_its_own_joint(tmp_path: Path) -> None:
     s = small(tmp_path)
     assert campaign.run(s, tmp_path / "a.h5", workers=1, block=4).unsettled == 0
-    with Reader.open(tmp_path / "a.h5") as store:
+    with ResultFile.open(tmp_path / "a.h5") as store:
         results, design, errors = store.results(), store.design(), store.errors()
         assert store.variants == s.variants
         assert store.case_names == s.case_names

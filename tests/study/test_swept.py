@@ -14,7 +14,7 @@ from tolstat.common.errors import InputError
 from tolstat.common.tables import Simulation
 from tolstat.joint.derived import DERIVED
 from tolstat.questions.exceedance.swept_axes import swept_axes
-from tolstat.store import Reader, ResultStore, recall, recorded
+from tolstat.store import ResultFile, Writer, recorded
 from tolstat.study import swept
 from tolstat.study.swept import KEYS
 
@@ -81,12 +81,12 @@ def test_without_the_nominal_joint(tmp_path: Path) -> None:
 def test_a_file_replays_its_sweep(tmp_path: Path) -> None:
     s = load(tmp_path)
     errors, rows = sampling.draw(s), np.arange(s.rows)
-    with ResultStore.create(tmp_path / "a.h5", s, errors) as store:
+    with Writer.create(tmp_path / "a.h5", s, errors) as store:
         store.write(rows, Simulation(synthetic.results(s.rows), {}))
-    with Reader.open(tmp_path / "a.h5") as store:
+    with ResultFile.open(tmp_path / "a.h5") as store:
         again = recorded.parameters(store, rows)
         assert again.tobytes() == recorded.perturbed(s, rows, errors, joint.perturb).tobytes()
-        assert recall.recall(store).identity() == s.identity()
+        assert recorded.recall(store).identity() == s.identity()
         frame = store.to_pandas(nominal=True)
         axes = swept_axes(store.view())
     np.testing.assert_allclose(frame["pin.d"], [s.joints[v].pin.d for v in s.design["variant"]])

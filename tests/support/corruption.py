@@ -17,11 +17,11 @@ from typing import Any, NamedTuple
 
 import h5py
 import numpy as np
+from tolstat.store.histories import parts_folder
 from typer.testing import CliRunner
 
 from tolstat import cli
 from tolstat.store import integrity, result_file
-from tolstat.store.histories import parts_folder
 
 LIMIT_S = 30
 """Processor seconds of a command."""

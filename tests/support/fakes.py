@@ -22,6 +22,7 @@ from tolstat.campaign import run as campaign
 from tolstat.campaign.blocks import Stages
 from tolstat.common import selected_results
 from tolstat.common.columns import Column
+from tolstat.common.counts import Counts
 from tolstat.common.tables import (
     DESIGN,
     ERROR,
@@ -36,7 +37,6 @@ from tolstat.common.tables import (
 )
 from tolstat.joint import Operation
 from tolstat.solver import stationary
-from tolstat.store import Counts
 from tolstat.study.design import flat
 from tolstat.study.model import Sampling
 from tolstat.study.points import Point

@@ -102,7 +102,7 @@ def store(folder, text=STUDY, name="small", simulated=None, **kwargs):
     """Make a result file without running the solver; `simulated` rows of it have invented results."""
     from tolstat import sampling, study
     from tolstat.common.tables import Simulation
-    from tolstat.store import ResultStore
+    from tolstat.store import Writer
 
     source = folder / f"{name}.toml"
     source.write_text(text, encoding="utf-8")
@@ -111,7 +111,7 @@ def store(folder, text=STUDY, name="small", simulated=None, **kwargs):
     table = results(plan.rows, **kwargs)
     rows = np.arange(plan.rows if simulated is None else simulated)
     origin = sampling.origin_blocks(plan, range(plan.rows))
-    with ResultStore.create(path, plan, sampling.draw(plan), origin=origin) as file:
+    with Writer.create(path, plan, [sampling.draw(plan)], origin=origin) as file:
         if rows.size:
             file.write(rows, Simulation(table[rows], None))
     return path

@@ -8,7 +8,7 @@ from tests.support import synthetic
 from tolstat.common.columns import RESULT_COLUMNS
 from tolstat.common.tables import Options
 from tolstat.joint import Operation
-from tolstat.store.numbering import Numbering
+from tolstat.store.reader import Reader
 from tolstat.store.view import View
 from tolstat.study.points import Point
 
@@ -16,13 +16,13 @@ OPERATION = Operation.model_construct(alpha=0.2618, speed=52.36, torque=100.0)
 """Operating point of all invented campaigns."""
 
 
-class FakeStore(Numbering):
+class FakeStore(Reader):
     """What a view reads of a result file, in memory; slot 0 is the nominal joint. `results` may be tables by point."""
 
     def __init__(self, method, limits, errors, results, study_text="", columns=RESULT_COLUMNS, joint=None):
         self.path, self.study_name, self.study_text = "made_up.h5", "made up", study_text
         self.sampling, self.limits, self.columns = {"method": method, "nominal_first": True}, limits, columns
-        self.variants, self.joint, self.heaviest = (), joint, 1.0
+        self.variants, self.joint, self.identity = (), joint, {}
         self.options = Options()._asdict()
         self._errors, self._results = errors, results if isinstance(results, dict) else {"": results}
         self.points = {name: Point(name, OPERATION, 1.0 / len(self._results)) for name in self._results}

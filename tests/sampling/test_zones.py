@@ -253,7 +253,9 @@ def test_meaning_has_the_deviations_of_the_draws(make: Make, name: str, bounded:
 @pytest.mark.parametrize("about", ["t", "z"])
 @pytest.mark.parametrize("name", ["pin2", "output_holes"])
 def test_meaning_of_two_planes_names_the_errors_that_are_drawn(make: Make, name: str, about: str) -> None:
-    s = make(f'"{name}.angularity" = {{ zone = "0.2 mm", over = "120 mm", distribution = "normal", about = "{about}" }}\n')
+    s = make(
+        f'"{name}.angularity" = {{ zone = "0.2 mm", over = "120 mm", distribution = "normal", about = "{about}" }}\n'
+    )
     errors = sampling.draw(s)
     parts = [part for entry in s.entries for site, model in entry.models for part in model.meaning(site)]
     told = {column: part.sigma for part in parts for column in part.errors}

@@ -91,6 +91,13 @@ def test_linear_model_has_the_shares_of_its_slopes():
         np.testing.assert_allclose(one, other, rtol=1e-10)
 
 
+def test_few_joints_give_an_error_without_effect_no_share_on_average_and_without_correction_they_do():
+    rng = np.random.default_rng(50)
+    x, y = rng.standard_normal((sensitivity.FEWEST, 40)), rng.standard_normal((sensitivity.FEWEST, 500))
+    assert abs(sensitivity.first_order(x, y).estimate.mean()) < 0.005
+    assert share_explained(x, y[:, 0]).mean() > 0.1
+
+
 def test_errors_of_few_values_and_of_one_value():
     rng = np.random.default_rng(8)
     x = np.column_stack([rng.integers(0, 2, 1000), rng.standard_normal(1000), np.full(1000, 3.0)])

@@ -8,10 +8,11 @@ from scipy.special import hyp2f1
 
 from tests.conftest import with_law
 from tests.measure import stability
+from tests.support import naive
 from tests.support.environment import ROOT
 from tolstat import joint as joints
 from tolstat.common.load_kinds import RESULTANT, SPAN
-from tolstat.common.tables import RESULT, Options, iterations_allowed
+from tolstat.common.tables import RESULT, Mode, Options, iterations_allowed
 from tolstat.joint.contact import PREDEFINED
 from tolstat.kernel.mechanics import dynamics, rotation
 from tolstat.kernel.mechanics.topology import N_DOF, N_LUMPS, PIN, S
@@ -157,6 +158,41 @@ def test_one_end_alone_touches_with_the_point_law_and_both_with_the_uniform_one(
     point = contact.k1p * depth**2 + contact.k2p * depth
     np.testing.assert_allclose(work.contact[0], [point, 0.0, point], rtol=2e-2)
     assert work.mode[0] == 1
+
+
+@pytest.mark.parametrize(
+    ("outer", "inner", "mode"),
+    [(-6e-6, 4e-6, "ONE_POINT"), (3e-6, 7e-6, "TWO_POINT"), (7e-6, 3e-6, "TWO_POINT"), (-2e-6, -5e-6, "NONE")],
+)
+def test_each_end_of_a_tilted_pin_presses_with_its_own_penetration(params, outer, inner, mode):
+    """Pin 1 crosses its hole: the outer end goes up by clearance + `outer`, the inner one down by clearance + `inner`.
+
+    The ends are 22 mm apart, the outer one farther from the joint's centre; a middle between them does not touch.
+    """
+    par, work = params()[0], make_work()
+    contact = joints.load("cirelli2021", {}, "test", None).contact
+    up, down, length = par.clearance[0] + outer, par.clearance[0] + inner, 0.022
+    q = np.zeros(N_DOF)
+    q[6 * PIN + 2], q[6 * PIN + 3] = 0.5 * (up - down), (up + down) / length  # shift along z, tilt of the pin along y
+    stations_of(par, q, np.zeros(N_DOF), work)
+    of_outer, of_inner = (contact.k1p * max(d, 0.0) ** 2 + contact.k2p * max(d, 0.0) for d in (outer, inner))
+    np.testing.assert_allclose(work.contact[0], [of_outer, of_inner, abs(of_outer - of_inner)], rtol=5e-3)
+    assert Mode(int(work.mode[0])).name == mode
+
+
+def test_largest_contact_forces_of_a_joint_are_those_of_its_motion(params):
+    """Inner and outer end and resultant of every pin, from positions along the revolution by the naive twin."""
+    par = params(alpha=0.26, pin1__tilt_z=0.004, hole2__tilt_t=-0.004)
+    left = np.full(1, iterations_allowed(Options().steps_per_rev, Options().max_revs))
+    options = Options(peak_substeps=1)
+    (found,) = simulation.simulate_alone(par, options, left, True, np.zeros(1, RESULT).view(np.recarray))
+    largest = np.zeros((4, 3))
+    for k, sample in enumerate(found[1]):
+        t = 2 * np.pi * k / len(found[1]) / par.omega[0]
+        largest = np.maximum(largest, naive.contacts(t, sample["q"], sample["v"], par[0]))
+    out = simulation.simulate_rows(par, options).results[0]["contact_max"]
+    np.testing.assert_allclose(out, largest, rtol=2e-3, atol=1e-2)
+    assert (np.abs(out[:, 0] - out[:, 1]) > 100.0).any()
 
 
 def test_samples_know_which_stations_carry_and_see_an_end_touch_beside_the_middle(params):

@@ -8,7 +8,7 @@ import pytest
 from tests.conftest import sliding, with_law
 from tests.support import naive
 from tolstat.benchmarks.cost.dense import dense
-from tolstat.common.load_kinds import RESULTANT
+from tolstat.common.load_kinds import INNER, OUTER, RESULTANT
 from tolstat.common.tables import Mode, Options
 from tolstat.joint.contact import PREDEFINED
 from tolstat.kernel.mechanics import dynamics, linsolve, tangent
@@ -73,6 +73,9 @@ def test_loads_are_those_of_the_naive_twin(params, random_errors, law, shaft):
     assert (work.contact[:, RESULTANT] > 100).all(), "the test wants every pin in contact"
     _, loads, _ = naive.forces(t, q, v, par)
     np.testing.assert_allclose(work.load, loads, rtol=1e-6, atol=1e-4 * np.abs(loads).max())
+    contacts = naive.contacts(t, q, v, par)
+    assert (contacts[:, OUTER] != contacts[:, INNER]).all(), "the test wants ends that differ"
+    np.testing.assert_allclose(work.contact, contacts, rtol=1e-4)
 
 
 @pytest.mark.parametrize("law", ["mode", "sliced"])

@@ -14,6 +14,7 @@ from tolstat.common.tables import KERNEL_RESULT, RESULT, RESULT_FIELDS, Options,
 from tolstat.kernel.mechanics import dynamics, ideal_loads, loads
 from tolstat.kernel.mechanics.loads import DECIDING, MEASURES, N_AVERAGED, N_INSTANT, N_LOADS, OF_MEASURE, OTHERS
 from tolstat.kernel.mechanics.work import make_work
+from tolstat.kernel.revolution import settle
 from tolstat.kernel.revolution.simulate import make_scratch
 from tolstat.solver.simulation import simulate_rows
 
@@ -33,6 +34,21 @@ def test_kernels_see_the_same_bytes() -> None:
             np.testing.assert_array_equal(table[f"{kind.key}_mean"], expected)
             assert (table[f"{kind.key}_range"] == -1).all()
     assert (table["lyapunov"] == 7).all()
+
+
+def test_the_range_of_a_modulus_that_falls_to_zero_is_not_above_its_largest_value(params) -> None:
+    """A load that half a revolution lacks: the parabola through the samples where it ends dips below zero."""
+    out = np.zeros(1, KERNEL_RESULT).view(np.recarray)
+    samples = settle.make_samples(1, 36)[0]
+    for name in samples.dtype.names:
+        samples[name] = 0
+    load = 700.0 * np.maximum(np.cos(2 * np.pi * (np.arange(36) + 0.2) / 36), 1e-4)
+    samples.loads[:] = load[:, None]
+    settle.summarise(params(alpha=0.26)[0], samples, out[0])
+    np.testing.assert_allclose(out.largest[0, :N_AVERAGED], 700.0, rtol=1e-3)
+    np.testing.assert_allclose(out.range[0], 700.0, rtol=1e-3)
+    assert (out.range[0] <= out.largest[0, :N_AVERAGED]).all()
+    np.testing.assert_allclose(out.average[0], load.mean())
 
 
 def test_kinds_with_mean_and_range_come_first() -> None:

@@ -94,6 +94,17 @@ def test_costs_decide_between_two_tolerances_with_the_same_effect(path, tmp_path
     assert rows.loc["pin2.offset_t", "cost"] == pytest.approx(rows.loc["pin2.offset_t", "factor"] ** -2)
 
 
+@pytest.mark.parametrize(
+    ("bound", "limit"), [('least = "0.12 mm"', LIMIT), ('most = "0.08 mm"', "P(cross1.F > 700 N) < 0.25")]
+)
+def test_a_tolerance_that_its_own_bounds_exclude_may_stay_as_it_is(path, tmp_path, bound, limit):
+    table = tmp_path / "costs.toml"
+    table.write_text(f'"pin[12].offset_t" = {{ cost = 4.0, {bound} }}\n', encoding="utf-8")
+    with Reader.open(path) as store:
+        found = allocate.allocated(store.view(), [limit], table)
+    assert found.tolerances.set_index("tolerance").loc["pin[12].offset_t", "factor"] == pytest.approx(1.0)
+
+
 def test_search_finds_the_optimum_of_a_problem_with_a_known_one():
     """Load x1 + x2: the optimum of c1 / f1 + c2 / f2 under f1² + f2² = r² has f1³ / f2³ = c1 / c2."""
     rng = np.random.default_rng(4)

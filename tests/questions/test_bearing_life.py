@@ -98,6 +98,18 @@ def test_a_bearing_without_load_at_one_point_lasts_by_the_other():
     assert np.isinf(lives_of(duty(loads=(0.0, 0.0))).hours).all()
 
 
+def test_joints_that_hardly_swing_at_one_point_of_their_duty_cycle_have_no_rating():
+    """3 deg to either side is below the critical amplitude, some 12 deg; 30 deg at the other point is above it."""
+    points = [
+        Point(name, Operation.model_construct(alpha=np.radians(angle), speed=50.0, torque=100.0), 0.5)
+        for name, angle in (("cruise", 3.0), ("climb", 30.0))
+    ]
+    made = views.at_points({point.name: synthetic.results(4) for point in points}, joint=held(), points=points)
+    assert lives_of(made).unrated == 3
+    assert answer(made)[0].startswith("no rating: every joint swings by less than 12.4 deg")
+    assert lives_of(duty()).unrated == 0
+
+
 def test_shares_of_the_time_are_needed():
     with pytest.raises(InputError, match=r"without a share of the time\n.*--point cruise"):
         lives_of(duty(shares=(np.nan, np.nan)))

@@ -1,5 +1,7 @@
 """Capability: exact intervals of normal loads, indices of quantiles for others, coverage, unresolved joints."""
 
+from statistics import fmean, stdev
+
 import numpy as np
 import pytest
 from scipy.special import nctdtr
@@ -46,6 +48,12 @@ def test_ends_are_where_the_estimate_is_at_the_edge_of_its_distribution(cpk, n):
     assert lower < cpk < upper
     assert nctdtr(n - 1, scale * lower, scale * cpk) == pytest.approx(0.95, abs=1e-3)
     assert nctdtr(n - 1, scale * upper, scale * cpk) == pytest.approx(0.05, abs=1e-3)
+
+
+def test_index_of_few_joints_has_the_standard_deviation_with_divisor_n_less_1():
+    loads = [640.0, 655.0, 648.0, 671.0]
+    found = capability.capability(loads, np.ones(4), 700.0)
+    assert found.cpk_normal == pytest.approx((700.0 - fmean(loads)) / (3.0 * stdev(loads)), rel=1e-12)
 
 
 @pytest.mark.slow

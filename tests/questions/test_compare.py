@@ -55,6 +55,24 @@ def test_paired_differences_cover_over_seeds_and_a_walds_interval_of_rare_shares
     assert np.mean(wald) < LEAST
 
 
+def test_pairs_that_often_change_sides_are_covered_and_independent_changes_are_not():
+    """No pair changes both ways, so the two numbers of changes are negatively correlated (multinomial)."""
+    n, up, down, rng = 100, 0.5, 0.4, np.random.default_rng(13)
+    covered, as_known, other = [], [], []
+    for numbers in rng.multinomial(n, [up, down, 1.0 - up - down], SEEDS):
+        a = np.repeat([1.0, 3.0, 1.0], numbers)
+        b = np.repeat([3.0, 1.0, 1.0], numbers)
+        found = difference.shares(a, b, [2.0], True)
+        covered.append(found.lower[0] <= up - down <= found.upper[0])
+        p, q = numbers[1] / n, numbers[0] / n
+        length = float(found.upper[0] - found.lower[0])
+        as_known.append(length / (2 * 1.96 * np.sqrt((p + q - (p - q) ** 2) / n)))
+        other.append(abs(q - p - (up - down)) <= 1.96 * np.sqrt((p * (1 - p) + q * (1 - q)) / n))
+    assert np.mean(covered) >= LEAST
+    assert np.mean(as_known) == pytest.approx(1.0, abs=0.06)  # Wald's length with the variance of a multinomial
+    assert np.mean(other) < LEAST
+
+
 def test_unpaired_differences_cover_and_neglecting_one_side_does_not():
     level, covered, half = 3.0, [], []
     for (a, _), (_, b) in zip(pairs(200), [*pairs(200)][1:], strict=False):

@@ -79,6 +79,16 @@ def test_intervals_cover_over_seeds_and_those_of_independent_states_do_not(load,
     assert np.mean(estimates) == pytest.approx(truth, rel=0.08)
 
 
+def test_intervals_of_few_joints_are_centred_at_the_truth_though_the_logarithm_is_biased_low():
+    truth, found = norm.sf(4.0), [walk_of(linear, 200, 4.0, seed).estimate() for seed in range(300)]
+    centre = np.array([0.5 * np.log(one.lower * one.upper) for one in found])
+    plain = np.log([one.probability for one in found])
+    np.testing.assert_allclose(centre - plain, [0.5 * one.deviation**2 for one in found], rtol=1e-6)
+    error = 3.0 * plain.std() / np.sqrt(plain.size)
+    assert abs(centre.mean() - np.log(truth)) < error
+    assert plain.mean() + error < np.log(truth)
+
+
 def test_a_limit_within_level_0_is_a_count_and_one_beyond_reach_a_bound():
     easy = walk_of(linear, 200, 0.5, 1)
     found = easy.estimate()

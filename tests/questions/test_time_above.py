@@ -8,6 +8,7 @@ import pytest
 from scipy.stats import norm
 from typer.testing import CliRunner
 
+import tolstat
 from tests.support import synthetic
 from tolstat import cli, sampling, study
 from tolstat.analysis import exceedance
@@ -15,7 +16,7 @@ from tolstat.common.channels import CHANNELS
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.load_kinds import BUSHINGS, SHAFTS
 from tolstat.common.loads import LOADS
-from tolstat.common.tables import Options, Simulation
+from tolstat.common.tables import Options, Simulation, Status
 from tolstat.questions.time_above import rendering
 from tolstat.questions.time_above.query import time_above
 from tolstat.solver.simulation import history_specs
@@ -84,6 +85,19 @@ def test_times_of_known_waves_and_joints_told_apart_from_them(path):
         assert row["joints_above"] == pytest.approx(np.mean(own > 750.0))
         assert row["time_lower"] < row["time"] < row["time_upper"] < row["joints_above"]
         assert row["time_50"] == 0.0
+
+
+def test_joints_that_are_pending_are_not_left_out(path, tmp_path):
+    """Of 30 joints, 20 are simulated; the file of an interrupted campaign says nothing about the others."""
+    text = TEXT.replace("n = 200", "n = 30").replace("[sampling]", f"{synthetic.SOLVER}\n[sampling]")
+    (tmp_path / "part.toml").write_text(text, encoding="utf-8")
+    plan = study.load(tmp_path / "part.toml")
+    tolstat.run(plan, tmp_path / "part.h5", workers=1, until_row=21, check=False)
+    with Reader.open(tmp_path / "part.h5") as store:
+        settled = int((store.status()[1:21] == Status.OK).sum())
+    found = json.loads(run(tmp_path / "part.h5", "--json").stdout)
+    assert (found["joints"], found["left_out"]) == (settled, 20 - settled)
+    assert settled > 0
 
 
 def test_the_mean_time_is_covered_where_few_joints_exceed_a_level_and_students_interval_is_not():

@@ -143,6 +143,15 @@ def test_pending_joints_are_told(tmp_path):
     assert said["notes"] == ["301 of 600 joints are still pending"]
 
 
+@pytest.mark.parametrize(("simulated", "mark"), [(31, "open"), (None, "")])
+def test_the_number_of_joints_is_marked_as_open_while_joints_are_pending(tmp_path, simulated, mark):
+    path = synthetic.store(tmp_path, simulated=simulated)
+    page.write_page(path, tmp_path / "page.html", accepted=0.05, replay=0)
+    text = (tmp_path / "page.html").read_text(encoding="utf-8")
+    (found,) = re.findall(r'<li( class="\w+")?><b>(\d+)</b><span>joints simulated</span>', text)
+    assert found == (f' class="{mark}"' if mark else "", "30" if simulated else "60")
+
+
 def test_a_limit_that_is_not_kept_leads_with_its_share(tmp_path):
     said, card = everywhere(synthetic.store(tmp_path), 0.05)
     low, high = clopper_pearson(20, 60)

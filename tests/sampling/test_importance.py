@@ -247,6 +247,17 @@ def test_a_verdict_is_kept_only_if_nothing_that_is_missed_could_change_it():
     assert headline.verdict(row | {"unsearched_upper": np.nan}, 0.01) == "yes"
 
 
+def test_joints_without_a_load_count_above_for_the_end_whatever_the_proposals_miss(tmp_path):
+    path = synthetic.store(tmp_path, PLAN.replace("n = 4000", "n = 400"), "small", failed=60, unsettled=20)
+    with Reader.open(path) as store:
+        row = exceeded.limits(store.view()).iloc[0]
+        own, results = store.origin()["component"][1:] == 0, store.results()[1:]
+    lost = results["status"] != Status.OK
+    count = ((results["F_max"][:, 0] > 700.0) | lost)[own].sum()
+    assert (own & lost).sum() > 10
+    assert row["unsearched_upper"] == pytest.approx(exceedance.clopper_pearson(count, own.sum())[1])
+
+
 @pytest.mark.slow
 def test_the_report_of_importance_sampling_has_both_ends(stored):
     with ResultFile.open(stored) as store:

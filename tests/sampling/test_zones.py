@@ -250,6 +250,20 @@ def test_meaning_has_the_deviations_of_the_draws(make: Make, name: str, bounded:
                 assert _std(errors, column) == pytest.approx(part.sigma, rel=0.03), (entries, column)
 
 
+@pytest.mark.parametrize("about", ["t", "z"])
+@pytest.mark.parametrize("name", ["pin2", "output_holes"])
+def test_meaning_of_two_planes_names_the_errors_that_are_drawn(make: Make, name: str, about: str) -> None:
+    s = make(
+        f'"{name}.angularity" = {{ zone = "0.2 mm", over = "120 mm", distribution = "normal", about = "{about}" }}\n'
+    )
+    errors = sampling.draw(s)
+    parts = [part for entry in s.entries for site, model in entry.models for part in model.meaning(site)]
+    told = {column: part.sigma for part in parts for column in part.errors}
+    assert set(told) == {column for column in errors.dtype.names if np.ptp(errors[column]) > 0}
+    for column, sigma in told.items():
+        assert _std(errors, column) == pytest.approx(sigma, rel=0.03), column
+
+
 def first_of(name: str) -> str:
     """First feature of a pair, or the feature."""
     return axes.PAIRS.get(name, (name,))[0]

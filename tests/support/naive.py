@@ -77,6 +77,43 @@ def contact_mode(stations):
     return "TWO_POINT" if sides[0] @ sides[1] < 0 else "UNIFORM"
 
 
+def stations_of(p, body, velocity, spin, par):
+    """Stations of pin p that touch its hole or not: point, normal, penetration, pressing force, force on the pin."""
+    pin, arm = f"pin{p}", f"arm{ARM_OF_PIN[p]}"
+    a_pin, a_arm = body.attitude[pin], body.attitude[arm]
+    centre = body.position[arm] + a_arm @ par.hole_point[ARM_OF_PIN[p] - 1]
+    axis = a_arm @ par.hole_axis[ARM_OF_PIN[p] - 1]
+    stations = []
+    for j in range(par.n_stations):
+        point = body.position[pin] + a_pin @ (par.pin_point[p - 1] + par.station_s[j] * par.pin_axis[p - 1])
+        d = point - centre
+        g = d - (d @ axis) * axis
+        n, delta = g / np.linalg.norm(g), np.linalg.norm(g) - par.clearance[p - 1]
+        if delta <= 0:
+            stations.append((point, n, delta, 0.0, np.zeros(3)))
+            continue
+        slip = velocity[pin] + np.cross(spin[pin], point - body.position[pin])
+        slip = slip - velocity[arm] - np.cross(spin[arm], point - body.position[arm])
+        elastic = par.station_k1[j] * delta**2 + par.station_k2[j] * delta
+        elastic += par.station_k3[j] * delta ** (13 / 8) / np.sqrt(delta + par.needle_b * par.clearance[p - 1])
+        ramp = par.station_weight[j] * smooth_step(delta / par.delta_d)
+        pressing = max(0.0, elastic + par.c_d * ramp * (slip @ n))
+        tangential = slip - (slip @ n) * n - (slip @ axis) * axis
+        stations.append((point, n, delta, pressing, -pressing * n - par.c_t * ramp * tangential))
+    return stations
+
+
+def contacts(t, q, v, par):
+    """Contact forces of each pin, (4, 3): of its outermost station, of its innermost one, resultant of all."""
+    motions = motion(t, q, v, np.zeros(56), par)
+    found = np.zeros((4, 3))
+    for p in (1, 2, 3, 4):
+        stations = stations_of(p, *motions, par)
+        total = np.linalg.norm(sum(f for *_, f in stations))
+        found[p - 1] = stations[0][3], stations[-1][3], total
+    return found
+
+
 def forces(t, q, v, par):
     """World force and torque about the reference point of every body, loads of the bushings, contact modes."""
     body, velocity, spin = motion(t, q, v, np.zeros(56), par)
@@ -120,28 +157,9 @@ def forces(t, q, v, par):
 
     for p in (1, 2, 3, 4):
         pin, arm = f"pin{p}", f"arm{ARM_OF_PIN[p]}"
-        a_pin, a_arm = body.attitude[pin], body.attitude[arm]
-        centre = body.position[arm] + a_arm @ par.hole_point[ARM_OF_PIN[p] - 1]
-        axis = a_arm @ par.hole_axis[ARM_OF_PIN[p] - 1]
-        stations = []
-        for j in range(par.n_stations):
-            point = body.position[pin] + a_pin @ (par.pin_point[p - 1] + par.station_s[j] * par.pin_axis[p - 1])
-            d = point - centre
-            g = d - (d @ axis) * axis
-            slip = velocity[pin] + np.cross(spin[pin], point - body.position[pin])
-            slip = slip - velocity[arm] - np.cross(spin[arm], point - body.position[arm])
-            stations.append((point, g / np.linalg.norm(g), np.linalg.norm(g) - par.clearance[p - 1], slip))
-        modes.append(contact_mode([(n, delta) for _, n, delta, _ in stations]))
-        springs = zip(par.station_k1, par.station_k2, par.station_k3, par.station_weight, strict=True)
-        for (point, n, delta, slip), (k1, k2, k3, weight) in zip(stations, springs, strict=False):
-            if delta <= 0:
-                continue
-            elastic = k1 * delta**2 + k2 * delta
-            elastic += k3 * delta ** (13 / 8) / np.sqrt(delta + par.needle_b * par.clearance[p - 1])
-            ramp = weight * smooth_step(delta / par.delta_d)
-            pressing = max(0.0, elastic + par.c_d * ramp * (slip @ n))
-            tangential = slip - (slip @ n) * n - (slip @ axis) * axis
-            f = -pressing * n - par.c_t * ramp * tangential
+        stations = stations_of(p, body, velocity, spin, par)
+        modes.append(contact_mode([(n, delta) for _, n, delta, _, _ in stations]))
+        for point, _, _, _, f in stations:
             apply(pin, f, np.zeros(3), point)
             apply(arm, -f, np.zeros(3), point)
     return force, loads, modes

@@ -84,6 +84,10 @@ seed = 2021
 """
 )
 
+SOLVER = '[solver]\nfidelity = "quasistatic"\nsteps_per_rev = 15\n'
+"""Cheapest settings: joints of a campaign that is really simulated."""
+REAL = STUDY.replace("[sampling]", f"{SOLVER}\n[sampling]")
+"""The study with these settings."""
 SWEEP = (
     HEAD
     + """[errors]

@@ -1,0 +1,50 @@
+"""How often a joint that kills its worker is tried: twice when it is alone, whatever block it was in before."""
+
+from __future__ import annotations
+
+import os
+import signal
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.support import fakes
+from tolstat.campaign.blocks import Execution
+from tolstat.common.tables import Options, Simulation, Status
+from tolstat.store import Reader
+
+
+def simulate_deadly(
+    params: np.ndarray, options: Options, histories: str, n_harmonics: int, folder: Path, deadly: float, alone: int
+) -> Simulation:
+    """Simulate; one joint kills its process in a block with others, and `alone` times when it is alone."""
+    if deadly in params["R"]:
+        number = len(list(folder.glob("alone_*")))
+        (folder / f"{'alone' if len(params) == 1 else 'among'}_{os.getpid()}_{number}").touch()
+        if len(params) > 1 or number < alone:
+            os.kill(os.getpid(), signal.SIGKILL)
+    return fakes.simulate(params, options, histories, n_harmonics)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("block", [1, 4])
+@pytest.mark.parametrize(("alone", "crashed"), [(1, False), (100, True)])
+def test_a_joint_whose_worker_dies_twice_when_it_is_alone_is_crashed(
+    tmp_path: Path, block: int, alone: int, crashed: bool
+) -> None:
+    plan, path, tried = fakes.Study(n=8), tmp_path / "a.h5", tmp_path / "tried"
+    tried.mkdir()
+    deadly = fakes.draw(plan)["pin1.offset_t"][5]
+    stages = fakes.stages(partial(simulate_deadly, folder=tried, deadly=deadly, alone=alone))
+    execution = Execution("processes", workers=2, block=block)
+    told: list[str] = []
+    counts = fakes.run(plan, path, stages=stages, execution=execution, tell=told.append)
+    assert counts.done == 8
+    with Reader.open(path) as store:
+        status = store.status()
+    assert np.flatnonzero(status == Status.CRASHED).tolist() == ([5] if crashed else [])
+    assert len(list(tried.glob("alone_*"))) == 2
+    assert bool(list(tried.glob("among_*"))) == (block > 1)
+    assert any("row 5: crashed" in message for message in told) == crashed

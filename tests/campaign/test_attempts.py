@@ -13,7 +13,7 @@ import pytest
 from tests.support import fakes
 from tolstat.campaign.blocks import Execution
 from tolstat.common.tables import Options, Simulation, Status
-from tolstat.store import Reader
+from tolstat.store import ResultFile
 
 
 def simulate_deadly(
@@ -42,7 +42,7 @@ def test_a_joint_whose_worker_dies_twice_when_it_is_alone_is_crashed(
     told: list[str] = []
     counts = fakes.run(plan, path, stages=stages, execution=execution, tell=told.append)
     assert counts.done == 8
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         status = store.status()
     assert np.flatnonzero(status == Status.CRASHED).tolist() == ([5] if crashed else [])
     assert len(list(tried.glob("alone_*"))) == 2

@@ -88,7 +88,7 @@ def test_a_check_that_fails_near_the_limit_does_not_hide_what_the_others_tell(pa
 
     monkeypatch.setattr(verify, "check_slots", check_but_one)
     near.check_near(path, "cross1.F > 720 N", joints=60)
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         row = exceeded.limits(store.view()).set_index("load").loc["cross1.F"]
     assert row["numerical_lower"] > row["estimate"]  # all loads are 2 % too small
     assert row["total_lower"] <= row["numerical_lower"] <= row["numerical_upper"] <= row["total_upper"]

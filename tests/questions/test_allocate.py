@@ -100,7 +100,7 @@ def test_costs_decide_between_two_tolerances_with_the_same_effect(path, tmp_path
 def test_a_tolerance_that_its_own_bounds_exclude_may_stay_as_it_is(path, tmp_path, bound, limit):
     table = tmp_path / "costs.toml"
     table.write_text(f'"pin[12].offset_t" = {{ cost = 4.0, {bound} }}\n', encoding="utf-8")
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         found = allocate.allocated(store.view(), [limit], table)
     assert found.tolerances.set_index("tolerance").loc["pin[12].offset_t", "factor"] == pytest.approx(1.0)
 

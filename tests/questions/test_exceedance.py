@@ -7,13 +7,13 @@ from tests.support import synthetic
 from tolstat.display.asked import Asked
 from tolstat.display.blocks import Table
 from tolstat.questions.exceedance import section
-from tolstat.store import Reader
+from tolstat.store import ResultFile
 
 
 def tolerance_limit(folder, joints):
     """Tolerance limit of cross1.F on the page, as printed, and the loads of the joints, N, ascending."""
     path = synthetic.store(folder, synthetic.STUDY.replace("n = 60", f"n = {joints}"))
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         view = store.view()
         blocks = [block for one in section.sections(view, Asked(path)) for block in one.blocks]
         loads = np.sort(view.load("cross1.F").values)

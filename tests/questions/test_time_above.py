@@ -57,7 +57,7 @@ def path(tmp_path_factory):
     plan = study.load(source)
     specs = history_specs(Options(steps_per_rev=SAMPLES), "full", 0)
     specs = {name: specs[name] for name in ("loads", "shafts")}
-    with Writer.create(folder / "waves.h5", plan, sampling.draw(plan), specs) as store:
+    with Writer.create(folder / "waves.h5", plan, [sampling.draw(plan)], specs) as store:
         rows = np.arange(plan.rows)
         histories = {"loads": wave(tops(plan.rows)), "shafts": turning(tops(plan.rows))}
         store.write(rows, Simulation(synthetic.results(plan.rows, failed=2), histories))
@@ -93,7 +93,7 @@ def test_joints_that_are_pending_are_not_left_out(path, tmp_path):
     (tmp_path / "part.toml").write_text(text, encoding="utf-8")
     plan = study.load(tmp_path / "part.toml")
     tolstat.run(plan, tmp_path / "part.h5", workers=1, until_row=21, check=False)
-    with Reader.open(tmp_path / "part.h5") as store:
+    with ResultFile.open(tmp_path / "part.h5") as store:
         settled = int((store.status()[1:21] == Status.OK).sum())
     found = json.loads(run(tmp_path / "part.h5", "--json").stdout)
     assert (found["joints"], found["left_out"]) == (settled, 20 - settled)

@@ -86,7 +86,7 @@ def made(folder, text=TEXT):
     plan = loaded(folder, text)
     errors = sampling.draw(plan)
     file = folder / "made.h5"
-    with Writer.create(file, plan, errors) as store:
+    with Writer.create(file, plan, [errors]) as store:
         store.write(np.arange(plan.rows), stand_in(perturb(plan.joint, plan.operation, errors), None))
     return file
 
@@ -446,7 +446,7 @@ def written(folder, text):
     """Campaign of two points; at the second, loads are larger in proportion to the torque."""
     plan = loaded(folder, text)
     errors, file = sampling.draw(plan), folder / "two.h5"
-    with Writer.create(file, plan, errors) as store:
+    with Writer.create(file, plan, [errors]) as store:
         for point in plan.points:
             found = stand_in(perturb(plan.joint, point.operation, errors), None)
             if point.name == "cruise":

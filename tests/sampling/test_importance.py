@@ -249,7 +249,7 @@ def test_a_verdict_is_kept_only_if_nothing_that_is_missed_could_change_it():
 
 def test_joints_without_a_load_count_above_for_the_end_whatever_the_proposals_miss(tmp_path):
     path = synthetic.store(tmp_path, PLAN.replace("n = 4000", "n = 400"), "small", failed=60, unsettled=20)
-    with Reader.open(path) as store:
+    with ResultFile.open(path) as store:
         row = exceeded.limits(store.view()).iloc[0]
         own, results = store.origin()["component"][1:] == 0, store.results()[1:]
     lost = results["status"] != Status.OK

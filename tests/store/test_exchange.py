@@ -67,7 +67,7 @@ def test_tables_are_written_block_by_block(tmp_path, monkeypatch):
     for source in (synthetic.store(tmp_path, failed=2), synthetic.store(tmp_path, synthetic.SWEEP, "sweep")):
         written = {}
         for rows in (10**6, 7):
-            monkeypatch.setattr(frame, "AT_ONCE", rows)
+            monkeypatch.setattr(result_file, "AT_ONCE", rows)
             out = tmp_path / f"{rows}.csv"
             assert export(source, "--csv", out, "--nominal").exit_code == 0
             written[rows] = out.read_text(encoding="utf-8")
@@ -79,7 +79,7 @@ def test_tables_are_written_block_by_block(tmp_path, monkeypatch):
 
 
 def test_damage_is_found_before_anything_goes_to_standard_output(tmp_path, monkeypatch):
-    monkeypatch.setattr(frame, "AT_ONCE", 7)
+    monkeypatch.setattr(result_file, "AT_ONCE", 7)
     path = synthetic.store(tmp_path)
     with h5py.File(path, "r+") as file:
         file["errors/pin1.offset_t"][50] += 1e-6

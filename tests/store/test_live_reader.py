@@ -15,7 +15,7 @@ from tests.support import synthetic
 from tolstat import study
 from tolstat.common.errors import StoreError
 from tolstat.common.tables import Status
-from tolstat.store import Reader
+from tolstat.store import ResultFile
 
 TEXT = synthetic.REAL.replace("n = 60", "n = 11").replace("[limits]", '[output]\nhistories = "full"\n\n[limits]')
 
@@ -25,7 +25,7 @@ def load(folder: Path, seed: int) -> study.Study:
     return study.load(folder / f"{seed}.toml")
 
 
-def everything(store: Reader, done: NDArray[np.intp]) -> dict[str, bytes]:
+def everything(store: ResultFile, done: NDArray[np.intp]) -> dict[str, bytes]:
     """Errors, results and histories of joints; what the file refuses to give is left out."""
     results = store.results()[done[1:]]
     found = {"errors": store.errors()[1:].tobytes()}

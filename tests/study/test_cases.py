@@ -144,7 +144,7 @@ def test_other_methods_have_one_joint(tmp_path: Path) -> None:
     assert s.joints == (s.joint,)
     assert (s.variants, s.case_names) == ((), ())
     assert s.design.tolist() == s.rows * [(0, 0, 0)]
-    with Writer.create(tmp_path / "a.h5", s, sampling.draw(s)) as store:
+    with Writer.create(tmp_path / "a.h5", s, [sampling.draw(s)]) as store:
         assert (store.variants, store.case_names) == ((), ())
         with pytest.raises(StoreError, match="has no list of variants"):
             store.design()

@@ -81,7 +81,7 @@ def test_without_the_nominal_joint(tmp_path: Path) -> None:
 def test_a_file_replays_its_sweep(tmp_path: Path) -> None:
     s = load(tmp_path)
     errors, rows = sampling.draw(s), np.arange(s.rows)
-    with Writer.create(tmp_path / "a.h5", s, errors) as store:
+    with Writer.create(tmp_path / "a.h5", s, [errors]) as store:
         store.write(rows, Simulation(synthetic.results(s.rows), {}))
     with ResultFile.open(tmp_path / "a.h5") as store:
         again = recorded.parameters(store, rows)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -17,13 +17,24 @@ if TYPE_CHECKING:
     from tolstat.store import Reader
 
 
-def status(file: ResultPath, wide: Wide = False, as_json: AsJson = False) -> None:
+def status(
+    file: ResultPath,
+    check: Annotated[
+        bool,
+        typer.Option("--check", help="Compare all that is in the file with its checksums; exit code 2 if damaged."),
+    ] = False,
+    wide: Wide = False,
+    as_json: AsJson = False,
+) -> None:
     """Print the number of joints by status.
 
     Prints the number of joints, why joints have no valid load and what to do, and the share of joints above each limit
     so far with its 95 % interval. During a run, prints also its rate and the remaining time; reading the file does not
     disturb the run. Of several operating points the worst status of a joint counts, and each has a line of its own.
     With --json, prints the number of every status.
+
+    With --check, says whether all numbers in the file are as they were written: what is damaged, or that results are
+    unchecked because a run is under way or was killed.
 
     Example: tolstat status iso2768_f.h5
     """
@@ -32,6 +43,8 @@ def status(file: ResultPath, wide: Wide = False, as_json: AsJson = False) -> Non
 
     with progress("reading the file"), ResultFile.open(file) as store:
         summary, states = _summary(store)
+        if check:
+            summary["checked"] = _checked(store)
         why = reasons(store, states)
     if as_json:
         causes = {
@@ -58,10 +71,37 @@ def _text(summary: dict[str, Any]) -> str:
     for point, numbers in summary.get("points", {}).items():
         lines.append(f"at {point}: {', '.join(f'{count} {name}' for name, count in numbers.items())}")
     lines += [f"{name}: {summary[name]}" for name in ("damaged", "simulated_again") if name in summary]
+    if "checked" in summary:
+        unchecked = "errors match; results have none while a run is under way, or after one that was killed"
+        lines.append(f"checksums: {'all match' if summary['checked'] else unchecked}")
     pace = ""
     if "joints_per_s" in summary:
         pace = f", {summary['joints_per_s']:g} joints/s, {clock(summary['s_to_go'])} left"
     return "\n".join([*lines, f"running: {'yes' if summary['running'] else 'no'}{pace}"])
+
+
+def _checked(store: Reader) -> bool:
+    """Whether all results have checksums, which match.
+
+    Raises
+    ------
+    StoreError
+        With everything that does not match its checksum.
+    """
+    from tolstat.common.errors import Fault, StoreError
+    from tolstat.store import verification, what_if
+
+    found = store.check()
+    faults = [f"{path} of rows {', '.join(rows)}" for path, rows in found.damaged.items()]
+    altered = what_if.damaged(store)
+    faults += [f"the joints of {altered} changes of what_if"] * bool(altered)
+    if faults:
+        remedy = "simulate joints with damaged results again: tolstat run STUDY; for damaged errors restore a copy"
+        raise StoreError(str(Fault(str(store.path), "\n    ".join(["is damaged:", *faults]), remedy)))
+    for one in store.each():
+        for name in (verification.VERIFY, verification.NEAR):
+            verification.read(one, name)
+    return found.checked
 
 
 def _print_shares(shares: list[dict[str, Any]], wide: bool) -> None:

@@ -30,7 +30,7 @@ REPLAYED = 1000
 
 
 def write_page(
-    source: str | Path | ResultFile | View,
+    source: str | Path | Reader | View,
     out: str | Path,
     accepted: float = np.nan,
     replay: int = REPLAYED,

@@ -44,12 +44,12 @@ class Integrity(NamedTuple):
     ----------
     checked : bool
         Whether results and histories have checksums: not while a run is under way, nor after one that was killed.
-    damaged : dict of str to ndarray
-        Blocks that do not match their checksum, ascending, by dataset.
+    damaged : dict of str to list of str
+        Rows of the campaign that do not match their checksum, ``"4096:8192"``, by dataset.
     """
 
     checked: bool
-    damaged: dict[str, NDArray[np.intp]]
+    damaged: dict[str, list[str]]
 
 
 class CheckedFile:
@@ -118,12 +118,12 @@ class CheckedFile:
             found = computed(self.file, [self.stored[path] for path in paths], blocks)
             return np.asarray((held[:, blocks - blocks[0]] != found).any(axis=0))
 
-    def check(self) -> Integrity:
-        """Compare everything that has a checksum with it, histories included."""
-        checked, n = self.number % 2 == 0, next(iter(self.stored.values())).shape[0]
-        paths = [path for path in self.stored if checked or not layout.is_at_point(path)]
+    def check(self) -> dict[str, NDArray[np.intp]]:
+        """Compare everything that has a checksum with it, histories included; damaged blocks by dataset."""
+        n = next(iter(self.stored.values())).shape[0]
+        paths = [path for path in self.stored if self.number % 2 == 0 or not layout.is_at_point(path)]
         found = {path: self.damaged((path,), 0, n) for path in paths}
-        return Integrity(checked, {path: blocks for path, blocks in found.items() if blocks.size})
+        return {path: blocks for path, blocks in found.items() if blocks.size}
 
     def digest(self, paths: Sequence[str]) -> str:
         """SHA-256 of the checksums of some datasets."""

@@ -397,7 +397,21 @@ class Reader:
 
     def check(self) -> Integrity:
         """Compare everything that has a checksum with it, histories included."""
-        return self._checked.check()
+        checked = self._checked.number % 2 == 0
+        found = self._checked.check()
+        return Integrity(checked, {path: [self._rows_of(b) for b in own.tolist()] for path, own in found.items()})
+
+    def check_errors(self) -> None:
+        """Compare errors, and how joints were drawn, with their checksums before any of them is used.
+
+        Raises
+        ------
+        StoreError
+            When they are damaged.
+        """
+        for path in self._checked.stored:
+            if not layout.is_at_point(path):
+                self._refuse(path, self._checked.damaged((path,), 0, self.n))
 
     def results_checksum(self) -> str:
         """Number that is equal for files with the same joints and results; empty while they have no checksums."""

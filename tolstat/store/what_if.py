@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import logging
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -11,12 +12,14 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from tolstat.common.errors import Fault
 from tolstat.common.shown import shown
 from tolstat.store.hdf5 import DAMAGE_ERRORS, put_attributes, text
 from tolstat.store.layout import GROUPS, MEANINGS, put_meanings
 from tolstat.store.reader import Reader
 from tolstat.store.writer import Writer
 
+LOG = logging.getLogger("tolstat.store")
 GROUP = "what_if"
 DATASETS = {
     "sample": ("i8", "1", "number of the sample; of an exchange, of the pair of samples 2 i and 2 i + 1"),
@@ -72,9 +75,25 @@ def key(about: Mapping[str, Any]) -> str:
 
 
 def read(store: Reader) -> dict[str, Altered]:
-    """Read all sets, by the digest of their change; sets whose checksum is wrong are left out, and so run again."""
+    """Read all sets, by the digest of their change; damaged ones are left out with a warning, and so run again."""
+    found, lost = _read(store)
+    if lost:
+        place, sets = str(store.path), "1 change" if lost == 1 else f"{lost} changes"
+        remedy = f"simulate them again: tolstat causes {store.path} --run"
+        LOG.warning("warning: %s", Fault(place, f"the joints of {sets} of what_if are damaged and left out", remedy))
+    return found
+
+
+def damaged(store: Reader) -> int:
+    """Number of sets that do not match their checksum."""
+    return _read(store)[1]
+
+
+def _read(store: Reader) -> tuple[dict[str, Altered], int]:
+    """Sets by the digest of their change, and number of damaged ones."""
     held = store.group(GROUP, at_point=False)
     found: dict[str, Altered] = {}
+    lost = 0
     for name, group in {} if held is None else held.items():
         try:
             one = Altered(
@@ -89,7 +108,9 @@ def read(store: Reader) -> dict[str, Altered]:
             sound = False
         if sound:
             found[name] = one
-    return found
+        else:
+            lost += 1
+    return found, lost
 
 
 def write(store: Writer, sets: Mapping[str, Altered]) -> None:

@@ -110,18 +110,16 @@ class Writer(Reader):
 
     def _verify(self) -> None:
         """Compare everything with its checksums: errors must match, joints with damaged results become pending."""
-        found = self.check()
-        self._written = np.full(blocks_of(self.n), not found.checked)
-        for path, blocks in found.damaged.items():
-            if not layout.is_at_point(path):
-                self._refuse(path, blocks)
+        found = self._checked.check()
+        self._written = np.full(blocks_of(self.n), self._checked.number % 2 == 1)
+        self.check_errors()
         for one in self.each():
             place = layout.place_of(one.point or "")
-            own = [b for path, b in found.damaged.items() if layout.is_at_point(path) and path.startswith(place)]
+            own = [b for path, b in found.items() if layout.is_at_point(path) and path.startswith(place)]
             damaged = np.isin(np.arange(self.n) // ROWS, np.concatenate([np.empty(0, np.intp), *own]))
             if damaged.any():
                 one._left_out.update(np.unique(np.concatenate(own)).tolist())
-                ledger = layout.path_of(one.point or "", "ledger", "attempt") in found.damaged
+                ledger = layout.path_of(one.point or "", "ledger", "attempt") in found
                 one._make_pending(np.flatnonzero(damaged), again=ledger)
         self._tell("pending again", "run its study to simulate these joints: tolstat run STUDY")
 

@@ -1,4 +1,4 @@
-"""Progress of a campaign: numbers of joints by status."""
+"""Progress of a campaign: numbers of joints by status, and the run under way."""
 
 from __future__ import annotations
 
@@ -68,3 +68,10 @@ class Counts(NamedTuple):
             self.not_resolved + count(Status.NOT_RESOLVED),
             self.points,
         )
+
+
+class Session(NamedTuple):
+    """A run under way: when it started (Unix time, s), and how many joints were done by then."""
+
+    started: float
+    done: int

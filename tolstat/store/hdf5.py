@@ -21,6 +21,8 @@ from tolstat.common.files import atomic_write, check_disk_space
 
 BLOCK = 1 << 16
 """Rows read or written at a time, so that no table of a large campaign need be in memory."""
+TOGETHER = 2048
+"""Rows that lie between two others in a block of so many are read with them: a read takes as long as some 4000 rows."""
 MAX_FIXED_TEXT = 32_000
 """Largest size of a text stored as an attribute of fixed length, bytes: HDF5 allows some 64 kB."""
 RUN_AGAIN = "run the campaign again: tolstat run STUDY --out OTHER.h5"
@@ -220,3 +222,9 @@ def text(attrs: h5py.AttributeManager, name: str) -> str:
     if isinstance(value, str):
         return value
     raise ValueError(f"attribute {name} is not a text")
+
+
+def pick(read: Callable[[slice], NDArray[Any]], slots: NDArray[np.intp]) -> NDArray[Any]:
+    """Read file slots, (m,) and ascending, of a table that is read by slices: one for each block of `TOGETHER`."""
+    runs = np.split(slots, np.flatnonzero(np.diff(slots // TOGETHER)) + 1)
+    return np.concatenate([read(slice(int(run[0]), int(run[-1]) + 1))[run - run[0]] for run in runs])

@@ -7,6 +7,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from enum import IntEnum
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import h5py
@@ -20,7 +21,7 @@ from tolstat.common.columns import DESIGN_COLUMNS, ERROR_COLUMNS, LEDGER_COLUMNS
 from tolstat.common.load_kinds import BUSHINGS, CONTACTS, PINS, SHAFTS
 from tolstat.common.tables import SCHEMA_VERSION, HistorySpec, Mode, Motion, Status
 from tolstat.store import metadata as documents
-from tolstat.store.hdf5 import BLOCK, put, put_attributes, put_text
+from tolstat.store.hdf5 import BLOCK, put, put_attributes, put_text, store_error
 from tolstat.store.metadata import Metadata
 
 FILETYPE = "tolstat campaign"
@@ -325,3 +326,23 @@ def put_meanings(dataset: h5py.Dataset, meanings: Mapping[int, str]) -> None:
         dataset.attrs["flag_values"] = np.array([*meanings], dataset.dtype)
         words = (re.sub(r"[^\w.+@-]+", "_", meaning) or "_" for meaning in meanings.values())
         put_attributes(dataset, {"flag_meanings": " ".join(words)})
+
+
+def check_schema(path: Path, file: h5py.File) -> None:
+    """Refuse another kind of file, or another version of it, in one sentence.
+
+    Raises
+    ------
+    StoreError
+        With what it is.
+    """
+    filetype = file.attrs.get("filetype")
+    filetype = filetype.decode(errors="replace") if isinstance(filetype, bytes) else filetype
+    if filetype != FILETYPE:
+        found = f"is HDF5, but of type {filetype!r} instead of {FILETYPE!r}"
+        raise store_error(path, found, "give a result file made by tolstat run")
+    version = int(file.attrs["schema_version"])
+    if version != SCHEMA_VERSION:
+        newer = version > SCHEMA_VERSION
+        remedy = "use a newer tolstat" if newer else "run its study again: tolstat run STUDY --out OTHER.h5"
+        raise store_error(path, f"has schema version {version}, this tolstat reads {SCHEMA_VERSION}", remedy)

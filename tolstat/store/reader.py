@@ -8,11 +8,11 @@ from __future__ import annotations
 import logging
 import math
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from copy import copy
 from pathlib import Path
 from types import TracebackType
-from typing import Any, NamedTuple, Self, TypeVar
+from typing import Any, Self, TypeVar
 
 import h5py
 import numpy as np
@@ -20,30 +20,20 @@ from numpy.typing import NDArray
 
 from tolstat.common import draw_records, selected_results, tables
 from tolstat.common.columns import DESIGN_COLUMNS, ERROR_COLUMNS, Column
-from tolstat.common.counts import Counts
+from tolstat.common.counts import Counts, Session
 from tolstat.common.errors import Fault, StoreError
-from tolstat.common.tables import SCHEMA_VERSION, Motion, Status
+from tolstat.common.tables import Motion, Status
 from tolstat.joint import Operation
 from tolstat.store import layout, metadata
 from tolstat.store.checksums import ROWS, CheckedFile, Integrity
-from tolstat.store.hdf5 import BLOCK, RUN_AGAIN, is_locked, open_hdf5, store_error, told_as_damage
-from tolstat.store.layout import FILETYPE
+from tolstat.store.hdf5 import BLOCK, RUN_AGAIN, is_locked, open_hdf5, pick, store_error, told_as_damage
 from tolstat.study.points import Point, only_one
 
 LOG = logging.getLogger("tolstat.store")
 RESTORE = f"restore a copy of the file, or {RUN_AGAIN}"
-TOGETHER = 2048
-"""Rows that lie between two others in a block of so many are read with them: a read takes as long as some 4000 rows."""
 MAX_TOLD = 5
 """Most blocks of damaged rows that a warning lists."""
 Number = TypeVar("Number", int, NDArray[np.intp])
-
-
-class Session(NamedTuple):
-    """A run under way: when it started (Unix time, s), and how many joints were done by then."""
-
-    started: float
-    done: int
 
 
 class Reader:
@@ -81,10 +71,7 @@ class Reader:
         path : str or Path
             The file.
 
-        Raises
-        ------
-        StoreError
-            When it is not a result file of this schema version, or is damaged.
+        Raises a `StoreError` when it is not a result file of this schema version, or is damaged.
         """
         return cls._opened(Path(path), "r")
 
@@ -93,7 +80,7 @@ class Reader:
         file = open_hdf5(path, mode)
         try:
             with told_as_damage(path):
-                _check_schema(path, file)
+                layout.check_schema(path, file)
                 return cls(path, file)
         except StoreError:
             file.close()
@@ -116,16 +103,10 @@ class Reader:
         self.n, self.campaign_rows = held.n, held.campaign_rows
         self.rows = range(held.first_row, held.first_row + held.n)
         self.columns = selected_results.columns(held.identity)
-        self.points = {name: _point(name, values) for name, values in held.points.items()}
+        self.points = {name: Point.of(name, values) for name, values in held.points.items()}
 
     def at(self, point: str) -> Self:
-        """Return the file at one of its operating points; both are closed together.
-
-        Raises
-        ------
-        InputError
-            When there is no such point.
-        """
+        """Return the file at one of its operating points; both are closed together. `InputError` if it has no such."""
         only_one(point, list(self.points), str(self.path))
         other = copy(self)
         other.point = point
@@ -137,13 +118,7 @@ class Reader:
 
     @property
     def operation(self) -> Operation:
-        """Operating point whose results are read, without the deviations of the joints.
-
-        Raises
-        ------
-        StoreError
-            When the file has several and none is chosen.
-        """
+        """Operating point whose results are read, without the deviations; `StoreError` unless one is chosen."""
         return self.points[self._point()].operation
 
     def _point(self) -> str:
@@ -241,10 +216,7 @@ class Reader:
     def status(self, slots: slice = slice(None)) -> NDArray[np.uint8]:
         """Status of the joints, (n,), or of a slice of file slots; joints whose results are damaged are PENDING.
 
-        Raises
-        ------
-        StoreError
-            When a status is unknown to this version.
+        Raises a `StoreError` when a status is unknown to this version.
         """
         found = self._codes(np.array(self.column("results", "status", slots)), Status)
         if found.any():  # PENDING is 0
@@ -268,10 +240,7 @@ class Reader:
         A joint whose results are damaged is PENDING. Results of pending joints are NaN (integers 0), as are columns
         that the campaign does not keep. With `fields` the table has these only.
 
-        Raises
-        ------
-        StoreError
-            When a code is unknown to this version.
+        Raises a `StoreError` when a code is unknown to this version.
         """
         names = tables.RESULT.names if fields is None else fields
         status = self.status(slots)  # first: the values that it declares valid were written before it
@@ -288,10 +257,7 @@ class Reader:
     def attempt(self, slots: slice = slice(None)) -> NDArray[np.int32]:
         """Attempt that each joint's results belong to, (n,): 0 for the study's settings, k for ``retries[k - 1]``.
 
-        Raises
-        ------
-        StoreError
-            When there was no such attempt.
+        Raises a `StoreError` when there was no such attempt.
         """
         found = np.array(self.column("ledger", "attempt", slots))
         found[self._damaged(slots)] = 0
@@ -304,20 +270,14 @@ class Reader:
     def errors(self, slots: slice = slice(None), fields: Sequence[str] | None = None) -> NDArray[np.void]:
         """Errors of every joint, (n,) table ERROR, or of a slice of file slots; with `fields` these only.
 
-        Raises
-        ------
-        StoreError
-            When the errors are damaged.
+        Raises a `StoreError` when the errors are damaged.
         """
         return self._table("errors", ERROR_COLUMNS, tables.ERROR, slots, fields or tables.ERROR.names or ())
 
     def design(self) -> NDArray[np.void]:
         """Variant, case and group of every joint, (n,) table DESIGN.
 
-        Raises
-        ------
-        StoreError
-            When all rows have the study's joint, or the table is damaged.
+        Raises a `StoreError` when all rows have the study's joint, or the table is damaged.
         """
         if not self.variants:
             remedy = 'give the result file of a study with sampling.method = "cases", or of a sweep of dimensions'
@@ -327,10 +287,7 @@ class Reader:
     def origin(self, slots: slice = slice(None)) -> NDArray[np.void]:
         """How every joint was drawn, (n,) table with the columns `draw_records.columns`, or of a slice of file slots.
 
-        Raises
-        ------
-        StoreError
-            When the sampling method has no such table, or it is damaged.
+        Raises a `StoreError` when the sampling method has no such table, or it is damaged.
         """
         columns = draw_records.columns(self.sampling)
         if not columns:
@@ -354,10 +311,7 @@ class Reader:
         (m, ...) array
             NaN (integers 0) for joints that are pending or have no results.
 
-        Raises
-        ------
-        StoreError
-            When the file holds no such histories, or they are damaged.
+        Raises a `StoreError` when the file holds no such histories, or they are damaged.
         """
         if name not in self.history_specs:
             held = ", ".join(self.history_specs) or "none"
@@ -374,13 +328,7 @@ class Reader:
         return np.asarray(read[back])
 
     def column(self, group: str, name: str, slots: slice) -> NDArray[Any]:
-        """Read a slice of file slots of a dataset; its rows may be damaged if it is one of the results.
-
-        Raises
-        ------
-        StoreError
-            When it cannot be read, or is damaged and no result.
-        """
+        """Read a slice of file slots of a dataset: of results as they are, `StoreError` for others that are damaged."""
         path = layout.path_of(self._point() if group in layout.AT_POINTS else "", group, name)
         if group not in ("results", "ledger"):
             first, last, _ = slots.indices(self.n)
@@ -402,13 +350,7 @@ class Reader:
         return Integrity(checked, {path: [self._rows_of(b) for b in own.tolist()] for path, own in found.items()})
 
     def check_errors(self) -> None:
-        """Compare errors, and how joints were drawn, with their checksums before any of them is used.
-
-        Raises
-        ------
-        StoreError
-            When they are damaged.
-        """
+        """Compare errors, and how joints were drawn, with their checksums; `StoreError` if they are damaged."""
         for path in self._checked.stored:
             if not layout.is_at_point(path):
                 self._refuse(path, self._checked.damaged((path,), 0, self.n))
@@ -454,36 +396,3 @@ class Reader:
             found = f"is damaged: {path} of rows {self._rows_of(int(blocks[0]))} does not match its checksum"
             again = f"simulate these joints again: tolstat run STUDY --out {self.path}"
             raise store_error(self.path, found, again if layout.is_at_point(path) else RESTORE)
-
-
-def pick(read: Callable[[slice], NDArray[Any]], slots: NDArray[np.intp]) -> NDArray[Any]:
-    """Read file slots, (m,) and ascending, of a table that is read by slices: one for each block of `TOGETHER`."""
-    runs = np.split(slots, np.flatnonzero(np.diff(slots // TOGETHER)) + 1)
-    return np.concatenate([read(slice(int(run[0]), int(run[-1]) + 1))[run - run[0]] for run in runs])
-
-
-def _check_schema(path: Path, file: h5py.File) -> None:
-    """Refuse another kind of file, or another version of it, in one sentence.
-
-    Raises
-    ------
-    StoreError
-        With what it is.
-    """
-    filetype = file.attrs.get("filetype")
-    filetype = filetype.decode(errors="replace") if isinstance(filetype, bytes) else filetype
-    if filetype != FILETYPE:
-        found = f"is HDF5, but of type {filetype!r} instead of {FILETYPE!r}"
-        raise store_error(path, found, "give a result file made by tolstat run")
-    version = int(file.attrs["schema_version"])
-    if version != SCHEMA_VERSION:
-        newer = version > SCHEMA_VERSION
-        remedy = "use a newer tolstat" if newer else "run its study again: tolstat run STUDY --out OTHER.h5"
-        raise store_error(path, f"has schema version {version}, this tolstat reads {SCHEMA_VERSION}", remedy)
-
-
-def _point(name: str, values: Mapping[str, float | None]) -> Point:
-    own = dict(values)
-    share = own.pop("share")
-    operation = Operation.model_construct(None, **own)
-    return Point(name, operation, math.nan if share is None else share)

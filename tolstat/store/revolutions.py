@@ -18,8 +18,8 @@ from tolstat.joint import perturb
 from tolstat.solver.compilation import is_compiled, warm_up
 from tolstat.solver.harmonics import restore
 from tolstat.solver.simulation import simulate_rows
-from tolstat.store.hdf5 import RUN_AGAIN
-from tolstat.store.reader import Reader, pick
+from tolstat.store.hdf5 import RUN_AGAIN, pick
+from tolstat.store.reader import Reader
 from tolstat.store.recorded import joint_of, operation_of, options_of
 
 AGAIN = "simulated again"

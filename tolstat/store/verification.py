@@ -15,9 +15,9 @@ from tolstat.common import selected_results, tables
 from tolstat.common.columns import Column
 from tolstat.common.shown import shown
 from tolstat.store import layout
-from tolstat.store.hdf5 import DAMAGE_ERRORS, put_attributes, store_error, text
+from tolstat.store.hdf5 import DAMAGE_ERRORS, pick, put_attributes, store_error, text
 from tolstat.store.metadata import CHECKSUM
-from tolstat.store.reader import Reader, pick
+from tolstat.store.reader import Reader
 from tolstat.store.writer import Writer
 
 VERIFY, NEAR = "verify", "near"

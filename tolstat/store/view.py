@@ -90,10 +90,7 @@ class View:
     def at(self, selection: str) -> View:
         """View of some of the operating points: ``"cruise"``, or the worst of ``"cruise+start"``; of all with ``""``.
 
-        Raises
-        ------
-        InputError
-            When there is no such point.
+        Raises an `InputError` if there is no such point.
         """
         chosen = names_of(selection, self.points, str(self.path))
         if chosen not in self._at:
@@ -190,14 +187,8 @@ class View:
 
         ``"all limits"`` is the largest ratio of load to limit of each joint, see `together`.
 
-        Its limit is the one of that name or, without it, the one that holds at these points.
-
-        Raises
-        ------
-        InputError
-            When there is no such load, or the study does not keep it.
-        StoreError
-            When the file holds levels of a subset simulation, which are not a sample.
+        Its limit is the one of that name or, without it, the one that holds at these points. Raises an `InputError` if
+        there is no such load or the study does not keep it, a `StoreError` for levels of a subset simulation.
         """
         if name not in self._loads:
             check_equal_weights(self.store.sampling, self.path, weighted=True)
@@ -327,17 +318,11 @@ class View:
 
     @property
     def aimed(self) -> bool:
-        """Whether proposals of importance sampling leave out ways to a limit: any but those of unknown processes.
-
-        A process of unknown mean and deviation is wider than the tolerances on all sides.
-        """
+        """Whether proposals of importance sampling leave out ways to a limit: those of processes are wide on all sides."""
         return self.weighted and any(set(drawn) != {"parts"} for _, drawn in self.store.identity["proposal"])
 
     def check_sample(self, allow_weights: bool = True) -> None:
-        """Refuse a file whose joints are no sample of a production, or (unless `allow_weights`) differ in weight.
-
-        Raises a StoreError, whose hint names what can be used.
-        """
+        """Raise a `StoreError` if joints are no sample of a production, or (unless `allow_weights`) differ in weight."""
         check_equal_weights(self.store.sampling, self.path, allow_weights)
         if self.method in ("cases", "sweep"):
             remedy = 'give the file of a study with sampling.method "random", "sobol" or "lhs"'

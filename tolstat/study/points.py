@@ -42,6 +42,13 @@ class Point(NamedTuple):
         said += f", axial force {own.axial_force:.4g} N" if own.axial_force else ""
         return f"{said}, {self.share:.4g} of the time" if self.name and not math.isnan(self.share) else said
 
+    @classmethod
+    def of(cls, name: str, values: Mapping[str, float | None]) -> Point:
+        """Return the point that has written these `values`."""
+        own = dict(values)
+        share = own.pop("share")
+        return cls(name, Operation.model_construct(None, **own), math.nan if share is None else share)
+
     def values(self) -> dict[str, Any]:
         """JSON values: ``alpha`` (rad), ``speed`` (rad/s), ``torque`` (N m), ``axial_force`` (N), ``share`` or null."""
         return self.operation.model_dump() | {"share": None if math.isnan(self.share) else self.share}

@@ -318,11 +318,11 @@ class View:
 
     @property
     def aimed(self) -> bool:
-        """Whether proposals of importance sampling leave out ways to a limit: those of processes are wide on all sides."""
+        """Whether proposals of importance sampling leave out ways to a limit; those of processes do not."""
         return self.weighted and any(set(drawn) != {"parts"} for _, drawn in self.store.identity["proposal"])
 
     def check_sample(self, allow_weights: bool = True) -> None:
-        """Raise a `StoreError` if joints are no sample of a production, or (unless `allow_weights`) differ in weight."""
+        """Raise a `StoreError` if joints are no sample of a production, or differ in weight without `allow_weights`."""
         check_equal_weights(self.store.sampling, self.path, allow_weights)
         if self.method in ("cases", "sweep"):
             remedy = 'give the file of a study with sampling.method "random", "sobol" or "lhs"'

@@ -1,17 +1,20 @@
-"""What measurements share: joints of a study, CPU times taken in turn, machine and versions."""
+"""What measurements share: joints of a study, CPU times taken in turn, machine and versions, tables in pages."""
 
 from __future__ import annotations
 
 import platform
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tolstat import joint, sampling
+from tolstat.common.errors import Fault, InputError
+from tolstat.common.files import atomic_write
 from tolstat.store.recorded import perturbed
 from tolstat.study import Study
 
@@ -125,3 +128,35 @@ def machine() -> str:
     from llvmlite.binding import get_host_cpu_name
 
     return f"processor {get_host_cpu_name()}, system {platform.system()} {platform.machine()}, {versions()}"
+
+
+def markdown(rows: Sequence[Sequence[str]]) -> str:
+    """Table in Markdown of rows of text, the first its headings."""
+    return "\n".join(f"| {' | '.join(row)} |" for row in (rows[0], ["---"] * len(rows[0]), *rows[1:]))
+
+
+def split_page(path: Path, name: str) -> tuple[str, str]:
+    """Split a Markdown file at its comments ``<!-- name -->`` and ``<!-- end of name -->``, which enclose a part.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be read or lacks the two comments.
+    """
+    begin, end = f"<!-- {name} -->", f"<!-- end of {name} -->"
+    try:
+        content = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError([Fault(str(path), f"cannot be read: {error}", "name a Markdown file")]) from error
+    head, opened, rest = content.partition(begin)
+    _, closed, tail = rest.partition(end)
+    if not (opened and closed):
+        raise InputError([Fault(str(path), "has no place for the table", f"add the lines {begin} and {end}")])
+    return head + begin, end + tail
+
+
+def insert(path: Path, name: str, part: str) -> None:
+    """Replace part `name` of a file by the text `part`; raises as `split_page` does."""
+    head, tail = split_page(path, name)
+    with atomic_write(path) as temporary:
+        temporary.write_text(f"{head}\n\n{part}\n\n{tail}", encoding="utf-8")

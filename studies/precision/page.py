@@ -13,12 +13,12 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
-from studies.precision.measuring import versions
+from studies.precision.measuring import markdown, versions
 from studies.precision.points import KINDS, build, cost, leaders
 from studies.precision.runs import Run
 from studies.precision.setup import Setup
 from tolstat.common.files import atomic_write
-from tolstat.display import style, table, text
+from tolstat.display import style, table
 
 OWN_MARKERS = ("o", "s", "D", "v", "*", "P")
 OWN_COLOURS = ("#0072B2", "#0072B2", "#0072B2", "#56B4E9", "#56B4E9", style.INK)
@@ -260,7 +260,7 @@ def _ahead(points: pd.DataFrame, truth: pd.DataFrame, error: str) -> pd.DataFram
 
 
 def _markdown(table: pd.DataFrame) -> str:
-    return text.markdown([list(table.columns), *([_text(x) for x in row] for row in table.itertuples(index=False))])
+    return markdown([list(table.columns), *([_text(x) for x in row] for row in table.itertuples(index=False))])
 
 
 def _text(x: Any) -> str:

@@ -32,16 +32,16 @@ def main() -> None:
     given = parser.parse_args()
     limit_threads()  # of libraries that are imported from here on, in this process and in workers
     from studies.precision import page, runs, setup
-    from tolstat.display import marks
+    from studies.precision.measuring import insert, split_page
 
     if given.into is not None:
-        marks.split(given.into, MARK)
+        split_page(given.into, MARK)
     given.out.mkdir(parents=True, exist_ok=True)
     asked, base = setup.load(given.comparison, given.quick)
     found = runs.run([*setup.jobs(asked, base, say)], say)
     print(page.write(found, asked, given.out / given.comparison.stem))
     if given.into is not None:
-        marks.insert(given.into, MARK, page.short(found))
+        insert(given.into, MARK, page.short(found))
 
 
 if __name__ == "__main__":

@@ -24,11 +24,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from studies.precision.measuring import machine
+from studies.precision.measuring import insert, machine, markdown, split_page
 from tests.measure import usage
 from tolstat import study
 from tolstat.common.cores import available_cores
-from tolstat.display import marks, style, table, text
+from tolstat.display import style, table, text
 from tolstat.display.table import Column
 
 MARK = "scale"
@@ -218,7 +218,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--into", type=Path, metavar="FILE", help=f"page with a place '{MARK}' for the table")
     given = parser.parse_args(arguments)
     if given.into is not None:
-        marks.split(given.into, MARK)
+        split_page(given.into, MARK)
     busy = f"load of the machine before {os.getloadavg()[0]:.1f}"
     rows = measure(given.study, given.joints, given.workers, given.folder)
     load = next(iter(study.load(given.study).asked), "cross1.F")
@@ -226,8 +226,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     print(table.as_text(COLUMNS, records(rows)))
     say(about)
     if given.into is not None:
-        filled = text.markdown(table.cells(COLUMNS, records(rows)))
-        marks.insert(given.into, MARK, "\n\n".join([filled, LEGEND, about]))
+        filled = markdown(table.cells(COLUMNS, records(rows)))
+        insert(given.into, MARK, "\n\n".join([filled, LEGEND, about]))
     if given.plot is not None:
         style.save(figure(rows, about), given.plot.with_suffix(""), (given.plot.suffix,))
 

@@ -13,9 +13,9 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from studies.precision.measuring import insert, split_page
 from tests.measure.coverage import page, run
 from tolstat.common.cores import available_cores, limit_threads
-from tolstat.display import marks
 
 MARK = "coverage"
 
@@ -41,10 +41,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     def keep(part: run.Coverage) -> None:
         if given.into is not None:
-            marks.insert(given.into, MARK, page.markdown(part))
+            insert(given.into, MARK, page.markdown(part))
 
     if given.into is not None:
-        marks.split(given.into, MARK)
+        split_page(given.into, MARK)
     found = run.measure(run.QUICK if given.quick else given.seeds, given.only, given.workers, say, keep=keep)
     print(page.text(found, given.cases))
     for row in found.failed:

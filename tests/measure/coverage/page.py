@@ -8,11 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from studies.precision.measuring import markdown as as_markdown
 from tests.measure.coverage.run import MOST, Coverage
 from tests.measure.coverage.statistics import CONTROL, NONE, STATISTICS
 from tests.measure.coverage.trial import Row
 from tolstat.display.text import align
-from tolstat.display.text import markdown as as_markdown
 
 ENOUGH = 0.05
 """Share of the seeds that must have an interval for a case to count in the summary."""

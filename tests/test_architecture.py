@@ -8,7 +8,7 @@ import pytest
 
 from tests.support.environment import ROOT
 
-SOURCES = [path for folder in ("tolstat", "tests") for path in (ROOT / folder).rglob("*.py")]
+SOURCES = [path for folder in ("tolstat", "tests", "studies") for path in (ROOT / folder).rglob("*.py")]
 BETWEEN = re.compile(r"^(?:[ ,(]|, | and )*$")
 """What may stand between a file and its names."""
 

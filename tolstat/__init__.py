@@ -36,7 +36,6 @@ if TYPE_CHECKING:
     from tolstat.report.page import write_page as write_page
     from tolstat.report.summary import statistics as statistics
     from tolstat.sampling import draw as draw
-    from tolstat.solver.integrate import integrate as integrate
     from tolstat.solver.simulation import simulate_rows as simulate_rows
     from tolstat.store import ResultFile
     from tolstat.study import load as load
@@ -54,7 +53,6 @@ _HOMES = {
     "capability": "tolstat.analysis.capability:capability",
     "draw": "tolstat.sampling:draw",
     "exceedance": "tolstat.analysis.exceedance:exceedance",
-    "integrate": "tolstat.solver.integrate:integrate",
     "load": "tolstat.study:load",
     "load_case": "tolstat.study:load_case",
     "open": "tolstat.store:ResultFile.open",

@@ -19,7 +19,6 @@ from tests.support import fakes, synthetic
 from tolstat import cli
 from tolstat.campaign import run as campaign
 from tolstat.campaign.executors import WorkerDied
-from tolstat.cli import bench
 from tolstat.common.columns import ERROR_COLUMNS, RESULT_COLUMNS
 from tolstat.common.load_kinds import BUSHINGS
 from tolstat.common.tables import Simulation, Status
@@ -27,10 +26,7 @@ from tolstat.display import text
 from tolstat.questions import QUESTIONS
 from tolstat.store import ResultFile
 
-COMMANDS = (
-    *(name.replace("_", "-") for names in cli.COMMANDS.values() for name in names),
-    *bench.INSTRUMENTS,
-)
+COMMANDS = tuple(name.replace("_", "-") for names in cli.COMMANDS.values() for name in names)
 HEAVY = {"numpy", "numba", "pandas", "pint", "matplotlib", "h5py", "scipy"}
 
 
@@ -90,10 +86,10 @@ def test_every_command_has_help_with_every_option_explained(command):
 def test_help_lists_the_commands_in_order_each_with_its_whole_summary():
     shown = call("--help").stdout
     groups = shown[shown.index("Plan:") :]
-    listed = re.findall(r"^  ([a-z-]+(?: [a-z-]+)?)  +([A-Z].*[.])$", groups, flags=re.MULTILINE)
+    listed = re.findall(r"^  ([a-z-]+)  +([A-Z].*[.])$", groups, flags=re.MULTILINE)
     assert tuple(name for name, _ in listed) == COMMANDS
     headings = re.findall(r"^(\w[\w ]*):$", groups, flags=re.MULTILINE)
-    assert headings == [*cli.COMMANDS, "Measure tolstat itself"]
+    assert headings == [*cli.COMMANDS]
     assert max(map(len, shown.splitlines())) <= 80
     assert "..." not in groups
 
@@ -103,15 +99,6 @@ def test_commands_of_questions_stand_under_their_headings_once():
     assert len(set(listed)) == len(listed)
     assert {(question.heading, name) for question in QUESTIONS for name in question.commands} <= set(listed)
     assert [question.name for question in QUESTIONS if bool(question.heading) != bool(question.commands)] == []
-
-
-def test_a_file_may_be_named_like_an_instrument(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    for args in (["precision.toml"], ["./precision"], ["--quick", "precision"]):
-        done = call("bench", *args)
-        assert done.exit_code == 2
-        assert done.stderr.startswith("error: precision")
-    assert "Missing argument 'COMPARISON'" in call("bench", "precision").stderr
 
 
 def test_help_is_light():

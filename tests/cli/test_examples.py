@@ -15,16 +15,10 @@ import tolstat
 from tests.support import synthetic
 from tests.support.environment import ROOT
 from tolstat import cli
-from tolstat.cli import bench
 
 COMMANDS = [name.replace("_", "-") for names in cli.COMMANDS.values() for name in names]
 STUDY = (ROOT / "studies" / "iso2768_f.toml").read_text(encoding="utf-8")
-FEW = {"codes": 'codes = ["LSODA"]', "methods": 'methods = ["bdf2"]', "fidelities": 'fidelities = ["quasistatic"]'}
-"""One integrator of each side in ``studies/precision.toml``."""
 SHORT = {
-    "bench": ("--joints", "16"),
-    "bench coverage": ("--seeds", "20"),
-    "bench scale": ("--joints", "200,400"),
     "lots": ("--lots", "30", "--joints", "2"),
     "rare": ("--n", "100", "--repeats", "1"),
     "selective": ("--n", "40"),
@@ -39,17 +33,14 @@ def call(*args: object) -> Result:
 
 def example(command: str) -> list[str]:
     """Words of the example on the help page of a command."""
-    (line,) = re.findall(r"^  Example: tolstat (.*)$", call(*command.split(), "--help").stdout, flags=re.MULTILINE)
+    (line,) = re.findall(r"^  Example: tolstat (.*)$", call(command, "--help").stdout, flags=re.MULTILINE)
     return shlex.split(line)
 
 
 @pytest.fixture(scope="module")
 def made(example_files: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Folder with the files that the examples name; instruments have few settings."""
+    """Folder with the files that the examples name."""
     folder = Path(shutil.copytree(example_files, tmp_path_factory.mktemp("made") / "examples"))
-    precision = folder / "studies" / "precision.toml"
-    few = re.sub(r"(codes|methods|fidelities) = .*", lambda found: FEW[found[1]], precision.read_text(encoding="utf-8"))
-    precision.write_text(few, encoding="utf-8")
     study = folder / "studies" / "iso2768_f.toml"
     for part, rows in (("part1", range(300)), ("part2", range(300, 601))):
         tolstat.run(tolstat.load(study), folder / f"{part}.h5", workers=1, rows=rows)
@@ -62,16 +53,16 @@ def too_wide(done: Result) -> list[str]:
     return [line for line in lines if len(line) > 80 and "/tmp" not in line]
 
 
-@pytest.mark.parametrize("command", [*COMMANDS, *bench.INSTRUMENTS])
+@pytest.mark.parametrize("command", COMMANDS)
 def test_help_has_plain_words_for_arguments(command: str) -> None:
-    shown = call(*command.split(), "--help").stdout
+    shown = call(command, "--help").stdout
     arguments = shown.partition("\nArguments:\n")[2].partition("\nOptions:\n")[0]
     assert not re.search(r"<\w|\[Path|list\[", arguments)
 
 
 @pytest.mark.usefixtures("one_core")
 @pytest.mark.slow
-@pytest.mark.parametrize("command", [*COMMANDS, *bench.INSTRUMENTS])
+@pytest.mark.parametrize("command", COMMANDS)
 def test_the_example_runs(command: str, made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     shutil.copytree(made, tmp_path / "work")
     monkeypatch.chdir(tmp_path / "work")
@@ -79,8 +70,7 @@ def test_the_example_runs(command: str, made: Path, tmp_path: Path, monkeypatch:
     done = call(*example(command), *SHORT.get(command, ()))
     assert done.exit_code == 0, done.stderr
     assert "Traceback" not in done.stderr
-    if command not in bench.INSTRUMENTS:
-        assert too_wide(done) == [] or command == "docs"  # whose pages have lines of any length
+    assert too_wide(done) == [] or command == "docs"  # whose pages have lines of any length
 
 
 TABLES = {

@@ -7,7 +7,7 @@ import pytest
 
 from tests.conftest import sliding, with_law
 from tests.support import naive
-from tolstat.benchmarks.cost.dense import dense
+from tests.support.kernel_states import dense
 from tolstat.common.load_kinds import INNER, OUTER, RESULTANT
 from tolstat.common.tables import Mode, Options
 from tolstat.joint.contact import PREDEFINED

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from tests.conftest import REFERENCE, joint_with_law, sliding
+from tests.support import kernel_states
 from tolstat import joint as joints
 from tolstat import sampling, study
-from tolstat.benchmarks.cost import iteration
 from tolstat.common.tables import PARAM, Fidelity, Options, Start, Status, iterations_allowed
 from tolstat.joint.contact import PREDEFINED
 from tolstat.kernel.lanes import lockstep
@@ -184,5 +184,5 @@ def test_lanes_wait_for_a_tangent_no_longer_than_allowed(monkeypatch):
     results = simulation.simulate_rows(params, options).results
     evaluations = sum(int(results[name].sum()) for name in ("newton_iterations", "steps", "halvings"))
     monkeypatch.setattr(lockstep, "PATIENCE", WIDTH + 1)
-    _, filled, tangents = iteration.tally(iteration.Sample(params, options))
+    _, filled, tangents = kernel_states.tally(kernel_states.Sample(params, options))
     assert 0 < (filled - evaluations) / tangents <= lockstep.STANDSTILL

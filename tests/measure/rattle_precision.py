@@ -13,10 +13,10 @@ import numpy as np
 import scipy.integrate
 from numpy.typing import NDArray
 
+from studies.precision.integrators import Code, Integrator, solve
+from studies.precision.runs import largest_of
 from tests.support.environment import ROOT
 from tolstat import joint, sampling, study
-from tolstat.benchmarks.integrators import Code, Integrator, solve
-from tolstat.benchmarks.runs import largest_of
 from tolstat.common.load_kinds import SPAN
 from tolstat.common.tables import Method, Options
 from tolstat.solver.reference import FirstOrder, Largest, first_order

@@ -126,7 +126,7 @@ def test_solver_defaults_are_those_of_the_kernel() -> None:
     changed = Solver(method="generalized_alpha", start="ramp", rho_inf=0.5).options()
     assert changed.method == tables.Method.GENERALIZED_ALPHA
     assert changed.start == tables.Start.RAMP
-    # the error control of tr_bdf2 is for systems of the user's own, see tolstat.integrate
+    # rtol and atol of tr_bdf2 are set by the refinement, not by the study
     assert set(Solver.model_fields) == set(tables.Options._fields) - {"rtol", "atol"} | {"error_budget"}
 
 

@@ -3,7 +3,6 @@
 from importlib import import_module
 
 from tolstat import questions
-from tolstat.cli import bench
 from tolstat.cli._app import GROUPS, OneCommand, app, command, main
 
 __all__ = ["COMMANDS", "app", "main"]
@@ -25,6 +24,3 @@ for heading, names in COMMANDS.items():
             command(getattr(import_module(f"tolstat.cli.{name}"), name))
         )
     GROUPS[heading] = tuple(name.replace("_", "-") for name in names)
-for words, instrument in bench.INSTRUMENTS.items():
-    app.command(words, cls=OneCommand, epilog=bench.SEE_ALSO)(command(instrument))
-GROUPS["Measure tolstat itself"] = tuple(bench.INSTRUMENTS)

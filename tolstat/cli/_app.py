@@ -43,15 +43,11 @@ EPILOG = (
 
 
 GROUPS: dict[str, tuple[str, ...]] = {}
-"""Headings of the help, and the words of the commands under each; `tolstat.cli` fills it."""
+"""Headings of the help, and the commands under each; `tolstat.cli` fills it."""
 
 
 class _Commands(TyperGroup):
-    """Commands of one or two words, listed in help under the headings of `GROUPS`."""
-
-    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        two = " ".join(args[:2])
-        return super().resolve_command(ctx, [two, *args[2:]] if two in self.commands else args)
+    """Commands, listed in help under the headings of `GROUPS`."""
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         width = max(map(len, self.commands))

@@ -75,11 +75,6 @@ def align(rows: Sequence[Sequence[str]], words: Sequence[bool] = ()) -> str:
     return "\n".join(lines)
 
 
-def markdown(rows: Sequence[Sequence[str]]) -> str:
-    """Table in Markdown of rows of text, the first its headings."""
-    return "\n".join(f"| {' | '.join(row)} |" for row in (rows[0], ["---"] * len(rows[0]), *rows[1:]))
-
-
 def multiple(largest: float, unit: str) -> tuple[float, str]:
     """Multiple of a unit for values up to `largest`: its size and text; kN and kN m from 1e4 N and N m on."""
     kilo = unit in ("N", "N*m") and abs(largest) >= 1e4

@@ -25,7 +25,7 @@ rows : ndarray of PARAM, shape (n,)
     Several joints.
 options : Options
     Numerical settings.
-work : record of WORK, or DenseWork
+work : record of WORK
     Scratch of an evaluation: bodies, stations, loads, blocks of the tangent.
 state : record of State
     Trial point, accepted points, counters of the integrator.

@@ -1,0 +1,227 @@
+"""Experiments on causes: Sobol' indices, rank regression, the tail, indices of lines that are exchanged."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from tests.measure.coverage.trial import Asked, Experiment, Found, Rng
+from tolstat.analysis import overrepresentation, pick_freeze, regression, sensitivity
+from tolstat.analysis.exceedance import FloatArray
+
+WEIGHTS = np.array([1.0, 0.5, 0.0])
+"""Weights of the three errors in the loads."""
+LONG = "the variance of a load with a long tail is that of few joints; `causes --run` decomposes its logarithm"
+BENT = "few joints for a load with several bends in an error"
+
+
+class Load(NamedTuple):
+    """A load of three independent errors, with its first-order and total indices, (3,)."""
+
+    name: str
+    draw: Callable[[Rng, tuple[int, ...]], FloatArray]
+    of: Callable[[FloatArray], FloatArray]
+    first: FloatArray
+    total: FloatArray
+    known: str = ""
+
+
+def loads() -> list[Load]:
+    """Linear, skew, and Ishigami's function."""
+    square = WEIGHTS**2
+    share = square / square.sum()
+    a, b = 7.0, 0.1
+    pi4, pi8 = np.pi**4, np.pi**8
+    parts = np.array([0.5 * (1.0 + b * pi4 / 5.0) ** 2, a**2 / 8.0, 0.0])
+    mixed = b**2 * pi8 * (1.0 / 18.0 - 1.0 / 50.0)
+    variance = parts.sum() + mixed
+    return [
+        Load("linear", _normal, lambda x: x @ WEIGHTS, share, share),
+        _exponential("exponential", WEIGHTS, LONG),
+        _exponential("slightly skew", 0.3 * WEIGHTS),
+        Load(
+            "Ishigami",
+            lambda rng, shape: rng.uniform(-np.pi, np.pi, shape),
+            lambda x: np.sin(x[..., 0]) * (1.0 + b * x[..., 2] ** 4) + a * np.sin(x[..., 1]) ** 2,
+            parts / variance,
+            (parts + np.array([mixed, 0.0, mixed])) / variance,
+        ),
+    ]
+
+
+def _exponential(name: str, weights: FloatArray, known: str = "") -> Load:
+    square = weights**2
+    whole = math.expm1(square.sum())
+    first, total = np.expm1(square) / whole, 1.0 - np.expm1(square.sum() - square) / whole
+    return Load(name, _normal, lambda x: np.exp(x @ weights), first, total, known)
+
+
+def _normal(rng: Rng, shape: tuple[int, ...]) -> FloatArray:
+    return rng.standard_normal(shape)
+
+
+def experiments() -> Iterator[Experiment]:
+    """All of this file."""
+    for load in loads():
+        for n in (200, 2000):
+            yield _given_data(load, n)
+            yield _pick_freeze(load, n)
+    for share in (0.5, 0.05):
+        for n in (200, 2000):
+            yield _event(share, n)
+    for weights in ((1.0, 0.5, 0.0), (1.0, 1.0, 1.0)):
+        for n in (200, 2000):
+            yield _ranks(np.array(weights), n)
+    for share in (0.1, 0.02):
+        for n in (1024, 4096):
+            yield _tail(share, n)
+    for n in (200, 800):
+        yield _angles(n)
+
+
+def _given_data(load: Load, n: int) -> Experiment:
+    known = load.known or (BENT if load.name == "Ishigami" and n < 1000 else "")
+    cases = [(f"{load.name}, error {k + 1}", n, np.nan, known) for k in range(3)]
+    asked = [Asked(name, *case) for name in ("index alone", "index in all") for case in cases]
+
+    def once(rng: Rng) -> list[Found]:
+        x = load.draw(rng, (n, 3))
+        first, total = sensitivity.first_and_total(x, load.of(x))
+        return [
+            *(Found(*own) for own in zip(first.lower, first.upper, load.first, strict=True)),
+            *(Found(*own) for own in zip(total.lower, total.upper, load.total, strict=True)),
+        ]
+
+    return Experiment(tuple(asked), once)
+
+
+def _exchanged(load: Callable[[FloatArray], FloatArray], ab: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Loads of points A and B, (2, n, 3), and of A with one error of B."""
+    a, b = ab
+    return load(a), load(b), load(np.stack([np.where(np.arange(3) == k, b, a) for k in range(3)], axis=1))
+
+
+def _pick_freeze(load: Load, n: int) -> Experiment:
+    cases = [(f"{load.name}, error {k + 1}", n) for k in range(3)]
+    asked = [Asked(f"{name}, exchanged", *case) for name in ("index alone", "index in all") for case in cases]
+
+    def once(rng: Rng) -> list[Found]:
+        try:
+            own = pick_freeze.indices(*_exchanged(load.of, load.draw(rng, (2, n, 3))))
+        except ValueError:
+            return [Found(math.nan, math.nan, 0.0)] * 6
+        return [
+            *(Found(*f) for f in zip(own.first.lower, own.first.upper, load.first, strict=True)),
+            *(Found(*f) for f in zip(own.total.lower, own.total.upper, load.total, strict=True)),
+        ]
+
+    return Experiment(tuple(asked), once)
+
+
+def _event(share: float, n: int) -> Experiment:
+    """Indices of the event that a linear load is above a level."""
+    from scipy.stats import norm
+
+    size = math.sqrt(float((WEIGHTS**2).sum()))
+    z = float(norm.isf(share))
+
+    x = np.linspace(-8.0, 8.0, 16_001)
+    density = norm.pdf(x) / norm.pdf(x).sum()
+
+    def of(part: float) -> float:
+        """Closed index of errors that make up a part of the variance of the load."""
+        if part in (0.0, 1.0):
+            return part
+        given = norm.sf((z - math.sqrt(part) * x) / math.sqrt(1.0 - part))
+        return float(density @ (given - share) ** 2) / (share * (1.0 - share))
+
+    parts = WEIGHTS**2 / size**2
+    first, total = [of(float(p)) for p in parts], [1.0 - of(float(1.0 - p)) for p in parts]
+    asked = [
+        Asked("index of the event", f"linear, {share:g}, {word}, error {k + 1}", n)
+        for word in ("alone", "in all")
+        for k in range(3)
+    ]
+
+    def once(rng: Rng) -> list[Found]:
+        points = rng.standard_normal((2, n, 3))
+        try:
+            own = pick_freeze.of_event(*_exchanged(lambda x: (x @ WEIGHTS > z * size).astype(float), points))
+        except ValueError:
+            return [Found(math.nan, math.nan, 0.0)] * 6
+        return [
+            *(Found(*f) for f in zip(own.first.lower, own.first.upper, first, strict=True)),
+            *(Found(*f) for f in zip(own.total.lower, own.total.upper, total, strict=True)),
+        ]
+
+    return Experiment(tuple(asked), once)
+
+
+def _ranks(weights: FloatArray, n: int) -> Experiment:
+    """Spearman's correlations of normal errors with their sum, of which all monotone functions have the same ranks."""
+    truth = 6.0 / np.pi * np.arcsin(0.5 * weights / math.sqrt(float((weights**2).sum())))
+    name = "exponential of a sum, weights " + ", ".join(f"{w:g}" for w in weights)
+
+    def once(rng: Rng) -> list[Found]:
+        x = rng.standard_normal((n, 3))
+        own = regression.ranks(x, np.exp(x @ weights))
+        return [Found(*f) for f in zip(own.lower, own.upper, truth, strict=True)]
+
+    return Experiment(tuple(Asked("rank regression", f"{name}, error {k + 1}", n) for k in range(3)), once)
+
+
+def _tail(share: float, n: int) -> Experiment:
+    """Errors of joints above a limit beside those of the others, for a sum."""
+    from scipy.stats import norm
+
+    size, z = math.sqrt(float((WEIGHTS**2).sum())), float(norm.isf(share))
+    x = np.linspace(-8.0, 8.0, 16_001)
+    direction, far = [], []
+    for w in WEIGHTS:
+        beyond = norm.sf((z * size - w * x) / math.sqrt(size**2 - w**2))
+        above, below = (norm.pdf(x) * part for part in (beyond, 1.0 - beyond))
+        direction.append(_larger(above, below))
+        far.append(_larger(above + above[::-1], below + below[::-1], 8_000))
+
+    def once(rng: Rng) -> list[Found]:
+        errors = rng.standard_normal((n, 3))
+        try:
+            own = overrepresentation.tail(errors, errors @ WEIGHTS > z * size)
+        except ValueError:
+            return [Found(math.nan, math.nan, 0.0)] * 6
+        return [
+            *(Found(*f) for f in zip(own.direction.lower, own.direction.upper, direction, strict=True)),
+            *(Found(*f) for f in zip(own.size.lower, own.size.upper, far, strict=True)),
+        ]
+
+    asked = [
+        Asked("errors above a limit", f"linear, {share:g}, {word} of error {k + 1}", n)
+        for word in ("direction", "size")
+        for k in range(3)
+    ]
+    return Experiment(tuple(asked), once)
+
+
+def _larger(one: FloatArray, other: FloatArray, first: int = 0) -> float:
+    """P(value of one density > that of another), of densities at equally spaced points from index `first` on."""
+    one, other = (own[first:] / own[first:].sum() for own in (one, other))
+    return float(one @ (np.cumsum(other) - 0.5 * other))
+
+
+def _angles(n: int, m: int = 24) -> Experiment:
+    """Shares over the revolution of a load whose errors act with sine, cosine and a product."""
+    angle = 2.0 * np.pi * np.arange(m) / m
+    acts = np.stack([np.sin(angle), 0.5 * np.cos(angle), 0.3 * np.ones(m)])
+    truth = (acts**2).sum(axis=1) / (acts**2).sum()
+
+    def once(rng: Rng) -> list[Found]:
+        x = rng.standard_normal((n, 3))
+        y = (x + 0.3 * (x**2 - 1.0)) / math.sqrt(1.0 + 2.0 * 0.3**2) @ acts
+        own = sensitivity.over_revolution(x, y)[1]
+        return [Found(*f) for f in zip(own.lower, own.upper, truth, strict=True)]
+
+    asked = (Asked("index over the revolution", f"error {k + 1}", n) for k in range(3))
+    return Experiment(tuple(asked), once)

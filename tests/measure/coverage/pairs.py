@@ -1,0 +1,137 @@
+"""Experiments on two sides: comparison, what if, two fidelities."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from tests.measure.coverage.trial import Asked, Experiment, Found, Law, Rng, fresh_share, laws
+from tolstat.analysis import difference, multifidelity
+from tolstat.analysis.exceedance import FloatArray
+from tolstat.analysis.multifidelity import Pairs
+
+SKEW = "means of skew loads: Student's interval is symmetric"
+
+
+class Two(NamedTuple):
+    """Two loads whose normal scores are correlated by `rho`; B is `to_b` of a load of the law, `from_b` its inverse."""
+
+    name: str
+    law: Law
+    to_b: Callable[[FloatArray], FloatArray]
+    from_b: Callable[[float], float]
+    rho: float
+
+    def draw(self, rng: Rng, n: int) -> tuple[FloatArray, FloatArray]:
+        """Loads A and B of n joints."""
+        from scipy.special import ndtr
+
+        z, own = rng.standard_normal((2, n))
+        other = self.rho * z + np.sqrt(1.0 - self.rho**2) * own
+        return np.asarray(self.law.ppf(ndtr(z))), self.to_b(np.asarray(self.law.ppf(ndtr(other))))
+
+    def share_of_b(self, level: float) -> float:
+        """Share of B above a level."""
+        return float(self.law.sf(self.from_b(level)))
+
+    def quantiles(self, share: float) -> tuple[float, float]:
+        """Quantiles of A and B."""
+        own = np.asarray(self.law.ppf(share), dtype=float)
+        return float(own), float(self.to_b(own))
+
+    def means(self) -> tuple[float, float]:
+        """Means of A and B, from points of equal probability."""
+        own = np.asarray(self.law.ppf((np.arange(100_000) + 0.5) / 100_000))
+        return float(own.mean()), float(self.to_b(own).mean())
+
+
+def sides(rho: float) -> list[Two]:
+    """Loads to compare: B is larger by a factor, is shifted, is bent."""
+    known = laws()
+    return [
+        Two("normal, moved by 0.2", known["normal"], lambda a: a + 0.2, lambda b: b - 0.2, rho),
+        Two("lognormal, 1.2 times", known["lognormal"], lambda a: 1.2 * a, lambda b: b / 1.2, rho),
+        Two("uniform, squared", known["uniform"], np.square, np.sqrt, rho),
+    ]
+
+
+def experiments() -> Iterator[Experiment]:
+    """All of this file."""
+    for rho in (0.9, 0.999, 0.0):
+        for two in sides(rho):
+            for n in (60, 1024):
+                yield _compared(two, n, paired=rho > 0)
+    for rho in (0.9, 0.99):
+        for two in sides(rho):
+            yield _with_lost(two, 1024)
+    for rho in (0.99, 0.9, 0.3):
+        for two in sides(rho):
+            yield _fidelities(two, 200, 4000)
+
+
+def _compared(two: Two, n: int, paired: bool) -> Experiment:
+    how = f"pairs correlated by {two.rho:g}" if paired else "not paired"
+    levels = [float(two.law.ppf(1.0 - share)) for share in (0.5, 0.05)]
+    name = f"{two.name}, {how}"
+    asked = [Asked("difference of shares", f"{name}, {share:g}", n) for share in (0.5, 0.05)]
+    asked += [Asked("difference of quantiles", f"{name}, {share} %", n) for share in (50, 90)]
+    asked.append(Asked("difference of means", name, n, known=SKEW if two.law.name == "lognormal" else ""))
+    of_shares = [two.share_of_b(level) - float(two.law.sf(level)) for level in levels]
+    of_quantiles = [float(np.subtract(*two.quantiles(share)[::-1])) for share in (0.5, 0.9)]
+    of_means = float(np.subtract(*two.means()[::-1]))
+
+    def once(rng: Rng) -> list[Found]:
+        a, b = two.draw(rng, n)
+        shares = difference.shares(a, b, levels, paired)
+        found = [Found(*own) for own in zip(shares.lower, shares.upper, of_shares, strict=True)]
+        for share, truth in zip((0.5, 0.9), of_quantiles, strict=True):
+            own = difference.quantiles(a, b, share, paired)
+            found.append(Found(own.lower, own.upper, truth))
+        own = difference.means(a, b, paired)
+        return [*found, Found(own.lower, own.upper, of_means)]
+
+    return Experiment(tuple(asked), once)
+
+
+def _with_lost(two: Two, n: int) -> Experiment:
+    """What if: change of a share; two of a hundred joints have no valid load, of those above the limit one in ten."""
+    level = float(two.law.ppf(0.95))
+    truth = two.share_of_b(level) - 0.05
+
+    def once(rng: Rng) -> list[Found]:
+        a, b = (np.where(rng.random(n) < np.where(side > level, 0.1, 0.02), np.nan, side) for side in two.draw(rng, n))
+        own = difference.shares(a, b, [level], paired=True)
+        return [Found(float(own.outer_lower[0]), float(own.outer_upper[0]), truth)]
+
+    case = f"{two.name}, pairs correlated by {two.rho:g}, some lost"
+    return Experiment((Asked("change of a share, what if", case, n),), once)
+
+
+def _fidelities(two: Two, m: int, n: int) -> Experiment:
+    """B is the load at the high fidelity of m of the n joints, A that at the low one of all."""
+    shares = (0.5, 0.05)
+    levels = [two.quantiles(1.0 - share)[1] for share in shares]
+    own = Law(two.name, lambda p: two.to_b(np.asarray(two.law.ppf(p))), lambda x: two.law.sf(two.from_b(x)))
+    name = f"{two.name}, correlated by {two.rho:g}"
+    asked = [Asked("share, two fidelities", f"{name}, {share:g}", m, fresh_share(m, share)) for share in shares]
+    asked += [
+        Asked("quantile, two fidelities", f"{name}, {100 * (1 - share):g} %", m, own.fresh_quantile(m, 1.0 - share))
+        for share in shares
+    ]
+    points = np.asarray(own.ppf((np.arange(100_000) + 0.5) / 100_000))
+    of_mean, known = 2.0 * 1.972 * float(points.std()) / np.sqrt(m), SKEW if two.law.name == "lognormal" else ""
+    asked.append(Asked("mean, two fidelities", name, m, of_mean, known))
+    mean = float(points.mean())
+
+    def once(rng: Rng) -> list[Found]:
+        low, high = two.draw(rng, n)
+        pairs = Pairs(high[:m], low, cost_high=1.0, cost_low=0.02)
+        found = [multifidelity.share_above(pairs, level) for level in levels]
+        found += [multifidelity.quantile(pairs, 1.0 - share) for share in shares]
+        found.append(multifidelity.mean(pairs))
+        truths = (*shares, *levels, mean)
+        return [Found(f.lower, f.upper, truth) for f, truth in zip(found, truths, strict=True)]
+
+    return Experiment(tuple(asked), once)

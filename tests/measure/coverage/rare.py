@@ -1,0 +1,99 @@
+"""Experiments on rare loads: tails, subset simulation, and loads of joints that never repeat."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+
+from tests.measure.coverage.trial import Asked, Experiment, Found, Rng, fresh_share, laws, ok
+from tolstat.analysis import extreme
+from tolstat.analysis.exceedance import FloatArray
+from tolstat.analysis.subset import Settings, Walk
+from tolstat.solver import stationary
+
+SLOW = dict.fromkeys(
+    ("normal", "gamma of shape 3", "lognormal"), "its tail is Pareto's far out only: the upper end is too low"
+)
+"""Laws whose tail approaches its limiting law slowly."""
+
+
+def experiments() -> Iterator[Experiment]:
+    """All of this file."""
+    for name in ("exponential", "gamma of shape 3", "Pareto tail, k = 0.2", "normal", "lognormal", "uniform"):
+        for n in (800, 4000):
+            yield _tail(name, n)
+    for name in _states():
+        for share in (1e-3, 1e-6):
+            for n in (300, 1000):
+                yield _subset(name, share, n)
+    for name in ("exponential", "normal", "uniform"):
+        for revolutions in (16, 32, 64):
+            yield _stationary(name, revolutions)
+
+
+def _tail(name: str, n: int) -> Experiment:
+    law = laws()[name]
+    shares = (0.1 / n, 0.01 / n)
+    loads = [float(law.ppf(1.0 - share)) for share in shares]
+    asked = [Asked("return load", f"{name}, 1 in {1.0 / share:.0f}", n, known=SLOW.get(name, "")) for share in shares]
+    of_share = fresh_share(n, shares[0])
+    asked.append(Asked("share above, from the tail", f"{name}, {shares[0]:.2e}", n, of_share, SLOW.get(name, "")))
+
+    def once(rng: Rng) -> list[Found]:
+        try:
+            tail = extreme.fit(law.draw(rng, n), ok(n))
+        except extreme.TooThinError:
+            return [Found(math.nan, math.nan, 0.0)] * 3
+        given = not tail.refusal
+        found = [tail.level(share) for share in shares]
+        rare = tail.probability(max(loads[0], tail.threshold))
+        return [
+            *(Found(own.lower, own.upper, load, given) for own, load in zip(found, loads, strict=True)),
+            Found(rare.lower, rare.upper, shares[0], given),
+        ]
+
+    return Experiment(tuple(asked), once)
+
+
+def _states() -> dict[str, tuple[int, Callable[[FloatArray], FloatArray], Callable[[float], float]]]:
+    """Loads for subset simulation by name: number of errors, load, limit that a share of the joints exceeds."""
+    from scipy.stats import chi2, norm
+
+    return {
+        "sum of 10 errors": (10, lambda z: z.sum(axis=1) / math.sqrt(10.0), lambda p: float(norm.isf(p))),
+        "sum of 44 errors": (44, lambda z: z.sum(axis=1) / math.sqrt(44.0), lambda p: float(norm.isf(p))),
+        "sphere, 10 errors": (10, lambda z: (z**2).sum(axis=1), lambda p: float(chi2.isf(p, 10))),
+        "largest of 10 errors": (
+            10,
+            lambda z: z.max(axis=1),
+            lambda p: float(norm.isf(-math.expm1(math.log1p(-p) / 10))),
+        ),
+    }
+
+
+def _subset(name: str, share: float, n: int) -> Experiment:
+    d, load, limit_of = _states()[name]
+    limit = limit_of(share)
+
+    def once(rng: Rng) -> list[Found]:
+        walk = Walk(Settings(n, 0.1, limit), lambda level, first, m: rng.standard_normal((m, d)))
+        while not walk.done:
+            walk.take(load(walk.next.scores))
+        own = walk.estimate()
+        return [Found(own.lower, own.upper, share, walk.reached)]
+
+    levels = math.ceil(-math.log10(share) - 1e-9)
+    joints = round(n * (1 + 0.9 * (levels - 1)))
+    return Experiment((Asked("rare share, subsets", f"{name}, {share:g}", n, fresh_share(joints, share)),), once)
+
+
+def _stationary(name: str, revolutions: int, duration: int = 1000) -> Experiment:
+    """Largest load of `duration` further revolutions, a random number itself: loads are 10 plus a law's."""
+    law = laws()[name]
+
+    def once(rng: Rng) -> list[Found]:
+        own = stationary.largest(10.0 + law.draw(rng, revolutions)[:, None], duration)
+        truth = 10.0 + float(law.draw(rng, duration).max())
+        return [Found(float(own.lower[0]), float(own.upper[0]), truth)]
+
+    return Experiment((Asked("load that never repeats", f"{name}, {duration} revolutions", revolutions),), once)

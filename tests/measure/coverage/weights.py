@@ -1,0 +1,307 @@
+"""Experiments on joints of unequal weight: other tolerances, allocation, importance sampling, measured parts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from tests.measure.coverage.trial import Asked, Experiment, Found, Law, Rng, fresh_share, ok
+from tolstat.analysis import allocation, exceedance, known_share, process, reweight, weighted
+from tolstat.analysis.exceedance import FloatArray
+from tolstat.analysis.known_share import Event, Mixture
+from tolstat.analysis.process import Known, Sums
+from tolstat.analysis.reweight import Ratios
+from tolstat.study.tolerances import density_ratio
+from tolstat.study.tolerances.distributions import Normal
+
+ERRORS = 10
+OTHERS = 0.8
+"""Share of the joints of importance sampling that do not come from the tolerances."""
+GROUPS, EACH = 2, 4
+"""Groups of errors whose tolerances are allocated, and errors in each."""
+ENTRIES = 2
+"""Entries of the tolerances, each with a process and measured parts of its own."""
+TOLERANCES = 0.2
+"""Share of the joints drawn from the tolerances; the others come from the posterior predictive."""
+ADDED = "an unknown mean can only add to a sum of squares: lower ends lie too high"
+TAKEN_FOR_KNOWN = "the tolerances are taken as exact: the interval of a study without `known_from`"
+PARTS = ((30, 1024, 0.05), (30, 4096, 0.005), (50, 1024, 0.002))
+"""Measured parts, joints, and share above the level."""
+MOST_SEEDS = 250
+"""Number of seeds: one takes up to a second."""
+
+
+class Load(NamedTuple):
+    """A load of independent normal errors of one deviation, with its distribution."""
+
+    name: str
+    of: Callable[[FloatArray], FloatArray]
+    law: Callable[[float], Law]
+
+
+def loads() -> list[Load]:
+    """Sum, sum of squares, and largest of the errors; laws by the factor on their deviation."""
+    from scipy.stats import chi2, norm
+
+    root = math.sqrt(ERRORS)
+
+    def largest(f: float) -> Law:
+        return Law("largest", lambda p: f * norm.ppf(p ** (1 / ERRORS)), lambda x: 1.0 - norm.cdf(x / f) ** ERRORS)
+
+    def total(f: float) -> Law:
+        return Law("sum", lambda p: f * root * norm.ppf(p), lambda x: norm.sf(x / f / root))
+
+    def squares(f: float) -> Law:
+        return Law("squares", lambda p: f**2 * chi2.ppf(p, ERRORS), lambda x: chi2.sf(x / f**2, ERRORS))
+
+    return [
+        Load("sum", lambda x: x.sum(axis=1), total),
+        Load("squares", lambda x: (x**2).sum(axis=1), squares),
+        Load("largest", lambda x: x.max(axis=1), largest),
+    ]
+
+
+def experiments() -> Iterator[Experiment]:
+    """All of this file."""
+    for load in loads():
+        for factor, n in ((0.8, 256), (0.8, 1024), (1.1, 1024), (1.1, 4096), (1.15, 4096), (1.3, 4096)):
+            yield _reweighted(load, factor, n)
+    for name in _ALLOCATED:
+        for n in (2048, 4096):
+            yield _allocated(name, n)
+    yield from _important()
+    for load in loads():
+        for parts, n, share in PARTS:
+            yield _known(load, parts, n, share)
+
+
+def ratios_of(x: FloatArray, factor: float) -> Ratios:
+    """Density ratios of standard normal errors, (n, d), for deviations `factor` times as large."""
+    d = x.shape[1]
+    exact = density_ratio.exact([(Normal(0.0, factor), Normal(0.0, 1.0))] * d)
+    logs = 0.5 * (1.0 - factor**-2) * (x**2).sum(axis=1) - d * math.log(factor)
+    return Ratios(np.exp(logs), exact.mean_square, exact.unbounded, float(np.exp(exact.largest)))
+
+
+def _reweighted(load: Load, factor: float, n: int) -> Experiment:
+    law, shares = load.law(factor), (0.5, 0.05, 0.005)
+    levels = [float(law.ppf(1.0 - share)) for share in shares]
+    names = [f"{load.name} of {ERRORS} errors, {factor:g} times as wide, {share:g}" for share in shares]
+    asked = [Asked("share, other tolerances", *own, fresh_share(n, share)) for own, share in _with(names, n, shares)]
+    asked += [
+        Asked("quantile, other tolerances", *own, law.fresh_quantile(n, 1.0 - share))
+        for own, share in _with(names, n, shares)
+    ]
+
+    def once(rng: Rng) -> list[Found]:
+        x = rng.standard_normal((n, ERRORS))
+        ratios = ratios_of(x, factor)
+        sample = reweight.sort_out(load.of(x), ok(n), ratios)
+        of_shares = [reweight.share_above(sample, ratios, level) for level in levels]
+        of_loads = [reweight.quantile(sample, ratios, 1.0 - share) for share in shares]
+        return [
+            *(Found(f.lower, f.upper, share, f.support.usable) for f, share in zip(of_shares, shares, strict=True)),
+            *(Found(f.lower, f.upper, level, f.usable) for f, level in zip(of_loads, levels, strict=True)),
+        ]
+
+    return Experiment(tuple(asked), once)
+
+
+def _with(names: list[str], n: int, shares: tuple[float, ...]) -> Iterator[tuple[tuple[str, int], float]]:
+    return (((name, n), share) for name, share in zip(names, shares, strict=True))
+
+
+class _Toy(NamedTuple):
+    """A load of eight errors, and its share above a level by the factors of two groups of them."""
+
+    of: Callable[[FloatArray], FloatArray]
+    share: Callable[[FloatArray, float], float]
+
+
+def _toys() -> dict[str, _Toy]:
+    from scipy.stats import norm
+
+    def of_largest(factors: FloatArray, level: float) -> float:
+        return float(1.0 - np.prod(norm.cdf(level / np.repeat(factors, EACH))))
+
+    def of_size(factors: FloatArray, level: float) -> float:
+        return float(1.0 - np.prod(1.0 - 2.0 * norm.sf(level / np.repeat(factors, EACH))))
+
+    return {
+        "sum": _Toy(
+            lambda x: x.sum(axis=1), lambda f, level: float(norm.sf(level / math.sqrt(float((EACH * f**2).sum()))))
+        ),
+        "largest": _Toy(lambda x: x.max(axis=1), of_largest),
+        "largest modulus": _Toy(lambda x: np.abs(x).max(axis=1), of_size),
+    }
+
+
+_ALLOCATED = ("sum", "largest", "largest modulus")
+
+
+def _allocated(name: str, n: int, target: float = 0.02, drawn: float = 0.04) -> Experiment:
+    """Halve the share above a limit at the least cost; a proposal that is said to hold, and does not, is a miss."""
+    from scipy.optimize import brentq
+
+    toy = _toys()[name]
+    level = float(brentq(lambda x: toy.share(np.ones(GROUPS), x) - drawn, 0.1, 30.0))
+
+    def log_ratios(squares: FloatArray, factors: FloatArray) -> FloatArray:
+        return np.asarray(squares @ (0.5 * (1.0 - factors**-2.0)) - EACH * np.log(factors).sum())
+
+    def exact_of(factors: FloatArray) -> density_ratio.Exact:
+        one = [density_ratio.exact([(Normal(0.0, float(own)), Normal(0.0, 1.0))]) for own in factors]
+        return density_ratio.Exact(*(EACH * float(sum(values)) for values in zip(*one, strict=True)))
+
+    def of(squares: FloatArray, factors: FloatArray) -> Ratios:
+        exact = exact_of(factors)
+        weights = np.exp(log_ratios(squares, factors))
+        return Ratios(weights, exact.mean_square, exact.unbounded, float(np.exp(exact.largest)))
+
+    def once(rng: Rng) -> list[Found]:
+        x = rng.standard_normal((n, GROUPS * EACH))
+        above, squares = toy.of(x) > level, (x**2).reshape(n, GROUPS, EACH).sum(axis=2)
+        searched, checked = allocation.halves(n, n)
+        of_search = squares[searched]
+        problem = allocation.Problem(
+            log_ratios=lambda f: log_ratios(of_search, f),
+            log_spread=lambda f: exact_of(f).mean_square,
+            usable=lambda f: of(of_search, f).usable,
+            above=above[searched, None],
+            targets=np.array([target]),
+            cost=lambda f: float((1.0 / f).sum()),
+            lower=np.full(GROUPS, 0.5),
+            upper=np.full(GROUPS, 1.2),
+            confidence=0.999,
+        )
+        factors = allocation.search(problem).factors
+        own = of(squares[checked], factors)
+        sample = reweight.sort_out(above[checked].astype(float), ok(len(checked)), own)
+        found = reweight.share_above(sample, own, 0.5)
+        holds = found.support.usable and found.upper < target
+        return [Found(-np.inf, target, toy.share(factors, level), holds)]
+
+    return Experiment((Asked("allocation holds", f"{name} of 8 errors, {drawn:g} to {target:g}", n),), once)
+
+
+class _Proposal(NamedTuple):
+    """Importance sampling: joints are drawn from the tolerances and from other distributions of the errors.
+
+    `draw` gives the errors that do not come from the tolerances; `ratio` their density over that of the tolerances;
+    `searched` is whether the proposals reach every way to the level.
+    """
+
+    name: str
+    dimensions: int
+    n: int
+    draw: Callable[[Rng, int, int], FloatArray]
+    ratio: Callable[[FloatArray], FloatArray]
+    load: Callable[[FloatArray], FloatArray]
+    level: float
+    share: float
+    searched: bool = True
+
+
+def _important() -> Iterator[Experiment]:
+    from scipy.stats import norm
+
+    def along(beta: float, d: int) -> tuple[Callable[[Rng, int, int], FloatArray], Callable[[FloatArray], FloatArray]]:
+        step = beta / math.sqrt(d)
+        return (
+            lambda rng, m, d: rng.standard_normal((m, d)) + step,
+            lambda x: np.exp(step * x.sum(axis=1) - 0.5 * beta**2),
+        )
+
+    def widened(s: float) -> tuple[Callable[[Rng, int, int], FloatArray], Callable[[FloatArray], FloatArray]]:
+        return (
+            lambda rng, m, d: s * rng.standard_normal((m, d)),
+            lambda x: np.exp(0.5 * (1.0 - s**-2) * (x**2).sum(axis=1)) / s ** x.shape[1],
+        )
+
+    def total(x: FloatArray) -> FloatArray:
+        return np.asarray(x.sum(axis=1) / math.sqrt(x.shape[1]))
+
+    def modulus(x: FloatArray) -> FloatArray:
+        return np.abs(total(x))
+
+    for beta in (2.0, 3.0, 4.75):
+        for n in (500, 2000):
+            share = float(norm.sf(beta))
+            yield _of_proposal(_Proposal("sum, moved to the limit", 10, n, *along(beta, 10), total, beta, share))
+    for s, beta, d in ((1.3, 3.0, 20), (1.6, 3.0, 5), (1.6, 4.0, 5)):
+        share = float(norm.sf(beta))
+        yield _of_proposal(_Proposal(f"sum, {s:g} times as wide", d, 4000, *widened(s), total, beta, share))
+    both = float(2.0 * norm.sf(3.0))
+    yield _of_proposal(_Proposal("both sides, 1.6 times as wide", 5, 4000, *widened(1.6), modulus, 3.0, both))
+    for beta in (3.0, 4.0):
+        both, moved = float(2.0 * norm.sf(beta)), along(beta, 10)
+        yield _of_proposal(_Proposal("both sides, moved to one", 10, 2000, *moved, modulus, beta, both, False))
+
+
+def _of_proposal(own: _Proposal) -> Experiment:
+    def once(rng: Rng) -> list[Found]:
+        m = round(OTHERS * own.n)
+        x = np.concatenate([own.draw(rng, m, own.dimensions), rng.standard_normal((own.n - m, own.dimensions))])
+        kept = 1.0 - OTHERS
+        weights = 1.0 / (kept + OTHERS * own.ratio(x))
+        loads = own.load(x)
+        of_tolerances = exceedance.exceedance(loads[m:], ok(own.n - m), own.level)
+        told = [Found(-np.inf, of_tolerances.outer_upper, own.share)]
+        if own.searched:
+            found = weighted.weighted_exceedance(loads, ok(own.n), weights, own.level, heaviest=1.0 / kept)
+            trust = weighted.trust(loads, ok(own.n), weights, own.level, 1.0 / kept)
+            told.append(Found(found.lower, found.upper, own.share, trust.usable))
+        return told
+
+    case = f"{own.name}, {own.share:.1e}"
+    asked = [Asked("share, whatever proposals miss", case, own.n)]
+    if own.searched:
+        asked.append(Asked("share, importance sampling", case, own.n, fresh_share(own.n, own.share)))
+    return Experiment(tuple(asked), once)
+
+
+def _known(load: Load, parts: int, n: int, share: float) -> Experiment:
+    level = float(load.law(1.0).ppf(1.0 - share))
+    entry = Known(parts, ERRORS // ENTRIES)
+    known = (entry,) * ENTRIES
+    drawn = process.draws((parts,) * ENTRIES)
+    mixture = [Mixture(TOLERANCES, (None,) * ENTRIES), Mixture(1.0 - TOLERANCES, (parts,) * ENTRIES)]
+    usable = known_share.supported(n, drawn, known, mixture)
+
+    def once(rng: Rng) -> list[Found]:
+        # the errors of the process are standard normal; the study states what its parts show
+        measured = rng.standard_normal((ENTRIES, parts))
+        center, spread = measured.mean(axis=1), measured.std(axis=1, ddof=1)
+        z = _joints(rng, n, entry)
+        sums = [Sums(own.sum(axis=1), np.square(own).sum(axis=1)) for own in z]
+        ratio = np.exp(sum(process.log_student(own, entry) for own in sums))
+        weights = 1.0 / (TOLERANCES + (1.0 - TOLERANCES) * ratio)
+        errors = center[:, None, None] + spread[:, None, None] * z
+        above = load.of(np.concatenate(list(errors), axis=1)) > level
+        (split,) = known_share.tallies(sums, known, drawn, weights, [Event(above, np.ones(n, dtype=bool))])
+        found = known_share.intervals(split, [split], [split], usable)
+        stated = weighted.weighted_exceedance(above, ok(n), weights, 0.5, heaviest=1.0 / TOLERANCES)
+        return [Found(found.lower, found.upper, share), Found(stated.lower, stated.upper, share)]
+
+    case = f"{load.name} of {ERRORS} errors, {parts} parts, {share:g}"
+    fresh = fresh_share(n, share)
+    return Experiment(
+        (
+            Asked("share, parts and joints", case, n, fresh, ADDED if load.name == "squares" else ""),
+            Asked("share, parts left out", case, n, fresh, TAKEN_FOR_KNOWN),
+        ),
+        once,
+        MOST_SEEDS,
+    )
+
+
+def _joints(rng: Rng, n: int, entry: Known) -> FloatArray:
+    """Scores of n joints from the mixture, (ENTRIES, n, errors of an entry)."""
+    z = rng.standard_normal((ENTRIES, n, entry.errors))
+    b = process.deviation(rng.random((ENTRIES, n)), entry.parts)
+    a = process.mean(rng.standard_normal((ENTRIES, n)), b, entry.parts)
+    of_parts = rng.random(n) >= TOLERANCES
+    return np.where(of_parts[None, :, None], a[:, :, None] + b[:, :, None] * z, z)

@@ -1,0 +1,143 @@
+"""States of joints in the kernel: joints of a study, the last point of a revolution, lanes filled with such points.
+
+The kernel's lanes are imported where they are used: the rest also runs without compilation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studies.precision.measuring import parameters
+from tolstat.common.tables import KERNEL_RESULT, Fidelity, Method, Options
+from tolstat.solver import simulation
+
+if TYPE_CHECKING:
+    from tolstat.kernel.lanes.batch import Batch
+    from tolstat.study import Study
+
+
+class Sample(NamedTuple):
+    """Joints that are measured, and their settings.
+
+    Attributes
+    ----------
+    params : ndarray of PARAM, shape (n,)
+        Joints, all with the same number of contact stations.
+    options : Options
+        Settings of the study, with BDF2 at fixed steps, dynamic fidelity and no refinement: the same work in lanes and
+        one at a time.
+    """
+
+    params: NDArray[np.void]
+    options: Options
+
+
+def sample(study: Study, n: int) -> Sample:
+    """Take the first n random joints of a study, and keep those with as many contact stations as the first."""
+    first = study.first_sample
+    params = parameters(study, np.arange(first, min(first + n, study.rows)))
+    alike = params["n_stations"] == params["n_stations"][0]
+    options = study.solver.options()
+    fixed = options._replace(fidelity=int(Fidelity.DYNAMIC), method=int(Method.BDF2), rtol=0.0, max_refinements=0)
+    return Sample(np.ascontiguousarray(params[alike]), fixed)
+
+
+class Snapshot(NamedTuple):
+    """State of a joint at one instant.
+
+    Attributes
+    ----------
+    params : ndarray of PARAM, shape (1,)
+        The joint.
+    t, cv, ca : float
+        Time, s; derivatives of velocity and acceleration by the unknowns in a step, 1/s and 1/s^2.
+    q, v, a : ndarray, shape (56,)
+        Unknowns and derivatives; m, rad and s.
+    """
+
+    params: NDArray[np.void]
+    t: float
+    cv: float
+    ca: float
+    q: NDArray[np.float64]
+    v: NDArray[np.float64]
+    a: NDArray[np.float64]
+
+
+def snapshots(these: Sample, n: int) -> Iterator[Snapshot]:
+    """Yield the last recorded state of each of the first n joints."""
+    from tolstat.kernel.integrators.state import UNLIMITED
+    from tolstat.kernel.revolution.simulate import simulate_joint
+
+    params, options = these
+    scratch = simulation.scratch(options)
+    state = scratch.state
+    out = np.zeros(1, KERNEL_RESULT).view(np.recarray)
+    for i in range(min(n, len(params))):
+        simulate_joint(params.view(np.recarray)[i], options, UNLIMITED, scratch, out[0])
+        h = 2 * np.pi / (abs(float(params["omega"][i])) * options.steps_per_rev)
+        cv = 1.5 / h
+        t = float(out["revolutions"][0]) * options.steps_per_rev * h
+        yield Snapshot(params[i : i + 1], t, cv, cv * cv, state.q0.copy(), state.v0.copy(), state.a0.copy())
+
+
+def into_lanes(snaps: list[Snapshot], options: Options) -> Batch:
+    """Make lanes with a state in each, in memory of their own; states repeat where there are fewer than lanes."""
+    from tolstat.kernel.lanes.batch import make_batch, put_joint
+    from tolstat.kernel.simd.lane import WIDTH
+
+    batch = make_batch(options)
+    for lane in range(WIDTH):
+        snap = snaps[lane % len(snaps)]
+        put_joint(lane, snap.params.view(np.float64), batch)
+        for name in ("q", "v", "a"):
+            batch.motion[name][:, lane] = getattr(snap, name)
+        for name in ("t", "cv", "ca"):
+            batch.control[name][lane] = getattr(snap, name)
+    batch.par.n_stations = snaps[0].params["n_stations"][0]
+    return batch
+
+
+def tally(these: Sample) -> NDArray[np.int64]:
+    """Counts of all joints in lock-step: rounds, lanes with a joint summed over rounds, rounds with new tangents."""
+    from tolstat.kernel.integrators.state import UNLIMITED
+    from tolstat.kernel.lanes.lockstep import PATIENCE, lockstep
+    from tolstat.kernel.revolution.settle import make_samples
+
+    params, options = these
+    batch, counts = simulation.lanes(options), np.zeros(3, np.int64)
+    batch.par.n_stations = params["n_stations"][0]
+    words = params.view(np.float64).reshape(len(params), -1)
+    out = np.zeros(len(params), KERNEL_RESULT).view(np.recarray)
+    samples, blocks = make_samples(0, options.steps_per_rev), np.zeros((0, 0), KERNEL_RESULT).view(np.recarray)
+    rows = params.view(np.recarray)
+    left, scratch = np.full(len(params), UNLIMITED), simulation.scratch(options)
+    starts = simulation.starts(rows, options)
+    lockstep(rows, words, starts, left, options, PATIENCE, scratch, batch, samples, blocks, out, counts)
+    return counts
+
+
+def dense(work: np.record) -> NDArray[np.float64]:
+    """Tangent as one matrix, (56, 56): the blocks of `work` after assembly and before elimination."""
+    from tolstat.kernel.mechanics.topology import ARM, ARM_OF_PIN, N_DOF, PIN, PSI, S
+    from tolstat.kernel.mechanics.work import ARM_PIN, ARM_SHAFT, HUB_PIN, OF_PSI, OF_S, PIN_ARM, PIN_HUB, SHAFT_ARM
+
+    s = np.zeros((N_DOF, N_DOF))
+    m, e = work.block, work.edge
+    s[:6, :6] = m[0]
+    for p in range(4):
+        pin, arm = 6 * (PIN + p), 6 * (ARM + ARM_OF_PIN[p])
+        i, j = slice(pin, pin + 6), slice(arm, arm + 6)
+        s[i, i], s[j, j] = m[PIN + p], m[ARM + ARM_OF_PIN[p]]
+        s[:6, i], s[i, :6] = m[HUB_PIN + p], m[PIN_HUB + p]
+        s[i, j], s[j, i] = m[PIN_ARM + p], m[ARM_PIN + p]
+    for a in range(4):
+        rows = slice(6 * (ARM + a), 6 * (ARM + a) + 6)
+        for unknown, of in ((PSI, OF_PSI), (S, OF_S)):
+            s[rows, unknown], s[unknown, rows] = e[of, ARM_SHAFT + a], e[of, SHAFT_ARM + a]
+    s[PSI : S + 1, PSI : S + 1] = work.corner
+    return s

@@ -1,1 +1,0 @@
-"""Speed against error: CPU time a joint of the solver and of other integrators over the error of its largest loads."""

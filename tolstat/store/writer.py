@@ -114,8 +114,8 @@ class Writer(Reader):
         self._written = np.full(blocks_of(self.n), self._checked.number % 2 == 1)
         self.check_errors()
         for one in self.each():
-            place = layout.place_of(one.point or "")
-            own = [b for path, b in found.items() if layout.is_at_point(path) and path.startswith(place)]
+            places = [layout.path_of(one.point or "", group, "") for group in layout.AT_POINTS]
+            own = [blocks for path, blocks in found.items() if path.rpartition("/")[0] in places]
             damaged = np.isin(np.arange(self.n) // ROWS, np.concatenate([np.empty(0, np.intp), *own]))
             if damaged.any():
                 one._left_out.update(np.unique(np.concatenate(own)).tolist())

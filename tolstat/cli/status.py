@@ -94,7 +94,7 @@ def _checked(store: Reader) -> bool:
     found = store.check()
     faults = [f"{path} of rows {', '.join(rows)}" for path, rows in found.damaged.items()]
     altered = what_if.damaged(store)
-    faults += [f"the joints of {altered} changes of what_if"] * bool(altered)
+    faults += [f"what_if: {altered} {'change' if altered == 1 else 'changes'}"] * bool(altered)
     if faults:
         remedy = "simulate joints with damaged results again: tolstat run STUDY; for damaged errors restore a copy"
         raise StoreError(str(Fault(str(store.path), "\n    ".join(["is damaged:", *faults]), remedy)))

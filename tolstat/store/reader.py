@@ -218,10 +218,10 @@ class Reader:
 
         Raises a `StoreError` when a status is unknown to this version.
         """
-        found = self._codes(np.array(self.column("results", "status", slots)), Status)
+        found = np.array(self.column("results", "status", slots))
         if found.any():  # PENDING is 0
             found[self._damaged(slots)] = Status.PENDING
-        return found
+        return self._codes(found, Status)
 
     def pending(self) -> NDArray[np.intp]:
         """File slots still to be simulated, ascending."""

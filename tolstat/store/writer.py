@@ -113,14 +113,15 @@ class Writer(Reader):
         found = self._checked.check()
         self._written = np.full(blocks_of(self.n), self._checked.number % 2 == 1)
         self.check_errors()
+        block = np.arange(self.n) // ROWS
         for one in self.each():
-            place = layout.place_of(one.point or "")
-            own = [b for path, b in found.items() if layout.is_at_point(path) and path.startswith(place)]
-            damaged = np.isin(np.arange(self.n) // ROWS, np.concatenate([np.empty(0, np.intp), *own]))
-            if damaged.any():
-                one._left_out.update(np.unique(np.concatenate(own)).tolist())
-                ledger = layout.path_of(one.point or "", "ledger", "attempt") in found
-                one._make_pending(np.flatnonzero(damaged), again=ledger)
+            places = [layout.path_of(one.point or "", group, "") for group in layout.AT_POINTS]
+            own = [blocks for path, blocks in found.items() if path.rpartition("/")[0] in places]
+            damaged = np.unique(np.concatenate([np.empty(0, np.intp), *own]))
+            if damaged.size:
+                one._left_out.update(damaged.tolist())
+                ledger = found.get(layout.path_of(one.point or "", "ledger", "attempt"), damaged[:0])
+                one._make_pending(*(np.flatnonzero(np.isin(block, own)) for own in (damaged, ledger)))
         self._tell("pending again", "run its study to simulate these joints: tolstat run STUDY")
 
     def close(self) -> None:
@@ -281,12 +282,11 @@ class Writer(Reader):
     def _place(self, group: str) -> h5py.Group:
         return self._checked.file[layout.path_of(self._point(), group, "")]
 
-    def _make_pending(self, rows: NDArray[np.intp], again: bool) -> None:
-        """Mark rows as pending; `again`, with the study's settings, because their attempts are damaged."""
+    def _make_pending(self, rows: NDArray[np.intp], again: NDArray[np.intp]) -> None:
+        """Mark rows as pending; `again`, whose attempts are damaged, with the study's settings."""
         self._begin_writing(rows)
         put(self._place("results"), rows, {"status": np.full(rows.size, Status.PENDING, np.uint8)})
-        if again:
-            put(self._place("ledger"), rows, {"attempt": np.zeros(rows.size, np.int32)})
+        put(self._place("ledger"), again, {"attempt": np.zeros(again.size, np.int32)})
         self._sync()
 
     def _sync(self) -> None:

@@ -26,7 +26,7 @@ from tolstat.questions.joints import query as joints
 from tolstat.report import headline as verdict
 from tolstat.report import html as writer
 from tolstat.report import page
-from tolstat.store import ResultFile, revolutions
+from tolstat.store import Reader, ResultFile, revolutions
 from tolstat.store.recorded import recall
 from tolstat.store.worst import MAX_LISTED
 
@@ -121,18 +121,18 @@ def test_every_picture_has_a_title_and_a_description(html):
 @pytest.mark.parametrize("replay", [pytest.param(0, marks=pytest.mark.slow), 100])
 def test_each_value_of_the_file_is_read_once_for_a_page(path, tmp_path, monkeypatch, replay):
     """Reads of each dataset, in rows; joints that the page draws over the revolution are simulated again."""
-    read, plain = Counter(), ResultFile.column
+    read, plain = Counter(), Reader.column
 
     def counting(self, group, name, rows):
         values = plain(self, group, name, rows)
         read[f"{group}/{name}"] += len(values)
         return values
 
-    monkeypatch.setattr(ResultFile, "column", counting)
+    monkeypatch.setattr(Reader, "column", counting)
     monkeypatch.setattr(revolutions, "read", drawn)
     monkeypatch.setattr(revolutions, "ahead", lambda *_: None)
-    opened = mock.Mock(side_effect=ResultFile.open)
-    monkeypatch.setattr(ResultFile, "open", opened)
+    opened = mock.Mock(side_effect=Reader.open)
+    monkeypatch.setattr(Reader, "open", opened)
     recalled = mock.Mock(side_effect=recall)
     monkeypatch.setattr("tolstat.store.view.recall", recalled)
     page.write_page(path, tmp_path / "page.html", accepted=0.05, replay=replay)

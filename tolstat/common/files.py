@@ -9,15 +9,12 @@ import secrets
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
-from contextvars import ContextVar
 from pathlib import Path
 
 from tolstat.common.errors import Fault, InputError
 
 MAX_INPUT_BYTES = 64_000_000
 """Largest size of a text file that is read, bytes."""
-_ONLY_BELOW: ContextVar[Path | None] = ContextVar("only_below", default=None)
-"""Folder that input files must be in, if they are named by a file that is not trusted."""
 
 
 def data_dir() -> Path:
@@ -42,21 +39,6 @@ def reason(error: OSError) -> str:
     return own[1] if own else " ".join(str(error).split())
 
 
-@contextmanager
-def only_below(folder: Path) -> Iterator[None]:
-    """Let `read_input` read files in `folder` and in the package's data only: a result file may come from anybody."""
-    token = _ONLY_BELOW.set(folder.resolve())
-    try:
-        yield
-    finally:
-        _ONLY_BELOW.reset(token)
-
-
-def may_quote() -> bool:
-    """Whether messages may quote contents of files that `read_input` has read: not inside `only_below`."""
-    return _ONLY_BELOW.get() is None
-
-
 def read_input(path: Path, encoding: str = "utf-8") -> str:
     """Read a text file that a user names.
 
@@ -64,13 +46,10 @@ def read_input(path: Path, encoding: str = "utf-8") -> str:
     ------
     OSError
         When it is missing, not permitted, not a regular file (a pipe would wait for ever, a device may have no end),
-        larger than `MAX_INPUT_BYTES`, or outside the folder of `only_below`.
+        or larger than `MAX_INPUT_BYTES`.
     UnicodeDecodeError
         When it is not text.
     """
-    allowed = _ONLY_BELOW.get()
-    if allowed is not None and not any(path.resolve().is_relative_to(top) for top in (allowed, data_dir().resolve())):
-        raise PermissionError(errno.EPERM, "a result file may name files in its own folder only", str(path))
     handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
     with open(handle, "rb") as file:
         held = os.fstat(handle)

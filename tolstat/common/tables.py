@@ -304,8 +304,8 @@ RESULT_FIELDS = (
 )
 
 DESIGN_FIELDS = (
-    Field("variant", "1", "index of the joint's variant in the attribute design", "i4"),
-    Field("case", "1", "index of the joint's errors among the cases of the attribute design; 0 has none", "i4"),
+    Field("variant", "1", "index of the joint's variant in `design` of the metadata", "i4"),
+    Field("case", "1", "index of the joint's errors among the cases of the metadata; 0 has none", "i4"),
     Field("group", "1", "joints of one group differ in their case only; the one without errors comes first", "i4"),
 )
 """Variant, case and group of each joint of a study that lists its joints (``sampling.method = "cases"``)."""

@@ -242,16 +242,17 @@ class Reader:
 
         Raises a `StoreError` when a code is unknown to this version.
         """
-        names = tables.RESULT.names if fields is None else fields
+        names = (tables.RESULT.names or ()) if fields is None else fields
         status = self.status(slots)  # first: the values that it declares valid were written before it
-        table = self._table("results", self.columns, tables.RESULT, slots, names or ())
+        others = tuple(c for c in self.columns if c.field != "status")
+        table = self._table("results", others, tables.RESULT, slots, names)
         pending = status == Status.PENDING
-        for field in tables.RESULT_FIELDS:
-            if field.name in (names or ()):
-                table[field.name][pending] = np.nan if np.dtype(field.dtype).kind == "f" else 0
-        for name, codes in (("status", status), ("motion", None)):
-            if name in (names or ()):
-                table[name] = self._codes(table[name], Motion) if codes is None else codes
+        for name in names:
+            table[name][pending] = np.nan if tables.RESULT[name].base.kind == "f" else 0
+        if "status" in names:
+            table["status"] = status
+        if "motion" in names:
+            self._codes(table["motion"], Motion)
         return table
 
     def attempt(self, slots: slice = slice(None)) -> NDArray[np.int32]:

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -29,10 +29,10 @@ from tolstat.store.sample_load import SampleLoad, frozen, largest_of
 from tolstat.store.verification import Verification
 from tolstat.store.what_if import Altered
 from tolstat.store.worst import FirstPass
+from tolstat.study import Study
 from tolstat.study.points import limits_at, names_of
 
-if TYPE_CHECKING:
-    from tolstat.study import Study
+SAMPLE = 'give the file of a study with sampling.method "random", "sobol" or "lhs"'
 
 
 class View:
@@ -88,10 +88,7 @@ class View:
         return table(repr(self)[1:-1], [("study", self.name), *loads])
 
     def at(self, selection: str) -> View:
-        """View of some of the operating points: ``"cruise"``, or the worst of ``"cruise+start"``; of all with ``""``.
-
-        Raises an `InputError` if there is no such point.
-        """
+        """View of one operating point, ``"cruise"``, or the worst of several, ``"cruise+start"``; ``""`` for all."""
         chosen = names_of(selection, self.points, str(self.path))
         if chosen not in self._at:
             parts = [self.parts[self.points.index(name)] for name in chosen]
@@ -325,14 +322,12 @@ class View:
         """Raise a `StoreError` if joints are no sample of a production, or differ in weight without `allow_weights`."""
         check_equal_weights(self.store.sampling, self.path, allow_weights)
         if self.method in ("cases", "sweep"):
-            remedy = 'give the file of a study with sampling.method "random", "sobol" or "lhs"'
-            raise StoreError(str(Fault(str(self.path), "holds joints that are no sample of a production", remedy)))
+            raise StoreError(str(Fault(str(self.path), "holds joints that are no sample of a production", SAMPLE)))
 
     def check_drawn(self) -> None:
         """Raise a StoreError for joints that were not drawn from tolerances."""
         if not self.study.tolerances:
-            remedy = 'give the file of a study with sampling.method "random", "sobol" or "lhs"'
-            raise StoreError(str(Fault(str(self.path), "holds joints that are not drawn from tolerances", remedy)))
+            raise StoreError(str(Fault(str(self.path), "holds joints that are not drawn from tolerances", SAMPLE)))
 
     def rows(self, samples: ArrayLike) -> NDArray[np.intp]:
         """Rows of the campaign of samples."""

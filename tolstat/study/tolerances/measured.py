@@ -14,7 +14,7 @@ from pydantic import Field
 
 from tolstat.analysis.process import LEAST_PARTS
 from tolstat.common import strict, units
-from tolstat.common.files import may_quote, read_input
+from tolstat.common.files import read_input
 from tolstat.common.strict import refuse
 from tolstat.study.tolerances import distributions as tolerance
 from tolstat.study.tolerances.entry import SingleEntry, Site
@@ -117,14 +117,13 @@ def _read(path: Path, column: str) -> list[float]:
             f"{path} cannot be read: {reason}", "give a CSV file; its path starts from the study's folder"
         ) from error
     if column not in columns:
-        remedy = strict.did_you_mean(column, list(columns)) if may_quote() else "give the name of a column"
+        remedy = strict.did_you_mean(column, list(columns))
         raise refuse(f"{path} has no column {column!r}", remedy)
     values = []
     for number, cell in enumerate(cells, start=1):
         value = _number(cell)
         if value is None:
-            shown = repr(cell) if may_quote() else "not a finite number"
-            raise refuse(f"{path}: row {number} of {column!r} is {shown}", "give a finite number in each row")
+            raise refuse(f"{path}: row {number} of {column!r} is {cell!r}", "give a finite number in each row")
         values.append(value)
     if len(values) < 2:
         raise refuse(f"{path} has {len(values)} values in {column!r}", "give at least two measured parts")

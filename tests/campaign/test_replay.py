@@ -211,7 +211,7 @@ def test_the_tail_of_a_subset_simulation_is_told_too(tmp_path: Path) -> None:
     subset = study.subset_of(plan, {"load": "cross1.F", "levels": {"cross1.F": 700.0}, "per_level": 60, "p0": 0.1})
     results, origin = synthetic.results(61), np.zeros(61, SUBSET)
     with Writer.create(tmp_path / "subset.h5", subset, [sampling.draw(plan)], origin=[origin]) as store:
-        store.write(np.arange(61), Simulation(results, None))
+        store.write(np.arange(61), Simulation(results, {}))
     with ResultFile.open(tmp_path / "subset.h5") as store:
         view = store.view()
         assert [joint.row for joint in worst_joints(view, "cross1.F", 1).joints] == [np.argmax(results["F_max"][:, 0])]

@@ -195,8 +195,8 @@ def test_a_slice_keeps_the_rows_of_the_campaign(tmp_path):
     (tmp_path / "plan.toml").write_text(synthetic.STUDY, encoding="utf-8")
     plan, rows, results = study.load(tmp_path / "plan.toml"), range(20, 30), synthetic.results(61)[20:30]
     with Writer.create(tmp_path / "b.h5", plan, [sampling.draw(plan, rows)], rows=rows) as store:
-        store.write(np.arange(10), Simulation(results, None))
-        solve = lambda slots, *_, **__: Simulation(results[slots], None)  # noqa: E731
+        store.write(np.arange(10), Simulation(results, {}))
+        solve = lambda slots, *_, **__: Simulation(results[slots], {})  # noqa: E731
         checked = verify.check_campaign(store, lambda slots: slots, ("newton",), 3, 7, solve)
         verification.write(store, checked)
     with ResultFile.open(tmp_path / "b.h5") as store:

@@ -37,7 +37,7 @@ def made(folder, text, name="known"):
         sigma = 1e-4 / 3
         load = 640.0 + 20.0 * errors["pin1.offset_t"] / sigma + 10.0 * (errors["pin2.offset_z"] / sigma) ** 2
         results["F_max"][:-5, 0] = load[:-5]
-        store.write(np.arange(store.n), Simulation(results, None))
+        store.write(np.arange(store.n), Simulation(results, {}))
     return file
 
 

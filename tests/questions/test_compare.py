@@ -117,7 +117,7 @@ def campaign(folder, name, text=synthetic.STUDY, n=400, factor=1.0):
     with Writer.open(path) as store:
         results = synthetic.results(store.n, failed=1)
         results["F_max"][:-1, 0] = 640.0 + factor * 1e6 * np.abs(store.errors()["pin1.offset_t"][:-1])
-        store.write(np.arange(store.n), Simulation(results, None))
+        store.write(np.arange(store.n), Simulation(results, {}))
     return path
 
 

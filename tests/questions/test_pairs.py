@@ -46,7 +46,7 @@ def path(tmp_path):
     use = combinations(errors, perturb(plan.joint, plan.operation, errors))[MISSED]
     results["F_max"][:, 0] = 640.0 + 800.0 * use + np.random.default_rng(1).normal(0.0, 5.0, plan.rows)
     with Writer.create(tmp_path / "made.h5", plan, [errors]) as store:
-        store.write(np.arange(plan.rows), Simulation(results, None))
+        store.write(np.arange(plan.rows), Simulation(results, {}))
     return tmp_path / "made.h5"
 
 
@@ -105,7 +105,7 @@ def test_of_several_points_the_load_is_that_of_the_worst_and_the_page_names_it(t
     tables["low"]["F_max"][:, 0], tables["high"]["F_max"][:, 0] = 640.0, 640.0 + 800.0 * use
     with Writer.create(tmp_path / "points.h5", plan, [errors]) as store:
         for name, table in tables.items():
-            store.at(name).write(np.arange(plan.rows), Simulation(table, None))
+            store.at(name).write(np.arange(plan.rows), Simulation(table, {}))
     with ResultFile.open(tmp_path / "points.h5") as store:
         found = tolstat.pairs_of(store.view(), "cross1.F")
         at_one = tolstat.pairs_of(store.view(), "cross1.F at high")

@@ -206,7 +206,7 @@ def campaign(folder, text=CORRELATED, name="many"):
     with Writer.open(path) as store:
         results = synthetic.results(store.n)
         results["F_max"][:, 0] = load_of(store.errors())
-        store.write(np.arange(store.n), Simulation(results, None))
+        store.write(np.arange(store.n), Simulation(results, {}))
     return path
 
 

@@ -98,7 +98,7 @@ def test_causes_name_the_components_of_a_zone(tmp_path):
     with Writer.open(path) as store:
         results, errors = synthetic.results(store.n), store.errors()
         results["F_max"][:, 0] = 640.0 + 1e6 * (errors["pin1.offset_t"] - 0.018 * errors["pin1.tilt_z"])
-        store.write(np.arange(store.n), Simulation(results, None))
+        store.write(np.arange(store.n), Simulation(results, {}))
         found = causes_of(store.view(), "cross1.F").table.set_index("error")
     assert len(found) == 25
     # the load follows the inner end along t, and nothing else

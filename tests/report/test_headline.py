@@ -40,7 +40,7 @@ def interfering(folder):
             results[name][1:37] = np.nan
     results["status"][1:37], results["settled"][1:37] = Status.OUTSIDE_MODEL, 0
     with Writer.open(path) as store:
-        store.write(np.arange(62), Simulation(results, None))
+        store.write(np.arange(62), Simulation(results, {}))
     return path
 
 
@@ -54,7 +54,7 @@ def failed_at_one_point(folder):
     plan = load(source)
     with Writer.create(folder / "points.h5", plan, [sampling.draw(plan)]) as store:
         for name, failed in (("cruise", 0), ("start", 40)):
-            store.at(name).write(np.arange(61), Simulation(synthetic.results(61, failed=failed), None))
+            store.at(name).write(np.arange(61), Simulation(synthetic.results(61, failed=failed), {}))
     return folder / "points.h5"
 
 

@@ -145,7 +145,7 @@ def campaign(folder, text=PLAN, name="plan", n=None):
     with Writer.open(path) as store:
         results = synthetic.results(store.n)
         results["F_max"][:, 0] = 700.0 + 100.0 * (3e4 * (store.errors()["pin1.offset_t"]) - 3.0)
-        store.write(np.arange(store.n), Simulation(results, None))
+        store.write(np.arange(store.n), Simulation(results, {}))
     return path
 
 

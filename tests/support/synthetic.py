@@ -117,5 +117,5 @@ def store(folder, text=STUDY, name="small", simulated=None, **kwargs):
     origin = sampling.origin_blocks(plan, range(plan.rows))
     with Writer.create(path, plan, [sampling.draw(plan)], origin=origin) as file:
         if rows.size:
-            file.write(rows, Simulation(table[rows], None))
+            file.write(rows, Simulation(table[rows], {}))
     return path

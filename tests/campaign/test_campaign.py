@@ -33,11 +33,11 @@ from tolstat.store.recorded import differing_keys
 
 
 def datasets(path: Path) -> dict[str, bytes]:
-    """Bytes of every dataset of a result file."""
+    """Bytes of every dataset of a result file but those that say when and how often it was written."""
     found: dict[str, bytes] = {}
 
     def take(name: str, item: object) -> None:
-        if isinstance(item, h5py.Dataset):
+        if isinstance(item, h5py.Dataset) and name not in ("metadata", "session/number"):
             held = item[...]  # names along an axis are Python objects, whose bytes are addresses
             found[name] = b" ".join(held.tolist()) if held.dtype.kind == "O" else held.tobytes()
 

@@ -16,7 +16,7 @@ from tolstat.common.loads import SHOWN_LOADS
 from tolstat.questions.capability import query as capability
 from tolstat.questions.exceedance import query as exceedance
 from tolstat.report import summary
-from tolstat.store import ResultFile
+from tolstat.store import ResultFile, result_file
 
 
 def export(*arguments):
@@ -85,7 +85,7 @@ def test_damage_is_found_before_anything_goes_to_standard_output(tmp_path, monke
         file["errors/pin1.offset_t"][50] += 1e-6
     done = export(path, "--csv", "-")
     assert done.exit_code == 2
-    assert "errors of row 50 do not match" in done.stderr
+    assert "errors/pin1.offset_t of rows 0:61 does not match its checksum" in done.stderr
     assert not done.stdout
 
 

@@ -7,7 +7,7 @@ from typer.testing import CliRunner
 from tests.questions.test_causes import TEXT, made
 from tolstat.cli import app
 from tolstat.common.loads import LOAD_FIELDS
-from tolstat.store import ResultFile, checked_tables, first_pass, view
+from tolstat.store import ResultFile, reader, view, worst
 
 BLOCK = 256
 
@@ -21,19 +21,17 @@ def path(tmp_path_factory):
 def read(monkeypatch):
     """Rows of each whole table that is read."""
     rows = []
-    for module, name in ((checked_tables, "BLOCK"), (first_pass, "AT_ONCE"), (view, "BLOCK")):
+    for module, name in ((reader, "BLOCK"), (worst, "AT_ONCE"), (view, "BLOCK")):
         monkeypatch.setattr(module, name, BLOCK)
 
-    def recording(method):
-        def wrapper(self, part):
-            table = method(self, part)
-            rows.append(len(table))
-            return table
+    own = reader.Reader._table
 
-        return wrapper
+    def recording(*args):
+        table = own(*args)
+        rows.append(len(table))
+        return table
 
-    for name in ("_errors", "_results"):
-        monkeypatch.setattr(ResultFile, name, recording(getattr(ResultFile, name)))
+    monkeypatch.setattr(reader.Reader, "_table", recording)
     return rows
 
 

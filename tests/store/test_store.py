@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import errno
-import json
 import shutil
 import subprocess
 import sys
@@ -25,7 +24,7 @@ from tolstat.common.counts import Counts
 from tolstat.common.errors import StoreError
 from tolstat.common.tables import Motion, Simulation, Status
 from tolstat.store import ResultFile, Writer, provenance
-from tolstat.store.result_file import text
+from tolstat.store.hdf5 import text
 
 
 def simulation(study: fakes.Study, rows: np.ndarray) -> Simulation:
@@ -103,6 +102,7 @@ def test_frame_holds_all_rows_and_columns(tmp_path: Path, study: fakes.Study) ->
     rows = np.arange(5)
     with new_store(tmp_path / "a.h5", study) as store:
         store.write(rows, simulation(study, rows))
+    with ResultFile.open(tmp_path / "a.h5") as store:
         frame, without = store.to_pandas(nominal=True), store.to_pandas()
         results = store.results()
     columns = ERROR_COLUMNS + RESULT_COLUMNS
@@ -132,8 +132,8 @@ def test_counts(tmp_path: Path, study: fakes.Study) -> None:
 
 @pytest.mark.slow
 def test_writing_moves_no_structure_of_the_file(tmp_path: Path) -> None:
-    """Why a kill cannot make the file unreadable: bytes change inside the results' own space only."""
-    study, path = fakes.Study(n=500), tmp_path / "a.h5"
+    """Why a kill cannot make the file unreadable: bytes change inside the space of numbers only."""
+    study, path = fakes.Study(n=500, output=fakes.Output("full")), tmp_path / "a.h5"
     new_store(path, study).close()
     before = np.fromfile(path, np.uint8)
     with Writer.open(path) as store:
@@ -144,7 +144,8 @@ def test_writing_moves_no_structure_of_the_file(tmp_path: Path) -> None:
     assert before.size == after.size
     may_change = np.zeros(before.size, bool)
     with h5py.File(path) as file:
-        for dataset in (*file["results"].values(), *file["ledger"].values()):
+        held = [file[group] for group in ("results", "ledger", "histories", "session")]
+        for dataset in (file["checksums/crc"], *(own for group in held for own in group.values())):
             may_change[dataset.id.get_offset() :][: dataset.id.get_storage_size()] = True
     changed = before != after
     assert changed.any()
@@ -239,8 +240,8 @@ def test_unreadable_files_are_refused(tmp_path: Path, study: fakes.Study) -> Non
     new_store(poor, study).close()
     with h5py.File(poor, "r+") as file:
         del file["results"]
-    with pytest.raises(StoreError, match="is damaged"):
-        ResultFile.open(poor)
+    with ResultFile.open(poor) as store, pytest.raises(StoreError, match="is damaged"):
+        store.counts()
 
 
 @pytest.mark.slow
@@ -261,12 +262,9 @@ def test_create_replaces_nothing(tmp_path: Path, study: fakes.Study) -> None:
     with pytest.raises(StoreError, match="exists already"):
         new_store(path, study)
     assert path.read_text() == "precious"
-    (tmp_path / "b.h5.parts").mkdir()
-    with pytest.raises(StoreError, match=r"b.h5.parts: holds histories of another campaign"):
-        new_store(tmp_path / "b.h5", study)
     with pytest.raises(StoreError, match="cannot be written"):
         new_store(path / "a.h5", study)
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["a.h5", "b.h5.parts"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["a.h5"]
 
 
 def test_create_makes_a_missing_folder(tmp_path: Path, study: fakes.Study) -> None:
@@ -278,7 +276,7 @@ def test_a_failed_create_leaves_nothing(tmp_path: Path, monkeypatch: pytest.Monk
     def interrupt(*args: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("tolstat.store.result_store.fill", interrupt)
+    monkeypatch.setattr("tolstat.store.layout.create", interrupt)
     with pytest.raises(KeyboardInterrupt):
         new_store(tmp_path / "a.h5", fakes.Study())
     assert list(tmp_path.iterdir()) == []
@@ -287,10 +285,10 @@ def test_a_failed_create_leaves_nothing(tmp_path: Path, monkeypatch: pytest.Monk
 @pytest.mark.slow
 def test_a_killed_create_leaves_no_half_file(tmp_path: Path) -> None:
     code = (
-        "import os, signal, pathlib, tolstat.store.result_store\n"
+        "import os, signal, pathlib, tolstat.store.layout\n"
         "from tests.support import fakes\n"
         "from tests.store import test_store\n"
-        "tolstat.store.result_store.fill = lambda *args: os.kill(os.getpid(), signal.SIGKILL)\n"
+        "tolstat.store.layout.create = lambda *args: os.kill(os.getpid(), signal.SIGKILL)\n"
         f"test_store.new_store(pathlib.Path({str(tmp_path / 'a.h5')!r}), fakes.Study())"
     )
     ended = subprocess.run([sys.executable, "-c", code], env=fakes.environment(), check=False)
@@ -338,13 +336,3 @@ DOCUMENTS = [format_tables.FORMAT, format_tables.MODEL, format_tables.SCHEMA]
 def test_tables_of_documents_are_up_to_date(path: Path) -> None:
     held = path.read_text(encoding="utf-8") if path.exists() else ""
     assert held == format_tables.documents()[path], "run: python -m tests.format_tables"
-
-
-def test_document_names_every_attribute(tmp_path: Path, study: fakes.Study) -> None:
-    new_store(tmp_path / "a.h5", study).close()
-    document = format_tables.FORMAT.read_text(encoding="utf-8")
-    with h5py.File(tmp_path / "a.h5") as file:
-        for name in file.attrs:
-            assert f"\n| `{name}` | " in document
-            if f"| `{name}` | JSON |" in document:
-                json.loads(text(file.attrs, name))

@@ -1,6 +1,7 @@
 """Views of campaigns with invented results, without a file."""
 
 from copy import copy
+from pathlib import Path
 
 import numpy as np
 
@@ -20,7 +21,7 @@ class FakeStore(Reader):
     """What a view reads of a result file, in memory; slot 0 is the nominal joint. `results` may be tables by point."""
 
     def __init__(self, method, limits, errors, results, study_text="", columns=RESULT_COLUMNS, joint=None):
-        self.path, self.study_name, self.study_text = "made_up.h5", "made up", study_text
+        self.path, self.study_name, self.study_text = Path("made_up.h5"), "made up", study_text
         self.sampling, self.limits, self.columns = {"method": method, "nominal_first": True}, limits, columns
         self.variants, self.joint, self.identity = (), joint, {}
         self.options = Options()._asdict()

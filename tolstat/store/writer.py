@@ -214,10 +214,10 @@ class Writer(Reader):
         def mark(file: h5py.File) -> None:
             file["session"]["number"][()] = self._checked.number | 1  # its checksums no longer hold
             for point, slots in rows.items():
-                place = layout.path_of(point, "{}", "")
                 number, pending = len(held.retries), np.full(slots.size, Status.PENDING, np.uint8)
-                put(file[place.format("ledger")], slots, {"attempt": np.full(slots.size, number, np.int32)})
-                put(file[place.format("results")], slots, {"status": pending})
+                attempt = {"attempt": np.full(slots.size, number, np.int32)}
+                put(file[layout.path_of(point, "ledger", "")], slots, attempt)
+                put(file[layout.path_of(point, "results", "")], slots, {"status": pending})
 
         for slots in rows.values():
             self._written[slots // ROWS] = True

@@ -352,6 +352,8 @@ def write_new(
     StoreError
         When the file exists and must not be replaced, or cannot be written.
     """
+    if not overwrite:
+        check_free(path, exists)
     try:
         make_parent(path)
         check_disk_space(path, layout.size_of(held))
@@ -367,3 +369,15 @@ def write_new(
     except OSError as error:
         remedy = "check that the folder is writable and the disk has space"
         raise store_error(path, f"cannot be written: {reason(error)}", remedy) from error
+
+
+def check_free(path: Path, remedy: str) -> None:
+    """Refuse a path of an existing file before anything is done that takes long.
+
+    Raises
+    ------
+    StoreError
+        When there is a file.
+    """
+    if path.exists():
+        raise store_error(path, "exists already", remedy)

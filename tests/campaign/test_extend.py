@@ -17,7 +17,7 @@ import pytest
 from typer.testing import CliRunner
 
 from tests.campaign.test_campaign import datasets
-from tests.support import fakes, synthetic
+from tests.support import damage, fakes, synthetic
 from tolstat import cli, joint, sampling
 from tolstat import study as studies
 from tolstat.campaign import extend
@@ -25,7 +25,7 @@ from tolstat.campaign import run as campaign
 from tolstat.common import files, tables
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.tables import Options, Simulation, Status
-from tolstat.store import ResultFile, Writer, provenance
+from tolstat.store import ResultFile, Writer, metadata, provenance
 from tolstat.study import Study
 
 KINDS = ("none", "full")
@@ -81,9 +81,8 @@ def test_an_extended_campaign_is_one_of_that_size(tmp_path: Path, make: Make, me
     assert datasets(grown) == datasets(whole)
     assert ("histories/loads" in before) == (kind == "full")
     with h5py.File(grown) as a, h5py.File(whole) as b:
-        for name in set(b.attrs) - {"study", "created", "digest"}:
-            assert a.attrs[name] == b.attrs[name], name
-    assert not list(tmp_path.glob("*.parts"))
+        held, expected = (metadata.read(file).model_dump(exclude={"study", "created"}) for file in (a, b))
+        assert held == expected
 
 
 @pytest.mark.slow
@@ -156,9 +155,8 @@ def test_merged_slices_are_one_run(tmp_path: Path, make: Make, method: str, kind
     assert datasets(tmp_path / "c.h5") == datasets(whole)
     assert (merged.counts.done, merged.twice) == (61, 0)
     with h5py.File(tmp_path / "c.h5") as a, h5py.File(whole) as b:
-        assert {k: v for k, v in a.attrs.items() if k not in ("created", "digest")} == {
-            k: v for k, v in b.attrs.items() if k not in ("created", "digest")
-        }
+        held, expected = (metadata.read(file).model_dump(exclude={"created"}) for file in (a, b))
+        assert held == expected
     assert run(study, tmp_path / "c.h5").read_bytes() == (tmp_path / "c.h5").read_bytes()
 
 
@@ -197,9 +195,60 @@ def test_gaps_and_strangers_are_told_together(tmp_path: Path, make: Make) -> Non
 def test_pending_rows_stay_pending_and_can_be_done_later(tmp_path: Path, make: Make) -> None:
     study = make(60)
     parts = slices(study, tmp_path, 0, 30, 61)
-    with h5py.File(parts[1], "r+") as file:
+    with damage.rewritten(parts[1]) as file:
         file["results/status"][3:9] = Status.PENDING
     assert extend.merge(parts, tmp_path / "c.h5").counts.done == 55
+    run(study, tmp_path / "c.h5")
+    assert datasets(tmp_path / "c.h5") == datasets(run(study, tmp_path / "whole.h5"))
+
+
+def killed(path: Path) -> None:
+    """Leave a file as a run does that is killed: some values without their status, results without checksums."""
+    with h5py.File(path, "r+") as file:
+        file["results/status"][12:15] = Status.PENDING
+        file["session/number"][()] += 1
+
+
+def test_a_campaign_with_pending_joints_grows(tmp_path: Path, make: Make) -> None:
+    grown = run(make(40, kind="full"), tmp_path / "grown.h5", until_row=30)
+    killed(grown)
+    study = extend.extend(grown, 60)
+    with ResultFile.open(grown) as store:
+        assert store.pending().tolist() == [12, 13, 14, *range(30, 61)]
+        assert np.isnan(store.histories("loads", np.array([12, 60]))).all()
+        assert store.check() == (True, {})
+    run(study, grown)
+    assert datasets(grown) == datasets(run(make(60, kind="full"), tmp_path / "whole.h5"))
+
+
+def test_slices_with_pending_joints_are_merged(tmp_path: Path, make: Make) -> None:
+    """A row that one file has and another has not is that of the first."""
+    study = make(60, kind="full")
+    parts = [*slices(study, tmp_path, 0, 40), run(study, tmp_path / "b.h5", rows=range(20, 61), until_row=50)]
+    killed(parts[0])
+    killed(parts[1])
+    merged = extend.merge(parts, tmp_path / "c.h5")
+    assert merged.counts.done == 61 - 3 - 11
+    with ResultFile.open(tmp_path / "c.h5") as store:
+        assert store.pending().tolist() == [12, 13, 14, *range(50, 61)]
+        assert store.check() == (True, {})
+    run(study, tmp_path / "c.h5")
+    assert datasets(tmp_path / "c.h5") == datasets(run(study, tmp_path / "whole.h5"))
+
+
+def test_slices_with_damaged_joints_are_merged_without_them(
+    tmp_path: Path, make: Make, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    damage.small_blocks(monkeypatch, 8)
+    study = make(40)
+    parts = slices(study, tmp_path, 0, 20, 41)
+    damage.flip_in(parts[1], "results/psi_max", 9)
+    assert extend.merge(parts, tmp_path / "c.h5").counts.done == 41 - 8
+    assert "the results of rows 28:36 are damaged and are left out" in caplog.text
+    damage.flip_in(parts[0], "errors/pin1.offset_t", 3)
+    with pytest.raises(StoreError, match=r"0-20\.h5: is damaged: errors/pin1\.offset_t of rows 0:8"):
+        extend.merge(parts, tmp_path / "d.h5")
+    assert not (tmp_path / "d.h5").exists()
     run(study, tmp_path / "c.h5")
     assert datasets(tmp_path / "c.h5") == datasets(run(study, tmp_path / "whole.h5"))
 

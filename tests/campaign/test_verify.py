@@ -6,13 +6,12 @@ import json
 import math
 from types import SimpleNamespace
 
-import h5py
 import numpy as np
 import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
-from tests.support import fakes, synthetic
+from tests.support import damage, fakes, synthetic
 from tolstat import cli, joint, sampling, study
 from tolstat.analysis import accuracy
 from tolstat.campaign import checks, verify
@@ -142,7 +141,7 @@ def test_the_seed_chooses_the_joints():
 
 def test_all_joints_are_those_that_settled_and_the_one_without_errors(tmp_path):
     campaign.run(study.load(written(tmp_path), n=4), tmp_path / "a.h5", workers=1, check=False)
-    with h5py.File(tmp_path / "a.h5", "r+") as file:
+    with damage.rewritten(tmp_path / "a.h5") as file:
         file["results/status"][2] = Status.NOT_SETTLED
     assert verify.check_file(tmp_path / "a.h5", "all", names=("newton",)).rows.tolist() == [0, 1, 3, 4]
     assert verify.check_file(tmp_path / "a.h5", 9, names=("newton",)).rows.tolist() == [1, 3, 4]

@@ -18,7 +18,7 @@ from tests.support import corruption, synthetic
 from tests.support.environment import environment
 from tolstat.cli import _talk
 from tolstat.display import text
-from tolstat.store import integrity, result_file
+from tolstat.store import metadata
 
 FORMULAS = ('=HYPERLINK("http://x")', "+1", "-1+1", "@SUM(1)", "\t=1", "\r=1")
 
@@ -63,8 +63,7 @@ def test_standard_error_moves_no_cursor(capsys: pytest.CaptureFixture[str]) -> N
 def test_a_terminal_gets_no_control_characters_and_a_pipe_what_is_there(tmp_path: Path) -> None:
     path = synthetic.store(tmp_path, simulated=0)
     with h5py.File(path, "r+") as file:
-        result_file.put_attributes(file, {"study_name": "a\x1b]0;title\x07b"})
-        integrity.seal(file)
+        metadata.write(file, metadata.read(file).changed(study_name="a\x1b]0;title\x07b"))
     command = [sys.executable, "-m", "tolstat", "status", str(path)]
     own, terminal = pty.openpty()
     subprocess.run(command, stdout=terminal, stderr=subprocess.DEVNULL, env=environment(), check=True)
@@ -76,29 +75,35 @@ def test_a_terminal_gets_no_control_characters_and_a_pipe_what_is_there(tmp_path
 
 
 @pytest.mark.slow
-def test_corrupted_files_end_in_data_or_one_message(tmp_path: Path) -> None:
-    """A share of ``python -m tests.measure.corruption``: no traceback, signal, hang or silent difference."""
+def test_a_changed_bit_changes_nothing_without_a_word(tmp_path: Path) -> None:
+    """A share of ``python -m tests.measure.corruption``."""
     path = synthetic.store(tmp_path)
-    commands = (("status", "FILE", "--json"), ("export", "FILE", "--csv", "-", "--quiet"))
-    corruption.warm(path, tmp_path, commands)
-    for k, words in enumerate(commands):
-        found, kinds = corruption.search(path, tmp_path / "x", range(k, 24, 2), [words])
-        assert not found
-        assert kinds["refused"] > 2
+    corruption.warm(path, tmp_path / "warm")
+    found, kinds = corruption.search(path, tmp_path / "x", range(60))
+    assert not found
+    assert min(kinds[kind] for kind in ("same", "refused", "told")) > 2
 
 
-def test_a_search_for_faults_finds_them(tmp_path: Path) -> None:
-    path = synthetic.store(tmp_path)
-    usual = corruption.call(["status", path, "--json"], tmp_path)
+@pytest.mark.slow
+def test_a_changed_bit_of_an_unfinished_file_ends_in_data_or_one_message(tmp_path: Path) -> None:
+    path = synthetic.store(tmp_path, simulated=30)
+    with h5py.File(path, "r+") as file:
+        file["session/number"][()] = 3  # as a run leaves it that is killed
+    corruption.warm(path, tmp_path / "warm")
+    found, kinds = corruption.search(path, tmp_path / "x", range(20))
+    assert {one.fault for one in found} <= {corruption.SILENT}
+    assert kinds["same"] > 2
+
+
+def test_a_search_for_faults_finds_them() -> None:
+    usual = corruption.Ended(0, "joints: 60", "")
     assert not corruption.fault(usual, usual)
     for wrong, said in (
-        (usual._replace(out="{}"), "silent difference"),
-        (usual._replace(code=-11), "signal 11 after"),
+        (usual._replace(out="joints: 59"), corruption.SILENT),
+        (usual._replace(code=-11), "signal 11"),
         (usual._replace(code=1, err="Traceback (most recent call last)"), "exit code 1"),
         (usual._replace(code=2, err="oh"), "no message"),
-        (usual._replace(code=corruption.LEFT_BEHIND), "exit code 97"),
-        (usual._replace(memory=1 << 31), "2048 MiB"),
     ):
-        assert corruption.fault(wrong, usual).startswith(said)
-    assert not corruption.fault(usual._replace(out="{}", err="the results of 1 joint are damaged"), usual)
-    assert corruption.fault(usual._replace(out='{"pending": 0}'), usual) == "silent difference"
+        assert corruption.fault(wrong, usual) == said
+    assert not corruption.fault(usual._replace(out="", err="the results of rows 0:61 are damaged"), usual)
+    assert not corruption.fault(usual._replace(code=2, err="error: a.h5: is damaged\n  hint: run it again"), usual)

@@ -1,69 +1,79 @@
-"""Corrupted result files through the commands: each must end with correct data, or with exit code 2 and one message.
+"""Result files with a changed bit through the commands that read them: each gives the right data, or names the damage.
 
-``python -m tests.measure.corruption FILE 1000 [FIRST [COMMAND ...]]`` corrupts a copy of FILE, a result file of 220
-joints, in 1000 ways, the first of them number FIRST (0), passes each to every command below, or to those named, and
-prints every traceback, signal, hang and silent difference. What a command writes is compared, too. FILE may have
-several operating points, and load histories or cycles: these pass through two commands more. Beside FILE of an
-unfinished campaign lie its histories, and its study, of the same name: ``run`` goes on with it, while ``extend`` and
-``merge`` would refuse it.
+``python -m tests.measure.corruption FOLDER 300 100`` makes a campaign of 220 joints at two operating points, with
+histories, checks and what-if runs, once finished and once killed half way; changes one random bit of the first in 300
+ways and of the second in 100; passes each to ``status --check``, ``report`` and ``export --statistics -``, and prints
+how many commands ended how, and every fault: a traceback, a signal, and in the finished file a silent difference.
 """
 
 from __future__ import annotations
 
+import os
+import signal
 import sys
-import tempfile
 from pathlib import Path
 
-import h5py
-from tolstat.store.histories import parts_folder
+import tolstat
+from tests.support import corruption, synthetic
+from tolstat import study
+from tolstat.common.counts import Counts
 
-from tests.support import corruption
-
-READING = (
-    ("status", "FILE", "--json"),
-    ("export", "FILE", "--csv", "-", "--quiet", "POINT"),
-    ("export", "FILE", "--statistics", "-", "--quiet"),
-    ("report", "FILE", "--out", "page.html", "--quiet"),
-    ("causes", "FILE", "--by", "cross1.F", "--json"),
-    ("verify", "FILE", "--near", "cross1.F > 1500 N", "--joints", "50", "--json", "--workers", "1"),
-    ("replay", "FILE", "--row", "1", "--json", "POINT"),
-)
-WRITING = (
-    ("extend", "FILE", "--n", "230", "--workers", "1", "--no-report"),
-    ("merge", "FILE", "--out", "whole.h5"),
-)
-OF_HISTORIES = (
-    ("export", "FILE", "--pylife", "-", "--quiet", "POINT"),
-    ("fatigue", "FILE", "--by", "cross1.F_t", "--json"),
-)
-"""Commands that read load histories or cycles."""
-GO_ON = ("run", "STUDY", "--out", "FILE", "--workers", "1", "--no-report", "--no-verify")
+POINTS = """
+[[operation]]
+name = "cruise"
+alpha = "10 deg"
+speed = "500 rpm"
+torque = "100 N*m"
+[[operation]]
+name = "start"
+alpha = "15 deg"
+speed = "100 rpm"
+torque = "200 N*m"
+"""
+OUTPUT = '[output]\nhistories = "harmonics+cycles"\nharmonics = 4\n\n[limits]'
+_HEAD, _, _REST = synthetic.REAL.partition("[operation]")
+TEXT = _HEAD + POINTS + _REST[_REST.index("[tolerances]") :].replace("n = 60", "n = 220").replace("[limits]", OUTPUT)
 
 
-def _commands(path: Path) -> list[tuple[str, ...]]:
-    """Commands for a file; a command that is about one operating point gets the first."""
-    with h5py.File(path) as file:
-        points = list(file.get("points", ()))
-        unfinished = parts_folder(path).exists()
-        histories = unfinished or "histories" in (file[f"points/{points[0]}"] if points else file)
-    point = ("--point", points[0]) if points else ()
-    go_on = tuple(str(path.with_suffix(".toml").resolve()) if word == "STUDY" else word for word in GO_ON)
-    changing = (go_on,) if unfinished else WRITING
-    commands = READING + OF_HISTORIES * histories + changing
-    return [tuple(word for given in words for word in (point if given == "POINT" else (given,))) for words in commands]
+def finished(folder: Path) -> Path:
+    """Make the file of a whole campaign, with checks and joints of other tolerances."""
+    path = folder / "finished.h5"
+    (folder / "s.toml").write_text(TEXT, encoding="utf-8")
+    tolstat.run(study.load(folder / "s.toml"), path)
+    for words in (["causes", path, "--by", "cross1.F", "--run"], ["verify", path, "--near", "cross1.F > 700 N"]):
+        ended = corruption.call(words, folder)
+        assert ended.code == 0, ended.err
+    return path
 
 
-def main(path: Path, count: int, first: int = 0, *names: str) -> None:
-    """Corrupt a file `count` times; print the faults and how many commands ended how."""
-    commands = [words for words in _commands(path) if not names or words[0] in names]
-    with tempfile.TemporaryDirectory() as folder:
-        corruption.warm(path, Path(folder), commands)
-        for words in commands:
-            found, kinds = corruption.search(path, Path(folder) / "x", range(first, first + count), [words])
-            print(" ".join(words), kinds, f"faults {len(found)}", flush=True)
-            for one in found:
-                print(f"  {one.fault}: {one.corruption}\n{one.ended.err[-1500:]}", flush=True)
+def killed(folder: Path) -> Path:
+    """Make the file of a campaign that was killed when half of its joints were done."""
+    path = folder / "killed.h5"
+
+    def kill(counts: Counts) -> None:
+        if counts.done >= counts.total // 2:
+            os.kill(os.getpid(), signal.SIGKILL)
+
+    pid = os.fork()
+    if pid == 0:
+        tolstat.run(study.load(folder / "s.toml"), path, block=16, progress=kill)
+    os.waitpid(pid, 0)
+    return path
+
+
+def main(folder: Path, of_finished: int, of_killed: int) -> None:
+    """Make both files, change each and print what came of it."""
+    folder.mkdir(exist_ok=True)
+    for make, count in ((finished, of_finished), (killed, of_killed)):
+        path = make(folder)
+        corruption.warm(path, folder / "warm")
+        found, kinds = corruption.search(path, folder / "x", range(count))
+        print(f"{path.name}, {path.stat().st_size} bytes, {count} changes:", kinds, flush=True)
+        for one in found:
+            if path.name != "killed.h5" or one.fault != corruption.SILENT:
+                print(f"  {one.fault}: {one.change}: {one.words}\n{one.ended.err[-1500:]}", flush=True)
+        print("  silent differences:", sum(one.fault == corruption.SILENT for one in found), flush=True)
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), int(sys.argv[2]), *map(int, sys.argv[3:4]), *sys.argv[4:])
+    main(Path(sys.argv[1]), *map(int, sys.argv[2:4]))

@@ -17,11 +17,12 @@ from tolstat.common.draw_records import columns
 from tolstat.common.errors import Fault, InputError
 from tolstat.sampling import draw_blocks, origin_blocks
 from tolstat.store import Reader, Writer, what_if
-from tolstat.store.assembly import DifferingResults, assemble
+from tolstat.store.assembly import OTHER_FILE, DifferingResults, assemble
 from tolstat.store.hdf5 import BLOCK
 from tolstat.store.provenance import differing_code
 from tolstat.store.recorded import differing_keys, recall
 from tolstat.store.what_if import Altered
+from tolstat.store.writer import check_free
 
 if TYPE_CHECKING:
     from tolstat.study import Study
@@ -156,6 +157,7 @@ def merge(paths: Sequence[Path], out: Path) -> Merged:
     StoreError
         When a file cannot be used, or `out` cannot be created.
     """
+    check_free(out, OTHER_FILE)
     with ExitStack() as opened:
         stores = [opened.enter_context(Reader.open(path)) for path in paths]
         stores.sort(key=lambda store: (store.rows[0], store.rows.stop))

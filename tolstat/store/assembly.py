@@ -17,6 +17,8 @@ from tolstat.store.metadata import Metadata
 from tolstat.store.reader import Reader
 from tolstat.store.writer import write_new
 
+OTHER_FILE = "give another file: --out OTHER.h5"
+"""Remedy where a file exists already."""
 COPY_BYTES = 1 << 25
 """Approximate number of bytes of a column that are copied at a time."""
 
@@ -73,7 +75,7 @@ def assemble(
         for source in (one for whole in sources for one in whole.each()):
             _copy(file, source)
 
-    write_new(path, metadata, "give another file: --out OTHER.h5", errors, design, origin, copy_all, overwrite)
+    write_new(path, metadata, OTHER_FILE, errors, design, origin, copy_all, overwrite)
 
 
 def _copy(file: h5py.File, source: Reader) -> None:

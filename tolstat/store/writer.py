@@ -214,10 +214,10 @@ class Writer(Reader):
         def mark(file: h5py.File) -> None:
             file["session"]["number"][()] = self._checked.number | 1  # its checksums no longer hold
             for point, slots in rows.items():
-                place = layout.path_of(point, "{}", "")
                 number, pending = len(held.retries), np.full(slots.size, Status.PENDING, np.uint8)
-                put(file[place.format("ledger")], slots, {"attempt": np.full(slots.size, number, np.int32)})
-                put(file[place.format("results")], slots, {"status": pending})
+                attempt = {"attempt": np.full(slots.size, number, np.int32)}
+                put(file[layout.path_of(point, "ledger", "")], slots, attempt)
+                put(file[layout.path_of(point, "results", "")], slots, {"status": pending})
 
         for slots in rows.values():
             self._written[slots // ROWS] = True
@@ -352,6 +352,8 @@ def write_new(
     StoreError
         When the file exists and must not be replaced, or cannot be written.
     """
+    if not overwrite:
+        check_free(path, exists)
     try:
         make_parent(path)
         check_disk_space(path, layout.size_of(held))
@@ -367,3 +369,15 @@ def write_new(
     except OSError as error:
         remedy = "check that the folder is writable and the disk has space"
         raise store_error(path, f"cannot be written: {reason(error)}", remedy) from error
+
+
+def check_free(path: Path, remedy: str) -> None:
+    """Refuse a path of an existing file before anything is done that takes long.
+
+    Raises
+    ------
+    StoreError
+        When there is a file.
+    """
+    if path.exists():
+        raise store_error(path, "exists already", remedy)

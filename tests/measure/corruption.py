@@ -1,9 +1,10 @@
 """Result files with a changed bit through the commands that read them: each gives the right data, or names the damage.
 
-``python -m tests.measure.corruption FOLDER 300 100`` makes a campaign of 220 joints at two operating points, with
+``python -m tests.measure.corruption FOLDER 300 100 [page]`` makes a campaign of 220 joints at two operating points, with
 histories, checks and what-if runs, once finished and once killed half way; changes one random bit of the first in 300
 ways and of the second in 100; passes each to ``status --check``, ``report`` and ``export --statistics -``, and prints
 how many commands ended how, and every fault: a traceback, a signal, and in the finished file a silent difference.
+With ``page``, the page of the report is what is made of each file.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from __future__ import annotations
 import os
 import signal
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import tolstat
@@ -61,13 +63,13 @@ def killed(folder: Path) -> Path:
     return path
 
 
-def main(folder: Path, of_finished: int, of_killed: int) -> None:
+def main(folder: Path, of_finished: int, of_killed: int, commands: Sequence[Sequence[str]]) -> None:
     """Make both files, change each and print what came of it."""
     folder.mkdir(exist_ok=True)
     for make, count in ((finished, of_finished), (killed, of_killed)):
         path = make(folder)
-        corruption.warm(path, folder / "warm")
-        found, kinds = corruption.search(path, folder / "x", range(count))
+        corruption.warm(path, folder / "warm", commands)
+        found, kinds = corruption.search(path, folder / "x", range(count), commands)
         print(f"{path.name}, {path.stat().st_size} bytes, {count} changes:", kinds, flush=True)
         for one in found:
             if path.name != "killed.h5" or one.fault != corruption.SILENT:
@@ -76,4 +78,4 @@ def main(folder: Path, of_finished: int, of_killed: int) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), *map(int, sys.argv[2:4]))
+    main(Path(sys.argv[1]), *map(int, sys.argv[2:4]), [corruption.PAGE] if sys.argv[4:] else corruption.READING)

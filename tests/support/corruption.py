@@ -22,10 +22,12 @@ from tolstat import cli
 
 READING = (
     ("status", "FILE", "--check"),
-    ("report", "FILE", "--out", "page.html"),
+    ("report", "FILE"),
     ("export", "FILE", "--statistics", "-"),
 )
 """Commands that a changed file is passed to; ``FILE`` stands for it."""
+PAGE = ("report", "FILE", "--out", "page.html")
+"""A command that reads nearly all of a file, and takes longer."""
 LIMIT_S = 60
 """Processor seconds of a command."""
 LIMIT_BYTES = 2 << 30
@@ -86,10 +88,10 @@ def _be_command(words: list[str], out: Path, err: Path, folder: Path) -> None:
 
 def read(words: Sequence[str], path: Path) -> Ended:
     """Pass a file to a command in the file's folder; a page that the command writes is part of its output."""
-    ended = call([path.name if word == "FILE" else word for word in words], path.parent)
     page = path.parent / "page.html"
-    whole = ended.out + (page.read_text(encoding="utf-8") if page.exists() else "")
     page.unlink(missing_ok=True)
+    ended = call([path.name if word == "FILE" else word for word in words], path.parent)
+    whole = ended.out + (page.read_text(encoding="utf-8") if page.exists() else "")
     return ended._replace(out=re.sub(r'.*"wall_s".*\n', "", whole))  # the one number that is another in each run
 
 

@@ -165,7 +165,7 @@ def test_errors_are_relative_to_the_largest_of_the_kind():
 
 def test_a_run_checks_a_few_joints_and_a_file_gives_them_back(tmp_path):
     path = tmp_path / "a.h5"
-    campaign.run(fakes.Study(n=900), path, 1, stages=fakes.stages())
+    fakes.run(fakes.Study(n=900), path, check=True)
     with Reader.open(path) as store:
         found = verification.read(store)
         assert found is not None
@@ -186,7 +186,7 @@ def test_a_run_checks_a_few_joints_and_a_file_gives_them_back(tmp_path):
 
 
 def test_a_run_can_do_without(tmp_path):
-    campaign.run(fakes.Study(), tmp_path / "a.h5", 1, stages=fakes.stages(), check=False)
+    fakes.run(fakes.Study(), tmp_path / "a.h5")
     with Reader.open(tmp_path / "a.h5") as store:
         assert verification.read(store) is None
 

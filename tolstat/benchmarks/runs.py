@@ -17,7 +17,7 @@ import numpy as np
 from tolstat.benchmarks.integrators import Integrator, Outcome, solve
 from tolstat.benchmarks.joints import Params
 from tolstat.benchmarks.timing import in_turn
-from tolstat.campaign.executors import Lost, Work, map_in_processes
+from tolstat.campaign.pool import Lost, Work, map_blocks
 from tolstat.common import loads
 from tolstat.common.cores import available_cores
 from tolstat.common.tables import SIMULATED, Options, Status
@@ -174,7 +174,7 @@ def run(jobs: Sequence[Job], say: Callable[[str], None]) -> list[Run]:
     prepare(first_order(truth.params, truth.options, from_start=True))
     places = {job.contender: place for place, job in enumerate(jobs)}
     runs: list[Run] = []
-    with closing(map_in_processes(Work(_work), jobs, available_cores())) as finished:
+    with closing(map_blocks(Work(_work), jobs, available_cores())) as finished:
         for done, (job, found) in enumerate(finished, 1):
             if isinstance(found, Lost):
                 say(f"{job.contender} on joint {job.joint}: {found.reason}")

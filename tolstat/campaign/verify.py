@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from tolstat.campaign.blocks import simulate_beside
 from tolstat.campaign.checks import (
     ALL_CHECKS,
     QUICK_CHECKS,
     Progress,
     Simulate,
     no_progress,
-    plain,
     run_checks,
-    solve_by_options,
+    simulate_each,
 )
 from tolstat.common import selected_results
 from tolstat.common.errors import Fault, InputError, StoreError, gather
@@ -48,7 +48,7 @@ def check_campaign(
     names: Iterable[str],
     joints: int | None,
     seed: int,
-    simulate: Simulate | None = None,
+    simulate: Simulate = simulate_beside,
     workers: int = 1,
     progress: Progress = no_progress,
 ) -> Verification | None:
@@ -87,7 +87,7 @@ def check_slots(
     slots: NDArray[np.intp],
     names: Iterable[str],
     seed: int = 0,
-    simulate: Simulate | None = None,
+    simulate: Simulate = simulate_beside,
     workers: int = 1,
     progress: Progress = no_progress,
 ) -> Verification:
@@ -196,7 +196,7 @@ def check_file(
         on_start()
         for one in store.each():
             params = partial(recorded.parameters, one)
-            if found := check_campaign(one, params, names, number, seed, None, workers, progress):
+            if found := check_campaign(one, params, names, number, seed, workers=workers, progress=progress):
                 verification.write(one, found)
         checked = worst.checks([one for one in map(verification.read, store.each()) if one is not None])
         assert checked is not None
@@ -244,8 +244,8 @@ def _check_at(
     rows = choose(np.arange(first, plan.rows), number, seed)
     params = recorded.perturbed(plan, rows, draw(plan)[rows], perturb)
     options = [plan.solvers[number].options() for number in recorded.variants(plan, rows).tolist()]
-    base = solve_by_options(partial(plain, None), params, options)
-    checks = run_checks(params, options, names, None, workers, progress)
+    base = simulate_each(params, options)
+    checks = run_checks(params, options, names, workers=workers, progress=progress)
     for results in (base, *(check.results for check in checks.values())):
         selected_results.blank_others(results, plan.output.columns)
     return Verification(seed, rows, base, checks)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.benchmarks.cost.rates import Sample
-from tolstat.campaign.executors import Lost, Work, map_in_processes
+from tolstat.campaign.pool import Lost, Work, map_blocks
 from tolstat.common.cores import available_cores
 from tolstat.common.tables import Options
 from tolstat.solver import compilation, simulation
@@ -134,7 +134,7 @@ def _run(blocks: Sequence[NDArray[np.void]], options: Options, workers: int) -> 
         partial(_simulate, options), prepare=partial(compilation.warm_up, options)
     )
     stints = []
-    with closing(map_in_processes(work, blocks, workers)) as results:
+    with closing(map_blocks(work, blocks, workers)) as results:
         for _, stint in results:
             if not isinstance(stint, Lost):
                 stints.append(stint)

@@ -16,7 +16,7 @@ from tolstat.benchmarks.coverage import causes, lots, pairs, parts, rare, shares
 from tolstat.benchmarks.coverage.laws import laws
 from tolstat.benchmarks.coverage.statistics import CONTROL, STATISTICS
 from tolstat.benchmarks.coverage.trial import Asked, Experiment, FloatArray, Found, Row
-from tolstat.campaign.executors.processes import one_thread_each
+from tolstat.common.cores import one_thread_each
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.strict import did_you_mean
 

@@ -1,9 +1,7 @@
-"""Executor on a Dask cluster; blocks that its workers do not survive are repeated in supervised processes here.
+"""Blocks through a Dask cluster; those that end with their workers, or raise, are repeated in the pool on this machine.
 
-The scheduler reassigns the blocks of a lost worker. A worker that hangs is killed by its `guard`. A block that kills
-several workers, or raises, is not submitted again: at the end its pieces are processed on this machine, which shows
-which of them crash or hang. If blocks fail before any has succeeded, a worker must get ready without one: if it does,
-the fault is in the blocks.
+The scheduler gives the blocks of a lost worker to others. A block that has cost four workers is not tried on the
+cluster again.
 """
 
 from __future__ import annotations
@@ -17,18 +15,20 @@ from contextlib import contextmanager
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
-from tolstat.campaign.executors.common import (
+from tolstat.campaign.pool import (
+    MAX_FAILURES,
     POLL_S,
     BlockT,
     Lost,
     ResultT,
     Work,
     WorkerDied,
+    map_blocks,
     never_stop,
+    signals_blocked,
+    too_many_failures,
 )
-from tolstat.campaign.executors.guard import Guard
-from tolstat.campaign.executors.processes import map_in_processes, one_thread_each, signals_blocked
-from tolstat.common.cores import available_cores
+from tolstat.common.cores import available_cores, one_thread_each
 from tolstat.common.errors import Fault, InputError
 
 if TYPE_CHECKING:
@@ -40,10 +40,6 @@ CONNECT_S = 15.0
 """Time limit for connecting to a scheduler, s."""
 FETCH_S = 60.0
 """Time limit for fetching a result, s."""
-MAX_FAILURES = 3
-"""Number of failed blocks, before any has succeeded, at which a worker must show that it can get ready."""
-READINESS = "readiness"
-"""Takes the place of a block when a worker only has to get ready."""
 LOOPBACK = "127.0.0.1"
 """Address of a cluster on this machine: Dask runs what it is sent, so nothing listens to other machines."""
 
@@ -83,78 +79,54 @@ def map_on_cluster(
     Yields
     ------
     tuple
-        As `map_in_processes`.
+        As `pool.map_blocks`.
 
     Raises
     ------
     InputError
         When Dask is not installed, the scheduler does not answer, or a worker's fingerprint differs.
     WorkerDied
-        When the scheduler is lost or has no workers, or its workers cannot get ready; otherwise as `map_in_processes`.
+        When the scheduler is lost or has no workers; otherwise as `pool.map_blocks`.
     """
+    failed: list[BlockT] = []
     with _client(scheduler, workers) as client:
         _check_fingerprints(client, fingerprint)
-        cluster = _Cluster(client, work, iter(blocks), fingerprint)
-        yield from cluster.run(stop)
-    pieces = [piece for block in cluster.suspects for piece in work.split(block)]
-    if pieces:
-        yield from map_in_processes(work, pieces, min(len(pieces), available_cores()), stop)
+        yield from _submitted(client, work, iter(blocks), fingerprint, failed, stop)
+    if failed and not stop():
+        yield from map_blocks(work, failed, min(len(failed), available_cores()), stop)
 
 
-class _Cluster:
-    """Blocks in work on a cluster, at most twice as many as it has threads."""
-
-    def __init__(self, client: Client, work: Work[Any, Any], blocks: Iterator[Any], fingerprint: Fingerprint) -> None:
-        self.client = client
-        self.work = work
-        self.blocks = blocks
-        self.fingerprint = fingerprint
-        self.expected = dict(fingerprint())
-        self.running: dict[Future, Any] = {}
-        self.ended: queue.SimpleQueue[Future] = queue.SimpleQueue()
-        self.suspects: list[Any] = []
-        self.proven = self.asked = False
-
-    def run(self, stop: Callable[[], bool]) -> Iterator[tuple[Any, Any]]:
-        more = True
-        while more or self.running:
-            if stop():
-                self.suspects.clear()
-                more = False
-            more = more and self._hand_out()
-            try:
-                future = self.ended.get(timeout=POLL_S)
-            except queue.Empty:
-                if self.client.status != "running":
-                    raise WorkerDied(
-                        "the Dask scheduler has ended\n  hint: start it again with: dask scheduler"
-                    ) from None
-                continue
-            yield from self._take(future)
-
-    def _hand_out(self) -> bool:
-        """Submit blocks; return whether there may be more."""
-        room = 2 * max(1, sum(self.client.nthreads().values())) - len(self.running)
-        for _ in range(room):
-            block = next(self.blocks, None)
-            if block is None:
-                return False
-            self._submit(process_block, block)
-        return True
-
-    def _submit(self, function: Callable[..., Any], block: Any) -> None:
-        future = self.client.submit(function, self.work, self.fingerprint, self.expected, block, pure=False)
-        self._watch(future, block)
-
-    def _watch(self, future: Future, block: Any) -> None:
-        self.running[future] = block
-        future.add_done_callback(self.ended.put)
-
-    def _take(self, future: Future) -> Iterator[tuple[Any, Any]]:
-        block = self.running.pop(future)
-        if future.status in ("lost", "pending"):  # lost with its worker; the scheduler runs it again
-            self._watch(future, block)
+def _submitted(
+    client: Client,
+    work: Work[BlockT, ResultT],
+    blocks: Iterator[BlockT],
+    fingerprint: Fingerprint,
+    failed: list[BlockT],
+    stop: Callable[[], bool],
+) -> Iterator[tuple[BlockT, ResultT]]:
+    """Yield the results of blocks that are submitted, two for each thread of the cluster; collect those that fail."""
+    running: dict[Future, BlockT] = {}
+    ended: queue.SimpleQueue[Future] = queue.SimpleQueue()
+    expected, failures, succeeded = dict(fingerprint()), 0, False
+    while True:
+        threads = max(1, sum(client.nthreads().values()))
+        while len(running) < 2 * threads and not stop() and (block := next(blocks, None)) is not None:
+            future = client.submit(process_block, work, fingerprint, expected, block, pure=False)
+            running[future] = block
+            future.add_done_callback(ended.put)
+        if not running:
             return
+        try:
+            future = ended.get(timeout=POLL_S)
+        except queue.Empty:
+            if client.status != "running":
+                found = "the Dask scheduler has ended\n  hint: start it again with: dask scheduler"
+                raise WorkerDied(found) from None
+            continue
+        if future.status in ("lost", "pending"):  # lost with its worker; the scheduler runs it again
+            future.add_done_callback(ended.put)
+            continue
+        block = running.pop(future)
         if future.status not in ("finished", "error"):
             raise WorkerDied("the Dask scheduler has dropped a block\n  hint: check whether it was restarted")
         try:
@@ -162,47 +134,21 @@ class _Cluster:
         except InputError:
             raise
         except Exception as error:  # workers died on the block or with its result, or it raised this
-            if block is READINESS:
-                found = f"the first {len(self.suspects)} blocks failed on the Dask cluster, and no worker gets ready"
-                raise WorkerDied(f"{found}: {error!r}\n  hint: read the logs of its workers") from error
-            self.suspects.append(block)
-            if not (self.proven or self.asked) and len(self.suspects) >= MAX_FAILURES:
-                self.asked = True
-                self._submit(make_ready, READINESS)
-            return
-        self.proven = True
-        if block is not READINESS:
+            failed.append(block)
+            failures += 1
+            if failures >= MAX_FAILURES + threads - 1:
+                raise too_many_failures(failures, error, succeeded) from error
+        else:
+            failures, succeeded = 0, True
             yield block, result
 
 
 def process_block(work: Work[Any, Any], fingerprint: Fingerprint, expected: Mapping[str, str], block: Any) -> Any:
     """Process a block in a worker, one block at a time."""
-    with _ready(work, fingerprint, expected) as guard:
-        guard.begin(work.limit_s, work.size(block))
-        try:
-            return work.function(block)
-        finally:
-            guard.end()
-
-
-def make_ready(work: Work[Any, Any], fingerprint: Fingerprint, expected: Mapping[str, str], _: Any) -> None:
-    """Get a worker ready as for a block."""
-    with _ready(work, fingerprint, expected):
-        pass
-
-
-@contextmanager
-def _ready(work: Work[Any, Any], fingerprint: Fingerprint, expected: Mapping[str, str]) -> Iterator[Guard]:
     check(expected, _own(fingerprint), "a Dask worker")
     with _ONE_AT_A_TIME:
-        guard = _guard()
         _prepare(work.prepare)
-        yield guard
-
-
-@cache
-def _guard() -> Guard:
-    return Guard()
+        return work.function(block)
 
 
 @cache

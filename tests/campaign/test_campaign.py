@@ -21,7 +21,7 @@ from tests.support.synthetic import HEAD
 from tolstat import joint
 from tolstat import study as studies
 from tolstat.campaign import blocks as execution
-from tolstat.campaign import progress, signals
+from tolstat.campaign import progress
 from tolstat.campaign import run as campaign
 from tolstat.common import tables
 from tolstat.common.errors import InputError, StoreError
@@ -318,18 +318,18 @@ def test_runs_outside_the_main_thread(tmp_path: Path) -> None:
 
 
 def test_signals_mean_the_same_as_before_afterwards(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    before = [signal.getsignal(number) for number in signals.CAUGHT]
+    before = [signal.getsignal(number) for number in campaign.CAUGHT]
     fakes.run(fakes.Study(), tmp_path / "a.h5", 1)
-    assert [signal.getsignal(number) for number in signals.CAUGHT] == before
-    with pytest.raises(KeyboardInterrupt), signals.caught():
+    assert [signal.getsignal(number) for number in campaign.CAUGHT] == before
+    with pytest.raises(KeyboardInterrupt), campaign.signals_caught():
         signal.raise_signal(signal.SIGTERM)
-    assert [signal.getsignal(number) for number in signals.CAUGHT] == before
+    assert [signal.getsignal(number) for number in campaign.CAUGHT] == before
 
 
 def test_an_ignored_hang_up_stays_ignored() -> None:
     before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
     try:
-        with signals.caught() as stop, stop.deferred():
+        with campaign.signals_caught() as stop, stop.deferred():
             signal.raise_signal(signal.SIGHUP)
             assert not stop()
             signal.raise_signal(signal.SIGTERM)

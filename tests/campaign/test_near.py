@@ -7,7 +7,7 @@ from typer.testing import CliRunner
 
 from tests.support import synthetic
 from tolstat.analysis import accuracy, exceedance, prediction
-from tolstat.campaign import checks, near, verify
+from tolstat.campaign import checks, verify
 from tolstat.cli import app
 from tolstat.common.errors import InputError
 from tolstat.common.tables import Status
@@ -53,7 +53,7 @@ def path(tmp_path, monkeypatch):
 
 @pytest.mark.slow
 def test_the_joints_nearest_to_the_limits_are_verified_once(path):
-    found = near.check_near(path, "cross1.F > 720 N")
+    found = verify.check_near(path, "cross1.F > 720 N")
     with Reader.open(path) as store:
         view = store.view()
         load = view.load("cross1.F")
@@ -65,7 +65,7 @@ def test_the_joints_nearest_to_the_limits_are_verified_once(path):
         assert "not known" in error_budget.unknown(view)
     assert np.nanmedian(low.values / load.values) == pytest.approx(1.02, rel=1e-3)
     assert (low.values <= high.values)[load.is_valid].all()
-    more = near.check_near(path, "any limit")
+    more = verify.check_near(path, "any limit")
     assert set(found.rows) < set(more.rows)
     assert (np.diff(more.rows) > 0).all()
     with Reader.open(path) as store:
@@ -84,7 +84,7 @@ def test_ppm_and_reweighting_carry_it(path):
 
     before, reweighted = tables()
     assert reweighted["total_upper"].isna().all()
-    near.check_near(path, "any limit")
+    verify.check_near(path, "any limit")
     after, moved = tables()
     assert after.loc["cross1.F", "ppm_upper"] > before.loc["cross1.F", "ppm_upper"]
     assert after.loc["all limits", "next_upper"] > before.loc["all limits", "next_upper"]
@@ -94,7 +94,7 @@ def test_ppm_and_reweighting_carry_it(path):
 
 def test_fewer_than_fifty_joints_are_refused(path):
     with pytest.raises(InputError, match="49 joints do not tell"):
-        near.check_near(path, "any limit", 49)
+        verify.check_near(path, "any limit", 49)
     done = CliRunner().invoke(app, ["verify", str(path), "--near", "cross9.F > 1 N"])
     assert done.exit_code == 2
     assert "'cross9.F' is not a load" in done.stderr

@@ -486,7 +486,7 @@ def case(tmp_path):
 
 def test_simulate_prints_json_or_text_and_writes_the_trace(case, tmp_path, monkeypatch):
     made = simulated("ok", 1.5)
-    monkeypatch.setattr("tolstat.campaign.trace.simulate_case", lambda _: made)
+    monkeypatch.setattr("tolstat.campaign.replay.simulate_case", lambda _: made)
     done = call("simulate", case, "--json", "--out", tmp_path / "trace.csv")
     assert done.exit_code == 0, done.stderr
     assert json.loads(done.stdout) == made.summary()
@@ -497,7 +497,7 @@ def test_simulate_prints_json_or_text_and_writes_the_trace(case, tmp_path, monke
 
 
 def test_simulate_of_a_joint_that_fails_is_data_with_a_warning(case, monkeypatch):
-    monkeypatch.setattr("tolstat.campaign.trace.simulate_case", lambda _: simulated("newton_failed", None))
+    monkeypatch.setattr("tolstat.campaign.replay.simulate_case", lambda _: simulated("newton_failed", None))
     done = call("simulate", case)
     assert done.exit_code == 0
     assert done.stdout.splitlines()[-1].split() == ["fork4", "N", "-", "1", "-"]
@@ -518,7 +518,7 @@ contact.stations = [
 @pytest.mark.slow
 def test_probable_mistakes_are_warnings(tmp_path, monkeypatch, command):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("tolstat.campaign.trace.simulate_case", lambda _: simulated("ok", 1.5))
+    monkeypatch.setattr("tolstat.campaign.replay.simulate_case", lambda _: simulated("ok", 1.5))
     text = synthetic.STUDY.replace("n = 60", "n = 2").replace("[operation]", f"{UNDAMPED}[operation]")
     if command == "simulate":
         text = text.partition("[tolerances]")[0]

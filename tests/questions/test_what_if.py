@@ -229,13 +229,13 @@ def test_fewer_changed_joints_move_the_share_of_all(path):
 
 @pytest.mark.usefixtures("quick")
 def test_interrupted_it_goes_on_and_ends_with_the_same_sets(path, tmp_path, monkeypatch):
-    whole, blocks = tmp_path / "whole.h5", []
+    whole, taken = tmp_path / "whole.h5", []
     whole.write_bytes(path.read_bytes())
     runner.simulate(whole, budget=60.0, workers=1)
 
     def failing(*arguments, **options):
-        blocks.append(1)
-        if len(blocks) == 9:
+        taken.append(1)
+        if len(taken) == 9:
             raise KeyboardInterrupt
         return stand_in(*arguments, **options)
 

@@ -208,7 +208,7 @@ class CheckedTables(Numbering):
         return self.results(slots)["status"].copy() if found.any() else found
 
     def _check_status(self, found: NDArray[np.uint8]) -> None:
-        if found.size and found.max() > max(Status):
+        if not np.isin(found, list(Status)).all():
             raise store_error(self.path, f"is damaged: a joint has the unknown status {found.max()}", RUN_AGAIN)
 
     def _described(self, group: str, slots: slice) -> NDArray[np.void]:

@@ -1,7 +1,7 @@
 """Blocks through a Dask cluster; those that end with their workers, or raise, are repeated in the pool on this machine.
 
 The scheduler gives the blocks of a lost worker to others. A block that has cost four workers is not tried on the
-cluster again.
+cluster again. A cluster of this machine whose workers do not come back leaves all blocks to the pool.
 """
 
 from __future__ import annotations
@@ -10,25 +10,16 @@ import os
 import queue
 import tempfile
 import threading
+import time
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
-from tolstat.campaign.pool import (
-    MAX_FAILURES,
-    POLL_S,
-    BlockT,
-    Lost,
-    ResultT,
-    Work,
-    WorkerDied,
-    map_blocks,
-    never_stop,
-    signals_blocked,
-    too_many_failures,
-)
-from tolstat.common.cores import available_cores, one_thread_each
+from tolstat.campaign import pool
+from tolstat.campaign.pool import BlockT, Lost, ResultT, Work, WorkerDied
+from tolstat.common.cores import one_thread_each
 from tolstat.common.errors import Fault, InputError
 
 if TYPE_CHECKING:
@@ -36,6 +27,9 @@ if TYPE_CHECKING:
 
 FIRST_WORKER_S = 300.0
 """Time limit for the first worker of a cluster to appear, s: a batch queue may have to start it."""
+GONE_S = 30.0
+"""Time after which workers of this machine that are gone are not expected back, s."""
+NO_WORKER = "the Dask cluster has no worker\n  hint: start workers with: dask worker tcp://HOST:PORT"
 CONNECT_S = 15.0
 """Time limit for connecting to a scheduler, s."""
 FETCH_S = 60.0
@@ -55,7 +49,7 @@ def map_on_cluster(
     scheduler: str | None,
     workers: int,
     fingerprint: Fingerprint,
-    stop: Callable[[], bool] = never_stop,
+    stop: Callable[[], bool] = pool.never_stop,
 ) -> Generator[tuple[BlockT, ResultT | Lost], None, None]:
     """Apply the function to every block on a Dask cluster and yield the results as they arrive.
 
@@ -70,7 +64,7 @@ def map_on_cluster(
     scheduler : str, optional
         Address of the scheduler; without it a cluster is started on this machine.
     workers : int
-        Number of processes of a cluster on this machine.
+        Number of processes of a cluster on this machine, and of the pool.
     fingerprint : callable
         () -> values by name, such as versions, that must be equal here and in every worker.
     stop : callable, optional
@@ -88,59 +82,48 @@ def map_on_cluster(
     WorkerDied
         When the scheduler is lost or has no workers; otherwise as `pool.map_blocks`.
     """
-    failed: list[BlockT] = []
-    with _client(scheduler, workers) as client:
-        _check_fingerprints(client, fingerprint)
-        yield from _submitted(client, work, iter(blocks), fingerprint, failed, stop)
-    if failed and not stop():
-        yield from map_blocks(work, failed, min(len(failed), available_cores()), stop)
+    from distributed import KilledWorker
 
-
-def _submitted(
-    client: Client,
-    work: Work[BlockT, ResultT],
-    blocks: Iterator[BlockT],
-    fingerprint: Fingerprint,
-    failed: list[BlockT],
-    stop: Callable[[], bool],
-) -> Iterator[tuple[BlockT, ResultT]]:
-    """Yield the results of blocks that are submitted, two for each thread of the cluster; collect those that fail."""
     running: dict[Future, BlockT] = {}
     ended: queue.SimpleQueue[Future] = queue.SimpleQueue()
-    expected, failures, succeeded = dict(fingerprint()), 0, False
-    while True:
-        threads = max(1, sum(client.nthreads().values()))
-        while len(running) < 2 * threads and not stop() and (block := next(blocks, None)) is not None:
-            future = client.submit(process_block, work, fingerprint, expected, block, pure=False)
-            running[future] = block
-            future.add_done_callback(ended.put)
-        if not running:
-            return
-        try:
-            future = ended.get(timeout=POLL_S)
-        except queue.Empty:
-            if client.status != "running":
-                found = "the Dask scheduler has ended\n  hint: start it again with: dask scheduler"
-                raise WorkerDied(found) from None
-            continue
-        if future.status in ("lost", "pending"):  # lost with its worker; the scheduler runs it again
-            future.add_done_callback(ended.put)
-            continue
-        block = running.pop(future)
-        if future.status not in ("finished", "error"):
-            raise WorkerDied("the Dask scheduler has dropped a block\n  hint: check whether it was restarted")
-        try:
-            result = future.result(timeout=FETCH_S)
-        except InputError:
-            raise
-        except Exception as error:  # workers died on the block or with its result, or it raised this
-            failed.append(block)
-            failures += 1
-            if failures >= MAX_FAILURES + threads - 1:
-                raise too_many_failures(failures, error, succeeded) from error
-        else:
-            failures, succeeded = 0, True
-            yield block, result
+    failed: list[BlockT] = []
+    todo, failures, succeeded, seen = iter(blocks), 0, False, time.monotonic()
+    with _client(scheduler, workers) as client:
+        expected = _checked(client, fingerprint)
+        while True:
+            threads = sum(client.nthreads().values())
+            seen = time.monotonic() if threads or scheduler else seen
+            while len(running) < 2 * max(1, threads) and not stop() and (block := next(todo, None)) is not None:
+                future = client.submit(process_block, work, fingerprint, expected, block, pure=False)
+                running[future] = block
+                future.add_done_callback(ended.put)
+            if not running:
+                break
+            try:
+                future = ended.get(timeout=pool.POLL_S)
+            except queue.Empty:
+                if client.status != "running":
+                    found = "the Dask scheduler has ended\n  hint: start it again with: dask scheduler"
+                    raise WorkerDied(found) from None
+                if time.monotonic() - seen > GONE_S:
+                    failed += running.values()
+                    break
+                continue
+            block = running.pop(future)
+            try:
+                result = future.result(timeout=FETCH_S)  # one lost with its worker is computed again
+            except InputError:
+                raise
+            except Exception as error:  # it cost too many workers, or raised this
+                failed.append(block)
+                failures += 1
+                if failures >= pool.MAX_FAILURES + max(0, threads - 1):
+                    last = str(error) if isinstance(error, KilledWorker) else error
+                    raise pool.too_many_failures(failures, last, succeeded) from error
+            else:
+                failures, succeeded = 0, True
+                yield block, result
+    yield from pool.map_blocks(work, chain(failed, todo), workers, stop)
 
 
 def process_block(work: Work[Any, Any], fingerprint: Fingerprint, expected: Mapping[str, str], block: Any) -> Any:
@@ -181,22 +164,23 @@ def check(expected: Mapping[str, str], found: Mapping[str, str], where: str) -> 
     ]
     if lines:
         differing = "\n    ".join([f"{where} has other software versions", *lines])
-        raise InputError(
-            [Fault("--executor dask", differing, "install the same versions there, and restart the workers")]
-        )
+        remedy = "install the same versions there, and restart the workers"
+        raise InputError([Fault("--executor dask", differing, remedy)])
 
 
-def _check_fingerprints(client: Client, fingerprint: Fingerprint) -> None:
+def _checked(client: Client, fingerprint: Fingerprint) -> dict[str, str]:
+    """Return the fingerprint of this process, which all workers have."""
     try:
         client.wait_for_workers(1, timeout=FIRST_WORKER_S)
     except TimeoutError as error:
-        found = f"the Dask cluster has no worker after {FIRST_WORKER_S:g} s"
-        raise WorkerDied(f"{found}\n  hint: start workers with: dask worker tcp://HOST:PORT") from error
+        raise WorkerDied(NO_WORKER) from error
+    expected = dict(fingerprint())
     for address, found in client.run(fingerprint, on_error="return").items():
         if isinstance(found, BaseException):
             remedy = "install tolstat there, and restart the workers"
             raise InputError([Fault("--executor dask", f"the worker {address} cannot run tolstat: {found!r}", remedy)])
-        check(dict(fingerprint()), found, f"the worker {address}")
+        check(expected, found, f"the worker {address}")
+    return expected
 
 
 @contextmanager
@@ -207,7 +191,7 @@ def _client(scheduler: str | None, workers: int) -> Iterator[Client]:
         remedy = "install it with: pip install 'tolstat[dask]'"
         raise InputError([Fault("--executor dask", "Dask's distributed is not installed", remedy)]) from error
     if scheduler is None:
-        with one_thread_each(), signals_blocked():
+        with one_thread_each(), pool.signals_blocked():
             cluster = LocalCluster(
                 n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None, host=LOOPBACK
             )

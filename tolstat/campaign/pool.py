@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import pickle
 import signal
 import sys
 import traceback
@@ -21,7 +22,6 @@ from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
-from multiprocessing.reduction import ForkingPickler
 from typing import Any, Generic, NamedTuple, TypeVar
 
 from tolstat.common.cores import one_thread_each
@@ -153,11 +153,8 @@ def too_many_failures(failures: int, last: str | Exception, succeeded: bool) -> 
     return WorkerDied(f"{found}\n  {HINT}")
 
 
-class _Task(NamedTuple, Generic[BlockT]):
-    """A block, and how often it failed alone."""
-
-    block: BlockT
-    failures: int = 0
+_Task = tuple[BlockT, int]
+"""A block, and how often it failed before, if it cannot be split."""
 
 
 class _Worker(Generic[BlockT]):
@@ -179,7 +176,7 @@ class _Worker(Generic[BlockT]):
         """Hand out a task."""
         self.task = task
         with suppress(OSError):  # the worker has died: `receive` will find its pipe closed
-            self.connection.send((function, task.block))
+            self.connection.send((function, task[0]))
 
     def receive(self) -> tuple[str, Any]:
         """Return kind and content of a message."""
@@ -241,7 +238,7 @@ class _Map(Generic[BlockT, ResultT]):
         if self.pieces and not self.failures:
             return self.pieces.popleft()
         for block in self.fresh:
-            return _Task(block)
+            return block, 0
         return self.pieces.popleft() if self.pieces else None
 
     def _hand_out(self) -> None:
@@ -264,24 +261,24 @@ class _Map(Generic[BlockT, ResultT]):
             worker.ready = True
         elif kind == RESULT and task is not None:
             self.failures, self.succeeded = 0, True
-            yield task.block, content
+            yield task[0], content
         else:
             if kind == DIED:
                 worker.end()
                 self.workers.remove(worker)
             self.failures, self.last = self.failures + 1, content
             if task is not None:
-                yield from self._repeat(task)
+                yield from self._repeat(*task)
 
-    def _repeat(self, task: _Task[BlockT]) -> Iterator[tuple[BlockT, Lost]]:
+    def _repeat(self, block: BlockT, failures: int) -> Iterator[tuple[BlockT, Lost]]:
         """Put the halves of a block that failed in the queue, or a joint once more; give up one that failed twice."""
-        halves = self.work.split(task.block)
+        halves = self.work.split(block)
         if len(halves) > 1:
-            self.pieces.extend(_Task(half) for half in halves)
-        elif task.failures + 1 < MAX_ATTEMPTS:
-            self.pieces.append(task._replace(failures=task.failures + 1))
+            self.pieces.extend((half, 0) for half in halves)
+        elif failures + 1 < MAX_ATTEMPTS:
+            self.pieces.append((block, failures + 1))
         else:
-            yield task.block, Lost(_reason(self.last))
+            yield block, Lost(_reason(self.last))
 
 
 def _reason(failure: str | Exception) -> str:
@@ -328,9 +325,9 @@ def _answer(function: Callable[[Any], Any], block: Any) -> tuple[str, Any]:
     except Exception as error:
         error.add_note(traceback.format_exc())
         try:
-            ForkingPickler.loads(ForkingPickler.dumps(error))
+            pickle.loads(pickle.dumps(error))
         except Exception:
-            return RAISED, RuntimeError(f"{type(error).__name__}: {error}\n{traceback.format_exc()}")
+            return RAISED, RuntimeError(f"{type(error).__name__}: {error}\n{error.__notes__[0]}")
         return RAISED, error
 
 

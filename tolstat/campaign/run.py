@@ -215,7 +215,7 @@ def run(
                 counts = _write_blocks(store, finished, counts, progress, tell)
             if check:
                 stage("check of the numerical error")
-                verify.check_few(store, partial(parameters, study), simulate_beside)
+                verify.check_few(store, partial(parameters, study))
             store.finish()
             store.end_session()
         except KeyboardInterrupt:

@@ -11,16 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.analysis.accuracy import LEAST_NEAR
-from tolstat.campaign.blocks import simulate_beside
-from tolstat.campaign.checks import (
-    ALL_CHECKS,
-    QUICK_CHECKS,
-    Progress,
-    Simulate,
-    no_progress,
-    run_checks,
-    simulate_each,
-)
+from tolstat.campaign.checks import ALL_CHECKS, QUICK_CHECKS, Progress, no_progress, run_checks, simulate_each
 from tolstat.common import selected_results
 from tolstat.common.errors import Fault, InputError, StoreError, gather
 from tolstat.common.loads import LOADS, Limit, load_of, split
@@ -52,7 +43,6 @@ def check_campaign(
     names: Iterable[str],
     joints: int | None,
     seed: int,
-    simulate: Simulate = simulate_beside,
     workers: int = 1,
     progress: Progress = no_progress,
 ) -> Verification | None:
@@ -64,7 +54,7 @@ def check_campaign(
         Result file of the campaign.
     parameters : callable
         File slots (m,) -> their parameters, (m,) table PARAM.
-    names, simulate, workers, progress
+    names, workers, progress
         As in `run_checks`.
     joints : int or None
         Number of joints; None for all, including the nominal joint.
@@ -82,7 +72,7 @@ def check_campaign(
     slots = choose(settled, joints, seed)
     if not slots.size:
         return None
-    return check_slots(store, parameters, slots, names, seed, simulate, workers, progress)
+    return check_slots(store, parameters, slots, names, seed, workers, progress)
 
 
 def check_slots(
@@ -91,13 +81,12 @@ def check_slots(
     slots: NDArray[np.intp],
     names: Iterable[str],
     seed: int = 0,
-    simulate: Simulate = simulate_beside,
     workers: int = 1,
     progress: Progress = no_progress,
 ) -> Verification:
     """Check the joints in file slots, (m,) ascending; parameters otherwise as in `check_campaign`."""
     options = [recorded.options_of(store, slot) for slot in slots.tolist()]
-    checks = run_checks(parameters(slots), options, names, simulate, workers, progress)
+    checks = run_checks(parameters(slots), options, names, workers=workers, progress=progress)
     for check in checks.values():
         selected_results.blank_others(check.results, store.columns)
     base = np.concatenate([store.results(slice(slot, slot + 1)) for slot in slots.tolist()])
@@ -109,9 +98,7 @@ def few(rows: int) -> int:
     return min(max(rows // JOINTS_PER_CHECKED, 1), MAX_CHECKED)
 
 
-def check_few(
-    store: ResultStore, parameters: Callable[[ResultStore, NDArray[np.intp]], NDArray[np.void]], simulate: Simulate
-) -> None:
+def check_few(store: ResultStore, parameters: Callable[[ResultStore, NDArray[np.intp]], NDArray[np.void]]) -> None:
     """Check a few joints of a campaign at each operating point at which it is complete, and store the checks.
 
     Does nothing if the file is a slice, and leaves checks that it has as they are. `parameters` is called with the file
@@ -120,7 +107,7 @@ def check_few(
     seed, made = int(store.sampling["seed"]), []
     for one in store.each() if store.whole else ():
         if one.complete and verification.read(one) is None:
-            found = check_campaign(one, partial(parameters, one), QUICK_CHECKS, few(one.n), seed, simulate)
+            found = check_campaign(one, partial(parameters, one), QUICK_CHECKS, few(one.n), seed)
             made += [(one, found)] if found else []
     if made:
         verification.write_all(made)
@@ -200,7 +187,7 @@ def check_file(
         on_start()
         for one in store.each():
             params = partial(recorded.parameters, one)
-            if found := check_campaign(one, params, names, number, seed, workers=workers, progress=progress):
+            if found := check_campaign(one, params, names, number, seed, workers, progress):
                 verification.write(one, found)
         checked = worst.checks([one for one in map(verification.read, store.each()) if one is not None])
         assert checked is not None

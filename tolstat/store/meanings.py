@@ -32,7 +32,10 @@ FIXED: dict[str, Meanings] = {
     "mode": _names(Mode),
 }
 """Meanings that are the same in every file, by column or history."""
-LABELS = {name: np.array([*FIXED[name].values()], dtype=object) for name in ("status", "motion")}
+LABELS = {
+    name: np.array([FIXED[name].get(code, "") for code in range(max(FIXED[name]) + 1)], dtype=object)
+    for name in ("status", "motion")
+}
 """Columns that an export holds as text: label of each code."""
 
 

@@ -117,13 +117,14 @@ def map_on_cluster(
             except Exception as error:  # it cost too many workers, or raised this
                 failed.append(block)
                 failures += 1
-                if failures >= pool.MAX_FAILURES + max(0, threads - 1):
-                    last = str(error) if isinstance(error, KilledWorker) else error
-                    raise pool.too_many_failures(failures, last, succeeded) from error
+                last = str(error) if isinstance(error, KilledWorker) else error
+                if ending := pool.too_many_failures(failures, max(1, threads), last, succeeded):
+                    raise ending from error
             else:
                 failures, succeeded = 0, True
                 yield block, result
-    yield from pool.map_blocks(work, chain(failed, todo), workers, stop)
+    halves = (half for block in failed for half in work.split(block))
+    yield from pool.map_blocks(work, chain(halves, todo), workers, stop)
 
 
 def process_block(work: Work[Any, Any], fingerprint: Fingerprint, expected: Mapping[str, str], block: Any) -> Any:

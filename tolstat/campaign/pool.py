@@ -34,8 +34,9 @@ POLL_S = 0.2
 """Interval at which a request to stop is checked while workers are busy, s."""
 MAX_ATTEMPTS = 2
 """Number of failures at which a single joint is given up."""
-MAX_FAILURES = 5
-"""Number of failures in a row that end a map; one more for each worker but the first: all may be killed at once."""
+MAX_FAILURES = 8
+"""Number of failures in a row that end a map, and one more for each worker but the first: all may be killed at once.
+Eight halvings lead from a block of 256 to a joint, which alone never ends a map."""
 READY, RESULT, RAISED, DIED = "ready", "result", "raised", "died"
 """Kinds of messages from a worker, and what stands for one from a worker that has died."""
 IGNORED = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
@@ -145,8 +146,10 @@ def kept_workers() -> Iterator[None]:
         _kept = None
 
 
-def too_many_failures(failures: int, last: str | Exception, succeeded: bool) -> Exception:
-    """Error that ends a map after that many failures in a row, the last one of which is given."""
+def too_many_failures(failures: int, workers: int, last: str | Exception, succeeded: bool) -> Exception | None:
+    """Error that ends a map after that many failures in a row, the last one of which is given; None if they are few."""
+    if failures < MAX_FAILURES + workers - 1:
+        return None
     if isinstance(last, Exception) and not succeeded:
         return last
     found = f"{failures} times in a row a worker process failed, the last time: {_reason(last)}"
@@ -220,11 +223,12 @@ class _Map(Generic[BlockT, ResultT]):
             ready = wait([worker.connection for worker in self.workers], timeout=POLL_S)
             told = [worker for worker in self.workers if worker.connection in ready]
             finished = [result for worker in told for result in self._receive(worker)]
-            if self.failures < MAX_FAILURES + self.size - 1:
+            error = too_many_failures(self.failures, self.size, self.last, self.succeeded)
+            if error is None:
                 self._hand_out()
             yield from finished
-            if self.failures >= MAX_FAILURES + self.size - 1:
-                raise too_many_failures(self.failures, self.last, self.succeeded)
+            if error is not None:
+                raise error
 
     def end(self) -> None:
         for worker in self.workers:
@@ -234,8 +238,8 @@ class _Map(Generic[BlockT, ResultT]):
                 worker.end()
 
     def _next(self) -> _Task[BlockT] | None:
-        """Return a piece of a block that failed, or a fresh block; after a failure rather the latter."""
-        if self.pieces and not self.failures:
+        """Return a piece of a block that failed, or a fresh block; while all fail, one and the other in turn."""
+        if self.pieces and self.failures % 2 == 0:
             return self.pieces.popleft()
         for block in self.fresh:
             return block, 0
@@ -266,7 +270,8 @@ class _Map(Generic[BlockT, ResultT]):
             if kind == DIED:
                 worker.end()
                 self.workers.remove(worker)
-            self.failures, self.last = self.failures + 1, content
+            self.last = content
+            self.failures += task is None or task[1] == 0  # the second failure of a joint confirms the first
             if task is not None:
                 yield from self._repeat(*task)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,7 @@ import pytest
 import tolstat
 from tests.support.environment import ROOT
 from tolstat import joint as joints
-from tolstat.campaign import blocks
+from tolstat.campaign import pool
 from tolstat.common.tables import PARAM
 
 REFERENCE = Path(__file__).parent / "reference"
@@ -31,7 +31,7 @@ steps_per_rev = 15
 UNIFORM = 'upper = "0.030 mm", distribution = "uniform"'
 
 Params = Callable[..., np.recarray]
-DEFAULT_KIND = blocks.default_kind
+IN_WORKERS = pool.map_blocks
 
 
 def with_law(par: np.recarray, law: str) -> np.recarray:
@@ -101,24 +101,31 @@ def random_errors() -> Callable[[int], dict[str, float]]:
 
 @pytest.fixture(scope="session", autouse=True)
 def _small_campaigns_in_this_process() -> Iterator[None]:
-    """Simulate campaigns of one worker or block here: starting a worker takes longer than the joints of most tests.
+    """Simulate campaigns of one worker here: starting it takes longer than the joints of most tests.
 
-    Tests of what joints do to their processes ask for ``"processes"``, or for the fixture `supervised`.
+    Tests of what joints do to their process ask for the fixture `in_workers`.
     """
 
-    def quick(workers: int, blocks: int) -> str:
-        return "processes" if workers > 1 and blocks > 1 else "serial"
+    def quick(
+        work: pool.Work[Any, Any], blocks: Iterable[Any], workers: int, stop: Callable[[], bool] = pool.never_stop
+    ) -> Iterator[tuple[Any, Any]]:
+        if workers > 1:
+            yield from IN_WORKERS(work, blocks, workers, stop)
+            return
+        for block in blocks:
+            if stop():
+                return
+            yield block, work.function(block)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("tolstat.campaign.blocks.default_kind", quick)
-        patch.setattr("tolstat.cli.run.MAX_AHEAD", 0)
+        patch.setattr(pool, "map_blocks", quick)
         yield
 
 
 @pytest.fixture
-def supervised(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Simulate all campaigns in supervised processes, as users do."""
-    monkeypatch.setattr("tolstat.campaign.blocks.default_kind", DEFAULT_KIND)
+def in_workers(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Simulate all campaigns in worker processes, as users do."""
+    monkeypatch.setattr(pool, "map_blocks", IN_WORKERS)
 
 
 @pytest.fixture

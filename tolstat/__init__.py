@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from tolstat.analysis.exceedance import exceedance as exceedance
     from tolstat.analysis.quantile import quantile as quantile
     from tolstat.analysis.weighted import weighted_exceedance as weighted_exceedance
+    from tolstat.campaign.replay import simulate_case as simulate_case
     from tolstat.campaign.run import run as run
-    from tolstat.campaign.trace import simulate_case as simulate_case
     from tolstat.common.errors import InputError as InputError
     from tolstat.common.errors import StoreError as StoreError
     from tolstat.common.errors import TolstatError as TolstatError
@@ -59,7 +59,7 @@ _HOMES = {
     "perturb": "tolstat.joint:perturb",
     "quantile": "tolstat.analysis.quantile:quantile",
     "run": "tolstat.campaign.run:run",
-    "simulate_case": "tolstat.campaign.trace:simulate_case",
+    "simulate_case": "tolstat.campaign.replay:simulate_case",
     "simulate_rows": "tolstat.solver.simulation:simulate_rows",
     "statistics": "tolstat.report.summary:statistics",
     "weighted_exceedance": "tolstat.analysis.weighted:weighted_exceedance",

@@ -1,7 +1,6 @@
 """Pick-freeze designs: indices with known answers, scipy's on the same joints, and a campaign from study to table."""
 
 import json
-from functools import partial
 
 import numpy as np
 import pytest
@@ -10,11 +9,9 @@ from typer.testing import CliRunner
 
 from tests.analysis.test_sensitivity import ISHIGAMI_FIRST, ISHIGAMI_TOTAL
 from tests.support import fakes, synthetic
-from tolstat import cli, joint, sampling, study
+from tolstat import cli, sampling, study
 from tolstat.analysis import pick_freeze
 from tolstat.campaign import extend
-from tolstat.campaign import run as campaign
-from tolstat.campaign.blocks import Execution
 from tolstat.common.errors import InputError
 from tolstat.common.tables import RESULT, Simulation, Status
 from tolstat.questions.causes.query import causes_of
@@ -158,16 +155,10 @@ def simulate(params, options, histories="none", n_harmonics=16):
     return Simulation(results, {})
 
 
-STAGES = campaign.Stages(
-    sampling.draw_blocks, sampling.dimensions, joint.perturb, lambda *_: {}, simulate, fakes.warm_up
-)
-
-
 @pytest.mark.slow
 def test_a_command_runs_the_design_of_a_study_and_tells_the_indices(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    run = partial(campaign.run, stages=STAGES)
-    monkeypatch.setattr(campaign, "run", lambda *a, **k: run(*a, **k | {"execution": Execution("serial", 1)}))
+    fakes.replace_functions(monkeypatch, **fakes.SOLVER | {"simulate_rows": simulate})
     load(tmp_path, TEXT.replace('\nmethod = "pick_freeze"', ""))
     command = ["causes", "design.toml", "--pick-freeze", "150", "--workers", "1"]
     done = CliRunner().invoke(cli.app, command)

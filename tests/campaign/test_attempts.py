@@ -37,10 +37,10 @@ def test_a_joint_whose_worker_dies_twice_when_it_is_alone_is_crashed(
     plan, path, tried = fakes.Study(n=8), tmp_path / "a.h5", tmp_path / "tried"
     tried.mkdir()
     deadly = fakes.draw(plan)["pin1.offset_t"][5]
-    stages = fakes.stages(partial(simulate_deadly, folder=tried, deadly=deadly, alone=alone))
+    simulate = partial(simulate_deadly, folder=tried, deadly=deadly, alone=alone)
     execution = Execution("processes", workers=2, block=block)
     told: list[str] = []
-    counts = fakes.run(plan, path, stages=stages, execution=execution, tell=told.append)
+    counts = fakes.run(plan, path, simulate_rows=simulate, execution=execution, tell=told.append)
     assert counts.done == 8
     with ResultFile.open(path) as store:
         status = store.status()

@@ -21,7 +21,7 @@ from tests.support.synthetic import HEAD
 from tolstat import joint
 from tolstat import study as studies
 from tolstat.campaign import blocks as execution
-from tolstat.campaign import progress, signals
+from tolstat.campaign import progress
 from tolstat.campaign import run as campaign
 from tolstat.common import tables
 from tolstat.common.counts import Counts
@@ -109,15 +109,15 @@ def test_resume_simulates_pending_rows_only(tmp_path: Path) -> None:
             raise KeyboardInterrupt
 
     with pytest.raises(campaign.Interrupted):
-        campaign.run(study, path, 1, 5, progress=interrupt, stages=fakes.stages(count))
-    campaign.run(study, path, 1, 5, stages=fakes.stages(count), check=False)
+        fakes.run(study, path, 1, 5, progress=interrupt, simulate_rows=count)
+    fakes.run(study, path, 1, 5, simulate_rows=count)
     assert sum(simulated) == 40
     before = path.read_bytes()
-    assert campaign.run(study, path, 1, stages=fakes.stages(count), check=False).done == 40
+    assert fakes.run(study, path, simulate_rows=count).done == 40
     assert sum(simulated) == 40
     assert path.read_bytes() == before
     for _ in range(2):  # the checks at the end are made once
-        campaign.run(study, path, 1, stages=fakes.stages(count))
+        fakes.run(study, path, check=True, simulate_rows=count)
         assert simulated[-3:] == [1, 1, 1]
         assert sum(simulated) == 43
 
@@ -137,8 +137,8 @@ def warm(calls: list[str], options: Options, params: np.ndarray) -> None:
 @pytest.mark.slow
 def test_the_kernel_is_compiled_before_there_are_workers(tmp_path: Path) -> None:
     calls: list[str] = []
-    stages = fakes.stages()._replace(warm_up=partial(warm, calls))
-    fakes.run(fakes.Study(), tmp_path / "a.h5", 2, progress=lambda c: calls.append("block"), stages=stages)
+    hear = {"warm_up": partial(warm, calls), "progress": lambda counts: calls.append("block")}
+    fakes.run(fakes.Study(), tmp_path / "a.h5", 2, **hear)
     assert calls[:2] == ["warm", "block"]
     assert calls.count("warm") == 1
 
@@ -146,7 +146,7 @@ def test_the_kernel_is_compiled_before_there_are_workers(tmp_path: Path) -> None
 def test_a_run_names_its_stages(tmp_path: Path) -> None:
     heard: list[str] = []
     for _ in range(2):
-        campaign.run(fakes.Study(), tmp_path / "a.h5", 1, stages=fakes.stages(), stage=heard.append)
+        fakes.run(fakes.Study(), tmp_path / "a.h5", check=True, stage=heard.append)
     kernels = progress.kernels()
     check = "check of the numerical error"
     assert heard[:4] == ["drawing the errors", kernels, progress.JOINTS, check]
@@ -273,9 +273,9 @@ def test_another_study_is_refused_with_the_keys(tmp_path: Path) -> None:
 def test_edited_limits_are_taken_over_and_nothing_is_simulated_again(tmp_path: Path) -> None:
     path = tmp_path / "a.h5"
     fakes.run(fakes.Study(), path, 1)
-    before, stages = datasets(path), fakes.stages(fakes.simulate_and_raise)
+    before = datasets(path)
     same = fakes.Study(limits={"fork1.T": 40.0}, text="# another comment", name="moved")
-    assert fakes.run(same, path, 1, stages=stages).done == 40
+    assert fakes.run(same, path, simulate_rows=fakes.simulate_and_raise).done == 40
     with ResultFile.open(path) as store:
         assert (store.limits, store.study_text, store.study_name) == ({"fork1.T": 40.0}, "# another comment", "moved")
     assert datasets(path) == before
@@ -301,7 +301,7 @@ def test_differing_keys_names_missing_ones() -> None:
 @pytest.mark.slow
 def test_a_bug_in_every_joint_comes_through(tmp_path: Path, workers: int) -> None:
     with pytest.raises(ZeroDivisionError):
-        fakes.run(fakes.Study(), tmp_path / "a.h5", workers, 2, stages=fakes.stages(fakes.simulate_and_raise))
+        fakes.run(fakes.Study(), tmp_path / "a.h5", workers, 2, simulate_rows=fakes.simulate_and_raise)
     fakes.run(fakes.Study(), tmp_path / "a.h5", 1)
 
 
@@ -318,18 +318,18 @@ def test_runs_outside_the_main_thread(tmp_path: Path) -> None:
 
 
 def test_signals_mean_the_same_as_before_afterwards(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    before = [signal.getsignal(number) for number in signals.CAUGHT]
+    before = [signal.getsignal(number) for number in campaign.CAUGHT]
     fakes.run(fakes.Study(), tmp_path / "a.h5", 1)
-    assert [signal.getsignal(number) for number in signals.CAUGHT] == before
-    with pytest.raises(KeyboardInterrupt), signals.caught():
+    assert [signal.getsignal(number) for number in campaign.CAUGHT] == before
+    with pytest.raises(KeyboardInterrupt), campaign.signals_caught():
         signal.raise_signal(signal.SIGTERM)
-    assert [signal.getsignal(number) for number in signals.CAUGHT] == before
+    assert [signal.getsignal(number) for number in campaign.CAUGHT] == before
 
 
 def test_an_ignored_hang_up_stays_ignored() -> None:
     before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
     try:
-        with signals.caught() as stop, stop.deferred():
+        with campaign.signals_caught() as stop, stop.deferred():
             signal.raise_signal(signal.SIGHUP)
             assert not stop()
             signal.raise_signal(signal.SIGTERM)

@@ -18,7 +18,7 @@ from typer.testing import CliRunner
 
 from tests.campaign.test_campaign import datasets
 from tests.support import damage, fakes, synthetic
-from tolstat import cli, joint, sampling
+from tolstat import cli, sampling
 from tolstat import study as studies
 from tolstat.campaign import extend
 from tolstat.campaign import run as campaign
@@ -40,9 +40,8 @@ def simulate(params: np.ndarray, options: Options, histories: str, n_harmonics: 
     return fakes.simulate(params, options, histories, n_harmonics)
 
 
-STAGES = campaign.Stages(
-    *(sampling.draw_blocks, sampling.dimensions, joint.perturb, fakes.history_specs, simulate, fakes.warm_up)
-)
+STAND_IN = fakes.SOLVER | {"history_specs": fakes.history_specs, "simulate_rows": simulate}
+"""Functions in place of the solver's."""
 
 
 def small(folder: Path, n: int, method: str = "random", kind: str = "none", seed: int = 2021) -> Study:
@@ -60,7 +59,9 @@ def make(tmp_path: Path) -> Make:
 
 def run(study: Study, path: Path, check: bool = False, **choices: object) -> Path:
     """Run in one block without checks of the numerical error, which merged slices do not have."""
-    campaign.run(study, path, 1, 1000, stages=STAGES, check=check, **choices)
+    with pytest.MonkeyPatch.context() as patch:
+        fakes.replace_functions(patch, **STAND_IN)
+        campaign.run(study, path, 1, 1000, check=check, **choices)
     return path
 
 
@@ -275,8 +276,8 @@ def test_rows_of_a_slice_are_those_of_the_campaign(tmp_path: Path, make: Make) -
 
 @pytest.mark.slow
 def test_commands(tmp_path: Path, make: Make, monkeypatch: pytest.MonkeyPatch) -> None:
-    study, own = make(60), campaign.run
-    monkeypatch.setattr(campaign, "run", lambda *args, **rest: own(*args, **rest | {"stages": STAGES}))
+    study = make(60)
+    fakes.replace_functions(monkeypatch, **STAND_IN)
     monkeypatch.chdir(tmp_path)
 
     def call(*words: str, code: int = 0) -> str:

@@ -7,7 +7,7 @@ from typer.testing import CliRunner
 
 from tests.support import synthetic
 from tolstat.analysis import accuracy, exceedance, prediction
-from tolstat.campaign import checks, near, verify
+from tolstat.campaign import checks, verify
 from tolstat.cli import app
 from tolstat.common.errors import InputError
 from tolstat.common.tables import Status
@@ -53,7 +53,7 @@ def path(tmp_path, monkeypatch):
 
 @pytest.mark.slow
 def test_the_joints_nearest_to_the_limits_are_verified_once(path):
-    found = near.check_near(path, "cross1.F > 720 N")
+    found = verify.check_near(path, "cross1.F > 720 N")
     with ResultFile.open(path) as store:
         view = store.view()
         load = view.load("cross1.F")
@@ -65,7 +65,7 @@ def test_the_joints_nearest_to_the_limits_are_verified_once(path):
         assert "not known" in error_budget.unknown(view)
     assert np.nanmedian(low.values / load.values) == pytest.approx(1.02, rel=1e-3)
     assert (low.values <= high.values)[load.is_valid].all()
-    more = near.check_near(path, "any limit")
+    more = verify.check_near(path, "any limit")
     assert set(found.rows) < set(more.rows)
     assert (np.diff(more.rows) > 0).all()
     with ResultFile.open(path) as store:
@@ -87,7 +87,7 @@ def test_a_check_that_fails_near_the_limit_does_not_hide_what_the_others_tell(pa
         return found
 
     monkeypatch.setattr(verify, "check_slots", check_but_one)
-    near.check_near(path, "cross1.F > 720 N", joints=60)
+    verify.check_near(path, "cross1.F > 720 N", joints=60)
     with ResultFile.open(path) as store:
         row = exceeded.limits(store.view()).set_index("load").loc["cross1.F"]
     assert row["numerical_lower"] > row["estimate"]  # all loads are 2 % too small
@@ -104,7 +104,7 @@ def test_ppm_and_reweighting_carry_it(path):
 
     before, reweighted = tables()
     assert reweighted["total_upper"].isna().all()
-    near.check_near(path, "any limit")
+    verify.check_near(path, "any limit")
     after, moved = tables()
     assert after.loc["cross1.F", "ppm_upper"] > before.loc["cross1.F", "ppm_upper"]
     assert after.loc["all limits", "next_upper"] > before.loc["all limits", "next_upper"]
@@ -114,7 +114,7 @@ def test_ppm_and_reweighting_carry_it(path):
 
 def test_fewer_than_fifty_joints_are_refused(path):
     with pytest.raises(InputError, match="49 joints do not tell"):
-        near.check_near(path, "any limit", 49)
+        verify.check_near(path, "any limit", 49)
     done = CliRunner().invoke(app, ["verify", str(path), "--near", "cross9.F > 1 N"])
     assert done.exit_code == 2
     assert "'cross9.F' is not a load" in done.stderr

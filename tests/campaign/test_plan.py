@@ -154,10 +154,9 @@ def test_the_report_says_that_the_campaign_was_stopped(tmp_path: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.usefixtures("few_looks")
 def test_run_until_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from tests.campaign.test_extend import STAGES
+    from tests.campaign.test_extend import STAND_IN
 
-    own = campaign.run
-    monkeypatch.setattr(campaign, "run", lambda *args, **rest: own(*args, **rest | {"stages": STAGES}))
+    fakes.replace_functions(monkeypatch, **STAND_IN)
     monkeypatch.chdir(tmp_path)
     Path("s.toml").write_text(synthetic.STUDY.replace("n = 60", "n = 400"), encoding="utf-8")
     words = ["run", "s.toml", "--until", RULE, "--workers", "1", "--no-report"]

@@ -29,13 +29,14 @@ from tests.support import damage, fakes
 from tolstat import cli
 from tolstat.campaign import run as campaign
 from tolstat.campaign.block import without_simulation
-from tolstat.campaign.blocks import MAX_BLOCK, Execution, Pace
-from tolstat.campaign.retry import Retry, parse
+from tolstat.campaign.blocks import MAX_BLOCK, Pace
+from tolstat.campaign.pool import WorkerDied
+from tolstat.campaign.remedy import Retry, parse_retry
 from tolstat.common.counts import Counts
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.tables import SIMULATED, Fidelity, Options, Simulation, Status
 from tolstat.joint import Operation
-from tolstat.store import ResultFile
+from tolstat.store import ResultFile, verification
 from tolstat.study.model import Solver
 
 LONG = bool(os.environ.get("TOLSTAT_LONG"))
@@ -59,22 +60,93 @@ def assert_same_but(path: Path, expected: dict[str, bytes], rows: list[int]) -> 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("workers", "block"), [(2, 4), (1, 40)] if LONG else [(2, 4)])
-def test_a_joint_that_kills_and_one_that_hangs_are_marked(
+@pytest.mark.usefixtures("in_workers")
+@pytest.mark.parametrize(("workers", "block"), [(2, 4), (1, 40)])
+def test_joints_that_kill_or_raise_are_marked_and_cost_only_themselves(
     tmp_path: Path, expected: dict[str, bytes], workers: int, block: int
 ) -> None:
     study, path, told = fakes.Study(), tmp_path / "a.h5", []
     values = fakes.draw(study)["pin1.offset_t"]
-    bad = partial(fakes.simulate_badly, kills=values[17], hangs=values[30])
-    execution = Execution("processes", workers, block, joint_timeout=0.1)
-    counts = fakes.run(study, path, stages=fakes.stages(bad), execution=execution, tell=told.append)
+    bad = partial(fakes.simulate_badly, kills=values[17], raises=values[30])
+    counts = fakes.run(study, path, workers, block, simulate_rows=bad, tell=told.append)
     assert counts.done == 40
     with ResultFile.open(path) as store:
-        assert store.status()[[17, 30]].tolist() == [Status.CRASHED, Status.TIMEOUT]
+        assert store.status()[[17, 30]].tolist() == [Status.CRASHED, Status.CRASHED]
         assert np.isnan(store.results()["F_max"][[17, 30]]).all()
-    hung = "row 30: timeout: made no progress in 0.1 s of processor time"
-    assert sorted(told) == ["row 17: crashed: killed by SIGKILL", hung]
+    raised = "row 30: crashed: ZeroDivisionError: a bug of this joint"
+    assert sorted(told) == ["row 17: crashed: killed by SIGKILL", raised]
     assert_same_but(path, expected, [17, 30])
+    again = Retry((Status.CRASHED,), {}, study.solver.options())
+    assert fakes.run(study, path, retry=again, tell=told.append).done == 40
+    with ResultFile.open(path) as store:
+        assert not (store.status() == Status.CRASHED).any()
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("in_workers")
+def test_a_machine_on_which_workers_die_ends_the_run_and_keeps_what_is_done(
+    tmp_path: Path, expected: dict[str, bytes]
+) -> None:
+    path = tmp_path / "a.h5"
+    dying = partial(simulate_until, folder=str(tmp_path / "done"))
+    (tmp_path / "done").mkdir()
+    with pytest.raises(WorkerDied, match=r"(?s)8 times in a row .*holds the results of \d+ of 40 joints; to resume"):
+        fakes.run(fakes.Study(), path, 1, 4, simulate_rows=dying)
+    with ResultFile.open(path) as store:
+        assert 16 <= store.counts().done < 30
+    again = Retry((Status.CRASHED,), {}, fakes.Study().solver.options())
+    fakes.run(fakes.Study(), path, retry=again, tell=lambda _: None)
+    found = datasets(path)
+    assert {name: found[name] for name in expected if name.startswith("results/")} == {
+        name: held for name, held in expected.items() if name.startswith("results/")
+    }
+
+
+def simulate_until(params: np.ndarray, options: Options, histories: str, n_harmonics: int, folder: str) -> Simulation:
+    """Simulate four blocks; then every process dies."""
+    if len(list(Path(folder).iterdir())) == 4:
+        os.kill(os.getpid(), signal.SIGKILL)
+    Path(folder, str(params["R"][0])).touch()
+    return fakes.simulate(params, options, histories, n_harmonics)
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("in_workers")
+def test_a_joint_that_kills_in_the_check_of_a_run_does_not_end_it(tmp_path: Path) -> None:
+    study, path = fakes.Study(n=3, solver=fakes.Solver(Options().steps_per_rev)), tmp_path / "a.h5"
+    assert fakes.run(study, path, 1, 3, check=True, simulate_rows=simulate_checks_badly).done == 3
+    with ResultFile.open(path) as store:
+        found = verification.read(store)
+    assert found is not None
+    status = {name: check.results["status"].tolist() for name, check in found.checks.items()}
+    assert status == {"half_step": [Status.CRASHED], "newton": [Status.OK], "settling": [Status.OK]}
+
+
+def simulate_checks_badly(params: np.ndarray, options: Options, histories: str, n_harmonics: int) -> Simulation:
+    """Simulate; joints with finer steps kill their process."""
+    if options.steps_per_rev > Options().steps_per_rev:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return fakes.simulate(params, options, histories, n_harmonics)
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("in_workers")
+def test_a_joint_that_kills_in_the_pilot_of_a_fidelity_is_no_joint_of_the_others() -> None:
+    study = fakes.Study(n=3)
+    kills = fakes.draw(study)["pin1.offset_t"][1]
+    with fakes.in_place(simulate_rows=partial(simulate_pilot_badly, kills=kills)):
+        record = campaign.choose_fidelity(study)
+    differing = {(rung["fidelity"], rung["steps_per_rev"]): rung["differing"] for rung in record["table"]}
+    assert [rung for rung, joints in differing.items() if joints] == [("quasistatic", 36), ("quasistatic", 60)]
+
+
+def simulate_pilot_badly(
+    params: np.ndarray, options: Options, histories: str, n_harmonics: int, kills: float
+) -> Simulation:
+    """Simulate; one joint kills its process with few quasi-static steps."""
+    if kills in params["R"] and options.fidelity == Fidelity.QUASISTATIC and options.steps_per_rev < 90:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return fakes.simulate(params, options, histories, n_harmonics)
 
 
 @pytest.mark.parametrize("workers", [1, 2])
@@ -83,8 +155,7 @@ def test_parameters_that_are_no_numbers_are_not_simulated(
     tmp_path: Path, expected: dict[str, bytes], workers: int
 ) -> None:
     path = tmp_path / "a.h5"
-    stages = fakes.stages()._replace(perturb=perturb_badly)
-    fakes.run(fakes.Study(), path, workers, 4, stages=stages)
+    fakes.run(fakes.Study(), path, workers, 4, perturb=perturb_badly)
     with ResultFile.open(path) as store:
         bad = np.flatnonzero(store.errors()["operation.alpha"] > 1.5)
         assert bad.size
@@ -296,8 +367,8 @@ def simulate_finely(params: np.ndarray, options: Options, histories: str, n_harm
 @pytest.mark.slow
 def test_failed_joints_are_simulated_again_with_other_settings(tmp_path: Path, histories: str) -> None:
     study, path, told = fakes.Study(output=fakes.Output(histories)), tmp_path / "a.h5", []
-    stages = fakes.stages(simulate_finely)
-    fakes.run(study, path, 1, stages=stages)
+    run = partial(fakes.run, study, path, simulate_rows=simulate_finely)
+    run()
     before = datasets(path)
     with ResultFile.open(path) as store:
         failed = np.flatnonzero(store.status() == Status.NEWTON_FAILED)
@@ -307,9 +378,9 @@ def test_failed_joints_are_simulated_again_with_other_settings(tmp_path: Path, h
             raise KeyboardInterrupt
 
     with pytest.raises(campaign.Interrupted):
-        fakes.run(study, path, 1, 1, progress=interrupt, stages=stages, retry=AGAIN, tell=told.append)
-    fakes.run(study, path, 2, 1, stages=stages)  # the rows to come know their settings
-    assert fakes.run(study, path, 1, stages=stages, retry=AGAIN, tell=told.append).failed == 0
+        run(1, 1, progress=interrupt, retry=AGAIN, tell=told.append)
+    run(2, 1)  # the rows to come know their settings
+    assert run(retry=AGAIN, tell=told.append).failed == 0
     assert told == [f"{failed.size} joints are simulated again", "0 joints are simulated again"]
     with ResultFile.open(path) as store:
         assert store.retries == (json.loads(json.dumps(AGAIN.entry())),)
@@ -327,20 +398,19 @@ def test_a_retry_that_changes_the_shape_of_histories_is_refused(tmp_path: Path) 
     study, path = fakes.Study(output=fakes.Output("full")), tmp_path / "a.h5"
     fakes.run(study, path, 1)
     before = path.read_bytes()
-    stages = fakes.stages()._replace(history_specs=lambda *args: {})
     with pytest.raises(InputError, match="another number of samples than those in the file"):
-        fakes.run(study, path, 1, stages=stages, retry=AGAIN)
+        fakes.run(study, path, retry=AGAIN, history_specs=lambda *args: {})
     assert path.read_bytes() == before
 
 
 def test_what_is_asked_for_again_is_read_with_all_faults() -> None:
     study = SimpleNamespace(solver=Solver(), has_axial_force=False)
-    again = parse("newton_failed, timeout", ["solver.steps_per_rev=360", "solver.method=tr_bdf2"], study)
-    assert again.status == (Status.NEWTON_FAILED, Status.TIMEOUT)
+    again = parse_retry("newton_failed, crashed", ["solver.steps_per_rev=360", "solver.method=tr_bdf2"], study)
+    assert again.status == (Status.NEWTON_FAILED, Status.CRASHED)
     assert again.settings == {"solver.steps_per_rev": 360, "solver.method": "tr_bdf2"}
     assert again.options == Solver(steps_per_rev=360, method="tr_bdf2").options()
     with pytest.raises(InputError) as caught:
-        parse("newton_faild,pending", ["limits.F=3", "solver.steps_per_rev=2.5", "solver.steps_per_re=1"], study)
+        parse_retry("newton_faild,pending", ["limits.F=3", "solver.steps_per_rev=2.5", "solver.steps_per_re=1"], study)
     text = str(caught.value)
     assert len(caught.value.faults) == 5
     assert "did you mean 'newton_failed'?" in text
@@ -351,9 +421,9 @@ def test_what_is_asked_for_again_is_read_with_all_faults() -> None:
 def test_what_auto_chose_holds_for_joints_that_are_simulated_again() -> None:
     study = SimpleNamespace(solver=Solver(fidelity="auto"), has_axial_force=False)
     chosen = {"fidelity": "quasistatic", "steps_per_rev": 60}
-    again = parse("timeout", ["solver.newton_max_iter=40"], study).chosen(chosen).options
+    again = parse_retry("crashed", ["solver.newton_max_iter=40"], study).chosen(chosen).options
     assert (again.fidelity, again.steps_per_rev, again.newton_max_iter) == (Fidelity.QUASISTATIC, 60, 40)
-    again = parse("timeout", ["solver.fidelity=dynamic"], study).chosen(chosen).options
+    again = parse_retry("crashed", ["solver.fidelity=dynamic"], study).chosen(chosen).options
     assert again == Options()
 
 

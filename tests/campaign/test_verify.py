@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -164,7 +165,7 @@ def test_errors_are_relative_to_the_largest_of_the_kind():
 
 def test_a_run_checks_a_few_joints_and_a_file_gives_them_back(tmp_path):
     path = tmp_path / "a.h5"
-    campaign.run(fakes.Study(n=900), path, 1, stages=fakes.stages())
+    fakes.run(fakes.Study(n=900), path, check=True)
     with ResultFile.open(path) as store:
         found = verification.read(store)
         assert found is not None
@@ -185,18 +186,19 @@ def test_a_run_checks_a_few_joints_and_a_file_gives_them_back(tmp_path):
 
 
 def test_a_run_can_do_without(tmp_path):
-    campaign.run(fakes.Study(), tmp_path / "a.h5", 1, stages=fakes.stages(), check=False)
+    fakes.run(fakes.Study(), tmp_path / "a.h5")
     with ResultFile.open(tmp_path / "a.h5") as store:
         assert verification.read(store) is None
 
 
-def test_a_slice_keeps_the_rows_of_the_campaign(tmp_path):
+def test_a_slice_keeps_the_rows_of_the_campaign(tmp_path, monkeypatch):
     (tmp_path / "plan.toml").write_text(synthetic.STUDY, encoding="utf-8")
     plan, rows, results = study.load(tmp_path / "plan.toml"), range(20, 30), synthetic.results(61)[20:30]
     with Writer.create(tmp_path / "b.h5", plan, [sampling.draw(plan, rows)], rows=rows) as store:
         store.write(np.arange(10), Simulation(results, {}))
         solve = lambda slots, *_, **__: Simulation(results[slots], {})  # noqa: E731
-        checked = verify.check_campaign(store, lambda slots: slots, ("newton",), 3, 7, solve)
+        monkeypatch.setattr(verify, "run_checks", partial(checks.run_checks, simulate=solve))
+        checked = verify.check_campaign(store, lambda slots: slots, ("newton",), 3, 7)
         verification.write(store, checked)
     with ResultFile.open(tmp_path / "b.h5") as store:
         found = verification.read(store)

@@ -5,7 +5,6 @@ import os
 import re
 import subprocess
 import sys
-from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -18,7 +17,7 @@ import tolstat
 from tests.support import fakes, synthetic
 from tolstat import cli
 from tolstat.campaign import run as campaign
-from tolstat.campaign.executors import WorkerDied
+from tolstat.campaign.pool import WorkerDied
 from tolstat.common.columns import ERROR_COLUMNS, RESULT_COLUMNS
 from tolstat.common.load_kinds import BUSHINGS
 from tolstat.common.tables import Simulation, Status
@@ -50,20 +49,11 @@ def simulate(params, options, histories="none", n_harmonics=16):
     return Simulation(synthetic.results(len(params)), {})
 
 
-def invented_campaign():
-    """`campaign.run` with a stand-in for the solver."""
-    from tolstat import joint, sampling
-
-    own = sampling.draw_blocks, sampling.dimensions, joint.perturb
-    stages = campaign.Stages(*own, lambda *_: {}, simulate, fakes.warm_up, sampling.origin_blocks)
-    return partial(campaign.run, stages=stages)
-
-
 @pytest.fixture
 def study(tmp_path, monkeypatch):
     """Write a study into the current folder and put a solver in place that invents its results."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(campaign, "run", invented_campaign())
+    fakes.replace_functions(monkeypatch, **fakes.SOLVER | {"simulate_rows": simulate})
     path = tmp_path / "small.toml"
     path.write_text(synthetic.STUDY, encoding="utf-8")
     return path
@@ -358,7 +348,7 @@ def test_completion_knows_the_commands_and_loads_nothing_heavy():
 
 @pytest.mark.slow
 def test_run_ends_with_the_report_and_resumes(study):
-    done = call("run", study, "--executor", "serial")
+    done = call("run", study, "--workers", 1)
     assert done.exit_code == 0, done.stderr
     verdict, mounting, _, head, *_ = done.stdout.splitlines()
     assert verdict.startswith("No verdict")
@@ -368,7 +358,7 @@ def test_run_ends_with_the_report_and_resumes(study):
     assert done.stderr.endswith("next: tolstat report small.h5 --out small.html\n")
     with ResultFile.open("small.h5") as store:
         assert store.complete
-    again = call("run", study, "--executor", "serial")
+    again = call("run", study, "--workers", 1)
     assert (again.exit_code, again.stdout) == (0, done.stdout)
 
 
@@ -391,7 +381,7 @@ def test_run_says_why_joints_have_no_load_and_how_to_try_again(study, monkeypatc
 
 
 def test_run_with_fewer_joints_into_another_file_without_report(study, tmp_path):
-    done = call("run", study, "--n", 5, "--out", "five.h5", "--executor", "serial", "--no-report")
+    done = call("run", study, "--n", 5, "--out", "five.h5", "--workers", 1, "--no-report")
     assert (done.exit_code, done.stdout) == (0, "")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["five.h5", "small.toml"]
 
@@ -400,14 +390,14 @@ def test_run_with_fewer_joints_into_another_file_without_report(study, tmp_path)
 def test_run_checks_the_numerical_error_by_default(study, monkeypatch, option, checks):
     told, run = [], campaign.run
     monkeypatch.setattr(campaign, "run", lambda *a, check=True, **k: told.append(check) or run(*a, **k))
-    assert call("run", study, "--executor", "serial", "--no-report", option).exit_code == 0
+    assert call("run", study, "--workers", 1, "--no-report", option).exit_code == 0
     assert told == [checks]
 
 
 def test_run_refuses_the_file_of_another_study(study):
-    call("run", study, "--n", 5, "--executor", "serial", "--no-report")
+    call("run", study, "--n", 5, "--workers", 1, "--no-report")
     study.write_text(synthetic.STUDY.replace("seed = 2021", "seed = 1"), encoding="utf-8")
-    done = call("run", study, "--n", 5, "--executor", "serial")
+    done = call("run", study, "--n", 5, "--workers", 1)
     assert done.exit_code == 2
     assert "sampling.seed: 2021 in the file, 1 in the study" in done.stderr
     assert "hint: give another file: --out OTHER.h5" in done.stderr
@@ -415,21 +405,21 @@ def test_run_refuses_the_file_of_another_study(study):
 
 @pytest.mark.slow
 def test_another_number_of_joints_is_an_extension_of_the_file(study):
-    call("run", study, "--n", 5, "--executor", "serial", "--no-report")
+    call("run", study, "--n", 5, "--workers", 1, "--no-report")
     before = Path("small.h5").read_bytes()
-    more = call("run", study, "--executor", "serial")
+    more = call("run", study, "--workers", 1)
     assert more.exit_code == 2
     assert more.stderr == (
         "small: shafts rigid along their axes; contact law mode\n"
         "error: small.h5: is the result file of this study with 5 joints, not 60\n"
         "  hint: simulate more of its joints: tolstat extend small.h5 --n 60\n"
     )
-    fewer = call("run", study, "--n", 3, "--executor", "serial")
+    fewer = call("run", study, "--n", 3, "--workers", 1)
     assert "hint: read it as it is: tolstat report small.h5, or give another file: --out OTHER.h5" in fewer.stderr
     assert Path("small.h5").read_bytes() == before
     study.write_text(synthetic.STUDY.replace("seed = 2021", 'method = "lhs"'), encoding="utf-8")
-    call("run", study, "--n", 5, "--executor", "serial", "--no-report", "--out", "lhs.h5")
-    strata = call("run", study, "--executor", "serial", "--out", "lhs.h5")
+    call("run", study, "--n", 5, "--workers", 1, "--no-report", "--out", "lhs.h5")
+    strata = call("run", study, "--workers", 1, "--out", "lhs.h5")
     assert "hint: give another file: --out OTHER.h5; a Latin hypercube has as many strata" in strata.stderr
 
 
@@ -483,7 +473,7 @@ def case(tmp_path):
 
 def test_simulate_prints_json_or_text_and_writes_the_trace(case, tmp_path, monkeypatch):
     made = simulated("ok", 1.5)
-    monkeypatch.setattr("tolstat.campaign.trace.simulate_case", lambda _: made)
+    monkeypatch.setattr("tolstat.campaign.replay.simulate_case", lambda _: made)
     done = call("simulate", case, "--json", "--out", tmp_path / "trace.csv")
     assert done.exit_code == 0, done.stderr
     assert json.loads(done.stdout) == made.summary()
@@ -494,7 +484,7 @@ def test_simulate_prints_json_or_text_and_writes_the_trace(case, tmp_path, monke
 
 
 def test_simulate_of_a_joint_that_fails_is_data_with_a_warning(case, monkeypatch):
-    monkeypatch.setattr("tolstat.campaign.trace.simulate_case", lambda _: simulated("newton_failed", None))
+    monkeypatch.setattr("tolstat.campaign.replay.simulate_case", lambda _: simulated("newton_failed", None))
     done = call("simulate", case)
     assert done.exit_code == 0
     assert done.stdout.splitlines()[-1].split() == ["fork4", "N", "-", "1", "-"]
@@ -515,7 +505,7 @@ contact.stations = [
 @pytest.mark.slow
 def test_probable_mistakes_are_warnings(tmp_path, monkeypatch, command):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("tolstat.campaign.trace.simulate_case", lambda _: simulated("ok", 1.5))
+    monkeypatch.setattr("tolstat.campaign.replay.simulate_case", lambda _: simulated("ok", 1.5))
     text = synthetic.STUDY.replace("n = 60", "n = 2").replace("[operation]", f"{UNDAMPED}[operation]")
     if command == "simulate":
         text = text.partition("[tolerances]")[0]

@@ -16,8 +16,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
-from tests.support import synthetic
+from tests.support import fakes, synthetic
 from tolstat import joint, sampling, study
 from tolstat.campaign import run as campaign
 from tolstat.common.counts import Counts
@@ -42,9 +43,6 @@ def warm_up(_: Options, __: np.ndarray | None = None) -> None:
     """Stub: there is nothing to compile."""
 
 
-STAGES = campaign.Stages(sampling.draw_blocks, sampling.dimensions, joint.perturb, no_histories, simulate, warm_up)
-
-
 def peak_bytes() -> int:
     """Largest memory of this process so far."""
     return 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
@@ -58,7 +56,9 @@ def measure(n: int, folder: Path, block: int = 4096, results: Sequence[str] = ()
         text = f"{text.partition('[limits]')[0]}[output]\nresults = {json.dumps(results)}\n"
     source.write_text(text, encoding="utf-8")
     plan, path = study.load(source), folder / "scale.h5"
-    small: dict[str, Any] = {"workers": 1, "block": block, "stages": STAGES}
+    small: dict[str, Any] = {"workers": 1, "block": block}
+    stand_in = {"simulate_rows": simulate, "history_specs": no_histories, "warm_up": warm_up}
+    fakes.replace_functions(pytest.MonkeyPatch(), **stand_in, is_compiled=lambda *_: False)
     campaign.run(study.load(source, n=1000), folder / "first.h5", **small)  # what the code itself takes
     (folder / "first.h5").unlink()
     before, times = peak_bytes(), [time.perf_counter()]

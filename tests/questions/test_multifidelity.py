@@ -2,7 +2,6 @@
 
 import json
 import math
-from functools import partial
 
 import numpy as np
 import pytest
@@ -10,10 +9,9 @@ from scipy.stats import norm
 from typer.testing import CliRunner
 
 from tests.support import fakes, synthetic
-from tolstat import joint, sampling, study
+from tolstat import study
 from tolstat.analysis import multifidelity as analysis
 from tolstat.analysis.multifidelity import Pairs
-from tolstat.campaign import run as campaign
 from tolstat.cli import app
 from tolstat.common.errors import InputError
 from tolstat.common.tables import RESULT, Fidelity, Simulation, Status
@@ -118,10 +116,7 @@ def simulate(params, options, histories="none", n_harmonics=0):
 
 @pytest.fixture
 def plan(tmp_path, monkeypatch):
-    stages = campaign.Stages(
-        sampling.draw_blocks, sampling.dimensions, joint.perturb, lambda *_: {}, simulate, fakes.warm_up
-    )
-    monkeypatch.setattr(campaign, "run", partial(campaign.run, stages=stages))
+    fakes.replace_functions(monkeypatch, **fakes.SOLVER | {"simulate_rows": simulate})
     costs = {"dynamic": 5e-3, "quasistatic": 4e-4}
     monkeypatch.setattr(multifidelity, "_cost", lambda plan: costs[plan.study.solver.fidelity])
     path = tmp_path / "plan.toml"

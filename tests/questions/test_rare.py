@@ -3,7 +3,6 @@
 import doctest
 import json
 import shutil
-from functools import partial
 from pathlib import Path
 
 import h5py
@@ -131,18 +130,8 @@ def simulate(params, options, histories="none", n_harmonics=0):
     return Simulation(results, {})
 
 
-def stages(simulate=simulate):
-    return campaign.Stages(
-        sampling.draw_blocks,
-        sampling.dimensions,
-        perturb,
-        lambda *_: {},
-        simulate,
-        fakes.warm_up,
-        sampling.origin_blocks,
-    )
-
-
+INVENTED = fakes.SOLVER | {"perturb": perturb, "simulate_rows": simulate}
+"""Functions in place of the solver's."""
 RUN = campaign.run
 SEEN = []
 """Counts that `once` reports."""
@@ -151,7 +140,7 @@ SEEN = []
 @pytest.fixture(autouse=True)
 def _invented(monkeypatch):
     """Put a solver in place that knows a formula."""
-    monkeypatch.setattr(campaign, "run", partial(RUN, stages=stages()))
+    fakes.replace_functions(monkeypatch, **INVENTED)
 
 
 @pytest.fixture(scope="module")
@@ -159,7 +148,7 @@ def once(tmp_path_factory):
     folder = tmp_path_factory.mktemp("rare")
     plan, path = asked(load(folder)), folder / "whole.h5"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(campaign, "run", partial(RUN, stages=stages()))
+        fakes.replace_functions(patch, **INVENTED)
         return plan, rare.run(plan, path, tell=lambda _: None, progress=SEEN.append), path
 
 
@@ -223,9 +212,10 @@ def test_stopped_and_gone_on_with_it_is_the_same_in_any_blocks(tmp_path, whole, 
         return simulate(params, options)
 
     def in_small_blocks(*args, execution, **kwargs):
-        return RUN(*args, execution=campaign.Execution("serial", 1, block=30), stages=stages(stop_at_times), **kwargs)
+        return RUN(*args, execution=Execution(workers=1, block=30), **kwargs)
 
     monkeypatch.setattr(campaign, "run", in_small_blocks)
+    fakes.replace_functions(monkeypatch, simulate_rows=stop_at_times)
     other, stops = tmp_path / "other.h5", 0
     while True:
         try:
@@ -358,21 +348,3 @@ def test_intervals_of_four_seeds_cover():
         rendering.together([walk_of(linear, 100, 2.5, 4 * k + i, 3).estimate() for i in range(4)])[0] for k in range(60)
     ]
     assert np.mean([one.lower < norm.sf(2.5) < one.upper for one in found]) > 0.95 - 3 * np.sqrt(0.95 * 0.05 / 60)
-
-
-def hang_together(params, options, histories="none", n_harmonics=0):
-    while len(params) > 6:
-        pass
-    return simulate(params, options)
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("supervised")
-def test_a_stage_whose_blocks_outlast_their_limit_ends(tmp_path, monkeypatch):
-    monkeypatch.setattr(rare, "Execution", partial(Execution, joint_timeout=0.01))
-    plan, whole, parts = asked(load(tmp_path), beta=-1.0, per_level=20), tmp_path / "a.h5", tmp_path / "b.h5"
-    rare.run(plan, whole, tell=lambda _: None)
-    monkeypatch.setattr(campaign, "run", partial(RUN, stages=stages(hang_together)))
-    found = rare.run(plan, parts, tell=lambda _: None)
-    assert (found.reached, found.joints) == (True, 20)
-    assert datasets(parts) == datasets(whole)

@@ -37,8 +37,7 @@ def _perturb(joint, operation, errors):
     return params
 
 
-STAGES = fakes.stages()._replace(draw=sampling.draw_blocks, perturb=_perturb)
-RUN = partial(tolstat.run, workers=1, stages=STAGES, check=False)
+RUN = partial(fakes.run, draw_blocks=sampling.draw_blocks, perturb=_perturb)
 
 
 @pytest.fixture(scope="module")

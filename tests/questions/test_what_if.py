@@ -17,9 +17,10 @@ from typer.testing import CliRunner
 import tolstat
 from tests.support import fakes, synthetic
 from tolstat import sampling, study
+from tolstat.campaign import blocks
 from tolstat.campaign import what_if as sets
-from tolstat.campaign.executors import kept_workers
 from tolstat.campaign.extend import extend, merge
+from tolstat.campaign.pool import kept_workers
 from tolstat.cli import app
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.tables import RESULT, Simulation, Status
@@ -75,7 +76,7 @@ def stand_in(params, options, histories="none", n_harmonics=0):
 @pytest.fixture
 def quick(monkeypatch):
     """The stand-in takes the place of the solver, in this process."""
-    monkeypatch.setattr(sets, "simulate_rows", stand_in)
+    monkeypatch.setattr(blocks, "simulate_rows", stand_in)
     monkeypatch.setattr(runner, "warm_up", lambda: None)
     monkeypatch.setattr(runner, "FIRST", 512)
     monkeypatch.setattr(runner, "MOST", 1024)
@@ -228,23 +229,23 @@ def test_fewer_changed_joints_move_the_share_of_all(path):
 
 @pytest.mark.usefixtures("quick")
 def test_interrupted_it_goes_on_and_ends_with_the_same_sets(path, tmp_path, monkeypatch):
-    whole, blocks = tmp_path / "whole.h5", []
+    whole, taken = tmp_path / "whole.h5", []
     whole.write_bytes(path.read_bytes())
     runner.simulate(whole, budget=60.0, workers=1)
 
     def failing(*arguments, **options):
-        blocks.append(1)
-        if len(blocks) == 9:
+        taken.append(1)
+        if len(taken) == 9:
             raise KeyboardInterrupt
         return stand_in(*arguments, **options)
 
-    monkeypatch.setattr(sets, "simulate_rows", failing)
+    monkeypatch.setattr(blocks, "simulate_rows", failing)
     with pytest.raises(KeyboardInterrupt):
         runner.simulate(path, budget=60.0, workers=1)
     with ResultFile.open(path) as store:
         begun = what_if.read(store)
     assert 0 < sum(len(one.status) for one in begun.values()) < 9 * sets.BLOCK
-    monkeypatch.setattr(sets, "simulate_rows", stand_in)
+    monkeypatch.setattr(blocks, "simulate_rows", stand_in)
     runner.simulate(path, budget=60.0, workers=1)
     with ResultFile.open(path) as store, ResultFile.open(whole) as other:
         found, expected = what_if.read(store), what_if.read(other)
@@ -265,12 +266,12 @@ def killing(params, options, tilt, **given):
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("quick", "supervised")
+@pytest.mark.usefixtures("quick", "in_workers")
 def test_a_joint_that_kills_its_process_has_no_results(tmp_path, monkeypatch):
     path, plan = made(tmp_path), loaded(tmp_path, TEXT)
     params = perturb(plan.joint, plan.operation, sets.as_drawn(plan).draw(range(4)))
-    monkeypatch.setattr(sets, "simulate_rows", partial(killing, tilt=params["pin_axis"][2, 0, 2]))
-    monkeypatch.setattr(sets, "warm_up", fakes.warm_up)
+    monkeypatch.setattr(blocks, "simulate_rows", partial(killing, tilt=params["pin_axis"][2, 0, 2]))
+    monkeypatch.setattr(blocks, "warm_up", fakes.warm_up)
     with Writer.open(path) as store, kept_workers():
         options, wanted = sets.options_of(plan, store), [sets.Wanted(sets.as_drawn(plan), range(4))]
         assert 0 < sets.seconds_per_joint(plan, options, 4, [""]) < 1
@@ -506,7 +507,7 @@ def test_a_joint_that_fails_at_one_point_has_no_worst_load(tmp_path, monkeypatch
         return found
 
     path = written(tmp_path, TWO)
-    monkeypatch.setattr(sets, "simulate_rows", failing)
+    monkeypatch.setattr(blocks, "simulate_rows", failing)
     runner.simulate(path, budget=60.0, workers=1)
     with ResultFile.open(path) as store:
         for one in what_if.read(store).values():

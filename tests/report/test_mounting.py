@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from tests.support import fakes, synthetic
-from tolstat import joint, report, sampling
-from tolstat.campaign import run as campaign
+from tolstat import report
 from tolstat.cli import app
 from tolstat.common.tables import Simulation
 from tolstat.report import page, summary
@@ -36,10 +34,8 @@ def simulate(params, options, histories="none", n_harmonics=16):
 @pytest.fixture(autouse=True)
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Work in an empty folder, with a solver that invents its results."""
-    own = sampling.draw_blocks, sampling.dimensions, joint.perturb
-    stages = campaign.Stages(*own, lambda *_: {}, simulate, fakes.warm_up, sampling.origin_blocks)
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(campaign, "run", partial(campaign.run, stages=stages))
+    fakes.replace_functions(monkeypatch, **fakes.SOLVER | {"simulate_rows": simulate})
 
 
 def call(*args: str):

@@ -311,7 +311,7 @@ def test_histories_have_the_steps_that_were_chosen(tmp_path, kind, least):
 
 def test_other_fidelities_choose_nothing(tmp_path, monkeypatch):
     monkeypatch.setattr(fidelity, "choose", lambda *args: pytest.fail("chosen"))
-    campaign.run(fakes.Study(), tmp_path / "a.h5", 1, stages=fakes.stages())
+    fakes.run(fakes.Study(), tmp_path / "a.h5", check=True)
     with ResultFile.open(tmp_path / "a.h5") as store:
         assert store.fidelity == {}
 

@@ -15,11 +15,11 @@ from tolstat.analysis.sorted_loads import Intervals
 from tolstat.common.errors import InputError
 from tolstat.common.loads import LOADS
 from tolstat.common.shown import short, shown
-from tolstat.store import Reader, ResultFile, Writer
+from tolstat.store import ResultFile, Writer
 from tolstat.store.sample_load import largest_of
 
 MAX_REPR = 250
-WRITING = {name for name in set(dir(Writer)) - set(dir(Reader)) if not name.startswith("_")}
+WRITING = {name for name in set(dir(Writer)) - set(dir(ResultFile)) if not name.startswith("_")}
 
 
 @pytest.fixture(scope="module")

@@ -96,8 +96,8 @@ def test_faults_are_told_together(tmp_path: Path) -> None:
 
 def test_the_file_holds_what_is_asked_for_and_no_more(tmp_path: Path) -> None:
     everything, path = tmp_path / "all.h5", tmp_path / "a.h5"
-    campaign.run(fakes.Study(), everything, 1, stages=fakes.stages())
-    campaign.run(fake(), path, 1, 7, stages=fakes.stages())
+    fakes.run(fakes.Study(), everything, 1, check=True)
+    fakes.run(fake(), path, 1, 7, check=True)
     with h5py.File(path) as file:
         assert set(file["results"]) == {*COURSE, *CROSS_F, "row", "nominal"}
         assert set(file["verify/half_step"]) == {*COURSE, *CROSS_F, "rows"}
@@ -120,28 +120,28 @@ def test_the_file_holds_what_is_asked_for_and_no_more(tmp_path: Path) -> None:
 
 def test_the_checksum_covers_what_is_stored(tmp_path: Path) -> None:
     path = tmp_path / "a.h5"
-    campaign.run(fake(), path, 1, stages=fakes.stages(), check=False)
+    fakes.run(fake(), path, 1)
     whole = datasets(path)
     for name in (*CROSS_F, "closure", "steps"):
         damage.flip_in(path, f"results/{name}", 5)
         with ResultFile.open(path) as store:
             assert not store.status().any()
-        campaign.run(fake(), path, 1, stages=fakes.stages(), check=False)
+        fakes.run(fake(), path, 1)
         assert datasets(path) == whole
 
 
 def test_another_selection_is_another_campaign(tmp_path: Path) -> None:
     path = tmp_path / "a.h5"
-    campaign.run(fake(), path, 1, stages=fakes.stages())
+    fakes.run(fake(), path, 1, check=True)
     other = fakes.Study(output=fakes.Output(results=("psi_max",)))
     for wrong in (fakes.Study(), other):
         with pytest.raises(StoreError, match=r"output\.results: \['cross1\.F_max', .* in the file"):
-            campaign.run(wrong, path, 1, stages=fakes.stages())
+            fakes.run(wrong, path, 1, check=True)
 
 
 def test_lost_and_unknown_columns_are_damage(tmp_path: Path) -> None:
     path = tmp_path / "a.h5"
-    campaign.run(fake(), path, 1, stages=fakes.stages())
+    fakes.run(fake(), path, 1, check=True)
     with h5py.File(path, "r+") as file:
         held = file["results/cross2.F_max"][:]
         del file["results/cross2.F_max"]

@@ -17,7 +17,6 @@ import pytest
 import tolstat
 from tests import format_tables
 from tests.support import fakes
-from tolstat.campaign import run as campaign
 from tolstat.common import tables
 from tolstat.common.columns import ERROR_COLUMNS, RESULT_COLUMNS
 from tolstat.common.counts import Counts
@@ -294,21 +293,21 @@ def test_a_killed_create_leaves_no_half_file(tmp_path: Path) -> None:
     ended = subprocess.run([sys.executable, "-c", code], env=fakes.environment(), check=False)
     assert ended.returncode == -9
     assert not (tmp_path / "a.h5").exists()
-    counts = campaign.run(fakes.Study(), tmp_path / "a.h5", 1, stages=fakes.stages())
+    counts = fakes.run(fakes.Study(), tmp_path / "a.h5", 1, check=True)
     assert counts.done == 40
 
 
 def test_other_sources_of_the_same_version_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path, package = tmp_path / "a.h5", tmp_path / "tolstat"
-    campaign.run(fakes.Study(), path, 1, stages=fakes.stages())
+    fakes.run(fakes.Study(), path, 1, check=True)
     shutil.copytree(Path(tolstat.__file__).parent, package)
     monkeypatch.setattr("tolstat.__file__", str(package / "__init__.py"))
-    campaign.run(fakes.Study(), path, 1, stages=fakes.stages())  # the same code in another place
+    fakes.run(fakes.Study(), path, 1, check=True)  # the same code in another place
     for name in ("kernel/contact.py", "joint/material.py", "tolerance.py"):
         (package / name).write_text("# edited")
         says = rf"a.h5: was begun by another version.*\n    sources: hash .*, {provenance.source_hash()} now\n  hint: "
         with pytest.raises(StoreError, match=says):
-            campaign.run(fakes.Study(), path, 1, stages=fakes.stages())
+            fakes.run(fakes.Study(), path, 1, check=True)
 
 
 def test_wrong_blocks_are_bugs(tmp_path: Path, study: fakes.Study) -> None:

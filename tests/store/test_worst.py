@@ -23,7 +23,7 @@ def tables():
     two["F_max"][::2] *= 1.5
     two["F_max"][1::2] *= 0.5
     one["status"][3], two["status"][5] = Status.NEWTON_FAILED, Status.NOT_SETTLED
-    one["status"][7], two["status"][7] = Status.NOT_SETTLED, Status.TIMEOUT
+    one["status"][7], two["status"][7] = Status.NOT_SETTLED, Status.CRASHED
     two["status"][9] = Status.STATIONARY
     two["F_max"][9], two["F_lower"][9], two["F_upper"][9] = 2 * one["F_max"][9], 0.4, 1.5
     return {"one": one, "two": two}
@@ -43,12 +43,12 @@ def test_a_load_is_the_largest_over_the_points(view, tables):
 
 def test_a_joint_is_resolved_only_if_it_is_at_all_points(view):
     status = view.load("cross1.F").status
-    expected = {2: Status.NEWTON_FAILED, 4: Status.NOT_SETTLED, 6: Status.TIMEOUT, 8: Status.STATIONARY}
+    expected = {2: Status.NEWTON_FAILED, 4: Status.NOT_SETTLED, 6: Status.CRASHED, 8: Status.STATIONARY}
     assert {k: Status(status[k]) for k in np.flatnonzero(status != Status.OK).tolist()} == expected
     assert view.load("cross1.F at one").status[4] == Status.OK
     row = limits(view).iloc[0]
     assert (row["n_failed"], row["n_unsettled"]) == (2, 1)
-    assert view.first_without_load["status"].tolist() == [Status.NEWTON_FAILED, Status.NOT_SETTLED, Status.TIMEOUT]
+    assert view.first_without_load["status"].tolist() == [Status.NEWTON_FAILED, Status.NOT_SETTLED, Status.CRASHED]
 
 
 def test_a_pending_joint_is_pending_at_the_worst(tables):

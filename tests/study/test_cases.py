@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -242,8 +243,8 @@ def test_workers_blocks_and_interruptions_change_no_byte(tmp_path: Path) -> None
         params["alpha"] = of.contact.D_P * 100 + (of.contact.law == "point") * of.cross.R
         return params
 
-    stages = fakes.stages()._replace(draw=sampling.draw_blocks, perturb=perturb)
-    campaign.run(s, tmp_path / "a.h5", 1, 5, stages=stages)
+    run = partial(fakes.run, check=True, draw_blocks=sampling.draw_blocks, perturb=perturb)
+    run(s, tmp_path / "a.h5", 1, 5)
     expected = datasets(tmp_path / "a.h5")
     assert {"design/variant", "design/case", "design/group"} <= expected.keys()
 
@@ -252,12 +253,12 @@ def test_workers_blocks_and_interruptions_change_no_byte(tmp_path: Path) -> None
             raise KeyboardInterrupt
 
     with pytest.raises(campaign.Interrupted):
-        campaign.run(s, tmp_path / "b.h5", 2, 7, progress=interrupt, stages=stages)
-    campaign.run(s, tmp_path / "b.h5", 1, 100, stages=stages)
+        run(s, tmp_path / "b.h5", 2, 7, progress=interrupt)
+    run(s, tmp_path / "b.h5", 1, 100)
     assert datasets(tmp_path / "b.h5") == expected
     changed = load(tmp_path, ('"75.6 mm"', '"75.5 mm"'))
     with pytest.raises(StoreError, match=r"contact.D_P: 0.0756 in the file, 0.0755 in the study"):
-        campaign.run(changed, tmp_path / "b.h5", 1, stages=stages)
+        run(changed, tmp_path / "b.h5", 1)
 
 
 FAULTS = {

@@ -1,4 +1,4 @@
-"""A study and stages that cost nothing, so that stores and campaigns can be tested without a kernel.
+"""A study and functions that cost nothing, so that stores and campaigns can be tested without a kernel.
 
 The numbers depend on the row's errors only, as those of the real simulation do. `main` runs a campaign, for
 tests that kill it.
@@ -9,17 +9,19 @@ from __future__ import annotations
 import os
 import signal
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
 from tests.support.environment import environment as environment
+from tolstat.campaign import blocks
 from tolstat.campaign import run as campaign
-from tolstat.campaign.blocks import Stages
 from tolstat.common import selected_results
 from tolstat.common.columns import Column
 from tolstat.common.counts import Counts
@@ -228,13 +230,13 @@ def simulate_and_raise(params: np.ndarray, options: Options, histories: str, n_h
 
 
 def simulate_badly(
-    params: np.ndarray, options: Options, histories: str, n_harmonics: int, kills: float, hangs: float
+    params: np.ndarray, options: Options, histories: str, n_harmonics: int, kills: float, raises: float = np.nan
 ) -> Simulation:
-    """Simulate, but the joint with one value of R kills its process, and another one takes for ever."""
+    """Simulate, but the joint with one value of R kills its process, and another one is a bug."""
     if kills in params["R"]:
         os.kill(os.getpid(), signal.SIGKILL)
-    while hangs in params["R"]:
-        pass
+    if raises in params["R"]:
+        raise ZeroDivisionError("a bug of this joint")
     return simulate(params, options, histories, n_harmonics)
 
 
@@ -242,13 +244,46 @@ def warm_up(options: Options, params: np.ndarray | None = None) -> None:
     """Compile nothing."""
 
 
-def stages(simulate: Any = simulate) -> Stages:
-    return Stages(draw_blocks, lambda: {"pin1.offset_e": 0}, perturb, history_specs, simulate, warm_up)
+FUNCTIONS: dict[str, Callable[..., Any]] = {
+    "draw_blocks": draw_blocks,
+    "origin_blocks": lambda *_: None,
+    "dimensions": lambda: {"pin1.offset_e": 0},
+    "perturb": perturb,
+    "history_specs": history_specs,
+    "simulate_rows": simulate,
+    "warm_up": warm_up,
+    "is_compiled": lambda *_: False,
+}
+"""Functions that campaigns call, by the names under which they import them."""
+SOLVER = {name: FUNCTIONS[name] for name in ("simulate_rows", "warm_up", "is_compiled")} | {
+    "history_specs": lambda *_: {}
+}
+"""Those of the solver, without histories."""
 
 
-def run(study: Study, path: Path, workers: int = 1, block: int | None = 1000, **choices: Any) -> Counts:
-    """Run a campaign with these stages, in one block, without the check of the numerical error."""
-    return campaign.run(study, path, workers, block, **({"stages": stages(), "check": False} | choices))
+def replace_functions(patch: pytest.MonkeyPatch, **functions: Callable[..., Any]) -> None:
+    """Let campaigns call other functions; workers find `simulate_rows` and `warm_up` in the modules they are from."""
+    for module in (campaign, blocks):
+        for name, function in functions.items():
+            if hasattr(module, name):
+                patch.setattr(module, name, function)
+
+
+@contextmanager
+def in_place(**functions: Callable[..., Any]) -> Iterator[None]:
+    """Let campaigns call those of `FUNCTIONS` inside, or the ones given."""
+    with pytest.MonkeyPatch.context() as patch:
+        replace_functions(patch, **FUNCTIONS | functions)
+        yield
+
+
+def run(
+    study: Any, path: Path, workers: int = 1, block: int | None = 1000, check: bool = False, **choices: Any
+) -> Counts:
+    """Run a campaign with the functions of this module, or those given, in one block, without checks."""
+    functions = {name: choices.pop(name) for name in FUNCTIONS.keys() & choices.keys()}
+    with in_place(**functions):
+        return campaign.run(study, path, workers, block, check=check, **choices)
 
 
 def main(out: str, workers: int, block: int, seconds: float, histories: str = "none", n: int = 40) -> None:
@@ -262,8 +297,7 @@ def main(out: str, workers: int, block: int, seconds: float, histories: str = "n
 
     study = Study(n=n, output=Output(histories))
     try:
-        slow = stages(partial(simulate, seconds=seconds))
-        run(study, Path(out), workers, block, progress=say, stages=slow)
+        run(study, Path(out), workers, block, progress=say, simulate_rows=partial(simulate, seconds=seconds))
     except campaign.Interrupted as stop:
         print(stop, flush=True)
         raise SystemExit(stop.exit_code) from None

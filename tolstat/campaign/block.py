@@ -9,8 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.campaign import executors
-from tolstat.campaign.executors import Lost
+from tolstat.campaign.pool import Lost, Work
 from tolstat.common.tables import PARAM, HistorySpec, Options, Simulation, Status, without_results
 
 
@@ -43,10 +42,6 @@ class Block(NamedTuple):
         parts = [part for part in (slice(half), slice(half, None)) if self.slots[part].size]
         return [self._replace(slots=self.slots[part], params=self.params[part]) for part in parts]
 
-    def size(self) -> int:
-        """Return the number of joints."""
-        return len(self.slots)
-
 
 class Timed(NamedTuple):
     """Result of simulating a block, and the time that it took, s."""
@@ -55,21 +50,14 @@ class Timed(NamedTuple):
     seconds: float
 
 
-BlockWork = executors.Work[Block, Timed | Lost]
+BlockWork = Work[Block, Timed | Lost]
 """How a worker simulates a block."""
 
 
-def prepare(warm_up: Callable[..., object], options: Iterable[Options], params: NDArray[np.void] | None = None) -> None:
-    """Compile what joints with any of the options need, such as `params`, or load it."""
-    for one in options:
-        warm_up(one, params)
-
-
-def _finite(params: NDArray[np.void]) -> NDArray[np.bool_]:
-    good = np.ones(len(params), bool)
-    for name in PARAM.names or ():
-        good &= np.isfinite(params[name]).reshape(len(params), -1).all(axis=1)
-    return good
+def load_kernels(warm_up: Callable[[Options], object], options: Iterable[Options]) -> None:
+    """Load what joints with any of the options need."""
+    for own in options:
+        warm_up(own)
 
 
 def simulate_block(
@@ -79,34 +67,34 @@ def simulate_block(
     specs: Mapping[str, HistorySpec],
     block: Block,
 ) -> Timed:
-    """Simulate a block and measure the time that it takes."""
+    """Simulate the joints of a block and measure the time; those whose parameters are not finite get INVALID_INPUT."""
     begin = time.perf_counter()
-    kept = (histories, n_harmonics, specs) if block.histories else ("none", 0, {})
-    simulation = simulate_finite(simulate, *kept, block)
-    return Timed(simulation, time.perf_counter() - begin)
-
-
-def simulate_finite(
-    simulate: Callable[..., Simulation],
-    histories: str,
-    n_harmonics: int,
-    specs: Mapping[str, HistorySpec],
-    block: Block,
-) -> Simulation:
-    """Simulate the joints of a block with finite parameters; the others get INVALID_INPUT."""
+    if not block.histories:
+        histories, n_harmonics, specs = "none", 0, {}
     good = _finite(block.params)
     whole = without_simulation(len(good), Status.INVALID_INPUT, specs)
-    if not good.any():
-        return whole
-    part = simulate(block.params[good], block.options, histories=histories, n_harmonics=n_harmonics)
-    if good.all():
-        return part
-    whole.results[good] = part.results
-    for name, values in part.histories.items():
-        whole.histories[name][good] = values
-    return whole
+    if good.any():
+        part = simulate(block.params[good], block.options, histories=histories, n_harmonics=n_harmonics)
+        whole.results[good] = part.results
+        for name, values in part.histories.items():
+            whole.histories[name][good] = values
+    return Timed(whole, time.perf_counter() - begin)
 
 
 def without_simulation(n: int, status: Status, specs: Mapping[str, HistorySpec]) -> Simulation:
     """Return what the file stores for `n` joints that have no results: the given status and NaN."""
     return Simulation(without_results(n, status), {name: spec.blank(n) for name, spec in specs.items()})
+
+
+def results_of(block: Block, result: Timed | Lost) -> NDArray[np.void]:
+    """Return the results of a block, (m,) table RESULT; without numbers if it was given up."""
+    if isinstance(result, Lost):
+        return without_results(len(block.slots), Status.CRASHED)
+    return result.simulation.results
+
+
+def _finite(params: NDArray[np.void]) -> NDArray[np.bool_]:
+    good = np.ones(len(params), bool)
+    for name in PARAM.names or ():
+        good &= np.isfinite(params[name]).reshape(len(params), -1).all(axis=1)
+    return good

@@ -1,23 +1,33 @@
-"""Simulate the pending rows of a result file in blocks, on any executor."""
+"""Joints of a result file in blocks through the pool, or a cluster; joints beside them, as checks and pilots do."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterator
 from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.campaign import executors
-from tolstat.campaign.block import Block, BlockWork, Timed, prepare, simulate_block, without_simulation
-from tolstat.campaign.executors import Lost
+from tolstat.campaign import pool
+from tolstat.campaign.block import (
+    Block,
+    BlockWork,
+    load_kernels,
+    results_of,
+    simulate_block,
+    without_simulation,
+)
+from tolstat.campaign.pool import Lost, Work
 from tolstat.common.cores import available_cores
 from tolstat.common.solver_options import from_names
-from tolstat.common.tables import HistorySpec, Options, Simulation, Status
+from tolstat.common.tables import Options, Simulation, Status, without_results
+from tolstat.joint import perturb
+from tolstat.solver.compilation import is_compiled, warm_up
+from tolstat.solver.simulation import simulate_rows
 from tolstat.store import Reader
 from tolstat.store.provenance import versions
 from tolstat.store.recorded import perturbed, settings, variants
@@ -36,45 +46,8 @@ MAX_WRITE_SHARE, MAX_PARENT_SHARE = 0.05, 0.25
 """Largest share of a block's simulation time that writing it may take, and largest share of the parent's time spent on
 writing: beyond a quarter the workers begin to wait for the parent. Writing a block waits twice for the disk, 5 to 50 ms
 together, whatever the block's size."""
-JOINT_TIMEOUT_S = 60.0
-"""Default processor time without progress after which a joint is given up, s: kernels count every iteration, so that
-only what they call in between takes time unseen, a second a block at most."""
-
-
-class Stages(NamedTuple):
-    """Functions that a campaign calls in sequence; tests substitute simple ones.
-
-    Attributes
-    ----------
-    draw : callable
-        Study, rows of the campaign (range) -> their errors, consecutive tables ERROR.
-    dimensions : callable
-        () -> dimension of the sampling sequence, by name of the error.
-    perturb : callable
-        Joint, operating point, (m,) table ERROR -> (m,) table PARAM.
-    history_specs : callable
-        Options, kind of histories, number of harmonics -> HistorySpec by name of the history.
-    simulate : callable
-        (m,) table PARAM, Options, ``histories=``, ``n_harmonics=`` -> Simulation; pickled to other processes.
-    warm_up : callable
-        Options, some joints or None -> None: compiles what `simulate` needs with them. Called before workers start, so
-        that they need not all compile; then called in each worker, to load the compiled code outside the time limit of
-        a joint.
-    origins : callable
-        Study, rows of the campaign (range) -> which proposal or level gave each joint, consecutive tables; None if the
-        sampling method has no such table (`draw_records.columns`).
-    is_compiled : callable
-        Options, some joints or None -> whether `warm_up` only has to load what is compiled: the workers do so then.
-    """
-
-    draw: Callable[..., Iterable[NDArray[np.void]]]
-    dimensions: Callable[[], Mapping[str, int]]
-    perturb: Callable[..., NDArray[np.void]]
-    history_specs: Callable[..., Mapping[str, HistorySpec]]
-    simulate: Callable[..., Simulation]
-    warm_up: Callable[..., object]
-    origins: Callable[..., Iterable[NDArray[np.void]] | None] = lambda *_: None
-    is_compiled: Callable[..., bool] = lambda *_: False
+SOME, READ = 64, 4096
+"""Number of joints that tell which kernels a campaign needs, and of the first rows that they are from."""
 
 
 @dataclass(frozen=True)
@@ -83,24 +56,19 @@ class Execution:
 
     Attributes
     ----------
-    kind : {"processes", "serial", "dask"}, optional
-        Supervised worker processes, this process, or a cluster; without it processes. With "serial" a joint that
-        crashes or hangs takes the campaign with it.
+    kind : {"processes", "dask"}
+        Worker processes on this machine, or a cluster.
     workers : int, optional
         Number of processes; without it the number of cores.
     block : int, optional
         Joints per block; without it as many as take some seconds, see `Pace`.
-    joint_timeout : float
-        Processor time without progress after which a joint is given up, s. A block in which one takes longer is halved
-        and simulated again.
     scheduler : str, optional
         Address of a Dask scheduler, such as ``tcp://host:8786``; without it a cluster is started on this machine.
     """
 
-    kind: Literal["processes", "serial", "dask"] | None = None
+    kind: Literal["processes", "dask"] = "processes"
     workers: int | None = None
     block: int | None = None
-    joint_timeout: float = JOINT_TIMEOUT_S
     scheduler: str | None = None
 
 
@@ -161,27 +129,21 @@ def pending(store: Reader, stop_slot: int) -> Iterator[tuple[Reader, NDArray[np.
                 yield one, slots
 
 
-def work_of(study: Study, store: Reader, stages: Stages, execution: Execution) -> BlockWork:
+def work_of(study: Study, store: Reader) -> BlockWork:
     """Return how a worker simulates the blocks of a campaign."""
-    return executors.Work(
-        partial(simulate_block, stages.simulate, study.output.histories, study.output.harmonics, store.history_specs),
-        Block.split,
-        Block.size,
-        partial(prepare, stages.warm_up, settings_in_use(study, store)),
-        execution.joint_timeout,
-    )
+    kept = study.output.histories, study.output.harmonics, store.history_specs
+    return _work(settings_in_use(study, store), *kept)
+
+
+def _work(options: list[Options], *kept: Any) -> BlockWork:
+    """How a worker simulates blocks with these options and histories."""
+    return Work(partial(simulate_block, simulate_rows, *kept), Block.split, partial(load_kernels, warm_up, options))
 
 
 def simulate_pending(
-    study: Study,
-    store: Reader,
-    stop_slot: int,
-    work: BlockWork,
-    perturb: Callable[..., NDArray[np.void]],
-    execution: Execution,
-    stop: Callable[[], bool],
+    study: Study, store: Reader, stop_slot: int, execution: Execution, stop: Callable[[], bool]
 ) -> Generator[Finished, None, None]:
-    """Simulate the joints in the pending file slots below `stop_slot` as `work_of` says, until `stop` returns true.
+    """Simulate the joints in the pending file slots below `stop_slot`, until `stop` returns true.
 
     Close the generator (`contextlib.closing`) when leaving it early.
 
@@ -195,22 +157,18 @@ def simulate_pending(
     size = execution.block or default_block(todo, workers)
     if not todo:
         return
-    kind = execution.kind or default_kind(workers, -(-todo // size))
     pace = Pace(todo, workers, execution.block)
-    blocks = _blocks(study, store, stop_slot, pace, perturb)
-    results: Generator[tuple[Block, Timed | Lost], None, None]
-    if kind == "serial":
-        results = executors.map_serially(work, blocks, stop)
-    elif kind == "dask":
-        from tolstat.campaign.executors.cluster import map_on_cluster
+    work, blocks = work_of(study, store), _blocks(study, store, stop_slot, pace)
+    if execution.kind == "dask":
+        from tolstat.campaign.cluster import map_on_cluster
 
         results = map_on_cluster(work, blocks, execution.scheduler, workers, versions, stop)
     else:
-        results = executors.map_in_processes(work, blocks, max(1, min(workers, -(-todo // size))), stop)
+        results = pool.map_blocks(work, blocks, max(1, min(workers, -(-todo // size))), stop)
     with closing(results):
         for block, result in results:
             if isinstance(result, Lost):
-                blank = without_simulation(len(block.slots), status_of(result), store.history_specs)
+                blank = without_simulation(len(block.slots), Status.CRASHED, store.history_specs)
                 yield Finished(block.point, block.slots, blank, result.reason)
             else:
                 begin = time.perf_counter()
@@ -219,14 +177,20 @@ def simulate_pending(
                 pace.note(len(block.slots), result.seconds, time.perf_counter() - begin)
 
 
-def status_of(lost: Lost) -> Status:
-    """Return the status of joints that were given up."""
-    return Status.TIMEOUT if lost.kind == "timeout" else Status.CRASHED
+def simulate_beside(params: NDArray[np.void], options: Options, **_: Any) -> Simulation:
+    """Simulate joints, (m,) table PARAM, in one worker and without histories; those that crash get no results."""
+    compile_missing(options)
+    results = without_results(len(params), Status.PENDING)
+    whole = Block("", np.arange(len(params)), params, options, histories=False)
+    with closing(pool.map_blocks(work_beside(options), [whole], 1)) as done:
+        for block, result in done:
+            results[block.slots] = results_of(block, result)
+    return Simulation(results, {})
 
 
-def default_kind(workers: int, blocks: int) -> Literal["processes", "serial"]:
-    """Return where to simulate without further instruction: always supervised, however few joints there are."""
-    return "processes"
+def work_beside(options: Options) -> BlockWork:
+    """Return how a worker simulates blocks without histories."""
+    return _work([options], "none", 0, {})
 
 
 def default_block(n_pending: int, workers: int) -> int:
@@ -240,15 +204,28 @@ def settings_in_use(study: Study, store: Reader) -> list[Options]:
     return list(dict.fromkeys([*(settings(solver, store.fidelity) for solver in study.solvers), *retried]))
 
 
-def compile_missing(stages: Stages, options: Options, params: NDArray[np.void] | None = None) -> None:
+def compile_missing(options: Options, params: NDArray[np.void] | None = None) -> None:
     """Compile what joints with these options need, such as `params`, unless it lies in the cache."""
-    if not stages.is_compiled(options, params):
-        stages.warm_up(options, params)
+    if not is_compiled(options, params):
+        warm_up(options, params)
 
 
-def _blocks(
-    study: Study, store: Reader, stop_slot: int, pace: Pace, perturb: Callable[..., NDArray[np.void]]
-) -> Iterator[Block]:
+def parameters(study: Study, store: Reader, slots: NDArray[np.intp]) -> NDArray[np.void]:
+    """Return the parameters of the joints in file slots at the operating point of `store`, (m,) table PARAM."""
+    errors = np.concatenate([store.errors(slice(slot, slot + 1)) for slot in slots.tolist()])
+    return perturbed(study.at(store.point or ""), store.row(slots), errors, perturb)
+
+
+def some_joints(study: Study, store: Reader) -> NDArray[np.void]:
+    """Return the parameters of some joints at each point: kernels that none of them needs are not compiled ahead."""
+    first = min(store.n, READ)
+    slots = np.unique(np.linspace(0, first - 1, min(first, SOME)).astype(np.intp))
+    errors = store.errors(slice(0, first))[slots]
+    each = [perturbed(study.at(one.point or ""), one.row(slots), errors, perturb) for one in store.each()]
+    return np.concatenate(each)
+
+
+def _blocks(study: Study, store: Reader, stop_slot: int, pace: Pace) -> Iterator[Block]:
     """Yield the pending file slots below `stop_slot` as blocks whose joints have the same point and solver options."""
     studies = {point: study.at(point) for point in store.points}
     variant_options = [settings(solver, store.fidelity) for solver in study.solvers]

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import closing
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.campaign import blocks
-from tolstat.campaign.blocks import Execution
-from tolstat.campaign.executors import Lost, Work, kept_workers, map_in_processes, map_serially
-from tolstat.campaign.supervised import supervised
+from tolstat.campaign import pool
+from tolstat.campaign.blocks import simulate_beside
+from tolstat.campaign.pool import Lost, Work, kept_workers
 from tolstat.common.counts import Counts
 from tolstat.common.solver_options import to_names
 from tolstat.common.tables import RESULT, Fidelity, Method, Options, Simulation, Start, Status, without_results
@@ -70,7 +68,7 @@ def run_checks(
     params: NDArray[np.void],
     options: Sequence[Options],
     names: Iterable[str],
-    simulate: Simulate | None = None,
+    simulate: Simulate = simulate_beside,
     workers: int = 1,
     progress: Progress = no_progress,
 ) -> dict[str, Check]:
@@ -84,8 +82,8 @@ def run_checks(
         Solver options of each joint in the campaign.
     names : iterable of str
         Names from `ALL_CHECKS`; ``fidelity`` is added if a joint is below dynamic fidelity.
-    simulate : callable, optional
-        Replaces `simulation.simulate_rows` in supervised processes.
+    simulate : callable
+        As `simulation.simulate_rows`; joints are simulated with it, without histories.
     workers : int
         Processes that compute the references, seconds each; their number changes results within the tolerance only.
     progress : callable
@@ -103,7 +101,7 @@ def run_checks(
             if name == "reference":
                 results = _references(params, own, workers, progress)
             else:
-                results = solve_by_options(partial(plain, simulate), params, own)
+                results = simulate_each(params, own, simulate)
             checks[name] = Check(DESCRIPTION[name], to_names(own[0]), results)
     return checks
 
@@ -118,10 +116,7 @@ def _references(
     """Compute the reference of each joint, (m,) table RESULT; each process computes one joint at a time."""
     joints: list[Single] = [(i, params[i : i + 1], one) for i, one in enumerate(options)]
     work: Work[Single, NDArray[np.void] | Lost] = Work(_reference)
-    done: Generator[tuple[Single, NDArray[np.void] | Lost], None, None]
-    workers = min(workers, len(joints))
-    serial = blocks.default_kind(workers, len(joints)) == "serial"
-    done = map_serially(work, joints) if serial else map_in_processes(work, joints, workers)
+    done = pool.map_blocks(work, joints, min(workers, len(joints)))
     results, counts = without_results(len(joints), Status.CRASHED), Counts(len(joints), 0, 0, 0)
     progress(counts)
     with closing(done):
@@ -140,23 +135,12 @@ def _reference(joint: Single) -> NDArray[np.void]:
     return reference_rows(params, options)
 
 
-def plain(simulate: Simulate | None, params: NDArray[np.void], options: Options) -> NDArray[np.void]:
-    """Results of joints, (m,) table RESULT, simulated by `simulate`, or in supervised processes."""
-    from tolstat.solver.compilation import warm_up
-    from tolstat.solver.simulation import simulate_rows
-
-    simulate = simulate or supervised(simulate_rows, warm_up, [Options()], Execution())
-    return simulate(params, options, histories="none", n_harmonics=0).results
-
-
-def solve_by_options(
-    solve: Callable[[NDArray[np.void], Options], NDArray[np.void]],
-    params: NDArray[np.void],
-    options: Sequence[Options],
+def simulate_each(
+    params: NDArray[np.void], options: Sequence[Options], simulate: Simulate = simulate_beside
 ) -> NDArray[np.void]:
-    """Results of joints with individual options, (m,) table RESULT; one call of `solve` per distinct option set."""
+    """Results of joints, (m,) table RESULT, each with its own options, without histories."""
     results = np.empty(len(params), RESULT)
     for one in dict.fromkeys(options):
         here = np.array([own == one for own in options])
-        results[here] = solve(params[here], one)
+        results[here] = simulate(params[here], one, histories="none", n_harmonics=0).results
     return results

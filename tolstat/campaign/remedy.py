@@ -28,7 +28,6 @@ if TYPE_CHECKING:
 MAX_REVS, MAX_STEPS = 1000, 20_000
 """Largest solver.max_revs and solver.steps_per_rev that a study may have."""
 WITHOUT_RESULTS = {
-    Status.TIMEOUT: 'it hangs; with more time: tolstat run STUDY --retry timeout --joint-timeout "1 h"',
     Status.CRASHED: "simulate it again: tolstat run STUDY --retry crashed; if it crashes again, report the error",
     Status.INVALID_INPUT: "a parameter is not finite: check the tolerances in the study",
     Status.OUTSIDE_MODEL: "negative clearance, |alpha| >= 90 deg, no speed or no stiffness: change joint or tolerances",

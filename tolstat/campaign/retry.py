@@ -57,7 +57,7 @@ def parse(statuses: str, settings: Sequence[str], study: Study) -> Retry:
     Parameters
     ----------
     statuses : str
-        ``"newton_failed,timeout"``.
+        ``"newton_failed,crashed"``.
     settings : sequence of str
         ``"solver.steps_per_rev=360"``: a key of the study's ``[solver]`` and its value as in TOML.
     study : Study

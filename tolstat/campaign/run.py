@@ -4,36 +4,39 @@ from __future__ import annotations
 
 import json
 import signal
-from collections.abc import Callable, Iterable
-from contextlib import closing
+import threading
+from collections.abc import Iterable, Iterator
+from contextlib import closing, contextmanager
 from functools import partial
 from pathlib import Path
+from types import FrameType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tolstat.campaign import signals, verify
-from tolstat.campaign.block import prepare
+from tolstat.campaign import verify
 from tolstat.campaign.blocks import (
     Execution,
     Finished,
-    Stages,
     compile_missing,
+    parameters,
     pending,
     settings_in_use,
+    simulate_beside,
     simulate_pending,
-    work_of,
+    some_joints,
 )
-from tolstat.campaign.executors import WorkerDied, kept_workers
 from tolstat.campaign.extend import NOT_EXTENDABLE, OTHER_CODE, code_of
+from tolstat.campaign.pool import WorkerDied, kept_workers
 from tolstat.campaign.progress import JOINTS, Reporter, Tell, kernels, note, silent
 from tolstat.campaign.retry import Retry, begin
-from tolstat.campaign.supervised import Supervised, supervised
 from tolstat.common.counts import Counts
 from tolstat.common.errors import Fault, InputError, StoreError
 from tolstat.common.tables import Status
+from tolstat.joint import perturb
+from tolstat.sampling import dimensions, draw_blocks, origin_blocks
 from tolstat.solver import fidelity, rainflow
+from tolstat.solver.simulation import Histories, history_specs
 from tolstat.store import Reader, Writer
 from tolstat.store.provenance import differing_code
 from tolstat.store.recorded import differing_keys, perturbed, settings
@@ -42,8 +45,64 @@ if TYPE_CHECKING:
     from tolstat.study import Study
 
 
-SOME, READ = 64, 4096
-"""Number of joints that tell which kernels a campaign needs, and of the first rows that they are from."""
+CAUGHT = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
+
+
+class Stop:
+    """Whether a signal has requested a stop, and which one.
+
+    Attributes
+    ----------
+    number : signal.Signals
+        The last signal received; SIGINT before any.
+    """
+
+    def __init__(self) -> None:
+        self.number = signal.SIGINT
+        self._asked = False
+        self._deferred = False
+
+    def __call__(self) -> bool:
+        """Whether to stop."""
+        return self._asked
+
+    @contextmanager
+    def deferred(self) -> Iterator[None]:
+        """Inside, the first signal only requests a stop, so that no write is interrupted; a second one interrupts."""
+        self._deferred = True
+        try:
+            yield
+        finally:
+            self._deferred = False
+
+    def handle(self, number: int, frame: FrameType | None) -> None:
+        """Handle a signal."""
+        again, self._asked, self.number = self._asked, True, signal.Signals(number)
+        if again:  # no signal may interrupt the cleanup that follows
+            for caught in CAUGHT:
+                signal.signal(caught, signal.SIG_IGN)
+        if again or not self._deferred:
+            raise KeyboardInterrupt
+
+
+@contextmanager
+def signals_caught() -> Iterator[Stop]:
+    """Catch SIGINT, SIGTERM and SIGHUP; the previous handlers are restored at the end.
+
+    A SIGHUP that is already ignored (nohup) stays ignored. Only the main thread can catch signals; in other threads
+    the caller has to handle them.
+    """
+    stop = Stop()
+    before: dict[int, Any] = {}
+    if threading.current_thread() is threading.main_thread():
+        for number in CAUGHT:
+            if number.name != "SIGHUP" or signal.getsignal(number) is not signal.SIG_IGN:
+                before[number] = signal.signal(number, stop.handle)
+    try:
+        yield stop
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, signal.SIG_DFL if handler is None else handler)
 
 
 class Interrupted(Exception):
@@ -75,7 +134,6 @@ def run(
     workers: int | None = None,
     block: int | None = None,
     progress: Reporter | None = None,
-    stages: Stages | None = None,
     rows: range | None = None,
     until_row: int | None = None,
     execution: Execution | None = None,
@@ -99,8 +157,6 @@ def run(
         Shorthand for an `Execution` with these; ignored if `execution` is given.
     progress : Reporter, optional
         Called with the counts at the start and after every block.
-    stages : Stages, optional
-        Functions that replace tolstat's own.
     rows : range, optional
         Rows of the campaign that the file holds, if a slice; all without it.
     until_row : int, optional
@@ -124,7 +180,7 @@ def run(
     Raises
     ------
     InputError
-        When workers, block size or time limit are not positive, or `rows` are not rows of the study.
+        When workers or block size are not positive, or `rows` are not rows of the study.
     StoreError
         When the file is of another study or other code (the message names the differences), or cannot be used.
     Interrupted
@@ -133,35 +189,33 @@ def run(
         When worker processes die whichever block they work on; the file holds all finished blocks.
     """
     execution = execution or Execution(workers=workers, block=block)
-    _check_positive(workers=execution.workers, block=execution.block, joint_timeout=execution.joint_timeout)
-    stages = stages or _own_stages()
+    _check_positive(workers=execution.workers, block=execution.block)
     path = Path(out)
     stage("drawing the errors" if not path.exists() else "opening the file")
     with (
-        signals.caught() as stop,
-        _create_or_resume(study, path, stages, rows, execution, tell) as store,
+        signals_caught() as stop,
+        _create_or_resume(study, path, rows, tell) as store,
         kept_workers(),
     ):
         if retry:
             retry = retry.chosen(store.fidelity)
-            begin(store, retry, stages.history_specs(retry.options, *_history_options(study)), tell)
+            begin(store, retry, history_specs(retry.options, *_history_options(study)), tell)
         counts = store.counts()
         last = store.n if until_row is None else store.slot(until_row)
-        compile_kernels = partial(compile_missing, stages)
         try:
             if next(pending(store, last), None) is not None:
                 stage(kernels())
-                prepare(compile_kernels, settings_in_use(study, store), _some_joints(study, store, stages))
+                examples = some_joints(study, store)
+                for options in settings_in_use(study, store):
+                    compile_missing(options, examples)
                 store.begin_session(counts.done)
             stage(JOINTS)
-            work = work_of(study, store, stages, execution)
-            finished = simulate_pending(study, store, last, work, stages.perturb, execution, stop)
+            finished = simulate_pending(study, store, last, execution, stop)
             with stop.deferred(), closing(finished):
                 counts = _write_blocks(store, finished, counts, progress, tell)
             if check:
                 stage("check of the numerical error")
-                again = Supervised(work, compile_kernels, execution.kind)
-                verify.check_few(store, partial(_rows_of, study, stages), again)
+                verify.check_few(store, partial(parameters, study))
             store.finish()
         except KeyboardInterrupt:
             raise Interrupted(path, store.counts(), stop.number) from None
@@ -192,36 +246,18 @@ def _write_blocks(
     return counts
 
 
-def _own_stages() -> Stages:
-    from tolstat import joint, sampling
-    from tolstat.solver import compilation, simulation
-
-    return Stages(
-        sampling.draw_blocks,
-        sampling.dimensions,
-        joint.perturb,
-        simulation.history_specs,
-        simulation.simulate_rows,
-        compilation.warm_up,
-        sampling.origin_blocks,
-        compilation.is_compiled,
-    )
-
-
-def _create_or_resume(
-    study: Study, path: Path, stages: Stages, rows: range | None, execution: Execution, tell: Callable[[str], None]
-) -> Writer:
+def _create_or_resume(study: Study, path: Path, rows: range | None, tell: Tell) -> Writer:
     rows = range(study.rows) if rows is None else rows
     _check_part(rows, study.rows)
     if not path.exists():
-        choice = choose_fidelity(study, stages, execution) if study.solver.fidelity == "auto" else {}
+        choice = choose_fidelity(study) if study.solver.fidelity == "auto" else {}
         if choice:
             tell(fidelity.describe(choice))
         options = settings(study.solver, choice)
-        histories = stages.history_specs(options, *_history_options(study))
-        errors = stages.draw(study, rows)
-        origin = stages.origins(study, rows)
-        return Writer.create(path, study, errors, histories, stages.dimensions(), rows, options, choice, origin)
+        histories = history_specs(options, *_history_options(study))
+        errors = draw_blocks(study, rows)
+        origin = origin_blocks(study, rows)
+        return Writer.create(path, study, errors, histories, dimensions(), rows, options, choice, origin)
     store = Writer.open(path)
     try:
         _check_same(store, study, rows)
@@ -239,22 +275,7 @@ def _check_part(part: range, n: int) -> None:
         raise InputError([Fault("rows", found, f"write --rows A:B with 0 <= A < B <= {n}")])
 
 
-def _rows_of(study: Study, stages: Stages, store: Reader, rows: NDArray[np.intp]) -> NDArray[np.void]:
-    """Return the parameters of the joints in file slots `rows` at the operating point of `store`, (m,) table PARAM."""
-    errors = np.concatenate([store.errors(slice(row, row + 1)) for row in rows.tolist()])
-    return perturbed(study.at(store.point or ""), store.row(rows), errors, stages.perturb)
-
-
-def _some_joints(study: Study, store: Reader, stages: Stages) -> NDArray[np.void]:
-    """Return the parameters of some joints at each point: kernels that none of them needs are not compiled ahead."""
-    first = min(store.n, READ)
-    rows = np.unique(np.linspace(0, first - 1, min(first, SOME)).astype(np.intp))
-    errors = store.errors(slice(0, first))[rows]
-    each = [perturbed(study.at(one.point or ""), one.row(rows), errors, stages.perturb) for one in store.each()]
-    return np.concatenate(each)
-
-
-def choose_fidelity(study: Study, stages: Stages | None = None, execution: Execution | None = None) -> dict[str, Any]:
+def choose_fidelity(study: Study) -> dict[str, Any]:
     """Choose the fidelity of a new campaign from a pilot of its joints, simulated as in the campaign.
 
     Returns
@@ -262,18 +283,15 @@ def choose_fidelity(study: Study, stages: Stages | None = None, execution: Execu
     dict
         The record of the choice, see `fidelity.Choice`.
     """
-    stages = stages or _own_stages()
     options = study.solver.options()
-    stages.warm_up(options)
     rows = fidelity.pilot(study.rows, study.first_sample, study.sampling.seed)
-    errors = np.concatenate([part for row in rows.tolist() for part in stages.draw(study, range(row, row + 1))])
-    each = [perturbed(study.at(point.name), rows, errors, stages.perturb) for point in study.points]
+    errors = np.concatenate([part for row in rows.tolist() for part in draw_blocks(study, range(row, row + 1))])
+    each = [perturbed(study.at(point.name), rows, errors, perturb) for point in study.points]
     params = np.concatenate(each)  # one choice for all points
-    simulate = supervised(stages.simulate, stages.warm_up, [options], execution or Execution())
     budget, min_steps = study.solver.error_budget, _min_steps(*_history_options(study))
     with kept_workers():
         closed_form = not study.has_axial_force
-        return fidelity.choose(params, options, budget, study.asked, simulate, min_steps, closed_form).record
+        return fidelity.choose(params, options, budget, study.asked, simulate_beside, min_steps, closed_form).record
 
 
 def _min_steps(histories: str, n_harmonics: int) -> int:
@@ -314,15 +332,15 @@ def _of_number(store: Reader, held: int, asked: int) -> Fault:
     return Fault(str(path), found, f"simulate more of its joints: tolstat extend {path} --n {asked}")
 
 
-def _check_positive(**numbers: float | None) -> None:
-    faults = []
-    for name, value in numbers.items():
-        if value is not None and not (value > 0 if isinstance(value, float) else value >= 1):
-            remedy = "give a time above zero" if isinstance(value, float) else "give a whole number of at least 1"
-            faults.append(Fault(name, f"{value} is too small", remedy))
+def _check_positive(**numbers: int | None) -> None:
+    faults = [
+        Fault(name, f"{value} is too small", "give a whole number of at least 1")
+        for name, value in numbers.items()
+        if value is not None and value < 1
+    ]
     if faults:
         raise InputError(faults)
 
 
-def _history_options(study: Study) -> tuple[str, int]:
+def _history_options(study: Study) -> tuple[Histories, int]:
     return study.output.histories, study.output.harmonics

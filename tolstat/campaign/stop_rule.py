@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from tolstat.analysis import exceedance, sequential
-from tolstat.campaign.executors import kept_workers
+from tolstat.campaign.pool import kept_workers
 from tolstat.common import selected_results
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import Limit, load_of

@@ -1,4 +1,4 @@
-"""Estimate the numerical error of a campaign: simulate some joints again with other settings or another solver."""
+"""Estimate the numerical error of a campaign: simulate some joints again, any of them or those nearest to a limit."""
 
 from __future__ import annotations
 
@@ -10,26 +10,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.campaign.checks import (
-    ALL_CHECKS,
-    QUICK_CHECKS,
-    Progress,
-    Simulate,
-    no_progress,
-    plain,
-    run_checks,
-    solve_by_options,
-)
+from tolstat.analysis.accuracy import LEAST_NEAR
+from tolstat.campaign.checks import ALL_CHECKS, QUICK_CHECKS, Progress, no_progress, run_checks, simulate_each
 from tolstat.common import selected_results
 from tolstat.common.errors import Fault, InputError, StoreError, gather
+from tolstat.common.loads import LOADS, Limit, load_of, split
 from tolstat.common.tables import Status
 from tolstat.store import Reader, Writer, recorded, verification, worst
 from tolstat.store.provenance import differing_code
-from tolstat.store.verification import Verification
+from tolstat.store.verification import Check, Verification
+from tolstat.study import rule
 
 if TYPE_CHECKING:
     from tolstat.study import Study
 
+EXAMPLE = 'write --near "cross1.F > 700 N", or --near "any limit"'
 JOINTS_PER_CHECKED, MAX_CHECKED = 400, 16
 """At the end of a run one joint in 400 is checked, at least one and at most 16: some 2 % of the run's time."""
 
@@ -48,7 +43,6 @@ def check_campaign(
     names: Iterable[str],
     joints: int | None,
     seed: int,
-    simulate: Simulate | None = None,
     workers: int = 1,
     progress: Progress = no_progress,
 ) -> Verification | None:
@@ -60,7 +54,7 @@ def check_campaign(
         Result file of the campaign.
     parameters : callable
         File slots (m,) -> their parameters, (m,) table PARAM.
-    names, simulate, workers, progress
+    names, workers, progress
         As in `run_checks`.
     joints : int or None
         Number of joints; None for all, including the nominal joint.
@@ -78,7 +72,7 @@ def check_campaign(
     slots = choose(settled, joints, seed)
     if not slots.size:
         return None
-    return check_slots(store, parameters, slots, names, seed, simulate, workers, progress)
+    return check_slots(store, parameters, slots, names, seed, workers, progress)
 
 
 def check_slots(
@@ -87,13 +81,12 @@ def check_slots(
     slots: NDArray[np.intp],
     names: Iterable[str],
     seed: int = 0,
-    simulate: Simulate | None = None,
     workers: int = 1,
     progress: Progress = no_progress,
 ) -> Verification:
     """Check the joints in file slots, (m,) ascending; parameters otherwise as in `check_campaign`."""
     options = [recorded.options_of(store, slot) for slot in slots.tolist()]
-    checks = run_checks(parameters(slots), options, names, simulate, workers, progress)
+    checks = run_checks(parameters(slots), options, names, workers=workers, progress=progress)
     for check in checks.values():
         selected_results.blank_others(check.results, store.columns)
     base = np.concatenate([store.results(slice(slot, slot + 1)) for slot in slots.tolist()])
@@ -105,9 +98,7 @@ def few(rows: int) -> int:
     return min(max(rows // JOINTS_PER_CHECKED, 1), MAX_CHECKED)
 
 
-def check_few(
-    store: Writer, parameters: Callable[[Writer, NDArray[np.intp]], NDArray[np.void]], simulate: Simulate
-) -> None:
+def check_few(store: Writer, parameters: Callable[[Writer, NDArray[np.intp]], NDArray[np.void]]) -> None:
     """Check a few joints of a campaign at each operating point at which it is complete, and store the checks.
 
     Does nothing if the file is a slice, and leaves checks that it has as they are. `parameters` is called with the file
@@ -116,7 +107,7 @@ def check_few(
     seed, made = int(store.sampling["seed"]), []
     for one in store.each() if store.whole else ():
         if one.complete and verification.read(one) is None:
-            found = check_campaign(one, partial(parameters, one), QUICK_CHECKS, few(one.n), seed, simulate)
+            found = check_campaign(one, partial(parameters, one), QUICK_CHECKS, few(one.n), seed)
             made += [(one, found)] if found else []
     if made:
         verification.write_all(made)
@@ -196,7 +187,7 @@ def check_file(
         on_start()
         for one in store.each():
             params = partial(recorded.parameters, one)
-            if found := check_campaign(one, params, names, number, seed, None, workers, progress):
+            if found := check_campaign(one, params, names, number, seed, workers, progress):
                 verification.write(one, found)
         checked = worst.checks([one for one in map(verification.read, store.each()) if one is not None])
         assert checked is not None
@@ -208,6 +199,101 @@ def check_version(store: Reader) -> None:
     if differing_code(store.versions):
         remedy = "verify it with that version, or run the campaign again: tolstat run STUDY --out OTHER.h5"
         raise StoreError(str(Fault(str(store.path), "was made by another version of the code", remedy)))
+
+
+def nearest(store: Reader, limit: Limit, joints: int) -> NDArray[np.intp]:
+    """File slots of the settled joints whose loads are nearest to a limit, ascending: so many for each load of it."""
+    slots = np.arange(store.first_sample, store.n)
+    results = store.results(slice(store.first_sample, None))
+    settled = results["status"] == Status.OK
+    found: set[int] = set()
+    for name, level in zip(limit.loads, limit.levels, strict=True):
+        plain, points = split(name)
+        if points and store.point not in points.split("+"):
+            continue
+        distance = np.where(settled, np.abs(LOADS[plain].of(results) - level), np.inf)
+        order = np.argsort(distance, kind="stable")[:joints]
+        found |= set(slots[order[np.isfinite(distance[order])]].tolist())
+    return np.array(sorted(found), dtype=np.intp)
+
+
+def check_near(
+    path: Path,
+    text: str,
+    joints: int | str = LEAST_NEAR,
+    names: Iterable[str] = QUICK_CHECKS,
+    on_start: Callable[[], None] = lambda: None,
+    workers: int = 1,
+    progress: Progress = no_progress,
+) -> Verification:
+    """Check the joints of a result file nearest to a limit, and add the checks to those that the file holds.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    text : str
+        ``"cross*.F > 700 N"``, or ``"any limit"``.
+    joints : int
+        Number of joints for each load of the limit, at least `LEAST_NEAR`.
+    names : iterable of str
+        As in `checks.run_checks`, the same at each call.
+    on_start, workers, progress
+        As in `check_file`.
+
+    Returns
+    -------
+    Verification
+        All verified joints near limits of the file.
+
+    Raises
+    ------
+    InputError
+        With every fault of limit and number.
+    StoreError
+        As `check_file`, or when too few joints are settled.
+    """
+    number = parse_joints(joints)
+    if number is None or number < LEAST_NEAR:
+        found = f"{joints} joints do not tell the numerical error near a limit"
+        raise InputError([Fault("--joints", found, f"give {LEAST_NEAR} or more")])
+    with Writer.open(path) as store:
+        limit = rule.limit_of(text, store.limits, "--near", EXAMPLE)
+        lacking = [name for name in limit.loads if not selected_results.holds(store.columns, load_of(name).name)]
+        if lacking:
+            remedy = "give loads that it keeps, see tolstat status"
+            raise InputError([Fault("--near", f"the file does not keep {', '.join(lacking)}", remedy)])
+        check_version(store)
+        chosen = [nearest(one, limit, number) for one in store.each()]
+        fewest = min(slots.size for slots in chosen if slots.size) if any(slots.size for slots in chosen) else 0
+        if fewest < LEAST_NEAR:
+            found = f"has {fewest} settled joints; {LEAST_NEAR} are needed"
+            raise StoreError(str(Fault(str(path), found, f"add joints: tolstat extend {path}")))
+        on_start()
+        for one, slots in zip(store.each(), chosen, strict=True):
+            before = verification.read(one, verification.NEAR)
+            new = slots if before is None else slots[~np.isin(one.row(slots), before.rows)]
+            if new.size:
+                params = partial(recorded.parameters, one)
+                made = check_slots(one, params, new, names, workers=workers, progress=progress)
+                verification.write(one, made if before is None else _merged(before, made), verification.NEAR)
+        held = [verification.read(one, verification.NEAR) for one in store.each()]
+        checked = worst.checks([one for one in held if one is not None])
+    assert checked is not None
+    return checked
+
+
+def _merged(one: Verification, other: Verification) -> Verification:
+    """Joints of both, ascending."""
+    rows = np.concatenate([one.rows, other.rows])
+    order = np.argsort(rows)
+    checks = {
+        name: Check(
+            check.description, check.options, np.concatenate([check.results, other.checks[name].results])[order]
+        )
+        for name, check in one.checks.items()
+    }
+    return Verification(one.seed, rows[order], np.concatenate([one.base, other.base])[order], checks)
 
 
 def check_study(
@@ -244,8 +330,8 @@ def _check_at(
     rows = choose(np.arange(first, plan.rows), number, seed)
     params = recorded.perturbed(plan, rows, draw(plan)[rows], perturb)
     options = [plan.solvers[number].options() for number in recorded.variants(plan, rows).tolist()]
-    base = solve_by_options(partial(plain, None), params, options)
-    checks = run_checks(params, options, names, None, workers, progress)
+    base = simulate_each(params, options)
+    checks = run_checks(params, options, names, workers=workers, progress=progress)
     for results in (base, *(check.results for check in checks.values())):
         selected_results.blank_others(results, plan.output.columns)
     return Verification(seed, rows, base, checks)

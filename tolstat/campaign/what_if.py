@@ -12,15 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat import sampling
-from tolstat.campaign import blocks, supervised
-from tolstat.campaign.block import Block, BlockWork, Timed
-from tolstat.campaign.blocks import JOINT_TIMEOUT_S, Execution
+from tolstat.campaign import pool
+from tolstat.campaign.block import Block, Timed, results_of
+from tolstat.campaign.blocks import work_beside
 from tolstat.common.counts import Counts
 from tolstat.common.loads import LOADS
 from tolstat.common.tables import VALID, Options, Status
 from tolstat.joint import perturb
-from tolstat.solver.compilation import warm_up
-from tolstat.solver.simulation import simulate_rows
 from tolstat.store import Writer, what_if, worst
 from tolstat.store.recorded import settings
 from tolstat.store.what_if import Altered
@@ -35,6 +33,8 @@ WIDTH, EXCHANGE, AS_DRAWN = "width", "exchange", "as drawn"
 """Kinds of sets: a line with another width; a line's errors from another joint; no change."""
 BLOCK = 128
 """Number of joints that a worker takes at a time: enough to keep the lanes busy, and 0.2 s on the main job."""
+SLOW_S = 60.0
+"""Time of a joint that is assumed where all joints of the pilot crash, s."""
 SAVE_S = 60.0
 """Time after which finished joints are written to the file, s: a kill loses those since."""
 
@@ -123,9 +123,9 @@ def options_of(study: Study, store: Writer) -> Options:
 def seconds_per_joint(study: Study, options: Options, joints: int, points: Sequence[str]) -> float:
     """Time of a joint at all these points in one process, s, from the first samples; kernels must be ready."""
     pilot = list(_blocks(study, options, [(as_drawn(study), range(joints))], points))
-    with closing(supervised.map_blocks(_work(), pilot, 1, blocks.default_kind(1, len(pilot)))) as done:
+    with closing(pool.map_blocks(work_beside(Options()), pilot, 1)) as done:
         spent = sum(result.seconds for _, result in done if isinstance(result, Timed))
-    return (spent or JOINT_TIMEOUT_S * joints) / joints
+    return (spent or SLOW_S * joints) / joints
 
 
 def simulate(
@@ -166,14 +166,13 @@ def simulate(
     todo = [(one.change, numbers) for one in wanted if (numbers := missing(held, one, names))]
     table = _Table(todo, asked, names)
     every = _blocks(study, options_of(study, store), todo, asked.points)
-    kind = blocks.default_kind(workers, -(-table.status.size // BLOCK))
-    done = supervised.map_blocks(_work(), every, workers, kind, stop)
+    done = pool.map_blocks(work_beside(Options()), every, workers, stop)
     counts, saved = Counts(table.status.size, 0, 0, 0), time.monotonic()
     progress(counts)
     try:
         with closing(done):
             for block, result in done:
-                counts = counts.after(table.put(block, supervised.results_of(block, result)))
+                counts = counts.after(table.put(block, results_of(block, result)))
                 progress(counts)
                 if time.monotonic() - saved > SAVE_S:
                     what_if.write(store, table.sets(held))
@@ -235,10 +234,6 @@ def _blocks(
             for point, operation in operations.items():
                 yield Block(point, slots, perturb(study.joint, operation, errors), options)
         begin += len(numbers)
-
-
-def _work() -> BlockWork:
-    return supervised.supervised(simulate_rows, warm_up, [Options()], Execution()).work
 
 
 def _draw(study: Study, numbers: range) -> NDArray[np.void]:

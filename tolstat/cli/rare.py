@@ -100,7 +100,7 @@ def rare(
     Example: tolstat rare studies/iso2768_f.toml --limit "cross1.F > 5 kN"
     """
     from tolstat.campaign import run as campaign
-    from tolstat.campaign.executors import WorkerDied
+    from tolstat.campaign.pool import WorkerDied
     from tolstat.display import text
     from tolstat.questions.rare import query as simulation
     from tolstat.questions.rare import rendering as tables

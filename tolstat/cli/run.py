@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
@@ -24,15 +22,12 @@ if TYPE_CHECKING:
     from tolstat.study import Study
 
 SECONDS_PER_UNIT = {"s": 1.0, "min": 60.0, "h": 3600.0}
-MAX_AHEAD = 4
-"""Largest number of workers that are started before the number of joints is known."""
 
 
 class Executor(StrEnum):
     """Where joints are simulated, see `campaign.blocks.Execution`."""
 
     PROCESSES = "processes"
-    SERIAL = "serial"
     DASK = "dask"
 
 
@@ -48,9 +43,7 @@ def run(
     workers: Workers = None,
     executor: Annotated[
         Executor,
-        typer.Option(
-            "--executor", metavar="WHERE", help="processes, dask (cluster), or serial (no protection against crashes)."
-        ),
+        typer.Option("--executor", metavar="WHERE", help="processes (of this machine), or dask (a cluster)."),
     ] = Executor.PROCESSES,
     scheduler: Annotated[
         str | None,
@@ -60,18 +53,10 @@ def run(
             help="Address of a Dask scheduler, tcp://HOST:PORT; default: start a cluster on this machine.",
         ),
     ] = None,
-    joint_timeout: Annotated[
-        str,
-        typer.Option(
-            "--joint-timeout",
-            metavar="TIME",
-            help="Processor time without progress, with unit s, min or h; a joint that exceeds it twice is a timeout.",
-        ),
-    ] = "60 s",
     retry: Annotated[
         str | None,
         typer.Option(
-            "--retry", metavar="STATES", help="Statuses of joints to simulate again, such as newton_failed,timeout."
+            "--retry", metavar="STATES", help="Statuses of joints to simulate again, such as newton_failed,crashed."
         ),
     ] = None,
     settings: Annotated[
@@ -119,50 +104,36 @@ def run(
     check_memory()
     from tolstat.common.files import check_target
 
-    limit, part, again = 0.0, None, None
+    part, again = None, None
     retried = [own for own in settings or () if own.startswith("solver.")]
     changes = [own for own in settings or () if own not in retried]
     faults = _cannot_be_combined(rows, until, retry, retried)
     if scheduler is not None and executor is not Executor.DASK:
         faults.append(Fault("--scheduler", "is used with --executor dask only", "add --executor dask"))
     with gather(faults):
-        limit = parse_time(joint_timeout)
-    with gather(faults):
         part = None if rows is None else parse_rows(rows)
     path = out if out is not None else Path(f"{study_file.stem}.h5")
     with gather(faults):
         check_target(path)  # now, not when the pictures of the report are written
-    with _workers_ahead(executor, workers):
-        from tolstat import study
-        from tolstat.campaign.blocks import Execution
-        from tolstat.campaign.retry import parse
-        from tolstat.common import strict
-        from tolstat.study import rewriting
+    from tolstat import study
+    from tolstat.campaign.blocks import Execution
+    from tolstat.campaign.retry import parse
+    from tolstat.common import strict
+    from tolstat.study import rewriting
 
-        with gather(faults):
-            text = rewriting.with_settings(strict.read_text(study_file), changes) if changes else None
-            plan = study.load(study_file, n=n, text=text)
-            again = None if retry is None else parse(retry, retried, plan)
-        if faults:
-            raise InputError(faults)
-        print_study_notes(study_file, plan)
-        execution = Execution(executor.value, workers, joint_timeout=limit, scheduler=scheduler)
-        if until is None:
-            simulate(plan, path, execution=execution, check=verify, rows=part, retry=again)
-        else:
-            simulate(plan, path, until, execution=execution, check=verify)
+    with gather(faults):
+        text = rewriting.with_settings(strict.read_text(study_file), changes) if changes else None
+        plan = study.load(study_file, n=n, text=text)
+        again = None if retry is None else parse(retry, retried, plan)
+    if faults:
+        raise InputError(faults)
+    print_study_notes(study_file, plan)
+    execution = Execution(executor.value, workers, scheduler=scheduler)
+    if until is None:
+        simulate(plan, path, execution=execution, check=verify, rows=part, retry=again)
+    else:
+        simulate(plan, path, until, execution=execution, check=verify)
     conclude(path, report, wide, " ".join([str(study_file), *(f"--set {quote(own)}" for own in changes)]))
-
-
-@contextmanager
-def _workers_ahead(executor: Executor, workers: int | None) -> Iterator[None]:
-    """Start workers inside, which load the kernels while the study is read."""
-    from tolstat.campaign.executors import kept_workers
-    from tolstat.solver.compilation import load
-
-    number = min(workers or available_cores(), MAX_AHEAD) if executor is Executor.PROCESSES else 0
-    with kept_workers(number, load):
-        yield
 
 
 def _cannot_be_combined(rows: str | None, until: str | None, retry: str | None, settings: list[str]) -> list[Fault]:
@@ -177,7 +148,7 @@ def _cannot_be_combined(rows: str | None, until: str | None, retry: str | None, 
     return faults
 
 
-def parse_time(text: str, option: str = "--joint-timeout") -> float:
+def parse_time(text: str, option: str) -> float:
     """Parse the time of an option, such as ``"60 s"``; returns seconds.
 
     Raises
@@ -212,7 +183,7 @@ def parse_rows(text: str) -> range:
 def simulate(plan: Study, path: Path, until: str | None = None, **choices: Any) -> None:
     """Simulate a campaign with progress on standard error; `choices` go to `campaign.run`."""
     from tolstat.campaign import run as campaign
-    from tolstat.campaign.executors import WorkerDied
+    from tolstat.campaign.pool import WorkerDied
 
     announce_compilation()
     try:

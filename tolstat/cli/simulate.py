@@ -11,7 +11,7 @@ from tolstat.cli._app import AsJson, announce_compilation, as_text, output_file,
 from tolstat.cli._talk import progress, say, warn
 
 if TYPE_CHECKING:
-    from tolstat.campaign.trace import CaseResult
+    from tolstat.campaign.replay import CaseResult
 
 
 def simulate(
@@ -30,7 +30,7 @@ def simulate(
     Example: tolstat simulate studies/tilted_pin.toml --out loads.csv
     """
     from tolstat import study
-    from tolstat.campaign import trace
+    from tolstat.campaign import replay
     from tolstat.common.files import check_target
     from tolstat.joint.mounting import in_words
 
@@ -41,7 +41,7 @@ def simulate(
     say(f"{loaded.name}: {in_words([loaded.joint.shaft.axial], [loaded.joint.contact.law])}")
     announce_compilation()
     with progress("simulation"):
-        result = trace.simulate_case(loaded)
+        result = replay.simulate_case(loaded)
     summary = result.summary()
     typer.echo(as_text(summary) if as_json else case_text(summary))
     warn_unless_ok(summary, result.remedy())

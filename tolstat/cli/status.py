@@ -151,11 +151,11 @@ def _summary(store: Reader) -> tuple[dict[str, Any], dict[str, NDArray[np.uint8]
                 own, state, intervals = worst.load_of([results[point] for point in at[name]], load_of(name))
                 values[:, slots], worst_states[name][slots] = (own, *intervals.ends(own)), state
     joints = np.choose(worst.deciding(list(states.values())), list(states.values()))
-    found = np.bincount(joints, minlength=len(Status))
+    found = np.bincount(joints, minlength=max(Status) + 1)
     summary: dict[str, Any] = {"study": store.study_name, "joints": store.n}
     summary |= {state.label: int(found[state]) for state in Status}
     if len(each) > 1:
-        counts = {point: np.bincount(own, minlength=len(Status)) for point, own in states.items()}
+        counts = {point: np.bincount(own, minlength=max(Status) + 1) for point, own in states.items()}
         summary["points"] = {p: {s.label: int(own[s]) for s in Status if own[s]} for p, own in counts.items()}
     again = sum(int((one.attempt() > 0).sum()) for one in each.values())
     condition = {"damaged": damaged, "simulated_again": again}

@@ -56,7 +56,7 @@ def verify(
     from tolstat.analysis.accuracy import LEAST_NEAR
     from tolstat.campaign import verify as verification
     from tolstat.campaign.checks import QUICK_CHECKS
-    from tolstat.campaign.near import check_near
+    from tolstat.campaign.verify import check_near
     from tolstat.common.cores import available_cores
     from tolstat.common.files import check_target
     from tolstat.questions.accuracy import query, rendering

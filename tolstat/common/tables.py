@@ -51,8 +51,7 @@ class Status(IntEnum):
     NOT_FINITE = 4
     OUTSIDE_MODEL = 5
     NOT_PERIODIC = 6
-    TIMEOUT = 7
-    CRASHED = 8
+    CRASHED = 8  # 7 was a joint that made no progress, in files of earlier versions
     INVALID_INPUT = 9
     NOT_RESOLVED = 10
     STATIONARY = 11
@@ -87,7 +86,6 @@ STATUS_TEXT = {
     Status.STATIONARY: "never the same in each revolution, but its largest loads are as large in the first half of the "
     "revolutions watched as in the second: results are the largest of solver.duration revolutions, estimated, with an "
     "interval (lower, upper); of a sub-harmonic joint those of its whole period",
-    Status.TIMEOUT: "made no progress in the processor time allowed; results are NaN",
     Status.CRASHED: "its process died with it twice; results are NaN",
     Status.INVALID_INPUT: "parameters are not finite numbers; results are NaN",
     Status.NEWTON_FAILED: "a step failed at the smallest sub-step, or too many iterations were spent; results are NaN",

@@ -113,12 +113,6 @@ def is_compiled(options: Options | None = None, params: NDArray[np.void] | None 
     return not missing(options or Options(), params)
 
 
-def load() -> None:
-    """Load the kernels that joints with default options need, if they lie in the cache."""
-    if is_compiled():
-        compile_kernels(kernels(Options()), Options())
-
-
 def warm_up(options: Options | None = None, params: NDArray[np.void] | None = None) -> None:
     """Compile the kernels that joints with `options` need, such as `params`, in two processes, or load them."""
     options = options or Options()

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common import progress_memory
 from tolstat.common.channels import BUSHING_LOADS, SHAFT_LOADS, LoadHistory
 from tolstat.common.load_kinds import CONTACTS, SPAN
 from tolstat.common.tables import (
@@ -93,22 +92,7 @@ def scratch(options: Options) -> Scratch:
     """Work arrays of this process for `options`; importing the kernel here keeps it out of light commands."""
     from tolstat.kernel.revolution.simulate import make_scratch
 
-    return make_scratch(options, _state())
-
-
-@cache
-def _state() -> NDArray[np.void]:
-    """Memory of the state of the joint that this process simulates alone: its counters show that it makes progress."""
-    from tolstat.kernel.integrators.state import record_dtype
-    from tolstat.kernel.mechanics.topology import N_DOF
-
-    return progress_memory.zeros(1, record_dtype(N_DOF))
-
-
-@cache
-def _tally() -> NDArray[np.int64]:
-    """Counters of the lanes of this process, which show that it makes progress; see `kernel.lanes.lockstep`."""
-    return progress_memory.zeros(3, np.dtype(np.int64))
+    return make_scratch(options)
 
 
 @cache
@@ -243,7 +227,7 @@ def simulate_together(
     from tolstat.kernel.lanes.lockstep import PATIENCE, lockstep
     from tolstat.kernel.revolution.settle import make_samples
 
-    batch, tally = lanes(options), _tally()
+    batch, tally = lanes(options), np.zeros(3, np.int64)
     max_size = max(1, MAX_KEPT_SAMPLES // options.steps_per_rev) if keep else len(params)
     memory = make_samples(min(max_size, len(params)) if keep else 0, options.steps_per_rev)
     for here in _groups(params, max_size):
@@ -263,7 +247,7 @@ def simulate_together(
                 samples[again[i]] = revolution
             out[again], allowed[again] = found, remaining
         else:
-            explicit(rows, words, steps[here], allowed, options, scratch(options), batch, samples, own, out, tally)
+            explicit(rows, words, steps[here], allowed, options, scratch(options), batch, samples, own, out)
         left[here] = allowed
         for_kernels(results)[here] = out
         if len(blocks):

@@ -56,9 +56,9 @@ def record_dtype(n: int) -> np.dtype[np.void]:
     return np.dtype([(name, *kind) for name, kind in layout(n).items()])
 
 
-def make_state_record(n: int, memory: np.ndarray | None = None) -> np.record:
-    """Allocate the record, or lay it into `memory`, an array of `record_dtype`, shape (1,)."""
-    state = (np.zeros(1, record_dtype(n)) if memory is None else memory).view(np.recarray)[0]
+def make_state_record(n: int) -> np.record:
+    """Allocate the record."""
+    state = np.zeros(1, record_dtype(n)).view(np.recarray)[0]
     for name in State._fields[:13]:
         state[name][...] = np.nan
     state["counters"][ALLOWED] = UNLIMITED

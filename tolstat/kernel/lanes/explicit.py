@@ -156,7 +156,7 @@ def finish_joint(lane, status, left, options, alone, batch, blocks, results):
 
 
 @njit
-def explicit(rows, words, steps, left, options, alone, batch, samples, blocks, results, tally):
+def explicit(rows, words, steps, left, options, alone, batch, samples, blocks, results):
     """Simulate joints with equal numbers of contact stations; row i of the results is joint i.
 
     Parameters
@@ -182,8 +182,6 @@ def explicit(rows, words, steps, left, options, alone, batch, samples, blocks, r
         Written unless empty: statistics of the last revolutions of every joint, revolution r at r modulo their number.
     results : ndarray of KERNEL_RESULT, shape (n,)
         Written.
-    tally : ndarray of int
-        Its first element is increased whenever a lane reaches a point of the output grid.
     """
     rows, words, samples, results = (
         without_refcount(rows),
@@ -192,7 +190,7 @@ def explicit(rows, words, steps, left, options, alone, batch, samples, blocks, r
         without_refcount(results),
     )
     blocks, steps = without_refcount(blocks), without_refcount(steps)
-    left, tally = without_refcount(left), without_refcount(tally)
+    left = without_refcount(left)
     alone, batch = without_refcount(alone), without_refcount(batch)
     lanes = as_lanes(batch.par), as_lanes(batch.work), as_lanes(batch.peaks)
     motion, control = as_lanes(batch.motion), as_lanes(batch.control)
@@ -201,7 +199,6 @@ def explicit(rows, words, steps, left, options, alone, batch, samples, blocks, r
         put_joint(lane, words[0], batch)
         rest(lane, batch)
     while queued < len(rows) or any_of(control.live > 0):
-        tally[0] += 1
         arrived = bits_of(control.until <= 0)
         for lane in range(WIDTH):
             trail = Trail(pasts.loads[lane], pasts.revolution[lane], pasts.notes[lane])

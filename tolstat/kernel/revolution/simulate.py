@@ -351,7 +351,6 @@ class Scratch(NamedTuple):
     past: Past
 
 
-def make_scratch(options: Options, memory: np.ndarray | None = None) -> Scratch:
-    """Allocate the work arrays of a process; `memory`: place of the state, see `make_state_record`."""
-    state = make_state_record(N_DOF, memory)
-    return Scratch(make_work(), state, make_ring(options.steps_per_rev), make_past(options))
+def make_scratch(options: Options) -> Scratch:
+    """Allocate the work arrays of a process."""
+    return Scratch(make_work(), make_state_record(N_DOF), make_ring(options.steps_per_rev), make_past(options))

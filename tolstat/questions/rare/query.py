@@ -24,8 +24,8 @@ from tolstat.analysis.sorted_loads import split
 from tolstat.analysis.subset import Candidates, Estimate, Level, Settings, Walk
 from tolstat.campaign import run as campaign
 from tolstat.campaign.blocks import Execution
-from tolstat.campaign.executors import kept_workers
 from tolstat.campaign.extend import grow
+from tolstat.campaign.pool import kept_workers
 from tolstat.campaign.progress import Reporter, note
 from tolstat.common.draw_records import SUBSET
 from tolstat.common.errors import Fault, StoreError

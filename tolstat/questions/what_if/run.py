@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from tolstat.campaign import what_if as sets
 from tolstat.campaign.checks import no_progress
-from tolstat.campaign.executors import kept_workers
+from tolstat.campaign.pool import kept_workers
 from tolstat.campaign.progress import clock, silent
 from tolstat.campaign.what_if import Asked, Wanted
 from tolstat.common.cores import available_cores

@@ -1,0 +1,211 @@
+"""Blocks through a Dask cluster; those that end with their workers, or raise, are repeated in the pool on this machine.
+
+The scheduler gives the blocks of a lost worker to others. A block that has cost four workers is not tried on the
+cluster again. A cluster of this machine whose workers do not come back leaves all blocks to the pool.
+"""
+
+from __future__ import annotations
+
+import os
+import queue
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from functools import cache
+from itertools import chain
+from typing import TYPE_CHECKING, Any
+
+from tolstat.campaign import pool
+from tolstat.campaign.pool import BlockT, Lost, ResultT, Work, WorkerDied
+from tolstat.common.cores import one_thread_each
+from tolstat.common.errors import Fault, InputError
+
+if TYPE_CHECKING:
+    from distributed import Client, Future
+
+FIRST_WORKER_S = 300.0
+"""Time limit for the first worker of a cluster to appear, s: a batch queue may have to start it."""
+GONE_S = 30.0
+"""Time after which workers of this machine that are gone are not expected back, s."""
+NO_WORKER = "the Dask cluster has no worker\n  hint: start workers with: dask worker tcp://HOST:PORT"
+CONNECT_S = 15.0
+"""Time limit for connecting to a scheduler, s."""
+FETCH_S = 60.0
+"""Time limit for fetching a result, s."""
+LOOPBACK = "127.0.0.1"
+"""Address of a cluster on this machine: Dask runs what it is sent, so nothing listens to other machines."""
+
+Fingerprint = Callable[[], Mapping[str, str]]
+
+_ONE_AT_A_TIME = threading.Lock()
+"""Lock: a simulation uses work arrays of the process, which the threads of a worker must not use at the same time."""
+
+
+def map_on_cluster(
+    work: Work[BlockT, ResultT],
+    blocks: Iterable[BlockT],
+    scheduler: str | None,
+    workers: int,
+    fingerprint: Fingerprint,
+    stop: Callable[[], bool] = pool.never_stop,
+) -> Generator[tuple[BlockT, ResultT | Lost], None, None]:
+    """Apply the function to every block on a Dask cluster and yield the results as they arrive.
+
+    Close the generator (`contextlib.closing`) when leaving it early.
+
+    Parameters
+    ----------
+    work : Work
+        Function to apply, and how.
+    blocks : iterable
+        Blocks; consumed only as they are needed.
+    scheduler : str, optional
+        Address of the scheduler; without it a cluster is started on this machine.
+    workers : int
+        Number of processes of a cluster on this machine, and of the pool.
+    fingerprint : callable
+        () -> values by name, such as versions, that must be equal here and in every worker.
+    stop : callable, optional
+        Called often; once it returns True no further block is started, and blocks in work are finished.
+
+    Yields
+    ------
+    tuple
+        As `pool.map_blocks`.
+
+    Raises
+    ------
+    InputError
+        When Dask is not installed, the scheduler does not answer, or a worker's fingerprint differs.
+    WorkerDied
+        When the scheduler is lost or has no workers; otherwise as `pool.map_blocks`.
+    """
+    from distributed import KilledWorker
+
+    running: dict[Future, BlockT] = {}
+    ended: queue.SimpleQueue[Future] = queue.SimpleQueue()
+    failed: list[BlockT] = []
+    todo, failures, succeeded, seen = iter(blocks), 0, False, time.monotonic()
+    with _client(scheduler, workers) as client:
+        expected = _checked(client, fingerprint)
+        while True:
+            threads = sum(client.nthreads().values())
+            seen = time.monotonic() if threads or scheduler else seen
+            while len(running) < 2 * max(1, threads) and not stop() and (block := next(todo, None)) is not None:
+                future = client.submit(process_block, work, fingerprint, expected, block, pure=False)
+                running[future] = block
+                future.add_done_callback(ended.put)
+            if not running:
+                break
+            try:
+                future = ended.get(timeout=pool.POLL_S)
+            except queue.Empty:
+                if client.status != "running":
+                    found = "the Dask scheduler has ended\n  hint: start it again with: dask scheduler"
+                    raise WorkerDied(found) from None
+                if time.monotonic() - seen > GONE_S:
+                    failed += running.values()
+                    break
+                continue
+            block = running.pop(future)
+            try:
+                result = future.result(timeout=FETCH_S)  # one lost with its worker is computed again
+            except InputError:
+                raise
+            except Exception as error:  # it cost too many workers, or raised this
+                failed.append(block)
+                failures += 1
+                last = str(error) if isinstance(error, KilledWorker) else error
+                if ending := pool.too_many_failures(failures, max(1, threads), last, succeeded):
+                    raise ending from error
+            else:
+                failures, succeeded = 0, True
+                yield block, result
+    halves = (half for block in failed for half in work.split(block))
+    yield from pool.map_blocks(work, chain(halves, todo), workers, stop)
+
+
+def process_block(work: Work[Any, Any], fingerprint: Fingerprint, expected: Mapping[str, str], block: Any) -> Any:
+    """Process a block in a worker, one block at a time."""
+    check(expected, _own(fingerprint), "a Dask worker")
+    with _ONE_AT_A_TIME:
+        _prepare(work.prepare)
+        return work.function(block)
+
+
+@cache
+def _own(fingerprint: Fingerprint) -> Mapping[str, str]:
+    return fingerprint()
+
+
+@cache
+def _prepare(prepare: Callable[[], object]) -> None:
+    """Prepare this process once; processes of a machine take turns, since they may compile into one cache."""
+    with open(os.path.join(tempfile.gettempdir(), f"tolstat-{os.getuid()}.lock"), "w") as lock:
+        import fcntl
+
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        prepare()
+
+
+def check(expected: Mapping[str, str], found: Mapping[str, str], where: str) -> None:
+    """Reject a process whose results could differ because its versions differ.
+
+    Raises
+    ------
+    InputError
+        With all differences.
+    """
+    lines = [
+        f"{name}: {value} here, {found.get(name)} on the worker"
+        for name, value in expected.items()
+        if found.get(name) != value
+    ]
+    if lines:
+        differing = "\n    ".join([f"{where} has other software versions", *lines])
+        remedy = "install the same versions there, and restart the workers"
+        raise InputError([Fault("--executor dask", differing, remedy)])
+
+
+def _checked(client: Client, fingerprint: Fingerprint) -> dict[str, str]:
+    """Return the fingerprint of this process, which all workers have."""
+    try:
+        client.wait_for_workers(1, timeout=FIRST_WORKER_S)
+    except TimeoutError as error:
+        raise WorkerDied(NO_WORKER) from error
+    expected = dict(fingerprint())
+    for address, found in client.run(fingerprint, on_error="return").items():
+        if isinstance(found, BaseException):
+            remedy = "install tolstat there, and restart the workers"
+            raise InputError([Fault("--executor dask", f"the worker {address} cannot run tolstat: {found!r}", remedy)])
+        check(expected, found, f"the worker {address}")
+    return expected
+
+
+@contextmanager
+def _client(scheduler: str | None, workers: int) -> Iterator[Client]:
+    try:
+        from distributed import Client, LocalCluster
+    except ImportError as error:
+        remedy = "install it with: pip install 'tolstat[dask]'"
+        raise InputError([Fault("--executor dask", "Dask's distributed is not installed", remedy)]) from error
+    if scheduler is None:
+        with one_thread_each(), pool.signals_blocked():
+            cluster = LocalCluster(
+                n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None, host=LOOPBACK
+            )
+        with cluster, Client(cluster) as client:
+            yield client
+        return
+    try:
+        client = Client(scheduler, timeout=CONNECT_S)
+    except (OSError, ValueError, TypeError, RuntimeError) as error:
+        found = f"{scheduler} does not answer: {error}"
+        remedy = "give the address that dask scheduler prints: --scheduler tcp://HOST:PORT"
+        if scheduler.startswith("tls:"):
+            remedy = "check the certificates: docs/cluster.md names the variables that Dask reads them from"
+        raise InputError([Fault("--scheduler", found, remedy)]) from error
+    with client:
+        yield client

@@ -1,10 +1,10 @@
 """Result files with a changed bit through the commands that read them: each gives the right data, or names the damage.
 
-``python -m tests.measure.corruption FOLDER 300 100 [page]`` makes a campaign of 220 joints at two operating points, with
+``python -m tests.measure.corruption FOLDER 300 100`` makes a campaign of 220 joints at two operating points, with
 histories, checks and what-if runs, once finished and once killed half way; changes one random bit of the first in 300
 ways and of the second in 100; passes each to ``status --check``, ``report`` and ``export --statistics -``, and prints
 how many commands ended how, and every fault: a traceback, a signal, and in the finished file a silent difference.
-With ``page``, the page of the report is what is made of each file.
+With ``page`` as last word, the page of the report is what is made of each file.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ alpha = "15 deg"
 speed = "100 rpm"
 torque = "200 N*m"
 """
-OUTPUT = '[output]\nhistories = "harmonics+cycles"\nharmonics = 4\n\n[limits]'
+OUTPUT = '[output]\nhistories = "harmonics"\nharmonics = 4\n\n[limits]'
 _HEAD, _, _REST = synthetic.REAL.partition("[operation]")
 TEXT = _HEAD + POINTS + _REST[_REST.index("[tolerances]") :].replace("n = 60", "n = 220").replace("[limits]", OUTPUT)
 
@@ -66,8 +66,7 @@ def killed(folder: Path) -> Path:
 def main(folder: Path, of_finished: int, of_killed: int, commands: Sequence[Sequence[str]]) -> None:
     """Make both files, change each and print what came of it."""
     folder.mkdir(exist_ok=True)
-    for make, count in ((finished, of_finished), (killed, of_killed)):
-        path = make(folder)
+    for path, count in ((finished(folder), of_finished), (killed(folder), of_killed)):
         corruption.warm(path, folder / "warm", commands)
         found, kinds = corruption.search(path, folder / "x", range(count), commands)
         print(f"{path.name}, {path.stat().st_size} bytes, {count} changes:", kinds, flush=True)

@@ -28,7 +28,7 @@ from tolstat.campaign import run as campaign
 from tolstat.campaign.block import without_simulation
 from tolstat.campaign.blocks import MAX_BLOCK, Pace
 from tolstat.campaign.pool import WorkerDied
-from tolstat.campaign.retry import Retry, parse
+from tolstat.campaign.remedy import Retry, parse_retry
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.tables import SIMULATED, Fidelity, Options, Simulation, Status
 from tolstat.joint import Operation
@@ -402,12 +402,12 @@ def test_a_retry_that_changes_the_shape_of_histories_is_refused(tmp_path: Path) 
 
 def test_what_is_asked_for_again_is_read_with_all_faults() -> None:
     study = SimpleNamespace(solver=Solver(), has_axial_force=False)
-    again = parse("newton_failed, crashed", ["solver.steps_per_rev=360", "solver.method=tr_bdf2"], study)
+    again = parse_retry("newton_failed, crashed", ["solver.steps_per_rev=360", "solver.method=tr_bdf2"], study)
     assert again.status == (Status.NEWTON_FAILED, Status.CRASHED)
     assert again.settings == {"solver.steps_per_rev": 360, "solver.method": "tr_bdf2"}
     assert again.options == Solver(steps_per_rev=360, method="tr_bdf2").options()
     with pytest.raises(InputError) as caught:
-        parse("newton_faild,pending", ["limits.F=3", "solver.steps_per_rev=2.5", "solver.steps_per_re=1"], study)
+        parse_retry("newton_faild,pending", ["limits.F=3", "solver.steps_per_rev=2.5", "solver.steps_per_re=1"], study)
     text = str(caught.value)
     assert len(caught.value.faults) == 5
     assert "did you mean 'newton_failed'?" in text
@@ -418,9 +418,9 @@ def test_what_is_asked_for_again_is_read_with_all_faults() -> None:
 def test_what_auto_chose_holds_for_joints_that_are_simulated_again() -> None:
     study = SimpleNamespace(solver=Solver(fidelity="auto"), has_axial_force=False)
     chosen = {"fidelity": "quasistatic", "steps_per_rev": 60}
-    again = parse("crashed", ["solver.newton_max_iter=40"], study).chosen(chosen).options
+    again = parse_retry("crashed", ["solver.newton_max_iter=40"], study).chosen(chosen).options
     assert (again.fidelity, again.steps_per_rev, again.newton_max_iter) == (Fidelity.QUASISTATIC, 60, 40)
-    again = parse("crashed", ["solver.fidelity=dynamic"], study).chosen(chosen).options
+    again = parse_retry("crashed", ["solver.fidelity=dynamic"], study).chosen(chosen).options
     assert again == Options()
 
 

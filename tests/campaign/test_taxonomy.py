@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 from tests.support.synthetic import HEAD
 from tolstat import cli, study
 from tolstat.campaign import run as campaign
-from tolstat.campaign.retry import parse
+from tolstat.campaign.remedy import parse_retry
 from tolstat.common.errors import InputError
 from tolstat.common.tables import FAILED, Status
 from tolstat.store import Reader
@@ -121,6 +121,6 @@ def test_each_state_can_be_asked_for_again(path: Path) -> None:
     for state in Status:
         if state == Status.PENDING:
             with pytest.raises(InputError, match="'pending' is not a status"):
-                parse(state.label, (), made)
+                parse_retry(state.label, (), made)
         else:
-            assert parse(state.label, (), made).status == (state,)
+            assert parse_retry(state.label, (), made).status == (state,)

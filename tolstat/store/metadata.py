@@ -150,7 +150,7 @@ class StopRecord(_File):
 
 
 class RetryRecord(_File):
-    """Settings of a retry, see `campaign.retry.Retry.entry`."""
+    """Settings of a retry, see `campaign.remedy.Retry.entry`."""
 
     status: list[str]
     settings: dict[str, str | float | bool]

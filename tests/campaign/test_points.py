@@ -13,7 +13,7 @@ from tolstat import study
 from tolstat.campaign import extend, replay
 from tolstat.campaign import run as campaign
 from tolstat.campaign.blocks import settings_in_use
-from tolstat.campaign.retry import Retry
+from tolstat.campaign.remedy import Retry
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.tables import Options, Status
 from tolstat.joint import Operation

@@ -1,4 +1,4 @@
-"""Result files with a changed bit through the commands that read them: each gives the right data, or names the damage.
+"""Files with a changed bit through the commands that read them: each gives the right data, or names the damage.
 
 ``python -m tests.measure.corruption FOLDER 300 100`` makes a campaign of 220 joints at two operating points, with
 histories, checks and what-if runs, once finished and once killed half way; changes one random bit of the first in 300

@@ -29,7 +29,7 @@ from tolstat.campaign.blocks import (
 from tolstat.campaign.extend import NOT_EXTENDABLE, OTHER_CODE, code_of
 from tolstat.campaign.pool import WorkerDied, kept_workers
 from tolstat.campaign.progress import JOINTS, Reporter, Tell, kernels, note, silent
-from tolstat.campaign.retry import Retry, begin
+from tolstat.campaign.remedy import Retry, begin_retry
 from tolstat.common.counts import Counts
 from tolstat.common.errors import Fault, InputError, StoreError
 from tolstat.common.tables import Status
@@ -199,7 +199,7 @@ def run(
     ):
         if retry:
             retry = retry.chosen(store.fidelity)
-            begin(store, retry, history_specs(retry.options, *_history_options(study)), tell)
+            begin_retry(store, retry, history_specs(retry.options, *_history_options(study)), tell)
         counts = store.counts()
         last = store.n if until_row is None else store.slot(until_row)
         try:

@@ -117,14 +117,14 @@ def run(
         check_target(path)  # now, not when the pictures of the report are written
     from tolstat import study
     from tolstat.campaign.blocks import Execution
-    from tolstat.campaign.retry import parse
+    from tolstat.campaign.remedy import parse_retry
     from tolstat.common import strict
     from tolstat.study import rewriting
 
     with gather(faults):
         text = rewriting.with_settings(strict.read_text(study_file), changes) if changes else None
         plan = study.load(study_file, n=n, text=text)
-        again = None if retry is None else parse(retry, retried, plan)
+        again = None if retry is None else parse_retry(retry, retried, plan)
     if faults:
         raise InputError(faults)
     print_study_notes(study_file, plan)

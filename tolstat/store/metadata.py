@@ -53,7 +53,7 @@ class Metadata(BaseModel):
     histories : dict of str to HistorySpec
         Load histories that the campaign keeps.
     retries : tuple of dict
-        Settings of each retry, in chronological order, see `campaign.retry.Retry.entry`.
+        Settings of each retry, in chronological order, see `campaign.remedy.Retry.entry`.
     stop : dict
         Stop rule and its outcome, see `campaign.stop_rule.Outcome.record`; empty without one.
     campaign_rows, first_row, n : int

@@ -12,9 +12,9 @@ from typing import Any
 DIGITS = 9
 RELATIVE, ABSOLUTE = 1e-6, 1e-12
 """Tolerances of numbers in JSON and CSV: processors differ in the last bits of a result, which differences amplify."""
-LINE, LONG = 110, 400
+LINE, LONG = 110, 200
 """Longest line of a list or table, characters; most lines of a document."""
-FEW, HEAD = 24, 4
+FEW, HEAD = 24, 2
 """Longest list, or table, that is shown whole; numbers shown of a longer one."""
 NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[+-]?\d+)?(?![\w.]*\w)|(?<!\w)-?(?:nan|inf)(?!\w)", re.IGNORECASE)
 
@@ -28,7 +28,7 @@ def short(value: float) -> str:
 
 
 def json_text(text: str) -> str:
-    """JSON as text: plain lists and tables on one line where they fit, long lists of numbers as head and summary."""
+    """JSON as text: what is short on one line, records of plain values as tables, long lists as head and summary."""
     lines = _json(json.loads(text), "").split("\n")
     more = [f"... {len(lines) - LONG} more lines"] if len(lines) > LONG else []
     return "\n".join(lines[:LONG] + more)
@@ -46,11 +46,23 @@ def _json(value: Any, indent: str) -> str:
             rows = [f"{inner}{json.dumps(key)}: {_json(item, inner)}" for key, item in value.items()]
         elif all(isinstance(item, int | float) for item in value):
             return line
+        elif _is_table(value):
+            rows = [inner + _one_line(list(row)) for row in (value[0].keys(), *(item.values() for item in value))]
         else:
             rows = [inner + _json(item, inner) for item in value]
         begin, end = "{}" if isinstance(value, dict) else "[]"
         return "\n".join([begin, *(f"{row}," for row in rows[:-1]), rows[-1], indent + end])
     return _one_line(value)
+
+
+def _is_table(rows: list[Any]) -> bool:
+    """Whether these are several records of the same plain values."""
+    return len(rows) > 2 and all(
+        isinstance(row, dict)
+        and list(row) == list(rows[0])
+        and not any(isinstance(cell, dict | list) for cell in row.values())
+        for row in rows
+    )
 
 
 def _one_line(value: Any) -> str:

@@ -8,7 +8,7 @@ PATTERNS: tuple[tuple[str, str], ...] = (
     (r"^compil(?:ing|ed)\b.*\n", ""),
     (r"^(?:[^\n:]+: )?\d+ of \d+ joints, (?:[^\n]* left, )?\d+ failed, \d+ not settled\n", ""),
     (r"^[a-z ]+, (?:\d+:)?\d+:\d\d\n", ""),
-    (r"\babout (?:\d+:)?\d+:\d\d on \d+ process(?:es)?", "about TIME on N processes"),
+    (r"\babout (?:\d+:)?\d+:\d\d on \d+\s+process(?:es)?", "about TIME on N processes"),
     (r"^(simulated \d+ joints) in \d+ s", r"\1 in TIME"),
     (r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(?:\.\d+)?(?:\+00:00|Z)?", "DATE"),
     (r"\b(tolstat|python|numpy|numba|scipy|h5py) \d+\.\d+\S*?(?=[\s,;:]|$)", r"\1 VERSION"),
@@ -21,6 +21,23 @@ PATTERNS: tuple[tuple[str, str], ...] = (
     (r"^( *\"?wall_s\"?): [\d.e+-]+", r"\1: TIME"),
 )
 """Regular expressions of lines, and what stands in their place."""
+
+COSTS: tuple[tuple[str, str], ...] = (
+    (r"^[\d.e-]+ and [\d.e-]+ ms per joint", "TIME and TIME per joint"),
+    (
+        r"[\d.e+]+ joints at low\s+fidelity for each at high fidelity; gain \S+",
+        "N joints at low fidelity for each; gain G",
+    ),
+    (r"  +(?:\d+\.?\d*|-|gain)$", "  GAIN"),
+)
+"""The same for the command that measures what joints cost at two fidelities: costs, and what follows from them."""
+
+
+def without_costs(text: str) -> str:
+    """Text of ``multifidelity`` without costs, and gains that follow from them."""
+    for pattern, word in COSTS:
+        text = re.sub(pattern, word, text, flags=re.MULTILINE)
+    return text
 
 
 def stable(text: str, places: dict[str, str]) -> str:

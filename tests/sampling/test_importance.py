@@ -150,7 +150,7 @@ def campaign(folder, text=PLAN, name="plan", n=None):
     """Campaign whose load cross1.F is a sum of its errors, in sigma."""
     plan, path = load(folder, text, name, n=n), folder / f"{name}.h5"
     run(plan, path)
-    with ResultStore.open_to_write(path) as store:
+    with Writer.open(path) as store:
         results = synthetic.results(store.n)
         results["F_max"][:, 0] = 700.0 + 100.0 * (3e4 * (store.errors()["pin1.offset_t"]) - 3.0)
         store.write(np.arange(store.n), Simulation(results, {}))

@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 
 import tolstat
-from tests.support import synthetic
+from tests.support import fakes, synthetic
 from tolstat import study
 from tolstat.common.tables import Status
+from tolstat.store import checksums, layout, metadata
 
 BLOCK = 7
 
@@ -79,3 +80,38 @@ def test_values_are_on_the_disk_before_their_status_and_both_before_joints_are_a
     assert [number for _, number in announced] == [0, 7, 14, 21, 25]
     for syncs, number in announced[1:]:
         assert done_at[syncs - 1] == number
+
+
+def columns_of(content: bytes) -> dict[str, bytes]:
+    """Bytes of the results in a file."""
+    return {name: values.tobytes() for name, values in read(content).items()}
+
+
+def matches(content: bytes) -> tuple[int, bool]:
+    """Session number of a file, and whether all its checksums match."""
+    with h5py.File(BytesIO(content), "r") as file:
+        held = metadata.read(file)
+        found = checksums.computed(file, layout.datasets(held), np.arange(checksums.blocks_of(held.n)))
+        return int(file["session/number"][()]), bool((found == file["checksums/crc"][()]).all())
+
+
+def test_results_never_have_wrong_checksums_that_count(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a run that resumes: the session number is odd on the disk before a result changes, and until all match."""
+    path = tmp_path / "a.h5"
+    fakes.run(fakes.Study(), path, until_row=10)
+    before, contents, sync = path.read_bytes(), list[bytes](), os.fsync
+
+    def watched(handle: int) -> None:
+        contents.append(path.read_bytes())  # what a power cut may leave, at the latest
+        sync(handle)
+
+    monkeypatch.setattr(os, "fsync", watched)
+    fakes.run(fakes.Study(), path, 1, 15)
+    found = [matches(content) for content in contents]
+    assert matches(before) == (2, True)
+    assert [number for number, _ in found] == sorted(number for number, _ in found)
+    assert {number for number, _ in found} == {3, 4}
+    assert not found[len(found) // 2][1]
+    assert all(same for number, same in found if number % 2 == 0)
+    first, own = (columns_of(content) for content in (contents[0], before))
+    assert first == own

@@ -21,12 +21,12 @@ from tests.support.synthetic import HEAD
 from tolstat import joint
 from tolstat import study as studies
 from tolstat.campaign import blocks as execution
-from tolstat.campaign import progress
 from tolstat.campaign import run as campaign
 from tolstat.common import tables
 from tolstat.common.counts import Counts
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.tables import Options
+from tolstat.display import progress
 from tolstat.solver import simulation
 from tolstat.store import ResultFile, Writer
 from tolstat.store.recorded import differing_keys

@@ -20,7 +20,7 @@ import pytest
 from tests.campaign.test_campaign import datasets
 from tests.support import fakes
 from tolstat.campaign.blocks import Execution
-from tolstat.campaign.pool import Work, WorkerDied
+from tolstat.campaign.pool import Work, WorkerDied, never_stop
 from tolstat.common.counts import Counts
 from tolstat.common.errors import InputError
 from tolstat.common.tables import Options, Simulation, Status
@@ -114,7 +114,7 @@ def simulate_or_raise(
 @pytest.mark.slow
 def test_a_cluster_whose_workers_cannot_get_ready_ends() -> None:
     with pytest.raises(MemoryError):
-        list(map_on_cluster(Work(abs, prepare=cannot), range(9), None, 1, dict))
+        list(map_on_cluster(Work(abs, prepare=cannot), range(9), None, 1, never_stop))
 
 
 @pytest.mark.slow
@@ -122,7 +122,7 @@ def test_a_cluster_whose_workers_die_ends(monkeypatch: pytest.MonkeyPatch) -> No
     """Dask does not always start workers again."""
     monkeypatch.setattr(cluster_module, "GONE_S", 10.0)
     with pytest.raises(WorkerDied, match=r"10 times in a row .* (all those workers died|killed by SIGKILL)"):
-        list(map_on_cluster(Work(die), range(9), None, 1, dict))
+        list(map_on_cluster(Work(die), range(9), None, 1, never_stop))
 
 
 def die(x: int) -> int:
@@ -143,9 +143,10 @@ def test_other_versions_are_refused() -> None:
 
 
 @pytest.mark.slow
-def test_a_worker_with_other_versions_is_refused(cluster: Cluster) -> None:
+def test_a_worker_with_other_versions_is_refused(cluster: Cluster, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cluster_module, "versions", process_number)
     with pytest.raises(InputError, match=r"the worker tcp.* has other software versions\n    process: \d+ here, \d+"):
-        list(map_on_cluster(Work(abs), range(9), cluster.address, 2, process_number))
+        list(map_on_cluster(Work(abs), range(9), cluster.address, 2, never_stop))
 
 
 def process_number() -> dict[str, str]:
@@ -155,14 +156,14 @@ def process_number() -> dict[str, str]:
 def test_a_scheduler_that_is_not_there(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("tolstat.campaign.cluster.CONNECT_S", 0.5)
     with pytest.raises(InputError, match=r"--scheduler: tcp://127.0.0.1:1 does not answer"):
-        list(map_on_cluster(Work(abs), range(9), "tcp://127.0.0.1:1", 2, process_number))
+        list(map_on_cluster(Work(abs), range(9), "tcp://127.0.0.1:1", 2, never_stop))
 
 
 @pytest.mark.slow
 def test_stop_finishes_what_is_begun(cluster: Cluster) -> None:
     seen: list[int] = []
     begin = time.monotonic()
-    for block, result in map_on_cluster(Work(abs), iter(range(10**6)), cluster.address, 2, dict, lambda: len(seen) > 9):
+    for block, result in map_on_cluster(Work(abs), iter(range(10**6)), cluster.address, 2, lambda: len(seen) > 9):
         seen.append(block)
         assert result == block
     assert 10 <= len(seen) < 40

@@ -12,6 +12,7 @@ from tests.support.views import view
 from tolstat import report, sampling
 from tolstat.analysis import prediction
 from tolstat.analysis.exceedance import clopper_pearson, needed
+from tolstat.analysis.sample_load import SampleLoad
 from tolstat.analysis.weighted import Trust
 from tolstat.cli import app
 from tolstat.common.tables import RESULT, Simulation, Status
@@ -19,7 +20,6 @@ from tolstat.display.asked import Asked
 from tolstat.questions.exceedance import query as exceedance
 from tolstat.report import headline, page, summary
 from tolstat.store import ResultFile, Writer
-from tolstat.store.sample_load import SampleLoad
 from tolstat.study import load
 
 ONE = synthetic.STUDY.partition("[limits]")[0] + '[limits]\n"cross1.F" = "1500 N"\n'

@@ -13,6 +13,7 @@ from tests.cli.test_cli import simulate
 from tests.support import fakes, synthetic
 from tolstat import sampling, study
 from tolstat.analysis import exceedance, weighted
+from tolstat.analysis.sample_load import SampleLoad
 from tolstat.analysis.sorted_loads import EXACT
 from tolstat.campaign import extend
 from tolstat.cli import app
@@ -21,8 +22,7 @@ from tolstat.common.tables import Simulation, Status
 from tolstat.questions.exceedance import query as exceeded
 from tolstat.questions.reweight import query as reweighting
 from tolstat.report import headline
-from tolstat.store import ResultFile
-from tolstat.store.sample_load import SampleLoad
+from tolstat.store import ResultFile, Writer
 from tolstat.study.proposal import Proposal, component, weights
 
 SEEDS = 500

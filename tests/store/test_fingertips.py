@@ -11,12 +11,12 @@ import pytest
 import tolstat
 from tests.support import synthetic
 from tolstat.analysis.quantile import Quantile
+from tolstat.analysis.sample_load import largest_of
 from tolstat.analysis.sorted_loads import Intervals
 from tolstat.common.errors import InputError
 from tolstat.common.loads import LOADS
 from tolstat.common.shown import short, shown
 from tolstat.store import ResultFile, Writer
-from tolstat.store.sample_load import largest_of
 
 MAX_REPR = 250
 WRITING = {name for name in set(dir(Writer)) - set(dir(ResultFile)) if not name.startswith("_")}

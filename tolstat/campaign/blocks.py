@@ -29,7 +29,6 @@ from tolstat.joint import perturb
 from tolstat.solver.compilation import is_compiled, warm_up
 from tolstat.solver.simulation import simulate_rows
 from tolstat.store import Reader
-from tolstat.store.provenance import versions
 from tolstat.store.recorded import perturbed, settings, variants
 
 if TYPE_CHECKING:
@@ -162,7 +161,7 @@ def simulate_pending(
     if execution.kind == "dask":
         from tolstat.campaign.cluster import map_on_cluster
 
-        results = map_on_cluster(work, blocks, execution.scheduler, workers, versions, stop)
+        results = map_on_cluster(work, blocks, execution.scheduler, workers, stop)
     else:
         results = pool.map_blocks(work, blocks, max(1, min(workers, -(-todo // size))), stop)
     with closing(results):

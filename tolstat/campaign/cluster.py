@@ -21,6 +21,7 @@ from tolstat.campaign import pool
 from tolstat.campaign.pool import BlockT, Lost, ResultT, Work, WorkerDied
 from tolstat.common.cores import one_thread_each
 from tolstat.common.errors import Fault, InputError
+from tolstat.store.provenance import versions
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -37,19 +38,12 @@ FETCH_S = 60.0
 LOOPBACK = "127.0.0.1"
 """Address of a cluster on this machine: Dask runs what it is sent, so nothing listens to other machines."""
 
-Fingerprint = Callable[[], Mapping[str, str]]
-
 _ONE_AT_A_TIME = threading.Lock()
 """Lock: a simulation uses work arrays of the process, which the threads of a worker must not use at the same time."""
 
 
 def map_on_cluster(
-    work: Work[BlockT, ResultT],
-    blocks: Iterable[BlockT],
-    scheduler: str | None,
-    workers: int,
-    fingerprint: Fingerprint,
-    stop: Callable[[], bool] = pool.never_stop,
+    work: Work[BlockT, ResultT], blocks: Iterable[BlockT], scheduler: str | None, workers: int, stop: Callable[[], bool]
 ) -> Generator[tuple[BlockT, ResultT | Lost], None, None]:
     """Apply the function to every block on a Dask cluster and yield the results as they arrive.
 
@@ -65,9 +59,7 @@ def map_on_cluster(
         Address of the scheduler; without it a cluster is started on this machine.
     workers : int
         Number of processes of a cluster on this machine, and of the pool.
-    fingerprint : callable
-        () -> values by name, such as versions, that must be equal here and in every worker.
-    stop : callable, optional
+    stop : callable
         Called often; once it returns True no further block is started, and blocks in work are finished.
 
     Yields
@@ -78,7 +70,7 @@ def map_on_cluster(
     Raises
     ------
     InputError
-        When Dask is not installed, the scheduler does not answer, or a worker's fingerprint differs.
+        When Dask is not installed, the scheduler does not answer, or a worker's software versions differ.
     WorkerDied
         When the scheduler is lost or has no workers; otherwise as `pool.map_blocks`.
     """
@@ -89,12 +81,12 @@ def map_on_cluster(
     failed: list[BlockT] = []
     todo, failures, succeeded, seen = iter(blocks), 0, False, time.monotonic()
     with _client(scheduler, workers) as client:
-        expected = _checked(client, fingerprint)
+        expected = _checked(client)
         while True:
             threads = sum(client.nthreads().values())
             seen = time.monotonic() if threads or scheduler else seen
             while len(running) < 2 * max(1, threads) and not stop() and (block := next(todo, None)) is not None:
-                future = client.submit(process_block, work, fingerprint, expected, block, pure=False)
+                future = client.submit(process_block, work, expected, block, pure=False)
                 running[future] = block
                 future.add_done_callback(ended.put)
             if not running:
@@ -126,17 +118,15 @@ def map_on_cluster(
     yield from pool.map_blocks(work, chain(failed, todo), workers, stop)
 
 
-def process_block(work: Work[Any, Any], fingerprint: Fingerprint, expected: Mapping[str, str], block: Any) -> Any:
+def process_block(work: Work[Any, Any], expected: Mapping[str, str], block: Any) -> Any:
     """Process a block in a worker, one block at a time."""
-    check(expected, _own(fingerprint), "a Dask worker")
+    check(expected, _versions(), "a Dask worker")
     with _ONE_AT_A_TIME:
         _prepare(work.prepare)
         return work.function(block)
 
 
-@cache
-def _own(fingerprint: Fingerprint) -> Mapping[str, str]:
-    return fingerprint()
+_versions = cache(versions)
 
 
 @cache
@@ -168,14 +158,14 @@ def check(expected: Mapping[str, str], found: Mapping[str, str], where: str) -> 
         raise InputError([Fault("--executor dask", differing, remedy)])
 
 
-def _checked(client: Client, fingerprint: Fingerprint) -> dict[str, str]:
-    """Return the fingerprint of this process, which all workers have."""
+def _checked(client: Client) -> dict[str, str]:
+    """Return the software versions of this process, which all workers have."""
     try:
         client.wait_for_workers(1, timeout=FIRST_WORKER_S)
     except TimeoutError as error:
         raise WorkerDied(NO_WORKER) from error
-    expected = dict(fingerprint())
-    for address, found in client.run(fingerprint, on_error="return").items():
+    expected = versions()
+    for address, found in client.run(versions, on_error="return").items():
         if isinstance(found, BaseException):
             remedy = "install tolstat there, and restart the workers"
             raise InputError([Fault("--executor dask", f"the worker {address} cannot run tolstat: {found!r}", remedy)])

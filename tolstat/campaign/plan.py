@@ -12,16 +12,16 @@ from numpy.typing import NDArray
 
 from tolstat.analysis import exceedance, quantile
 from tolstat.campaign import checks, verify
-from tolstat.campaign.progress import Tell, kernels, silent
 from tolstat.campaign.run import choose_fidelity
 from tolstat.common.cores import available_cores
 from tolstat.common.loads import load_of, split
 from tolstat.common.tables import FAILED, RESULT, UNSETTLED, Options, Simulation, Status
 from tolstat.display import text
+from tolstat.display.progress import Tell, silent
 from tolstat.joint import ideal, perturb
 from tolstat.sampling import dimensions, draw, streams
 from tolstat.solver import refinement
-from tolstat.solver.compilation import warm_up
+from tolstat.solver.compilation import stage_name, warm_up
 from tolstat.solver.simulation import history_specs, simulate_rows
 from tolstat.store import layout, metadata, worst
 from tolstat.store.recorded import perturbed, settings, variants
@@ -213,7 +213,7 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT, stage: Te
     Plan
     """
     workers = workers or available_cores()
-    stage(kernels())
+    stage(stage_name())
     warm_up()
     stage("pilot")
     rows = np.unique(np.linspace(0, study.rows - 1, min(pilot, study.rows)).astype(np.intp))

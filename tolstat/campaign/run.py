@@ -28,14 +28,15 @@ from tolstat.campaign.blocks import (
 )
 from tolstat.campaign.extend import NOT_EXTENDABLE, OTHER_CODE, code_of
 from tolstat.campaign.pool import WorkerDied, kept_workers
-from tolstat.campaign.progress import JOINTS, Reporter, Tell, kernels, note, silent
 from tolstat.campaign.remedy import Retry, begin_retry
 from tolstat.common.counts import Counts
 from tolstat.common.errors import Fault, InputError, StoreError
 from tolstat.common.tables import Status
+from tolstat.display.progress import JOINTS, Reporter, Tell, note, silent
 from tolstat.joint import perturb
 from tolstat.sampling import dimensions, draw_blocks, origin_blocks
 from tolstat.solver import fidelity, rainflow
+from tolstat.solver.compilation import stage_name
 from tolstat.solver.simulation import Histories, history_specs
 from tolstat.store import Reader, Writer
 from tolstat.store.provenance import differing_code
@@ -204,7 +205,7 @@ def run(
         last = store.n if until_row is None else store.slot(until_row)
         try:
             if next(pending(store, last), None) is not None:
-                stage(kernels())
+                stage(stage_name())
                 examples = some_joints(study, store)
                 for options in settings_in_use(study, store):
                     compile_missing(options, examples)

@@ -18,7 +18,7 @@ from tolstat.common.errors import Fault, InputError
 from tolstat.display.unseen import visible
 
 if TYPE_CHECKING:
-    from tolstat.campaign.progress import Display
+    from tolstat.display.progress import Display
 
 WIDTH = 80
 """Maximum length of a line of prose, characters."""
@@ -131,7 +131,7 @@ def _log_file(path: Path) -> logging.Handler:
 @contextmanager
 def progress(first: str = "") -> Iterator[Display]:
     """Show progress on standard error, with the stage `first` to begin with; see `campaign.progress.Display`."""
-    from tolstat.campaign.progress import display
+    from tolstat.display.progress import display
 
     quiet = bool(LOG.handlers) and LOG.handlers[0].level > logging.INFO
     with display(say, _detail, quiet) as shown:

@@ -62,8 +62,8 @@ def status(
 
 def _text(summary: dict[str, Any]) -> str:
     """Counts and pace as lines; statuses without joints are left out."""
-    from tolstat.campaign.progress import clock
     from tolstat.common.tables import Status
+    from tolstat.display.progress import clock
 
     found = {state.label: summary[state.label] for state in Status if summary[state.label]}
     lines = [f"study: {summary['study']}", f"joints: {summary['joints']}"]
@@ -180,9 +180,9 @@ def _pace(store: Reader, points: int, pending: int) -> dict[str, Any]:
 
 def _exceedance(store: Reader, states: NDArray[np.uint8], name: str, values: NDArray[np.float64]) -> dict[str, Any]:
     """Share of the joints above a limit so far, from loads and their ends, (3, n); None without an estimate."""
+    from tolstat.analysis.sample_load import SampleLoad
     from tolstat.analysis.sorted_loads import Intervals
     from tolstat.common.loads import load_of
-    from tolstat.store.sample_load import SampleLoad
 
     samples, method = slice(store.first_sample, None), store.sampling["method"]
     weights = store.origin()["weight"][samples] if method == "importance" else None

@@ -183,3 +183,8 @@ def _watch(names: list[str], ended: threading.Event) -> None:
             left.remove(name)
             done = 1 - sum(KERNELS[name].share for name in left) / work
             LOG.info("compiled: %s (%.0f %%, %.0f s)", KERNELS[name].what, 100 * done, time.monotonic() - begun)
+
+
+def stage_name() -> str:
+    """Name of the stage that makes the kernels ready: says that they are compiled if they are not in the cache."""
+    return "loading the kernels" if is_compiled() else "compiling the kernels, about half a minute, once"

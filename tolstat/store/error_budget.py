@@ -10,9 +10,9 @@ import numpy as np
 
 from tolstat.analysis import prediction
 from tolstat.analysis.accuracy import LEAST_NEAR, OBSERVABLES, corrected, corrections, size
+from tolstat.analysis.sample_load import SampleLoad, frozen, largest_of
 from tolstat.common.loads import ALL_LIMITS, ANY_LIMIT, LOADS, FloatArray
 from tolstat.common.once import once
-from tolstat.store.sample_load import SampleLoad, frozen, largest_of
 from tolstat.store.view import View
 
 

@@ -11,13 +11,13 @@ from tolstat.analysis import known_share, process
 from tolstat.analysis.exceedance import Mask
 from tolstat.analysis.known_share import Event, KnownShare, Mixture
 from tolstat.analysis.process import Known, Sums
+from tolstat.analysis.sample_load import SampleLoad
 from tolstat.analysis.weighted import Split
 from tolstat.common.loads import ALL_LIMITS
 from tolstat.common.once import once
 from tolstat.common.tables import Status
 from tolstat.store import error_budget
 from tolstat.store.recorded import mentions
-from tolstat.store.sample_load import SampleLoad
 from tolstat.store.view import View
 from tolstat.study import known
 from tolstat.study.axes import streams_of

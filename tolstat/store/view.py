@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tolstat.analysis import accuracy
 from tolstat.analysis.exceedance import FloatArray
+from tolstat.analysis.sample_load import SampleLoad, frozen, largest_of
 from tolstat.common import selected_results
 from tolstat.common.counts import Counts
 from tolstat.common.draw_records import DRAWN, METHODS, check_equal_weights
@@ -25,7 +26,6 @@ from tolstat.store import verification, what_if, worst
 from tolstat.store.hdf5 import BLOCK
 from tolstat.store.reader import Reader
 from tolstat.store.recorded import recall
-from tolstat.store.sample_load import SampleLoad, frozen, largest_of
 from tolstat.store.verification import Verification
 from tolstat.store.what_if import Altered
 from tolstat.store.worst import FirstPass

@@ -8,12 +8,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tolstat.analysis.sample_load import frozen
 from tolstat.analysis.sorted_loads import Intervals
 from tolstat.common.load_kinds import SPAN
 from tolstat.common.loads import LOAD_FIELDS, LOADS, FloatArray, Limit, Load, Results, split
 from tolstat.common.tables import FAILED, RESULT, UNSETTLED, VALID, Status, without_results
 from tolstat.store.reader import Reader
-from tolstat.store.sample_load import frozen
 from tolstat.store.verification import Verification
 
 AT_ONCE = 16_384

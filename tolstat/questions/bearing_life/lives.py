@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from tolstat.analysis import accuracy
 from tolstat.analysis.exceedance import FloatArray
 from tolstat.analysis.rating_life import basic_life, system_life, turns_per_revolution
+from tolstat.analysis.sample_load import SampleLoad
 from tolstat.analysis.sorted_loads import EXACT
 from tolstat.common.errors import Fault, StoreError
 from tolstat.common.load_kinds import PINS
@@ -20,7 +21,6 @@ from tolstat.joint import Bearing, operating
 from tolstat.joint.bearing import FOR_LIFE
 from tolstat.store import points
 from tolstat.store.recorded import joint_of
-from tolstat.store.sample_load import SampleLoad
 from tolstat.store.view import View
 
 JOINT = "joint"

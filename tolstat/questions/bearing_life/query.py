@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from tolstat.analysis.sample_load import SampleLoad
 from tolstat.analysis.sorted_loads import EXACT
 from tolstat.common.load_kinds import PINS
 from tolstat.common.tables import LIFE_EXPONENT, Mode
@@ -17,7 +18,6 @@ from tolstat.joint.bearing import FOR_LIFE
 from tolstat.questions.bearing_life.lives import PLACES, Lives, bearing_of, keeps_loads, lives_of
 from tolstat.store import points
 from tolstat.store.error_budget import total_interval
-from tolstat.store.sample_load import SampleLoad
 from tolstat.store.view import View
 
 SHARES = (0.5, 0.9, 0.99)

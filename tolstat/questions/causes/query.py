@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from tolstat import sampling
 from tolstat.analysis import overrepresentation, pick_freeze, regression, sensitivity
+from tolstat.analysis.sample_load import SampleLoad
 from tolstat.common.errors import Fault, InputError, StoreError
 from tolstat.common.loads import ALL_LIMITS
 from tolstat.common.shown import shown
-from tolstat.store.sample_load import SampleLoad
 from tolstat.store.view import View
 
 Array = NDArray[np.float64]

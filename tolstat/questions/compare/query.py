@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from tolstat.analysis import difference
 from tolstat.analysis.exceedance import FloatArray
+from tolstat.analysis.sample_load import SampleLoad
 from tolstat.common.counts import Counts
 from tolstat.common.draw_records import DRAWN
 from tolstat.common.errors import Fault, InputError, StoreError
@@ -19,7 +20,6 @@ from tolstat.common.loads import ALL_LIMITS
 from tolstat.common.shown import shown
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import Status
-from tolstat.store.sample_load import SampleLoad
 from tolstat.store.view import View
 
 SHARES = (0.5, 0.9, 0.99)

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.analysis import exceedance
+from tolstat.analysis.sample_load import SampleLoad
 from tolstat.common.loads import ALL_LIMITS, SHOWN_LOADS, load_of, unit_text
 from tolstat.common.once import once
 from tolstat.display import text
 from tolstat.store import error_budget, known_parts
-from tolstat.store.sample_load import SampleLoad
 from tolstat.store.view import View
 
 if TYPE_CHECKING:

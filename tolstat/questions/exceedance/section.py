@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
 from tolstat.analysis.exceedance import simultaneous
+from tolstat.analysis.sample_load import SampleLoad
 from tolstat.common.load_kinds import Kind
 from tolstat.common.loads import LOADS, PANELS, QUANTITY, load_of, names_of
 from tolstat.common.tables import VALID
@@ -18,7 +19,6 @@ from tolstat.display.blocks import Block, Panel, Panels, ResultFile, Section, Ta
 from tolstat.display.table import Rows, as_block
 from tolstat.questions.exceedance import curves_figure, query, rendering, sweep
 from tolstat.store.recorded import joint_of
-from tolstat.store.sample_load import SampleLoad
 from tolstat.store.view import View
 
 THIN_LEVELS = 80

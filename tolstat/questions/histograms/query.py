@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.analysis.exceedance import FloatArray
-from tolstat.store.sample_load import SampleLoad
+from tolstat.analysis.sample_load import SampleLoad
 from tolstat.store.view import View
 from tolstat.study.tolerances.entry import SingleEntry
 

@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
+from tolstat.analysis.sample_load import SampleLoad
 from tolstat.common.tables import VALID
 from tolstat.common.units import DISPLAY_UNITS
 from tolstat.display import drawing, style, text
@@ -15,7 +16,6 @@ from tolstat.display.asked import Asked
 from tolstat.display.blocks import Block, Panel, Panels, Section, Text
 from tolstat.questions.histograms import query
 from tolstat.questions.histograms.query import Drawn, Histogram
-from tolstat.store.sample_load import SampleLoad
 from tolstat.store.view import View
 
 

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from tolstat.analysis import exceedance, lots, prediction
 from tolstat.analysis.lots import Delivery, Law
+from tolstat.analysis.sample_load import SampleLoad
 from tolstat.common.errors import Fault, StoreError
 from tolstat.common.loads import ALL_LIMITS
 from tolstat.common.shown import shown
 from tolstat.store import error_budget
-from tolstat.store.sample_load import SampleLoad
 from tolstat.store.view import View
 from tolstat.study import Study, load
 from tolstat.study.rewriting import with_keys

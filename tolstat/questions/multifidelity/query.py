@@ -12,21 +12,21 @@ import pandas as pd
 
 from tolstat.analysis import multifidelity
 from tolstat.analysis.multifidelity import Allocation, Pairs
+from tolstat.analysis.sample_load import SampleLoad
 from tolstat.campaign import run as campaign
 from tolstat.campaign.blocks import Execution
 from tolstat.campaign.extend import grow
 from tolstat.campaign.plan import simulate_timed
-from tolstat.campaign.progress import Reporter, note, silent
 from tolstat.common.errors import Fault, InputError, StoreError, gather
 from tolstat.common.loads import SHOWN_LOADS, UNIT_OF_LOAD
 from tolstat.common.shown import shown
 from tolstat.common.strict import did_you_mean, validate
+from tolstat.display.progress import Reporter, note, silent
 from tolstat.joint import perturb
 from tolstat.joint.ideal import NO_CLOSED_FORM
 from tolstat.sampling import draw, draw_blocks
 from tolstat.store import ResultFile, Writer
 from tolstat.store.recorded import perturbed
-from tolstat.store.sample_load import SampleLoad
 from tolstat.study import Study
 from tolstat.study.model import Solver
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tolstat.analysis.sample_load import CONFIDENCE
 from tolstat.common.columns import RESULT_COLUMNS
 from tolstat.common.errors import Fault, StoreError
 from tolstat.common.load_kinds import LOAD_KINDS, SHAFTS
@@ -15,7 +16,6 @@ from tolstat.common.shown import shown
 from tolstat.common.tables import VALID
 from tolstat.store import revolutions
 from tolstat.store.points import point_of
-from tolstat.store.sample_load import CONFIDENCE
 from tolstat.store.view import View
 
 if TYPE_CHECKING:

@@ -26,11 +26,11 @@ from tolstat.campaign import run as campaign
 from tolstat.campaign.blocks import Execution
 from tolstat.campaign.extend import grow
 from tolstat.campaign.pool import kept_workers
-from tolstat.campaign.progress import Reporter, note
 from tolstat.common.draw_records import SUBSET
 from tolstat.common.errors import Fault, StoreError
 from tolstat.common.loads import Limit
 from tolstat.common.shown import shown
+from tolstat.display.progress import Reporter, note
 from tolstat.questions.rare import numerical
 from tolstat.store import ResultFile, Writer
 from tolstat.store.recorded import differing_keys

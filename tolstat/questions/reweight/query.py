@@ -18,11 +18,11 @@ from tolstat.analysis import prediction, reweight
 from tolstat.analysis.exceedance import FloatArray
 from tolstat.analysis.prediction import DELIVERY
 from tolstat.analysis.reweight import Ratios
+from tolstat.analysis.sample_load import SampleLoad
 from tolstat.common.errors import Fault, InputError, StoreError
 from tolstat.common.shown import shown
 from tolstat.common.tables import Status
 from tolstat.store import error_budget
-from tolstat.store.sample_load import SampleLoad
 from tolstat.store.view import View
 from tolstat.study import Study
 from tolstat.study.axes import columns_of

@@ -11,11 +11,11 @@ import numpy as np
 import pandas as pd
 
 from tolstat.analysis.exceedance import FloatArray
+from tolstat.analysis.sample_load import SampleLoad
 from tolstat.common.errors import Fault, StoreError
 from tolstat.common.loads import ALL_LIMITS
 from tolstat.common.shown import shown
 from tolstat.store import error_budget
-from tolstat.store.sample_load import SampleLoad
 from tolstat.store.view import View
 from tolstat.study import Study, costs, scaling, sorting
 from tolstat.study.costs import Cost

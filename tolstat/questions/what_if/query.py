@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from tolstat.analysis import difference, exceedance, pick_freeze
 from tolstat.analysis.exceedance import FloatArray
+from tolstat.analysis.sample_load import SampleLoad
 from tolstat.campaign import what_if as sets
 from tolstat.campaign.what_if import EXCHANGE, WIDTH
 from tolstat.common.errors import Fault, InputError, StoreError
@@ -20,7 +21,6 @@ from tolstat.common.shown import shown
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import Status
 from tolstat.store import what_if as kept
-from tolstat.store.sample_load import SampleLoad
 from tolstat.store.view import View
 from tolstat.store.what_if import Altered
 from tolstat.study import widths

@@ -10,12 +10,12 @@ from typing import NamedTuple
 from tolstat.campaign import what_if as sets
 from tolstat.campaign.checks import no_progress
 from tolstat.campaign.pool import kept_workers
-from tolstat.campaign.progress import clock, silent
 from tolstat.campaign.what_if import Asked, Wanted
 from tolstat.common.cores import available_cores
 from tolstat.common.counts import Counts
 from tolstat.common.errors import Fault, StoreError
 from tolstat.common.loads import ALL_LIMITS, split
+from tolstat.display.progress import clock, silent
 from tolstat.questions.what_if import query
 from tolstat.solver.compilation import warm_up
 from tolstat.store import Writer, what_if

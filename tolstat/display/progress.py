@@ -72,13 +72,6 @@ def clock(seconds: float) -> str:
     return f"{hours}:{m:02d}:{s:02d}" if hours else f"{m}:{s:02d}"
 
 
-def kernels() -> str:
-    """Name of the stage that makes the kernels ready: says that they are compiled if they are not in the cache."""
-    from tolstat.solver.compilation import is_compiled
-
-    return "loading the kernels" if is_compiled() else "compiling the kernels, about half a minute, once"
-
-
 class Display:
     """Stages of some work, one after the other; of a campaign also its counts. Shows nothing: subclasses do.
 

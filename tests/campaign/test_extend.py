@@ -222,6 +222,16 @@ def test_a_campaign_with_pending_joints_grows(tmp_path: Path, make: Make) -> Non
     assert datasets(grown) == datasets(run(make(60, kind="full"), tmp_path / "whole.h5"))
 
 
+def test_joints_that_are_to_be_simulated_again_stay_so_when_the_campaign_grows(tmp_path: Path, make: Make) -> None:
+    grown = run(make(40), tmp_path / "grown.h5")
+    with Writer.open(grown) as store:
+        store.begin_retry({"": np.array([3, 9])}, {"status": ["ok"], "settings": {}, "options": store.options})
+    extend.extend(grown, 60)
+    with ResultFile.open(grown) as store:
+        assert store.pending().tolist() == [3, 9, *range(41, 61)]
+        assert np.flatnonzero(store.attempt()).tolist() == [3, 9]
+
+
 def test_slices_with_pending_joints_are_merged(tmp_path: Path, make: Make) -> None:
     """A row that one file has and another has not is that of the first."""
     study = make(60, kind="full")

@@ -226,6 +226,23 @@ def test_a_damaged_attempt_simulates_nothing_with_the_settings_of_another(
         assert np.flatnonzero(store.attempt()).tolist() == [9]
 
 
+def test_a_retry_that_is_killed_or_stopped_before_its_first_joint_is_no_damage(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    damage.small_blocks(monkeypatch, 4)
+    path, killed, plan = tmp_path / "a.h5", tmp_path / "b.h5", fakes.Study(n=12)
+    with new_store(path, plan) as store:
+        store.write(np.arange(12), simulation(plan, np.arange(12)))
+    with Writer.open(path) as store:
+        store.begin_retry({"": np.array([3, 9])}, {"status": ["ok"], "settings": {}, "options": store.options})
+        killed.write_bytes(path.read_bytes())
+    for file, checked in ((path, True), (killed, False)):
+        with ResultFile.open(file) as store:
+            assert store.pending().tolist() == [3, 9]
+            assert np.flatnonzero(store.attempt()).tolist() == [3, 9]
+            assert store.check() == (checked, {})
+
+
 def test_damage_at_one_operating_point_is_not_that_of_another(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     damage.small_blocks(monkeypatch, 4)
     names = ("low", "lower")

@@ -114,7 +114,7 @@ def simulate_or_raise(
 @pytest.mark.slow
 def test_a_cluster_whose_workers_cannot_get_ready_ends() -> None:
     with pytest.raises(MemoryError):
-        list(map_on_cluster(Work(abs, prepare=cannot), range(9), None, 1, never_stop))
+        list(map_on_cluster(Work(abs, prepare=cannot), range(20), None, 1, never_stop))
 
 
 @pytest.mark.slow
@@ -122,7 +122,7 @@ def test_a_cluster_whose_workers_die_ends(monkeypatch: pytest.MonkeyPatch) -> No
     """Dask does not always start workers again."""
     monkeypatch.setattr(cluster_module, "GONE_S", 10.0)
     with pytest.raises(WorkerDied, match=r"10 times in a row .* (all those workers died|killed by SIGKILL)"):
-        list(map_on_cluster(Work(die), range(9), None, 1, never_stop))
+        list(map_on_cluster(Work(die), range(20), None, 1, never_stop))
 
 
 def die(x: int) -> int:

@@ -88,6 +88,7 @@ SORTING = Campaign(
     usual("sorting.h5")
     | {
         "sorting": forms("sorting sorting.h5"),
+        "capability_rare": forms("capability sorting.h5 --one-in 1000 --delivery 50"),
         "causes": [
             *forms("causes sorting.h5 --by cross1.T --top 5"),
             "causes sorting.h5 --logarithm",

@@ -12,7 +12,7 @@ from typing import Any
 DIGITS = 9
 RELATIVE, ABSOLUTE = 1e-6, 1e-12
 """Tolerances of numbers in JSON and CSV: processors differ in the last bits of a result, which differences amplify."""
-LINE, LONG = 110, 260
+LINE, LONG = 110, 200
 """Longest line of a list or table, characters; most lines of a document."""
 FEW, HEAD = 24, 2
 """Longest list, or table, that is shown whole; numbers shown of a longer one."""

@@ -18,6 +18,10 @@ PATTERNS: tuple[tuple[str, str], ...] = (
     (r"^time: about .* on \d+ cores?", "time: about TIME on N cores"),
     (r"^  (start|joints|check|report): (?:less than )?[\d.]+ (?:s|min|h)$", r"  \1: TIME"),
     (r"^memory: .*$", "memory: SIZE"),
+    (
+        r"^.*\d of \d+ joints, (?:[^\n]*\n    )?[^\n]*joints/s,[^\n]*(?:\n    [^\n]*)?\n",
+        "",
+    ),
     (r"^( *\"?wall_s\"?): [\d.e+-]+", r"\1: TIME"),
 )
 """Regular expressions of lines, and what stands in their place."""

@@ -79,7 +79,7 @@ MISLEADING = {
 
 @pytest.fixture(autouse=True)
 def _without_pictures(monkeypatch):
-    monkeypatch.setattr("tolstat.report._pictures", lambda view, stem, processes: [])
+    monkeypatch.setattr("tolstat.report._pictures", lambda view, stem: [])
     monkeypatch.setattr("tolstat.questions.sections", lambda view, asked: [])
 
 

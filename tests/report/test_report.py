@@ -195,16 +195,6 @@ def test_sweep_page_shows_unsettled_and_failed_joints():
 
 
 @pytest.mark.slow
-def test_two_processes_write_the_same_files(tmp_path):
-    path = synthetic.store(tmp_path, failed=2)
-    one, two = (report.build(path, tmp_path / str(k), accepted=0.1, processes=k) for k in (1, 2))
-    assert (one.table, one.notes) == (two.table, two.notes)
-    assert [file.name for file in one.files] == [file.name for file in two.files]
-    assert len(one.files) == 5
-    assert [file.read_bytes() for file in one.files] == [file.read_bytes() for file in two.files]
-
-
-@pytest.mark.slow
 def test_numbers_need_neither_pandas_nor_matplotlib(tmp_path):
     path = synthetic.store(tmp_path)
     code = (

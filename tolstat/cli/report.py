@@ -62,7 +62,6 @@ def report(
     if out is not None and out.suffix.lower() in PAGES:
         _page(file, out, accept, again, point or "")
         return
-    from tolstat.common.cores import available_cores
     from tolstat.report import build
     from tolstat.store import ResultFile, recorded, viewed
 
@@ -72,7 +71,7 @@ def report(
         make_folder(out)
     with viewed(file) as view:
         with progress("report") as shown:
-            made = build(view, out, width_of(wide), shown.stage, accepted, point or "", available_cores())
+            made = build(view, out, width_of(wide), shown.stage, accepted, point or "")
         tell(made)
         if note := recorded.note_on_mounting(view.store):
             say(f"note: {note}")

@@ -13,7 +13,6 @@ import typer
 from tolstat.cli._app import Wide, Workers, announce_compilation, print_study_notes, tell, width_of
 from tolstat.cli._shortage import check_memory
 from tolstat.cli._talk import fail, progress, say
-from tolstat.common.cores import available_cores
 from tolstat.common.errors import Fault, InputError, gather
 
 if TYPE_CHECKING:
@@ -210,7 +209,7 @@ def conclude(path: Path, report: bool, wide: bool, study: str = "STUDY") -> None
             with progress("report") as shown:
                 from tolstat.report import build
 
-                made = build(store, None, width_of(wide), shown.stage, processes=available_cores())
+                made = build(store, None, width_of(wide), shown.stage)
             tell(made)
         found = reasons(store, {one.point or "": one.status() for one in store.each()})
         for reason in found:

@@ -9,11 +9,9 @@ from __future__ import annotations
 import math
 import textwrap
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from tolstat.common.aside import Aside
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.files import atomic_write
 from tolstat.common.tables import VALID
@@ -62,7 +60,6 @@ def build(
     stage: Callable[[str], None] = silent,
     accepted: float = math.nan,
     point: str = "",
-    processes: int = 1,
 ) -> Report:
     """Write the report of a result file; the campaign may be unfinished.
 
@@ -87,8 +84,6 @@ def build(
     point : str
         Operating point, ``"cruise"``, or the worst of some, ``"cruise+start"``; names of files end in it. The worst of
         all by default.
-    processes : int
-        Number of processes: with two, on Linux, forks of this one write the numbers and one picture of load exceedance.
 
     Returns
     -------
@@ -115,11 +110,7 @@ def build(
             if store.case_names:
                 return _noted(_cases(store, stem, width), stands_on)
             stem = stem.with_name(f"{stem.name}_{point}") if point else stem
-            report = (
-                _sweep(view, stem, width)
-                if view.method == "sweep"
-                else _exceedance(view, stem, width, accepted, processes)
-            )
+            report = _sweep(view, stem, width) if view.method == "sweep" else _exceedance(view, stem, width, accepted)
             stopped = _stopped(store.stop) if store.stop.get("reached") else ""
             for note in (query.not_kept(view), stopped, stands_on):
                 report = _noted(report, note)
@@ -140,24 +131,17 @@ def _noted(report: Report, note: str) -> Report:
     return report._replace(notes=f"{report.notes}\n{note}") if note else report
 
 
-def _exceedance(view: View, stem: Path, width: int | None, accepted: float, processes: int) -> Report:
-    """Report of load exceedance: its numbers in a fork of the process while this one draws, which takes longer."""
-    view.counts, view.verification  # noqa: B018 - read once, for both
-    numbers = Aside(partial(_numbers, view, stem, width, accepted), processes > 1)
-    pictures = _pictures(view, stem, processes) if view.bushing_loads else []
-    found = numbers.result()
-    return found._replace(files=[*pictures, *found.files])
+def _exceedance(view: View, stem: Path, width: int | None, accepted: float) -> Report:
+    """Report of load exceedance."""
+    found = _numbers(view, stem, width, accepted)
+    return found._replace(files=[*(_pictures(view, stem) if view.bushing_loads else []), *found.files])
 
 
-def _pictures(view: View, stem: Path, processes: int) -> list[Path]:
+def _pictures(view: View, stem: Path) -> list[Path]:
     from tolstat.display import style
     from tolstat.questions.exceedance.curves_figure import figure
 
-    made, path = figure(view), stem.with_name(f"{stem.name}_exceedance")
-    for ax in made.axes:
-        ax.yaxis.get_minorticklabels()  # makes the ticks, which take long, once for both pictures
-    vectors = Aside(partial(style.save, made, path, (".svg",)), processes > 1)
-    return [*style.save(made, path, (".png",)), *vectors.result()]
+    return style.save(figure(view), stem.with_name(f"{stem.name}_exceedance"))
 
 
 def _numbers(view: View, stem: Path, width: int | None, accepted: float) -> Report:

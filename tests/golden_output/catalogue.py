@@ -40,16 +40,16 @@ def forms(*commands: str) -> list[str]:
     return [command + form for command in commands for form in FORMS]
 
 
-def usual(file: str) -> dict[str, list[str]]:
-    """Commands that are asked of every campaign."""
+def usual(file: str, kind: str = "") -> dict[str, list[str]]:
+    """Commands that are asked of every campaign; `kind` stands before those that show many digits of small numbers."""
     return {
         "status": forms(f"status {file}"),
         "report": [f"report {file} --wide --accept '5 %' --out wide"],
         "page": [f"report {file} --out page.html --accept '10 %' --replay 20"],
         "capability": forms(f"capability {file}"),
         "worst": forms(f"worst {file} --top 4"),
-        "orders": forms(f"orders {file}"),
-        "export": [f"export {file} --csv - --nominal", f"export {file} --statistics statistics.json"],
+        "orders": forms(f"{kind}orders {file}"),
+        "export": [f"{kind}export {file} --csv - --nominal", f"{kind}export {file} --statistics statistics.json"],
     }
 
 
@@ -66,9 +66,9 @@ MAIN = Campaign(
         "show": ["show iso2768_f.h5 --row 3", "show iso2768_f.h5 --out joint.png", "show iso2768_f.h5 --errors"],
         "replay": ["replay iso2768_f.h5 --row 17 --out trace.csv", "replay iso2768_f.h5 --row 0 --json"],
         "verify": [
-            "verify iso2768_f.h5 --joints 1 --out errors.csv",
+            "rough: verify iso2768_f.h5 --joints 1 --out errors.csv",
             "status iso2768_f.h5",
-            "report iso2768_f.h5",
+            "rough: report iso2768_f.h5",
         ],
         "verify_near": [
             "verify iso2768_f.h5 --near 'any limit' --joints 4",
@@ -196,6 +196,6 @@ HELP = Campaign(
             "run rigid_shafts.toml --n 0",
             "run missing.toml",
         ],
-        "verify_study": ["verify line_bored.toml --joints 1 --json"],
+        "verify_study": ["rough: verify line_bored.toml --joints 1 --json"],
     },
 )

@@ -98,8 +98,8 @@ SORTING = Campaign(
         "reweight": forms("reweight sorting.h5 --set 'pin*.tilt_[tz].cpk=0.6' --set 'hole*.diameter.cpk=1.2'"),
         "reweight_out": ["reweight sorting.h5 --set 'pin*.tilt_[tz].cpk=0.6' --out changed.toml"],
         "allocate": [
-            *forms("allocate sorting.h5 --target 'P(any limit) < 0.2'"),
-            "allocate sorting.h5 --target 'P(cross*.T > 60 N*m) < 0.05' --keep 'pin*.diameter' --out proposed.toml",
+            *forms("shape: allocate sorting.h5 --target 'P(any limit) < 0.2'"),
+            "shape: allocate sorting.h5 --target 'P(cross*.T > 60 N*m) < 0.05' --keep 'pin*.diameter' --out new.toml",
         ],
         "time_above": [
             *forms("time-above sorting.h5"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from tests.golden_output.catalogue import Campaign, forms, usual
+from tests.golden_output.transcript import ROUGH
 
 CHEAP = '|[sampling]|[solver]\\nfidelity = "quasistatic"\\nsteps_per_rev = 24\\n\\n[sampling]|'
 """Edit of a study: quasi-static, with few steps."""
@@ -14,7 +15,9 @@ def cheap(*studies: str) -> str:
     return f"sed '{CHEAP}' " + " ".join(f"{study}.toml" for study in studies)
 
 
-SWEEP = Campaign("clearance", ["run clearance.toml"], usual("clearance.h5") | {"show": ["show clearance.h5 --row 2"]})
+SWEEP = Campaign(
+    "clearance", ["run clearance.toml"], usual("clearance.h5", ROUGH) | {"show": ["show clearance.h5 --row 2"]}
+)
 BORED = Campaign("line_bored", ["run line_bored.toml --n 48"], usual("line_bored.h5"))
 OVERNIGHT = Campaign("overnight", ["run overnight.toml --n 64"], usual("overnight.h5"))
 RATTLE = Campaign("rattle", ["run rattle.toml --n 12"], usual("rattle.h5"))
@@ -82,10 +85,10 @@ POINTS = Campaign(
 NEEDLES = Campaign(
     "needle_bearings",
     ["run needle_bearings.toml --n 48"],
-    usual("needle_bearings.h5")
+    usual("needle_bearings.h5", ROUGH)
     | {
         "bearing_life": [
-            *forms("bearing-life needle_bearings.h5"),
+            *forms(f"{ROUGH}bearing-life needle_bearings.h5"),
             'sed \'|C = "21 kN"|C = "23 kN"|\' needle_bearings.toml',
             "run needle_bearings.toml --n 48 --no-report",
             "bearing-life needle_bearings.h5",

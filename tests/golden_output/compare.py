@@ -5,8 +5,7 @@ from __future__ import annotations
 import difflib
 from pathlib import Path
 
-from tests.golden_output.numbers import same_line
-from tests.golden_output.transcript import NUMBERS
+from tests.golden_output.numbers import TOLERANCES, same_line
 
 SHOWN = 60
 """Most lines of a difference that are shown."""
@@ -15,7 +14,7 @@ SHOWN = 60
 def difference(path: Path, name: str, actual: str) -> str:
     """Lines that differ between the golden file at `path`, called `name`, and the text now; empty if none does.
 
-    Blocks whose head ends in ``, numbers`` are compared with a tolerance, all others letter by letter.
+    Blocks whose head ends in ``numbers`` are compared with a tolerance, all others letter by letter.
     """
     if not path.exists():
         return f"{name}: there is no golden file; pytest --update-golden writes it"
@@ -38,8 +37,9 @@ def _aligned(before: list[str], now: list[str]) -> list[str]:
         return now
     lines = []
     for old, new in zip(old_blocks, new_blocks, strict=True):
-        tolerant = old[0].endswith(NUMBERS) and len(old) == len(new)
-        lines += [a if same_line(a, b) else b for a, b in zip(old, new, strict=True)] if tolerant else new
+        how = next((how for how in TOLERANCES if old[0].endswith(how)), "")
+        alike = how and len(old) == len(new)
+        lines += [a if same_line(a, b, how) else b for a, b in zip(old, new, strict=True)] if alike else new
     return lines
 
 

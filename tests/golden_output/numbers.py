@@ -10,8 +10,10 @@ from io import StringIO
 from typing import Any
 
 DIGITS = 9
-RELATIVE, ABSOLUTE = 1e-6, 1e-12
-"""Tolerances of numbers in JSON and CSV: processors differ in the last bits of a result, which differences amplify."""
+CLOSE, ROUGH = ", numbers", ", rough numbers"
+"""At the end of the head of a block whose numbers are compared with a tolerance."""
+TOLERANCES = {CLOSE: (1e-6, 1e-12), ROUGH: (0.05, 1e-9)}
+"""Relative and absolute: processors differ in the last bits of a result, which differences amplify."""
 LINE, LONG = 110, 200
 """Longest line of a list or table, characters; most lines of a document."""
 FEW, HEAD = 24, 2
@@ -130,19 +132,24 @@ def _column(cells: list[str]) -> str:
     return summary(known) + (f", {cells.count('')} empty" if "" in cells else "")
 
 
-def same_line(expected: str, actual: str) -> bool:
+def without_numbers(text: str) -> str:
+    """Text with a sign in place of each number, and one blank in place of several."""
+    return re.sub(r" {2,}", " ", NUMBER.sub("#", text))
+
+
+def same_line(expected: str, actual: str, how: str = CLOSE) -> bool:
     """Whether two lines have the same words, and numbers that agree within the tolerances; integers exactly."""
     if expected == actual:
         return True
-    if NUMBER.sub("#", expected) != NUMBER.sub("#", actual):
+    if without_numbers(expected) != without_numbers(actual):
         return False
     pairs = zip(NUMBER.findall(expected), NUMBER.findall(actual), strict=True)
-    return all(_same_number(one, other) for one, other in pairs)
+    return all(_same_number(one, other, *TOLERANCES[how]) for one, other in pairs)
 
 
-def _same_number(one: str, other: str) -> bool:
+def _same_number(one: str, other: str, relative: float, absolute: float) -> bool:
     if one == other:
         return True
     if re.fullmatch(r"-?\d+", one) and re.fullmatch(r"-?\d+", other):
         return False
-    return math.isclose(float(one), float(other), rel_tol=RELATIVE, abs_tol=ABSOLUTE)
+    return math.isclose(float(one), float(other), rel_tol=relative, abs_tol=absolute)

@@ -21,8 +21,9 @@ from tolstat.cli import app
 
 PROCESS = "process: "
 """Before a command that is run as a process of its own; all others run in this one."""
-NUMBERS = ", numbers"
-"""At the end of the head of a block whose numbers are compared with a tolerance."""
+ROUGH, SHAPE = "rough: ", "shape: "
+"""Before a command whose numbers depend on the processor, by linear algebra in it: the first are compared roughly, of
+the second words and tables alone."""
 SHOWN_FILES = {".csv", ".json", ".toml", ".html", ".md"}
 RESULT_FILES = {".h5", ".png", ".svg", ".parquet", ".xlsx"}
 ENVIRONMENT = {"COLUMNS": "80", "LINES": "40", "TERM": "dumb", "NO_COLOR": "1"}
@@ -45,39 +46,45 @@ def _one(folder: Path, command: str) -> str:
         _keep_variants(folder / file, names)
         return f"$ {command}"
     before = _files(folder)
-    words = shlex.split(command.removeprefix(PROCESS))
-    code, out, err = _in_a_process(folder, words) if command.startswith(PROCESS) else _here(folder, words)
+    kind = next((prefix for prefix in (PROCESS, ROUGH, SHAPE) if command.startswith(prefix)), "")
+    command = command.removeprefix(kind)
+    words = shlex.split(command)
+    code, out, err = _in_a_process(folder, words) if kind == PROCESS else _here(folder, words)
     assert "Traceback (most recent call last)" not in out + err, f"tolstat {command}\n{out}\n{err}"
     assert out.strip() or err.strip(), f"tolstat {command}: exit code {code}, and not a word"
     changed = [name for name, state in _files(folder).items() if before.get(name) != state]
     changed = [name for name in changed if name not in before or not name.endswith(".h5")]
     places = {str(folder): "FOLDER", str(ROOT): "ROOT"}
-    blocks = [f"$ tolstat {command.removeprefix(PROCESS)}", f"exit code {code}"]
+    blocks = [f"$ tolstat {command}", f"exit code {code}"]
     for head, text in (("stdout", out), ("stderr", err)):
         if text.strip():
-            blocks += _block(head, text if words[:1] != ["multifidelity"] else without_costs(text), places)
+            blocks += _block(head, text if words[:1] != ["multifidelity"] else without_costs(text), places, kind)
     if changed:
         blocks.append("== wrote " + ", ".join(changed))
     for name in changed:
         if Path(name).suffix in SHOWN_FILES:
-            blocks += _block(name, (folder / name).read_text(encoding="utf-8"), places)
+            blocks += _block(name, (folder / name).read_text(encoding="utf-8"), places, kind)
         else:
             assert Path(name).suffix in RESULT_FILES, name
             assert (folder / name).stat().st_size, name
     return "\n".join(blocks)
 
 
-def _block(name: str, text: str, places: dict[str, str]) -> list[str]:
+def _block(name: str, text: str, places: dict[str, str], kind: str) -> list[str]:
     """Head and text of one output, in the form of its kind."""
+    how = ""
     if name.endswith(".html"):
         shown = page.as_text(text)
     elif name.endswith(".json") or (name == "stdout" and text[:1] in {"{", "["}):
-        name, shown = name + NUMBERS, numbers.json_text(text)
+        how, shown = numbers.CLOSE, numbers.json_text(text)
     elif name.endswith(".csv") or (name == "stdout" and text.count(",") > 60 * text.count("\n")):
-        name, shown = name + NUMBERS, numbers.csv_text(text)
+        how, shown = numbers.CLOSE, numbers.csv_text(text)
     else:
         shown = text
-    return [f"== {name}", stable(shown, places)]
+    shown = stable(shown, places)
+    if kind == SHAPE:
+        how, shown = "", numbers.without_numbers(shown)
+    return [f"== {name}{numbers.ROUGH if kind == ROUGH else how}", shown]
 
 
 def _edit(path: Path, old: str, new: str) -> None:

@@ -56,6 +56,11 @@ def joint_with_law(law: str) -> joints.Joint:
     return joints.load("cirelli2021", {"contact": {"law": law}, "bearing": bearing}, "test", None)
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the option that writes the golden files of tests/golden/output anew where they differ."""
+    parser.addoption("--update-golden", action="store_true", help="write golden files anew where the output differs")
+
+
 @pytest.fixture(scope="session")
 def cirelli() -> joints.Joint:
     return joints.load("cirelli2021", {}, "test", None)

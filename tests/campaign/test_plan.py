@@ -257,18 +257,18 @@ joint.contact.D_P = "75.9 mm"
 
 def test_a_plan_simulates_variants_as_they_are(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "v.toml").write_text(VARIANTS, encoding="utf-8")
-    loaded, own, made = study.load(tmp_path / "v.toml"), plan._file_bytes, []
+    loaded, own, made = study.load(tmp_path / "v.toml"), plan.simulate_timed, []
 
-    def keep(*args: object) -> int:
-        made.append(args[2])
-        return own(*args)
+    def keep(*args: object) -> object:
+        made.append(own(*args))
+        return made[-1]
 
-    monkeypatch.setattr(plan, "_file_bytes", keep)
+    monkeypatch.setattr(plan, "simulate_timed", keep)
     found = plan.plan(loaded, workers=1)
     assert (found.rows, found.pilot, found.failed, found.unsettled) == (6, 6, 0, 0)
     campaign.run(loaded, tmp_path / "v.h5", 1, check=False)
     with ResultFile.open(tmp_path / "v.h5") as store:
-        np.testing.assert_array_equal(made[0].results["F_max"], store.results()["F_max"])
+        np.testing.assert_array_equal(made[0][0].results["F_max"], store.results()["F_max"])
 
 
 @pytest.mark.slow

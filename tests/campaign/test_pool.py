@@ -179,10 +179,10 @@ def test_the_only_joint_is_given_up_too() -> None:
 
 def test_workers_that_begin_to_die_end_the_map(tmp_path: Path) -> None:
     seen: dict[Any, Any] = {}
-    with pytest.raises(WorkerDied, match="8 times in a row a worker process failed, the last time: killed by SIGKILL"):
+    with pytest.raises(WorkerDied, match="10 times in a row a worker process failed, the last time: killed by SIGKILL"):
         seen.update(map_blocks(Work(die_in_the_end), ((str(tmp_path), x) for x in range(100)), 1))
     assert [found for found in seen.values() if not isinstance(found, Lost)] == list(range(5))
-    assert len(seen) < 14
+    assert len(seen) < 16
 
 
 def test_an_exception_in_every_block_comes_through() -> None:
@@ -195,7 +195,7 @@ def test_an_exception_in_every_block_comes_through() -> None:
 
 
 def test_workers_that_cannot_start() -> None:
-    with pytest.raises(WorkerDied, match=r"9 times in a row a worker process failed, .*: ended with exit code 3"):
+    with pytest.raises(WorkerDied, match=r"11 times in a row a worker process failed, .*: ended with exit code 3"):
         list(map_blocks(Work(square, prepare=partial(sys.exit, 3)), range(9), 2))
 
 

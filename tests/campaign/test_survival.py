@@ -82,7 +82,7 @@ def test_a_machine_on_which_workers_die_ends_the_run_and_keeps_what_is_done(
     path = tmp_path / "a.h5"
     dying = partial(simulate_until, folder=str(tmp_path / "done"))
     (tmp_path / "done").mkdir()
-    with pytest.raises(WorkerDied, match=r"(?s)8 times in a row .*holds the results of \d+ of 40 joints; to resume"):
+    with pytest.raises(WorkerDied, match=r"(?s)10 times in a row .*holds the results of \d+ of 40 joints; to resume"):
         fakes.run(fakes.Study(), path, 1, 4, simulate_rows=dying)
     with ResultFile.open(path) as store:
         assert 16 <= store.counts().done < 30

@@ -8,8 +8,9 @@ import pytest
 from scipy.stats import norm
 from typer.testing import CliRunner
 
-from tests.cli.test_cli import invented_campaign
-from tests.support import synthetic
+import tolstat
+from tests.cli.test_cli import simulate
+from tests.support import fakes, synthetic
 from tolstat import sampling, study
 from tolstat.analysis import exceedance, weighted
 from tolstat.analysis.sorted_loads import EXACT
@@ -20,7 +21,7 @@ from tolstat.common.tables import Simulation, Status
 from tolstat.questions.exceedance import query as exceeded
 from tolstat.questions.reweight import query as reweighting
 from tolstat.report import headline
-from tolstat.store import ResultFile, Writer
+from tolstat.store import ResultFile
 from tolstat.store.sample_load import SampleLoad
 from tolstat.study.proposal import Proposal, component, weights
 
@@ -138,10 +139,17 @@ def test_equal_weights_give_what_joints_that_count_alike_give():
     assert weighted.trust(values, status, np.ones(300), 1.0).usable
 
 
+def run(*given, **choices):
+    """Run a campaign with a stand-in for the solver."""
+    with pytest.MonkeyPatch.context() as patch:
+        fakes.replace_functions(patch, **fakes.SOLVER | {"simulate_rows": simulate})
+        tolstat.run(*given, workers=1, check=False, **choices)
+
+
 def campaign(folder, text=PLAN, name="plan", n=None):
     """Campaign whose load cross1.F is a sum of its errors, in sigma."""
     plan, path = load(folder, text, name, n=n), folder / f"{name}.h5"
-    invented_campaign()(plan, path, workers=1, check=False)
+    run(plan, path)
     with Writer.open(path) as store:
         results = synthetic.results(store.n)
         results["F_max"][:, 0] = 700.0 + 100.0 * (3e4 * (store.errors()["pin1.offset_t"]) - 3.0)
@@ -184,7 +192,7 @@ def test_slices_and_extensions_have_the_weights_of_one_run(tmp_path, stored):
     parts = []
     for rows in (range(600), range(600, 1201)):
         parts.append(tmp_path / f"part{rows.start}.h5")
-        invented_campaign()(load(tmp_path, n=1200), parts[-1], workers=1, rows=rows, check=False)
+        run(load(tmp_path, n=1200), parts[-1], rows=rows)
     extend.merge(parts, tmp_path / "merged.h5")
     with ResultFile.open(stored) as whole, ResultFile.open(tmp_path / "merged.h5") as merged:
         np.testing.assert_array_equal(merged.origin(), whole.origin(slice(0, 1201)))

@@ -11,7 +11,7 @@ import pytest
 
 from tests.conftest import REFERENCE, REFERENCE_CASES, with_law
 from tolstat import joint, study
-from tolstat.campaign import trace
+from tolstat.campaign import replay
 from tolstat.campaign.remedy import Reason, remedy
 from tolstat.common.load_kinds import RESULTANT
 from tolstat.common.tables import RESULT, SIMULATED, Fidelity, Method, Mode, Options, Start, Status, iterations_allowed
@@ -42,7 +42,7 @@ def reference():
 def test_reference_joints(reference, name):
     """Every component at every angle within 1e-3 of the largest of its kind, and the maxima too."""
     case = study.load_case(REFERENCE / f"{name}.toml")
-    result = trace.simulate_case(case)
+    result = replay.simulate_case(case)
     row = result.simulation.results[0]
     assert row["status"] == Status.OK
     largest = reference[f"{name}__max"]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tolstat import sampling, study
-from tolstat.campaign import retry
+from tolstat.campaign import remedy
 from tolstat.common.errors import InputError
 from tolstat.common.tables import Options, Simulation, without_results
 from tolstat.joint import operating, perturb
@@ -165,7 +165,7 @@ def test_closed_forms_are_refused_with_an_axial_force(tmp_path: Path) -> None:
     assert "does not hold" in faults(tmp_path, IDEAL, NO_FORCE, ("[tolerances]\n", SCATTER))
     s = load(tmp_path)
     with pytest.raises(InputError, match=r"--set: solver.fidelity: 'ideal' does not hold"):
-        retry.parse("newton_failed", ["solver.fidelity='ideal'"], s)
+        remedy.parse_retry("newton_failed", ["solver.fidelity='ideal'"], s)
     with pytest.raises(InputError, match=r"--low: 'ideal' does not hold"):
         solver_of(s, "ideal", "--low")
 

@@ -123,8 +123,7 @@ def map_on_cluster(
             else:
                 failures, succeeded = 0, True
                 yield block, result
-    halves = (half for block in failed for half in work.split(block))
-    yield from pool.map_blocks(work, chain(halves, todo), workers, stop)
+    yield from pool.map_blocks(work, chain(failed, todo), workers, stop)
 
 
 def process_block(work: Work[Any, Any], fingerprint: Fingerprint, expected: Mapping[str, str], block: Any) -> Any:

@@ -1,8 +1,8 @@
 """Worker processes on this machine: a pipe for each worker, one block of work at a time.
 
-So a death has one culprit and costs one worker. Its block is halved and repeated, down to single joints; one that fails
-twice alone is given up as `Lost`. A function that raises is a failure of its block in the same way. Failures in a row,
-without a finished block between them, end the map: then the machine is at fault, or the function.
+So a death has one culprit and costs one worker. Its block is halved and repeated at once, down to single joints; one
+that fails twice alone is given up as `Lost`. A function that raises is a failure of its block in the same way. Failures
+in a row, without a finished block between them, end the map: then the machine is at fault, or the function.
 
 `ProcessPoolExecutor` was tried: a worker killed while it sends leaves the pool hanging, one death fails innocent
 blocks, and workers outlive a killed parent. Workers are spawned, because a forked child inherits locks of threads that
@@ -34,9 +34,9 @@ POLL_S = 0.2
 """Interval at which a request to stop is checked while workers are busy, s."""
 MAX_ATTEMPTS = 2
 """Number of failures at which a single joint is given up."""
-MAX_FAILURES = 8
+MAX_FAILURES = 10
 """Number of failures in a row that end a map, and one more for each worker but the first: all may be killed at once.
-Eight halvings lead from a block of 256 to a joint, which alone never ends a map."""
+Nine attempts lead from a block of 256 to a joint, so that one joint never ends a map."""
 READY, RESULT, RAISED, DIED = "ready", "result", "raised", "died"
 """Kinds of messages from a worker, and what stands for one from a worker that has died."""
 IGNORED = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
@@ -238,12 +238,12 @@ class _Map(Generic[BlockT, ResultT]):
                 worker.end()
 
     def _next(self) -> _Task[BlockT] | None:
-        """Return a piece of a block that failed, or a fresh block; while all fail, one and the other in turn."""
-        if self.pieces and self.failures % 2 == 0:
-            return self.pieces.popleft()
+        """Return the newest piece of a block that failed, which is the smallest, or a fresh block."""
+        if self.pieces:
+            return self.pieces.pop()
         for block in self.fresh:
             return block, 0
-        return self.pieces.popleft() if self.pieces else None
+        return None
 
     def _hand_out(self) -> None:
         self.ahead = self.ahead or self._next()
@@ -276,12 +276,12 @@ class _Map(Generic[BlockT, ResultT]):
                 yield from self._repeat(*task)
 
     def _repeat(self, block: BlockT, failures: int) -> Iterator[tuple[BlockT, Lost]]:
-        """Put the halves of a block that failed in the queue, or a joint once more; give up one that failed twice."""
+        """Queue the halves of a block that failed, a joint behind all others; give up one that failed twice."""
         halves = self.work.split(block)
         if len(halves) > 1:
-            self.pieces.extend((half, 0) for half in halves)
+            self.pieces.extend((half, 0) for half in reversed(halves))
         elif failures + 1 < MAX_ATTEMPTS:
-            self.pieces.append((block, failures + 1))
+            self.pieces.appendleft((block, failures + 1))
         else:
             yield block, Lost(_reason(self.last))
 

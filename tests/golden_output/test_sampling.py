@@ -1,0 +1,17 @@
+"""What commands say about joints that are drawn at random: Sobol' points, Latin hypercubes, importance sampling."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.golden_output import catalogue_decisions as catalogue
+from tests.golden_output.catalogue import Campaign, cases
+from tests.golden_output.conftest import Check
+
+CAMPAIGNS = (catalogue.SOBOL, catalogue.LHS, catalogue.IMPORTANCE, catalogue.PARTS)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("campaign", "name"), cases(*CAMPAIGNS))
+def test_output_is_that_of_the_golden_file(campaign: Campaign, name: str, check: Check) -> None:
+    check(campaign, name)

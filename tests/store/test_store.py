@@ -189,6 +189,7 @@ def test_limits_are_replaced_whole_or_not_at_all(
         assert store.identity == study.identity()
         assert store.errors().tobytes() == fakes.draw(study).tobytes()
         assert store.counts().done == 5
+        assert store.check() == (True, {})
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,7 @@ from tolstat.common.tables import Simulation, Status
 from tolstat.questions.exceedance import query as exceeded
 from tolstat.questions.reweight import query as reweighting
 from tolstat.report import headline
-from tolstat.store import ResultFile
+from tolstat.store import ResultFile, Writer
 from tolstat.store.sample_load import SampleLoad
 from tolstat.study.proposal import Proposal, component, weights
 

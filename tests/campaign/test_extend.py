@@ -222,6 +222,22 @@ def test_a_campaign_with_pending_joints_grows(tmp_path: Path, make: Make) -> Non
     assert datasets(grown) == datasets(run(make(60, kind="full"), tmp_path / "whole.h5"))
 
 
+def test_a_campaign_with_damaged_joints_grows_without_them(
+    tmp_path: Path, make: Make, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    damage.small_blocks(monkeypatch, 8)
+    grown = run(make(40, kind="full"), tmp_path / "grown.h5")
+    damage.flip_in(grown, "results/psi_max", 9)
+    damage.flip_in(grown, "histories/loads", 30)
+    study = extend.extend(grown, 60)
+    assert "the results of rows 8:16, 24:32 are damaged and pending again" in caplog.text
+    with ResultFile.open(grown) as store:
+        assert store.pending().tolist() == [*range(8, 16), *range(24, 32), *range(41, 61)]
+        assert store.check() == (True, {})
+    run(study, grown)
+    assert datasets(grown) == datasets(run(make(60, kind="full"), tmp_path / "whole.h5"))
+
+
 def test_joints_that_are_to_be_simulated_again_stay_so_when_the_campaign_grows(tmp_path: Path, make: Make) -> None:
     grown = run(make(40), tmp_path / "grown.h5")
     with Writer.open(grown) as store:

@@ -145,6 +145,17 @@ def test_a_damaged_checksum_is_damage_of_its_numbers(path: Path) -> None:
         assert store.check() == Integrity(True, {"results/psi_max": ["16:24"]})
 
 
+@pytest.mark.parametrize("name", ["verify", "what_if"])
+def test_a_group_of_another_name_is_not_taken_for_missing(path: Path, name: str) -> None:
+    content = path.read_bytes()
+    damage.flip(path, content.index(f"\0{name}\0".encode()) + len(name), 2)
+    done = call(path, "status")
+    assert (done.exit_code, done.stdout) == (2, "")
+    assert "is damaged or no tolstat result file: " in done.stderr
+    with h5py.File(path) as file:
+        assert name not in file
+
+
 def test_only_the_block_is_lost(path: Path, caplog: pytest.LogCaptureFixture) -> None:
     for row, name in ((9, "results/cross1.F_max"), (14, "results/psi_max"), (40, "results/closure")):
         damage.flip_in(path, name, row)

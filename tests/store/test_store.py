@@ -24,6 +24,7 @@ from tolstat.common.errors import StoreError
 from tolstat.common.tables import Motion, Simulation, Status
 from tolstat.store import ResultFile, Writer, provenance
 from tolstat.store.hdf5 import text
+from tolstat.store.metadata import Metadata
 
 
 def simulation(study: fakes.Study, rows: np.ndarray) -> Simulation:
@@ -189,6 +190,7 @@ def test_limits_are_replaced_whole_or_not_at_all(
         assert store.identity == study.identity()
         assert store.errors().tobytes() == fakes.draw(study).tobytes()
         assert store.counts().done == 5
+        assert store.check() == (True, {})
 
 
 @pytest.mark.parametrize(
@@ -335,3 +337,11 @@ DOCUMENTS = [format_tables.FORMAT, format_tables.MODEL, format_tables.SCHEMA]
 def test_tables_of_documents_are_up_to_date(path: Path) -> None:
     held = path.read_text(encoding="utf-8") if path.exists() else ""
     assert held == format_tables.documents()[path], "run: python -m tests.format_tables"
+
+
+def test_document_names_every_attribute_and_every_key_of_the_metadata(tmp_path: Path, study: fakes.Study) -> None:
+    new_store(tmp_path / "a.h5", study).close()
+    document = format_tables.FORMAT.read_text(encoding="utf-8")
+    with h5py.File(tmp_path / "a.h5") as file:
+        assert [name for name in file.attrs if f"`{name}`" not in document] == []
+    assert [key for key in Metadata.model_fields if f"\n| `{key}` | " not in document] == []

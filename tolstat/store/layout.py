@@ -52,6 +52,9 @@ SESSION = {
 LINKED = ("row", "nominal")
 """Datasets of the file that every group with joints has as links: number of each row, mark of the nominal joint."""
 
+NAMES = {*GROUPS, *LINKED, "metadata", "checksums", "verify", "near"}
+"""All names that a file may have at its top, and at each operating point; some only with time."""
+
 
 class Stored(NamedTuple):
     """A dataset with a row for each joint: its path in the file, type and shape."""
@@ -106,6 +109,20 @@ def datasets(metadata: Metadata) -> list[Stored]:
             for name, spec in metadata.histories.items()
         ]
     return found
+
+
+def check_names(file: h5py.File, metadata: Metadata) -> None:
+    """Refuse a file with an unknown name: a group that is there with time only would seem to be missing.
+
+    Raises
+    ------
+    ValueError
+        With the name.
+    """
+    for place in ("", *filter(None, metadata.points)):
+        unknown = set(file[place_of(place) or "/"]) - NAMES
+        if unknown:
+            raise ValueError(f"{min(unknown)!r} is no name of this version")
 
 
 def size_of(metadata: Metadata) -> int:

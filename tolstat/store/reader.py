@@ -89,6 +89,7 @@ class Reader:
     def __init__(self, path: Path, file: h5py.File) -> None:
         self.path = path
         self._describe(metadata.read(file))
+        layout.check_names(file, self.metadata)
         self._checked = CheckedFile(path, file, self.metadata)
         self._left_out: set[int] = set()
         self.point = next(iter(self.points)) if len(self.points) == 1 else None

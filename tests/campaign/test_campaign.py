@@ -27,7 +27,7 @@ from tolstat.common.counts import Counts
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.tables import Options
 from tolstat.display import progress
-from tolstat.solver import simulation
+from tolstat.solver import compilation, simulation
 from tolstat.store import ResultFile, Writer
 from tolstat.store.recorded import differing_keys
 
@@ -147,7 +147,7 @@ def test_a_run_names_its_stages(tmp_path: Path) -> None:
     heard: list[str] = []
     for _ in range(2):
         fakes.run(fakes.Study(), tmp_path / "a.h5", check=True, stage=heard.append)
-    kernels = progress.kernels()
+    kernels = compilation.stage_name()
     check = "check of the numerical error"
     assert heard[:4] == ["drawing the errors", kernels, progress.JOINTS, check]
     assert heard[4:] == ["opening the file", progress.JOINTS, check]

@@ -130,7 +130,7 @@ def _log_file(path: Path) -> logging.Handler:
 
 @contextmanager
 def progress(first: str = "") -> Iterator[Display]:
-    """Show progress on standard error, with the stage `first` to begin with; see `campaign.progress.Display`."""
+    """Show progress on standard error, with the stage `first` to begin with; see `display.progress.Display`."""
     from tolstat.display.progress import display
 
     quiet = bool(LOG.handlers) and LOG.handlers[0].level > logging.INFO

@@ -137,6 +137,16 @@ def test_the_page_names_points(tables):
     assert {"fork1.T at one", "fork1.T at two"} < found[2].curves.keys()
 
 
+def test_the_page_names_a_point_without_a_valid_joint(tables):
+    """All joints are pending there, as after damage of their only block."""
+    tables["two"]["status"] = Status.PENDING
+    view = views.at_points(tables, {"cross1.F": 700.0})
+    (table,) = verdict._points(view)
+    kept = table.head.index("keep all limits there")
+    assert table.rows[1][kept] == verdict.WORDS["none"]
+    assert table.rows[0][kept] != verdict.WORDS["none"]
+
+
 def test_contact_modes_of_several_points_are_not_averaged(view):
     assert np.isnan(view.mode_share).all()
     assert np.isfinite(view.at("one").mode_share).all()

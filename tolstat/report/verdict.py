@@ -87,7 +87,7 @@ POINTS = (
     Column("point", lambda row: str(row["point"])),
     Column("misalignment, speed, torque", lambda row: str(row["operation"])),
     Column("of the time", lambda row: text.percent(row["share"]), shown=has("share")),
-    Column("keep all limits there", lambda row: str(row["kept"]), shown=has("kept")),
+    Column("keep all limits there", lambda row: str(row.get("kept", WORDS["none"])), shown=has("kept")),
 )
 """Columns of the table of operating points."""
 

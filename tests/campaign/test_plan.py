@@ -165,12 +165,12 @@ def test_run_until_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
     assert f"{RULE}: reached with" in done.stderr
     assert "corrected for the stop" in done.stderr
     with h5py.File("s.h5") as file:
-        taken = json.loads(file.attrs["stop"])["looks"]
+        taken = json.loads(file["metadata"][()])["stop"]["looks"]
     assert taken == sequential.looks(0.4, 400)[: len(taken)]
     done = CliRunner().invoke(cli.app, ["extend", "s.h5", "--n", "500"])
     assert done.exit_code == 0, done.output
     with h5py.File("s.h5") as file:
-        assert json.loads(file.attrs["stop"]) == {"reached": False, "looks": taken}
+        assert json.loads(file["metadata"][()])["stop"] == {"reached": False, "looks": taken}
     done = CliRunner().invoke(cli.app, [*words, "--rows", "0:9"])
     assert done.exit_code == 2
 

@@ -198,7 +198,10 @@ def test_slices_and_extensions_have_the_weights_of_one_run(tmp_path, stored):
         np.testing.assert_array_equal(merged.origin(), whole.origin(slice(0, 1201)))
     with h5py.File(parts[0], "r+") as file:
         file["origin/weight"][7] *= 2.0
-    with ResultFile.open(parts[0]) as store, pytest.raises(StoreError, match="errors of row 7 do not match"):
+    with (
+        ResultFile.open(parts[0]) as store,
+        pytest.raises(StoreError, match="origin/weight of rows 0:600 does not match"),
+    ):
         store.origin()
 
 

@@ -24,14 +24,14 @@ def read(monkeypatch):
     for module, name in ((reader, "BLOCK"), (worst, "AT_ONCE"), (view, "BLOCK")):
         monkeypatch.setattr(module, name, BLOCK)
 
-    own = reader.ResultFile._table
+    own = reader.Reader._table
 
     def recording(*args):
         table = own(*args)
         rows.append(len(table))
         return table
 
-    monkeypatch.setattr(reader.ResultFile, "_table", recording)
+    monkeypatch.setattr(reader.Reader, "_table", recording)
     return rows
 
 

@@ -14,4 +14,5 @@ CAMPAIGNS = (catalogue.HELP,)
 @pytest.mark.slow
 @pytest.mark.parametrize(("campaign", "name"), cases(*CAMPAIGNS))
 def test_output_is_that_of_the_golden_file(campaign: Campaign, name: str, check: Check) -> None:
-    check(campaign, name)
+    difference = check(campaign, name)
+    assert not difference, difference

@@ -142,7 +142,7 @@ class Plan:
     process_bytes : int
         Peak memory of this process so far; the campaign needs as much for each worker and for its parent process.
     file_bytes : int
-        Size of the result file; the compressed size of histories is extrapolated from the pilot.
+        Size of the result file, histories included.
     widths : dict of float to float
         Width of the interval by exceedance; empty if samples are not independent.
     limits : list of LimitPlan

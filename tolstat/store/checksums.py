@@ -89,9 +89,10 @@ class CheckedFile:
             return int(self.file["session"]["number"][()])
 
     def damaged(self, paths: tuple[str, ...], begin: int, end: int) -> NDArray[np.intp]:
-        """Blocks of the rows from `begin` to `end` in which one of some datasets does not match its checksum.
+        """Blocks of the rows from `begin` to `end` in which at least one of the datasets `paths` is damaged.
 
-        The datasets are all of results and histories, or none is.
+        Either all of them change in a run (results, ledger, histories), or none does. Without checksums no block counts
+        as damaged.
         """
         blocks, number = np.arange(begin // ROWS, blocks_of(max(begin, end))), self.number
         changes = layout.is_at_point(paths[0])

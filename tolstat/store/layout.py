@@ -53,7 +53,7 @@ LINKED = ("row", "nominal")
 """Datasets of the file that every group with joints has as links: number of each row, mark of the nominal joint."""
 
 NAMES = {*GROUPS, *LINKED, "metadata", "checksums", "verify", "near"}
-"""All names that a file may have at its top, and at each operating point; some only with time."""
+"""All names that a file may have at its top and at each operating point."""
 
 
 class Stored(NamedTuple):
@@ -112,7 +112,7 @@ def datasets(metadata: Metadata) -> list[Stored]:
 
 
 def check_names(file: h5py.File, metadata: Metadata) -> None:
-    """Refuse a file with an unknown name: a group that is there with time only would seem to be missing.
+    """Refuse a file with an unknown name: a damaged name of ``verify``, ``near`` or ``what_if`` would hide that group.
 
     Raises
     ------
@@ -122,7 +122,7 @@ def check_names(file: h5py.File, metadata: Metadata) -> None:
     for place in ("", *filter(None, metadata.points)):
         unknown = set(file[place_of(place) or "/"]) - NAMES
         if unknown:
-            raise ValueError(f"{min(unknown)!r} is no name of this version")
+            raise ValueError(f"{min(unknown)!r} is not the name of a group or dataset of this schema")
 
 
 def size_of(metadata: Metadata) -> int:

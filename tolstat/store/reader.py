@@ -259,14 +259,14 @@ class Reader:
     def attempt(self, slots: slice = slice(None)) -> NDArray[np.int32]:
         """Attempt that each joint's results belong to, (n,): 0 for the study's settings, k for ``retries[k - 1]``.
 
-        Raises a `StoreError` when there was no such attempt.
+        Raises a `StoreError` when an attempt is damaged.
         """
         found = np.array(self.column("ledger", "attempt", slots))
         found[self._damaged(slots)] = 0
         wrong = (found < 0) | (found > len(self.retries))
         if wrong.any():
             row = self.row(slots.indices(self.n)[0] + int(np.argmax(wrong)))
-            raise store_error(self.path, f"is damaged: row {row} has an attempt that never was", RESTORE)
+            raise store_error(self.path, f"is damaged: row {row} names a retry that the file does not have", RESTORE)
         return found
 
     def errors(self, slots: slice = slice(None), fields: Sequence[str] | None = None) -> NDArray[np.void]:

@@ -22,8 +22,8 @@ from tolstat.questions import PUBLIC
 if TYPE_CHECKING:
     from tolstat.analysis.capability import capability as capability
     from tolstat.analysis.exceedance import exceedance as exceedance
-    from tolstat.analysis.quantile import quantile as quantile
-    from tolstat.analysis.weighted import weighted_exceedance as weighted_exceedance
+    from tolstat.analysis.exceedance import quantile as quantile
+    from tolstat.analysis.exceedance import weighted_exceedance as weighted_exceedance
     from tolstat.campaign.replay import simulate_case as simulate_case
     from tolstat.campaign.run import run as run
     from tolstat.common.errors import InputError as InputError
@@ -57,12 +57,12 @@ _HOMES = {
     "load_case": "tolstat.study:load_case",
     "open": "tolstat.store:ResultFile.open",
     "perturb": "tolstat.joint:perturb",
-    "quantile": "tolstat.analysis.quantile:quantile",
+    "quantile": "tolstat.analysis.exceedance:quantile",
     "run": "tolstat.campaign.run:run",
     "simulate_case": "tolstat.campaign.replay:simulate_case",
     "simulate_rows": "tolstat.solver.simulation:simulate_rows",
     "statistics": "tolstat.report.summary:statistics",
-    "weighted_exceedance": "tolstat.analysis.weighted:weighted_exceedance",
+    "weighted_exceedance": "tolstat.analysis.exceedance:weighted_exceedance",
     "write_page": "tolstat.report.page:write_page",
     "write_report": "tolstat.report:write_report",
 } | {name: f"{module}:{name}" for name, module in PUBLIC.items()}

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.analysis import reweight
-from tolstat.analysis.exceedance import FloatArray
 from tolstat.analysis.weighted import Split
+from tolstat.common.loads import FloatArray
 
 FEWEST = 10
 """Minimum number of joints above each limit for a search that aims at the estimated shares."""
@@ -197,7 +197,7 @@ def joints_needed(share: float, ess: float, target: float, confidence: float = 0
     >>> joints_needed(share=0.008, ess=1000, target=0.01)
     16.0
     """
-    from tolstat.analysis.exceedance import clopper_pearson
+    from tolstat.analysis.binomial import clopper_pearson
 
     factors = 2.0 ** np.arange(0, 24)
     upper = clopper_pearson(share * ess * factors, ess * factors, confidence)[1]
@@ -205,11 +205,16 @@ def joints_needed(share: float, ess: float, target: float, confidence: float = 0
     return float(factors[enough[0]]) if enough.size and share < target else np.inf
 
 
-def halves(n: int, most: int, lots: NDArray[np.intp] | None = None) -> Sequence[NDArray[np.intp]]:
-    """Split n joints: every second one, at most `most`, for the search; all others for the check.
+def halves(units: NDArray[np.intp], most: int) -> Sequence[NDArray[np.intp]]:
+    """Split joints: every second independent unit, at most `most` joints, for the search; all others for the check.
 
-    With the lot of each joint, (n,), every second lot as a whole.
+    Parameters
+    ----------
+    units : ndarray of int, shape (n,)
+        Unit of each joint, see `Design.units`.
+    most : int
+        Maximum number of joints for the search.
     """
-    rows = np.arange(n)
-    chosen = rows[(rows if lots is None else lots) % 2 == 0][:most]
+    rows = np.arange(units.size)
+    chosen = rows[units % 2 == 0][:most]
     return chosen, np.setdiff1d(rows, chosen, assume_unique=True)

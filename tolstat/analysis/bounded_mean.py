@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tolstat.analysis.exceedance import FloatArray
+from tolstat.common.loads import FloatArray
 
 STEPS = 40
 """Bisections of an end: its error is below 1e-12."""

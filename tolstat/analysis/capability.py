@@ -14,9 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tolstat.analysis import exceedance, quantile
-from tolstat.analysis.exceedance import Exceedance, FloatArray
-from tolstat.analysis.sorted_loads import EXACT, Ends, Intervals, Sample, sort_out
+from tolstat.analysis import binomial, exceedance
+from tolstat.analysis.independent import Independent
+from tolstat.analysis.listed import Listed
+from tolstat.analysis.sample import Ends, Exceedance, Sample
+from tolstat.common.loads import FloatArray
 from tolstat.common.shown import shown
 
 REFERENCE = 0.9986501019683699
@@ -98,7 +100,7 @@ def capability(
     iid : bool
         Whether the joints are independent samples; the intervals are NaN when they are not.
     ends : tuple of array_like, shape (n,), optional
-        Interval of each load, see `exceedance.curve`.
+        Interval of each load, see `exceedance.exceedance`.
 
     Returns
     -------
@@ -118,20 +120,19 @@ def capability(
     >>> round(found.cpk_normal, 1), found.above.count, found.needed
     (1.3, 0, 3244)
     """
-    intervals = EXACT if ends is None else Intervals.of(np.asarray(values, dtype=float), ends)
-    return of_sample(sort_out(values, status, intervals), limit, confidence, iid)
+    return of_sample(Sample.of(values, status, Independent() if iid else Listed(""), ends), limit, confidence)
 
 
-def of_sample(sample: Sample, limit: float, confidence: float = 0.95, iid: bool = True) -> Capability:
-    """Capability of one load from loads that are sorted already; other parameters as in `capability`."""
-    valid = sample.valid
-    above = Exceedance(*exceedance.curve_of(sample, [limit], confidence, iid)[0].tolist())
+def of_sample(sample: Sample, limit: float, confidence: float = 0.95) -> Capability:
+    """Capability of the load of joints that count equally; other parameters as in `capability`."""
+    valid, iid = sample.valid, sample.design.has_interval("index")
+    above = sample.above(limit, confidence)
     blank = (np.nan, np.nan, np.nan)
     scatters = valid.size > 1 and np.ptp(valid) > 0
     normal = _normal(valid, limit, confidence, iid) if scatters else blank
     general = _of_quantiles(valid, limit, confidence, iid) if scatters else blank
     # Bonferroni over two quantiles with two ends each: a quarter of the error probability for this upper end
-    needed = quantile.wilks(REFERENCE, 1.0 - 0.25 * (1.0 - confidence))
+    needed = binomial.wilks(REFERENCE, 1.0 - 0.25 * (1.0 - confidence))
     return Capability(above, *normal, _normality(valid) if scatters else np.nan, *general, needed)
 
 
@@ -211,8 +212,8 @@ def _normality(valid: FloatArray) -> float:
 
 def _of_quantiles(valid: FloatArray, limit: float, confidence: float, iid: bool) -> tuple[float, float, float]:
     """Quantile index; interval from those of both quantiles, half the error probability each (Bonferroni)."""
-    sample, each = Sample.exact(valid), 0.5 * (1.0 + confidence)
-    middle, high = (quantile.of_sample(sample, share, each, iid) for share in (0.5, REFERENCE))
+    each = 0.5 * (1.0 + confidence)
+    middle, high = (exceedance.quantile(valid, np.ones(valid.size), share, each, iid) for share in (0.5, REFERENCE))
     index = float(_index(limit, middle.estimate, high.estimate))
     if not iid:
         return index, np.nan, np.nan

@@ -13,8 +13,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tolstat.analysis import quantile
-from tolstat.analysis.exceedance import FloatArray, clopper_pearson
+from tolstat.analysis.binomial import clopper_pearson
+from tolstat.analysis.column import Column
+from tolstat.analysis.design import Claim, Design
+from tolstat.analysis.sample import Sample
+from tolstat.common.loads import FloatArray
 from tolstat.common.shown import shown
 
 RESAMPLES = 500
@@ -74,29 +77,25 @@ class Difference(NamedTuple):
     upper: float
 
 
-def shares(
-    a: ArrayLike, b: ArrayLike, levels: ArrayLike, paired: bool, confidence: float = 0.95, iid: bool = True
-) -> ShareDifference:
+def shares(a: Sample, b: Sample, levels: ArrayLike, paired: bool, confidence: float = 0.95) -> ShareDifference:
     """Difference of the shares of joints above levels.
 
     Parameters
     ----------
-    a, b : array_like, shape (n,) and (k,)
-        Load of each joint in the two studies, NaN where a joint has no valid load. Paired: n = k, in the same order.
+    a, b : Sample
+        Load of the joints in the two studies. Paired: of as many joints, in the same order.
     levels : array_like, shape (m,)
         Levels, in the unit of the loads.
     paired : bool
         Whether joint i has the same random numbers in both studies.
     confidence : float
         Confidence level of the intervals.
-    iid : bool
-        Whether the joints of each study are independent samples.
 
     Returns
     -------
     ShareDifference
-        The interval is recovered from Clopper and Pearson's intervals of the two shares; with pairs, of the shares of
-        pairs above the level in A only and in B only.
+        The interval is recovered from the intervals of the two shares, as their designs have them; with pairs, from
+        Clopper and Pearson's of the shares of pairs above the level in A only and in B only.
 
     Raises
     ------
@@ -105,33 +104,30 @@ def shares(
 
     Examples
     --------
-    >>> a = [650.0, 690.0, 705.0, 640.0]
-    >>> b = [660.0, 710.0, 720.0, 650.0]
+    >>> a = Sample.of([650.0, 690.0, 705.0, 640.0], [1] * 4)
+    >>> b = Sample.of([660.0, 710.0, 720.0, 650.0], [1] * 4)
     >>> found = shares(a, b, [700.0], paired=True)
     >>> found.only_a.tolist(), found.only_b.tolist(), found.estimate.tolist(), found.p.tolist()
     ([0], [1], [0.25], [1.0])
     """
-    x, y = _sides(a, b, paired)
+    _valid(a, b, paired)
     level = np.atleast_1d(np.asarray(levels, dtype=float))
-    found = _interval(*_valid(x, y, paired), level, paired, confidence)
-    least = _interval(np.nan_to_num(x, nan=np.inf), np.nan_to_num(y, nan=-np.inf), level, paired, confidence)
-    most = _interval(np.nan_to_num(x, nan=-np.inf), np.nan_to_num(y, nan=np.inf), level, paired, confidence)
-    none = np.full(level.shape, np.nan)
-    p = _mcnemar(found.only_a, found.only_b) if paired and iid else none
-    found = found._replace(p=p, bound_lower=least.estimate, bound_upper=most.estimate)
-    if not iid:
-        return found._replace(lower=none, upper=none, outer_lower=none, outer_upper=none)
-    return found._replace(outer_lower=least.lower, outer_upper=most.upper)
+    kind = _pairs if paired else _apart
+    found, least, most = (
+        kind(x, y, a.design, b.design, level, confidence)
+        for x, y in ((a.value, b.value), (a.upper, b.lower), (a.lower, b.upper))
+    )
+    return found._replace(
+        bound_lower=least.estimate, bound_upper=most.estimate, outer_lower=least.lower, outer_upper=most.upper
+    )
 
 
-def quantiles(
-    a: ArrayLike, b: ArrayLike, share: float, paired: bool, confidence: float = 0.95, iid: bool = True
-) -> Difference:
+def quantiles(a: Sample, b: Sample, share: float, paired: bool, confidence: float = 0.95) -> Difference:
     """Difference of the loads that a share of the joints stays at or below.
 
     Parameters
     ----------
-    a, b, paired, confidence, iid
+    a, b, paired, confidence
         As in `shares`.
     share : float
         Between 0 and 1.
@@ -148,15 +144,17 @@ def quantiles(
     ValueError
         As `shares`.
     """
-    x, y = _valid(*_sides(a, b, paired), paired)
-    of_a, of_b = (quantile.quantile(side, np.ones(side.size, int), share, confidence) for side in (x, y))
+    a, b = _valid(a, b, paired)
+    x, y = a.values, b.values
+    of_a, of_b = (side.quantile(share, confidence) for side in (a, b))
     estimate = of_b.estimate - of_a.estimate
     lower, upper = np.nan, np.nan
-    if iid and paired and min(share, 1.0 - share) * x.size >= BEYOND:
+    known = _known(a, b, "difference" if paired else "quantile")
+    if known and paired and min(share, 1.0 - share) * x.size >= BEYOND:
         tail = 0.5 * (1.0 - confidence)
         resampled = np.quantile(_resampled(x, y, share), [tail, 1.0 - tail], method="inverted_cdf")
         lower, upper = min(float(resampled[0]), estimate), max(float(resampled[1]), estimate)
-    elif iid:
+    elif known:
         rho = _correlation(x <= of_a.estimate, y <= of_b.estimate) if paired else 0.0
         below, above = _recovered(
             (of_b.estimate - of_b.lower, of_b.upper - of_b.estimate),
@@ -167,12 +165,12 @@ def quantiles(
     return Difference(of_a.estimate, of_b.estimate, estimate, lower, upper)
 
 
-def means(a: ArrayLike, b: ArrayLike, paired: bool, confidence: float = 0.95, iid: bool = True) -> Difference:
+def means(a: Sample, b: Sample, paired: bool, confidence: float = 0.95) -> Difference:
     """Difference of the mean loads, with Student's interval for paired differences, else Welch's (1947).
 
     Parameters
     ----------
-    a, b, paired, confidence, iid
+    a, b, paired, confidence
         As in `shares`.
 
     Returns
@@ -187,9 +185,10 @@ def means(a: ArrayLike, b: ArrayLike, paired: bool, confidence: float = 0.95, ii
     """
     from scipy.special import stdtrit
 
-    x, y = _valid(*_sides(a, b, paired), paired)
+    a, b = _valid(a, b, paired)
+    x, y = a.values, b.values
     of_a, of_b = float(x.mean()), float(y.mean())
-    if not iid or min(x.size, y.size) < 2:
+    if not _known(a, b, "difference") or min(x.size, y.size) < 2:
         return Difference(of_a, of_b, of_b - of_a, np.nan, np.nan)
     if paired:
         error, degrees = float(np.std(y - x, ddof=1) / np.sqrt(x.size)), x.size - 1.0
@@ -202,47 +201,50 @@ def means(a: ArrayLike, b: ArrayLike, paired: bool, confidence: float = 0.95, ii
     return Difference(of_a, of_b, of_b - of_a, of_b - of_a - half, of_b - of_a + half)
 
 
-def _sides(a: ArrayLike, b: ArrayLike, paired: bool) -> tuple[FloatArray, FloatArray]:
-    x, y = np.asarray(a, dtype=float), np.asarray(b, dtype=float)
-    if x.ndim != 1 or y.ndim != 1 or (paired and x.shape != y.shape):
-        raise ValueError(f"loads {x.shape} and {y.shape} are not those of pairs")
-    return x, y
+def _known(a: Sample, b: Sample, claim: Claim) -> bool:
+    """Whether both designs give intervals of a claim."""
+    return a.design.has_interval(claim) and b.design.has_interval(claim)
 
 
-def _valid(x: FloatArray, y: FloatArray, paired: bool) -> tuple[FloatArray, FloatArray]:
-    in_x, in_y = np.isfinite(x), np.isfinite(y)
+def _valid(a: Sample, b: Sample, paired: bool) -> tuple[Sample, Sample]:
+    """Joints with a valid load; of pairs, those that have one in both studies."""
+    if paired and a.values.size != b.values.size:
+        raise ValueError(f"loads of {a.values.size} and {b.values.size} joints are not those of pairs")
+    of_a, of_b = a.is_valid, b.is_valid
     if paired:
-        in_x = in_y = in_x & in_y
-    if not (in_x.any() and in_y.any()):
+        of_a = of_b = of_a & of_b
+    if not (of_a.any() and of_b.any()):
         raise ValueError("there is no joint with a valid load to compare")
-    return x[in_x], y[in_y]
+    return a.only(of_a), b.only(of_b)
 
 
-def _interval(x: FloatArray, y: FloatArray, level: FloatArray, paired: bool, confidence: float) -> ShareDifference:
-    """Shares, counts, estimate and interval for loads without NaN; the other fields are NaN."""
-    a, b = _above(x, level), _above(y, level)
-    only_a, only_b, correlation = a, b, np.zeros(level.shape)
-    if paired:
-        up, down = y > x, y < x
-        only_b = _above(y[up], level) - _above(x[up], level)
-        only_a = _above(x[down], level) - _above(y[down], level)
-        one, other = only_a / x.size, only_b / x.size
-        with np.errstate(divide="ignore", invalid="ignore"):  # multinomial counts: negatively correlated
-            correlation = -np.nan_to_num(np.sqrt(one * other / ((1.0 - one) * (1.0 - other))))
-    (p, q), (n, m) = (only_a / x.size, only_b / y.size), (x.size, y.size)
-    (lower_p, upper_p), (lower_q, upper_q) = (
-        clopper_pearson(only_a, n, confidence),
-        clopper_pearson(only_b, m, confidence),
-    )
+def _pairs(x: Column, y: Column, a: Design, b: Design, level: FloatArray, confidence: float) -> ShareDifference:
+    """Shares, counts, estimate, interval and p-value of pairs; the other fields are NaN."""
+    both = ~np.isnan(x.values) & ~np.isnan(y.values)
+    one, other = x.values[both], y.values[both]
+    n, up, down = one.size, other > one, other < one
+    only_b = Column(other[up]).above(level) - Column(one[up]).above(level)
+    only_a = Column(one[down]).above(level) - Column(other[down]).above(level)
+    (lower_p, upper_p), (lower_q, upper_q) = (clopper_pearson(count, n, confidence) for count in (only_a, only_b))
+    p, q = only_a / n, only_b / n
+    with np.errstate(divide="ignore", invalid="ignore"):  # multinomial counts: negatively correlated
+        correlation = -np.nan_to_num(np.sqrt(p * q / ((1.0 - p) * (1.0 - q))))
     lower, upper = _recovered((q - lower_q, upper_q - q), (p - lower_p, upper_p - p), correlation)
-    d, none = q - p, np.full(level.shape, np.nan)
-    return ShareDifference(
-        a / x.size, b / y.size, min(n, m), only_a, only_b, d, d - lower, d + upper, none, none, none, none, none
-    )
+    none, d = np.full(level.shape, np.nan), q - p
+    shares = Column(one).above(level) / n, Column(other).above(level) / n
+    if not (a.has_interval("difference") and b.has_interval("difference")):
+        return ShareDifference(*shares, n, only_a, only_b, d, *[none] * 7)
+    return ShareDifference(*shares, n, only_a, only_b, d, d - lower, d + upper, _mcnemar(only_a, only_b), *[none] * 4)
 
 
-def _above(values: FloatArray, level: FloatArray) -> NDArray[np.intp]:
-    return np.asarray(values.size - np.searchsorted(np.sort(values), level, side="right"))
+def _apart(x: Column, y: Column, a: Design, b: Design, level: FloatArray, confidence: float) -> ShareDifference:
+    """Shares, counts, estimate and interval of joints that are no pairs; the other fields are NaN."""
+    p, q = a.shares(x, level, confidence), b.shares(y, level, confidence)
+    below, above = (q.estimate - q.lower, q.upper - q.estimate), (p.estimate - p.lower, p.upper - p.estimate)
+    lower, upper = _recovered(below, above, 0.0)
+    d, none = q.estimate - p.estimate, np.full(level.shape, np.nan)
+    counts = x.above(level), y.above(level)
+    return ShareDifference(p.estimate, q.estimate, min(x.n, y.n), *counts, d, d - lower, d + upper, *[none] * 5)
 
 
 def _recovered(

@@ -17,8 +17,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tolstat.analysis import pareto
-from tolstat.analysis.exceedance import FloatArray
-from tolstat.analysis.sorted_loads import Sample, sort_out
+from tolstat.analysis.independent import Independent
+from tolstat.analysis.listed import Listed
+from tolstat.analysis.sample import Sample
+from tolstat.common.loads import FloatArray
 from tolstat.common.shown import shown
 
 MIN_EXCESSES = 50
@@ -190,22 +192,23 @@ def fit(
     TooThinError
         When fewer than `MIN_EXCESSES` joints are above the threshold.
     """
-    return of_sample(sort_out(values, status), share, confidence, iid)
+    return of_sample(Sample.of(values, status, Independent() if iid else Listed("")), share, confidence)
 
 
-def of_sample(sample: Sample, share: float | None = None, confidence: float = 0.95, iid: bool = True) -> Tail:
-    """Fit a tail to loads that are sorted already; other parameters and errors raised as in `fit`."""
+def of_sample(sample: Sample, share: float | None = None, confidence: float = 0.95) -> Tail:
+    """Fit a tail to the load of joints that count equally; other parameters and errors raised as in `fit`."""
     from scipy.special import gammaincinv, xlog1py, xlogy
 
-    valid = sample.valid
+    valid, lost, iid = sample.valid, sum(sample.unresolved), sample.design.has_interval("tail")
+    joints = valid.size + lost
     share = min(0.1, 3.0 / np.sqrt(max(valid.size, 1))) if share is None else share
     count = int(share * valid.size * (1 + 1e-12))
     if count < MIN_EXCESSES:
-        raise TooThinError(count, int(np.ceil(MIN_EXCESSES / share * max(1.0, sample.n / max(valid.size, 1)))))
+        raise TooThinError(count, int(np.ceil(MIN_EXCESSES / share * max(1.0, joints / max(valid.size, 1)))))
     threshold = float(valid[-min(count + 1, valid.size)])
     excesses = valid[valid > threshold] - threshold
     if excesses.size < MIN_EXCESSES:
-        raise TooThinError(excesses.size, int(np.ceil(sample.n * MIN_EXCESSES / max(excesses.size, 1))))
+        raise TooThinError(excesses.size, int(np.ceil(joints * MIN_EXCESSES / max(excesses.size, 1))))
     m, n = excesses.size, valid.size
     reach = float(gammaincinv(0.5, confidence))  # half the quantile of chi-square with one degree of freedom
     k, sigma, deficit = _likelihood(excesses, reach)
@@ -217,7 +220,7 @@ def of_sample(sample: Sample, share: float | None = None, confidence: float = 0.
     region = np.column_stack([shares[inside[:, 0]], k[inside[:, 1], inside[:, 2]], sigma[inside[:, 1], inside[:, 2]]])
     ends = [(float(v.min()), float(v.max())) if iid else (np.nan, np.nan) for v in region.T[1:]]
     shape, scale = (Estimate(value, *own) for value, own in zip(best, ends, strict=True))
-    return Tail(threshold, sample.n, sample.n_unresolved, m, shape, scale, excesses, region, iid)
+    return Tail(threshold, joints, lost, m, shape, scale, excesses, region, iid)
 
 
 def stability(
@@ -237,11 +240,11 @@ def stability(
     TooThinError
         When a share has fewer than `MIN_EXCESSES` joints.
     """
-    sample = sort_out(values, status)
+    sample = Sample.of(values, status, Independent() if iid else Listed(""))
     n = sample.valid.size
     least = min(0.3, (MIN_EXCESSES + 1) / max(n, 1))
     asked = np.geomspace(0.3, least, 8) if shares is None else np.sort(np.atleast_1d(shares))[::-1]
-    return [of_sample(sample, float(share), confidence, iid) for share in asked]
+    return [of_sample(sample, float(share), confidence) for share in asked]
 
 
 def _likelihood(excesses: FloatArray, reach: float) -> tuple[FloatArray, FloatArray, FloatArray]:

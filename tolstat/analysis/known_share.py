@@ -15,10 +15,11 @@ from typing import NamedTuple
 import numpy as np
 
 from tolstat.analysis import process
-from tolstat.analysis.exceedance import FloatArray, Mask
+from tolstat.analysis.column import Mask
 from tolstat.analysis.process import Draws, Known, Sums
 from tolstat.analysis.reweight import LARGEST_SPREAD, LEAST_ESS
 from tolstat.analysis.weighted import Side, Split
+from tolstat.common.loads import FloatArray
 from tolstat.common.shown import shown
 
 BLOCK = 1 << 20
@@ -100,7 +101,7 @@ def tallies(
     sums: Sequence[Sums],
     known: Sequence[Known],
     drawn: Draws,
-    weights: FloatArray | None,
+    weights: FloatArray,
     events: Sequence[Event],
 ) -> list[Split]:
     """Weights above and below, of each event, for each process.
@@ -111,8 +112,8 @@ def tallies(
         Scores of the errors of each entry in n joints.
     known, drawn
         The entries and the processes.
-    weights : ndarray, (n,), optional
-        Density of each joint under the tolerances over that which it was drawn from; 1 without them.
+    weights : ndarray, (n,)
+        Density of each joint under the tolerances over that which it was drawn from.
     events : sequence of Event
         What is counted.
 
@@ -121,7 +122,7 @@ def tallies(
     list of Split
         One of each event, with arrays (K,).
     """
-    base = np.zeros(len(sums[0].total)) if weights is None else np.log(weights)
+    base = np.log(weights)
     sides = [mask for event in events for mask in (event.above & event.counted, ~event.above & event.counted)]
     members = np.stack(sides).astype(float)
     tables: list[list[FloatArray]] = []

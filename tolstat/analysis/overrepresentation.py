@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tolstat.analysis.exceedance import FloatArray
 from tolstat.analysis.ranks import from_places, places
+from tolstat.common.loads import FloatArray
 
 BoolArray = NDArray[np.bool_]
 

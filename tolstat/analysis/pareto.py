@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tolstat.analysis.exceedance import FloatArray
+from tolstat.common.loads import FloatArray
 
 STRAIGHT = 1e-8
 """``|k|`` below which the tail counts as exponential."""

@@ -11,8 +11,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tolstat.analysis.exceedance import FloatArray, clopper_pearson
+from tolstat.analysis.binomial import clopper_pearson
 from tolstat.analysis.sensitivity import normal_half
+from tolstat.common.loads import FloatArray
 from tolstat.common.shown import shown
 
 FEWEST = 50

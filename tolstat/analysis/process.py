@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tolstat.analysis.exceedance import FloatArray
+from tolstat.common.loads import FloatArray
 
 LEAST_PARTS, MOST_PARTS = 5, 100_000
 """Fewest and most parts that a process may be known from."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tolstat.analysis.exceedance import FloatArray
+from tolstat.common.loads import FloatArray
 
 
 def places(values: ArrayLike) -> NDArray[np.intp]:

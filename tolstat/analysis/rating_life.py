@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tolstat.analysis.exceedance import FloatArray
+from tolstat.common.loads import FloatArray
 from tolstat.common.tables import LIFE_EXPONENT
 
 WEIBULL_SLOPE = 9 / 8

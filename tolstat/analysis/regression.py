@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tolstat.analysis.exceedance import FloatArray
 from tolstat.analysis.ranks import from_places, places
+from tolstat.common.loads import FloatArray
 
 GROUPS = 20
 """Number of groups in the delete-a-group jackknife."""

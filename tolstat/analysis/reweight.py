@@ -11,14 +11,16 @@ Errors where no joint was drawn have no weight at all. The interval is that of `
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from tolstat.analysis import pareto, weighted
-from tolstat.analysis.exceedance import FloatArray
-from tolstat.analysis.weighted import Sample
+from tolstat.analysis import pareto
+from tolstat.analysis.column import Mask
+from tolstat.analysis.sample import Sample
+from tolstat.analysis.weighted import Split, Weighted
+from tolstat.common.loads import FloatArray
 from tolstat.common.shown import shown
 
 LEAST_ESS = 50
@@ -133,26 +135,19 @@ class Load(NamedTuple):
     usable: bool
 
 
-def sort_out(values: ArrayLike, status: ArrayLike, ratios: Ratios) -> Sample:
-    """Sort the joints by load for all shares and quantiles; see `weighted.sort_out`."""
-    return weighted.sort_out(values, status, ratios.values, heaviest=ratios.heaviest)
-
-
-def share_above(sample: Sample, ratios: Ratios, level: float, confidence: float = 0.95, iid: bool = True) -> Share:
+def share_above(load: Sample, ratios: Ratios, level: float, confidence: float = 0.95) -> Share:
     """Share of the joints above a level.
 
     Parameters
     ----------
-    sample : Sample
-        Loads and ratios of the joints; see `sort_out`.
+    load : Sample
+        Load of the joints, as they were drawn.
     ratios : Ratios
-        The same ratios.
+        Their density ratios.
     level : float
         Level, in the unit of the values.
     confidence : float
         Confidence level of the interval.
-    iid : bool
-        Whether the joints are independent samples.
 
     Returns
     -------
@@ -165,37 +160,41 @@ def share_above(sample: Sample, ratios: Ratios, level: float, confidence: float 
     >>> errors = norm.ppf([(k + 0.5) / 400 for k in range(400)])  # of a normal tolerance, sigma 1
     >>> ratio = np.exp(norm.logpdf(errors, 0, 0.8) - norm.logpdf(errors))  # and for sigma 0.8
     >>> ratios = Ratios(ratio, log_mean_square=0.0696, heaviest=1.25)
-    >>> found = share_above(sort_out(errors, [1] * 400, ratios), ratios, 1.0)
+    >>> found = share_above(Sample.of(errors, [1] * 400), ratios, 1.0)
     >>> [round(float(x), 3) for x in (found.lower, found.estimate, found.upper, norm.sf(1.0 / 0.8))]
     [0.079, 0.105, 0.135, 0.106]
     >>> found.support.usable, round(found.ess)
     (True, 518)
     """
-    least = 0.0 if np.isfinite(ratios.heaviest) else LEAST_BESIDE
-    row = weighted.curve_of(sample, [level], confidence, least)[0]
-    estimate, (lower, upper) = float(row["estimate"]), (row["lower"], row["upper"]) if iid else (np.nan, np.nan)
-    bounds = float(row["bound_lower"]), float(row["bound_upper"])
-    return Share(
-        estimate, float(lower), float(upper), *bounds, _ess(sample, ratios, level), support(sample, ratios, level)
-    )
+    withheld = 0.0 if np.isfinite(ratios.heaviest) else LEAST_BESIDE
+    design = Weighted(ratios.values, ratios.heaviest, withheld=withheld)
+    row = replace(load, design=design).above(level, confidence)
+    ends = (row.lower, row.upper) if load.design.has_interval("reweighting") else (np.nan, np.nan)
+    own = _ess(load, ratios, level), support(load, ratios, level)
+    return Share(row.estimate, *ends, row.bound_lower, row.bound_upper, *own)
 
 
-def _ess(sample: Sample, ratios: Ratios, level: float) -> float:
-    w = sample.weights / sample.weights.sum()
-    above = sample.loads > level
+def _sides(load: Sample, ratios: Ratios, level: float) -> tuple[FloatArray, Mask]:
+    """Ratios of the joints with a load, and which of these are above the level, (m,) each."""
+    known = load.is_valid
+    return ratios.values[known], load.values[known] > level
+
+
+def _ess(load: Sample, ratios: Ratios, level: float) -> float:
+    w, above = _sides(load, ratios, level)
+    w = w / w.sum()
     share = float(w[above].sum())
     variance = float(((w * (above - share)) ** 2).sum())
     return share * (1.0 - share) / variance if 0.0 < share < 1.0 and variance > 0 else ratios.effective
 
 
-def support(sample: Sample, ratios: Ratios, level: float) -> Support:
+def support(load: Sample, ratios: Ratios, level: float) -> Support:
     """Tell whether the share above a level is usable; parameters as in `share_above`."""
-    above = sample.loads > level
-    sides = weighted.Split.by(above, sample.weights)
-    effective = [float(side.effective[0]) for side in sides]
-    k = max((pareto.shape_of_weights(sample.weights[mask]) for mask in (above, ~above)), key=_rank)
+    w, above = _sides(load, ratios, level)
+    effective = [float(side.effective[0]) for side in Split.by(above, w)]
+    k = max((pareto.shape_of_weights(w[mask]) for mask in (above, ~above)), key=_rank)
     beside = np.isfinite(ratios.heaviest) or min(effective) >= LEAST_BESIDE
-    usable = ratios.usable and bool(beside) and not k > pareto.allowed_shape(sample.weights.size)
+    usable = ratios.usable and bool(beside) and not k > pareto.allowed_shape(w.size)
     return Support(effective[0], effective[1], k, usable)
 
 
@@ -203,12 +202,12 @@ def _rank(k: float) -> float:
     return -np.inf if np.isnan(k) else k
 
 
-def quantile(sample: Sample, ratios: Ratios, share: float, confidence: float = 0.95, iid: bool = True) -> Load:
+def quantile(load: Sample, ratios: Ratios, share: float, confidence: float = 0.95) -> Load:
     """Load that a share of the joints stays at or below, and its interval, which inverts that of shares.
 
     Parameters
     ----------
-    sample, ratios, confidence, iid
+    load, ratios, confidence
         As in `share_above`.
     share : float
         Between 0 and 1.
@@ -218,9 +217,10 @@ def quantile(sample: Sample, ratios: Ratios, share: float, confidence: float = 0
     Load
         It holds only if `Load.usable`.
     """
-    found = weighted.quantile_of(sample, share, confidence)
-    ends = (found.lower, found.upper) if iid else (found.estimate, found.estimate)
-    beside = [support(sample, ratios, end) for end in (found.estimate, *ends) if np.isfinite(end)]
+    found = replace(load, design=Weighted(ratios.values, ratios.heaviest)).quantile(share, confidence)
+    known = load.design.has_interval("reweighting")
+    ends = (found.lower, found.upper) if known else (found.estimate, found.estimate)
+    beside = [support(load, ratios, end) for end in (found.estimate, *ends) if np.isfinite(end)]
     enough = len(beside) == 3 and all(s.usable and min(s.above, s.below) >= LEAST_BESIDE for s in beside)
-    lower, upper = (found.lower, found.upper) if iid else (np.nan, np.nan)
-    return Load(found.estimate, lower, upper, _ess(sample, ratios, found.estimate), enough)
+    lower, upper = (found.lower, found.upper) if known else (np.nan, np.nan)
+    return Load(found.estimate, lower, upper, _ess(load, ratios, found.estimate), enough)

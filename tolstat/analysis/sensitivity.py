@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tolstat.analysis.exceedance import FloatArray
 from tolstat.analysis.ranks import ranks
+from tolstat.common.loads import FloatArray
 from tolstat.common.shown import shown
 
 WIDER = 1.2

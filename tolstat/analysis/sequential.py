@@ -18,7 +18,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.analysis.exceedance import FloatArray, clopper_pearson
+from tolstat.analysis.binomial import clopper_pearson
+from tolstat.common.loads import FloatArray
 
 GROWTH = 1.05
 """Ratio of the numbers of joints of two looks."""

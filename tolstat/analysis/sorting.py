@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tolstat.analysis.exceedance import FloatArray
+from tolstat.common.loads import FloatArray
 
 
 def accepted(values: FloatArray, lower: float, upper: float, deviation: float) -> FloatArray:

@@ -13,9 +13,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tolstat.analysis import exceedance
+from tolstat.analysis.binomial import clopper_pearson
 from tolstat.analysis.bounded_mean import interval
-from tolstat.analysis.exceedance import FloatArray, Mask
+from tolstat.analysis.column import Mask
+from tolstat.common.loads import FloatArray
 
 DECILES = 2.5631031310892007
 """Distance between the 10 % and the 90 % quantile of the standard normal distribution."""
@@ -238,6 +239,6 @@ def failures(
 def _ends(chances: FloatArray, confidence: float) -> tuple[float, float]:
     counts: Mask = (chances == 0.0) | (chances == 1.0)
     if counts.all():
-        lower, upper = exceedance.clopper_pearson(chances.sum(), chances.size, confidence)
+        lower, upper = clopper_pearson(chances.sum(), chances.size, confidence)
         return float(lower), float(upper)
     return interval(chances, confidence)

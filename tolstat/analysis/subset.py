@@ -23,7 +23,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.analysis.exceedance import FloatArray, clopper_pearson
+from tolstat.analysis.binomial import clopper_pearson
+from tolstat.common.loads import FloatArray
 from tolstat.common.shown import shown
 
 Noise = Callable[[int, int, int], FloatArray]

@@ -10,20 +10,22 @@ the largest weight that a joint can have or, if no bound is known, that any join
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tolstat.analysis import pareto
-from tolstat.analysis.exceedance import CURVE, Exceedance, FloatArray, Table
-from tolstat.analysis.quantile import Quantile
-from tolstat.analysis.sorted_loads import Ends, split
+from tolstat.analysis.column import Column
+from tolstat.analysis.design import Claim, Design, Refusal, Shares
+from tolstat.analysis.independent import Independent
+from tolstat.common.loads import FloatArray
 from tolstat.common.shown import shown
 
 LEAST_EFFECTIVE = 20.0
 """Minimum effective number of joints above a level for a trusted share."""
+LARGEST_SHAPE = 0.7
+"""Shape of the tail of the weights, from which on a share is not trusted."""
 
 
 @shown
@@ -81,27 +83,19 @@ class Split(NamedTuple):
     below: Side
 
     @classmethod
-    def at(
-        cls,
-        first: NDArray[np.intp],
-        weights: FloatArray,
-        below: FloatArray,
-        above: FloatArray,
-        heaviest: float,
-    ) -> Split:
-        """Count weights from index `first` on, and `above`, as above the level; earlier ones, and `below`, as below.
+    def at(cls, first: NDArray[np.intp], weights: FloatArray, heaviest: float) -> Split:
+        """Count weights from index `first` on as above the level, earlier ones as below.
 
         The largest weight of a side is that of the outermost `LEAST_EFFECTIVE` joints at least.
         """
         sides = []
-        every = heaviest if np.isfinite(heaviest) else np.concatenate([weights, below, above]).max(initial=0.0)
-        for w, rest, number in ((weights[::-1], above, weights.size - first), (weights, below, first)):
+        every = heaviest if np.isfinite(heaviest) else weights.max(initial=0.0)
+        for w, number in ((weights[::-1], weights.size - first), (weights, first)):
             sums, squares, largest = (
                 np.insert(f, 0, 0.0) for f in (w.cumsum(), (w**2).cumsum(), np.maximum.accumulate(w))
             )
             most = largest[np.clip(number, min(int(LEAST_EFFECTIVE), w.size), None)]
-            own = sums[number] + rest.sum(), squares[number] + (rest**2).sum(), np.maximum(most, rest.max(initial=0.0))
-            sides.append(Side.of(*own, every))
+            sides.append(Side.of(sums[number], squares[number], most, every))
         return cls(*sides)
 
     @classmethod
@@ -110,11 +104,6 @@ class Split(NamedTuple):
         every = heaviest if np.isfinite(heaviest) else weights.max(initial=0.0)
         parts = (weights[mask] for mask in (is_above, ~is_above))
         return cls(*(Side.of(w.sum(), (w**2).sum(), w.max(initial=0.0), every) for w in parts))
-
-    def only(self, index: int) -> Split:
-        """Return the split at one of the levels."""
-        above, below = (Side(*(values[index : index + 1] for values in side)) for side in self)
-        return Split(above, below)
 
     @property
     def share(self) -> FloatArray:
@@ -179,219 +168,111 @@ def _far_end(own: FloatArray, other: FloatArray, tail: float, least: float) -> F
     return np.where(other > least, high, 1.0)
 
 
-class Sample(NamedTuple):
-    """One load of the simulated joints with their weights, sorted once; see `sort_out`.
-
-    Attributes
-    ----------
-    loads, weights : ndarray, shape (m,)
-        Loads of the valid joints, ascending, and their weights.
-    lower, upper : tuple of ndarray, shape (m,)
-        Ends of the intervals of these loads, ascending, and the weights in the same order.
-    failed, unsettled : ndarray
-        Weights of the joints without a valid load.
-    heaviest : float
-        Largest weight that a joint can have; inf if no bound is known.
-    """
-
-    loads: FloatArray
-    weights: FloatArray
-    lower: tuple[FloatArray, FloatArray]
-    upper: tuple[FloatArray, FloatArray]
-    failed: FloatArray
-    unsettled: FloatArray
-    heaviest: float = np.inf
-
-
-def curve(
-    values: ArrayLike,
-    status: ArrayLike,
-    weights: ArrayLike,
-    levels: ArrayLike | None = None,
-    confidence: float = 0.95,
-    ends: Ends | None = None,
-    heaviest: float = np.inf,
-) -> Table:
-    """Share of the joints above each of many levels, see `exceedance.curve`.
+class Weighted(Design):
+    """Independent joints that count differently.
 
     Parameters
     ----------
-    values, status, levels, confidence, ends
-        As in `exceedance.curve`.
     weights : array_like, shape (n,)
-        Weight of each joint; independent draws, mean 1.
+        Weight of each joint, mean 1.
     heaviest : float
         Largest weight that a joint can have; inf if no bound is known.
-
-    Returns
-    -------
-    ndarray of CURVE, shape (m,)
-        ``count``, ``n``, ``n_failed`` and ``n_unsettled`` are numbers of joints; all shares are weighted.
-
-    Raises
-    ------
-    ValueError
-        When the shapes differ, a weight is negative or not finite, or a level is NaN.
-    """
-    return curve_of(sort_out(values, status, weights, ends, heaviest), levels, confidence)
-
-
-def curve_of(sample: Sample, levels: ArrayLike | None = None, confidence: float = 0.95, least: float = 0.0) -> Table:
-    """Share of the joints above each of many levels, from loads that are sorted already; see `curve`.
-
-    `least` is that of `Split.interval`, for shares that are withheld below it.
-    """
-    x = np.unique(sample.loads) if levels is None else np.atleast_1d(np.asarray(levels, dtype=float))
-    if np.isnan(x).any():
-        raise ValueError("a level is NaN")
-    first, w = np.searchsorted(sample.loads, x, side="right"), sample.weights
-    lost, none = np.concatenate([sample.failed, sample.unsettled]), np.empty(0)
-    table = np.zeros(x.shape, CURVE)
-    table["level"], table["count"] = x, w.size - first
-    table["n"], table["n_failed"], table["n_unsettled"] = w.size + lost.size, sample.failed.size, sample.unsettled.size
-    valid, fewest, most = (
-        Split.at(np.searchsorted(loads, x, side="right"), own, below, above, sample.heaviest)
-        for (loads, own), below, above in (
-            ((sample.loads, w), none, none),
-            (sample.lower, lost, none),
-            (sample.upper, none, lost),
-        )
-    )
-    table["estimate"], (table["lower"], table["upper"]) = valid.share, valid.interval(confidence, least)
-    table["bound_lower"], (table["outer_lower"], _) = fewest.share, fewest.interval(confidence, least)
-    table["bound_upper"], (_, table["outer_upper"]) = most.share, most.interval(confidence, least)
-    return table
-
-
-def weighted_exceedance(
-    values: ArrayLike,
-    status: ArrayLike,
-    weights: ArrayLike,
-    level: float,
-    confidence: float = 0.95,
-    heaviest: float = np.inf,
-) -> Exceedance:
-    """Share of the joints above one level; parameters and errors raised as in `curve`.
-
-    Returns
-    -------
-    Exceedance
-        Estimate, interval and bounds.
-
-    Examples
-    --------
-    Normal loads drawn about 4, half of them: which share is above 4 under the standard normal distribution?
-
-    >>> rng = np.random.default_rng(1)
-    >>> loads = rng.standard_normal(4000) + 4.0 * (np.arange(4000) % 2)
-    >>> weights = 1.0 / (0.5 + 0.5 * np.exp(4.0 * loads - 8.0))
-    >>> found = weighted_exceedance(loads, np.ones(4000, int), weights, 4.0)
-    >>> found.lower < 3.167e-5 < found.upper, f"{found.estimate:.1e}"
-    (True, '3.2e-05')
-    """
-    return Exceedance(*curve(values, status, weights, [level], confidence, None, heaviest)[0].tolist())
-
-
-def trust(values: ArrayLike, status: ArrayLike, weights: ArrayLike, level: float, heaviest: float = np.inf) -> Trust:
-    """Diagnose whether the share above a level can be trusted; parameters as in `weighted_exceedance`."""
-    return trust_of(sort_out(values, status, weights, heaviest=heaviest), level)
-
-
-def trust_of(sample: Sample, level: float) -> Trust:
-    """Diagnose whether the share above a level can be trusted, from loads that are sorted already."""
-    w = sample.weights[sample.loads > level]
-    effective = float(w.sum() ** 2 / (w**2).sum()) if w.any() else 0.0
-    k = pareto.shape_of_weights(w)
-    enough = effective >= LEAST_EFFECTIVE or np.isfinite(sample.heaviest)
-    return Trust(effective, k, bool(enough and not k >= 0.7))
-
-
-def quantile(
-    values: ArrayLike, status: ArrayLike, weights: ArrayLike, share: float, confidence: float = 0.95
-) -> Quantile:
-    """Load that a share of the joints stays at or below; its interval inverts that of shares.
-
-    Parameters
-    ----------
-    values, status, weights, confidence
-        As in `curve`.
-    share : float
-        Between 0 and 1.
-
-    Returns
-    -------
-    Quantile
-        As from `quantile.quantile`, which is for equal weights.
-    """
-    return quantile_of(sort_out(values, status, weights), share, confidence)
-
-
-def quantile_of(sample: Sample, share: float, confidence: float = 0.95) -> Quantile:
-    """Load that a share of the joints stays at or below, from loads that are sorted already; see `quantile`."""
-    loads, below = sample.loads, np.cumsum(sample.weights)
-    n_failed, n_unsettled = sample.failed.size, sample.unsettled.size
-    lost = sample.failed.sum() + sample.unsettled.sum()
-    numbers = (share, loads.size + n_failed + n_unsettled, n_failed, n_unsettled)
-    if not loads.size:
-        return Quantile(*numbers, np.nan, -np.inf, np.inf, -np.inf, np.inf)
-    total = below[-1]
-
-    def load_at(part: float) -> float:
-        """Smallest load at or below which joints have the weight `part`; infinite where there is none."""
-        if part <= 0:
-            return -np.inf
-        rank = int(np.searchsorted(below, part * (1 - 1e-12)))
-        return float(loads[rank]) if rank < loads.size else np.inf
-
-    estimate = load_at(share * total)
-    bounds = load_at(share * (total + lost) - lost), load_at(share * (total + lost))
-    none = np.empty(0)
-    splits = Split.at(np.arange(loads.size + 1), sample.weights, none, none, sample.heaviest)
-    # the least load whose share above is surely at most, the largest of which that of its own and above is at least so
-    high = _first(loads.size, lambda i: splits.only(i + 1).interval(confidence)[1][0] <= 1.0 - share)
-    low = _first(loads.size, lambda i: splits.only(i).interval(confidence)[0][0] < 1.0 - share) - 1
-    ends = float(loads[low]) if low >= 0 else -np.inf, float(loads[high]) if high < loads.size else np.inf
-    return Quantile(*numbers, estimate, *ends, *bounds)
-
-
-def _first(n: int, holds: Callable[[int], bool]) -> int:
-    """Find by bisection the first of the numbers 0 to n - 1 for which a condition holds; n if it never does."""
-    low, high = 0, n
-    while low < high:
-        middle = (low + high) // 2
-        low, high = (low, middle) if holds(middle) else (middle + 1, high)
-    return low
-
-
-def sort_out(
-    values: ArrayLike, status: ArrayLike, weights: ArrayLike, ends: Ends | None = None, heaviest: float = np.inf
-) -> Sample:
-    """Split the simulated joints into valid (sorted ascending), failed and unsettled, see `sorted_loads.sort_out`.
-
-    Parameters
-    ----------
-    values, status, ends
-        As in `exceedance.curve`.
-    weights, heaviest
-        As in `curve`.
+    from_tolerances : ndarray of bool, shape (n,), optional
+        Joints that were drawn from the tolerances themselves, where proposals may leave out ways to a limit.
+    withheld : float
+        Effective number of joints on a side of a level below which shares are withheld; see `Split.interval`.
 
     Raises
     ------
     ValueError
-        When the shapes differ, or a weight is negative or not finite.
+        When a weight is negative or not finite.
     """
-    load, state, w = np.asarray(values, dtype=float), np.asarray(status), np.asarray(weights, dtype=float)
-    if load.ndim != 1 or not load.shape == state.shape == w.shape:
-        raise ValueError(f"values {load.shape}, status {state.shape} and weights {w.shape} must be of one length")
-    if not (np.isfinite(w) & (w >= 0)).all():
-        raise ValueError("a weight is negative or no number")
-    valid, failed, unsettled = split(load, state)
-    exact, lower, upper = (
-        _ascending(np.where(np.isfinite(end), end, load)[valid], w[valid]) for end in (load, *(ends or (load, load)))
+
+    claims = frozenset(("share", "quantile", "delivery", "reweighting"))
+    interval = "Clopper–Pearson's"
+    covers = (
+        "joints counted by their weights; bands: pointwise 95 % Clopper–Pearson intervals of as many equal joints as "
+        "would be as sure"
     )
-    return Sample(*exact, lower, upper, w[failed], w[unsettled], heaviest)
+    counting = "Joints are counted by their weights."
 
+    def __init__(
+        self,
+        weights: ArrayLike,
+        heaviest: float = np.inf,
+        from_tolerances: NDArray[np.bool_] | None = None,
+        withheld: float = 0.0,
+    ) -> None:
+        self.weights: FloatArray = np.asarray(weights, dtype=float)
+        if not (np.isfinite(self.weights) & (self.weights >= 0)).all():
+            raise ValueError("a weight is negative or no number")
+        self.heaviest, self.from_tolerances, self._withheld = heaviest, from_tolerances, withheld
+        if from_tolerances is not None:
+            self.caveat = (
+                "intervals hold if the proposals reach every way to the limit, the last column, from the joints of the "
+                "tolerances alone, whatever they miss"
+            )
 
-def _ascending(loads: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
-    order = np.argsort(loads, kind="stable")
-    return loads[order], weights[order]
+    def shares(self, x: Column, levels: FloatArray, confidence: float) -> Shares:
+        """See `Design.shares` and the head of this file."""
+        split = self._split(x, levels)
+        return Shares(split.share, *split.interval(confidence, self._withheld))
+
+    def estimate(self, x: Column, levels: FloatArray) -> FloatArray:
+        """See `Design.estimate`."""
+        return self._split(x, levels).share
+
+    def _split(self, x: Column, levels: FloatArray) -> Split:
+        values = x.values
+        counts = np.flatnonzero(~np.isnan(values))
+        order = counts[np.argsort(values[counts], kind="stable")]
+        first = np.searchsorted(values[order], levels, side="right")
+        return Split.at(first, self.weights[order], self.heaviest)
+
+    def only(self, joints: NDArray[np.intp] | NDArray[np.bool_]) -> Weighted:
+        """See `Design.only`."""
+        own = None if self.from_tolerances is None else self.from_tolerances[joints]
+        return Weighted(self.weights[joints], self.heaviest, own, self._withheld)
+
+    def times(self, factors: FloatArray, largest: float = 1.0) -> Weighted:
+        """Return the design with weights times factors, (n,), of mean 1 again; `largest` is the largest factor."""
+        mean = float(np.average(factors, weights=self.weights))
+        return Weighted(self.weights * factors / mean, self.heaviest * largest / mean)
+
+    def refuses(self, claim: Claim) -> Refusal | None:
+        """See `Design.refuses`: only shares and quantiles take the weights into account."""
+        if claim in self.claims:
+            return None
+        remedy = 'use tolstat report {path}, or write sampling.method = "random" in the study'
+        return Refusal("holds weighted joints (importance sampling), which this statistic does not support", remedy)
+
+    def each(self, n: int) -> FloatArray:
+        """See `Design.each`."""
+        return self.weights
+
+    def trust(self, x: Column, level: float) -> Trust:
+        """Diagnose whether the share above a level can be trusted."""
+        w = self.weights[x.values > level]
+        effective = float(w.sum() ** 2 / (w**2).sum()) if w.any() else 0.0
+        k = pareto.shape_of_weights(w)
+        enough = effective >= LEAST_EFFECTIVE or np.isfinite(self.heaviest)
+        return Trust(effective, k, bool(enough and not k >= LARGEST_SHAPE))
+
+    def doubt(self, x: Column, level: float) -> str:
+        """See `Design.doubt`."""
+        found = self.trust(x, level)
+        if found.usable:
+            return ""
+        tail = "" if np.isnan(found.k) else f", Pareto k {found.k:.2f}, {LARGEST_SHAPE:g} allowed"
+        return f"few joints have most of the weight above it: {found.effective:.0f} effective joints{tail}"
+
+    def upper_if_missed(self, x: Column, level: float, confidence: float) -> float:
+        """See `Design.upper_if_missed`: that of the joints drawn from the tolerances themselves."""
+        if self.from_tolerances is None:
+            return np.nan
+        own = Column(x.values[self.from_tolerances])
+        return float(Independent().shares(own, np.array([level]), confidence).upper[0])
+
+    def smallest(self, n: int, shares: FloatArray) -> float:
+        """See `Design.smallest`: the smallest that is not zero."""
+        return float(shares[shares > 0].min(initial=1.0))

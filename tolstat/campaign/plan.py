@@ -10,7 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.analysis import exceedance, quantile
+from tolstat.analysis import binomial
+from tolstat.analysis.column import Column
+from tolstat.analysis.independent import Independent
+from tolstat.analysis.sample import Sample
 from tolstat.campaign import checks, verify
 from tolstat.campaign.run import choose_fidelity
 from tolstat.common.cores import available_cores
@@ -248,7 +251,7 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT, stage: Te
         file_bytes=_file_bytes(study, settings(study.solver, choice), choice),
         widths={share: _width(share, study.samples) for share in SHARES} if iid else {},
         limits=_limits(study, {name: own[valid] for name, own in results.items()}) if iid else [],
-        wilks={share: quantile.wilks(share, CONFIDENCE) for share in QUANTILES},
+        wilks={share: binomial.wilks(share, CONFIDENCE) for share in QUANTILES},
         reversals=_reversals(np.concatenate([*at.values()]), np.concatenate([*results.values()])),
         assembly=_assembly(study, iid),
         fit=fit_in_words(study),
@@ -279,7 +282,7 @@ def _assembly(study: Study, iid: bool) -> Assembly:
     rows = np.arange(study.first_sample, min(study.rows, study.first_sample + DRAWN))
     errors = draw(study, range(rows[0], rows[-1] + 1))
     misfits = int((perturbed(study, rows, errors, perturb)["clearance"] < 0.0).any(axis=1).sum())
-    lower, upper = exceedance.clopper_pearson(misfits, rows.size, CONFIDENCE)
+    lower, upper = binomial.clopper_pearson(misfits, rows.size, CONFIDENCE)
     return Assembly(misfits, rows.size, (float(lower), float(upper)) if iid else None)
 
 
@@ -328,7 +331,7 @@ def simulate_timed(study: Study, params: NDArray[np.void], options: list[Options
 
 
 def _width(share: float, n: int) -> float:
-    lower, upper = exceedance.clopper_pearson(round(share * n), n, CONFIDENCE)
+    lower, upper = binomial.clopper_pearson(round(share * n), n, CONFIDENCE)
     return float(upper - lower)
 
 
@@ -336,8 +339,9 @@ def _limits(study: Study, results: Mapping[str, NDArray[np.void]]) -> list[Limit
     plans = []
     for name, level in study.limits.items():
         points = names_of(split(name)[1], list(results), "limits")
-        values, status, intervals = worst.load_of([results[point] for point in points], load_of(name))
-        found = exceedance.above(values, status, intervals, level, CONFIDENCE)
+        values, status, inexact = worst.load_of([results[point] for point in points], load_of(name))
+        load = Sample(name, load_of(name).unit, level, np.nan, Column(values), inexact, status, Independent())
+        found = load.above(level, CONFIDENCE)
         valid = found.n - found.n_failed - found.n_unsettled
         nearest_half = min(max(0.5, found.lower), found.upper)  # the interval is widest at a share of one half
         plans.append(LimitPlan(name, level, found.count, valid, _width(nearest_half, study.samples)))

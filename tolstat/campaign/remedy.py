@@ -45,18 +45,6 @@ WITHOUT_RESULTS = {
 """Remedies that do not depend on the results of the joint."""
 
 
-WITHOUT_INTERVAL = {"sobol": "Sobol' points", "lhs": "a Latin hypercube"}
-"""Sampling methods of a production whose joints are not independent."""
-
-
-def without_interval(method: str, replicates: int = 1) -> str:
-    """Return why shares of a sampling method have no interval, and the remedy; empty if they have one."""
-    if method not in WITHOUT_INTERVAL or replicates > 1:
-        return ""
-    remedy = 'set sampling.replicates = 8, or sampling.method = "random"'
-    return f"shares of {WITHOUT_INTERVAL[method]} have no interval: {remedy} for a verdict"
-
-
 class Reason(NamedTuple):
     """Joints without a valid load that have the same status.
 

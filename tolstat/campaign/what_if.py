@@ -17,9 +17,9 @@ from tolstat.campaign.block import Block, Timed, results_of
 from tolstat.campaign.blocks import work_beside
 from tolstat.common.counts import Counts
 from tolstat.common.loads import LOADS
-from tolstat.common.tables import VALID, Options, Status
+from tolstat.common.tables import VALID, Options, Status, worst_status
 from tolstat.joint import perturb
-from tolstat.store import Writer, what_if, worst
+from tolstat.store import Writer, what_if
 from tolstat.store.recorded import settings
 from tolstat.store.what_if import Altered
 from tolstat.study import axes, widths
@@ -210,7 +210,7 @@ class _Table:
             own = slice(here.start, here.start + int(waiting[0]) if waiting.size else here.stop)
             if own.stop > own.start:
                 name, states = what_if.key(change.about), list(self.status[own].T)
-                status = np.choose(worst.deciding(states), states)
+                status = worst_status(states)
                 loads = self.loads[own].reshape(-1, len(self.names))
                 found[name] = _joined(held.get(name), Altered(change.about, numbers.start, self.names, loads, status))
         return found

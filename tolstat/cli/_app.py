@@ -229,7 +229,7 @@ def print_study_notes(path: Path, study: Study) -> None:
     These are mounting and contact law; warnings of its joints, common axes that are too short, shares without an
     interval, and a note where rigid shafts meet errors along them.
     """
-    from tolstat.campaign.remedy import without_interval
+    from tolstat.analysis.listed import without_interval
     from tolstat.study import mounting
     from tolstat.study.tolerances import zones
 

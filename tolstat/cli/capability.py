@@ -44,7 +44,7 @@ def capability(
         if not view.limits or view.method in ("sweep", "cases"):
             remedy = 'give the result file of a study with [limits] and sampling.method "random", "sobol" or "lhs"'
             raise StoreError(str(Fault(str(file), "has no limits, or its joints are no random sample", remedy)))
-        view.check_sample(allow_weights=False)
+        view.check("index")
         table, unknown = query.limits(view, delivery=delivery), error_budget.unknown(view)
         try:
             rare = query.returns(view, list(view.limits), one_in) if one_in else None

@@ -126,7 +126,7 @@ def _summary(store: Reader) -> tuple[dict[str, Any], dict[str, NDArray[np.uint8]
     import numpy as np
 
     from tolstat.common.loads import load_of, split
-    from tolstat.common.tables import Status
+    from tolstat.common.tables import Status, worst_status
     from tolstat.store import worst
     from tolstat.store.hdf5 import BLOCK
     from tolstat.study.points import names_of
@@ -148,10 +148,9 @@ def _summary(store: Reader) -> tuple[dict[str, Any], dict[str, NDArray[np.uint8]
                 damaged += int(((written != Status.PENDING) & (states[point][slots] == Status.PENDING)).sum())
         for name, values in loads.items():
             if all(point in results for point in at[name]):
-                own, state, intervals = worst.load_of([results[point] for point in at[name]], load_of(name))
-                values[:, slots], worst_states[name][slots] = (own, *intervals.ends(own)), state
-    joints = np.choose(worst.deciding(list(states.values())), list(states.values()))
-    found = np.bincount(joints, minlength=max(Status) + 1)
+                own, state, inexact = worst.load_of([results[point] for point in at[name]], load_of(name))
+                values[:, slots], worst_states[name][slots] = (own, *inexact.of(np.arange(own.size), own)), state
+    found = np.bincount(worst_status(list(states.values())), minlength=max(Status) + 1)
     summary: dict[str, Any] = {"study": store.study_name, "joints": store.n}
     summary |= {state.label: int(found[state]) for state in Status}
     if len(each) > 1:
@@ -180,17 +179,18 @@ def _pace(store: Reader, points: int, pending: int) -> dict[str, Any]:
 
 def _exceedance(store: Reader, states: NDArray[np.uint8], name: str, values: NDArray[np.float64]) -> dict[str, Any]:
     """Share of the joints above a limit so far, from loads and their ends, (3, n); None without an estimate."""
-    from tolstat.analysis.sample_load import SampleLoad
-    from tolstat.analysis.sorted_loads import Intervals
+    from tolstat.analysis.designs import design_of
+    from tolstat.analysis.sample import Sample
     from tolstat.common.loads import load_of
+    from tolstat.common.tables import Status
+    from tolstat.store.view import drawn
 
-    samples, method = slice(store.first_sample, None), store.sampling["method"]
-    weights = store.origin()["weight"][samples] if method == "importance" else None
+    samples = slice(store.first_sample, None)
+    weights = store.origin()["weight"][samples] if store.sampling["method"] == "importance" else None
     limit, unit = store.limits[name], load_of(name).unit
-    own, lower, upper = values[:, samples]
-    iid = method in ("random", "importance") and "joints_per_lot" not in store.sampling
-    held = Intervals.of(own, (lower, upper))
-    load = SampleLoad(name, unit, limit, float("nan"), own, held, states[samples], weights, iid, store.heaviest)
+    own, *ends = values[:, samples]
+    design = design_of(drawn(store, weights, Status.PENDING in states[samples]))
+    load = Sample.of(own, states[samples], design, (ends[0], ends[1]))
     share = load.above(limit)
     numbers = {key: getattr(share, key) for key in ("estimate", "lower", "upper")}
     rounded = {key: float(f"{value:.3g}") if value == value else None for key, value in numbers.items()}

@@ -6,13 +6,11 @@ The result file keeps them in the group ``origin``; row i is joint i.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from tolstat.common.columns import Column
-from tolstat.common.errors import Fault, StoreError
 from tolstat.common.fields import Field, dtype_of
 
 IMPORTANCE_FIELDS = (
@@ -55,29 +53,3 @@ def columns(sampling: Mapping[str, Any]) -> tuple[Column, ...]:
 def dtype(sampling: Mapping[str, Any]) -> np.dtype[np.void]:
     """Structured type of a row of the table."""
     return dtype_of(FIELDS[sampling["method"]])
-
-
-def check_equal_weights(sampling: Mapping[str, Any], path: Path, weighted: bool = False) -> None:
-    """Refuse a file whose joints must not be counted equally, for a statistic that does so.
-
-    Parameters
-    ----------
-    sampling : mapping
-        The attribute ``sampling`` of the file.
-    path : Path
-        The file.
-    weighted : bool
-        Whether the statistic applies the weights of importance sampling.
-
-    Raises
-    ------
-    StoreError
-        For a subset simulation, and for importance sampling unless `weighted`; the hint names what can be used.
-    """
-    if sampling["method"] == "subset":
-        remedy = f"print its probability: tolstat rare {path}"
-        raise StoreError(str(Fault(str(path), "holds the levels of a subset simulation, no random sample", remedy)))
-    if sampling["method"] == "importance" and not weighted:
-        found = "holds weighted joints (importance sampling), which this statistic does not support"
-        remedy = f'use tolstat report {path}, or write sampling.method = "random" in the study'
-        raise StoreError(str(Fault(str(path), found, remedy)))

@@ -7,6 +7,7 @@ columns of the result file and of every CSV (`columns`). SI units throughout.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from enum import IntEnum
 from itertools import chain
 from typing import Any, NamedTuple
@@ -73,6 +74,30 @@ SIMULATED = (*VALID, *UNSETTLED)
 
 FAILED = tuple(s for s in Status if s not in SIMULATED and s != Status.PENDING)
 """States of a joint that has no results."""
+
+_SEVERITY = np.zeros(max(Status) + 1, np.uint8)
+for _rank, _states in enumerate(((Status.STATIONARY,), UNSETTLED, FAILED, (Status.PENDING,)), 1):
+    _SEVERITY[[int(state) for state in _states]] = _rank
+
+
+def deciding(status: Sequence[NDArray[np.uint8]]) -> NDArray[np.intp]:
+    """Index of the operating point that decides the status of each joint, (n,).
+
+    A joint is pending if it is so anywhere, else failed, unsettled or stationary; ``OK`` only if it is at all points.
+
+    Parameters
+    ----------
+    status : sequence of (n,) arrays
+        Status of the joints at each operating point.
+    """
+    return np.asarray(np.argmax(_SEVERITY[np.stack(status)], axis=0))
+
+
+def worst_status(status: Sequence[NDArray[np.uint8]]) -> NDArray[np.uint8]:
+    """Status of joints over operating points, (n,); see `deciding`."""
+    first = status[0]
+    return first if all(own is first for own in status) else np.choose(deciding(status), status)
+
 
 STATUS_TEXT = {
     Status.PENDING: "not simulated yet",

@@ -14,13 +14,12 @@ from typing import Any, NamedTuple
 
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.files import atomic_write
-from tolstat.common.tables import VALID
 from tolstat.display import table, text
 from tolstat.display.asked import silent
 from tolstat.display.table import WIDTH
 from tolstat.joint.mounting import in_words
 from tolstat.solver import fidelity
-from tolstat.store import Reader, ResultFile, known_parts, recorded, viewed
+from tolstat.store import Reader, ResultFile, recorded, viewed
 from tolstat.store.view import View
 
 
@@ -148,7 +147,7 @@ def _numbers(view: View, stem: Path, width: int | None, accepted: float) -> Repo
     from tolstat.questions.capability import query as capability
     from tolstat.questions.capability import rendering as capabilities
     from tolstat.questions.exceedance import query, rendering
-    from tolstat.report.headline import headline
+    from tolstat.report.headline import headline, tells_yield
 
     files, shown, more = [], "no largest load is kept; the results that are: tolstat export", ""
     if view.shown_loads:
@@ -164,7 +163,7 @@ def _numbers(view: View, stem: Path, width: int | None, accepted: float) -> Repo
         if points := query.point_rows(view):
             shown += f"\n\n{rendering.AT_POINTS}\n{table.as_text(rendering.at_points(view), points, width)}"
     shown = _headed(shown, view.store, width, verdict.sentence if verdict else "")
-    if verdict and verdict.answer and not view.weighted and known_parts.of(view) is None and view.count(*VALID):
+    if verdict and verdict.answer and tells_yield(view):
         kept = capabilities.together(capability.limit_rows(view))
         shown += f"\n\nyield: {kept.value} {kept.words}"
     notes = [*(verdict.notes if verdict else ()), more, view.head(), rendering.note(view), _accuracy(view)]

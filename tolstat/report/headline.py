@@ -7,10 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tolstat.analysis import exceedance as shares
-from tolstat.campaign.remedy import without_interval
+from tolstat.analysis import binomial
 from tolstat.common.loads import ALL_LIMITS
-from tolstat.common.tables import FAILED, STATUS_TEXT, UNSETTLED
+from tolstat.common.tables import FAILED, STATUS_TEXT, UNSETTLED, VALID
 from tolstat.display import text
 from tolstat.questions.capability import query as capability
 from tolstat.questions.capability import rendering as capabilities
@@ -153,7 +152,7 @@ def _needed(row: Row, accepted: float) -> str:
         high = max(high, row["numerical_upper"] * (1.0 - part) + part)
     if low <= accepted <= high:
         return "no number of them"
-    joints = shares.needed(high if high < accepted else low, accepted)
+    joints = binomial.needed(high if high < accepted else low, accepted)
     return text.number(joints) if joints < 1e7 else "more than 1e7"
 
 
@@ -169,7 +168,7 @@ def _judged(view: View, records: Sequence[Row], accepted: float) -> Headline:
         worst = row
     numbers = ", ".join(f"{answers.count(own)} {word}" for own, word in WORDS.items() if own in answers)
     notes: tuple[str, ...] = (f"of {len(records)} limits, each by itself: {numbers}",) if several else ()
-    decide = deciding(row, accepted) if view.iid and not view.weighted else ""
+    decide = deciding(row, accepted) if view.design.has_interval("index") else ""
     notes += (decide,) if decide else ()
     if answer == "open" and row.get("parts_lower", np.nan) <= accepted < row.get("parts_upper", np.nan):
         notes += (f"not decided by more joints: the parts leave shares of {_open(row)} open. Measure more parts",)
@@ -203,6 +202,11 @@ def _judged(view: View, records: Sequence[Row], accepted: float) -> Headline:
     return Headline(answer, WORDS[answer], said, notes, worst["load"])
 
 
+def tells_yield(view: View) -> bool:
+    """Whether the share of the joints that keep all limits can be told: of joints that count equally, with a load."""
+    return view.design.refuses("index") is None and known_parts.of(view) is None and bool(view.count(*VALID))
+
+
 def _decisive(view: View, records: Sequence[Row]) -> Row:
     """Row on which the verdict is: that of the joints above at least one limit, or of the only limit."""
     return exceedance.all_limits(view) if len(records) > 1 else records[0]
@@ -231,8 +235,9 @@ def _limit(view: View, row: Row) -> str:
 
 def _yield(view: View, records: Sequence[Row]) -> Headline:
     """Without an accepted share: share of the joints that keep all limits; of weighted joints, that exceed any."""
-    notes: tuple[str, ...] = () if view.has_intervals else (without_interval(view.method),)
-    if view.weighted or known_parts.of(view) is not None:
+    without = view.design.without_interval("share")
+    notes: tuple[str, ...] = (without,) if without else ()
+    if view.design.refuses("index") or known_parts.of(view) is not None:
         row, worst = _decisive(view, records), exceedance.most_exceeded(view, records)
         if np.isnan(row["estimate"]):
             known = [own for own in records if not np.isnan(own["estimate"])]
@@ -243,7 +248,8 @@ def _yield(view: View, records: Sequence[Row]) -> Headline:
         if _undecided([row]) or np.isnan(ends(row)[0]):
             return Headline("none", WORDS["none"], _reason(view, [row]), notes)
         interval = "total interval" if _matter([row]) else f"total interval {text.span(*ends(row))}"
-        missed = f"; whatever the proposals miss, at most {text.percent(row['unsearched_upper'])}" if view.aimed else ""
+        missed = row["unsearched_upper"]
+        missed = "" if np.isnan(missed) else f"; whatever the proposals miss, at most {text.percent(missed)}"
         most = ", the limit exceeded most" if row is worst else ""
         said = f"of the joints exceed {_words(view, row)}{most} ({interval}{missed})"
         if row["load"] == ALL_LIMITS and worst["count"] and not np.isnan(worst["estimate"]):
@@ -265,8 +271,7 @@ def _reason(view: View, records: Sequence[Row]) -> str:
     n = max(row["n"] for row in records)
     poor = [row for row in records if row["n"] > lost and np.isnan(row["estimate"])]
     if poor:
-        trust = view.load(poor[0]["load"]).trust(poor[0]["level"])
-        return f"few joints have most of the weight above {text.limit(poor[0])} (Pareto k {trust.k:.2f}, 0.7 allowed)"
+        return f"above {text.limit(poor[0])} {view.load(poor[0]['load']).doubt(poor[0]['level'])}"
     known = known_parts.of(view)
     if known is not None and np.isnan(ends(records[0])[0]):
         unsupported = text.percent(records[0]["unsupported"])
@@ -275,14 +280,14 @@ def _reason(view: View, records: Sequence[Row]) -> str:
     if _matter(records):
         what = "valid result" if view.count(*UNSETTLED) else "result"
         return f"{text.percent(lost / n)} of the joints have no {what} ({lost} of {n})"
-    if not view.has_intervals:
-        return without_interval(view.method)
+    if without := view.design.without_interval("share"):
+        return without
     return f"{n} {'joint is' if n == 1 else 'joints are'} too few"
 
 
 def _matter(records: Sequence[Row] | list[Row]) -> bool:
     return any(
-        shares.unresolved_matter(row["count"], row["n"], row["n_failed"] + row["n_unsettled"]) for row in records
+        binomial.unresolved_matter(row["count"], row["n"], row["n_failed"] + row["n_unsettled"]) for row in records
     )
 
 

@@ -22,7 +22,7 @@ from tolstat.questions.exceedance import query as exceedance
 from tolstat.questions.exceedance.curves_figure import LIMIT_DASH
 from tolstat.questions.exceedance.rendering import AT_POINTS, LIMITS, above, at_points
 from tolstat.questions.show import section as show
-from tolstat.report.headline import WORDS, Headline, ends, headline, share_of, verdict
+from tolstat.report.headline import WORDS, Headline, ends, headline, share_of, tells_yield, verdict
 from tolstat.store import known_parts
 from tolstat.store.view import View
 
@@ -76,7 +76,7 @@ def _points(view: View) -> list[Table]:
     for part in view.parts:
         point = part.store.points[part.points[0]]
         row = {"point": point.name, "operation": point._replace(share=np.nan).in_words, "share": point.share}
-        if part.sampled and not part.weighted and known_parts.of(part) is None and part.limits and part.count(*VALID):
+        if part.sampled and part.limits and tells_yield(part):
             found = capabilities.together(capability.limit_rows(part))
             row |= {"kept": found.value if found.decides else WORDS["none"]}
         rows.append(row)
@@ -114,7 +114,7 @@ def _answer(view: View, found: Headline | None) -> Card:
 def _cards(view: View, found: Headline | None) -> list[Card]:
     """Unless the verdict says it, the yield and the limit exceeded most; next delivery, number of joints, errors."""
     cards = []
-    if found is not None and not view.weighted and known_parts.of(view) is None and view.count(*VALID):
+    if found is not None and tells_yield(view):
         rows = capability.limit_rows(view)
         if found.answer:
             together = capabilities.together(rows)
@@ -149,15 +149,15 @@ def _basis(view: View) -> list[Card]:
 
 def _how(view: View, asked: Asked) -> list[str]:
     """Paragraphs on what the picture shows, and what decides."""
-    if not view.has_intervals:
+    if not view.design.has_interval("share"):
         return [
             "Points: share of the joints with a valid load. Grey: with failed and unsettled joints counted below and "
             "above every limit.",
             "No intervals: Clopper–Pearson holds for independent samples only; sampling.replicates gives intervals.",
         ]
-    said = "Joints are counted by their weights. " if view.weighted else ""
+    said = f"{view.design.counting} ".lstrip()
     paragraphs = [
-        f"{said}Points: share of the joints with a valid load. Blue: its interval ({view.interval_of}), 95 % "
+        f"{said}Points: share of the joints with a valid load. Blue: its interval ({view.design.interval}), 95 % "
         "for each limit by itself.",
         "Grey: the total interval. Failed and unsettled joints are counted below the limit at its lower end and above "
         "it at its upper end; it covers the numerical error, too, where it is known.",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,20 +10,26 @@ import numpy as np
 
 from tolstat.analysis import prediction
 from tolstat.analysis.accuracy import LEAST_NEAR, OBSERVABLES, corrected, corrections, size
-from tolstat.analysis.sample_load import SampleLoad, frozen, largest_of
+from tolstat.analysis.column import frozen
+from tolstat.analysis.sample import Sample, largest_of
 from tolstat.common.loads import ALL_LIMITS, ANY_LIMIT, LOADS, FloatArray
 from tolstat.common.once import once
 from tolstat.store.view import View
 
 
-def shifted(view: View, load: SampleLoad) -> tuple[SampleLoad, SampleLoad] | None:
+def with_error(view: View, load: Sample) -> tuple[Sample, ...]:
+    """Return a load, and the load at both ends of its numerical error if that is known."""
+    return load, *(_shifted(view, load) or ())
+
+
+def _shifted(view: View, load: Sample) -> tuple[Sample, Sample] | None:
     """Return the load of all joints at both ends of its numerical error, as far as that is known; None if it is not.
 
     With enough verified joints near the limit of the load, see `near`; otherwise the load is reduced and increased by
     the error that most joints checked at random stay below.
     """
     if load.parts:
-        return _together(load, (shifted(view, part) for part in load.each()))
+        return _together(load, (_shifted(view, part) for part in load.each()))
     found = near(view, load)
     if found is not None:
         return found
@@ -41,12 +47,12 @@ def _largest(view: View, kind: str) -> FloatArray:
     return frozen(size(view.results, next(name for name in OBSERVABLES if LOADS[name].kind.key == kind)))
 
 
-def near(view: View, load: SampleLoad) -> tuple[SampleLoad, SampleLoad] | None:
+def near(view: View, load: Sample) -> tuple[Sample, Sample] | None:
     """Return the load of all joints corrected by what verified joints near its limit lack; see `accuracy.corrected`.
 
     Returns
     -------
-    tuple of SampleLoad or None
+    tuple of Sample or None
         The load at both ends of the mean correction. None if fewer than `accuracy.LEAST_NEAR` of the joints nearest to
         the limit are verified, twice as many at most; `unknown` has the command that verifies them.
     """
@@ -60,7 +66,7 @@ def near(view: View, load: SampleLoad) -> tuple[SampleLoad, SampleLoad] | None:
     if view.near is None:
         return None
     checks = {name: check.results for name, check in view.near.checks.items()}
-    distance = np.abs(load.valid_or_nan - load.limit)
+    distance = np.abs(load.values - load.limit)
     nearest = view.rows(np.argsort(distance, kind="stable")[: 2 * LEAST_NEAR])
     found = corrections(view.near.base, checks)[np.isin(view.near.rows, nearest), OBSERVABLES.index(name)]
     found = found[np.isfinite(found)]
@@ -71,18 +77,16 @@ def near(view: View, load: SampleLoad) -> tuple[SampleLoad, SampleLoad] | None:
     return load.shifted(low), load.shifted(high)
 
 
-def _at(part: View, name: str, load: SampleLoad) -> SampleLoad:
+def _at(part: View, name: str, load: Sample) -> Sample:
     """A load at one operating point, with the limit, and as the ratio, of the load over several."""
     assert load.limit is not None
     own = replace(part.load(name), limit=load.limit * load.scale)
     return own if load.scale == 1.0 else own.of_limit()
 
 
-def _together(
-    load: SampleLoad, pairs: Iterable[tuple[SampleLoad, SampleLoad] | None]
-) -> tuple[SampleLoad, SampleLoad] | None:
+def _together(load: Sample, pairs: Iterable[tuple[Sample, Sample] | None]) -> tuple[Sample, Sample] | None:
     """The largest of the loads at each end, taken one by one to save memory; None if one of them is not known."""
-    found: tuple[SampleLoad, SampleLoad] | None = None
+    found: tuple[Sample, Sample] | None = None
     for pair in pairs:
         if pair is None:
             return None
@@ -114,43 +118,13 @@ def relative(view: View, name: str) -> float:
     return narrowed.numerical_error.get(LOADS[plain].kind.key, np.nan)
 
 
-def total_interval(
-    load: SampleLoad, ends: tuple[SampleLoad, SampleLoad] | None, level: float, confidence: float
-) -> tuple[float, float]:
-    """Interval of the share above a level that covers sampling, unresolved joints and numerical error.
-
-    Parameters
-    ----------
-    load : SampleLoad
-        The load as simulated.
-    ends : tuple of SampleLoad, optional
-        The load reduced and increased by its numerical error; None if the error is unknown, which is then not covered.
-    level, confidence : float
-        As in `SampleLoad.above`.
-
-    Returns
-    -------
-    lower, upper : float
-        Shares of the joints; NaN for dependent samples.
-    """
-    found = [part.above(level, confidence) for part in (load, *(ends or ()))]
-    lower, upper = [part.outer_lower for part in found], [part.outer_upper for part in found]
-    return min(lower), max(upper)
-
-
-def delivery(
-    load: SampleLoad,
-    ends: tuple[SampleLoad, SampleLoad] | None,
-    level: float,
-    number: int,
-    confidence: float,
-) -> dict[str, float]:
-    """Prediction interval for the number above a level among `number` further joints; parameters as `total_interval`.
+def delivery(samples: Sequence[Sample], level: float, number: int, confidence: float) -> dict[str, float]:
+    """Prediction interval for the number above a level among `number` further joints; see `sample.total_interval`.
 
     Returns
     -------
     dict
-        ``next_lower``, ``next_upper``: whole numbers, ends included; NaN for dependent samples; ``delivery``: `number`.
+        ``next_lower``, ``next_upper``: whole numbers, ends included; NaN without an interval; ``delivery``: `number`.
     """
-    found = [part.delivery(level, number, confidence) for part in (load, *(ends or ()))]
+    found = [sample.delivery(level, number, confidence) for sample in samples]
     return prediction.columns((min(low for low, _ in found), max(high for _, high in found)), number)

@@ -8,10 +8,9 @@ from functools import cached_property
 import numpy as np
 
 from tolstat.analysis import known_share, process
-from tolstat.analysis.exceedance import Mask
+from tolstat.analysis.column import Mask
 from tolstat.analysis.known_share import Event, KnownShare, Mixture
 from tolstat.analysis.process import Known, Sums
-from tolstat.analysis.sample_load import SampleLoad
 from tolstat.analysis.weighted import Split
 from tolstat.common.loads import ALL_LIMITS
 from tolstat.common.once import once
@@ -110,18 +109,19 @@ class KnownParts:
     @cached_property
     def _tallies(self) -> dict[str, tuple[Split, list[Split], list[Split]]]:
         """Weights above each limit: of joints with a valid load; for the lower end; and for the upper end."""
-        view = self.view
+        view, done = self.view, self._done
         names = [*view.limits, ALL_LIMITS]
         events: list[Event] = []
         places = []
         for load in view.loads(names):
-            ends = (load, *(error_budget.shifted(view, load) or ()))
-            own = [self._plain(load), *(self._fewest(end) for end in ends), *(self._most(end) for end in ends)]
+            ends, limit = error_budget.with_error(view, load), float(load.limit or np.nan)
+            own = [Event(load.values > limit, load.is_valid)]
+            own += [Event(end.lower.values > limit, done) for end in ends]
+            own += [Event(end.upper.values > limit, done) for end in ends]
             places.append((len(events), len(ends)))
             events += own
-        done = self._done
         events = [Event(event.above[done], event.counted[done]) for event in events]
-        weights = None if view.weights is None else view.weights[done]
+        weights = view.design.each(view.n)[done]
         found = known_share.tallies(self._sums(), self._known, self._drawn, weights, events)
         return {
             name: (found[k], found[k + 1 : k + 1 + m], found[k + 1 + m : k + 1 + 2 * m])
@@ -139,20 +139,6 @@ class KnownParts:
             parts.append([(own.sum(axis=0), np.square(own).sum(axis=0)) for own in stacked])
         each = zip(*parts, strict=True)
         return [Sums(*(np.concatenate(one)[self._done] for one in zip(*entry, strict=True))) for entry in each]
-
-    def _plain(self, load: SampleLoad) -> Event:
-        assert load.limit is not None
-        return Event(load.values > load.limit, load.is_valid)
-
-    def _fewest(self, load: SampleLoad) -> Event:
-        """Event with all joints without a valid load below, and the least load of those that never repeat."""
-        assert load.limit is not None
-        return Event(load.is_valid & (load.ends[0] > load.limit), self._done)
-
-    def _most(self, load: SampleLoad) -> Event:
-        """Event with all joints without a valid load above, and the largest load of those that never repeat."""
-        assert load.limit is not None
-        return Event(~load.is_valid | (load.ends[1] > load.limit), self._done)
 
 
 def _parts_of(entry: KnownEntry, proposal: Proposal) -> int | None:

@@ -169,7 +169,7 @@ class NamedLoads:
 
         load, store = self._view.load(name), self._view.store
         index = pd.RangeIndex(store.rows[store.first_sample :], name="row")
-        series = pd.Series(load.valid_or_nan, index, name=name)
+        series = pd.Series(load.values, index, name=name)
         series.attrs["units"] = load.unit
         return series
 

@@ -12,13 +12,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tolstat.analysis import accuracy
-from tolstat.analysis.exceedance import FloatArray
-from tolstat.analysis.sample_load import SampleLoad, frozen, largest_of
+from tolstat.analysis.column import Column, frozen
+from tolstat.analysis.design import SAMPLE, Claim, Design
+from tolstat.analysis.designs import Drawn, design_of
+from tolstat.analysis.sample import Sample, largest_of
 from tolstat.common import selected_results
 from tolstat.common.counts import Counts
-from tolstat.common.draw_records import DRAWN, METHODS, check_equal_weights
+from tolstat.common.draw_records import METHODS
 from tolstat.common.errors import Fault, InputError, StoreError
-from tolstat.common.loads import ALL_LIMITS, LOADS, SHOWN_LOADS, Limit, limits_in_words, split
+from tolstat.common.loads import ALL_LIMITS, LOADS, SHOWN_LOADS, FloatArray, Limit, limits_in_words, split
 from tolstat.common.shown import table
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import ERROR, Status
@@ -31,8 +33,6 @@ from tolstat.store.what_if import Altered
 from tolstat.store.worst import FirstPass
 from tolstat.study import Study
 from tolstat.study.points import limits_at, names_of
-
-SAMPLE = 'give the file of a study with sampling.method "random", "sobol" or "lhs"'
 
 
 class View:
@@ -75,7 +75,7 @@ class View:
         self.columns = store.columns
         self.n = store.n - store.first_sample
         self._study_path = study_path
-        self._loads: dict[str, SampleLoad] = {}
+        self._loads: dict[str, Sample] = {}
         self._at: dict[tuple[str, ...], View] = {self.points: self}
 
     def __repr__(self) -> str:
@@ -133,7 +133,7 @@ class View:
         return accuracy.usual(self.verification.base, checks)
 
     @cached_property
-    def weights(self) -> FloatArray | None:
+    def _weights(self) -> FloatArray | None:
         """Weight of each joint, (n,), if joints were not drawn from the tolerances alone."""
         if self.method != "importance":
             return None
@@ -177,9 +177,9 @@ class View:
     def _tables(self) -> FirstPass:
         if len(self.parts) > 1:
             return worst.of_points([part._tables for part in self.parts], [part.store for part in self.parts])
-        return worst.first_pass(self.store, self.weights)
+        return worst.first_pass(self.store, self._weights)
 
-    def load(self, name: str) -> SampleLoad:
+    def load(self, name: str) -> Sample:
         """Largest load over the revolution of every joint, by its name; ``"cross1.F at cruise"`` at that point only.
 
         ``"all limits"`` is the largest ratio of load to limit of each joint, see `together`.
@@ -188,7 +188,8 @@ class View:
         there is no such load or the study does not keep it, a `StoreError` for levels of a subset simulation.
         """
         if name not in self._loads:
-            check_equal_weights(self.store.sampling, self.path, weighted=True)
+            if self.method == "subset":
+                self.check("share")
             if name == ALL_LIMITS and self.limits:
                 return self._loads.setdefault(name, self.together)
             view, plain = self.narrowed(name)
@@ -201,17 +202,15 @@ class View:
             if not selected_results.holds(self.columns, name):
                 found = f"is not kept in {self.path}, see [output] results of its study"
                 raise InputError([Fault(name, found, f"give one of: {', '.join(self.kept_loads)}")])
-            load, skip = LOADS[name], self.store.first_sample
-            drawn = frozen(self.store.origin()["component"][skip:] == 0) if self.aimed else None
+            load, limit = LOADS[name], self.limits.get(name)
             nominal = float(load.of(self.nominal)[0]) if len(self.nominal) else np.nan
-            values, _, intervals = worst.load_of([part.results for part in self.parts], load)
-            self._loads[name] = SampleLoad(
-                name, load.unit, self.limits.get(name), nominal, values, intervals,
-                self.status, self.weights, self.iid, self.store.heaviest, self.replicates, drawn, lots=self.lots,
-            )  # fmt: skip
+            values, _, inexact = worst.load_of([part.results for part in self.parts], load)
+            self._loads[name] = Sample(
+                name, load.unit, limit, nominal, Column(values), inexact, self.status, self.design
+            )
         return self._loads[name]
 
-    def loads(self, names: Sequence[str]) -> list[SampleLoad]:
+    def loads(self, names: Sequence[str]) -> list[Sample]:
         """Several loads; see `load`."""
         return [self.load(name) for name in names]
 
@@ -230,7 +229,7 @@ class View:
         """Loads that tables show: the bushing loads or, if the study keeps none, all others that it keeps."""
         return self.bushing_loads or self.kept_loads
 
-    def load_of(self, limit: Limit) -> SampleLoad:
+    def load_of(self, limit: Limit) -> Sample:
         """Load that a limit is about; of several loads their maximum, or the maximum of load/level if levels differ.
 
         Its limit is the level. Raises as `load`.
@@ -240,7 +239,7 @@ class View:
         return loads[0] if limit.loads == (limit.name,) else largest_of(limit.name, loads, not limit.has_one_level)
 
     @property
-    def together(self) -> SampleLoad:
+    def together(self) -> Sample:
         """Largest ratio of load to limit of each joint over all limits of the study; above 1, a limit is exceeded."""
         return self.load_of(Limit(ALL_LIMITS, tuple(self.limits), tuple(self.limits.values())))
 
@@ -274,55 +273,22 @@ class View:
         known = {name: share for name, share in shares.items() if share == share}
         return max(known, key=lambda name: known[name]) if known else next(iter((*self.leading, "cross1.F")))
 
-    @property
-    def iid(self) -> bool:
-        """Whether the joints are independent samples."""
-        return self.method in ("random", "importance") and self.lots is None
-
     @cached_property
-    def lots(self) -> NDArray[np.intp] | None:
-        """Lot of each joint, (n,), numbered in the campaign; None where each joint is its own lot."""
-        size = int(self.store.sampling.get("joints_per_lot", 1))
-        return frozen(np.asarray(self.campaign_samples) // size) if size > 1 else None
-
-    @cached_property
-    def replicates(self) -> int:
-        """Number of independent replicates with all joints simulated; 1 without them, and in a slice."""
-        number, whole = int(self.store.sampling.get("replicates", 1)), self.n == self.store.sampling.get("n")
-        return number if whole and not (self.status == Status.PENDING).any() else 1
-
-    @property
-    def has_intervals(self) -> bool:
-        """Whether shares and quantiles have intervals: of independent joints, over replicates, or over lots."""
-        return self.iid or self.replicates > 1 or self.lots is not None
-
-    @property
-    def interval_of(self) -> str:
-        """Name of the intervals of shares, in words."""
-        if self.lots is not None:
-            return "Student's t over lots, on the logit"
-        return f"Student's t over {self.replicates} replicates" if self.replicates > 1 else "Clopper–Pearson's"
+    def design(self) -> Design:
+        """How the joints were drawn, and what they allow to conclude."""
+        return design_of(drawn(self.store, self._weights, bool(self.count(Status.PENDING))))
 
     @property
     def sampled(self) -> bool:
         """Whether the joints are a sample of a production, not a grid or a design."""
-        return self.method in (*DRAWN, "importance")
+        return self.design.is_sample
 
-    @property
-    def weighted(self) -> bool:
-        """Whether joints have different weights."""
-        return self.method == "importance"
-
-    @property
-    def aimed(self) -> bool:
-        """Whether proposals of importance sampling leave out ways to a limit; those of processes do not."""
-        return self.weighted and any(set(drawn) != {"parts"} for _, drawn in self.store.identity["proposal"])
-
-    def check_sample(self, allow_weights: bool = True) -> None:
-        """Raise a `StoreError` if joints are no sample of a production, or differ in weight without `allow_weights`."""
-        check_equal_weights(self.store.sampling, self.path, allow_weights)
-        if self.method in ("cases", "sweep"):
-            raise StoreError(str(Fault(str(self.path), "holds joints that are no sample of a production", SAMPLE)))
+    def check(self, claim: Claim) -> None:
+        """Raise a `StoreError` if the joints give no estimate of a claim."""
+        refusal = self.design.refuses(claim)
+        if refusal is not None:
+            remedy = refusal.remedy.format(path=self.path)
+            raise StoreError(str(Fault(str(self.path), refusal.found, remedy)))
 
     def check_drawn(self) -> None:
         """Raise a StoreError for joints that were not drawn from tolerances."""
@@ -397,3 +363,32 @@ class View:
             *others, last = self.points
             text += f", each at {', '.join(others)} and {last}" if others else f" at {last}"
         return f"{text}, {self.counts.shortfall}" + (f", {pending} still pending" if pending else "")
+
+
+def drawn(store: Reader, weights: FloatArray | None, unfinished: bool) -> Drawn:
+    """How the joints of a file were drawn.
+
+    Parameters
+    ----------
+    store : Reader
+        The file.
+    weights : ndarray, shape (n,), optional
+        Weights of its samples under importance sampling.
+    unfinished : bool
+        Whether joints are pending; replicates are then unequal, and do not count as such.
+    """
+    sampling, skip = store.sampling, store.first_sample
+    whole = store.n - skip == sampling.get("n") and not unfinished
+    own = None
+    # proposals of processes alone leave out no way to a limit
+    if weights is not None and any(set(changed) != {"parts"} for _, changed in store.identity["proposal"]):
+        own = frozen(store.origin()["component"][skip:] == 0)
+    return Drawn(
+        str(sampling["method"]),
+        store.samples,
+        int(sampling.get("joints_per_lot", 1)),
+        int(sampling.get("replicates", 1)) if whole else 1,
+        weights,
+        store.heaviest,
+        own,
+    )

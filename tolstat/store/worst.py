@@ -8,11 +8,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.analysis.sample_load import frozen
-from tolstat.analysis.sorted_loads import Intervals
+from tolstat.analysis.column import frozen
+from tolstat.analysis.sample import Inexact, is_valid
 from tolstat.common.load_kinds import SPAN
 from tolstat.common.loads import LOAD_FIELDS, LOADS, FloatArray, Limit, Load, Results, split
-from tolstat.common.tables import FAILED, RESULT, UNSETTLED, VALID, Status, without_results
+from tolstat.common.tables import FAILED, RESULT, UNSETTLED, VALID, Status, deciding, without_results, worst_status
 from tolstat.store.reader import Reader
 from tolstat.store.verification import Verification
 
@@ -20,22 +20,6 @@ AT_ONCE = 16_384
 """Rows read at once. They are written to a table column by column, faster where it fits the processor's cache."""
 MAX_LISTED = 12
 """Number of joints without a valid load whose complete results are kept."""
-_SEVERITY = np.zeros(max(Status) + 1, np.uint8)
-for _rank, _states in enumerate(((Status.STATIONARY,), UNSETTLED, FAILED, (Status.PENDING,)), 1):
-    _SEVERITY[[int(state) for state in _states]] = _rank
-
-
-def deciding(status: Sequence[NDArray[np.uint8]]) -> NDArray[np.intp]:
-    """Index of the operating point that decides the status of each joint, (n,).
-
-    A joint is pending if it is so anywhere, else failed, unsettled or stationary; ``OK`` only if it is at all points.
-
-    Parameters
-    ----------
-    status : sequence of (n,) arrays
-        Status of the joints at each operating point.
-    """
-    return np.asarray(np.argmax(_SEVERITY[np.stack(status)], axis=0))
 
 
 def together(parts: Sequence[Results]) -> dict[str, NDArray[Any]]:
@@ -53,7 +37,7 @@ def together(parts: Sequence[Results]) -> dict[str, NDArray[Any]]:
         stationary joints: loads of one kind may have theirs from different points, see `load_of`.
     """
     status = [part["status"] for part in parts]
-    found: dict[str, NDArray[Any]] = {"status": np.choose(deciding(status), status)}
+    found: dict[str, NDArray[Any]] = {"status": worst_status(status)}
     for kind in SPAN:
         found[f"{kind}_max"] = np.maximum.reduce([part[f"{kind}_max"] for part in parts])
         for end in ("lower", "upper"):
@@ -61,7 +45,7 @@ def together(parts: Sequence[Results]) -> dict[str, NDArray[Any]]:
     return found
 
 
-def load_of(parts: Sequence[Results], load: Load) -> tuple[FloatArray, NDArray[np.uint8], Intervals]:
+def load_of(parts: Sequence[Results], load: Load) -> tuple[FloatArray, NDArray[np.uint8], Inexact]:
     """One load of the joints over some operating points, in arrays that cannot be written to.
 
     Parameters
@@ -74,24 +58,35 @@ def load_of(parts: Sequence[Results], load: Load) -> tuple[FloatArray, NDArray[n
     Returns
     -------
     values : ndarray, shape (n,)
-        Largest value, SI.
+        Largest value, SI; NaN unless the joint is valid at all points.
     status : ndarray, shape (n,)
-        See `deciding`.
-    intervals : Intervals
-        Those of joints that are stationary at a point: the largest of the lower ends, and of the upper ones.
+        See `tables.worst_status`.
+    inexact : Inexact
+        Joints that are stationary, failed or unsettled at a point: the largest of the lower ends, and of the upper
+        ones.
     """
     status, each = [part["status"] for part in parts], [load.of(part) for part in parts]
-    several = len(parts) > 1  # of one point the values are a column of its results, not a copy
-    values = np.maximum.reduce(each) if several else each[0]
-    decided = np.choose(deciding(status), status) if several else status[0]
-    joints = np.flatnonzero(np.logical_or.reduce([own == Status.STATIONARY for own in status]))
+    valid = [is_valid(own, state) for own, state in zip(each, status, strict=True)]
+    for k, (own, good) in enumerate(zip(each, valid, strict=True)):
+        if np.isfinite(own[~good]).any():
+            each[k] = np.where(good, own, np.nan)
+    values = np.maximum.reduce(each) if len(parts) > 1 else each[0]  # of one point a column of its results, no copy
+    lost = [~good & (state != Status.PENDING) for good, state in zip(valid, status, strict=True)]
+    inexact = [own | (state == Status.STATIONARY) for own, state in zip(lost, status, strict=True)]
+    joints = np.flatnonzero(np.logical_or.reduce(inexact))
     names = [f"{load.kind.key}_{of}" for of in ("max", "lower", "upper")]
-    ends = (load.ends({name: part[name][joints] for name in names}) for part in parts)
+    ends = []
+    for part, own, without in zip(parts, each, lost, strict=True):
+        exact, outside = own[joints], without[joints]
+        low, high = load.ends({name: part[name][joints] for name in names})
+        low, high = (np.where(np.isfinite(end + exact), end, exact) for end in (low, high))
+        ends.append((np.where(outside, -np.inf, low), np.where(outside, np.inf, high)))
     lower, upper = (np.maximum.reduce(own) for own in zip(*ends, strict=True))
-    intervals = Intervals.of(values[joints], (lower, upper)).among(joints)
-    for array in (values, *intervals):
+    apart = (lower != values[joints]) | (upper != values[joints])
+    found = Inexact(joints[apart], lower[apart], upper[apart])
+    for array in (values, *found):
         frozen(array)
-    return values, decided, intervals
+    return values, worst_status(status), found
 
 
 def limit_of(parts: Mapping[str, NDArray[np.void]], limit: Limit) -> tuple[FloatArray, NDArray[np.uint8]]:
@@ -111,7 +106,7 @@ def limit_of(parts: Mapping[str, NDArray[np.void]], limit: Limit) -> tuple[Float
         values, status, _ = load_of(chosen, LOADS[split(name)[0]])
         found.append(values if limit.has_one_level else values / level)
         states.append(status)
-    return np.maximum.reduce(found), np.choose(deciding(states), states)
+    return np.maximum.reduce(found), worst_status(states)
 
 
 def nominal(parts: Sequence[NDArray[np.void]]) -> NDArray[np.void]:
@@ -147,7 +142,8 @@ class FirstPass(NamedTuple):
     Attributes
     ----------
     results : dict of str to ndarray, shape (n, ...)
-        Columns `LOAD_FIELDS` of the samples; the values of one load lie side by side.
+        Columns `LOAD_FIELDS` of the samples, loads of joints that are not valid NaN; the values of one load lie side by
+        side.
     nominal : ndarray of RESULT, shape (1,) or (0,)
         The nominal joint, if the file has one and its results are valid.
     without_load : ndarray of RESULT, shape (m,)
@@ -173,11 +169,13 @@ def first_pass(store: Reader, weights: FloatArray | None) -> FirstPass:
         if first == 0 and skip:
             nominal, block = block[:1][np.isin(block["status"][:1], VALID)].copy(), block[1:]
         begin = max(0, first - skip)
+        valid = np.isin(block["status"], VALID)
         for name in LOAD_FIELDS:
             results[name][begin : begin + len(block)] = block[name]
+            if name != "status":
+                results[name][begin : begin + len(block)][~valid] = np.nan
         if sum(map(len, kept)) < MAX_LISTED:
             kept.append(block[np.isin(block["status"], (*FAILED, *UNSETTLED))][:MAX_LISTED])
-        valid = np.isin(block["status"], VALID)
         weight = np.ones(len(block)) if weights is None else weights[begin : begin + len(block)]
         shares += np.tensordot(weight[valid], block["mode_share"][valid], 1)
         total += float(weight[valid].sum())

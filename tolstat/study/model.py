@@ -7,7 +7,7 @@ from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
 
 from pydantic import AfterValidator, Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
-from tolstat.analysis.lots import LEAST
+from tolstat.analysis.clustered import LEAST
 from tolstat.common import selected_results, units
 from tolstat.common.columns import Column
 from tolstat.common.loads import Limit

@@ -11,8 +11,10 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from tolstat.analysis import allocation, prediction, reweight
+from tolstat.analysis.design import Design
 from tolstat.analysis.prediction import DELIVERY
 from tolstat.analysis.reweight import Ratios
+from tolstat.analysis.sample import Sample
 from tolstat.common import selected_results
 from tolstat.common.errors import Fault, InputError, StoreError, gather
 from tolstat.common.loads import ALL_LIMITS
@@ -169,7 +171,7 @@ def allocated(
     request = _read_request(view, limits, cost_file, keep)
     done = np.flatnonzero(view.status != Status.PENDING)
     above = np.column_stack([_above(view, statement) for statement in request.statements])[done]
-    searched, checked = allocation.halves(len(done), MAX_SEARCHED, None if view.lots is None else view.lots[done])
+    searched, checked = allocation.halves(view.design.units(view.n)[done], MAX_SEARCHED)
     if len(checked) < 4 * reweight.LEAST_ESS:
         found = f"has {len(done)} joints simulated"
         raise StoreError(str(Fault(str(view.path), found, f"run {8 * reweight.LEAST_ESS} joints or more")))
@@ -181,7 +183,7 @@ def allocated(
     }
     ratios = _check_ratios(view, request, entries, done[checked])
     ends = [_ends_above(view, statement, done[checked]) for statement in request.statements]
-    table = _limits(request.statements, above, above[checked], ends, ratios, view.iid, confidence, delivery)
+    table = _limits(request.statements, above, above[checked], ends, ratios, view.design, confidence, delivery)
     growth = [
         allocation.joints_needed(share, ess, target, confidence)
         for share, ess, target in table[["estimate", "ess", "target"]].to_numpy(float)[: len(request.statements)]
@@ -207,7 +209,7 @@ def _ratios(logs: NDArray[np.float64], exact: Exact) -> Ratios:
 def _check_joints(view: View) -> None:
     """Refuse joints that are not drawn from tolerances, all with the same weight and independently of each other."""
     view.check_drawn()
-    view.check_sample(allow_weights=False)
+    view.check("mean")
     if view.study.groups:
         remedy = 'give the file of a study with sampling.method = "random"'
         found = "holds joints that share errors with others, so that one half of them is no check of the other"
@@ -274,7 +276,7 @@ def _search(view: View, request: _Request, above: NDArray[np.bool_], samples: ND
         cost=request.cost,
         lower=reach[:, 0],
         upper=np.where([t.widens for t in request.tolerances], reach[:, 1], 1.0),
-        iid=view.iid,
+        iid=view.design.has_interval("reweighting"),
         confidence=SEARCH_CONFIDENCE,
     )
     return allocation.search(problem)
@@ -286,7 +288,7 @@ def _limits(
     above_checked: NDArray[np.bool_],
     ends: Sequence[Sequence[NDArray[np.bool_]]],
     ratios: Ratios,
-    iid: bool,
+    design: Design,
     confidence: float,
     delivery: int,
 ) -> pd.DataFrame:
@@ -297,8 +299,7 @@ def _limits(
     """
 
     def share(own: NDArray[np.bool_], confidence: float) -> reweight.Share:
-        sample = reweight.sort_out(own, np.full(own.size, Status.OK), ratios)
-        return reweight.share_above(sample, ratios, 0.5, confidence, iid)
+        return reweight.share_above(Sample.of(own, np.full(own.size, Status.OK), design), ratios, 0.5, confidence)
 
     columns: list[tuple[str, float, Any, list[Any], bool]] = [
         (s.text, s.bound, above[:, i], [above_checked[:, i], *ends[i]], bool(ends[i])) for i, s in enumerate(statements)

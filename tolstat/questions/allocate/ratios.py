@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat import sampling
-from tolstat.analysis.exceedance import FloatArray
+from tolstat.common.loads import FloatArray
 from tolstat.study import Study
 from tolstat.study.scaling import Tolerance
 from tolstat.study.tolerances.density_ratio import Exact, exact, log_mean_square

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.analysis import accuracy
-from tolstat.analysis.exceedance import FloatArray
+from tolstat.analysis.design import Design
 from tolstat.analysis.rating_life import basic_life, system_life, turns_per_revolution
-from tolstat.analysis.sample_load import SampleLoad
-from tolstat.analysis.sorted_loads import EXACT
+from tolstat.analysis.sample import Sample
 from tolstat.common.errors import Fault, StoreError
 from tolstat.common.load_kinds import PINS
+from tolstat.common.loads import FloatArray
 from tolstat.common.shown import shown
 from tolstat.common.tables import LIFE_EXPONENT, VALID
 from tolstat.joint import Bearing, operating
@@ -71,8 +71,7 @@ class Lives:
     unrated: int
     load_error: float
     status: NDArray[np.uint8]
-    weights: FloatArray | None
-    iid: bool
+    design: Design
 
     @property
     def valid(self) -> int:
@@ -84,19 +83,19 @@ class Lives:
         """Required life, h; NaN if none is given."""
         return np.nan if self.bearing.required_life is None else self.bearing.required_life / HOUR
 
-    def rate(self, place: str) -> SampleLoad:
+    def rate(self, place: str) -> Sample:
         """Reciprocal of the life of a bearing or of the joint, 1/h: as with a load, higher is worse."""
         k = PLACES.index(place)
         with np.errstate(divide="ignore"):
             return self._load(place, "1/h", 1.0 / self.nominal_hours[k], 1.0 / self.hours[:, k])
 
-    def load(self, pin: str) -> SampleLoad:
+    def load(self, pin: str) -> Sample:
         """Dynamic equivalent load of a pin's bearing, N."""
         k = PINS.index(pin)
         return self._load(pin, "N", float(self.nominal_loads[k]), self.loads[:, k])
 
-    def _load(self, name: str, unit: str, nominal: float, values: FloatArray) -> SampleLoad:
-        return SampleLoad(name, unit, None, nominal, values, EXACT, self.status, self.weights, self.iid)
+    def _load(self, name: str, unit: str, nominal: float, values: FloatArray) -> Sample:
+        return Sample.of(values, self.status, self.design, name=name, unit=unit, nominal=nominal)
 
 
 def bearing_of(view: View) -> Bearing | None:
@@ -126,7 +125,7 @@ def lives_of(view: View) -> Lives:
     InputError
         When the view has several operating points, and the study does not give their shares of the time.
     """
-    view.check_sample()
+    view.check("quantile")
     bearing = bearing_of(view)
     if bearing is None:
         remedy = (
@@ -167,8 +166,7 @@ def lives_of(view: View) -> Lives:
         unrated=int(unrated.sum()),
         load_error=load_error(view),
         status=view.status,
-        weights=view.weights,
-        iid=view.iid,
+        design=view.design,
     )
 
 

@@ -9,15 +9,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from tolstat.analysis.sample_load import SampleLoad
-from tolstat.analysis.sorted_loads import EXACT
+from tolstat.analysis.sample import Sample, total_interval
 from tolstat.common.load_kinds import PINS
 from tolstat.common.tables import LIFE_EXPONENT, Mode
 from tolstat.display import text
 from tolstat.joint.bearing import FOR_LIFE
 from tolstat.questions.bearing_life.lives import PLACES, Lives, bearing_of, keeps_loads, lives_of
 from tolstat.store import points
-from tolstat.store.error_budget import total_interval
 from tolstat.store.view import View
 
 SHARES = (0.5, 0.9, 0.99)
@@ -98,7 +96,7 @@ def below(lives: Lives, confidence: float = 0.95) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        One row per place of `PLACES`: ``place``, ``required`` (h), the fields of `analysis.exceedance.Exceedance` but
+        One row per place of `PLACES`: ``place``, ``required`` (h), the fields of `analysis.sample.Exceedance` but
         its level (``count`` are the joints below the required life; bounds have joints without a life above and
         below), ``total_lower`` and ``total_upper`` (cover sampling, joints without a life and, if known, the numerical
         error), ``confidence``. No rows without a required life.
@@ -107,20 +105,19 @@ def below(lives: Lives, confidence: float = 0.95) -> pd.DataFrame:
     for place in PLACES if np.isfinite(lives.required) else ():
         rate, level = lives.rate(place), 1.0 / lives.required
         found = asdict(rate.above(level, confidence))
-        low, high = total_interval(rate, _with_error(rate, lives.load_error), level, confidence)
+        low, high = total_interval(_with_error(rate, lives.load_error), level, confidence)
         del found["level"]
         head = {"place": place, "required": lives.required}
         rows.append(head | found | {"total_lower": low, "total_upper": high, "confidence": confidence})
     return pd.DataFrame(rows)
 
 
-def _with_error(rate: SampleLoad, error: float) -> tuple[SampleLoad, SampleLoad] | None:
-    """Rates with equivalent loads reduced and increased by their numerical error; None if it is unknown."""
+def _with_error(rate: Sample, error: float) -> tuple[Sample, ...]:
+    """Rates, and those with equivalent loads reduced and increased by their numerical error if it is known."""
     if np.isnan(error):
-        return None
+        return (rate,)
     factors = (max(0.0, 1.0 - error) ** LIFE_EXPONENT, (1.0 + error) ** LIFE_EXPONENT)
-    low, high = map(rate.scaled, factors)
-    return low, high
+    return rate, *map(rate.scaled, factors)
 
 
 def contacts(view: View, confidence: float = 0.95) -> pd.DataFrame:
@@ -145,8 +142,7 @@ def contacts(view: View, confidence: float = 0.95) -> pd.DataFrame:
         row: dict[str, Any] = {"place": place}
         for name, mode in LOADED.items():
             values = own[:, :, mode].max(axis=1)
-            load = SampleLoad(name, "1", None, np.nan, values, EXACT, view.status, view.weights, view.iid)
-            found = load.above(MOSTLY, confidence)
+            found = Sample.of(values, view.status, view.design).above(MOSTLY, confidence)
             row |= {name: found.estimate, f"{name}_lower": found.lower, f"{name}_upper": found.upper}
         rows.append(row)
     return pd.DataFrame(rows)

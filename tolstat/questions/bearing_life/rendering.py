@@ -10,7 +10,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from tolstat.analysis.exceedance import unresolved_matter
+from tolstat.analysis.binomial import unresolved_matter
 from tolstat.analysis.rating_life import A1
 from tolstat.common.load_kinds import PINS
 from tolstat.display import style, text
@@ -182,7 +182,7 @@ def notes(lives: Lives, contacts: pd.DataFrame) -> list[str]:
         lines.append(f"{lives.unrated} of {lives.valid} joints have no rating: {_unrated(lives, 'each of them')}")
     if lives.load_error > 0.0:
         lines.append(f"numerical error of an equivalent load: {text.percent(lives.load_error)}, in the total interval")
-    if not lives.iid:
+    if not lives.design.has_interval("quantile"):
         lines.append("no intervals: they hold for independent samples only")
     return lines
 
@@ -197,7 +197,7 @@ def curve(lives: Lives) -> Callable[[Axes], None] | None:
     def draw(ax: Axes) -> None:
         x, floor = 1.0 / table["level"], 0.5 / float(table["n"][0])
         shares = {name: table[name].clip(floor, 1.0) for name in ("outer_lower", "estimate", "outer_upper")}
-        if lives.iid:
+        if lives.design.has_interval("quantile"):
             band = shares["outer_lower"], shares["outer_upper"]
             ax.fill_between(x, *band, step="pre", color=style.COLOURS[0], alpha=0.2, lw=0, label="95 % band")
         ax.step(x, shares["estimate"], where="pre", color=style.COLOURS[0])

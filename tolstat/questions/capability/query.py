@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tolstat.analysis import capability, exceedance, extreme
+from tolstat.analysis import binomial, capability, extreme
 from tolstat.analysis.prediction import DELIVERY
+from tolstat.analysis.sample import total_interval
 from tolstat.common.loads import ALL_LIMITS
 from tolstat.common.once import once
 from tolstat.display import text
@@ -43,7 +44,7 @@ def limits(view: View, confidence: float = 0.95, delivery: int = DELIVERY) -> pd
         ``needed``; ``next_lower`` and ``next_upper``, prediction interval for the joints above the limit in the
         delivery. The last row, `ALL_LIMITS`, is for the largest ratio of load to limit of each joint. ``cpk_normal`` is
         NaN where the load has a long tail (`capability.LONGEST_TAIL`), both indices where unresolved joints matter
-        (`analysis.exceedance.unresolved_matter`).
+        (`analysis.binomial.unresolved_matter`).
     """
     import pandas as pd
 
@@ -56,17 +57,17 @@ def limit_rows(view: View, confidence: float = 0.95, delivery: int = DELIVERY) -
     rows = []
     for load in [*view.loads(list(view.limits)), view.load(ALL_LIMITS)]:
         assert load.limit is not None
-        pair = error_budget.shifted(view, load)
-        c = capability.of_sample(load.sample, load.limit, confidence, view.iid)
+        loads = error_budget.with_error(view, load)
+        c = capability.of_sample(load, load.limit, confidence)
         row = {"load": load.name, "unit": load.unit, "limit": load.limit, "n": c.above.n}
         row |= {key: getattr(c.above, key) for key in ("n_failed", "n_unsettled", "count")}
-        low, high = error_budget.total_interval(load, pair, load.limit, confidence)
+        low, high = total_interval(loads, load.limit, confidence)
         row |= {"good": 1.0 - c.above.estimate, "good_lower": 1.0 - high, "good_upper": 1.0 - low}
         row |= {"ppm": 1e6 * c.above.estimate, "ppm_lower": 1e6 * low, "ppm_upper": 1e6 * high}
-        row |= error_budget.delivery(load, pair, load.limit, delivery, confidence)
+        row |= error_budget.delivery(loads, load.limit, delivery, confidence)
         names = [f"{key}{end}" for key in ("cpk", "cpk_normal") for end in ("", "_lower", "_upper")]
         row |= {key: getattr(c, key) for key in (*names, "normal_p", "needed")}
-        if exceedance.unresolved_matter(c.above.count, c.above.n, c.above.n_failed + c.above.n_unsettled):
+        if binomial.unresolved_matter(c.above.count, c.above.n, c.above.n_failed + c.above.n_unsettled):
             row |= dict.fromkeys(names, np.nan)
         rows.append(row)
     return rows
@@ -104,7 +105,7 @@ def returns(view: View, names: Sequence[str], one_in: Sequence[float], confidenc
     rows = []
     for name in names:
         load = view.load(name)
-        tail = extreme.of_sample(load.sample, None, confidence, view.iid)
+        tail = extreme.of_sample(load, None, confidence)
         for number in one_in:
             row: dict[str, object] = {"load": name, "unit": load.unit, "one_in": number}
             row |= tail.level(1.0 / number)._asdict()
@@ -119,5 +120,5 @@ def returns(view: View, names: Sequence[str], one_in: Sequence[float], confidenc
 
 def summary(view: View, confidence: float) -> dict[str, Any]:
     """JSON value: ``capability``, the rows of `limits`; empty without limits and for joints of different weight."""
-    counted = bool(view.limits) and not view.weighted
+    counted = bool(view.limits) and view.design.refuses("index") is None
     return {"capability": text.records(limits(view, confidence)) if counted else []}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
-from tolstat.analysis import exceedance
+from tolstat.analysis.binomial import unresolved_matter
 from tolstat.analysis.prediction import DELIVERY
 from tolstat.common.loads import ALL_LIMITS
 from tolstat.display import text
@@ -80,7 +80,7 @@ def together(rows: Rows) -> Yield:
     if not known:
         low, high = ((valid - above) / n, 1.0 - above / n) if n else (0.0, 1.0)
     counted = f"{valid - above} of {valid}" + (" with a valid load" if unresolved else "")
-    if exceedance.unresolved_matter(above, n, unresolved):
+    if unresolved_matter(above, n, unresolved):
         covers = kind if known else "bounds"
         return Yield(text.span(low, high), f"of the joints {keep} ({counted}; {covers})", high - low < WIDEST)
     interval = f"{kind} {text.span(low, high)}" if known else "no interval"

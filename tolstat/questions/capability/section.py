@@ -21,7 +21,7 @@ ONE_IN = (1e3, 1e4, 1e5)
 
 def sections(view: View, asked: Asked) -> list[Section]:
     """Capability against each limit and all together, and rare loads; for samples of joints of equal weight."""
-    if not (view.sampled and view.count(*VALID)) or view.weighted:
+    if not (view.sampled and view.count(*VALID)) or view.design.refuses("index"):
         return []
     blocks: list[Block] = []
     if view.limits:

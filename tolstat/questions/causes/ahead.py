@@ -51,7 +51,7 @@ def evaluated(view: View, joints: int) -> tuple[NDArray[np.intp], NDArray[np.int
         As `against_angle`.
     """
     view.check_drawn()
-    view.check_sample(allow_weights=False)
+    view.check("index")
     if view.study.groups:
         remedy = 'give the file of a study with sampling.method "random", "sobol" or "lhs"'
         raise StoreError(str(Fault(str(view.path), "holds a pick-freeze design", remedy)))

@@ -121,7 +121,9 @@ def against_angle(
     found = revolutions.read(view.store, np.concatenate([nominal, view.slots(samples)]), loads)
     errors = view.errors(samples, sampling.columns(view.study))
     x = scattering(sampling.components(view.study, errors))
-    return [_of_load(x, found, len(nominal), name, view.iid, name in logarithmic) for name in loads]
+    return [
+        _of_load(x, found, len(nominal), name, view.design.has_interval("index"), name in logarithmic) for name in loads
+    ]
 
 
 def _of_load(

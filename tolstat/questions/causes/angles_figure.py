@@ -10,8 +10,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from tolstat.analysis.exceedance import FloatArray
-from tolstat.common.loads import unit_text
+from tolstat.common.loads import FloatArray, unit_text
 from tolstat.display import style
 from tolstat.display.table import Column
 

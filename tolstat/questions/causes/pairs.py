@@ -13,10 +13,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.analysis.exceedance import FloatArray
 from tolstat.analysis.ranks import ranks
 from tolstat.common.errors import Fault, StoreError
 from tolstat.common.load_kinds import PINS
+from tolstat.common.loads import FloatArray
 from tolstat.common.shown import shown
 from tolstat.joint import HOLE_OF_PIN, perturb
 from tolstat.store import points
@@ -97,7 +97,7 @@ def pairs_of(view: View, by: str) -> Pairs:
     ...     tolstat.pairs_of(store.view(), "fork1.F").name
     """
     view.check_drawn()
-    view.check_sample(allow_weights=False)
+    view.check("index")
     load = view.load(by)
     samples = np.flatnonzero(load.is_valid)[:MOST]
     if samples.size < FEWEST or np.ptp(load.values[samples]) == 0.0:

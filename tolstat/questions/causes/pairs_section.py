@@ -24,7 +24,7 @@ LISTED = 5
 
 def sections(view: View, asked: Asked) -> list[Section]:
     """Section ``pairs`` of the load with the limit exceeded most; none where a single error tells more than a pair."""
-    if not view.sampled or view.weighted or not view.limits or view.study.groups:
+    if not view.sampled or view.design.refuses("index") or not view.limits or view.study.groups:
         return []
     with asked.noting("no pairs of errors"):
         found = pairs_of(view, view.most_exceeded)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from tolstat import sampling
 from tolstat.analysis import overrepresentation, pick_freeze, regression, sensitivity
-from tolstat.analysis.sample_load import SampleLoad
+from tolstat.analysis.sample import Sample
 from tolstat.common.errors import Fault, InputError, StoreError
 from tolstat.common.loads import ALL_LIMITS
 from tolstat.common.shown import shown
@@ -114,7 +114,7 @@ def causes_of(view: View, by: str, confidence: float = 0.95, log: bool = False, 
     ['pin1.offset_t', 'pin2.offset_z']
     """
     view.check_drawn()
-    view.check_sample(allow_weights=False)
+    view.check("index")
     load = view.load(by)
     if view.study.groups:
         return _of_design(view, load, confidence, log)
@@ -123,7 +123,7 @@ def causes_of(view: View, by: str, confidence: float = 0.95, log: bool = False, 
     return _of_samples(view, load, confidence, log)
 
 
-def _of_samples(view: View, load: SampleLoad, confidence: float, log: bool) -> Causes:
+def _of_samples(view: View, load: Sample, confidence: float, log: bool) -> Causes:
     """Causes from joints that are all drawn from the same tolerances."""
     study = view.study
     samples = np.flatnonzero(load.is_valid)
@@ -144,12 +144,12 @@ def _of_samples(view: View, load: SampleLoad, confidence: float, log: bool) -> C
     names, x = list(own), np.column_stack(list(own.values()))
     y = values[:MAX_JOINTS]
     response = np.log(y) if log else y
-    ranks = regression.ranks(x, y, confidence, view.iid)
+    ranks = regression.ranks(x, y, confidence, view.design.has_interval("index"))
     parts: dict[str, NamedTuple] = {"srrc": ranks}
     if study.copula.names or study.sampling.is_matched:
-        first = parts["first"] = sensitivity.first_order(x, response, confidence, view.iid)
+        first = parts["first"] = sensitivity.first_order(x, response, confidence, view.design.has_interval("index"))
     else:
-        first, parts["total"] = sensitivity.first_and_total(x, response, confidence, view.iid)
+        first, parts["total"] = sensitivity.first_and_total(x, response, confidence, view.design.has_interval("index"))
         parts["first"] = first
     level = _tail_level(load)
     above = values > level
@@ -159,7 +159,7 @@ def _of_samples(view: View, load: SampleLoad, confidence: float, log: bool) -> C
         load=load.name,
         joints=samples.size,
         used=len(y),
-        without_load=load.sample.n_unresolved,
+        without_load=sum(load.unresolved),
         level=level,
         above=int(above.sum()),
         unit=load.unit,
@@ -179,15 +179,15 @@ def _over_represented(
     errors = view.errors(samples[chosen], sampling.columns(study))
     scores = sampling.normal_scores(study, errors)
     z = np.column_stack([scores[name] for name in names])
-    return overrepresentation.tail(z, above[chosen], confidence, view.iid)._asdict()
+    return overrepresentation.tail(z, above[chosen], confidence, view.design.has_interval("index"))._asdict()
 
 
-def _of_design(view: View, load: SampleLoad, confidence: float, log: bool) -> Causes:
+def _of_design(view: View, load: Sample, confidence: float, log: bool) -> Causes:
     """Causes from a pick-freeze design: Sobol' indices of groups of errors."""
     path, groups = str(view.path), view.study.groups
     if not view.store.whole:
         raise StoreError(str(Fault(path, "holds a slice of a design", "merge all slices first: tolstat merge")))
-    values = load.valid_or_nan
+    values = load.values
     if log:
         _check_positive(load.name, values[load.is_valid])
         values = np.log(values)
@@ -202,7 +202,7 @@ def _of_design(view: View, load: SampleLoad, confidence: float, log: bool) -> Ca
         load=load.name,
         joints=load.valid.size,
         used=load.valid.size,
-        without_load=load.sample.n_unresolved,
+        without_load=sum(load.unresolved),
         level=level,
         above=int((load.valid > level).sum()),
         unit=load.unit,
@@ -224,7 +224,7 @@ def _check_positive(name: str, values: NDArray[np.float64]) -> None:
         raise InputError([Fault(name, "is not positive in all joints", remedy)])
 
 
-def _tail_level(load: SampleLoad) -> float:
+def _tail_level(load: Sample) -> float:
     return load.quantile(TAIL_STARTS_AT).estimate if load.limit is None else load.limit
 
 

@@ -58,7 +58,7 @@ def _causes(
     causes: list[Causes] = []
     against: list[AgainstAngle] = []
     with asked.noting("causes are left out"):
-        view.check_sample(allow_weights=False)
+        view.check("index")
         jobs = [partial(causes_of, view, load, log=load in logarithmic, joints=JOINTS) for load in view.leading]
         tried = mapped([partial(_tried, job) for job in jobs], min(asked.processes, 2))
         for load, job, found in zip(view.leading, jobs, tried, strict=True):

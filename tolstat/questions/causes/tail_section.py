@@ -9,9 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from matplotlib.axes import Axes
 
-from tolstat.analysis.exceedance import FloatArray
 from tolstat.common.channels import CHANNELS
-from tolstat.common.loads import unit_text
+from tolstat.common.loads import FloatArray, unit_text
 from tolstat.display import drawing, style, text
 from tolstat.display.blocks import Block, Panel, Panels, Section, Table, Text
 from tolstat.questions.causes import angles_figure

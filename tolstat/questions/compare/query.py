@@ -11,8 +11,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from tolstat.analysis import difference
-from tolstat.analysis.exceedance import FloatArray
-from tolstat.analysis.sample_load import SampleLoad
+from tolstat.analysis.design import Claim
+from tolstat.analysis.sample import Sample
 from tolstat.common.counts import Counts
 from tolstat.common.draw_records import DRAWN
 from tolstat.common.errors import Fault, InputError, StoreError
@@ -62,7 +62,7 @@ class Side(NamedTuple):
         counts = Counts.of(self.view.status[self.samples])
         return counts.failed + counts.unsettled
 
-    def load(self, name: str) -> SampleLoad:
+    def load(self, name: str) -> Sample:
         """Load of these joints."""
         load = self.view.load(name)
         return load if len(self.samples) == self.view.n else load.only(self.samples)  # a million joints are not copied
@@ -84,19 +84,19 @@ class Sides(NamedTuple):
     paired: bool
 
     @property
-    def iid(self) -> bool:
-        """Whether the joints of both are independent samples."""
-        return self.a.view.iid and self.b.view.iid
+    def has_intervals(self) -> bool:
+        """Whether differences of shares have intervals."""
+        claim: Claim = "difference" if self.paired else "share"
+        return self.a.view.design.has_interval(claim) and self.b.view.design.has_interval(claim)
 
     @property
     def rows(self) -> NDArray[np.intp]:
         """Row of each joint of A in its campaign, (n,)."""
         return self.a.view.rows(self.a.samples)
 
-    def load(self, name: str) -> tuple[FloatArray, FloatArray, str]:
-        """Load of each joint of A and of B, NaN if not valid, and its unit."""
-        a, b = self.a.load(name), self.b.load(name)
-        return a.valid_or_nan, b.valid_or_nan, a.unit
+    def load(self, name: str) -> tuple[Sample, Sample]:
+        """Load of the joints of A and of B."""
+        return self.a.load(name), self.b.load(name)
 
 
 @shown
@@ -234,30 +234,32 @@ def _names(a: View, b: View, by: Sequence[str], limited: Sequence[str]) -> list[
 
 
 def _share(sides: Sides, name: str, level: float, confidence: float) -> dict[str, object]:
-    a, b, unit = sides.load(name)
-    found = difference.shares(a, b, [level], sides.paired, confidence, sides.iid)
-    values = {key: value if key == "n" else value[0] for key, value in found._asdict().items()}
-    return {"load": name, "unit": unit, "level": level, **values}
+    return _shares(*sides.load(name), level, sides.paired, confidence) | {"load": name, "level": level}
 
 
 def _together(sides: Sides, confidence: float) -> dict[str, object]:
     """Joints above any limit of their own study: one less the yields."""
-    a, b = (side.view.together.only(side.samples).valid_or_nan for side in (sides.a, sides.b))
-    found = difference.shares(a, b, [1.0], sides.paired, confidence, sides.iid)
+    a, b = (side.view.together.only(side.samples) for side in (sides.a, sides.b))
+    return _shares(a, b, 1.0, sides.paired, confidence) | {"load": ALL_LIMITS, "level": 1.0}
+
+
+def _shares(a: Sample, b: Sample, level: float, paired: bool, confidence: float) -> dict[str, object]:
+    found = difference.shares(a, b, [level], paired, confidence)
     values = {key: value if key == "n" else value[0] for key, value in found._asdict().items()}
-    return {"load": ALL_LIMITS, "unit": "1", "level": 1.0, **values}
+    return {"load": "", "unit": a.unit, "level": level, **values}
 
 
 def _load(sides: Sides, name: str, confidence: float) -> list[dict[str, object]]:
-    a, b, unit = sides.load(name)
-    found = {"mean": difference.means(a, b, sides.paired, confidence, sides.iid)}
+    a, b = sides.load(name)
+    found = {"mean": difference.means(a, b, sides.paired, confidence)}
     for share in SHARES:
-        found[f"{100 * share:g} %"] = difference.quantiles(a, b, share, sides.paired, confidence, sides.iid)
-    return [{"load": name, "unit": unit, "statistic": key, **value._asdict()} for key, value in found.items()]
+        found[f"{100 * share:g} %"] = difference.quantiles(a, b, share, sides.paired, confidence)
+    return [{"load": name, "unit": a.unit, "statistic": key, **value._asdict()} for key, value in found.items()]
 
 
 def _switched(sides: Sides, name: str, level: float) -> pd.DataFrame:
-    a, b, unit = sides.load(name)
+    of_a, of_b = sides.load(name)
+    a, b = of_a.values, of_b.values
     here = np.isfinite(a) & np.isfinite(b) & ((a > level) != (b > level))
-    table = pd.DataFrame({"row": sides.rows[here], "load": name, "unit": unit, "level": level})
+    table = pd.DataFrame({"row": sides.rows[here], "load": name, "unit": of_a.unit, "level": level})
     return table.assign(a=a[here], b=b[here])

@@ -15,7 +15,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from tolstat.analysis import difference, exceedance
+from tolstat.analysis import difference
 from tolstat.common.loads import unit_text
 from tolstat.display import style
 from tolstat.display.table import Column, Row
@@ -53,7 +53,7 @@ def note(found: Comparison, a: str, b: str) -> str:
         lines.append(
             f"{unresolved} joints without a valid load: left out; the bounds in the CSV count them below, then above"
         )
-    if not sides.iid:
+    if not sides.has_intervals:
         lines.append("no intervals: they hold for independent samples only")
     return "\n".join(lines)
 
@@ -115,7 +115,7 @@ def figure(found: Comparison, names: tuple[str, str]) -> Figure:
             Line2D([], [], color=c, ls=d) for c, d in zip(style.COLOURS, style.DASHES[:2], strict=False)
         ]
         labels = [f"A: {names[0]}", f"B: {names[1]}"]
-        if found.sides.iid:
+        if found.sides.has_intervals:
             handles.append(Patch(color=style.FAINT, alpha=0.3, lw=0))
             labels.append("95 % band" + (" (below: of pairs)" if found.sides.paired else ""))
         page.subplots_adjust(
@@ -126,26 +126,26 @@ def figure(found: Comparison, names: tuple[str, str]) -> Figure:
 
 
 def _curves(ax: Axes, sides: Sides, name: str) -> None:
-    a, b, _ = sides.load(name)
+    a, b = sides.load(name)
     ax.set_title(name)
-    levels, floor = _levels(a, b), 0.5 / max(len(a), len(b))
-    for values, colour, dash in zip((a, b), style.COLOURS, style.DASHES, strict=False):
-        table = exceedance.curve(values, np.ones(len(values), int), levels, iid=sides.iid)
+    levels, floor = _levels(a.values, b.values), 0.5 / max(a.values.size, b.values.size)
+    for load, colour, dash in zip((a, b), style.COLOURS, style.DASHES, strict=False):
+        table = load.curve(levels)
         ax.step(levels, table["estimate"].clip(0.1 * floor), where="post", color=colour, ls=dash)
-        if sides.iid:
+        if sides.has_intervals:
             _band(ax, levels, table["lower"].clip(0.1 * floor), table["upper"], colour)
     style.share_axis(ax, floor)
 
 
 def _difference(ax: Axes, sides: Sides, name: str) -> None:
-    a, b, unit = sides.load(name)
-    levels = _levels(a, b)
-    found = difference.shares(a, b, levels, sides.paired, iid=sides.iid)
+    a, b = sides.load(name)
+    levels = _levels(a.values, b.values)
+    found = difference.shares(a, b, levels, sides.paired)
     ax.axhline(0.0, color=style.FAINT, lw=1.0)
     ax.step(levels, 100.0 * found.estimate, where="post", color=style.INK)
-    if sides.iid:
+    if sides.has_intervals:
         _band(ax, levels, 100.0 * found.lower, 100.0 * found.upper, style.INK)
-    ax.set_xlabel(f"x [{unit_text(unit)}]" if unit != "1" else "x")
+    ax.set_xlabel(f"x [{unit_text(a.unit)}]" if a.unit != "1" else "x")
 
 
 def _band(

@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from tolstat.analysis import exceedance
+from tolstat.analysis.sample import CURVE
 from tolstat.common.load_kinds import Kind
 from tolstat.common.loads import PANELS, names_of
 from tolstat.display import drawing, style, text
@@ -54,9 +54,7 @@ def panel(ax: Axes, view: View, group: str, kind: Kind, confidence: float = 0.95
     """Draw the curves of the loads of one kind at four bushings: ``cross`` or ``fork``."""
     names = names_of(group, kind)
     tables = [
-        curve(view.load(name), confidence, DRAWN_LEVELS)
-        if name in view.bushing_loads
-        else np.empty(0, exceedance.CURVE)
+        curve(view.load(name), confidence, DRAWN_LEVELS) if name in view.bushing_loads else np.empty(0, CURVE)
         for name in names
     ]
     unit = kind.unit
@@ -74,7 +72,7 @@ def panel(ax: Axes, view: View, group: str, kind: Kind, confidence: float = 0.95
     ax.set_xlim(low, high)
     shown = drawing.loads_axis(ax.xaxis, max(marked, default=high), unit)
     ax.set_xlabel(f"x: largest |{kind.symbol}| over the revolution [{shown}]")
-    floor = 0.5 * min(least(view, table) for table in tables if table.size)
+    floor = 0.5 * min(view.design.smallest(table["n"][0], table["estimate"]) for table in tables if table.size)
     style.share_axis(ax, floor)
     for i, table in enumerate(tables):
         if table.size:
@@ -82,16 +80,10 @@ def panel(ax: Axes, view: View, group: str, kind: Kind, confidence: float = 0.95
             nominal = view.load(names[i]).nominal
             if low <= nominal <= high:
                 style.mark(ax, nominal, 1.0, style.COLOURS[i])
-    if view.has_intervals:
+    if view.design.has_interval("share"):
         ends = [table["outer_upper"][-1] for table in tables if table.size]
         ax.axhline(max(ends), color=style.FAINT, lw=1.1, ls=ZERO_DASH, zorder=1.5)
     limit_lines(ax, marked, unit)
-
-
-def least(view: View, table: NDArray[np.void]) -> float:
-    """Smallest share that a curve shows: that of one joint or, with weights, the smallest positive estimate."""
-    shares = table["estimate"][table["estimate"] > 0]
-    return 1.0 / float(table["n"][0]) if not view.weighted else float(shares.min(initial=1.0))
 
 
 def axis_range(levels: NDArray[np.float64], marked: list[float]) -> tuple[float, float]:
@@ -178,7 +170,7 @@ def _legend(page: Figure, view: View) -> None:
         Line2D([], [], color=c, ls=dash) for c, dash in zip(style.COLOURS, style.DASHES, strict=True)
     ]
     labels = [f"bushing {i}" for i in (1, 2, 3, 4)]
-    if view.has_intervals:
+    if view.design.has_interval("share"):
         handles += [Patch(color=style.FAINT, alpha=0.4, lw=0)]
         handles += [Line2D([], [], color=style.FAINT, lw=1.1, ls=ZERO_DASH)]
         labels += ["95 % band", "upper end where none exceeds x"]

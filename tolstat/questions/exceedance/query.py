@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.analysis import exceedance
-from tolstat.analysis.sample_load import SampleLoad
+from tolstat.analysis.sample import CURVE, Sample, total_interval
 from tolstat.common.loads import ALL_LIMITS, SHOWN_LOADS, load_of, unit_text
 from tolstat.common.once import once
 from tolstat.display import text
@@ -51,12 +50,12 @@ def limits(view: View, confidence: float = 0.95) -> pd.DataFrame:
     -------
     DataFrame
         One row per limit, in the study's order: ``load``, ``unit``, ``nominal``, then the fields of
-        `analysis.exceedance.Exceedance` (``level`` is the limit), then ``confidence``, the error budget, see
+        `analysis.sample.Exceedance` (``level`` is the limit), then ``confidence``, the error budget, see
         `_error_budget`, and ``unsearched_upper``, the upper end whatever the proposals of importance sampling miss.
         Where tolerances are known from measured parts also ``both_lower``, ``both_upper`` and the fields `KNOWN`, see
         `known_share.KnownShare`: with unresolved joints and the numerical error; NaN without support.
         Loads in SI units. Shares and intervals are NaN where weighted joints do not support them, see
-        `SampleLoad.supports`.
+        `Sample.doubt`.
     """
     import pandas as pd
 
@@ -83,21 +82,20 @@ def all_limits(view: View, confidence: float = 0.95) -> dict[str, Any]:
     return _above_limit(view, view.load(ALL_LIMITS), confidence)
 
 
-def _above_limit(view: View, load: SampleLoad, confidence: float) -> dict[str, Any]:
+def _above_limit(view: View, load: Sample, confidence: float) -> dict[str, Any]:
     level = load.limit
     assert level is not None
     head = {"load": load.name, "unit": load.unit, "nominal": load.nominal}
-    ends = error_budget.shifted(view, load)
-    budget = _error_budget(view, load, ends, level, confidence)
+    loads = error_budget.with_error(view, load)
+    budget = _error_budget(view, loads, level, confidence)
     row = {**head, **vars(load.above(level, confidence)), "confidence": confidence, **budget}
-    top = (ends or (load, load))[1]  # the load with its numerical error, where that is known
-    row["unsearched_upper"] = max(one.unsearched(level, confidence) for one in (load, top))
+    row["unsearched_upper"] = max(own.upper_if_missed(level, confidence) for own in (loads[0], loads[-1]))
     parts = known_parts.of(view)
     if parts is not None:
         known = parts.share(load.name, confidence)
         row |= {"both_lower": known.lower, "both_upper": known.upper}
         row |= {name: getattr(known, name) for name in KNOWN}
-    return row if load.supports(level) else row | dict.fromkeys(WITHHELD, np.nan)
+    return row | dict.fromkeys(WITHHELD, np.nan) if load.doubt(level) else row
 
 
 def at_points(view: View) -> pd.DataFrame:
@@ -122,16 +120,14 @@ def point_rows(view: View) -> list[dict[str, Any]]:
         at, plain = view.narrowed(name)
         if len(at.points) > 1:
             loads = {part.points[0]: part.load(plain) for part in at.parts}
-            shares = {p: own.above(level).estimate if own.supports(level) else np.nan for p, own in loads.items()}
+            shares = {p: np.nan if own.doubt(level) else own.above(level).estimate for p, own in loads.items()}
             blank = dict.fromkeys(view.points, np.nan)
             rows.append({"load": name, "unit": load_of(name).unit, "level": level} | blank | shares)
     return rows
 
 
-def _error_budget(
-    view: View, load: SampleLoad, ends: tuple[SampleLoad, SampleLoad] | None, level: float, confidence: float
-) -> dict[str, float]:
-    """Bounds of a share with every load shifted down and up by the numerical error: `ends`, if that is known.
+def _error_budget(view: View, loads: Sequence[Sample], level: float, confidence: float) -> dict[str, float]:
+    """Bounds of a share with every load shifted down and up by the numerical error; `loads` are of `with_error`.
 
     Returns
     -------
@@ -140,11 +136,11 @@ def _error_budget(
         and ``numerical_upper``, the estimates with loads shifted down and up; ``total_lower`` and ``total_upper``,
         their ends ``outer_lower`` and ``outer_upper``: cover numerical error, sampling and unresolved joints.
     """
-    error = error_budget.relative(view, load.name)
-    if ends is None:
+    error = error_budget.relative(view, loads[0].name)
+    if len(loads) == 1:
         return {"numerical_error": error} | dict.fromkeys(ERROR_BUDGET, np.nan)
-    estimates = (end.above(level, confidence).estimate for end in ends)
-    bounds = (*estimates, *error_budget.total_interval(load, ends, level, confidence))
+    estimates = (end.above(level, confidence).estimate for end in loads[1:])
+    bounds = (*estimates, *total_interval(loads, level, confidence))
     return {"numerical_error": error, **dict(zip(ERROR_BUDGET, bounds, strict=True))}
 
 
@@ -154,7 +150,7 @@ def quantiles(view: View, confidence: float = 0.95) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        One row per load and share: ``load``, ``unit``, ``nominal``, the fields of `analysis.quantile.Quantile`,
+        One row per load and share: ``load``, ``unit``, ``nominal``, the fields of `analysis.sample.Quantile`,
         ``confidence``. Loads in SI units.
     """
     import pandas as pd
@@ -187,7 +183,7 @@ def curves(view: View, confidence: float = 0.95) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        ``load``, ``unit``, then the fields of `analysis.exceedance.Exceedance`; SI units, at most
+        ``load``, ``unit``, then the fields of `analysis.sample.Exceedance`; SI units, at most
         `MAX_LEVELS` levels per load.
     """
     import pandas as pd
@@ -197,17 +193,17 @@ def curves(view: View, confidence: float = 0.95) -> pd.DataFrame:
 
 def curve_columns(view: View, confidence: float = 0.95) -> dict[str, list[Any]]:
     """Columns of the table `curves`."""
-    columns: dict[str, list[Any]] = {name: [] for name in ("load", "unit", *(exceedance.CURVE.names or ()))}
+    columns: dict[str, list[Any]] = {name: [] for name in ("load", "unit", *(CURVE.names or ()))}
     for load in view.loads(view.shown_loads):
         table = curve(load, confidence, MAX_LEVELS)
         columns["load"] += [load.name] * len(table)
         columns["unit"] += [load.unit] * len(table)
-        for field in exceedance.CURVE.names or ():
+        for field in CURVE.names or ():
             columns[field] += table[field].tolist()
     return columns
 
 
-def curve(load: SampleLoad, confidence: float, max_levels: int) -> NDArray[np.void]:
+def curve(load: Sample, confidence: float, max_levels: int) -> NDArray[np.void]:
     """Exceedance curve of a load, thinned to `max_levels` levels: denser at the largest loads."""
     levels = np.unique(load.valid)
     if levels.size > max_levels:
@@ -230,7 +226,8 @@ def readings(view: View) -> dict[str, Any]:
         ``outer_upper``, otherwise ``bound_lower``, ``bound_upper``.
     """
     found = {}
-    ends = ("lower", "upper", "outer_lower", "outer_upper") if view.has_intervals else ("bound_lower", "bound_upper")
+    known = view.design.has_interval("share")
+    ends = ("lower", "upper", "outer_lower", "outer_upper") if known else ("bound_lower", "bound_upper")
     for load in view.loads(list(dict.fromkeys((*view.shown_loads, *view.limits)))):
         if not load.valid.size:
             continue

@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
-
 from tolstat.common.tables import VALID, Status
 from tolstat.display import text
 from tolstat.display.table import Column, Row, Rows, has, has_unresolved
@@ -127,34 +125,11 @@ def by_load(quantiles: Rows) -> Rows:
 
 def note(view: View) -> str:
     """Sentence on what the intervals cover."""
-    if view.weighted:
-        text = (
-            "joints counted by their weights; bands: pointwise 95 % Clopper–Pearson intervals of as many equal joints "
-            f"as would be as sure{_distrust(view)}"
-        )
-        if view.aimed:
-            text += (
-                "; intervals hold if the proposals reach every way to the limit, the "
-                "last column, from the joints of the tolerances alone, whatever they miss"
-            )
-    elif view.replicates > 1 or view.lots is not None:
-        text = f"bands: pointwise 95 % intervals of the settled joints, {view.interval_of}"
-    elif view.iid:
-        text = "bands: pointwise 95 % Clopper–Pearson intervals of the settled joints"
-    else:
-        text = "no intervals: Clopper–Pearson holds for independent samples only"
+    doubts = [(name, view.load(name).doubt(level)) for name, level in view.limits.items()]
+    poor = [f"{name} ({doubt})" for name, doubt in doubts if doubt]
+    text = view.design.covers
+    text += f"; no share, needs more joints or other proposals: {', '.join(poor)}" if poor else ""
+    text += f"; {view.design.caveat}" if view.design.caveat else ""
     if view.count(*VALID, Status.PENDING) < view.n:
         text += "; light bands: with the others counted below and above every x"
     return text
-
-
-def _distrust(view: View) -> str:
-    """Words on limits without a share, because few joints have most of the weight above them."""
-    poor = []
-    for name, level in view.limits.items():
-        load = view.load(name)
-        if not load.supports(level):
-            found = load.trust(level)
-            tail = "" if np.isnan(found.k) else f", Pareto k {found.k:.2f}"
-            poor.append(f"{name} ({found.effective:.0f} effective joints above{tail})")
-    return f"; no share, needs more joints or other proposals: {', '.join(poor)}" if poor else ""

@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
-from tolstat.analysis.exceedance import simultaneous
-from tolstat.analysis.sample_load import SampleLoad
+from tolstat.analysis.binomial import simultaneous
+from tolstat.analysis.sample import Sample
 from tolstat.common.load_kinds import Kind
 from tolstat.common.loads import LOADS, PANELS, QUANTITY, load_of, names_of
 from tolstat.common.tables import VALID
@@ -69,7 +69,7 @@ def _beyond(view: View) -> str:
     return f" Its force on the cross is below T/(2 R) = {at_middle}: without errors pins bear at their outer ends."
 
 
-def _described(load: SampleLoad) -> str:
+def _described(load: Sample) -> str:
     half, few = (text.value(load.quantile(share).estimate, load.unit) for share in (0.5, 0.99))
     return f"{load.name}: half of the joints exceed {half}, 1 % {few}"
 
@@ -81,7 +81,7 @@ def _leading_panel(view: View, name: str) -> Panel:
     others = [other for other in others if LOADS[other].kind == LOADS[plain].kind]
     others = [f"{other}{name.removeprefix(plain)}" for other in others]
     switches = [("others", "other bushings, without bands (cross solid, fork dashed)")] if others else []
-    if view.iid and not view.weighted:
+    if view.design.has_interval("band"):
         switches.append(("curve-band", "95 % band for the whole curve (DKW)"))
     return Panel(
         f"leading-{name}",
@@ -94,7 +94,7 @@ def _leading_panel(view: View, name: str) -> Panel:
     )
 
 
-def _leading(ax: Axes, view: View, load: SampleLoad, others: list[str]) -> None:
+def _leading(ax: Axes, view: View, load: Sample, others: list[str]) -> None:
     """One load with its band, limit and nominal joint; other loads as thin lines, and the band for all x, switched."""
     table = query.curve(load, 0.95, curves_figure.DRAWN_LEVELS)
     if not len(table):
@@ -104,12 +104,12 @@ def _leading(ax: Axes, view: View, load: SampleLoad, others: list[str]) -> None:
     thin = {other.name: query.curve(other, 0.95, THIN_LEVELS) for other in known}
     levels = np.concatenate([table["level"], *(own["level"] for own in thin.values())])
     low, high = curves_figure.axis_range(levels, [] if load.limit is None else [load.limit])
-    floor = 0.5 * curves_figure.least(view, table)
+    floor = 0.5 * load.design.smallest(table["n"][0], table["estimate"])
     ax.set_xlim(low, high)
     style.share_axis(ax, floor)
     curves_figure.steps(ax, table, 0, low, floor)
     x = np.concatenate([[low], table["level"][1:]])
-    if view.iid and not view.weighted:
+    if view.design.has_interval("band"):
         half = simultaneous(load.valid.size)
         for end in (table["bound_upper"] + half, table["bound_lower"] - half):
             drawn = ax.step(x, end.clip(1e-3 * floor, 1.0), where="post", color=style.INK, lw=0.9, ls=(0.0, (4.0, 2.0)))
@@ -132,10 +132,9 @@ def _leading(ax: Axes, view: View, load: SampleLoad, others: list[str]) -> None:
 def _quantiles(view: View) -> Table:
     """Quantiles of every load with their intervals, and its tolerance limit."""
     table = rendering.by_load(query.quantile_rows(view))
-    kind = "over lots" if view.lots is not None else "over replicates" if view.replicates > 1 else "of order statistics"
-    title = f"Quantiles with 95 % intervals {kind}, and one-sided tolerance limits (Wilks)"
+    title = f"Quantiles with 95 % intervals {view.design.of_quantiles}, and one-sided tolerance limits (Wilks)"
     columns = rendering.quantile_columns(query.tolerance_limits(view))
-    return as_block(title if view.has_intervals else "Quantiles", columns, table)
+    return as_block(title if view.design.has_interval("quantile") else "Quantiles", columns, table)
 
 
 def _of_sweep(view: View) -> Section:

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tolstat.analysis.exceedance import FloatArray
+from tolstat.common.loads import FloatArray
 from tolstat.common.strict import read_section
 from tolstat.common.tables import ERROR_FIELDS
 from tolstat.common.units import DISPLAY_UNITS

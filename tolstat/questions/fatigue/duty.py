@@ -7,9 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from tolstat.analysis.design import Design
 from tolstat.common.errors import Fault, InputError
-from tolstat.common.tables import ERROR_FIELDS
-from tolstat.store import points, worst
+from tolstat.common.tables import ERROR_FIELDS, worst_status
+from tolstat.store import points
 from tolstat.store.view import View
 
 
@@ -38,7 +39,7 @@ def members(views: Sequence[View], shares: Sequence[float] | None) -> tuple[Sequ
         found = f"{list(shares)} for {len(views)} files"
         raise InputError([Fault("shares", found, "give a positive share for each file; their sum is 1")])
     for view in views:
-        view.check_sample(allow_weights=False)
+        view.check("mean")
         if view is not views[0]:
             _check_same_joints(view, views[0])
     total = sum(shares)
@@ -53,7 +54,12 @@ def described(views: Sequence[View], shares: Sequence[float]) -> tuple[tuple[str
 def status(views: Sequence[View], samples: int | None) -> NDArray[np.uint8]:
     """Status of the first samples, of several operating points that of the point that decides, (n,)."""
     own = [view.status[:samples] for view in views]
-    return np.asarray(np.choose(worst.deciding(own), own))
+    return worst_status(own)
+
+
+def design(view: View, samples: int | None) -> Design:
+    """Design of the first samples."""
+    return view.design if samples is None else view.design.only(np.arange(min(samples, view.n)))
 
 
 def _of_points(views: Sequence[View], shares: Sequence[float] | None) -> tuple[list[View], list[float]]:

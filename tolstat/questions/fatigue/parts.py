@@ -9,11 +9,12 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from tolstat.analysis import prediction, quantile, sorted_loads, strength
+from tolstat.analysis import prediction, strength
 from tolstat.analysis.cycles import FloatArray
 from tolstat.analysis.prediction import DELIVERY
+from tolstat.analysis.sample import Sample
 from tolstat.analysis.strength import Collective, Failures, Line
-from tolstat.common.tables import Status
+from tolstat.common.tables import FAILED, Status
 from tolstat.questions.fatigue.stress import Stressed, Stresses
 from tolstat.study.fatigue import Fatigue
 
@@ -146,16 +147,16 @@ def evaluated(stresses: Stresses, settings: Fatigue) -> list[Evaluated]:
 
 def course_of(stressed: Stressed, points: Sequence[Evaluated]) -> Course:
     """Failures of the joints at some points; joints that are not settled, or never repeat, have no stresses."""
-    failed = sorted_loads.split(np.zeros(stressed.status.size), stressed.status)[1]
     done = stressed.status != Status.PENDING
-    n_failed, n_without = int(failed.sum()), int((done & ~stressed.valid).sum())
-    return Course(points, done, n_failed, n_without - n_failed, stressed.iid)
+    n_failed, n_without = int(np.isin(stressed.status, FAILED).sum()), int((done & ~stressed.valid).sum())
+    return Course(points, done, n_failed, n_without - n_failed, stressed.design.has_interval("mean"))
 
 
 def _damage(stressed: Stressed, p: int, own: Evaluated, nominal: Evaluated) -> dict[str, Any]:
     point = stressed.settings.points[p]
     sums, ideal = strength.damage_at(*own), strength.damage_at(*nominal)
-    ends = [quantile.quantile(sums, stressed.status, share).estimate for share in (0.5, 0.99)]
+    sample = Sample.of(sums, stressed.status, stressed.design)
+    ends = [sample.quantile(share).estimate for share in (0.5, 0.99)]
     return {
         "point": point.name,
         "bushing": point.bushing,

@@ -85,7 +85,7 @@ def notes(stressed: Stressed, failures: pd.DataFrame) -> str:
         lines.insert(1, cycle)
     if (failures["point"] == ANY).any():
         lines.append(f"{ANY}: the joint fails with its first part; strengths of two points are independent")
-    if not stressed.iid:
+    if not stressed.design.has_interval("mean"):
         lines.append("no intervals: they hold for independent samples only")
     if stressed.apart > MAX_APART:
         lines.append(f"joints simulated again differ from the file by up to {stressed.apart:.1g} of a largest load")
@@ -109,7 +109,7 @@ def panel(ax: Axes, stressed: Stressed, failures: pd.DataFrame) -> None:
     first, last = sorted([life, centre if math.isfinite(centre) and centre > 0 else life])
     numbers = np.geomspace(first / 10**DECADES, last * 10**DECADES, POINTS)
     curve = failures_over_life(stressed, numbers.tolist())
-    if stressed.iid:
+    if stressed.design.has_interval("mean"):
         ax.fill_between(
             curve["revolutions"], curve["outer_lower"], curve["outer_upper"], color=style.COLOURS[0], alpha=0.2, lw=0
         )
@@ -119,7 +119,7 @@ def panel(ax: Axes, stressed: Stressed, failures: pd.DataFrame) -> None:
         "service life", (life, 1.0), (4, -2), xycoords=("data", "axes fraction"), textcoords="offset points", va="top"
     )
     ax.set(xscale="log", xlim=(numbers[0], numbers[-1]))
-    ends = curve["outer_upper"] if stressed.iid else curve["estimate"]
+    ends = curve["outer_upper"] if stressed.design.has_interval("mean") else curve["estimate"]
     ax.set_ylim(0.0, min(1.0, 1.1 * float(ends.max())) or 1.0)
     ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.0e}".replace("e+0", "e").replace("e+", "e")))
     ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{100 * value:g} %"))

@@ -9,9 +9,11 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from tolstat.analysis import cycles, damage, exceedance, prediction, quantile, sorted_loads
+from tolstat.analysis import cycles, damage, prediction
 from tolstat.analysis.cycles import Cycles, FloatArray
+from tolstat.analysis.design import Design
 from tolstat.analysis.prediction import DELIVERY
+from tolstat.analysis.sample import Sample
 from tolstat.common.channels import CHANNELS, Channel
 from tolstat.common.load_kinds import PLACES, Kind
 from tolstat.common.loads import PANELS
@@ -42,11 +44,11 @@ class Loading:
     cycles : Cycles
         Cycles of the n samples.
     status : ndarray, shape (n,)
-        `tables.Status`; with several operating points the worst, see `store.worst.deciding`.
+        `tables.Status`; with several operating points the worst, see `tables.worst_status`.
     nominal : Cycles
         Cycles of the nominal joint; no rows if there is none that settled.
-    iid : bool
-        Whether the joints are independent samples.
+    design : Design
+        How the joints were drawn.
     settings : Fatigue
         Section ``[fatigue]`` of the study; of the first study if there are several.
     duty : tuple of (str, float)
@@ -57,7 +59,7 @@ class Loading:
     cycles: Cycles
     status: NDArray[np.uint8]
     nominal: Cycles
-    iid: bool
+    design: Design
     settings: Fatigue
     duty: tuple[tuple[str, float], ...]
 
@@ -111,7 +113,7 @@ def load_cycles(
         cycles=cycles.duty_cycle([own for own, _ in parts], shares),
         status=duty.status(views, samples),
         nominal=cycles.duty_cycle([nominal.rows(rows) for _, nominal in parts], shares),
-        iid=first.iid,
+        design=duty.design(first, samples),
         settings=settings,
         duty=duty.described(views, shares),
     )
@@ -143,7 +145,7 @@ def equivalent_loads(loading: Loading, shares: Sequence[float] = SHARES, confide
     DataFrame
         One row per channel, exponent and share: ``channel``, ``unit``, ``m``, ``nominal``, ``lacking`` (upper bound of
         the relative increase of the sum of S^m by cycles that the file does not hold, maximum over the joints), the
-        fields of `analysis.quantile.Quantile`, ``confidence``. Loads are ranges in SI units.
+        fields of `analysis.sample.Quantile`, ``confidence``. Loads are ranges in SI units.
     """
     settings, rows = loading.settings, []
     for m in settings.exponents:
@@ -153,9 +155,9 @@ def equivalent_loads(loading: Loading, shares: Sequence[float] = SHARES, confide
         for c, channel in enumerate(loading.cycles.channels):
             head = {"channel": channel, "unit": CHANNELS[channel].unit, "m": m, "nominal": _only(nominal[:, c])}
             head["lacking"] = float(lacking[:, c].max(initial=0.0))
-            sample = sorted_loads.sort_out(values[:, c], loading.status)
+            sample = Sample.of(values[:, c], loading.status, loading.design)
             for share in shares:
-                found = quantile.of_sample(sample, share, confidence, loading.iid)
+                found = sample.quantile(share, confidence)
                 rows.append({**head, **found._asdict(), "confidence": confidence})
     return pd.DataFrame(rows)
 
@@ -168,7 +170,7 @@ def damages(loading: Loading, confidence: float = 0.95, delivery: int = DELIVERY
     DataFrame
         One row per channel and, of several, `ANY` for joints with any of these damage sums above 1 (it has no line):
         ``channel``, ``m``, ``S0`` (N or N m), ``N0``, ``nominal`` (damage of the nominal joint), ``median`` (of the
-        joints), the fields of `analysis.exceedance.Exceedance` for the level 1, ``next_lower`` and ``next_upper``
+        joints), the fields of `analysis.sample.Exceedance` for the level 1, ``next_lower`` and ``next_upper``
         (prediction interval for the joints above 1 in the next delivery), ``confidence``.
     """
     rows, worst = [], []
@@ -192,14 +194,10 @@ def damages(loading: Loading, confidence: float = 0.95, delivery: int = DELIVERY
 
 def _above_one(loading: Loading, sums: FloatArray, confidence: float, delivery: int) -> dict[str, object]:
     """Columns of `damages` that follow from the damage sums of the joints."""
-    above = exceedance.exceedance(sums, loading.status, 1.0, confidence, loading.iid)
-    following = (np.nan, np.nan)
-    if loading.iid:
-        least, most = round(above.n * above.bound_lower), round(above.n * above.bound_upper)
-        following = prediction.of_counts(least, most, above.n, delivery, confidence)
-    median = quantile.quantile(sums, loading.status, 0.5).estimate
-    ends = prediction.columns(following, delivery)
-    return {"median": median} | asdict(above) | ends | {"confidence": confidence}
+    sample = Sample.of(sums, loading.status, loading.design)
+    ends = prediction.columns(sample.delivery(1.0, delivery, confidence), delivery)
+    above = asdict(sample.above(1.0, confidence))
+    return {"median": sample.quantile(0.5).estimate} | above | ends | {"confidence": confidence}
 
 
 def spectra(
@@ -223,7 +221,7 @@ def spectra(
     -------
     DataFrame
         One row per channel, share and number: ``channel``, ``unit``, ``cycles`` (in the service life), ``nominal``, the
-        fields of `analysis.quantile.Quantile`, ``confidence``. Ranges in SI units, ascending numbers.
+        fields of `analysis.sample.Quantile`, ``confidence``. Ranges in SI units, ascending numbers.
     """
     rows = []
     for channel in loading.cycles.channels if channels is None else channels:
@@ -231,7 +229,7 @@ def spectra(
         numbers = _numbers(part)
         values = cycles.spectrum(part, numbers)[:, 0]
         nominal = cycles.spectrum(loading.nominal.of(channel), numbers)[:, 0]
-        samples = [sorted_loads.sort_out(own, loading.status) for own in values.T]
+        samples = [Sample.of(own, loading.status, loading.design) for own in values.T]
         for share in shares:
             for number, sample, own in zip(numbers, samples, nominal.T, strict=True):
                 head = {
@@ -239,7 +237,7 @@ def spectra(
                     "unit": CHANNELS[channel].unit,
                     "cycles": number * loading.settings.revolutions,
                 }
-                found = quantile.of_sample(sample, share, confidence, loading.iid)
+                found = sample.quantile(share, confidence)
                 rows.append({**head, "nominal": _only(own), **found._asdict(), "confidence": confidence})
     return pd.DataFrame(rows)
 

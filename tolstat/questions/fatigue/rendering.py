@@ -84,7 +84,7 @@ def notes(loading: Loading, table: pd.DataFrame) -> str:
     ]
     if cycle := duty_sentence(loading.duty):
         lines.append(cycle)
-    if not loading.iid:
+    if not loading.design.has_interval("quantile"):
         lines.append("no intervals: order statistics hold for independent samples only")
     lacking = table["lacking"].max() if len(table) else 0.0
     if lacking > MAX_LACKING:
@@ -118,7 +118,7 @@ def figure(loading: Loading, confidence: float = 0.95) -> Figure:
     channels = leading(equivalent_loads(loading, SHARES[-1:]))
     with style.settings():
         small = f"{_settled(loading)}; in each panel the bushing and direction with the largest equivalent load"
-        if loading.iid:
+        if loading.design.has_interval("quantile"):
             small += f"\nbands: pointwise {100 * confidence:g} % intervals of order statistics"
         page, panels = style.panels(f"{loading.name}: load spectra over the joints", small)
         for group, kind, ax in panels:

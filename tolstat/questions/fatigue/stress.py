@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.analysis.cycles import Cycles, FloatArray, duty_cycle
+from tolstat.analysis.design import Design
 from tolstat.common.channels import BUSHING_LOADS
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.shown import shown
@@ -60,8 +61,8 @@ class Stressed:
         `tables.Status`; with several operating points the first that is not ``OK``.
     nominal : Stresses
         Stresses of the nominal joint; no rows if there is none that settled.
-    iid : bool
-        Whether the joints are independent samples.
+    design : Design
+        How the joints were drawn.
     settings : Fatigue
         Section ``[fatigue]`` of the study; of the first study if there are several.
     total : int
@@ -76,7 +77,7 @@ class Stressed:
     own: Stresses
     status: NDArray[np.uint8]
     nominal: Stresses
-    iid: bool
+    design: Design
     settings: Fatigue
     total: int
     apart: float
@@ -130,9 +131,8 @@ def load_stresses(views: Sequence[View], shares: Sequence[float] | None = None, 
     nominal = [part.rows(slice(min(skips))) for part in parts]  # settled at all operating points, or no row
     own = [_spread(part.rows(slice(skip, None)), settled, status.size) for part, skip in zip(parts, skips, strict=True)]
     cycle = duty.described(views, shares)
-    return Stressed(
-        name, _mixed(own, shares), status, _mixed(nominal, shares), first.iid, settings, first.n, apart, cycle
-    )
+    design = duty.design(first, samples)
+    return Stressed(name, _mixed(own, shares), status, _mixed(nominal, shares), design, settings, first.n, apart, cycle)
 
 
 def stresses_of(store: Reader, slots: NDArray[np.intp], points: Sequence[StressPoint]) -> tuple[Stresses, float]:

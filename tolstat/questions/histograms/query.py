@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.analysis.exceedance import FloatArray
-from tolstat.analysis.sample_load import SampleLoad
+from tolstat.analysis.sample import Sample
+from tolstat.common.loads import FloatArray
 from tolstat.store.view import View
 from tolstat.study.tolerances.entry import SingleEntry
 
@@ -84,7 +84,7 @@ def drawn(view: View) -> list[Drawn]:
         return []
     samples = np.arange(min(view.n, JOINTS))
     table = view.errors(samples, sorted({name for names in found.values() for name in names}))
-    weights = np.ones(len(samples)) if view.weights is None else view.weights[: len(samples)]
+    weights = view.design.each(view.n)[: len(samples)]
     return [
         _drawn(pattern, number, tuple(dict.fromkeys(names)), unit, band, table, weights)
         for (pattern, number, unit, band), names in found.items()
@@ -111,10 +111,9 @@ def _drawn(
     return Drawn(entry, number, errors, unit, band, outside, _counted(values, edges, weights))
 
 
-def of_load(load: SampleLoad) -> Histogram:
+def of_load(load: Sample) -> Histogram:
     """Histogram of a load over its valid joints, counted by weight; bins of equal ratio where it has a long tail."""
-    values = load.values[load.is_valid]
-    weights = np.ones(len(values)) if load.weights is None else load.weights[load.is_valid]
+    values, weights = load.values[load.is_valid], load.counting
     low, high = float(values.min()), float(values.max())
     high = high if high > low else low + max(1e-3 * abs(low), 1e-12)
     edges = np.geomspace(low, high, BINS + 1) if load.long_tailed else np.linspace(low, high, BINS + 1)

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
-from tolstat.analysis.sample_load import SampleLoad
+from tolstat.analysis.sample import Sample
 from tolstat.common.tables import VALID
 from tolstat.common.units import DISPLAY_UNITS
 from tolstat.display import drawing, style, text
@@ -41,10 +41,10 @@ def _note(view: View) -> str:
     said += "its tolerance band."
     if view.n > query.JOINTS:
         said += f" The first {query.JOINTS} joints."
-    return said + (" Joints are counted by their weights." if view.weighted else "")
+    return f"{said} {view.design.counting}".rstrip()
 
 
-def _load_panel(load: SampleLoad) -> Panel:
+def _load_panel(load: Sample) -> Panel:
     median, most = (text.value(load.quantile(share).estimate, load.unit) for share in (0.5, 0.95))
     scale = ", logarithmic" if load.long_tailed else ""
     return Panel(
@@ -56,7 +56,7 @@ def _load_panel(load: SampleLoad) -> Panel:
     )
 
 
-def _load(ax: Axes, load: SampleLoad) -> None:
+def _load(ax: Axes, load: Sample) -> None:
     found = query.of_load(load)
     _bars(ax, found, 100.0)
     low, high = float(found.edges[0]), float(found.edges[-1])

@@ -53,7 +53,7 @@ def their_errors(view: View) -> pd.DataFrame | None:
     """
     import pandas as pd
 
-    if view.weighted or view.study.groups:
+    if view.design.refuses("difference") or view.study.groups:
         return None
     samples = np.flatnonzero(view.status[:MAX_JOINTS] != Status.PENDING)
     bad = np.isin(view.status[samples], (*FAILED, *UNSETTLED))
@@ -61,7 +61,8 @@ def their_errors(view: View) -> pd.DataFrame | None:
         return None
     errors = view.errors(samples)
     scores = {name: own for name, own in sampling.normal_scores(view.study, errors).items() if np.ptp(own) > 0}
-    found = overrepresentation.tail(np.column_stack(list(scores.values())), bad, iid=view.iid)
+    z = np.column_stack(list(scores.values()))
+    found = overrepresentation.tail(z, bad, iid=view.design.has_interval("difference"))
     columns: dict[str, Any] = {"error": list(scores)}
     for key, part in found._asdict().items():
         columns |= {key: part.estimate, f"{key}_lower": part.lower, f"{key}_upper": part.upper, f"{key}_p": part.p}

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from tolstat.analysis import exceedance, lots, prediction
-from tolstat.analysis.lots import Delivery, Law
-from tolstat.analysis.sample_load import SampleLoad
+from tolstat.analysis import clustered, prediction
+from tolstat.analysis.clustered import Clustered, Delivery, Law
+from tolstat.analysis.column import Column
+from tolstat.analysis.design import Design
+from tolstat.analysis.sample import Sample, total_interval
 from tolstat.common.errors import Fault, StoreError
 from tolstat.common.loads import ALL_LIMITS
 from tolstat.common.shown import shown
@@ -99,7 +101,7 @@ def lots_of(
     Raises
     ------
     StoreError
-        When the study has no limits, each joint is its own lot, or fewer than `lots.LEAST` lots have joints done.
+        When the study has no limits, each joint is its own lot, or fewer than `clustered.LEAST` lots have joints done.
 
     Examples
     --------
@@ -109,54 +111,56 @@ def lots_of(
     check(view)
     rows, every, known = [], {}, dict[bytes, Delivery]()
     for own in [*view.loads(list(view.limits)), view.load(ALL_LIMITS)]:
-        every[own.name] = counted(own)
+        every[own.name] = counted(own, own.value)
         rows.append(_row(view, own, known, (delivery, from_lots, accepted, confidence)))
     above, n = every[ALL_LIMITS]
-    assert view.lots is not None
-    done = [part.n > 0 for part in view.load(ALL_LIMITS).of_lots]
-    shares = {"lot": np.unique(view.lots)[done], "n": n} | {name: own[0] for name, own in every.items()}
+    lots = _lots_of(view.design)
+    shares = {"lot": lots.numbers[lots.counts(own.upper, [1.0])[1] > 0], "n": n}
+    shares |= {name: own[0] for name, own in every.items()}
     size = int(view.store.sampling["joints_per_lot"])
-    return Lots(size, pd.DataFrame(rows), pd.DataFrame(shares), lots.law_of(above, n))
+    return Lots(size, pd.DataFrame(rows), pd.DataFrame(shares), clustered.law_of(above, n))
 
 
 def check(view: View) -> None:
     """Raise a StoreError for a file whose lots tell nothing; the hint names what can be used."""
     found, remedy = "", "give the file of a study with [limits], or simulate its lots: tolstat lots STUDY"
-    if view.lots is None:
+    if not isinstance(view.design, Clustered):
         found = "holds joints that are each its own lot"
     elif not view.limits:
         found = "is of a study without [limits]"
     else:
-        done = len(counted(view.load(ALL_LIMITS))[1])
-        if done < lots.LEAST:
-            found = f"has joints of {done} lots simulated, and fewer than {lots.LEAST} have no interval"
+        load = view.load(ALL_LIMITS)
+        done = len(counted(load, load.value)[1])
+        if done < clustered.LEAST:
+            found = f"has joints of {done} lots simulated, and fewer than {clustered.LEAST} have no interval"
             remedy = "simulate the others: run the same command again, or tolstat run STUDY"
     if found:
         raise StoreError(str(Fault(str(view.path), found, remedy)))
 
 
-def counted(
-    load: SampleLoad, which: Literal["count", "least", "most"] = "count"
-) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def counted(load: Sample, x: Column) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Joints above the limit, and joints, of each lot with a joint done.
 
     Parameters
     ----------
-    load : SampleLoad
+    load : Sample
         A load with a limit, of joints that share lots.
-    which : {"count", "least", "most"}
-        Joints with a valid load above the limit; or those without one counted, below or above.
+    x : Column
+        What is compared with the limit: its values, or their lower or upper ends.
     """
-    parts = [part for part in load.of_lots if part.n]
-    each = np.concatenate([exceedance.curve_of(part, [load.limit or 0.0], iid=False) for part in parts])
-    found = each["count"]
-    if which != "count":
-        found = each["bound_lower" if which == "least" else "bound_upper"] * each["n"]
-    return np.rint(found).astype(np.intp), each["n"].astype(np.intp)
+    lots = _lots_of(load.design)
+    levels = [load.limit or 0.0]
+    n = lots.counts(load.upper, levels)[1]
+    return lots.counts(x, levels)[0][n > 0, 0].astype(np.intp), n[n > 0].astype(np.intp)
+
+
+def _lots_of(design: Design) -> Clustered:
+    assert isinstance(design, Clustered)
+    return design
 
 
 def _row(
-    view: View, load: SampleLoad, known: dict[bytes, Delivery], asked: tuple[int, int, float, float]
+    view: View, load: Sample, known: dict[bytes, Delivery], asked: tuple[int, int, float, float]
 ) -> dict[str, object]:
     assert load.limit is not None
     delivery, from_lots, accepted, confidence = asked
@@ -164,19 +168,19 @@ def _row(
     def predicted(counts: tuple[NDArray[np.intp], NDArray[np.intp]]) -> Delivery:
         key = b"".join(own.tobytes() for own in counts)  # equal counts have one prediction
         if key not in known:
-            known[key] = lots.law_of(*counts).delivery(delivery, from_lots)
+            known[key] = clustered.law_of(*counts).delivery(delivery, from_lots)
         return known[key]
 
-    pair = error_budget.shifted(view, load)
+    loads = error_budget.with_error(view, load)
     above = load.above(load.limit, confidence)
-    low, high = error_budget.total_interval(load, pair, load.limit, confidence)
-    count, n = counted(load)
+    low, high = total_interval(loads, load.limit, confidence)
+    count, n = counted(load, load.value)
     share = count / n
-    least = predicted(counted(pair[0] if pair else load, "least"))
-    most = predicted(counted(pair[1] if pair else load, "most"))
+    least = predicted(counted(loads[0], loads[1 % len(loads)].lower))
+    most = predicted(counted(loads[0], loads[-1].upper))
     row: dict[str, object] = {"load": load.name, "unit": load.unit, "limit": load.limit, "lots": len(n)}
     row |= {key: getattr(above, key) for key in ("n", "n_failed", "n_unsettled", "count", "estimate")}
-    row |= {"lower": low, "upper": high, "correlation": float(lots.interval(count, n).correlation)}
+    row |= {"lower": low, "upper": high, "correlation": float(clustered.interval(count, n).correlation)}
     row |= {"without": float(np.mean(count == 0)), "median": float(np.median(share))}
     row |= {"high": float(np.quantile(share, 0.9, method="inverted_cdf")), "worst": float(share.max())}
     row |= prediction.columns((least.ends(confidence)[0], most.ends(confidence)[1]), delivery)
@@ -187,7 +191,7 @@ def summary(view: View, confidence: float) -> dict[str, Any]:
     """JSON value: ``lots``, the rows of the table of `lots_of`; nothing where each joint is its own lot."""
     from tolstat.display import text
 
-    if view.lots is None:
+    if not isinstance(view.design, Clustered):
         return {}
     try:
         return {"lots": text.records(lots_of(view, confidence=confidence).table)}

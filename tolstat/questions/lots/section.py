@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
+from tolstat.analysis.clustered import Clustered
 from tolstat.common.errors import StoreError
 from tolstat.common.tables import VALID
 from tolstat.display import drawing, text
@@ -17,7 +18,7 @@ from tolstat.store.view import View
 
 def sections(view: View, asked: Asked) -> list[Section]:
     """Shares of the lots and the next delivery; for campaigns whose joints share lots."""
-    if view.lots is None or not view.limits or not view.count(*VALID):
+    if not isinstance(view.design, Clustered) or not view.limits or not view.count(*VALID):
         return []
     try:
         found = query.lots_of(view, accepted=asked.accepted)

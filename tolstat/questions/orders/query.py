@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.analysis.sample_load import CONFIDENCE
+from tolstat.analysis.sample import CONFIDENCE
 from tolstat.common.columns import RESULT_COLUMNS
 from tolstat.common.errors import Fault, StoreError
 from tolstat.common.load_kinds import LOAD_KINDS, SHAFTS
@@ -170,7 +170,7 @@ def _near(view: View, name: str) -> dict[str, int]:
     load = view.load(name)
     found = {"nominal": int(view.nominal_slots[0])} if view.nominal_slots.size else {}
     for near, share in NEAR.items():
-        apart = np.abs(load.valid_or_nan - load.quantile(share).estimate)
+        apart = np.abs(load.values - load.quantile(share).estimate)
         if np.isfinite(apart).any():
             found[near] = int(view.slots(np.nanargmin(apart)))
     return found

@@ -19,8 +19,7 @@ import numpy as np
 
 from tolstat import sampling
 from tolstat.analysis import prediction
-from tolstat.analysis.exceedance import FloatArray
-from tolstat.analysis.sorted_loads import split
+from tolstat.analysis.sample import is_valid
 from tolstat.analysis.subset import Candidates, Estimate, Level, Settings, Walk
 from tolstat.campaign import run as campaign
 from tolstat.campaign.blocks import Execution
@@ -28,7 +27,7 @@ from tolstat.campaign.extend import grow
 from tolstat.campaign.pool import kept_workers
 from tolstat.common.draw_records import SUBSET
 from tolstat.common.errors import Fault, StoreError
-from tolstat.common.loads import Limit
+from tolstat.common.loads import FloatArray, Limit
 from tolstat.common.shown import shown
 from tolstat.display.progress import Reporter, note
 from tolstat.questions.rare import numerical
@@ -363,6 +362,6 @@ def _loads(plan: Study, settings: Subset, out: Path, stage: range, joints: Candi
         found = f"rows {stage.start}:{stage.stop} do not follow from the loads before them"
         raise StoreError(str(Fault(str(out), found, "run the study again into another file (--out)")))
     loads = settings.limit.of(results).copy()
-    valid = split(loads, results["status"])[0]
+    valid = is_valid(loads, results["status"])
     loads[~valid] = math.inf if settings.unresolved == "above" else -math.inf
     return loads, int(np.count_nonzero(~valid))

@@ -15,11 +15,12 @@ from numpy.typing import NDArray
 
 from tolstat import sampling
 from tolstat.analysis import prediction, reweight
-from tolstat.analysis.exceedance import FloatArray
 from tolstat.analysis.prediction import DELIVERY
 from tolstat.analysis.reweight import Ratios
-from tolstat.analysis.sample_load import SampleLoad
+from tolstat.analysis.sample import Sample
+from tolstat.analysis.weighted import Weighted
 from tolstat.common.errors import Fault, InputError, StoreError
+from tolstat.common.loads import FloatArray
 from tolstat.common.shown import shown
 from tolstat.common.tables import Status
 from tolstat.store import error_budget
@@ -139,7 +140,7 @@ def reweighted(view: View, settings: Sequence[str], confidence: float = 0.95, de
     (True, 'cross1.F', True)
     """
     view.check_drawn()
-    view.check_sample()
+    view.check("share")
     old = view.study.tolerances
     new = changed(view.study, settings)
     names = [name for name in new if new[name].describe() != old[name].describe()]
@@ -172,8 +173,9 @@ def _ratios(view: View, new: Mapping[str, Distribution], names: Sequence[str], d
     if correlated:
         own = _mean_square_of_correlated(study, new, correlated)
         square, open_square, largest = square + own, open_square + own, np.inf
-    if view.weights is not None:  # the tolerances have at least the share 1 / heaviest of the mixture drawn from
-        square, largest = square + np.log(view.store.heaviest), largest + np.log(view.store.heaviest)
+    if isinstance(view.design, Weighted):
+        # the tolerances have at least the share 1 / heaviest of the mixture drawn from
+        square, largest = square + np.log(view.design.heaviest), largest + np.log(view.design.heaviest)
     return Ratios(values, float(square), float(open_square), float(np.exp(largest)))
 
 
@@ -210,7 +212,7 @@ def _log_ratios(view: View, new: Mapping[str, Distribution], names: Sequence[str
     columns = [column for name in dict.fromkeys((*names, *study.copula.names)) for column in columns_of(name)]
     blocks = view.error_blocks(columns)  # the errors of a million joints would be half a gigabyte
     logs = np.concatenate([_block_log_ratios(study, new, names, errors) for errors in blocks])
-    return logs if view.weights is None else logs + np.log(view.weights)
+    return logs + np.log(view.design.each(view.n))
 
 
 def _block_log_ratios(
@@ -232,16 +234,14 @@ def _block_log_ratios(
 
 
 def _share_above(
-    view: View, load: SampleLoad, done: NDArray[np.intp], ratios: Ratios, confidence: float, delivery: int
+    view: View, load: Sample, done: NDArray[np.intp], ratios: Ratios, confidence: float, delivery: int
 ) -> dict[str, Any]:
     """Row of the table for a limit; `ratios` are those of the joints `done`."""
     assert load.limit is not None
     level, known = load.limit, error_budget.near(view, load)
 
-    def share(load: SampleLoad, confidence: float) -> reweight.Share:
-        own = load.only(done)
-        sample = reweight.sort_out(own.values, own.status, ratios)
-        return reweight.share_above(sample, ratios, level, confidence, own.iid)
+    def share(load: Sample, confidence: float) -> reweight.Share:
+        return reweight.share_above(load.only(done), ratios, level, confidence)
 
     def widest(confidence: float) -> tuple[float, float]:
         """Ends of the interval; with the numerical error where that is known."""
@@ -259,9 +259,8 @@ def _share_above(
     return row | {"ess": found.ess} | found.support._asdict()
 
 
-def _quantile(load: SampleLoad, ratios: Ratios, share: float, confidence: float) -> dict[str, Any]:
+def _quantile(load: Sample, ratios: Ratios, share: float, confidence: float) -> dict[str, Any]:
     """Row of the table for a quantile; `ratios` are those of the joints of `load`."""
-    sample = reweight.sort_out(load.values, load.status, ratios)
-    found = reweight.quantile(sample, ratios, share, confidence, load.iid)
+    found = reweight.quantile(load, ratios, share, confidence)
     before = load.quantile(share, confidence).estimate
     return {"load": load.name, "unit": load.unit, "share": share, "before": before, **found._asdict()}

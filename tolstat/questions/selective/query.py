@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
+from tolstat.analysis.sample import total_interval
 from tolstat.common.errors import Fault, InputError, StoreError
 from tolstat.common.loads import ALL_LIMITS
 from tolstat.common.shown import shown
@@ -94,13 +95,13 @@ def assembled(views: Sequence[View], confidence: float = 0.95) -> Assembled:
 
 
 def _row(view: View, confidence: float) -> dict[str, Any]:
-    view.check_sample(allow_weights=False)
+    view.check("mean")
     if not view.limits:
         remedy = "add [limits] to the study, and run the same command again"
         raise StoreError(str(Fault(str(view.path), "is of a study without [limits]", remedy)))
     classes, own = classes_of(view), view.load(ALL_LIMITS)
     above = own.above(1.0, confidence)
-    low, high = error_budget.total_interval(own, error_budget.shifted(view, own), 1.0, confidence)
+    low, high = total_interval(error_budget.with_error(view, own), 1.0, confidence)
     unmatched = 0.0 if classes is None else classes.unmatched
     row: dict[str, Any] = {"classes": 1 if classes is None else classes.matched.size, "unmatched": unmatched}
     row |= {"clearance": _clearance(view)}

@@ -10,10 +10,10 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from tolstat.analysis.exceedance import FloatArray
-from tolstat.analysis.sample_load import SampleLoad
+from tolstat.analysis.sample import Sample, total_interval
+from tolstat.analysis.weighted import Weighted
 from tolstat.common.errors import Fault, StoreError
-from tolstat.common.loads import ALL_LIMITS
+from tolstat.common.loads import ALL_LIMITS, FloatArray
 from tolstat.common.shown import shown
 from tolstat.store import error_budget
 from tolstat.store.view import View
@@ -87,11 +87,11 @@ def sorted_joints(view: View, cost_file: Path | None = None, confidence: float =
     if not (scrap or study.rejects) or not view.limits:
         remedy = "give an entry of [tolerances] a gauge, or add [reject]; and [limits]"
         raise StoreError(str(Fault(str(view.path), "is of a study that sorts nothing, or has no limits", remedy)))
-    if not (view.iid and view.sampled):
+    if not view.design.has_interval("reweighting"):
         remedy = 'write sampling.method = "random"'
         raise StoreError(str(Fault(str(view.path), "holds joints that are not independent", remedy)))
     of_part = {part: _accepted(view, [own for own in scrap if own.part == part]) for part in PARTS}
-    base = np.ones(view.n) if view.weights is None else view.weights
+    base = view.design.each(view.n)
     used = {part: float(np.average(kept, weights=base)) for part, kept in of_part.items()}
     price = _prices(study, costs.of(scaling.tolerances(study), cost_file))
     parts = pd.DataFrame(
@@ -133,21 +133,15 @@ def _prices(study: Study, prices: Sequence[Cost]) -> dict[str, float]:
     return found
 
 
-def _row(view: View, load: SampleLoad, stage: _Stage, confidence: float) -> dict[str, object]:
+def _row(view: View, load: Sample, stage: _Stage, confidence: float) -> dict[str, object]:
     assert load.limit is not None
-    own = load if stage.name == MADE else _kept(view, load, stage.kept)
-    ends = error_budget.shifted(view, load)
-    if ends is not None and stage.name != MADE:
-        ends = (_kept(view, ends[0], stage.kept), _kept(view, ends[1], stage.kept))
-    share = own.above(load.limit, confidence).estimate
-    lower, upper = error_budget.total_interval(own, ends, load.limit, confidence)
+    loads = error_budget.with_error(view, load)
+    if stage.name != MADE:  # each joint counts by its probability to be kept
+        base = load.design if isinstance(load.design, Weighted) else Weighted(np.ones(view.n), 1.0)
+        design = base.times(stage.kept)
+        loads = tuple(replace(own, design=design) for own in loads)
+    share = loads[0].above(load.limit, confidence).estimate
+    lower, upper = total_interval(loads, load.limit, confidence)
     row = {"stage": stage.name, "load": load.name, "unit": load.unit, "level": load.limit, "estimate": share}
     row |= {"lower": lower, "upper": upper, "rejected": stage.rejected, "cost": stage.cost}
     return row | {"cost_good": stage.cost / (1.0 - share) if share < 1.0 else np.inf}
-
-
-def _kept(view: View, load: SampleLoad, kept: FloatArray) -> SampleLoad:
-    """Return a load of the same joints, each counted by its probability to be kept."""
-    base = np.ones(view.n) if load.weights is None else load.weights
-    mean = float(np.average(kept, weights=base))
-    return replace(load, weights=base * kept / mean, heaviest=view.store.heaviest / mean, drawn=None)

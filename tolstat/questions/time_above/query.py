@@ -10,10 +10,12 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from tolstat.analysis import cycles, exceedance, quantile, sorted_loads
-from tolstat.analysis.exceedance import FloatArray
+from tolstat.analysis import binomial, cycles
+from tolstat.analysis.design import Design
+from tolstat.analysis.sample import Sample
 from tolstat.common.channels import CHANNELS, histories_of
 from tolstat.common.errors import Fault, InputError, StoreError, gather
+from tolstat.common.loads import FloatArray
 from tolstat.common.shown import shown
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import Status
@@ -87,17 +89,18 @@ def time_above(
     StoreError
         When the file holds no histories, joints that are no sample of a production, or no settled joint.
     """
-    view.check_sample(allow_weights=False)
+    view.check("mean")
     asked = _levels(view, by, levels)
     settled = np.flatnonzero(view.status == Status.OK)
     if not settled.size:
         raise StoreError(str(Fault(str(view.path), "has no settled joint", "resume the campaign")))
     shares, ends = _shares(view, settled, asked)
-    rows = list(_rows(asked, shares, view.iid, confidence))
+    design = view.design.only(settled)
+    rows = list(_rows(asked, shares, design, confidence))
     more: list[dict[str, Any]] = []
     if curves:
         spread = {name: np.linspace(*ends[name], POINTS) for name in asked}
-        more = list(_rows(spread, _shares(view, settled, spread)[0], view.iid, confidence))
+        more = list(_rows(spread, _shares(view, settled, spread)[0], design, confidence))
     left_out = view.counts.done - settled.size
     return TimeAbove(view.name, settled.size, left_out, pd.DataFrame(rows), pd.DataFrame(more))
 
@@ -157,20 +160,21 @@ def _shares(
 
 
 def _rows(
-    levels: Mapping[str, FloatArray], shares: Mapping[str, FloatArray], iid: bool, confidence: float
+    levels: Mapping[str, FloatArray], shares: Mapping[str, FloatArray], design: Design, confidence: float
 ) -> Iterator[dict[str, Any]]:
     """One row per load and level, as in `TimeAbove`."""
     for name, own in levels.items():
         for level, time in zip(own, shares[name].T, strict=True):
-            sample = sorted_loads.sort_out(time, np.full(time.size, int(Status.OK)))
-            above = exceedance.curve_of(sample, [0.0], confidence, iid)[0]
+            sample = Sample.of(time, np.full(time.size, Status.OK), design)
+            above = sample.above(0.0, confidence)
             row = {"load": name, "unit": CHANNELS[name].unit, "level": float(level)}
-            row |= _ends("joints_above", *(float(above[name]) for name in ("estimate", "lower", "upper")))
+            row |= _ends("joints_above", above.estimate, above.lower, above.upper)
             # a variable in [0, 1] has at most the variance of a Bernoulli variable with the same mean
-            mean = exceedance.clopper_pearson(time.sum(), time.size, confidence) if iid else (np.nan, np.nan)
+            known = design.has_interval("mean")
+            mean = binomial.clopper_pearson(time.sum(), time.size, confidence) if known else (np.nan, np.nan)
             row |= _ends("time", float(time.mean()), *map(float, mean))
             for share in SHARES:
-                q = quantile.of_sample(sample, share, confidence, iid)
+                q = sample.quantile(share, confidence)
                 lower, upper = np.clip([q.lower, q.upper], 0.0, 1.0)
                 row |= _ends(f"time_{100 * share:g}", q.estimate, lower, upper)
             yield row

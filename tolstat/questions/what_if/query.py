@@ -8,15 +8,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
-from tolstat.analysis import difference, exceedance, pick_freeze
-from tolstat.analysis.exceedance import FloatArray
-from tolstat.analysis.sample_load import SampleLoad
+from tolstat.analysis import difference, pick_freeze
+from tolstat.analysis.sample import Sample
 from tolstat.campaign import what_if as sets
 from tolstat.campaign.what_if import EXCHANGE, WIDTH
 from tolstat.common.errors import Fault, InputError, StoreError
-from tolstat.common.loads import ALL_LIMITS
+from tolstat.common.loads import ALL_LIMITS, FloatArray
 from tolstat.common.shown import shown
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import Status
@@ -142,7 +140,7 @@ def what_if(view: View, by: str, confidence: float = 0.95) -> WhatIf | None:
         return None
     order = _order(table)
     table = table.sort_values(["line", "step"], key=lambda c: c.map(order | _STEPS), kind="stable", ignore_index=True)
-    above = exceedance.exceedance(base, _states(base), level, confidence)
+    above = _sample(base).above(level, confidence)
     return WhatIf(
         load=by,
         unit=load.unit,
@@ -169,7 +167,7 @@ def check(view: View) -> None:
         The hint names what can be used.
     """
     view.check_drawn()
-    view.check_sample(allow_weights=False)
+    view.check("difference")
     if view.study.groups:
         remedy = 'give the file of a study with sampling.method "random", "sobol" or "lhs"'
         raise StoreError(str(Fault(str(view.path), "holds a pick-freeze design", remedy)))
@@ -191,14 +189,14 @@ def measure(view: View, load: str) -> Measure:
     return Measure(((names_at_points(view, load), 1.0),))
 
 
-def level_of(load: SampleLoad) -> float:
+def level_of(load: Sample) -> float:
     """Limit of a load; without one, the 90 % quantile of the joints."""
     return load.quantile(TAIL_STARTS_AT).estimate if load.limit is None else load.limit
 
 
 def own_joints(view: View) -> int:
     """Number of samples of the campaign, from the first, that serve as joints as drawn: none of them pending."""
-    if view.method != "random" or not view.iid:
+    if not view.design.has_interval("difference"):
         return 0
     waiting = np.flatnonzero(view.status == Status.PENDING)
     return int(waiting[0]) if waiting.size else view.n
@@ -207,7 +205,7 @@ def own_joints(view: View) -> int:
 def as_drawn(view: View, load: str, held: Mapping[str, Altered]) -> FloatArray:
     """Load of the joints as drawn, from sample 0 on, NaN without a valid one, (n,): the campaign's, then fresh ones."""
     own = own_joints(view)
-    values = view.load(load).valid_or_nan[:own]
+    values = view.load(load).values[:own]
     more, how = held.get(kept.key(sets.as_drawn(view.study).about)), measure(view, load)
     if more is None or not how.held(more) or not more.first <= own < more.end:
         return values
@@ -237,7 +235,7 @@ def is_settled(values: list[FloatArray], base: FloatArray, level: float, confide
     drawn = float(np.mean(base[:n] > level))
     own = 1.0 - (1.0 - confidence) / (len(values) - 1)
     for one, other in pairwise(ranked):
-        found = difference.shares(one[:n], other[:n], [level], paired=True, confidence=own)
+        found = difference.shares(_sample(one[:n]), _sample(other[:n]), [level], paired=True, confidence=own)
         low, high = float(found.lower[0]), float(found.upper[0])
         if low <= 0.0 <= high and max(-low, high) > NEGLIGIBLE * drawn:
             return False
@@ -273,9 +271,8 @@ def _row(
     values = load.of(one)[:n]
     if not np.isfinite(values).any() or not np.isfinite(values + base[:n]).any():
         return None
-    drawn = exceedance.exceedance(base, _states(base), level, confidence)
-    own = exceedance.exceedance(values, _states(values), level, confidence)
-    pair = difference.shares(base[:n], values, [level], paired=True, confidence=confidence)
+    drawn, own = (_sample(loads).above(level, confidence) for loads in (base, values))
+    pair = difference.shares(_sample(base[:n]), _sample(values), [level], paired=True, confidence=confidence)
     factors = {own["factor"] for own in one.about["tolerances"].values()}
     factor = factors.pop() if len(factors) == 1 else np.nan
     change = float(pair.estimate[0]), float(pair.outer_lower[0]), float(pair.outer_upper[0])
@@ -311,13 +308,13 @@ def _moved(drawn: Ends, change: Ends) -> Ends:
     return tuple(float(np.clip(value, 0.0, 1.0)) for value in found)  # type: ignore[return-value]
 
 
-def _states(values: FloatArray) -> NDArray[np.uint8]:
-    """Status of joints: valid, or failed where they have no valid load."""
-    return np.where(np.isfinite(values), Status.OK, Status.NEWTON_FAILED).astype(np.uint8)
+def _sample(values: FloatArray) -> Sample:
+    """Sample of loads; joints without one have failed."""
+    return Sample.of(values, np.full(values.size, Status.OK))
 
 
 def _indices(
-    view: View, base: FloatArray, load: SampleLoad, level: float, confidence: float, order: list[str]
+    view: View, base: FloatArray, load: Sample, level: float, confidence: float, order: list[str]
 ) -> pd.DataFrame:
     own = measure(view, load.name)
     held = {one.about["label"]: one for one in view.altered.values() if one.about["kind"] == EXCHANGE}

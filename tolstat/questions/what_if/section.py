@@ -20,7 +20,8 @@ def sections(view: View, asked: Asked) -> list[Section]:
 
     Where the file holds no joints with other widths, it says which command simulates them.
     """
-    if not (view.sampled and view.limits and view.count(*VALID)) or view.weighted or not view.store.whole:
+    applies = view.sampled and view.limits and view.store.whole and view.count(*VALID)
+    if not applies or view.design.refuses("difference"):
         return []
     with asked.noting("nothing on the lines of the drawing"):
         found = query.what_if(view, view.decisive)

@@ -8,17 +8,16 @@ the beta-binomial law, too.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from tolstat.analysis import exceedance, prediction
-from tolstat.analysis.exceedance import FloatArray, Table
-from tolstat.analysis.quantile import Quantile
-from tolstat.analysis.quantile import of_sample as quantile_of_sample
-from tolstat.analysis.sorted_loads import Sample
+from tolstat.analysis import prediction
+from tolstat.analysis.binomial import clopper_pearson
+from tolstat.analysis.column import Column
+from tolstat.analysis.design import Design, Shares, counts_by_group
+from tolstat.common.loads import FloatArray
 
 LEAST = 30
 """Number of lots from which on intervals over lots hold; with fewer there are none."""
@@ -27,8 +26,6 @@ FEW = 20
 number below which it contains that of the beta-binomial law."""
 STEP = 0.2
 """Distance of the mean shares, on the logit scale, at which the posterior density of that law is computed."""
-MOST_LEVELS = 2000
-"""Number of loads at which the interval of a quantile is looked for; its ends are rounded outwards to one of these."""
 GRID, REACH = 33, 5.0
 """Points of each parameter of the posterior distribution, and its half width in standard errors of the mean share."""
 SPREADS = np.linspace(-8.0, 5.0, GRID)
@@ -37,7 +34,7 @@ NEGLIGIBLE = 1e-5
 """Posterior probability below which a point of the grid is left out."""
 
 
-class Shares(NamedTuple):
+class LotShares(NamedTuple):
     """Shares of lots.
 
     Attributes
@@ -58,7 +55,7 @@ class Shares(NamedTuple):
     n: int
 
 
-def interval(above: ArrayLike, joints: ArrayLike, confidence: float = 0.95) -> Shares:
+def interval(above: ArrayLike, joints: ArrayLike, confidence: float = 0.95) -> LotShares:
     """Student's t interval of the share of the joints, on its logit, from lots.
 
     Parameters
@@ -72,7 +69,7 @@ def interval(above: ArrayLike, joints: ArrayLike, confidence: float = 0.95) -> S
 
     Returns
     -------
-    Shares
+    LotShares
         Where no joint is above a limit, or each, the share of lots with such a joint bounds that of the joints: its end
         is Clopper and Pearson's for lots. Where the joints on a side of the limit, (sum of k)² / sum of k² over the
         lots, are effectively fewer than `FEW`, the interval contains `_credible`, too. NaN for fewer than `LEAST` lots.
@@ -88,7 +85,7 @@ def interval(above: ArrayLike, joints: ArrayLike, confidence: float = 0.95) -> S
         between = ((k - p * n) ** 2).sum(axis=0) * lots / (lots - 1.0)
         half = stdtrit(lots - 1, 0.5 * (1.0 + confidence)) * np.sqrt(between) / total / (p * (1.0 - p))
         lower, upper = np.asarray(expit(logit(p) - half)), np.asarray(expit(logit(p) + half))
-        none = float(exceedance.clopper_pearson(0, lots, confidence)[1])
+        none = float(clopper_pearson(0, lots, confidence)[1])
         sides = np.stack([k, n - k])
         effective = (sides.sum(axis=1) ** 2 / (sides**2).sum(axis=1)).min(axis=0)
         few = (p > 0.0) & (p < 1.0) & (effective < FEW)
@@ -104,7 +101,7 @@ def interval(above: ArrayLike, joints: ArrayLike, confidence: float = 0.95) -> S
         correlation = (outside - inside) / (outside + (size - 1.0) * inside)
     if lots < LEAST:
         lower, upper = np.full_like(p, np.nan), np.full_like(p, np.nan)
-    return Shares(p, lower, upper, correlation, lots)
+    return LotShares(p, lower, upper, correlation, lots)
 
 
 def _credible(k: FloatArray, n: FloatArray, confidence: float) -> tuple[FloatArray, FloatArray]:
@@ -129,59 +126,57 @@ def _credible(k: FloatArray, n: FloatArray, confidence: float) -> tuple[FloatArr
     return expit(ends[:, 0]), expit(ends[:, 1])
 
 
-def curve_of(
-    whole: Sample, parts: Sequence[Sample], levels: ArrayLike | None = None, confidence: float = 0.95
-) -> Table:
-    """Share of the joints above each of many levels, with intervals over lots.
+class Clustered(Design):
+    """Joints of lots, which share the errors of their lot.
 
     Parameters
     ----------
-    whole : Sample
-        A load of all joints.
-    parts : sequence of Sample
-        The same load of the joints of each lot.
-    levels, confidence
-        As in `exceedance.curve`.
+    lots : ndarray of int, shape (n,)
+        Number of the lot of each joint in the campaign.
 
-    Returns
-    -------
-    ndarray of exceedance.CURVE, shape (m,)
-        As from `exceedance.curve`. With fewer than `FEW` joints on a side of a level an interval contains that of as
-        many independent joints (Clopper and Pearson), too. NaN for fewer than `LEAST` lots.
+    Attributes
+    ----------
+    numbers : ndarray of int, shape (lots,)
+        The lots, ascending.
     """
-    table = exceedance.curve_of(whole, levels, confidence)
-    parts = [part for part in parts if part.n]
-    each = [exceedance.curve_of(part, table["level"], confidence, iid=False) for part in parts]
-    n, valid = np.array([part.n for part in parts]), np.array([part.valid.size for part in parts])
-    shape = (len(parts), len(table))
-    counted = {"estimate": (np.reshape([own["count"] for own in each], shape)[valid > 0], valid[valid > 0])}
-    if (valid < n).any():
-        for name in ("bound_lower", "bound_upper"):
-            counted[name] = ((np.reshape([own[name] for own in each], shape) * n[:, None]).round(), n)
-    shares = {name: interval(above, joints, confidence) for name, (above, joints) in counted.items()}
-    ends = {"estimate": ("lower", "upper"), "bound_lower": ("outer_lower", ""), "bound_upper": ("", "outer_upper")}
-    for name, (low, high) in ends.items():
-        own = name if name in counted else "estimate"
-        (above, joints), found = counted[own], shares[own]
-        total = above.sum(axis=0)
-        few = np.minimum(total, joints.sum() - total) < FEW
-        for end, value, outermost in ((low, found.lower, np.minimum), (high, found.upper, np.maximum)):
-            if end:
-                table[end] = np.where(few, outermost(value, table[end]), value)
-    return table
 
+    claims = frozenset(("share", "quantile"))
+    interval = "Student's t over lots, on the logit"
+    covers = f"bands: pointwise 95 % intervals of the settled joints, {interval}"
+    of_quantiles = "over lots"
+    ranks_at_once = 2000
 
-def quantile_of(whole: Sample, parts: Sequence[Sample], share: float, confidence: float = 0.95) -> Quantile:
-    """Load that a share of the joints stays at or below; its interval inverts that of `curve_of`."""
-    found = quantile_of_sample(whole, share, confidence, iid=False)
-    loads = np.unique(whole.valid)
-    if loads.size == 0 or sum(part.n > 0 for part in parts) < LEAST:
-        return found
-    loads = loads[np.unique(np.append(np.arange(0, loads.size, -(-loads.size // MOST_LEVELS)), loads.size - 1))]
-    table = curve_of(whole, parts, np.concatenate([[np.nextafter(loads[0], -np.inf)], loads]), confidence)
-    above, below = np.flatnonzero(table["upper"][1:] <= 1.0 - share), np.flatnonzero(table["lower"][:-1] >= 1.0 - share)
-    upper = float(loads[above[0]]) if above.size else np.inf
-    return found._replace(lower=float(loads[below[-1]]) if below.size else -np.inf, upper=upper)
+    def __init__(self, lots: NDArray[np.intp]) -> None:
+        self.numbers, self._lots = np.unique(lots, return_inverse=True)
+
+    def shares(self, x: Column, levels: FloatArray, confidence: float) -> Shares:
+        """See `Design.shares`: `interval` over the lots; none for fewer than `LEAST` lots.
+
+        With fewer than `FEW` joints on a side of a level it contains the interval of as many independent joints
+        (Clopper and Pearson), too.
+        """
+        above, joints = self.counts(x, levels)
+        above, joints = above[joints > 0], joints[joints > 0]
+        if not joints.size:
+            return Shares.counted(x, levels)
+        found = interval(above, joints, confidence)
+        count = above.sum(axis=0)
+        low, high = clopper_pearson(count, x.n, confidence)
+        few = np.minimum(count, x.n - count) < FEW
+        lower, upper = np.minimum(found.lower, low), np.maximum(found.upper, high)
+        return Shares(found.estimate, np.where(few, lower, found.lower), np.where(few, upper, found.upper))
+
+    def counts(self, x: Column, levels: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """Joints above each level, (lots, m), and joints that count, (lots,), of each lot of `numbers`."""
+        return counts_by_group(x, self._lots, levels)
+
+    def units(self, n: int) -> NDArray[np.intp]:
+        """See `Design.units`: the lots."""
+        return self.numbers[self._lots]
+
+    def only(self, joints: NDArray[np.intp] | NDArray[np.bool_]) -> Clustered:
+        """See `Design.only`."""
+        return Clustered(self.numbers[self._lots[joints]])
 
 
 class Law(NamedTuple):

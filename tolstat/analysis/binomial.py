@@ -1,0 +1,178 @@
+"""Joints counted one by one, independent of each other: exact intervals, and numbers of joints needed."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from tolstat.common.loads import FloatArray
+
+
+def clopper_pearson(count: ArrayLike, n: ArrayLike, confidence: float = 0.95) -> tuple[FloatArray, FloatArray]:
+    """Two-sided exact interval of a binomial probability (Clopper and Pearson 1934).
+
+    Parameters
+    ----------
+    count, n : array_like of int
+        Successes and trials, broadcast together; ``0 <= count <= n``. No trial gives (0, 1).
+    confidence : float
+        Coverage guaranteed for every true probability.
+
+    Returns
+    -------
+    lower, upper : ndarray
+        Ends of the interval, shape of the broadcast.
+
+    Raises
+    ------
+    ValueError
+        When the confidence is not between 0 and 1, or a count is not between 0 and `n`.
+    """
+    from scipy.special import betaincinv
+
+    if not 0.0 < confidence < 1.0:
+        raise ValueError(f"confidence {confidence} must lie between 0 and 1")
+    k, m = np.broadcast_arrays(np.asarray(count, dtype=float), np.asarray(n, dtype=float))
+    if np.any(k < 0) or np.any(k > m):
+        raise ValueError("count must lie between 0 and n")
+    tail = 0.5 * (1.0 - confidence)
+    # The beta function of order 0 does not exist; those ends are 0 and 1 by definition.
+    some, others = np.where(k > 0, k, 1.0), np.where(k < m, m - k, 1.0)
+    lower = np.where(k > 0, betaincinv(some, m - some + 1.0, tail), 0.0)
+    upper = np.where(k < m, betaincinv(k + 1.0, others, 1.0 - tail), 1.0)
+    return lower, upper
+
+
+def simultaneous(n: int, confidence: float = 0.95) -> float:
+    """Half width of the simultaneous band of the exceedance curve (Dvoretzky, Kiefer and Wolfowitz 1956).
+
+    With the constant of Massart (1990): ``P(sup |estimate - truth| > e) <= 2 exp(-2 n e^2)``, for every distribution.
+
+    Parameters
+    ----------
+    n : int
+        Independent joints.
+    confidence : float
+        Coverage guaranteed for all levels together.
+
+    Returns
+    -------
+    float
+        Half width e, a share of the joints; at most 1.
+
+    Raises
+    ------
+    ValueError
+        When the confidence is not between 0 and 1.
+
+    Examples
+    --------
+    >>> round(simultaneous(1024), 4)
+    0.0424
+    """
+    if not 0.0 < confidence < 1.0:
+        raise ValueError(f"confidence {confidence} must lie between 0 and 1")
+    return min(1.0, float(np.sqrt(0.5 * np.log(2.0 / (1.0 - confidence)) / max(n, 1))))
+
+
+def needed(share: float, accepted: float, confidence: float = 0.95) -> float:
+    """Minimum number of joints for a Clopper–Pearson interval that excludes an accepted share.
+
+    Parameters
+    ----------
+    share : float
+        Assumed share of the joints above the level, such as the estimate of an earlier campaign.
+    accepted : float
+        Accepted share, between 0 and 1.
+    confidence : float
+        Confidence level of the interval.
+
+    Returns
+    -------
+    float
+        Least number of independent joints whose interval, with exactly `share` of them above the level, excludes
+        `accepted`; infinite if both shares are equal.
+
+    Raises
+    ------
+    ValueError
+        When `accepted` or the confidence is not between 0 and 1, or `share` not from 0 to 1.
+
+    Examples
+    --------
+    >>> needed(0.0, 0.01)  # none of 368 joints
+    368.0
+    """
+    if not (0.0 < accepted < 1.0 and 0.0 <= share <= 1.0):
+        raise ValueError(f"share {share} and accepted share {accepted} must lie between 0 and 1")
+    if share == accepted:
+        return np.inf
+
+    def tells(n: float) -> bool:
+        lower, upper = clopper_pearson(share * n, n, confidence)
+        return bool(upper <= accepted or lower > accepted)
+
+    high = 1.0
+    while not tells(high) and high < 1e15:
+        high *= 2.0
+    low = 0.5 * high
+    while high - low > 1.0:  # bisection: with the share fixed, more joints make the interval narrower
+        middle = np.floor(0.5 * (low + high))
+        low, high = (low, middle) if tells(middle) else (middle, high)
+    return float(high)
+
+
+def unresolved_matter(count: int, n: int, n_unresolved: int, confidence: float = 0.95) -> bool:
+    """Whether joints without a valid load make a share about as uncertain as sampling does, or more.
+
+    Parameters
+    ----------
+    count : int
+        Valid joints above the level.
+    n, n_unresolved : int
+        Joints simulated, and those of them without a valid load.
+    confidence : float
+        Confidence level of the Clopper–Pearson interval that tells how uncertain sampling makes the share.
+
+    Returns
+    -------
+    bool
+        Whether their share of all joints is at least half the width of the interval of the valid joints.
+
+    Examples
+    --------
+    >>> unresolved_matter(0, 61, 36), unresolved_matter(75, 1024, 2)
+    (True, False)
+    """
+    if not n_unresolved:
+        return False
+    lower, upper = clopper_pearson(count, n - n_unresolved, confidence)
+    return bool(n_unresolved / n >= 0.5 * (upper - lower))
+
+
+def wilks(share: float, confidence: float = 0.95) -> int:
+    """Return the least number of joints whose largest load bounds the quantile from above (Wilks 1941, first order).
+
+    With that many independent joints the largest of them exceeds the quantile with probability
+    1 - share^n >= confidence.
+
+    Parameters
+    ----------
+    share : float
+        Share of the joints that stay at or below the quantile, 0 < share < 1.
+    confidence : float
+        Confidence level of the bound.
+
+    Raises
+    ------
+    ValueError
+        When `share` or `confidence` is not between 0 and 1.
+
+    Examples
+    --------
+    >>> wilks(0.95), wilks(0.99)
+    (59, 299)
+    """
+    if not (0.0 < share < 1.0 and 0.0 < confidence < 1.0):
+        raise ValueError(f"share {share} and confidence {confidence} must lie between 0 and 1")
+    return max(1, int(np.ceil(np.log1p(-confidence) / np.log(share))))

@@ -1,0 +1,88 @@
+"""One number for each joint, counted above levels."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tolstat.common.loads import FloatArray
+
+FEW_LEVELS = 8
+"""Number of levels up to which joints are counted without sorting, which takes less time and no memory."""
+
+Mask = NDArray[np.bool_]
+ArrayT = TypeVar("ArrayT", bound=NDArray[Any])
+
+
+def frozen(array: ArrayT) -> ArrayT:
+    """Return an array that is kept for later readers, and cannot be written to from now on."""
+    array.flags.writeable = False
+    return array
+
+
+class Column:
+    """Numbers of n joints; NaN for a joint that does not count.
+
+    Parameters
+    ----------
+    values : array_like, shape (n,)
+        The numbers; they may be infinite.
+    """
+
+    def __init__(self, values: ArrayLike) -> None:
+        self.values: FloatArray = np.asarray(values, dtype=float)
+
+    @cached_property
+    def n(self) -> int:
+        """Number of joints that count."""
+        return int(self.values.size - np.count_nonzero(np.isnan(self.values)))
+
+    @cached_property
+    def ascending(self) -> FloatArray:
+        """Numbers of the joints that count, ascending, (`n`,)."""
+        return frozen(np.sort(self.values)[: self.n])  # NaN is sorted last
+
+    def above(self, levels: FloatArray) -> NDArray[np.intp]:
+        """Count the joints above each level, (m,)."""
+        if levels.size <= FEW_LEVELS and "ascending" not in vars(self):
+            return np.array([np.count_nonzero(self.values > level) for level in levels], dtype=np.intp)
+        return np.asarray(self.n - np.searchsorted(self.ascending, levels, side="right"))
+
+    def replaced(self, joints: NDArray[np.intp], values: FloatArray) -> Column:
+        """Return the column with other numbers for some joints; what is sorted already is not sorted again."""
+        return _Replaced(self, joints, values) if joints.size else self
+
+
+class _Replaced(Column):
+    """Column with other numbers for some joints: counts are those of the whole, less the old, plus the new."""
+
+    def __init__(self, base: Column, joints: NDArray[np.intp], values: FloatArray) -> None:
+        self._base, self._joints = base, joints
+        self._old, self._new = Column(base.values[joints]), Column(values)
+
+    @property
+    def values(self) -> FloatArray:  # type: ignore[override]
+        """The numbers, (n,), in a new array."""
+        values = self._base.values.copy()
+        values[self._joints] = self._new.values
+        return values
+
+    @property
+    def n(self) -> int:
+        """Number of joints that count."""
+        return self._base.n - self._old.n + self._new.n
+
+    @property
+    def ascending(self) -> FloatArray:
+        """Numbers of the joints that count, ascending, in a new array."""
+        whole, old, new = self._base.ascending, self._old.ascending, self._new.ascending
+        place = np.searchsorted(whole, old) + np.arange(old.size) - np.searchsorted(old, old)  # equal ones one by one
+        kept = np.delete(whole, place)
+        return np.insert(kept, np.searchsorted(kept, new), new)
+
+    def above(self, levels: FloatArray) -> NDArray[np.intp]:
+        """Count the joints above each level, (m,)."""
+        return np.asarray(self._base.above(levels) - self._old.above(levels) + self._new.above(levels))

@@ -1,0 +1,195 @@
+"""What the joints of a campaign allow to conclude: the contract of a sampling design."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import ClassVar, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tolstat.analysis import prediction
+from tolstat.analysis.column import Column
+from tolstat.common.loads import FloatArray
+
+Claim = Literal["share", "quantile", "mean", "difference", "index", "tail", "band", "delivery", "reweighting"]
+"""What is estimated from joints. An index is one of capability or of sensitivity, or a number of joints needed; a band
+holds for a whole curve; reweighting counts the joints by other weights."""
+SAMPLE = 'give the file of a study with sampling.method "random", "sobol" or "lhs"'
+
+
+class Shares(NamedTuple):
+    """Shares of the joints above some levels.
+
+    Attributes
+    ----------
+    estimate, lower, upper : ndarray, shape (m,)
+        Share and its pointwise interval; NaN ends where the design gives none.
+    """
+
+    estimate: FloatArray
+    lower: FloatArray
+    upper: FloatArray
+
+    @classmethod
+    def counted(cls, x: Column, levels: FloatArray) -> Shares:
+        """Make shares of joints that count equally, without an interval."""
+        none = np.full(levels.shape, np.nan)
+        return cls(_counted(x, levels), none, none)
+
+
+class Refusal(NamedTuple):
+    """Why joints give no estimate: what is found in the file, and the remedy; ``{path}`` stands for the file."""
+
+    found: str
+    remedy: str
+
+
+class Design(ABC):
+    """How the joints of a campaign were drawn.
+
+    Attributes
+    ----------
+    is_sample : bool
+        Whether the joints are a sample of a production.
+    claims : frozenset of str
+        Claims that have an interval.
+    interval : str
+        Name of the interval of a share.
+    covers : str
+        Sentence on the intervals of shares.
+    caveat : str
+        What else they depend on; empty if nothing.
+    counting : str
+        Sentence on how joints count; empty if equally.
+    of_quantiles : str
+        What the intervals of quantiles are of.
+    ranks_at_once : int
+        Number of ranks at which an end of the interval of a quantile is searched at once: many where the ends of shares
+        may rise with the level.
+    """
+
+    is_sample: bool = True
+    claims: ClassVar[frozenset[Claim]] = frozenset()
+    interval: str = ""
+    covers: str = "no intervals: Clopper–Pearson holds for independent samples only"
+    caveat: str = ""
+    counting: ClassVar[str] = ""
+    of_quantiles: ClassVar[str] = "of order statistics"
+    ranks_at_once: ClassVar[int] = 16
+
+    @abstractmethod
+    def shares(self, x: Column, levels: FloatArray, confidence: float) -> Shares:
+        """Share of the joints above each level, (m,).
+
+        Parameters
+        ----------
+        x : Column
+            A number of each joint; joints with NaN do not count.
+        levels : ndarray, shape (m,)
+            Levels, in any order.
+        confidence : float
+            Confidence level of the intervals.
+        """
+
+    def estimate(self, x: Column, levels: FloatArray) -> FloatArray:
+        """Share of the joints above each level, (m,), as in `shares`."""
+        return _counted(x, levels)
+
+    @abstractmethod
+    def only(self, joints: NDArray[np.intp] | NDArray[np.bool_]) -> Design:
+        """Return the design of some of the joints."""
+
+    def refuses(self, claim: Claim) -> Refusal | None:
+        """Return why the joints give no estimate of a claim; None if they do."""
+        return None
+
+    def without_interval(self, claim: Claim) -> str:
+        """Return why an estimate has no interval, with the remedy; empty if it has one."""
+        return "" if claim in self.claims else f"joints of this design give no interval of a {claim}"
+
+    def has_interval(self, claim: Claim) -> bool:
+        """Whether a claim has an interval."""
+        return claim in self.claims
+
+    def units(self, n: int) -> NDArray[np.intp]:
+        """Number of the unit of each of n joints, (n,): units are independent of each other."""
+        return np.arange(n)
+
+    def each(self, n: int) -> FloatArray:
+        """What each of n joints counts, (n,); the mean is 1."""
+        return np.ones(n)
+
+    def doubt(self, x: Column, level: float) -> str:
+        """Return why the share above a level is not supported; empty if it is."""
+        return ""
+
+    def upper_if_missed(self, x: Column, level: float, confidence: float) -> float:
+        """Upper end of a share whatever was not drawn where it matters; NaN where the design misses nothing."""
+        return np.nan
+
+    def smallest(self, n: int, shares: FloatArray) -> float:
+        """Smallest share of n joints that a curve shows: that of one joint."""
+        return 1.0 / n
+
+    def delivery(
+        self, lower: Column, upper: Column, level: float, number: int, confidence: float
+    ) -> tuple[float, float]:
+        """Prediction interval for the number above a level among further joints; see `analysis.prediction`.
+
+        Parameters
+        ----------
+        lower, upper : Column
+            Lower and upper end of the number of each joint.
+        level, confidence
+            As in `shares`.
+        number : int
+            Number of further joints.
+
+        Returns
+        -------
+        lower, upper : float
+            Whole numbers, ends included; NaN without an interval.
+        """
+        if "delivery" not in self.claims:
+            return np.nan, np.nan
+        at, half = np.array([level]), prediction.half(confidence)
+        low, high = self.shares(lower, at, half).lower[0], self.shares(upper, at, half).upper[0]
+        return prediction.of_share(float(low), float(high), number, confidence)
+
+
+def _counted(x: Column, levels: FloatArray) -> FloatArray:
+    """Joints above each level over all joints, (m,); NaN where there are none."""
+    with np.errstate(invalid="ignore"):
+        return np.asarray(x.above(levels) / np.float64(x.n))
+
+
+def counts_by_group(x: Column, groups: NDArray[np.intp], levels: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Count the joints of each group above each level.
+
+    Parameters
+    ----------
+    x : Column
+        A number of each joint.
+    groups : ndarray of int, shape (n,)
+        Group of each joint, from 0.
+    levels : array_like, shape (m,)
+        Levels.
+
+    Returns
+    -------
+    above : ndarray, shape (groups, m)
+        Joints above each level.
+    joints : ndarray, shape (groups,)
+        Joints that count.
+    """
+    values = x.values
+    counts = ~np.isnan(values)
+    levels = np.asarray(levels, dtype=float)
+    order = np.argsort(levels, kind="stable")
+    number, steps = int(groups.max(initial=-1)) + 1, levels.size + 1
+    below = np.searchsorted(levels[order], values[counts], side="left")  # number of levels that the joint is above
+    table = np.bincount(groups[counts] * steps + below, minlength=number * steps).reshape(number, steps)
+    above = np.empty((number, levels.size))
+    above[:, order] = table[:, ::-1].cumsum(axis=1)[:, ::-1][:, 1:]
+    return above, table.sum(axis=1).astype(float)

@@ -1,0 +1,475 @@
+"""One load of the joints of a campaign: a value and two ends for each joint, and the design they were drawn by."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tolstat.analysis.column import Column, Mask, frozen
+from tolstat.analysis.design import Design
+from tolstat.analysis.independent import Independent
+from tolstat.common.loads import FloatArray
+from tolstat.common.shown import shown, table
+from tolstat.common.tables import UNSETTLED, VALID, Status, worst_status
+
+CONFIDENCE = 0.95
+LONG_TAIL = 3.0
+"""Ratio of the largest load to the median above which a load has a long tail."""
+Ends = tuple[ArrayLike, ArrayLike]
+"""Lower and upper end of the load of each joint."""
+
+_IS_VALID, _IS_UNSETTLED = (np.isin(np.arange(256), states) for states in (VALID, UNSETTLED))
+
+
+@shown
+@dataclass(frozen=True)
+class Exceedance:
+    """Share of the joints whose load is above a level.
+
+    Attributes
+    ----------
+    level : float
+        Load level, in the unit of the values.
+    n : int
+        Joints simulated, the unresolved ones included.
+    n_failed, n_unsettled : int
+        Joints without a valid load: the solution failed, or had not settled at ``solver.max_revs``.
+    count : int
+        Valid joints above the level.
+    estimate : float
+        Share of the valid joints above the level; NaN when none is valid.
+    lower, upper : float
+        Interval of that share; NaN when the design gives none.
+    bound_lower, bound_upper : float
+        Share of all `n` joints above the level with every undecided joint counted below it, and above it. Undecided
+        are the unresolved joints, and stationary ones whose interval contains the level.
+    outer_lower, outer_upper : float
+        Lower end of the interval of ``bound_lower`` and upper end of that of ``bound_upper``: cover both uncertainties.
+    """
+
+    level: float
+    n: int
+    n_failed: int
+    n_unsettled: int
+    count: int
+    estimate: float
+    lower: float
+    upper: float
+    bound_lower: float
+    bound_upper: float
+    outer_lower: float
+    outer_upper: float
+
+
+CURVE = np.dtype([(f.name, "i8" if f.type == "int" else "f8") for f in fields(Exceedance)])
+"""A row of a curve: the fields of `Exceedance`."""
+
+
+@shown
+class Quantile(NamedTuple):
+    """Load that a share of the joints stays at or below.
+
+    Attributes
+    ----------
+    share : float
+        Share of the joints, between 0 and 1.
+    n, n_failed, n_unsettled : int
+        As in `Exceedance`.
+    estimate : float
+        Smallest value that at least `share` of the valid joints do not exceed; NaN when none is valid.
+    lower, upper : float
+        Two-sided interval from the valid joints, ±inf when they are too few; NaN when the design gives none.
+    bound_lower, bound_upper : float
+        The estimate with the lower and with the upper end of every load; ±inf if it falls among unresolved joints.
+    """
+
+    share: float
+    n: int
+    n_failed: int
+    n_unsettled: int
+    estimate: float
+    lower: float
+    upper: float
+    bound_lower: float
+    bound_upper: float
+
+
+class Inexact(NamedTuple):
+    """Joints whose load is no single number.
+
+    Attributes
+    ----------
+    joints : ndarray of int, shape (k,)
+        Indices of these joints, ascending.
+    lower, upper : ndarray, shape (k,)
+        Ends of their loads: an interval (stationary), -inf and inf (failed or unsettled), NaN (pending).
+    """
+
+    joints: NDArray[np.intp]
+    lower: FloatArray
+    upper: FloatArray
+
+    def of(self, joints: NDArray[np.intp], values: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Ends of the loads of some joints, all of these among them, (m,) each; `values` are all loads."""
+        lower, upper = values[joints], values[joints]
+        place = np.searchsorted(joints, self.joints)
+        lower[place], upper[place] = self.lower, self.upper
+        return lower, upper
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Sample:
+    """Largest load over the revolution of n joints.
+
+    Attributes
+    ----------
+    name, unit : str
+        ``cross1.F``, and its SI unit.
+    limit : float, optional
+        Limit of the study, SI.
+    nominal : float
+        Load of the nominal joint, SI; NaN if there is none.
+    value : Column
+        Load of each joint, SI; NaN where it does not count.
+    inexact : Inexact
+        Joints without a single number.
+    status : ndarray, shape (n,)
+        `tables.Status` of each joint.
+    design : Design
+        How the joints were drawn.
+    scale : float
+        Value of one in `unit` as a load, SI: 1 but for ratios of load to limit.
+    parts : tuple of Sample
+        Loads of which this is the largest; empty for a single one. See `largest_of`.
+    of_ratios : bool
+        Whether this is the largest ratio of `parts` to their limits.
+    """
+
+    name: str
+    unit: str
+    limit: float | None
+    nominal: float
+    value: Column
+    inexact: Inexact
+    status: NDArray[np.uint8]
+    design: Design
+    scale: float = 1.0
+    parts: tuple[Sample, ...] = ()
+    of_ratios: bool = False
+
+    @classmethod
+    def of(
+        cls,
+        values: ArrayLike,
+        status: ArrayLike,
+        design: Design | None = None,
+        ends: Ends | None = None,
+        name: str = "",
+        unit: str = "1",
+        limit: float | None = None,
+        nominal: float = np.nan,
+    ) -> Sample:
+        """Make a sample of the loads of all joints.
+
+        Parameters
+        ----------
+        values : array_like, shape (n,)
+            Load of each joint, any unit. A valid joint whose load is not finite counts as failed.
+        status : array_like of int, shape (n,)
+            `tables.Status` of each joint. Pending joints are left out.
+        design : Design, optional
+            How the joints were drawn; by default independently.
+        ends : tuple of array_like, shape (n,), optional
+            Ends of each load; without them, and where an end is not finite, the load is exact.
+        name, unit, limit, nominal
+            See the attributes.
+
+        Raises
+        ------
+        ValueError
+            When the shapes differ or are not one-dimensional.
+        """
+        load, state = np.asarray(values, dtype=float), np.asarray(status).astype(np.uint8, copy=False)
+        if load.ndim != 1 or load.shape != state.shape:
+            raise ValueError(f"values {load.shape} and status {state.shape} must be of one length")
+        valid = is_valid(load, state)
+        value = load if valid.all() else np.where(valid, load, np.nan)
+        lost = ~valid & (state != Status.PENDING)
+        lower, upper = (np.where(np.isfinite(end) & valid, end, value) for end in ends or (value, value))
+        joints = np.flatnonzero(lost | (valid & ((lower != value) | (upper != value))))
+        low, high = np.where(lost, -np.inf, lower)[joints], np.where(lost, np.inf, upper)[joints]
+        own = Independent() if design is None else design
+        return cls(name, unit, limit, nominal, Column(value), Inexact(joints, low, high), state, own)
+
+    def __repr__(self) -> str:
+        valid = self.valid
+        span = f", {valid[0]:.4g} to {valid[-1]:.4g} {self.unit}" if valid.size else ""
+        limit = "" if self.limit is None else f", limit {self.limit:.4g} {self.unit}"
+        return f"<load {self.name!r}: {valid.size} of {self.values.size} joints valid{span}{limit}>"
+
+    def _repr_html_(self) -> str:
+        shares = (0.5, 0.9, 0.99) if self.valid.size else ()
+        entries = [(f"{share:.0%} quantile", f"{self.quantile(share).estimate:.4g} {self.unit}") for share in shares]
+        return table(repr(self)[1:-1], [("nominal", f"{self.nominal:.4g} {self.unit}"), *entries])
+
+    @property
+    def values(self) -> FloatArray:
+        """Load of each joint, NaN where it does not count, (n,)."""
+        return self.value.values
+
+    @cached_property
+    def lower(self) -> Column:
+        """Lower end of the load of each joint."""
+        return self.value.replaced(self.inexact.joints, self.inexact.lower)
+
+    @cached_property
+    def upper(self) -> Column:
+        """Upper end of the load of each joint."""
+        return self.value.replaced(self.inexact.joints, self.inexact.upper)
+
+    @property
+    def valid(self) -> FloatArray:
+        """Loads of the valid joints, ascending."""
+        return self.value.ascending
+
+    @property
+    def is_valid(self) -> Mask:
+        """Which joints have a load, (n,)."""
+        return ~np.isnan(self.values)
+
+    @cached_property
+    def unresolved(self) -> tuple[int, int]:
+        """Number of joints without a load that failed, and that had not settled."""
+        lost = np.flatnonzero(np.isnan(self.values) & (self.status != Status.PENDING))
+        unsettled = int(np.count_nonzero(_IS_UNSETTLED[self.status[lost]]))
+        return lost.size - unsettled, unsettled
+
+    @property
+    def counting(self) -> FloatArray:
+        """What each valid joint counts, in the order of the joints."""
+        return self.design.each(self.values.size)[self.is_valid]
+
+    @property
+    def long_tailed(self) -> bool:
+        """Whether all valid loads are positive and the largest exceeds `LONG_TAIL` times the median."""
+        valid = self.valid
+        return bool(valid.size and valid[0] > 0 and valid[-1] > LONG_TAIL * valid[valid.size // 2])
+
+    def each(self) -> Iterator[Sample]:
+        """Yield the loads, or the ratios of load to limit, of which this is the largest."""
+        for part in self.parts:
+            yield part.of_limit() if self.of_ratios else part
+
+    def curve(self, levels: ArrayLike | None = None, confidence: float = CONFIDENCE) -> NDArray[np.void]:
+        """Share of the joints above each of many levels: the table of P(load > x).
+
+        Parameters
+        ----------
+        levels : array_like, shape (m,), optional
+            Levels in the unit of the values. By default every value that a valid joint has, ascending; between two of
+            them the share does not change, so that the table is the whole step curve.
+        confidence : float
+            Confidence level of the intervals.
+
+        Returns
+        -------
+        ndarray of CURVE, shape (m,)
+            One row a level. The interval is pointwise: it holds at a level chosen beforehand, not for all levels
+            jointly.
+
+        Raises
+        ------
+        ValueError
+            When a level is NaN, or the confidence is not between 0 and 1.
+        """
+        x = np.unique(self.valid) if levels is None else np.atleast_1d(np.asarray(levels, dtype=float))
+        if np.isnan(x).any():
+            raise ValueError("a level is NaN")
+        own = self.design.shares(self.value, x, confidence)
+        low, high = (
+            own if end is self.value else self.design.shares(end, x, confidence) for end in (self.lower, self.upper)
+        )
+        rows = np.zeros(x.shape, CURVE)
+        rows["level"], rows["count"], rows["n"] = x, self.value.above(x), self.value.n + sum(self.unresolved)
+        rows["n_failed"], rows["n_unsettled"] = self.unresolved
+        rows["estimate"], rows["lower"], rows["upper"] = own
+        rows["bound_lower"], rows["outer_lower"] = np.nan_to_num(low.estimate, nan=0.0), low.lower
+        rows["bound_upper"], rows["outer_upper"] = np.nan_to_num(high.estimate, nan=1.0), high.upper
+        return rows
+
+    def above(self, level: float, confidence: float = CONFIDENCE) -> Exceedance:
+        """Share of the joints above one level; see `curve`."""
+        return Exceedance(*self.curve([level], confidence)[0].tolist())
+
+    def quantile(self, share: float, confidence: float = CONFIDENCE) -> Quantile:
+        """Load that a share of the joints stays at or below; its interval inverts that of `curve`.
+
+        Raises
+        ------
+        ValueError
+            When `share` or `confidence` is not between 0 and 1.
+        """
+        if not (0.0 < share < 1.0 and 0.0 < confidence < 1.0):
+            raise ValueError(f"share {share} and confidence {confidence} must lie between 0 and 1")
+        numbers = share, self.value.n + sum(self.unresolved), *self.unresolved
+        estimate = self._at(self.value, share) if self.value.n else np.nan
+        bounds = (self._at(self.lower, share), self._at(self.upper, share)) if self.upper.n else (-np.inf, np.inf)
+        return Quantile(*numbers, estimate, *self._interval(share, confidence), *bounds)
+
+    def _at(self, x: Column, share: float) -> float:
+        """Smallest number of a column above which at most 1 - `share` of the joints are."""
+        loads = x.ascending
+        most = (1.0 - share) * (1.0 + 1e-12) + 1e-15
+
+        def reached(ranks: NDArray[np.intp]) -> Mask:
+            return np.asarray(self.design.estimate(x, loads[ranks]) <= most)
+
+        return float(loads[_first(reached, loads.size - 1, Design.ranks_at_once)])  # no joint is above the largest
+
+    def _interval(self, share: float, confidence: float) -> tuple[float, float]:
+        """Ends of the interval of a quantile."""
+        loads, n = self.valid, self.value.n
+        if not self.design.has_interval("quantile"):
+            return np.nan, np.nan
+        below = np.append(np.nextafter(loads[:1], -np.inf), loads[:-1])
+
+        def high_enough(ranks: NDArray[np.intp]) -> Mask:
+            return np.asarray(self.design.shares(self.value, loads[ranks], confidence).upper <= 1.0 - share)
+
+        def low_enough(ranks: NDArray[np.intp]) -> Mask:
+            """From the largest load down: whether surely enough joints are at this load or above."""
+            return np.asarray(self.design.shares(self.value, below[n - 1 - ranks], confidence).lower >= 1.0 - share)
+
+        at_once = self.design.ranks_at_once
+        upper, lower = _first(high_enough, n, at_once), n - 1 - _first(low_enough, n, at_once)
+        return float(loads[lower]) if lower >= 0 else -np.inf, float(loads[upper]) if upper < n else np.inf
+
+    def doubt(self, level: float) -> str:
+        """Return why the share above a level is not supported; empty if it is."""
+        return self.design.doubt(self.value, level)
+
+    def upper_if_missed(self, level: float, confidence: float = CONFIDENCE) -> float:
+        """See `Design.upper_if_missed`; joints without a valid load count above the level."""
+        return self.design.upper_if_missed(self.upper, level, confidence)
+
+    def delivery(self, level: float, number: int, confidence: float = CONFIDENCE) -> tuple[float, float]:
+        """Prediction interval for the number above a level among further joints; see `Design.delivery`.
+
+        Joints without a valid load count below the level for its lower end, above it for its upper end.
+        """
+        if not self.upper.n:
+            return np.nan, np.nan
+        return self.design.delivery(self.lower, self.upper, level, number, confidence)
+
+    def shifted(self, by: FloatArray) -> Sample:
+        """Return the load of the same joints with `by`, (n,), added; a change that is not known counts as none."""
+        at = np.nan_to_num(by[self.inexact.joints])
+        inexact = Inexact(self.inexact.joints, self.inexact.lower + at, self.inexact.upper + at)
+        return replace(self, value=Column(self.values + by), inexact=inexact)
+
+    def scaled(self, factor: float) -> Sample:
+        """Return the load of the same joints times a factor, not negative."""
+        joints, lower, upper = self.inexact
+        with np.errstate(invalid="ignore"):
+            lower, upper = (np.where(np.isinf(end), end, factor * end) for end in (lower, upper))
+        return replace(self, value=Column(factor * self.values), inexact=Inexact(joints, lower, upper))
+
+    def of_limit(self) -> Sample:
+        """Return the ratio of load to limit of the same joints; its limit is 1."""
+        assert self.limit is not None
+        limit = self.limit
+        joints, lower, upper = self.inexact
+        return replace(
+            self,
+            value=Column(self.values / limit),
+            inexact=Inexact(joints, lower / limit, upper / limit),
+            unit="1",
+            limit=1.0,
+            nominal=self.nominal / limit,
+            scale=self.scale * limit,
+        )
+
+    def only(self, joints: NDArray[np.intp] | Mask) -> Sample:
+        """Return the load of some of the joints."""
+        value = self.values[joints]
+        lower, upper = (end.values[joints] for end in (self.lower, self.upper))
+        own = np.flatnonzero((lower != value) & ~np.isnan(lower) | (upper != value) & ~np.isnan(upper))
+        return replace(
+            self,
+            value=Column(value),
+            inexact=Inexact(own, lower[own], upper[own]),
+            status=self.status[joints],
+            design=self.design.only(joints),
+            parts=tuple(part.only(joints) for part in self.parts),
+        )
+
+
+def is_valid(load: FloatArray, status: NDArray[np.uint8]) -> Mask:
+    """Which joints have a valid load, (n,)."""
+    return _IS_VALID[status] & np.isfinite(load)
+
+
+def total_interval(samples: Sequence[Sample], level: float, confidence: float) -> tuple[float, float]:
+    """Interval of the share above a level that covers sampling, unresolved joints and numerical error.
+
+    Parameters
+    ----------
+    samples : sequence of Sample
+        A load as simulated and, if its numerical error is known, the load at both ends of that error.
+    level, confidence : float
+        As in `Sample.above`.
+
+    Returns
+    -------
+    lower, upper : float
+        Envelope of their intervals; NaN when the design gives none.
+    """
+    each = [sample.above(level, confidence) for sample in samples]
+    return min(own.outer_lower for own in each), max(own.outer_upper for own in each)
+
+
+def largest_of(name: str, parts: Sequence[Sample], of_ratios: bool = False) -> Sample:
+    """Largest of several loads of the same joints, whose limits are equal, or largest ratio of load to limit.
+
+    Computed load by load, and ratios are not kept, to save memory. A joint that has no load in one part and is above a
+    level in another is above it: its lower end is the largest of the lower ends.
+    """
+    joints = np.unique(np.concatenate([part.inexact.joints for part in parts]))
+    loads = replace(parts[0], parts=tuple(parts), of_ratios=of_ratios).each()
+    first = next(loads)
+    values, nominal = first.values.copy(), first.nominal
+    lower, upper = first.inexact.of(joints, first.values)
+    for load in loads:
+        own = load.inexact.of(joints, load.values)
+        lower, upper = np.maximum(lower, own[0]), np.maximum(upper, own[1])
+        np.maximum(values, load.values, out=values)
+        nominal = max(nominal, load.nominal)
+    return replace(
+        first,
+        name=name,
+        nominal=nominal,
+        value=Column(frozen(values)),
+        inexact=Inexact(joints, lower, upper),
+        status=worst_status([part.status for part in parts]),
+        parts=tuple(parts),
+        of_ratios=of_ratios,
+    )
+
+
+def _first(holds: Callable[[NDArray[np.intp]], Mask], n: int, at_once: int) -> int:
+    """Find the first of the ranks 0 to n - 1 from which on a condition holds; n if it never does."""
+    begin, end = 0, n
+    while begin < end:
+        ranks = np.arange(begin, end, -(-(end - begin) // at_once))
+        held = np.flatnonzero(holds(ranks))
+        begin, end = (
+            (int(ranks[held[0] - 1]) + 1 if held[0] else int(ranks[0]), int(ranks[held[0]]))
+            if held.size
+            else (int(ranks[-1]) + 1, end)
+        )
+    return end

@@ -9,7 +9,7 @@ import pytest
 
 from tolstat.analysis import bounded_mean
 from tolstat.analysis.bounded_mean import interval
-from tolstat.analysis.exceedance import clopper_pearson
+from tolstat.analysis.binomial import clopper_pearson
 
 SEEDS = 150
 LAWS = {

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import binom, binomtest, norm
 
-from tolstat.analysis import exceedance, quantile
+from tolstat.analysis import binomial, exceedance, quantile
 from tolstat.common.tables import Status
 
 N_SEEDS = 1500
@@ -21,7 +21,7 @@ def samples():
 
 
 def clopper_pearson(count, n):
-    return exceedance.clopper_pearson(count, n, 0.95)
+    return binomial.clopper_pearson(count, n, 0.95)
 
 
 def wald(count, n):
@@ -41,7 +41,7 @@ def coverage(interval):
 @pytest.mark.parametrize("n", [1, 2, 7, 50, 512, 4096])
 def test_interval_is_scipys_exact_interval(n, confidence):
     count = np.unique([0, 1, n // 3, n - 1, n])
-    lower, upper = exceedance.clopper_pearson(count, n, confidence)
+    lower, upper = binomial.clopper_pearson(count, n, confidence)
     for k, low, high in zip(count, lower, upper, strict=True):
         expected = binomtest(int(k), n).proportion_ci(confidence, method="exact")
         assert low == pytest.approx(expected.low, rel=1e-9, abs=1e-12)
@@ -49,7 +49,7 @@ def test_interval_is_scipys_exact_interval(n, confidence):
 
 
 def test_no_trial_tells_nothing():
-    assert [float(end) for end in exceedance.clopper_pearson(0, 0)] == [0.0, 1.0]
+    assert [float(end) for end in binomial.clopper_pearson(0, 0)] == [0.0, 1.0]
 
 
 def test_interval_covers_over_seeds_and_the_wald_interval_does_not():
@@ -72,31 +72,31 @@ def test_simultaneous_band_holds_the_whole_curve_and_the_pointwise_one_does_not(
         u = np.sort(rng.random(n))  # exceedance of a uniform load is 1 - u: largest distance at the steps
         above = 1.0 - np.arange(n) / n
         far = max(np.abs(above - (1.0 - u)).max(), np.abs(above - 1.0 / n - (1.0 - u)).max())
-        whole += far <= exceedance.simultaneous(n)
-        lower, upper = exceedance.clopper_pearson(n - 1 - np.arange(n), n)
+        whole += far <= binomial.simultaneous(n)
+        lower, upper = binomial.clopper_pearson(n - 1 - np.arange(n), n)
         pointwise += bool(np.all((lower <= 1.0 - u) & (1.0 - u <= upper)))
     least = 0.95 - 3.0 * np.sqrt(0.95 * 0.05 / 500)
     assert whole / 500 >= least
     assert pointwise / 500 < least
-    assert exceedance.simultaneous(0) == 1.0
+    assert binomial.simultaneous(0) == 1.0
     with pytest.raises(ValueError, match="confidence"):
-        exceedance.simultaneous(10, 95)
+        binomial.simultaneous(10, 95)
 
 
 @pytest.mark.parametrize(
     ("share", "accepted"), [(0.0, 0.001), (0.03, 0.05), (0.08, 0.05), (0.0484, 0.05), (0.02, 0.01), (1.0, 0.5)]
 )
 def test_joints_needed_are_the_first_whose_interval_tells(share, accepted):
-    n = exceedance.needed(share, accepted)
+    n = binomial.needed(share, accepted)
     told = []
     for number in (n - 1, n):
-        lower, upper = exceedance.clopper_pearson(share * number, number)
+        lower, upper = binomial.clopper_pearson(share * number, number)
         told.append(bool(upper <= accepted or lower > accepted))
     assert told == [False, True]
     assert n > 100 or share == 1.0  # less than one joint above in all tells nothing
-    assert exceedance.needed(accepted, accepted) == np.inf
+    assert binomial.needed(accepted, accepted) == np.inf
     with pytest.raises(ValueError, match="between 0 and 1"):
-        exceedance.needed(share, 1.5)
+        binomial.needed(share, 1.5)
 
 
 def test_hand_counted_case():
@@ -171,8 +171,8 @@ def test_curve_agrees_with_counting_and_falls(rows, level):
         (lambda: exceedance.exceedance([1.0], [1, 1], 0.0), "one length"),
         (lambda: exceedance.exceedance([1.0], [1], float("nan")), "NaN"),
         (lambda: exceedance.exceedance([1.0], [1], 0.0, confidence=1.0), "confidence"),
-        (lambda: exceedance.clopper_pearson(3, 2), "between 0 and n"),
-        (lambda: quantile.quantile([1.0], [1], 1.0), "share"),
+        (lambda: binomial.clopper_pearson(3, 2), "between 0 and n"),
+        (lambda: exceedance.quantile([1.0], [1], 1.0), "share"),
     ],
 )
 def test_misuse_is_refused(call, message):
@@ -183,8 +183,8 @@ def test_misuse_is_refused(call, message):
 @pytest.mark.parametrize(("share", "confidence", "n"), [(0.95, 0.9, 59), (0.99, 0.9, 299)])
 def test_quantile_upper_end_needs_the_number_of_joints_wilks_gives(share, confidence, n):
     """A two-sided 90 % interval has the one-sided 95 % upper end of Wilks' first-order formula."""
-    enough = quantile.quantile(np.arange(n), np.ones(n), share, confidence)
-    too_few = quantile.quantile(np.arange(n - 1), np.ones(n - 1), share, confidence)
+    enough = exceedance.quantile(np.arange(n), np.ones(n), share, confidence)
+    too_few = exceedance.quantile(np.arange(n - 1), np.ones(n - 1), share, confidence)
     assert enough.upper == n - 1
     assert too_few.upper == np.inf
 
@@ -205,7 +205,7 @@ def test_ranks_of_the_interval_are_the_outermost_that_scipys_binomial_allows(n, 
 def test_quantile_interval_covers_over_seeds(share):
     truth, covered = norm.ppf(share), 0
     for loads in samples()[:600]:
-        q = quantile.quantile(loads, np.ones(N_JOINTS), share)
+        q = exceedance.quantile(loads, np.ones(N_JOINTS), share)
         covered += q.lower <= truth <= q.upper
     assert covered / 600 >= 0.95 - 3.0 * np.sqrt(0.95 * 0.05 / 600)
 
@@ -213,15 +213,15 @@ def test_quantile_interval_covers_over_seeds(share):
 def test_quantile_is_numpys_inverted_cdf_and_unresolved_joints_bound_it():
     loads = np.random.default_rng(3).normal(size=100)
     status = np.ones(100)
-    assert quantile.quantile(loads, status, 0.9).estimate == np.quantile(loads, 0.9, method="inverted_cdf")
+    assert exceedance.quantile(loads, status, 0.9).estimate == np.quantile(loads, 0.9, method="inverted_cdf")
     status[:5] = Status.NEWTON_FAILED
-    q = quantile.quantile(loads, status, 0.9)
+    q = exceedance.quantile(loads, status, 0.9)
     low, high = loads.copy(), loads.copy()
     low[:5], high[:5] = -np.inf, np.inf
     assert q.bound_lower == np.quantile(low, 0.9, method="inverted_cdf")
     assert q.bound_upper == np.quantile(high, 0.9, method="inverted_cdf")
-    assert quantile.quantile(loads, status, 0.96).bound_upper == np.inf
-    assert np.isnan(quantile.quantile(loads, status, 0.9, iid=False).lower)
+    assert exceedance.quantile(loads, status, 0.96).bound_upper == np.inf
+    assert np.isnan(exceedance.quantile(loads, status, 0.9, iid=False).lower)
 
 
 def test_analysis_needs_no_file_and_no_figure():

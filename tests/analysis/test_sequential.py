@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from tolstat.analysis import exceedance, sequential
+from tolstat.analysis import binomial, exceedance, sequential
 from tolstat.analysis.sequential import Scheme
 
 WIDTH, JOINTS = 0.1, 1000
@@ -80,7 +80,7 @@ def test_drawn_campaigns_agree_and_without_correction_they_miss_too_often(scheme
     above = np.cumsum(rng.binomial(np.diff([0, *scheme.looks]), p, (runs, len(scheme.looks))), axis=1)
     missed, bias = {}, {}
     for confidence in (scheme.confidence, 0.95):
-        lower, upper = exceedance.clopper_pearson(above, scheme.looks, confidence)
+        lower, upper = binomial.clopper_pearson(above, scheme.looks, confidence)
         beside = (above >= sequential.LEAST_BESIDE) & (np.array(scheme.looks) - above >= sequential.LEAST_BESIDE)
         stop = (upper - lower < WIDTH) & beside
         at, every = np.where(stop.any(axis=1), stop.argmax(axis=1), len(scheme.looks) - 1), np.arange(runs)

@@ -174,7 +174,7 @@ def test_joints_without_a_result_count_both_ways():
 
 
 def test_strengths_without_scatter_give_the_share_of_joints():
-    from tolstat.analysis.exceedance import clopper_pearson
+    from tolstat.analysis.binomial import clopper_pearson
 
     factor = np.array([0.5, 0.99, 1.0, 3.0])
     chances = strength.probability(factor, 1.0)

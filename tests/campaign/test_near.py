@@ -6,7 +6,7 @@ from scipy.stats import norm
 from typer.testing import CliRunner
 
 from tests.support import synthetic
-from tolstat.analysis import accuracy, exceedance, prediction
+from tolstat.analysis import accuracy, binomial, exceedance, prediction
 from tolstat.campaign import checks, verify
 from tolstat.cli import app
 from tolstat.common.errors import InputError
@@ -134,5 +134,5 @@ def test_deliveries_lie_in_their_prediction_interval(p):
     assert (binom.pmf(np.arange(n + 1), n, p) * inside).sum() < 0.95
     half = prediction.half(0.95)
     for k, (low, high) in enumerate(ends[:20]):
-        wide = prediction.of_share(*map(float, exceedance.clopper_pearson(k, n, half)), number)
+        wide = prediction.of_share(*map(float, binomial.clopper_pearson(k, n, half)), number)
         assert wide[0] <= low <= high <= wide[1]

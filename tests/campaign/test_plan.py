@@ -15,7 +15,7 @@ from tests.campaign.test_campaign import datasets
 from tests.support import fakes, synthetic
 from tests.support.synthetic import HEAD
 from tolstat import cli, report, study
-from tolstat.analysis import exceedance, quantile, sequential
+from tolstat.analysis import binomial, exceedance, quantile, sequential
 from tolstat.campaign import plan, stop_rule
 from tolstat.campaign import run as campaign
 from tolstat.common.errors import InputError
@@ -177,11 +177,11 @@ def test_run_until_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
 
 @pytest.mark.parametrize(("share", "n"), [(0.95, 59), (0.99, 299), (0.999, 2995)])
 def test_wilks(share: float, n: int) -> None:
-    assert quantile.wilks(share) == n
+    assert binomial.wilks(share) == n
     assert 1 - share**n >= 0.95 > 1 - share ** (n - 1)
     for bad in (0.0, 1.0):
         with pytest.raises(ValueError, match="must lie between 0 and 1"):
-            quantile.wilks(bad)
+            binomial.wilks(bad)
 
 
 @pytest.fixture
@@ -202,7 +202,7 @@ def test_a_plan_is_what_the_campaign_takes(tmp_path: Path, small: study.Study) -
     assert made.seconds == pytest.approx(sum(made.stages.values()))
     assert made.process_bytes > 1e7
     assert made.wilks == {0.95: 59, 0.99: 299, 0.999: 2995}
-    lower, upper = exceedance.clopper_pearson(6, 60)
+    lower, upper = binomial.clopper_pearson(6, 60)
     assert made.widths[0.1] == upper - lower
     campaign.run(small, tmp_path / "a.h5", 1, check=False)
     assert made.file_bytes == pytest.approx((tmp_path / "a.h5").stat().st_size, rel=0.05)
@@ -217,14 +217,14 @@ def test_a_plan_is_what_the_campaign_takes(tmp_path: Path, small: study.Study) -
 
 
 def test_a_plan_counts_joints_that_do_not_go_together(tmp_path: Path, small: study.Study) -> None:
-    assert plan.plan(small, pilot=2).assembly == plan.Assembly(0, 60, exceedance.clopper_pearson(0, 60))
+    assert plan.plan(small, pilot=2).assembly == plan.Assembly(0, 60, binomial.clopper_pearson(0, 60))
     head, tail = synthetic.STUDY.split("[tolerances]")[0], '[sampling]\nmethod = "random"\nn = 30000\nseed = 1\n'
     entry = '"pin*.diameter" = { lower = "0.1 mm", upper = "0.3 mm", distribution = "uniform" }\n'
     loaded = study.load(tmp_path / "tight.toml", text=f"{head}[tolerances]\n{entry}{tail}")
     found = plan._assembly(loaded, iid=True)
     assert found.of == plan.DRAWN
     assert found.interval[0] < 1 - 0.5**4 < found.interval[1]  # one pin in two is larger than the hole, 0.2 mm wider
-    assert found.interval == exceedance.clopper_pearson(found.misfits, found.of)
+    assert found.interval == binomial.clopper_pearson(found.misfits, found.of)
     (tmp_path / "few.toml").write_text(loaded.text.replace("30000", "12"), encoding="utf-8")
     done = CliRunner().invoke(cli.app, ["plan", str(tmp_path / "few.toml"), "--pilot", "2"])
     assert "of 12 joints have a pin larger than its hole and cannot be simulated; 95 % interval" in done.stdout.replace(

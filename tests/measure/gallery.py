@@ -16,7 +16,7 @@ import numpy as np
 
 import tolstat
 from tests.support.environment import ROOT
-from tolstat.analysis.exceedance import clopper_pearson
+from tolstat.analysis.binomial import clopper_pearson
 from tolstat.common.loads import split
 from tolstat.common.tables import Status
 from tolstat.display import style

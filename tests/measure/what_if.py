@@ -22,7 +22,7 @@ import scipy.stats
 from numpy.typing import NDArray
 
 import tolstat
-from tolstat.analysis.exceedance import clopper_pearson
+from tolstat.analysis.binomial import clopper_pearson
 from tolstat.campaign import what_if as sets
 from tolstat.common.loads import ALL_LIMITS, LOADS
 from tolstat.common.tables import VALID

@@ -11,7 +11,7 @@ import pytest
 import tolstat
 from tests.support import synthetic, views
 from tolstat import joint
-from tolstat.analysis.exceedance import clopper_pearson
+from tolstat.analysis.binomial import clopper_pearson
 from tolstat.common.columns import RESULT_COLUMNS
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.load_kinds import PINS

@@ -8,7 +8,7 @@ from scipy.special import nctdtr
 from scipy.stats import betabinom, lognorm, norm, normaltest, t
 
 from tests.support.views import view
-from tolstat.analysis import capability, exceedance, extreme, prediction
+from tolstat.analysis import binomial, capability, exceedance, extreme, prediction
 from tolstat.common.loads import ALL_LIMITS
 from tolstat.common.tables import Status
 from tolstat.questions.capability import query, rendering
@@ -120,8 +120,8 @@ def test_unresolved_joints_lower_the_yield():
     status[:4] = Status.NOT_SETTLED
     found = capability.capability(loads, status, 89.5)
     assert found.good[0] == pytest.approx(1 - 10 / 96)
-    assert found.good[1] == 1 - exceedance.clopper_pearson(14, 100)[1]
-    assert found.ppm[1] == pytest.approx(1e6 * exceedance.clopper_pearson(10, 100)[0])
+    assert found.good[1] == 1 - binomial.clopper_pearson(14, 100)[1]
+    assert found.ppm[1] == pytest.approx(1e6 * binomial.clopper_pearson(10, 100)[0])
 
 
 def test_dependent_samples_have_no_interval():

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from tests.support import synthetic
 from tolstat.analysis import difference
-from tolstat.analysis.exceedance import clopper_pearson
+from tolstat.analysis.binomial import clopper_pearson
 from tolstat.cli import app
 from tolstat.common.errors import InputError
 from tolstat.common.tables import Simulation, Status

@@ -59,7 +59,7 @@ def test_table_counts_lots_and_predicts_the_next_delivery():
     assert row["without"] == np.mean(by_lot == 0)
     assert row["worst"] == by_lot.max() / 20
     assert row["lower"] < row["estimate"] == above.mean() < row["upper"]
-    law = lots.law_of(by_lot, np.full(40, 20)).delivery(100)
+    law = clustered.law_of(by_lot, np.full(40, 20)).delivery(100)
     assert (row["next_lower"], row["next_upper"]) == law.ends()
     assert row["bad"] == law.more_than(0.1)
     assert "more than 10 %" in rendering.note(found, 0.1)

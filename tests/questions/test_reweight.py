@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from tests.support import synthetic
 from tolstat import sampling, study
-from tolstat.analysis import exceedance, reweight, weighted
+from tolstat.analysis import binomial, exceedance, reweight, weighted
 from tolstat.analysis.reweight import Ratios
 from tolstat.cli import app
 from tolstat.common.errors import InputError
@@ -81,7 +81,7 @@ def misses(factor, n=1024, share=0.05):
         drawn = exceedance.exceedance(loads, np.ones(n, int), level)  # as though they were of the new tolerances
         plain.append(drawn.lower <= share <= drawn.upper)
     usable, above, below, width = np.array(found, dtype=float).T
-    fresh = np.subtract(*exceedance.clopper_pearson(share * n, n)[::-1])
+    fresh = np.subtract(*binomial.clopper_pearson(share * n, n)[::-1])
     some = usable > 0
     return usable.mean(), above[some].mean(), below[some].mean(), width[some].mean() / fresh, np.mean(plain)
 
@@ -139,7 +139,7 @@ def test_a_level_that_no_joint_is_above_needs_a_bound_of_the_ratio():
         found = reweight.share_above(reweight.sort_out(x.sum(axis=1), status, ratios), ratios, level)
         assert (found.estimate, found.lower, found.support.usable) == (0.0, 0.0, usable)
     # the joint that could have been drawn has the weight of the middle of all tolerances
-    assert found.upper > 0.9 * exceedance.clopper_pearson(0, 1024 / 0.8**-ERRORS)[1]
+    assert found.upper > 0.9 * binomial.clopper_pearson(0, 1024 / 0.8**-ERRORS)[1]
 
 
 def test_an_end_of_a_quantile_beyond_the_joints_is_refused():
@@ -159,7 +159,7 @@ def test_lower_ends_are_those_of_shares_that_are_given():
         lower = split.interval(0.95, 10.0)[0][0]
         given = stats.binom.sf(count - 1, 1000, lower) / stats.binom.sf(9, 1000, lower)
         assert given == pytest.approx(0.025, rel=1e-6)
-        assert lower < exceedance.clopper_pearson(count, 1000)[0]
+        assert lower < binomial.clopper_pearson(count, 1000)[0]
 
 
 def test_settings_replace_keys_of_the_errors_they_select(tmp_path):

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from tests.sampling.test_importance import load
 from tests.support import synthetic
-from tolstat.analysis import exceedance, sorting
+from tolstat.analysis import binomial, exceedance, sorting
 from tolstat.cli import app
 from tolstat.common.errors import InputError, StoreError
 from tolstat.questions.sorting import query, section
@@ -50,7 +50,7 @@ def test_an_exact_gauge_gives_what_counting_the_joints_that_are_kept_gives(store
     count = ((force > 700.0) & kept).sum()
     row = stages.loc[query.SCRAPPED]
     assert row["estimate"] == pytest.approx(count / kept.sum())
-    ends = exceedance.clopper_pearson(count, kept.sum())
+    ends = binomial.clopper_pearson(count, kept.sum())
     assert (row["lower"], row["upper"]) == (pytest.approx(ends[0], abs=2e-3), pytest.approx(ends[1], abs=2e-3))
     # all clearances are 0.1 mm, and the gauge of each pin rejects the same share
     passed = norm.cdf(1.0) ** 4 * (errors["pin1.offset_t"] <= 5e-5)[kept].mean()

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 import tolstat
 from tests.support import synthetic
 from tolstat import cli, sampling, study
-from tolstat.analysis import exceedance
+from tolstat.analysis import binomial, exceedance
 from tolstat.common.channels import CHANNELS
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.load_kinds import BUSHINGS, SHAFTS
@@ -107,7 +107,7 @@ def test_the_mean_time_is_covered_where_few_joints_exceed_a_level_and_students_i
     covered, student = [], []
     for top in rng.normal(1.0, 0.5, (SEEDS, 100)):
         time = np.where(top > level, np.arccos(np.clip(level / top, -1, 1)) / np.pi, 0.0)
-        lower, upper = exceedance.clopper_pearson(time.sum(), time.size)
+        lower, upper = binomial.clopper_pearson(time.sum(), time.size)
         covered.append(lower <= truth <= upper)
         student.append(abs(time.mean() - truth) <= 1.98 * time.std(ddof=1) / 10.0)
     least = 0.95 - 3.0 * np.sqrt(0.95 * 0.05 / SEEDS)

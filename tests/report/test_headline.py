@@ -11,7 +11,7 @@ from tests.support import synthetic
 from tests.support.views import view
 from tolstat import report, sampling
 from tolstat.analysis import prediction
-from tolstat.analysis.exceedance import clopper_pearson, needed
+from tolstat.analysis.binomial import clopper_pearson, needed
 from tolstat.analysis.sample_load import SampleLoad
 from tolstat.analysis.weighted import Trust
 from tolstat.cli import app

@@ -12,7 +12,7 @@ import tolstat
 from tests.cli.test_cli import simulate
 from tests.support import fakes, synthetic
 from tolstat import sampling, study
-from tolstat.analysis import exceedance, weighted
+from tolstat.analysis import binomial, exceedance, weighted
 from tolstat.analysis.sample_load import SampleLoad
 from tolstat.analysis.sorted_loads import EXACT
 from tolstat.campaign import extend
@@ -113,7 +113,7 @@ def test_one_in_a_million_is_covered_over_seeds_and_unweighted_it_is_not():
     truth, covered, naive, estimates = norm.sf(BETA), [], [], []
     for seed in range(SEEDS):
         g, w = linear_limit_state(seed, 500)
-        found = weighted.weighted_exceedance(g, np.full(500, Status.OK), w, BETA)
+        found = exceedance.weighted_exceedance(g, np.full(500, Status.OK), w, BETA)
         covered.append(found.lower <= truth <= found.upper)
         estimates.append(found.estimate)
         plain = exceedance.exceedance(g, np.full(500, Status.OK), BETA)
@@ -134,7 +134,7 @@ def test_equal_weights_give_what_joints_that_count_alike_give():
         np.testing.assert_allclose(own[name], theirs[name], atol=1e-12, err_msg=name)
     # a level that no joint is above: a joint as heavy as the heaviest could have been
     heavy = np.where(np.arange(300) == 0, 20.0, 1.0)
-    assert weighted.weighted_exceedance(values, status, heavy, 30.0).upper > 15 * theirs["upper"][-1]
+    assert exceedance.weighted_exceedance(values, status, heavy, 30.0).upper > 15 * theirs["upper"][-1]
     assert not weighted.trust(values, status, heavy, 30.0).usable
     assert weighted.trust(values, status, np.ones(300), 1.0).usable
 
@@ -266,7 +266,7 @@ def test_joints_without_a_load_count_above_for_the_end_whatever_the_proposals_mi
     lost = results["status"] != Status.OK
     count = ((results["F_max"][:, 0] > 700.0) | lost)[own].sum()
     assert (own & lost).sum() > 10
-    assert row["unsearched_upper"] == pytest.approx(exceedance.clopper_pearson(count, own.sum())[1])
+    assert row["unsearched_upper"] == pytest.approx(binomial.clopper_pearson(count, own.sum())[1])
 
 
 @pytest.mark.slow
@@ -275,7 +275,7 @@ def test_the_report_of_importance_sampling_has_both_ends(stored):
         row = exceeded.limits(store.view()).iloc[0]
         own = store.origin()["component"][1:] == 0
         count = (store.results()["F_max"][1:, 0][own] > 700.0).sum()
-    assert row["unsearched_upper"] == pytest.approx(exceedance.clopper_pearson(count, own.sum())[1])
+    assert row["unsearched_upper"] == pytest.approx(binomial.clopper_pearson(count, own.sum())[1])
     assert row["unsearched_upper"] > row["upper"]
     done = CliRunner().invoke(app, ["report", str(stored), "--wide", "--out", str(stored.parent)])
     assert done.exit_code == 0, done.output

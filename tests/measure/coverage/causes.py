@@ -10,7 +10,7 @@ import numpy as np
 
 from tests.measure.coverage.trial import Asked, Experiment, Found, Rng
 from tolstat.analysis import overrepresentation, pick_freeze, regression, sensitivity
-from tolstat.analysis.exceedance import FloatArray
+from tolstat.common.loads import FloatArray
 
 WEIGHTS = np.array([1.0, 0.5, 0.0])
 """Weights of the three errors in the loads."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from tests.measure.coverage.trial import Asked, Experiment, Found, Law, Rng, fresh_share, laws
 from tolstat.analysis import difference, multifidelity
-from tolstat.analysis.exceedance import FloatArray
+from tolstat.common.loads import FloatArray
 from tolstat.analysis.multifidelity import Pairs
 
 SKEW = "means of skew loads: Student's interval is symmetric"

@@ -23,7 +23,7 @@ from tolstat.analysis import (
     sorted_loads,
     strength,
 )
-from tolstat.analysis.exceedance import FloatArray
+from tolstat.common.loads import FloatArray
 from tolstat.common.tables import Status
 
 SHARES, QUANTILES = (0.5, 0.05, 0.002), (0.5, 0.9, 0.99)
@@ -138,7 +138,7 @@ def _equivalent(exponent: float, n: int) -> Experiment:
         loads = damage.equivalent_load(counted, exponent)[:, 0]
         found = []
         for share in (0.5, 0.9):
-            own, truth = quantile.quantile(loads, ok(n), share), float(known.ppf(share))
+            own, truth = exceedance.quantile(loads, ok(n), share), float(known.ppf(share))
             found.append(Found(own.lower, own.upper, truth * (1.0 + 0.5**exponent) ** (1.0 / exponent)))
         return found
 

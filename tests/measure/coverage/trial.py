@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.analysis.exceedance import clopper_pearson
+from tolstat.analysis.binomial import clopper_pearson
 from tolstat.common.tables import Status
 
 FloatArray = NDArray[np.float64]

@@ -10,7 +10,7 @@ import numpy as np
 
 from tests.measure.coverage.trial import Asked, Experiment, Found, Law, Rng, fresh_share, ok
 from tolstat.analysis import allocation, exceedance, known_share, process, reweight, weighted
-from tolstat.analysis.exceedance import FloatArray
+from tolstat.common.loads import FloatArray
 from tolstat.analysis.known_share import Event, Mixture
 from tolstat.analysis.process import Known, Sums
 from tolstat.analysis.reweight import Ratios
@@ -251,7 +251,7 @@ def _of_proposal(own: _Proposal) -> Experiment:
         of_tolerances = exceedance.exceedance(loads[m:], ok(own.n - m), own.level)
         told = [Found(-np.inf, of_tolerances.outer_upper, own.share)]
         if own.searched:
-            found = weighted.weighted_exceedance(loads, ok(own.n), weights, own.level, heaviest=1.0 / kept)
+            found = exceedance.weighted_exceedance(loads, ok(own.n), weights, own.level, heaviest=1.0 / kept)
             trust = weighted.trust(loads, ok(own.n), weights, own.level, 1.0 / kept)
             told.append(Found(found.lower, found.upper, own.share, trust.usable))
         return told
@@ -283,7 +283,7 @@ def _known(load: Load, parts: int, n: int, share: float) -> Experiment:
         above = load.of(np.concatenate(list(errors), axis=1)) > level
         (split,) = known_share.tallies(sums, known, drawn, weights, [Event(above, np.ones(n, dtype=bool))])
         found = known_share.intervals(split, [split], [split], usable)
-        stated = weighted.weighted_exceedance(above, ok(n), weights, 0.5, heaviest=1.0 / TOLERANCES)
+        stated = exceedance.weighted_exceedance(above, ok(n), weights, 0.5, heaviest=1.0 / TOLERANCES)
         return [Found(found.lower, found.upper, share), Found(stated.lower, stated.upper, share)]
 
     case = f"{load.name} of {ERRORS} errors, {parts} parts, {share:g}"

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm, qmc
 
-from tolstat.analysis import exceedance, replicates, sorted_loads
+from tolstat.analysis import binomial, exceedance, replicates, sorted_loads
 
 SEEDS, REPLICATES, JOINTS = 600, 4, 64
 
@@ -22,14 +22,14 @@ def shares():
 
 def test_interval_covers_over_seeds_and_a_normal_one_does_not(shares):
     truth, slack = norm.sf(2.0 / np.sqrt(5.0)), 3.0 * np.sqrt(0.95 * 0.05 / SEEDS)
-    found = replicates.interval(shares.T)
+    found = replicated.interval(shares.T)
     assert np.mean((found.lower <= truth) & (found.upper >= truth)) == pytest.approx(0.95, abs=slack)
     half = 1.96 * shares.std(axis=1, ddof=1) / np.sqrt(REPLICATES)
     assert np.mean(np.abs(shares.mean(axis=1) - truth) <= half) < 0.95 - slack
 
 
 def test_shares_stay_between_none_and_all():
-    found = replicates.interval([[0.0, 0.2], [0.02, 0.21], [0.0, 0.19]], least=0.0, most=1.0)
+    found = replicated.interval([[0.0, 0.2], [0.02, 0.21], [0.0, 0.19]], least=0.0, most=1.0)
     assert found.lower[0] == 0.0
     assert found.n == 3
     assert found.estimate == pytest.approx([0.02 / 3, 0.2])
@@ -38,20 +38,20 @@ def test_shares_stay_between_none_and_all():
 
 
 def test_replicates_of_no_event_are_no_fault():
-    assert float(replicates.interval([0.0, 0.0, 0.0], least=0.0, most=1.0).upper) == 0.0
+    assert float(replicated.interval([0.0, 0.0, 0.0], least=0.0, most=1.0).upper) == 0.0
 
 
 def test_estimates_of_any_kind():
     status = np.ones(50)
     shares = [exceedance.exceedance(np.random.default_rng(s).normal(size=50), status, 1.0).estimate for s in range(5)]
-    found = replicates.interval(shares)
+    found = replicated.interval(shares)
     assert found.lower < np.mean(shares) < found.upper
 
 
 @pytest.mark.parametrize("estimates", [[0.1], [[1.0, 2.0]], [[1.0, 2.0], [1.0, 2.0]]])
 def test_too_few_and_equal_replicates_are_refused(estimates):
     with pytest.raises(ValueError, match=r"sampling\.seed"):
-        replicates.interval(estimates)
+        replicated.interval(estimates)
 
 
 def loads_of(seed, joints, number):
@@ -72,8 +72,8 @@ def test_shares_and_quantiles_of_blocks_cover_over_seeds(share):
     for seed in range(150):
         loads = loads_of(seed, 1024, 8)
         whole, parts = sample_of(loads), [sample_of(block) for block in np.split(loads, 8)]
-        row = replicates.curve_of(whole, parts, [level])[0]
-        quantile = replicates.quantile_of(whole, parts, 1.0 - share)
+        row = replicated.curve_of(whole, parts, [level])[0]
+        quantile = replicated.quantile_of(whole, parts, 1.0 - share)
         found.append([row["lower"] <= share <= row["upper"], quantile.lower <= level <= quantile.upper])
         few.append(exceedance.curve_of(whole, [level])["upper"][0] - row["upper"])
     assert np.mean(found, axis=0).min() >= 0.95 - 3.0 * np.sqrt(0.95 * 0.05 / 150)
@@ -83,7 +83,7 @@ def test_shares_and_quantiles_of_blocks_cover_over_seeds(share):
 def test_no_joint_above_in_any_block_does_not_mean_none():
     loads = np.arange(800.0) % 100
     whole, parts = sample_of(loads), [sample_of(block) for block in np.split(loads, 8)]
-    row = replicates.curve_of(whole, parts, [99.0])[0]
+    row = replicated.curve_of(whole, parts, [99.0])[0]
     assert (row["estimate"], row["lower"]) == (0.0, 0.0)
-    assert row["upper"] == exceedance.clopper_pearson(0, 800)[1]
+    assert row["upper"] == binomial.clopper_pearson(0, 800)[1]
     assert row["outer_upper"] >= row["upper"]

@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import beta, betabinom, norm
 from scipy.stats import t as student
 
-from tolstat.analysis import exceedance, lots, prediction, sorted_loads
+from tolstat.analysis import clustered, prediction
 from tolstat.common.tables import Status
 
 RNG = np.random.default_rng(5)
@@ -18,7 +18,7 @@ def of_beta(share, correlation, number, joints, rng=RNG):
 
 def test_interval_is_students_t_on_the_logit_of_the_mean():
     above = np.tile([0, 2, 5], 12)
-    found = lots.interval(above, np.full(36, 20))
+    found = clustered.interval(above, np.full(36, 20))
     shares = above / 20
     p, error = shares.mean(), shares.std(ddof=1) / 6.0
     half = student.ppf(0.975, 35) * error / (p * (1 - p))
@@ -27,39 +27,39 @@ def test_interval_is_students_t_on_the_logit_of_the_mean():
 
 
 def test_fewer_than_thirty_lots_have_no_interval_and_lots_without_a_bad_joint_have_an_upper_end():
-    assert np.isnan(lots.interval([1] * 29, [20] * 29).upper)
-    found = lots.interval([0] * 50, [20] * 50)
+    assert np.isnan(clustered.interval([1] * 29, [20] * 29).upper)
+    found = clustered.interval([0] * 50, [20] * 50)
     assert (found.lower, found.upper) == (0.0, pytest.approx(1.0 - 0.025 ** (1 / 50)))
-    found = lots.interval([20] * 50, [20] * 50)
+    found = clustered.interval([20] * 50, [20] * 50)
     assert (found.lower, found.upper) == (pytest.approx(0.025 ** (1 / 50)), 1.0)
 
 
 def test_interval_covers_where_few_lots_have_the_bad_joints():
     rng = np.random.default_rng(7)
     above = np.stack([of_beta(0.02, 0.2, 50, 20, rng) for _ in range(800)], axis=1)
-    found = lots.interval(above, np.full(50, 20))
+    found = clustered.interval(above, np.full(50, 20))
     assert np.mean(found.upper < 0.02) < 0.01  # with Student's t alone 0.06 to 0.08
     assert np.mean(found.lower > 0.02) < 0.035
     assert np.median(found.upper - found.lower) < 0.08  # and yet it says something
-    one = lots.interval(above[:, 3], [20] * 50)
+    one = clustered.interval(above[:, 3], [20] * 50)
     assert (one.lower, one.upper) == pytest.approx((found.lower[3], found.upper[3]), rel=0.05)
 
 
 def test_correlation_is_one_for_lots_of_one_kind_and_zero_where_lots_are_alike():
-    assert lots.interval([0, 20] * 20, [20] * 40).correlation == 1.0
-    assert abs(lots.interval(RNG.binomial(20, 0.3, 4000), [20] * 4000).correlation) < 0.01
+    assert clustered.interval([0, 20] * 20, [20] * 40).correlation == 1.0
+    assert abs(clustered.interval(RNG.binomial(20, 0.3, 4000), [20] * 4000).correlation) < 0.01
     sizes = RNG.integers(5, 30, 8000)
-    found = lots.interval(RNG.binomial(sizes, RNG.beta(1.0, 3.0, 8000)), sizes)
+    found = clustered.interval(RNG.binomial(sizes, RNG.beta(1.0, 3.0, 8000)), sizes)
     assert found.correlation == pytest.approx(0.2, abs=0.02)  # 1 / (a + b + 1)
 
 
 def test_interval_covers_where_that_of_independent_joints_does_not():
     seeds, share = 2000, 0.1
     above = np.array([of_beta(share, 0.2, 50, 20) for _ in range(seeds)]).T
-    found = lots.interval(above, np.full(50, 20))
+    found = clustered.interval(above, np.full(50, 20))
     covered = np.mean((found.lower <= share) & (share <= found.upper))
     assert 0.925 < covered < 0.975
-    low, high = exceedance.clopper_pearson(above.sum(axis=0), 1000)
+    low, high = binomial.clopper_pearson(above.sum(axis=0), 1000)
     assert np.mean((low <= share) & (share <= high)) < 0.8
 
 
@@ -74,7 +74,7 @@ def test_curve_counts_joints_without_a_load_both_ways_and_parts_of_lots():
     assert row["outer_lower"] < row["lower"] < row["estimate"] < row["upper"] < row["outer_upper"]
     n = np.array([part.n for part in parts])
     most = np.bincount(lot, (values > 1.0) | (status == Status.NEWTON_FAILED))
-    assert row["outer_upper"] == pytest.approx(float(lots.interval(most, n).upper))
+    assert row["outer_upper"] == pytest.approx(float(clustered.interval(most, n).upper))
 
 
 def test_quantile_inverts_the_curve():
@@ -90,7 +90,7 @@ def test_quantile_inverts_the_curve():
 
 
 def test_prediction_of_many_lots_is_the_law_itself_and_deliveries_of_several_lots_scatter_less():
-    law = lots.law_of(of_beta(0.2, 0.25, 5000, 20), np.full(5000, 20))
+    law = clustered.law_of(of_beta(0.2, 0.25, 5000, 20), np.full(5000, 20))
     exact = betabinom(60, 0.6, 2.4)
     assert np.abs(law.delivery(60).probability - exact.pmf(np.arange(61))).max() < 0.004
     assert law.delivery(60).more_than(0.5) == pytest.approx(exact.sf(30), abs=0.01)
@@ -104,8 +104,8 @@ def test_prediction_of_many_lots_is_the_law_itself_and_deliveries_of_several_lot
 
 
 def test_prediction_of_few_lots_is_wider_and_none_bad_leaves_room():
-    few, many = (lots.law_of([0, 2, 4, 1, 0] * times, [20] * 5 * times) for times in (6, 200))
+    few, many = (clustered.law_of([0, 2, 4, 1, 0] * times, [20] * 5 * times) for times in (6, 200))
     assert few.delivery(500).ends()[1] > many.delivery(500).ends()[1]
-    none = lots.law_of([0] * 50, [20] * 50).delivery(500)
+    none = clustered.law_of([0] * 50, [20] * 50).delivery(500)
     assert none.ends()[0] == 0.0
     assert none.ends()[1] == prediction.of_counts(0, 0, 1000, 500)[1] > 0.0

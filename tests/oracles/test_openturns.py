@@ -110,7 +110,7 @@ def test_profile_likelihood_of_the_shape(shape):
 def test_profile_likelihood_of_the_shape_of_a_heavy_tail():
     """OpenTURNS' upper end is 0.70, ours is 0.82: beyond, its maximum over the scale is not found.
 
-    There its profile likelihood is lower than the likelihood of scales that it should have tried. So it was in 11 of 20
+    There its profile likelihood is lower than the likelihood of scales that it should have tried. So it was in 10 of 20
     samples of 5000 with shapes of 0.3 and 0.5; in two of them not even the estimate was in the interval.
     """
     loads = loads_of(0.5, 5000, 3)

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from tolstat.analysis import bounded_mean
-from tolstat.analysis.bounded_mean import interval
 from tolstat.analysis.binomial import clopper_pearson
+from tolstat.analysis.bounded_mean import interval
 
 SEEDS = 150
 LAWS = {

@@ -6,6 +6,9 @@ from scipy.stats import beta, betabinom, norm
 from scipy.stats import t as student
 
 from tolstat.analysis import clustered, prediction
+from tolstat.analysis.binomial import clopper_pearson
+from tolstat.analysis.clustered import Clustered
+from tolstat.analysis.sample import Sample
 from tolstat.common.tables import Status
 
 RNG = np.random.default_rng(5)
@@ -59,7 +62,7 @@ def test_interval_covers_where_that_of_independent_joints_does_not():
     found = clustered.interval(above, np.full(50, 20))
     covered = np.mean((found.lower <= share) & (share <= found.upper))
     assert 0.925 < covered < 0.975
-    low, high = binomial.clopper_pearson(above.sum(axis=0), 1000)
+    low, high = clopper_pearson(above.sum(axis=0), 1000)
     assert np.mean((low <= share) & (share <= high)) < 0.8
 
 
@@ -68,23 +71,22 @@ def test_curve_counts_joints_without_a_load_both_ways_and_parts_of_lots():
     lot, values = np.repeat(np.arange(40), 20)[7:], loads.ravel()[7:]  # a slice cuts the first lot
     status = np.full(values.size, int(Status.OK))
     status[:30] = Status.NEWTON_FAILED
-    parts = [sorted_loads.sort_out(values[lot == k], status[lot == k]) for k in range(40)]
-    row = lots.curve_of(sorted_loads.sort_out(values, status), parts, [1.0])[0]
+    load = Sample.of(values, status, Clustered(lot))
+    row = load.curve([1.0])[0]
     assert row["estimate"] == np.mean(values[30:] > 1.0)
     assert row["outer_lower"] < row["lower"] < row["estimate"] < row["upper"] < row["outer_upper"]
-    n = np.array([part.n for part in parts])
+    n = np.bincount(lot)
     most = np.bincount(lot, (values > 1.0) | (status == Status.NEWTON_FAILED))
     assert row["outer_upper"] == pytest.approx(float(clustered.interval(most, n).upper))
 
 
 def test_quantile_inverts_the_curve():
     loads = RNG.standard_normal((50, 20))
-    parts = [sorted_loads.sort_out(own, np.ones(20)) for own in loads]
-    whole = sorted_loads.sort_out(loads.ravel(), np.ones(1000))
-    found = lots.quantile_of(whole, parts, 0.9)
+    load = Sample.of(loads.ravel(), np.ones(1000), Clustered(np.repeat(np.arange(50), 20)))
+    found = load.quantile(0.9)
     assert found.lower < found.estimate < found.upper
-    ends = lots.curve_of(whole, parts, [found.lower, found.upper])
-    assert ends["lower"][0] < 0.1 <= lots.curve_of(whole, parts, [np.nextafter(found.lower, -9.0)])["lower"][0]
+    ends = load.curve([found.lower, found.upper])
+    assert ends["lower"][0] < 0.1 <= load.curve([np.nextafter(found.lower, -9.0)])["lower"][0]
     assert ends["upper"][1] <= 0.1
     assert abs(found.estimate - norm.ppf(0.9)) < 0.2
 

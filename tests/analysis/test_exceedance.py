@@ -6,7 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import binom, binomtest, norm
 
-from tolstat.analysis import binomial, exceedance, quantile
+from tolstat.analysis import binomial, exceedance
+from tolstat.analysis.sample import Sample
 from tolstat.common.tables import Status
 
 N_SEEDS = 1500
@@ -142,7 +143,7 @@ def test_no_joint_at_all():
     share = exceedance.exceedance([], [], 1.0)
     assert np.isnan(share.estimate)
     assert (share.lower, share.upper, share.bound_lower, share.bound_upper) == (0.0, 1.0, 0.0, 1.0)
-    assert exceedance.curve([np.nan], [Status.PENDING]).size == 0
+    assert Sample.of([np.nan], [Status.PENDING]).curve().size == 0
 
 
 @given(
@@ -152,7 +153,7 @@ def test_no_joint_at_all():
 @settings(max_examples=60, deadline=None)
 def test_curve_agrees_with_counting_and_falls(rows, level):
     values, status = (np.array(column) for column in zip(*rows, strict=True))
-    table = exceedance.curve(values, status)
+    table = Sample.of(values, status).curve()
     assert list(table["level"]) == sorted(set(values[status == Status.OK]))
     assert np.all(np.diff(table["count"]) < 0)
     share = exceedance.exceedance(values, status, level)
@@ -193,7 +194,8 @@ def test_quantile_upper_end_needs_the_number_of_joints_wilks_gives(share, confid
 @settings(max_examples=200, deadline=None)
 def test_ranks_of_the_interval_are_the_outermost_that_scipys_binomial_allows(n, share, confidence):
     at_most = binom.cdf(np.arange(-1, n + 1), n, share)  # P(B <= k), k = -1 .. n
-    low, high = quantile._interval_ranks(n, share, confidence)
+    found = exceedance.quantile(np.arange(n), np.ones(n), share, confidence)
+    low, high = (0 if found.lower < 0 else int(found.lower) + 1, n + 1 if found.upper > n else int(found.upper) + 1)
     tail = 0.5 * (1 - confidence)
     assert at_most[low] <= tail * (1 + 1e-9)  # P(B < low)
     assert at_most[low + 1] > tail * (1 - 1e-9)
@@ -229,7 +231,7 @@ def test_analysis_needs_no_file_and_no_figure():
     import sys
 
     code = (
-        "import sys, tolstat.analysis.exceedance, tolstat.analysis.quantile;"
+        "import sys, tolstat.analysis.exceedance, tolstat.analysis.clustered;"
         "print(sorted({'h5py', 'matplotlib', 'pandas', 'tolstat.store'} & set(sys.modules)))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

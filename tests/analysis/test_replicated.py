@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 from scipy.stats import norm, qmc
 
-from tolstat.analysis import binomial, exceedance, replicates, sorted_loads
+from tolstat.analysis import binomial, exceedance, replicated
+from tolstat.analysis.replicated import Replicated
+from tolstat.analysis.sample import Sample
 
 SEEDS, REPLICATES, JOINTS = 600, 4, 64
 
@@ -62,7 +64,7 @@ def loads_of(seed, joints, number):
 
 
 def sample_of(values):
-    return sorted_loads.sort_out(values, np.ones(len(values), int))
+    return Sample.of(values, np.ones(len(values)), Replicated(len(values), 8, "sobol"))
 
 
 @pytest.mark.slow
@@ -70,20 +72,16 @@ def sample_of(values):
 def test_shares_and_quantiles_of_blocks_cover_over_seeds(share):
     level, found, few = norm.isf(share) * np.sqrt(5.0), [], []
     for seed in range(150):
-        loads = loads_of(seed, 1024, 8)
-        whole, parts = sample_of(loads), [sample_of(block) for block in np.split(loads, 8)]
-        row = replicated.curve_of(whole, parts, [level])[0]
-        quantile = replicated.quantile_of(whole, parts, 1.0 - share)
-        found.append([row["lower"] <= share <= row["upper"], quantile.lower <= level <= quantile.upper])
-        few.append(exceedance.curve_of(whole, [level])["upper"][0] - row["upper"])
+        load = sample_of(loads_of(seed, 1024, 8))
+        row, quantile = load.above(level), load.quantile(1.0 - share)
+        found.append([row.lower <= share <= row.upper, quantile.lower <= level <= quantile.upper])
+        few.append(exceedance.exceedance(load.values, load.status, level).upper - row.upper)
     assert np.mean(found, axis=0).min() >= 0.95 - 3.0 * np.sqrt(0.95 * 0.05 / 150)
     assert (np.mean(few) > 0) == (share == 0.2)  # narrower than those of independent joints, where joints are many
 
 
 def test_no_joint_above_in_any_block_does_not_mean_none():
     loads = np.arange(800.0) % 100
-    whole, parts = sample_of(loads), [sample_of(block) for block in np.split(loads, 8)]
-    row = replicated.curve_of(whole, parts, [99.0])[0]
-    assert (row["estimate"], row["lower"]) == (0.0, 0.0)
-    assert row["upper"] == binomial.clopper_pearson(0, 800)[1]
-    assert row["outer_upper"] >= row["upper"]
+    row = sample_of(loads).above(99.0)
+    assert (row.estimate, row.lower) == (0.0, 0.0)
+    assert row.upper == row.outer_upper == binomial.clopper_pearson(0, 800)[1]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from tolstat.analysis import binomial, exceedance, sequential
+from tolstat.analysis import binomial, sequential
 from tolstat.analysis.sequential import Scheme
 
 WIDTH, JOINTS = 0.1, 1000

@@ -15,7 +15,7 @@ from tests.campaign.test_campaign import datasets
 from tests.support import fakes, synthetic
 from tests.support.synthetic import HEAD
 from tolstat import cli, report, study
-from tolstat.analysis import binomial, exceedance, quantile, sequential
+from tolstat.analysis import binomial, exceedance, sequential
 from tolstat.campaign import plan, stop_rule
 from tolstat.campaign import run as campaign
 from tolstat.common.errors import InputError

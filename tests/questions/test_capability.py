@@ -8,7 +8,7 @@ from scipy.special import nctdtr
 from scipy.stats import betabinom, lognorm, norm, normaltest, t
 
 from tests.support.views import view
-from tolstat.analysis import binomial, capability, exceedance, extreme, prediction
+from tolstat.analysis import binomial, capability, extreme, prediction
 from tolstat.common.loads import ALL_LIMITS
 from tolstat.common.tables import Status
 from tolstat.questions.capability import query, rendering

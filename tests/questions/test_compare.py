@@ -11,6 +11,8 @@ from typer.testing import CliRunner
 from tests.support import synthetic
 from tolstat.analysis import difference
 from tolstat.analysis.binomial import clopper_pearson
+from tolstat.analysis.listed import Listed
+from tolstat.analysis.sample import Sample
 from tolstat.cli import app
 from tolstat.common.errors import InputError
 from tolstat.common.tables import Simulation, Status
@@ -27,6 +29,11 @@ def pairs(n, seeds=SEEDS):
     return zip(np.exp(z[:, 0]), 1.1 * np.exp(0.8 * z[:, 0] + 0.6 * z[:, 1]), strict=True)
 
 
+def loads(values, design=None):
+    """Sample of loads; a joint with NaN has failed."""
+    return Sample.of(values, np.ones(len(values)), design)
+
+
 def truth(share=None, level=None):
     if share is not None:
         return 0.1 * np.exp(norm.ppf(share))
@@ -38,8 +45,9 @@ def test_paired_differences_cover_over_seeds_and_a_walds_interval_of_rare_shares
     monkeypatch.setattr(difference, "RESAMPLES", 200)
     level, covered, wald = 16.0, [], []  # one in some 300 joints
     for a, b in pairs(200):
-        share, q = difference.shares(a, b, [level], True), difference.quantiles(a, b, 0.7, True)
-        mean = difference.means(a, b, True)
+        one, other = loads(a), loads(b)
+        share, q = difference.shares(one, other, [level], True), difference.quantiles(one, other, 0.7, True)
+        mean = difference.means(one, other, True)
         covered.append(
             [
                 share.lower[0] <= truth(level=level) <= share.upper[0],
@@ -62,7 +70,7 @@ def test_pairs_that_often_change_sides_are_covered_and_independent_changes_are_n
     for numbers in rng.multinomial(n, [up, down, 1.0 - up - down], SEEDS):
         a = np.repeat([1.0, 3.0, 1.0], numbers)
         b = np.repeat([3.0, 1.0, 1.0], numbers)
-        found = difference.shares(a, b, [2.0], True)
+        found = difference.shares(loads(a), loads(b), [2.0], True)
         covered.append(found.lower[0] <= up - down <= found.upper[0])
         p, q = numbers[1] / n, numbers[0] / n
         length = float(found.upper[0] - found.lower[0])
@@ -76,7 +84,8 @@ def test_pairs_that_often_change_sides_are_covered_and_independent_changes_are_n
 def test_unpaired_differences_cover_and_neglecting_one_side_does_not():
     level, covered, half = 3.0, [], []
     for (a, _), (_, b) in zip(pairs(200), [*pairs(200)][1:], strict=False):
-        share, q = difference.shares(a, b, [level], False), difference.quantiles(a, b, 0.8, False)
+        one, other = loads(a), loads(b)
+        share, q = difference.shares(one, other, [level], False), difference.quantiles(one, other, 0.8, False)
         covered.append([share.lower[0] <= truth(level=level) <= share.upper[0], q.lower <= truth(share=0.8) <= q.upper])
         low, high = clopper_pearson(np.sum(b > level), b.size)
         half.append(low - np.mean(a > level) <= truth(level=level) <= high - np.mean(a > level))
@@ -86,29 +95,30 @@ def test_unpaired_differences_cover_and_neglecting_one_side_does_not():
 
 def test_tests_and_means_are_scipys():
     a, b = next(pairs(400))
-    share = difference.shares(a, b, [2.0, 5.0], True)
+    share = difference.shares(loads(a), loads(b), [2.0, 5.0], True)
     for i, level in enumerate((2.0, 5.0)):
         only = (int(np.sum((b > level) & (a <= level))), int(np.sum((a > level) & (b <= level))))
         assert (share.only_b[i], share.only_a[i]) == only
         assert share.p[i] == pytest.approx(binomtest(only[0], sum(only)).pvalue)
         assert share.estimate[i] == pytest.approx(np.mean(b > level) - np.mean(a > level))
     for paired, test in ((True, ttest_rel(b, a)), (False, ttest_ind(b, a, equal_var=False))):
-        found, theirs = difference.means(a, b, paired), test.confidence_interval()
+        found, theirs = difference.means(loads(a), loads(b), paired), test.confidence_interval()
         assert (found.lower, found.upper) == pytest.approx((theirs.low, theirs.high))
 
 
 def test_joints_without_a_load_are_bounds_and_dependent_samples_have_no_interval():
     a, b = np.array([1.0, 2.0, np.nan, 4.0]), np.array([1.0, 3.0, 3.0, np.nan])
-    found = difference.shares(a, b, [2.5], True)
+    found = difference.shares(loads(a), loads(b), [2.5], True)
     assert (found.n, found.estimate[0]) == (2, 0.5)
     assert (found.bound_lower[0], found.bound_upper[0]) == (0.5 - 0.5, 0.75 - 0.25)
     assert found.outer_lower[0] < 0.0 < found.bound_upper[0] < found.outer_upper[0]
-    assert np.isnan(difference.shares(a, b, [2.5], True, iid=False).outer_upper[0])
-    assert np.isnan(difference.quantiles(a, b, 0.5, True, iid=False).lower)
+    one, other = (loads(values, Listed("sobol")) for values in (a, b))
+    assert np.isnan(difference.shares(one, other, [2.5], True).outer_upper[0])
+    assert np.isnan(difference.quantiles(one, other, 0.5, True).lower)
     with pytest.raises(ValueError, match="not those of pairs"):
-        difference.shares(a, b[:2], [2.5], True)
+        difference.shares(loads(a), loads(b[:2]), [2.5], True)
     with pytest.raises(ValueError, match="no joint with a valid load"):
-        difference.means(a[2:3], b, False)
+        difference.means(loads(a[2:3]), loads(b), False)
 
 
 def campaign(folder, name, text=synthetic.STUDY, n=400, factor=1.0):

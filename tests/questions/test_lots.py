@@ -11,7 +11,7 @@ import tolstat
 from tests.support import fakes, synthetic
 from tests.support.views import view
 from tolstat import sampling
-from tolstat.analysis import allocation, exceedance, lots
+from tolstat.analysis import allocation, clustered, exceedance
 from tolstat.campaign import stop_rule
 from tolstat.campaign.extend import merge
 from tolstat.cli import app
@@ -82,8 +82,8 @@ def test_joints_without_a_load_count_both_ways():
 
 def test_joints_that_share_lots_are_not_independent_anywhere():
     made = of_lots()
-    assert not made.iid
-    assert made.has_intervals
+    assert not made.design.has_interval("mean")
+    assert made.design.has_interval("share")
     load = made.load("cross1.F")
     independent = exceedance.exceedance(load.values, load.status, 700.0)
     assert load.above(700.0).lower != independent.lower
@@ -105,7 +105,7 @@ def test_what_needs_independent_joints_is_refused(tmp_path):
 
 def test_halves_are_of_whole_lots():
     lot = np.repeat(np.arange(7), 5)[3:]
-    searched, checked = allocation.halves(len(lot), 100, lot)
+    searched, checked = allocation.halves(lot, 100)
     assert set(lot[searched]) == {0, 2, 4, 6}
     assert set(lot[checked]) == {1, 3, 5}
 

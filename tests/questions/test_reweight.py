@@ -13,6 +13,7 @@ from tests.support import synthetic
 from tolstat import sampling, study
 from tolstat.analysis import binomial, exceedance, reweight, weighted
 from tolstat.analysis.reweight import Ratios
+from tolstat.analysis.sample import Sample
 from tolstat.cli import app
 from tolstat.common.errors import InputError
 from tolstat.common.tables import Simulation, Status
@@ -76,7 +77,7 @@ def misses(factor, n=1024, share=0.05):
     for _ in range(SEEDS):
         x = rng.standard_normal((n, ERRORS))
         ratios, loads = ratios_of(x, factor), x.sum(axis=1)
-        own = reweight.share_above(reweight.sort_out(loads, np.ones(n, int), ratios), ratios, level)
+        own = reweight.share_above(Sample.of(loads, np.ones(n, int)), ratios, level)
         found.append([own.support.usable, own.lower > share, own.upper < share, own.upper - own.lower])
         drawn = exceedance.exceedance(loads, np.ones(n, int), level)  # as though they were of the new tolerances
         plain.append(drawn.lower <= share <= drawn.upper)
@@ -103,7 +104,7 @@ def test_quantiles_cover_over_seeds():
     for _ in range(SEEDS):
         x = rng.standard_normal((1024, ERRORS))
         ratios = ratios_of(x, 1.1)
-        found = reweight.quantile(reweight.sort_out(x.sum(axis=1), np.ones(1024, int), ratios), ratios, 0.9)
+        found = reweight.quantile(Sample.of(x.sum(axis=1), np.ones(1024, int)), ratios, 0.9)
         missed += [[found.lower > truth, found.upper < truth]] * found.usable
     assert len(missed) >= 0.9 * SEEDS
     assert np.mean(missed, axis=0).max() <= 0.025 + 3.0 * np.sqrt(0.025 * 0.975 / SEEDS)
@@ -111,7 +112,7 @@ def test_quantiles_cover_over_seeds():
 
 def test_shares_of_the_same_tolerances_are_those_of_the_joints():
     ratios, loads = Ratios(np.ones(200), heaviest=1.0), np.arange(200.0)
-    sample = reweight.sort_out(loads, np.ones(200, int), ratios)
+    sample = Sample.of(loads, np.ones(200, int))
     for level in (179.5, 199.5, -1.0):  # twenty joints, none and all above
         found, plain = (
             reweight.share_above(sample, ratios, level),
@@ -126,7 +127,7 @@ def test_wider_tolerances_are_refused_however_many_joints_happen_to_be_above():
     x = np.random.default_rng(5).standard_normal((4096, ERRORS))
     wide, loads = ratios_of(x, 1.3), x.sum(axis=1)
     assert wide.effective > reweight.LEAST_ESS  # 162 of 4096 joints, and yet a few decide
-    found = reweight.share_above(reweight.sort_out(loads, np.ones(4096, int), wide), wide, 0.0)
+    found = reweight.share_above(Sample.of(loads, np.ones(4096, int)), wide, 0.0)
     assert min(found.support.above, found.support.below) > 20
     assert not found.support.usable
 
@@ -136,7 +137,7 @@ def test_a_level_that_no_joint_is_above_needs_a_bound_of_the_ratio():
     level, status = x.sum(axis=1).max(), np.ones(1024, int)
     for factor, usable in ((1.1, False), (0.8, True)):
         ratios = ratios_of(x, factor)
-        found = reweight.share_above(reweight.sort_out(x.sum(axis=1), status, ratios), ratios, level)
+        found = reweight.share_above(Sample.of(x.sum(axis=1), status), ratios, level)
         assert (found.estimate, found.lower, found.support.usable) == (0.0, 0.0, usable)
     # the joint that could have been drawn has the weight of the middle of all tolerances
     assert found.upper > 0.9 * binomial.clopper_pearson(0, 1024 / 0.8**-ERRORS)[1]
@@ -145,7 +146,7 @@ def test_a_level_that_no_joint_is_above_needs_a_bound_of_the_ratio():
 def test_an_end_of_a_quantile_beyond_the_joints_is_refused():
     x = np.random.default_rng(7).standard_normal((1024, ERRORS))
     ratios = ratios_of(x, 1.1)
-    sample = reweight.sort_out(x.sum(axis=1), np.ones(1024, int), ratios)
+    sample = Sample.of(x.sum(axis=1), np.ones(1024, int))
     assert reweight.quantile(sample, ratios, 0.9).usable
     far = reweight.quantile(sample, ratios, 0.98)
     assert reweight.support(sample, ratios, far.estimate).above >= reweight.LEAST_BESIDE

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from tests.sampling.test_importance import load
 from tests.support import synthetic
-from tolstat.analysis import binomial, exceedance, sorting
+from tolstat.analysis import binomial, sorting
 from tolstat.cli import app
 from tolstat.common.errors import InputError, StoreError
 from tolstat.questions.sorting import query, section

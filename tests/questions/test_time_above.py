@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 import tolstat
 from tests.support import synthetic
 from tolstat import cli, sampling, study
-from tolstat.analysis import binomial, exceedance
+from tolstat.analysis import binomial
 from tolstat.common.channels import CHANNELS
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.load_kinds import BUSHINGS, SHAFTS

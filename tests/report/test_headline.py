@@ -12,8 +12,7 @@ from tests.support.views import view
 from tolstat import report, sampling
 from tolstat.analysis import prediction
 from tolstat.analysis.binomial import clopper_pearson, needed
-from tolstat.analysis.sample_load import SampleLoad
-from tolstat.analysis.weighted import Trust
+from tolstat.analysis.sample import Sample
 from tolstat.cli import app
 from tolstat.common.tables import RESULT, Simulation, Status
 from tolstat.display.asked import Asked
@@ -217,16 +216,15 @@ def test_the_joint_verdict_covers_joints_without_a_load():
 @pytest.mark.parametrize(("accepted", "answer"), [(0.02, "no"), (0.5, "none")])
 def test_where_the_weights_support_no_joint_share_one_limit_can_only_be_missed(monkeypatch, accepted, answer):
     made = apart(100)
-    supports = SampleLoad.supports
-    monkeypatch.setattr(SampleLoad, "supports", lambda self, level: self.name != "all limits" and supports(self, level))
-    monkeypatch.setattr(SampleLoad, "trust", lambda self, level: Trust(1.0, 0.9, False))
+    few = "few joints have most of the weight above it: 1 effective joints"
+    monkeypatch.setattr(Sample, "doubt", lambda self, level: few if self.name == "all limits" else "")
     found = headline.headline(made, accepted)
     assert found.answer == answer
     if answer == "no":
         assert "exceed 700 N on cross1.F" in found.words
         assert found.notes[-1].startswith("No share of the joints that exceed at least one limit: few joints")
     else:
-        assert "few joints have most of the weight above any limit" in found.words
+        assert "above any limit few joints have most of the weight" in found.words
 
 
 def test_of_limits_that_are_exceeded_equally_often_the_leading_load_is_named_and_marked():

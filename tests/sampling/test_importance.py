@@ -12,9 +12,9 @@ import tolstat
 from tests.cli.test_cli import simulate
 from tests.support import fakes, synthetic
 from tolstat import sampling, study
-from tolstat.analysis import binomial, exceedance, weighted
-from tolstat.analysis.sample_load import SampleLoad
-from tolstat.analysis.sorted_loads import EXACT
+from tolstat.analysis import binomial, exceedance
+from tolstat.analysis.sample import Sample
+from tolstat.analysis.weighted import Weighted
 from tolstat.campaign import extend
 from tolstat.cli import app
 from tolstat.common.errors import InputError, StoreError
@@ -129,14 +129,14 @@ def test_equal_weights_give_what_joints_that_count_alike_give():
     values, status = rng.gamma(2.0, 1.0, 300), np.ones(300, int)
     status[[5, 9, 17]] = Status.NOT_SETTLED, Status.NEWTON_FAILED, Status.PENDING
     levels = [-1.0, 0.3, 2.0, 30.0]
-    own, theirs = weighted.curve(values, status, np.ones(300), levels), exceedance.curve(values, status, levels)
+    own, theirs = (Sample.of(values, status, design).curve(levels) for design in (Weighted(np.ones(300)), None))
     for name in theirs.dtype.names:
         np.testing.assert_allclose(own[name], theirs[name], atol=1e-12, err_msg=name)
     # a level that no joint is above: a joint as heavy as the heaviest could have been
     heavy = np.where(np.arange(300) == 0, 20.0, 1.0)
     assert exceedance.weighted_exceedance(values, status, heavy, 30.0).upper > 15 * theirs["upper"][-1]
-    assert not weighted.trust(values, status, heavy, 30.0).usable
-    assert weighted.trust(values, status, np.ones(300), 1.0).usable
+    assert Sample.of(values, status, Weighted(heavy)).doubt(30.0)
+    assert not Sample.of(values, status, Weighted(np.ones(300))).doubt(1.0)
 
 
 def run(*given, **choices):
@@ -237,14 +237,14 @@ def two_ways(seeds, n, beta=3.0):
 
 def loads_of(values, w, own):
     status = np.full(values.size, Status.OK)
-    return SampleLoad("x", "N", 3.0, np.nan, values, EXACT, status, w, True, 5.0, 1, own)
+    return Sample.of(values, status, Weighted(w, 5.0, own))
 
 
 def test_an_upper_end_covers_a_way_that_the_proposals_do_not_know_and_that_of_the_weights_does_not():
     truth = 1.0 - norm.cdf(3.0) ** 2
     values, weight, own = two_ways(400, 400)
     made = [loads_of(*one) for one in zip(values, weight, own, strict=True)]
-    found = [(load.above(3.0).upper >= truth, load.unsearched(3.0) >= truth, load.supports(3.0)) for load in made]
+    found = [(load.above(3.0).upper >= truth, load.upper_if_missed(3.0) >= truth, not load.doubt(3.0)) for load in made]
     of_weights, whatever, supported = np.mean(found, axis=0)
     assert supported > 0.8  # the weights look as if all were well
     assert of_weights < 0.8

@@ -13,7 +13,9 @@ from tests.conftest import REFERENCE
 from tests.solver.test_refinement import assert_same
 from tests.support.environment import ROOT
 from tolstat import joint, sampling, study
-from tolstat.analysis import exceedance, weighted
+from tolstat.analysis import exceedance
+from tolstat.analysis.sample import Sample
+from tolstat.analysis.weighted import Weighted
 from tolstat.campaign import plan
 from tolstat.common.tables import PARAM, RESULT, Method, Motion, Options, Status, iterations_allowed
 from tolstat.joint import ideal
@@ -238,8 +240,8 @@ def test_a_stationary_joint_counts_on_both_sides_of_a_limit_inside_its_interval(
     for level, least, count, most in ((5.5, 3, 3, 3), (6.5, 2, 3, 3), (7.5, 2, 2, 3), (8.0, 1, 1, 2), (8.5, 1, 1, 1)):
         found = exceedance.exceedance(values, status, level, ends=ends)
         assert (found.bound_lower, found.estimate, found.bound_upper) == (least / 4, count / 4, most / 4)
-        row = weighted.curve(values, status, np.ones(4), [level], ends=ends)[0]
-        assert (row["bound_lower"], row["bound_upper"]) == pytest.approx((least / 4, most / 4))
+        row = Sample.of(values, status, Weighted(np.ones(4)), ends).above(level)
+        assert (row.bound_lower, row.bound_upper) == pytest.approx((least / 4, most / 4))
     assert exceedance.exceedance(values, status, 6.5).bound_lower == 0.75
 
 

@@ -10,9 +10,7 @@ import pytest
 
 import tolstat
 from tests.support import synthetic
-from tolstat.analysis.quantile import Quantile
-from tolstat.analysis.sample_load import largest_of
-from tolstat.analysis.sorted_loads import Intervals
+from tolstat.analysis.sample import Inexact, Quantile, largest_of
 from tolstat.common.errors import InputError
 from tolstat.common.loads import LOADS
 from tolstat.common.shown import short, shown
@@ -70,7 +68,7 @@ def test_what_is_opened_for_reading_cannot_write(store):
     assert not WRITING & set(dir(store))
     view = store.view()
     load = view.load("cross1.F")
-    kept = [load.values, *load.intervals, load.status, load.is_valid, *load.sample[:4], view.nominal, view.mode_share]
+    kept = [load.values, *load.inexact, load.status, load.valid, view.nominal, view.mode_share]
     kept += [*view.results.values(), view.first_without_load, next(view.error_blocks(()))]
     assert not any(array.flags.writeable for array in kept)
     with pytest.raises(ValueError, match="read-only"):
@@ -90,25 +88,28 @@ def test_a_load_is_a_column_of_what_is_read_and_ratios_are_not_kept(store):
 
 def test_intervals_of_loads_follow_their_joints(store):
     load = store.view().load("cross1.F")
-    held = Intervals(np.array([2, 50]), load.values[[2, 50]] - 4.0, load.values[[2, 50]] + 6.0)
-    one, other = replace(load, intervals=held), load.scaled(0.999)
+    lower, upper = load.lower.values.copy(), load.upper.values.copy()
+    lower[[2, 50]] -= 4.0
+    upper[[2, 50]] += 6.0
+    joints = np.union1d([2, 50], load.inexact.joints)
+    one, other = replace(load, inexact=Inexact(joints, lower[joints], upper[joints])), load.scaled(0.999)
     by = np.arange(60.0)
-    lower, upper = one.ends
+    larger = np.maximum(lower, other.lower.values), np.maximum(upper, other.upper.values)
     for found, expected in (
         (one.shifted(by), (lower + by, upper + by)),
         (one.scaled(2.0), (2.0 * lower, 2.0 * upper)),
         (one.of_limit(), (lower / 700.0, upper / 700.0)),
         (one.only(np.arange(40, 60)), (lower[40:], upper[40:])),
         (one.only(by < 40.0), (lower[:40], upper[:40])),
-        (largest_of("both", [one, other]), (np.maximum(lower, other.values), np.maximum(upper, other.values))),
-        (largest_of("both", [other, one]), (np.maximum(lower, other.values), np.maximum(upper, other.values))),
+        (largest_of("both", [one, other]), larger),
+        (largest_of("both", [other, one]), larger),
     ):
-        np.testing.assert_array_equal(found.ends, expected)
+        np.testing.assert_array_equal((found.lower.values, found.upper.values), expected)
     level = float(load.values[2]) + 1.0
     alone = one.above(level)
-    assert one.sample.valid.size == 55
+    assert one.valid.size == 55
     assert one.above(level) == alone, "sorted or not"
-    undecided = 5 + np.sum((held.lower <= level) & (level < held.upper))
+    undecided = 5 + np.sum((lower[[2, 50]] <= level) & (level < upper[[2, 50]]))
     assert round(alone.n * (alone.bound_upper - alone.bound_lower)) == undecided
 
 

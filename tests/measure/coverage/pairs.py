@@ -9,8 +9,8 @@ import numpy as np
 
 from tests.measure.coverage.trial import Asked, Experiment, Found, Law, Rng, fresh_share, laws
 from tolstat.analysis import difference, multifidelity
-from tolstat.common.loads import FloatArray
 from tolstat.analysis.multifidelity import Pairs
+from tolstat.common.loads import FloatArray
 
 SKEW = "means of skew loads: Student's interval is symmetric"
 

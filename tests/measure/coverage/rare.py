@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterator
 
 from tests.measure.coverage.trial import Asked, Experiment, Found, Rng, fresh_share, laws, ok
 from tolstat.analysis import extreme
-from tolstat.common.loads import FloatArray
 from tolstat.analysis.subset import Settings, Walk
+from tolstat.common.loads import FloatArray
 from tolstat.solver import stationary
 
 SLOW = dict.fromkeys(

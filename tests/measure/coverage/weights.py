@@ -10,10 +10,10 @@ import numpy as np
 
 from tests.measure.coverage.trial import Asked, Experiment, Found, Law, Rng, fresh_share, ok
 from tolstat.analysis import allocation, exceedance, known_share, process, reweight, weighted
-from tolstat.common.loads import FloatArray
 from tolstat.analysis.known_share import Event, Mixture
 from tolstat.analysis.process import Known, Sums
 from tolstat.analysis.reweight import Ratios
+from tolstat.common.loads import FloatArray
 from tolstat.study.tolerances import density_ratio
 from tolstat.study.tolerances.distributions import Normal
 

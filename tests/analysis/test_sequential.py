@@ -1,118 +1,109 @@
 """Stop rules: coverage, cost and bias from the exact distribution over look and count; drawn campaigns agree."""
 
+from __future__ import annotations
+
 import itertools
 
 import numpy as np
 import pytest
-from scipy.stats import binom
 
-from tolstat.analysis import binomial, sequential
-from tolstat.analysis.sequential import Scheme
+from tests.measure.stop_rule import fixed
+from tests.support import stops
+from tolstat.analysis import sequential
 
-WIDTH, JOINTS = 0.1, 1000
-
-
-@pytest.fixture(scope="module")
-def scheme():
-    return sequential.scheme(WIDTH, sequential.looks(WIDTH, JOINTS))
+PLANS = [
+    (0.2, 500),
+    *(pytest.param(*plan, marks=pytest.mark.slow) for plan in ((0.1, 2000), (0.05, 5000), (0.02, 20_000))),
+]
 
 
-def paths_counted(scheme, p):
-    """Probability of each pair (look, count) at which a campaign stops, and the mean share of the first look there."""
-    found, ways, seen = {}, {0: (1.0, 0.0)}, 0
-    for look, n in enumerate(scheme.looks):
-        after = {}
-        for (count, (mass, first)), more in itertools.product(ways.items(), range(n - seen + 1)):
-            own = binom.pmf(more, n - seen, p)
-            start = first if seen else mass * more / n
-            a, b = after.get(count + more, (0.0, 0.0))
-            after[count + more] = (a + mass * own, b + start * own)
-        seen = n
-        last = look == len(scheme.looks) - 1
-        ends = {k: v for k, v in after.items() if last or scheme.narrow(look, k)}
-        found |= {(look, k): v for k, v in ends.items()}
-        ways = {k: v for k, v in after.items() if k not in ends}
-    return found
+def least_coverage(width: float, n: int, confidence: float, most: int) -> float:
+    """Least coverage at the stop over ends of intervals, where it is worst, and over shares between."""
+    rule = stops.Rule(width, stops.grid(n), confidence)
+    shares = np.concatenate([rule.ends(most), np.geomspace(10 / n, 0.5, 30)])
+    return min(rule.coverage(float(p)) for p in shares)
 
 
-def test_the_distribution_at_the_stop_is_that_of_counted_paths():
-    small = Scheme(0.5, [20, 23, 27, 32], 0.95)
-    for p in (0.3, 0.6):
-        known = paths_counted(small, p)
-        own = {
-            (s.look, int(k)): (m, f)
-            for s in small.paths(p)
-            for k, m, f in zip(s.counts, s.probability, s.first, strict=True)
-        }
-        for pair, (mass, first) in known.items():
-            assert own.get(pair, (0.0, 0.0)) == pytest.approx((mass, first), abs=1e-12)
-        found = small.performance(p)
-        ends = {pair: small.interval(*pair) for pair in known}
-        assert found.too_high == pytest.approx(sum(m for pair, (m, _) in known.items() if ends[pair][0] > p))
-        assert found.too_low == pytest.approx(sum(m for pair, (m, _) in known.items() if ends[pair][1] < p))
-        assert found.joints == pytest.approx(sum(small.looks[look] * m for (look, _), (m, _) in known.items()))
-        assert found.unbiased == pytest.approx(0.0, abs=1e-12)
-    (mass, first) = paths_counted(small, 0.37)[1, 11]
-    assert small.estimate(1, 11) == pytest.approx(first / mass)
+def campaign(width: float, loads: np.ndarray, planned: list[int], ahead: bool) -> tuple[int, int]:
+    """Number of joints at the stop, and count above; loads are 1 above the level, 0 below it, -1 without a value.
+
+    `ahead`: looks at which no stop is possible are left out.
+    """
+    above, others = np.cumsum(loads == 1), np.cumsum(loads == -1)
+    joints = sequential.next_look(width, planned) if ahead else planned[0]
+    while True:
+        counts = int(above[joints - 1]), int(others[joints - 1]), joints
+        if joints == planned[-1] or sequential.narrow(width, *counts):
+            return joints, counts[0]
+        joints = sequential.next_look(width, planned, *counts) if ahead else planned[planned.index(joints) + 1]
 
 
-def test_the_interval_at_the_stop_covers_every_share(scheme):
-    """Between two ends of intervals one miss grows with the share, the other falls: both ends bound it."""
-    shares = scheme.critical_shares(most=400)
-    found = [scheme.performance(float(p)) for p in shares]
-    assert min(one.coverage for one in found) >= 0.95
-    assert all(a.too_low + b.too_high <= 0.0505 for a, b in itertools.pairwise(found))
-    assert max(max(one.too_high, one.too_low) for one in found) <= 0.035
+@pytest.mark.parametrize(("width", "n"), PLANS)
+def test_the_interval_at_the_stop_covers_every_share_and_one_without_correction_does_not(width: float, n: int) -> None:
+    assert least_coverage(width, n, sequential.CONFIDENCE, 120) >= 0.95
+    assert least_coverage(width, n, 0.95, 120) < 0.95
 
 
-@pytest.mark.parametrize("p", [0.003, 0.02, 0.078, 0.1, 0.3, 0.5])
-def test_it_costs_little_more_than_a_fixed_plan_and_its_estimate_has_no_bias(scheme, p):
-    found = scheme.performance(p)
-    assert found.unbiased == pytest.approx(0.0, abs=1e-10)
-    assert found.coverage > 0.95
-    joints = sequential.fixed(p, WIDTH)
-    if p * joints >= sequential.LEAST_BESIDE:  # with 10.1 above at a share of 0.078, where it costs most
-        assert found.joints < 1.25 * joints
+@pytest.mark.slow
+def test_it_covers_between_two_ends_of_intervals() -> None:
+    """Between two ends one miss grows with the share and the other falls: their largest values bound the sum."""
+    rule = stops.Rule(0.3, stops.grid(110), sequential.CONFIDENCE)
+    misses = [rule.misses(float(p)) for p in rule.ends(10_000)]
+    assert max(below + above for (_, below), (above, _) in itertools.pairwise(misses)) <= 0.05
 
 
-def test_drawn_campaigns_agree_and_without_correction_they_miss_too_often(scheme):
-    rng, runs, p = np.random.default_rng(5), 6_000, 0.12
-    above = np.cumsum(rng.binomial(np.diff([0, *scheme.looks]), p, (runs, len(scheme.looks))), axis=1)
-    missed, bias = {}, {}
-    for confidence in (scheme.confidence, 0.95):
-        lower, upper = binomial.clopper_pearson(above, scheme.looks, confidence)
-        beside = (above >= sequential.LEAST_BESIDE) & (np.array(scheme.looks) - above >= sequential.LEAST_BESIDE)
-        stop = (upper - lower < WIDTH) & beside
-        at, every = np.where(stop.any(axis=1), stop.argmax(axis=1), len(scheme.looks) - 1), np.arange(runs)
-        missed[confidence] = np.mean((lower[every, at] > p) | (upper[every, at] < p))
-        bias[confidence] = np.mean(above[every, at] / np.array(scheme.looks)[at]) / p - 1.0
-    known = scheme.performance(p)
-    assert missed[scheme.confidence] == pytest.approx(1.0 - known.coverage, abs=0.009)
-    assert bias[scheme.confidence] == pytest.approx(known.plain, abs=0.012)
-    plain = Scheme(WIDTH, scheme.looks, 0.95)
-    assert min(plain.performance(float(p)).coverage for p in plain.critical_shares()) < 0.9495
+def test_the_rule_is_the_one_whose_coverage_is_computed() -> None:
+    assert sequential.looks(2000) == stops.grid(2000)
+    rule = stops.Rule(0.1, sequential.looks(2000), sequential.CONFIDENCE)
+    for look, n in enumerate(rule.looks):
+        counts = np.arange(n + 1)
+        for own, known in zip(sequential.interval(counts, 0, n), (rule.lower[look], rule.upper[look]), strict=True):
+            np.testing.assert_allclose(own, known, rtol=1e-9)
+        if n < 2000:
+            np.testing.assert_array_equal(sequential.narrow(0.1, counts, 0, n), rule.stop[look])
 
 
-def test_a_stop_has_ten_joints_on_each_side():
-    loose = Scheme(0.4, [40, 46, 53], 0.95)
-    assert not loose.narrow(0, 9)
-    assert loose.narrow(0, 10)
-    assert not loose.narrow(0, 31)
-    assert not loose.narrow(0, 10, others=9)
+@pytest.mark.slow
+def test_drawn_campaigns_agree_with_the_computation() -> None:
+    rng, p, planned = np.random.default_rng(5), 0.12, sequential.looks(500)
+    rule = stops.Rule(0.2, planned, sequential.CONFIDENCE)
+    assert sum(mass.sum() for _, _, mass in rule.stops(p)) == pytest.approx(1.0, abs=1e-9)
+    ends = np.array([campaign(0.2, rng.binomial(1, p, 500), planned, ahead=True) for _ in range(1000)])
+    joints, count = ends.T
+    lower, upper = sequential.interval(count, 0, joints)
+    assert np.mean((lower > p) | (upper < p)) == pytest.approx(1.0 - rule.coverage(p), abs=0.015)
+    assert joints.mean() == pytest.approx(rule.joints(p), rel=0.02)
+    assert np.mean(count / joints) / p - 1.0 == pytest.approx(rule.bias(p), abs=0.04)
 
 
-def test_looks_grow_slowly_and_those_taken_stay():
-    planned = sequential.looks(0.002, 100_000)
-    assert planned[0] == 1843
-    assert all(b / a < 1.051 for a, b in itertools.pairwise(planned))
-    assert sequential.looks(0.1, 20) == [20]
-    before = sequential.looks(0.1, 301)
-    longer = sequential.looks(0.1, 1000, taken=before)
-    assert set(before) <= set(longer)
-    assert 301 not in sequential.looks(0.1, 1000)
+def test_it_costs_little_more_than_a_fixed_plan_and_its_share_is_biased_high() -> None:
+    rule = stops.Rule(0.1, stops.grid(2000), sequential.CONFIDENCE)
+    shares = np.geomspace(0.01, 0.5, 30)
+    costs = [rule.joints(p) / fixed(p, 0.1) for p in shares if p * fixed(p, 0.1) >= 10]
+    assert 1.0 < min(costs) < max(costs) < 1.4
+    assert max(rule.bias(p) for p in shares) == pytest.approx(sequential.BIAS, abs=0.008)
 
 
-def test_looks_between_are_waited_for_only_where_a_stop_is_plausible(scheme):
-    later = scheme.next_look(0, 18)  # half of the joints are above: hundreds are needed
-    assert scheme.looks[later] > 200
-    assert scheme.next_look(later, scheme.looks[later] // 2) == later + 1
+@pytest.mark.parametrize("lost", [0.0, 0.05, 0.3])
+def test_looks_that_are_left_out_could_not_have_stopped(lost: float) -> None:
+    rng = np.random.default_rng(3)
+    planned = sequential.looks(900)
+    for p, width in itertools.product((0.01, 0.1, 0.5, 0.97), (0.5, 0.2, 0.1)):
+        for _ in range(3):
+            loads = rng.choice([1, 0, -1], 900, p=[p * (1 - lost), (1 - p) * (1 - lost), lost])
+            assert campaign(width, loads, planned, ahead=True) == campaign(width, loads, planned, ahead=False)
+
+
+def test_a_stop_has_ten_joints_on_each_side() -> None:
+    found = sequential.narrow(0.4, [9, 10, 31, 10], [0, 0, 0, 21], 40)
+    np.testing.assert_array_equal(found, [False, True, False, False])
+
+
+def test_looks_grow_slowly_and_those_taken_stay() -> None:
+    planned = sequential.looks(100_000)
+    assert planned[0] == 20
+    assert all(b <= 1.05 * a + 1 for a, b in itertools.pairwise(planned))
+    assert sequential.looks(12) == [12]
+    before = sequential.looks(301)
+    assert set(before) <= set(sequential.looks(1000, taken=before))
+    assert 301 not in sequential.looks(1000)

@@ -90,7 +90,7 @@ def test_a_campaign_stops_where_the_rule_holds(tmp_path: Path) -> None:
     outcome = stopped(path)
     look = outcome.look
     assert outcome.reached
-    assert outcome.looks == sequential.looks(0.4, 399)
+    assert outcome.looks == sequential.looks(399)
     assert look.joints in outcome.looks[:-1]
     with ResultFile.open(path) as store:
         status, loads = store.status(), store.results()["F_max"][:, 0]
@@ -101,7 +101,7 @@ def test_a_campaign_stops_where_the_rule_holds(tmp_path: Path) -> None:
         assert store.stop["looks"] == [n for n in outcome.looks if n <= look.joints]
     assert look.n_unresolved == (status[1 : look.joints + 1] != Status.OK).sum()
     shares = [
-        exceedance.exceedance(loads[1 : n + 1], status[1 : n + 1], 0.5, outcome.confidence_of_a_look)
+        exceedance.exceedance(loads[1 : n + 1], status[1 : n + 1], 0.5, sequential.CONFIDENCE)
         for n in outcome.looks
         if n <= look.joints
     ]
@@ -146,9 +146,10 @@ def test_the_report_says_that_the_campaign_was_stopped(tmp_path: Path) -> None:
     path = synthetic.store(tmp_path, simulated=40)
     look = stop_rule.Look(39, 0, 4, 0.1, 0.02, 0.25)
     with Writer.open(path) as store:
-        store.record_stop(stop_rule.Outcome(True, look, [20, 39, 60], 0.96).record(stop_rule.parse(RULE, {})))
+        store.record_stop(stop_rule.Outcome(True, look, [20, 39, 60]).record(stop_rule.parse(RULE, {})))
     notes = report.build(path).notes
-    assert f"stopped by {RULE} at 39 joints: 0.10000, 95 % interval 0.02000 to 0.25000, valid after 2 looks" in notes
+    assert f"stopped by {RULE} at 39 joints: 95 % interval 0.02000 to 0.25000, valid after any number of looks" in notes
+    assert "share 0.10000, biased high if few joints are above (11 % of itself with 10)" in notes
 
 
 @pytest.mark.slow
@@ -163,10 +164,10 @@ def test_run_until_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
     done = CliRunner().invoke(cli.app, words)
     assert done.exit_code == 0, done.output
     assert f"{RULE}: reached with" in done.stderr
-    assert "corrected for the stop" in done.stderr
+    assert "biased high if few joints are above" in done.stderr
     with h5py.File("s.h5") as file:
         taken = json.loads(file["metadata"][()])["stop"]["looks"]
-    assert taken == sequential.looks(0.4, 400)[: len(taken)]
+    assert taken == sequential.looks(400)[: len(taken)]
     done = CliRunner().invoke(cli.app, ["extend", "s.h5", "--n", "500"])
     assert done.exit_code == 0, done.output
     with h5py.File("s.h5") as file:

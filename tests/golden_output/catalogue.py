@@ -13,7 +13,7 @@ FORMS = ("", " --wide", " --json")
 COMMANDS = (
     *("new", "schema", "show", "simulate", "plan", "run", "extend", "merge", "status", "verify", "replay", "report"),
     *("capability", "lots", "worst", "causes", "fatigue", "bearing-life", "orders", "time-above", "sorting"),
-    *("reweight", "allocate", "compare", "rare", "selective", "multifidelity", "export", "docs", "cache"),
+    *("reweight", "allocate", "compare", "rare", "selective", "export", "docs", "cache"),
 )
 
 

@@ -125,11 +125,6 @@ RARE = Campaign(
         "any": ["rare rigid_shafts.toml --limit 'any limit' --n 40 --p0 0.25 --repeats 1 --out any.h5 --json"],
     },
 )
-FIDELITIES = Campaign(
-    "multifidelity",
-    ["multifidelity rigid_shafts.toml --low quasistatic:24 --high dynamic:60 --pilot 64 --budget '0.001 s' --wide"],
-    {"files": ["status rigid_shafts_low.h5 --json", "multifidelity rigid_shafts.toml --low ideal --pilot 3"]},
-)
 LISTED = Campaign(
     "cases",
     [

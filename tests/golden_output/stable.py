@@ -26,23 +26,6 @@ PATTERNS: tuple[tuple[str, str], ...] = (
 )
 """Regular expressions of lines, and what stands in their place."""
 
-COSTS: tuple[tuple[str, str], ...] = (
-    (r"^[\d.e-]+ and [\d.e-]+ ms per joint", "TIME and TIME per joint"),
-    (
-        r"[\d.e+]+ joints at low\s+fidelity for each at high fidelity; gain \S+",
-        "N joints at low fidelity for each; gain G",
-    ),
-    (r"  +(?:\d+\.?\d*|-|gain)$", "  GAIN"),
-)
-"""The same for the command that measures what joints cost at two fidelities: costs, and what follows from them."""
-
-
-def without_costs(text: str) -> str:
-    """Text of ``multifidelity`` without costs, and gains that follow from them."""
-    for pattern, word in COSTS:
-        text = re.sub(pattern, word, text, flags=re.MULTILINE)
-    return text
-
 
 def stable(text: str, places: dict[str, str]) -> str:
     """Text without what depends on machine, time and versions; `places` are folders with the words shown for them."""

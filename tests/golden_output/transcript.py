@@ -15,7 +15,7 @@ from pathlib import Path
 from typer.testing import CliRunner
 
 from tests.golden_output import numbers, page
-from tests.golden_output.stable import stable, without_costs
+from tests.golden_output.stable import stable
 from tests.support.environment import ROOT, environment
 from tolstat.cli import app
 
@@ -58,7 +58,7 @@ def _one(folder: Path, command: str) -> str:
     blocks = [f"$ tolstat {command}", f"exit code {code}"]
     for head, text in (("stdout", out), ("stderr", err)):
         if text.strip():
-            blocks += _block(head, text if words[:1] != ["multifidelity"] else without_costs(text), places, kind)
+            blocks += _block(head, text, places, kind)
     if changed:
         blocks.append("== wrote " + ", ".join(changed))
     for name in changed:

@@ -216,13 +216,15 @@ def test_the_joint_verdict_covers_joints_without_a_load():
 @pytest.mark.parametrize(("accepted", "answer"), [(0.02, "no"), (0.5, "none")])
 def test_where_the_weights_support_no_joint_share_one_limit_can_only_be_missed(monkeypatch, accepted, answer):
     made = apart(100)
-    few = "few joints have most of the weight above it: 1 effective joints"
+    few = "few joints have most of the weight: 1 effective"
     monkeypatch.setattr(Sample, "doubt", lambda self, level: few if self.name == "all limits" else "")
     found = headline.headline(made, accepted)
     assert found.answer == answer
     if answer == "no":
         assert "exceed 700 N on cross1.F" in found.words
-        assert found.notes[-1].startswith("No share of the joints that exceed at least one limit: few joints")
+        assert found.notes[-1].startswith(
+            "No share of the joints that exceed at least one limit: above any limit few joints"
+        )
     else:
         assert "above any limit few joints have most of the weight" in found.words
 

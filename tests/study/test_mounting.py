@@ -12,7 +12,6 @@ from tolstat.campaign import remedy
 from tolstat.common.errors import InputError
 from tolstat.common.tables import Options, Simulation, without_results
 from tolstat.joint import operating, perturb
-from tolstat.questions.multifidelity.query import solver_of
 from tolstat.solver import fidelity
 from tolstat.study.mounting import note
 
@@ -166,8 +165,6 @@ def test_closed_forms_are_refused_with_an_axial_force(tmp_path: Path) -> None:
     s = load(tmp_path)
     with pytest.raises(InputError, match=r"--set: solver.fidelity: 'ideal' does not hold"):
         remedy.parse_retry("newton_failed", ["solver.fidelity='ideal'"], s)
-    with pytest.raises(InputError, match=r"--low: 'ideal' does not hold"):
-        solver_of(s, "ideal", "--low")
 
 
 @pytest.mark.parametrize("closed_form", [True, False])

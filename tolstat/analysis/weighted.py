@@ -264,7 +264,7 @@ class Weighted(Design):
         if found.usable:
             return ""
         tail = "" if np.isnan(found.k) else f", Pareto k {found.k:.2f}, {LARGEST_SHAPE:g} allowed"
-        return f"few joints have most of the weight above it: {found.effective:.0f} effective joints{tail}"
+        return f"few joints have most of the weight: {found.effective:.0f} effective{tail}"
 
     def upper_if_missed(self, x: Column, level: float, confidence: float) -> float:
         """See `Design.upper_if_missed`: that of the joints drawn from the tolerances themselves."""

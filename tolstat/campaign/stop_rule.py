@@ -1,8 +1,8 @@
 """Stop rule: end a campaign when the interval of an exceedance is narrow enough.
 
-When to look, and with which confidence, is in `analysis.sequential`. The looks depend only on the rule and on the
-numbers of joints of the campaign, not on workers or time: each evaluates the first joints of the sequence, all of them
-done. Looks of a campaign that is extended afterwards stay looks.
+When to look, and with which confidence, is in `analysis.sequential`. The looks depend only on the number of joints of
+the campaign, not on workers or time: each evaluates the first joints of the sequence, all of them done. Looks of a
+campaign that is extended afterwards stay looks.
 """
 
 from __future__ import annotations
@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from tolstat.study import Study
 
 CONFIDENCE = 0.95
+BIASED = f"biased high if few joints are above ({100 * sequential.BIAS:.0f} % of itself with {sequential.LEAST_BESIDE})"
+"""Sentence on the share at a stop."""
 EXAMPLE = 'write --until "P(cross1.F > 700 N) width < 0.01"'
 
 
@@ -40,9 +42,9 @@ class Look(NamedTuple):
     above : int
         Valid joints above the level.
     estimate : float
-        Share of the valid joints above the level; unbiased if all are valid, see `sequential.Scheme.estimate`.
+        Share of the valid joints above the level. At a stop with few of them it is biased high.
     lower, upper : float
-        Interval with the confidence of one look, `sequential.Scheme.confidence`.
+        Interval with the confidence of one look, `sequential.CONFIDENCE`.
     """
 
     joints: int
@@ -64,19 +66,16 @@ class Outcome(NamedTuple):
         The last look.
     looks : list of int
         Numbers of joints of the planned looks.
-    confidence_of_a_look : float
-        Confidence of the interval of each look, for which that of the last look covers with `CONFIDENCE`.
     """
 
     reached: bool
     look: Look
     looks: list[int]
-    confidence_of_a_look: float
 
     def record(self, rule: rules.Statement) -> dict[str, Any]:
         """Return the attribute ``stop`` of the result file."""
         taken = [joints for joints in self.looks if joints <= self.look.joints]
-        how = {"confidence": CONFIDENCE, "confidence_of_a_look": self.confidence_of_a_look, "looks": taken}
+        how = {"confidence": CONFIDENCE, "confidence_of_a_look": sequential.CONFIDENCE, "looks": taken}
         return {"rule": rule.text, "reached": self.reached} | self.look._asdict() | how
 
 
@@ -125,38 +124,32 @@ def run_until(study: Study, out: Path, rule: rules.Statement, run: Callable[[int
         if not selected_results.holds(study.output.columns, load.name):
             remedy = f"add {', '.join(load.columns)}"
             raise InputError([study.fault("output.results", f"leaves out {load.name}, which --until needs", remedy)])
-    scheme = sequential.scheme(rule.bound, sequential.looks(rule.bound, study.samples, _taken(out)), CONFIDENCE)
+    planned = sequential.looks(study.samples, _taken(out))
     with kept_workers():
-        number, look, reached = _looked(study.first_sample, out, rule.limit, scheme, run)
-    valid = max(look.joints - look.n_unresolved, 1)
-    look = look._replace(estimate=scheme.estimate(number, look.above) * look.joints / valid)
-    outcome = Outcome(reached, look, scheme.looks, scheme.confidence)
+        reached, look = _looked(study.first_sample, out, rule, planned, run)
+    outcome = Outcome(reached, look, planned)
     with Writer.open(out) as store:
         store.record_stop(outcome.record(rule))
     return outcome
 
 
 def _looked(
-    first: int, out: Path, limit: Limit, scheme: sequential.Scheme, run: Callable[[int], object]
-) -> tuple[int, Look, bool]:
-    """Simulate and look until the rule holds, or the joints end; return the last look, its number, whether it holds.
+    first: int, out: Path, rule: rules.Statement, planned: list[int], run: Callable[[int], object]
+) -> tuple[bool, Look]:
+    """Simulate and look until the rule holds or the joints end; return whether it holds, and the last look.
 
-    `first` is the row of sample 0. The file is opened once for all looks at what has been simulated.
+    `first` is the row of sample 0. Looks at which no stop is possible are not taken.
     """
-    number, simulated = 0, 0
+    joints = sequential.next_look(rule.bound, planned)
     while True:
-        run(first + scheme.looks[simulated])
+        run(first + joints)
         with Reader.open(out) as store:
-            while True:
-                look = _look(store, limit, range(first, first + scheme.looks[number]), scheme, number)
-                reached = scheme.narrow(number, look.above, look.n_unresolved)
-                if reached or number == simulated:
-                    break
-                number += 1
-        if reached or number == len(scheme.looks) - 1:
-            return number, look, reached
-        simulated = scheme.next_look(number, look.above)
-        number += 1
+            look = _look(store, rule.limit, range(first, first + joints))
+        counts = look.above, look.n_unresolved, joints
+        reached = bool(sequential.narrow(rule.bound, *counts))
+        if reached or joints == planned[-1]:
+            return reached, look
+        joints = sequential.next_look(rule.bound, planned, *counts)
 
 
 def _taken(out: Path) -> list[int]:
@@ -167,7 +160,7 @@ def _taken(out: Path) -> list[int]:
         return list(store.stop.get("looks", ()))
 
 
-def _look(store: Reader, limit: Limit, rows: range, scheme: sequential.Scheme, number: int) -> Look:
+def _look(store: Reader, limit: Limit, rows: range) -> Look:
     count = unresolved = 0
     for begin in range(0, len(rows), BLOCK):
         block = rows[begin : begin + BLOCK]
@@ -175,5 +168,5 @@ def _look(store: Reader, limit: Limit, rows: range, scheme: sequential.Scheme, n
         part = exceedance.exceedance(*worst.limit_of(parts, limit), limit.level, iid=False)
         count += part.count
         unresolved += part.n_failed + part.n_unsettled
-    ends = scheme.interval(number, count, unresolved)
-    return Look(len(rows), unresolved, count, count / max(len(rows) - unresolved, 1), *ends)
+    lower, upper = sequential.interval(count, unresolved, len(rows))
+    return Look(len(rows), unresolved, count, count / max(len(rows) - unresolved, 1), float(lower), float(upper))

@@ -248,9 +248,10 @@ def _campaign_until(text: str, plan: Study, path: Path, **choices: Any) -> Count
     say(
         f"{rule.text}: {'reached' if outcome.reached else 'not reached'} with {look.joints} joints, "
         f"{look.above} above, {look.n_unresolved} failed or not settled\n"
-        f"share above {look.estimate:.5f}, corrected for the stop; {100 * stop_rule.CONFIDENCE:.0f} % interval "
-        f"{look.lower:.5f} to {look.upper:.5f} (failed and unsettled joints: below at its lower end, above at its "
-        "upper end), valid after any number of looks; shares and intervals in the report are not corrected"
+        f"{100 * stop_rule.CONFIDENCE:.0f} % interval {look.lower:.5f} to {look.upper:.5f}, valid after any number of "
+        "looks (failed and unsettled joints: below at its lower end, above at its upper end)\n"
+        f"share above {look.estimate:.5f}{f', {stop_rule.BIASED}: go by the interval' if outcome.reached else ''}; "
+        "shares and intervals in the report are not corrected for the stop"
     )
     with ResultFile.open(path) as store:
         return store.counts()

@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from tolstat.questions.fatigue.query import load_cycles as load_cycles
     from tolstat.questions.fatigue.stress import load_stresses as load_stresses
     from tolstat.questions.lots.query import lots_of as lots_of
-    from tolstat.questions.multifidelity.query import two_fidelities as two_fidelities
     from tolstat.questions.orders.query import orders_of as orders_of
     from tolstat.questions.rare.query import rare_event as rare_event
     from tolstat.questions.reweight.query import reweighted as reweighted
@@ -111,7 +110,6 @@ QUESTIONS = (
     Question("compare", ("query.compared",), "Decide", ("compare",)),
     Question("rare", ("query.rare_event",), "Decide", ("rare",)),
     Question("selective", ("query.assembled",), "Decide", ("selective",), has_section=True),
-    Question("multifidelity", ("query.two_fidelities",), "Decide", ("multifidelity",)),
 )
 
 PUBLIC = {

@@ -213,10 +213,12 @@ def _text(content: str, stem: Path, ending: str) -> Path:
 
 
 def _stopped(stop: dict[str, Any]) -> str:
-    """Sentence about a campaign that its stop rule ended."""
+    """Sentences about a campaign that its stop rule ended."""
+    from tolstat.campaign.stop_rule import BIASED
+
     confidence = f"{100 * stop['confidence']:.0f} %"
     return (
-        f"stopped by {stop['rule']} at {stop['joints']} joints: {stop['estimate']:.5f}, {confidence} interval "
-        f"{stop['lower']:.5f} to {stop['upper']:.5f}, valid after {len(stop['looks'])} looks. Shares above are not "
-        "corrected for the stop."
+        f"stopped by {stop['rule']} at {stop['joints']} joints: {confidence} interval {stop['lower']:.5f} to "
+        f"{stop['upper']:.5f}, valid after any number of looks; share {stop['estimate']:.5f}, {BIASED}. Shares and "
+        "intervals above are not corrected for the stop."
     )

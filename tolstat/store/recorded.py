@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -191,8 +190,6 @@ def recall(store: Reader, n: int | None = None, path: Path | None = None) -> Stu
         raise InputError([*own, Fault(str(store.path), found, remedy)]) from error
     if store.sampling["method"] == "subset":
         study = subset_of(study, {key: value for key, value in store.sampling.items() if key != "dimensions"})
-    if path is None:
-        study = replace(study, solver=_solver(store, study))
     study = _at_point(store, study)
     differing = differing_keys(store.identity, json.loads(json.dumps(study.identity())))
     if differing:
@@ -201,8 +198,7 @@ def recall(store: Reader, n: int | None = None, path: Path | None = None) -> Stu
         raise StoreError(str(Fault(str(store.path), found, "give the study file of the campaign: --study STUDY")))
     if n is None:
         return study
-    larger = load(source, n=n, text=text, joint=joint)
-    return replace(_at_point(store, larger), solver=study.solver)
+    return _at_point(store, load(source, n=n, text=text, joint=joint))
 
 
 def mentions(store: Reader, keys: Collection[str], section: str) -> bool:
@@ -236,12 +232,3 @@ def differing_keys(held: Mapping[str, Any], wanted: Mapping[str, Any]) -> list[s
             sides = (f"{side[key]!r}" if key in side else "nothing" for side in (held, wanted))
             lines.append("{}: {} in the file, {} in the study".format(key, *sides))
     return lines
-
-
-def _solver(store: Reader, study: Study) -> Solver:
-    """Solver settings of the file; they differ from those in the study's text in campaigns at two fidelities."""
-    held = {key.removeprefix("solver."): value for key, value in store.identity.items() if key.startswith("solver.")}
-    own = study.solver.model_dump()
-    changed = {key: value for key, value in held.items() if key in own and own[key] != value}
-    given = study.solver.model_dump(exclude_unset=True) | changed
-    return validate(Solver, given, f"{store.path}: solver") if changed else study.solver

@@ -1,4 +1,4 @@
-"""Experiments on two sides: comparison, what if, two fidelities."""
+"""Experiments on two sides: comparison, what if."""
 
 from __future__ import annotations
 
@@ -7,9 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tests.measure.coverage.trial import Asked, Experiment, Found, Law, Rng, fresh_share, laws
-from tolstat.analysis import difference, multifidelity
-from tolstat.analysis.multifidelity import Pairs
+from tests.measure.coverage.trial import Asked, Experiment, Found, Law, Rng, laws
+from tolstat.analysis import difference
 from tolstat.common.loads import FloatArray
 
 SKEW = "means of skew loads: Student's interval is symmetric"
@@ -66,9 +65,6 @@ def experiments() -> Iterator[Experiment]:
     for rho in (0.9, 0.99):
         for two in sides(rho):
             yield _with_lost(two, 1024)
-    for rho in (0.99, 0.9, 0.3):
-        for two in sides(rho):
-            yield _fidelities(two, 200, 4000)
 
 
 def _compared(two: Two, n: int, paired: bool) -> Experiment:
@@ -107,31 +103,3 @@ def _with_lost(two: Two, n: int) -> Experiment:
 
     case = f"{two.name}, pairs correlated by {two.rho:g}, some lost"
     return Experiment((Asked("change of a share, what if", case, n),), once)
-
-
-def _fidelities(two: Two, m: int, n: int) -> Experiment:
-    """B is the load at the high fidelity of m of the n joints, A that at the low one of all."""
-    shares = (0.5, 0.05)
-    levels = [two.quantiles(1.0 - share)[1] for share in shares]
-    own = Law(two.name, lambda p: two.to_b(np.asarray(two.law.ppf(p))), lambda x: two.law.sf(two.from_b(x)))
-    name = f"{two.name}, correlated by {two.rho:g}"
-    asked = [Asked("share, two fidelities", f"{name}, {share:g}", m, fresh_share(m, share)) for share in shares]
-    asked += [
-        Asked("quantile, two fidelities", f"{name}, {100 * (1 - share):g} %", m, own.fresh_quantile(m, 1.0 - share))
-        for share in shares
-    ]
-    points = np.asarray(own.ppf((np.arange(100_000) + 0.5) / 100_000))
-    of_mean, known = 2.0 * 1.972 * float(points.std()) / np.sqrt(m), SKEW if two.law.name == "lognormal" else ""
-    asked.append(Asked("mean, two fidelities", name, m, of_mean, known))
-    mean = float(points.mean())
-
-    def once(rng: Rng) -> list[Found]:
-        low, high = two.draw(rng, n)
-        pairs = Pairs(high[:m], low, cost_high=1.0, cost_low=0.02)
-        found = [multifidelity.share_above(pairs, level) for level in levels]
-        found += [multifidelity.quantile(pairs, 1.0 - share) for share in shares]
-        found.append(multifidelity.mean(pairs))
-        truths = (*shares, *levels, mean)
-        return [Found(f.lower, f.upper, truth) for f, truth in zip(found, truths, strict=True)]
-
-    return Experiment(tuple(asked), once)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -224,21 +223,17 @@ def _delivered(share: float, n: int) -> Experiment:
     return Experiment((Asked("next delivery", case, n), Asked("next delivery, from a share", case, n)), once)
 
 
-@cache
-def _scheme(width: float, most: int) -> sequential.Scheme:
-    return sequential.scheme(width, sequential.looks(width, most))
-
-
 def _until(share: float, width: float = 0.02, most: int = 20_000) -> Experiment:
     """A campaign that looks at its interval until it is narrow."""
 
     def once(rng: Rng) -> list[Found]:
-        scheme, above, joints, number = _scheme(width, most), 0, 0, 0
-        for number, look in enumerate(scheme.looks):
+        above = joints = 0
+        for look in sequential.looks(most):
             above, joints = above + int(rng.binomial(look - joints, share)), look
-            if scheme.narrow(number, above):
+            if sequential.narrow(width, above, 0, joints):
                 break
-        return [Found(*scheme.interval(number, above), share)]
+        lower, upper = sequential.interval(above, 0, joints)
+        return [Found(float(lower), float(upper), share)]
 
     return Experiment((Asked("share at a stop", f"any law, {share:g}, narrower than {width:g}", most),), once)
 

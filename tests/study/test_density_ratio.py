@@ -30,6 +30,10 @@ class Laplace(Distribution):
     def ppf(self, u):
         return np.where(u < 0.5, np.log(2 * u), -np.log(2 * (1 - u))) * self.scale
 
+    def cdf(self, x):
+        tail = 0.5 * np.exp(-np.abs(x) / self.scale)
+        return np.where(x < 0, tail, 1 - tail)
+
     def logpdf(self, x):
         return -np.abs(x) / self.scale - math.log(2 * self.scale)
 

@@ -16,11 +16,12 @@ from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
 from tolstat.common import units
+from tolstat.common.bisection import first
 from tolstat.common.errors import Fault
 from tolstat.common.load_kinds import PINS
 from tolstat.common.strict import Strict, refuse
 from tolstat.study.tolerances.accepted import scores_among
-from tolstat.study.tolerances.distributions import Array, Distribution, score
+from tolstat.study.tolerances.distributions import Array, Distribution, probability
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -28,8 +29,6 @@ if TYPE_CHECKING:
     from tolstat.study.tolerances.entry import Toleranced
 
 MAX_CLASSES = 20
-STEPS = 40
-"""Bisections of an edge between classes of equally many parts."""
 ROUNDING = 1e-8
 """Unmatched share below which it is the rounding of classes of equally many parts."""
 LEAST = 1e-300
@@ -135,9 +134,7 @@ class Range(NamedTuple):
     @property
     def _ends(self) -> tuple[float, float]:
         """Probabilities that a diameter without gauge error is below each end."""
-        from scipy.special import ndtr
-
-        low, high = ndtr(score(self.distribution, np.clip([self.low, self.high], -1.0, 1.0))).tolist()
+        low, high = probability(self.distribution, np.clip([self.low, self.high], -1.0, 1.0)).tolist()
         return (low if self.low > -np.inf else 0.0), (high if self.high < np.inf else 1.0)
 
 
@@ -286,10 +283,7 @@ def _quantile(distribution: Distribution, gauge: float, share: float, low: float
     """Measured deviation that a share of the parts stays below."""
     if not gauge:
         return float(distribution.ppf(np.array([share]))[0])
-    for _ in range(STEPS):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if Range(distribution, gauge, -np.inf, middle).share < share else (low, middle)
-    return 0.5 * (low + high)
+    return float(first(lambda x: Range(distribution, gauge, -np.inf, float(x)).share >= share, low, high, halvings=40))
 
 
 def _bands(entries: Iterable[Toleranced]) -> dict[str, tuple[float, float] | None]:

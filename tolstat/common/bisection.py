@@ -8,11 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-HALVINGS = 60
-"""Halvings of a bracket of real numbers: from a width of 1 to 1e-18."""
 
-
-def first(holds: Callable[[Any], Any], low: ArrayLike, high: ArrayLike, halvings: int = HALVINGS) -> NDArray[Any]:
+def first(holds: Callable[[Any], Any], low: ArrayLike, high: ArrayLike, halvings: int = 60) -> NDArray[Any]:
     """Find the smallest number of each bracket at which a condition holds that also holds at all larger ones.
 
     Parameters

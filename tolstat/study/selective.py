@@ -118,8 +118,7 @@ class Range(NamedTuple):
         """Share of the parts."""
         if self.gauge:
             return _among(self)[2]
-        low, high = self._ends
-        return high - low
+        return float(np.diff(self._ends)[0])
 
     def scores(self, u: Array) -> Array:
         """Score, among all parts, of the diameter that is exceeded with probability 1 - u in the range; both (n,)."""
@@ -132,10 +131,9 @@ class Range(NamedTuple):
         return np.asarray(ndtri(np.clip(low + u * (high - low), LEAST, 1.0 - 2.0**-53)))
 
     @property
-    def _ends(self) -> tuple[float, float]:
+    def _ends(self) -> Array:
         """Probabilities that a diameter without gauge error is below each end."""
-        low, high = probability(self.distribution, np.clip([self.low, self.high], -1.0, 1.0)).tolist()
-        return (low if self.low > -np.inf else 0.0), (high if self.high < np.inf else 1.0)
+        return probability(self.distribution, np.array([self.low, self.high]))
 
 
 @lru_cache(maxsize=512)
@@ -274,16 +272,12 @@ def _edges(classes: int, gauge: float, split: str, kind: Kind, own: _Diameters) 
     else:
         count = len(kind.errors)
         below = parts ** (1.0 / count) if kind.worst > 0 else 1.0 - (1.0 - parts) ** (1.0 / count)
-        reach = own.distribution.ppf(np.array([1e-12, 1.0 - 1e-12])) + 9.0 * gauge * np.array([-1.0, 1.0])
-        inner = np.array([_quantile(own.distribution, gauge, share, *reach) for share in below])
+        inner = own.distribution.ppf(below)
+        if gauge:  # of the measured deviations
+            reach = own.distribution.ppf(np.array([1e-12, 1.0 - 1e-12])) + 9.0 * gauge * np.array([-1.0, 1.0])
+            upto = np.vectorize(lambda end: Range(own.distribution, gauge, -np.inf, float(end)).share, otypes=[float])
+            inner = first(lambda ends: upto(ends) >= below, reach[0], reach[1], halvings=40)
     return np.concatenate([[-np.inf], inner, [np.inf]])
-
-
-def _quantile(distribution: Distribution, gauge: float, share: float, low: float, high: float) -> float:
-    """Measured deviation that a share of the parts stays below."""
-    if not gauge:
-        return float(distribution.ppf(np.array([share]))[0])
-    return float(first(lambda x: Range(distribution, gauge, -np.inf, float(x)).share >= share, low, high, halvings=40))
 
 
 def _bands(entries: Iterable[Toleranced]) -> dict[str, tuple[float, float] | None]:

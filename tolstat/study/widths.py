@@ -17,14 +17,13 @@ import numpy as np
 
 from tolstat.common import units
 from tolstat.common.errors import Fault, InputError, gather
-from tolstat.common.files import data_dir
 from tolstat.common.strict import did_you_mean
 from tolstat.joint import HOLE_OF_PIN
 from tolstat.study import scaling, selection
 from tolstat.study.axes import is_zone
 from tolstat.study.study import Study
 from tolstat.study.tolerances import fits, iso286, iso2768
-from tolstat.study.tolerances.distributions import Array, Distribution, Moments
+from tolstat.study.tolerances.distributions import Array, Distribution
 from tolstat.study.tolerances.entry import SingleEntry, Site, Toleranced, ToleranceEntry
 
 HALF, EXACT, FINER, COARSER = STEPS = ("half", "exact", "finer", "coarser")
@@ -64,14 +63,6 @@ class Rescaled(Distribution):
         if self.factor == 0.0:
             return np.where(off >= 0.0, 1.0, 0.0)
         return self.every.cdf(self.middle + off / self.factor)
-
-    @property
-    def moments(self) -> Moments:
-        """See `Distribution.moments`."""
-        every = self.every.moments
-        return Moments(
-            self.middle + self.shift + self.factor * (every.mean - self.middle), self.factor * every.deviation
-        )
 
     def logpdf(self, x: Array) -> Array:
         """See `Distribution.logpdf`."""
@@ -269,7 +260,7 @@ def _classed(entry: Toleranced, site: Site, side: int) -> Width | None:
         return None
     other, kind = CLASSES[CLASSES.index(own) + side], "angular" if site.unit == "rad" else "linear"
     nominal = units.to_si(entry.keys["nominal"], "m")
-    old, new = (iso2768.deviation(data_dir() / "iso2768.csv", kind, one, nominal) for one in (own, other))
+    old, new = (iso2768.deviation(kind, one, nominal) for one in (own, other))
     return None if new == old else Width(new / old, 0.0, f"class {other}")
 
 

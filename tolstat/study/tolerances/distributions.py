@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-LOG_ROOT_2PI = 0.5 * math.log(2 * math.pi)
 NODES = np.linspace(-8.5, 8.5, 6801)
 """Normal scores of the trapezoidal rule, which converges faster than any power of the step here."""
 NEGLIGIBLE = 1e-12
@@ -61,7 +60,7 @@ class Distribution(ABC):
 
     @property
     def moments(self) -> Moments:
-        """Mean and standard deviation: by quadrature where they have no closed form, or one that cancels."""
+        """Mean and standard deviation; by quadrature where a truncation leaves no closed form that keeps its digits."""
         mean = self.expect(lambda x: x)
         return Moments(mean, math.sqrt(self.expect(lambda x: (x - mean) ** 2)))
 
@@ -69,10 +68,9 @@ class Distribution(ABC):
         """Return the mean of a function of the values, by the trapezoidal rule over their normal scores."""
         from scipy.special import ndtr
 
-        weights: Array = np.exp(-0.5 * NODES**2)
         # the upper half from its own tail would need a survival function: beyond a score of 8 ndtr rounds to 1
         values = self.ppf(np.minimum(ndtr(NODES), 1.0 - 2.0**-53))
-        return float((function(values) * weights).sum() / weights.sum())
+        return float(np.average(function(values), weights=np.exp(-0.5 * NODES**2)))
 
     def outside(self, lower: float, upper: float) -> float:
         """Return the share outside the band from `lower` to `upper`, SI."""
@@ -125,7 +123,7 @@ class Normal(Described):
 
     def logpdf(self, x: Array) -> Array:
         """See `Distribution.logpdf`."""
-        return -0.5 * ((x - self.mean) / self.sigma) ** 2 - math.log(self.sigma) - LOG_ROOT_2PI
+        return -0.5 * ((x - self.mean) / self.sigma) ** 2 - math.log(self.sigma) - 0.5 * math.log(2 * math.pi)
 
     @property
     def moments(self) -> Moments:
@@ -158,8 +156,7 @@ class TruncatedNormal(Described):
         # each half from its own tail: probabilities near 1 have fewer significant digits than those near 0
         low = ndtri(ndtr(a) + u * (ndtr(b) - ndtr(a)))
         high = -ndtri(ndtr(-b) + (1 - u) * (ndtr(-a) - ndtr(-b)))
-        z = np.where(low <= 0, low, high)
-        return np.clip(self.mean + self.sigma * z, self.lower, self.upper)
+        return np.clip(self.mean + self.sigma * np.where(low <= 0, low, high), self.lower, self.upper)
 
     def cdf(self, x: Array) -> Array:
         """See `Distribution.cdf`."""
@@ -216,11 +213,11 @@ class Triangular(Described):
 
     def cdf(self, x: Array) -> Array:
         """See `Distribution.cdf`."""
-        width, x = self.upper - self.lower, np.clip(x, self.lower, self.upper)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            below = (x - self.lower) ** 2 / (width * (self.peak - self.lower))
-            above = 1.0 - (self.upper - x) ** 2 / (width * (self.upper - self.peak))
-        return np.where(x < self.peak, below, np.where(x < self.upper, above, 1.0))
+        x = np.clip(x, self.lower, self.upper)
+        width, rise, fall = self.upper - self.lower, self.peak - self.lower, self.upper - self.peak
+        below = (x - self.lower) ** 2 / (width * (rise or 1.0))
+        above = 1.0 - (self.upper - x) ** 2 / (width * (fall or 1.0))
+        return np.where(x < self.peak, below, above)
 
     def logpdf(self, x: Array) -> Array:
         """See `Distribution.logpdf`."""
@@ -233,8 +230,7 @@ class Triangular(Described):
     def moments(self) -> Moments:
         """See `Distribution.moments`."""
         rise, fall = self.peak - self.lower, self.upper - self.peak
-        mean = (self.lower + self.upper + self.peak) / 3.0
-        return Moments(mean, math.sqrt((rise**2 + rise * fall + fall**2) / 18.0))
+        return Moments((self.lower + self.upper + self.peak) / 3.0, math.sqrt((rise**2 + rise * fall + fall**2) / 18.0))
 
 
 @dataclass(frozen=True)
@@ -258,14 +254,6 @@ class LogNormal(Described):
         above = x > self.threshold
         y = np.log(np.where(above, x - self.threshold, 1.0))
         return np.where(above, self.log.logpdf(y) - y, -np.inf)
-
-    @property
-    def moments(self) -> Moments:
-        """See `Distribution.moments`."""
-        if isinstance(self.log, TruncatedNormal):
-            return super().moments
-        size = math.exp(self.log.mean + 0.5 * self.log.sigma**2)
-        return Moments(self.threshold + size, size * math.sqrt(math.expm1(self.log.sigma**2)))
 
 
 @dataclass(frozen=True)
@@ -384,7 +372,7 @@ def score(distribution: Distribution, values: Array) -> Array:
     """
     from scipy.special import ndtri
 
-    if isinstance(distribution, Normal):
+    if isinstance(distribution, Normal):  # from the values: a probability near 1 has few digits of its tail
         return np.clip((values - distribution.mean) / distribution.sigma, -9.0, 9.0)
     return np.clip(ndtri(probability(distribution, values)), -9.0, 9.0)
 

@@ -16,7 +16,6 @@ import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, WithJsonSchema, model_validator
 
 from tolstat.common import strict, units
-from tolstat.common.files import data_dir
 from tolstat.common.notation import PLUS_MINUS
 from tolstat.common.strict import refuse
 from tolstat.study.tolerances import iso2768
@@ -254,7 +253,7 @@ class HalfBand(SingleEntry):
             raise refuse(f"ISO 2768 has no tolerance for {site.name}", "give plus_minus")
         kind = "angular" if site.unit == "rad" else "linear"
         try:
-            return iso2768.deviation(data_dir() / "iso2768.csv", kind, self.iso2768, self.nominal)
+            return iso2768.deviation(kind, self.iso2768, self.nominal)
         except ValueError as error:
             raise refuse(f"nominal = {{nominal}}: {error}", "give plus_minus", "nominal") from error
 

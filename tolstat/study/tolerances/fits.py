@@ -21,7 +21,7 @@ from tolstat.display.text import percent
 from tolstat.study import selection
 from tolstat.study.selection import Entry
 from tolstat.study.tolerances import iso286, kinds
-from tolstat.study.tolerances.distributions import Distribution, Normal
+from tolstat.study.tolerances.distributions import Distribution
 from tolstat.study.tolerances.entry import PositiveLength, PositiveNumber, Site
 
 KEY = "fit"
@@ -222,11 +222,8 @@ def larger(pin: Distribution, hole: Distribution, clearance: float) -> float:
     Returns
     -------
     float
-        In closed form for two normal distributions, otherwise by quadrature over the hole's diameters.
+        By quadrature over the hole's diameters.
     """
-    if isinstance(pin, Normal) and isinstance(hole, Normal):
-        mean = clearance + hole.mean - pin.mean
-        return 0.5 * math.erfc(mean / (math.sqrt(2.0) * math.hypot(hole.sigma, pin.sigma)))
     return 1.0 - hole.expect(lambda deviation: pin.cdf(deviation + clearance))
 
 

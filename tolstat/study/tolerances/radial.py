@@ -45,13 +45,6 @@ class Rayleigh(Described):
             radius = np.log(np.where(inside, x, 0.0))
         return radius - 0.5 * (x / self.sigma) ** 2 - 2 * math.log(self.sigma) - math.log(self._share)
 
-    @property
-    def moments(self) -> Moments:
-        """See `Distribution.moments`."""
-        if self.upper is not None:
-            return super().moments
-        return Moments(self.sigma * math.sqrt(0.5 * math.pi), self.sigma * math.sqrt(2.0 - 0.5 * math.pi))
-
 
 @dataclass(frozen=True)
 class Disc(Described):

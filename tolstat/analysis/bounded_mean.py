@@ -53,7 +53,7 @@ def _lower(x: FloatArray, confidence: float) -> float:
     def rejected(m: float) -> bool:
         return bool(np.log1p(np.minimum(bets, STAKE / m) * (x - m)).sum() >= gain)
 
-    return mean - float(first(lambda less: rejected(mean - less), 0.0, mean, halvings=40))
+    return mean - float(first(lambda less: rejected(mean - float(less)), 0.0, mean, halvings=40))
 
 
 def _bets(x: FloatArray, gain: float) -> FloatArray:

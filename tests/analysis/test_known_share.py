@@ -66,7 +66,7 @@ def test_with_very_many_parts_both_is_the_interval_of_the_joints():
 def test_processes_without_support_count_at_both_ends():
     z = np.random.default_rng(5).standard_normal((500, 2))
     event = Event(z[:, 0] > 1.0, z[:, 0] < 9.0)
-    (split,) = known_share.tallies([sums(z)], (Known(30, 2),), process.draws((30,)), np.ones(1024), [event])
+    (split,) = known_share.tallies([sums(z)], (Known(30, 2),), process.draws((30,)), np.ones(500), [event])
     some = np.arange(1024) >= 10
     few = known_share.intervals(split, [split], [split], some)
     all_ = known_share.intervals(split, [split], [split], np.ones(1024, dtype=bool))

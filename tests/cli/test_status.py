@@ -12,6 +12,7 @@ import tolstat
 from tests.support import synthetic
 from tests.support.environment import environment
 from tolstat import cli, study
+from tolstat.analysis.binomial import clopper_pearson
 
 EARLIER, BLOCK, WAIT_S = 300, 5, 0.5
 
@@ -42,8 +43,8 @@ def test_pace_is_that_of_this_run_and_counts_no_joint_of_an_earlier_one(tmp_path
     assert found["s_to_go"] == pytest.approx(found["pending"] / found["joints_per_s"], rel=0.02, abs=1)
 
 
-@pytest.mark.parametrize(("lot", "interval"), [("", True), ("joints_per_lot = 5\n", False)])
-def test_joints_that_share_lots_have_no_interval_of_independent_ones(tmp_path, lot, interval):
+@pytest.mark.parametrize("lot", ["", "joints_per_lot = 5\n"])
+def test_shares_so_far_have_the_interval_of_the_joints_design(tmp_path, lot):
     text = synthetic.STUDY.replace("n = 60\n", f"n = 200\n{lot}")
     text = text.replace("cpk = 1.0 }", "cpk = 1.0, lot = { share = 0.5 } }") if lot else text
     path = synthetic.store(tmp_path, text)
@@ -52,4 +53,5 @@ def test_joints_that_share_lots_have_no_interval_of_independent_ones(tmp_path, l
     assert len(shares) == 7
     for share in shares:
         assert share["estimate"] is not None
-        assert [share["lower"] is not None, share["upper"] is not None] == [interval, interval]
+        independent = [float(f"{end:.3g}") for end in clopper_pearson(share["above"], share["of"])]
+        assert ([share["lower"], share["upper"]] == independent) == (not lot)

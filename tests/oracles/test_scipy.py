@@ -6,7 +6,7 @@ from scipy import stats
 
 import tolstat
 from tolstat.analysis import prediction
-from tolstat.analysis.exceedance import clopper_pearson
+from tolstat.analysis.binomial import clopper_pearson
 from tolstat.common.tables import Status
 
 CONFIDENCES = (0.5, 0.8, 0.95, 0.999)

@@ -5,6 +5,7 @@ import pytest
 from scipy import stats
 
 from tolstat.analysis import difference, overrepresentation
+from tolstat.analysis.sample import Sample
 
 pytest.importorskip("statsmodels", reason="pip install .[oracles]")
 from statsmodels.stats.contingency_tables import mcnemar
@@ -12,10 +13,15 @@ from statsmodels.stats.nonparametric import rank_compare_2indep
 from statsmodels.stats.proportion import confint_proportions_2indep
 
 
+def loads(above):
+    """Sample of independent joints, 1 above the level and 0 below it."""
+    return Sample.of(above, np.ones(above.size))
+
+
 def ours(above_a, n, above_b, m):
     """Interval of the share in B less that in A."""
     a, b = np.arange(n) < above_a, np.arange(m) < above_b
-    found = difference.shares(a, b, [0.5], paired=False)
+    found = difference.shares(loads(a), loads(b), [0.5], paired=False)
     return found.lower[0], found.upper[0]
 
 
@@ -71,7 +77,7 @@ def test_mcnemars_p():
             a = np.repeat([True, False, True, False], [only_a, only_b, 5, 20])
             b = np.repeat([False, True, True, False], [only_a, only_b, 5, 20])
             theirs = mcnemar([[5, only_a], [only_b, 20]], exact=True).pvalue
-            assert difference.shares(a, b, [0.5], paired=True).p[0] == pytest.approx(theirs, rel=1e-13)
+            assert difference.shares(loads(a), loads(b), [0.5], paired=True).p[0] == pytest.approx(theirs, rel=1e-13)
 
 
 def larger(above, others):

@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 import tolstat
 from tolstat.analysis import strength
 from tolstat.analysis.cycles import Cycles
+from tolstat.analysis.independent import Independent
 from tolstat.common.errors import InputError
 from tolstat.common.load_kinds import BUSHINGS
 from tolstat.common.tables import Status
@@ -184,7 +185,7 @@ def synthetic(n=400, seed=3, scatter=1.3, status=None):
     )
     own = Stresses(cycles, -0.5 * size, 0.5 * size)
     settings = Fatigue(revolutions=1e6, points=(point(line), point(line, "b")))
-    return Stressed("made", own, state, own.rows(slice(0)), True, settings, n, 0.0, (("", 1.0),)), size, line
+    return Stressed("made", own, state, own.rows(slice(0)), Independent(), settings, n, 0.0, (("", 1.0),)), size, line
 
 
 def test_failures_and_lives_of_one_cycle_in_closed_form():

@@ -7,10 +7,9 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
+from tolstat.common.bisection import first
 from tolstat.common.loads import FloatArray
 
-STEPS = 40
-"""Bisections of an end: its error is below 1e-12."""
 STAKE = 0.75
 """Maximum share of the capital that one value can cost: with 1, one value of 0 would ruin the gambler."""
 
@@ -49,14 +48,12 @@ def interval(values: ArrayLike, confidence: float = 0.95) -> tuple[float, float]
 def _lower(x: FloatArray, confidence: float) -> float:
     gain = math.log(2.0 / (1.0 - confidence))
     bets = _bets(x, gain)
-    low, high = 0.0, float(x.mean())
-    for _ in range(STEPS):
-        middle = 0.5 * (low + high)
-        if middle <= 0.0:
-            break
-        capital = np.log1p(np.minimum(bets, STAKE / middle) * (x - middle)).sum()
-        low, high = (middle, high) if capital >= gain else (low, middle)
-    return low
+    mean = float(x.mean())
+
+    def rejected(m: float) -> bool:
+        return bool(np.log1p(np.minimum(bets, STAKE / m) * (x - m)).sum() >= gain)
+
+    return mean - float(first(lambda less: rejected(mean - float(less)), 0.0, mean, halvings=40))
 
 
 def _bets(x: FloatArray, gain: float) -> FloatArray:

@@ -15,9 +15,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tolstat.analysis import binomial, exceedance
+from tolstat.analysis.estimates import Exceedance
 from tolstat.analysis.independent import Independent
 from tolstat.analysis.listed import Listed
-from tolstat.analysis.sample import Ends, Exceedance, Sample
+from tolstat.analysis.sample import Ends, Sample
 from tolstat.common.loads import FloatArray
 from tolstat.common.shown import shown
 

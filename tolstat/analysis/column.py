@@ -1,9 +1,10 @@
-"""One number for each joint, counted above levels."""
+"""One number for each joint, counted above levels; and joints that have no single number."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import cached_property
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -60,29 +61,65 @@ class _Replaced(Column):
     """Column with other numbers for some joints: counts are those of the whole, less the old, plus the new."""
 
     def __init__(self, base: Column, joints: NDArray[np.intp], values: FloatArray) -> None:
-        self._base, self._joints = base, joints
+        self.base, self._joints = base, joints
         self._old, self._new = Column(base.values[joints]), Column(values)
 
     @property
     def values(self) -> FloatArray:  # type: ignore[override]
         """The numbers, (n,), in a new array."""
-        values = self._base.values.copy()
+        values = self.base.values.copy()
         values[self._joints] = self._new.values
-        return values
+        return frozen(values)
 
     @property
     def n(self) -> int:
         """Number of joints that count."""
-        return self._base.n - self._old.n + self._new.n
+        return self.base.n - self._old.n + self._new.n
 
     @property
     def ascending(self) -> FloatArray:
         """Numbers of the joints that count, ascending, in a new array."""
-        whole, old, new = self._base.ascending, self._old.ascending, self._new.ascending
+        whole, old, new = self.base.ascending, self._old.ascending, self._new.ascending
         place = np.searchsorted(whole, old) + np.arange(old.size) - np.searchsorted(old, old)  # equal ones one by one
         kept = np.delete(whole, place)
-        return np.insert(kept, np.searchsorted(kept, new), new)
+        return frozen(np.insert(kept, np.searchsorted(kept, new), new))
 
     def above(self, levels: FloatArray) -> NDArray[np.intp]:
         """Count the joints above each level, (m,)."""
-        return np.asarray(self._base.above(levels) - self._old.above(levels) + self._new.above(levels))
+        return np.asarray(self.base.above(levels) - self._old.above(levels) + self._new.above(levels))
+
+
+class Inexact(NamedTuple):
+    """Joints whose load is no single number.
+
+    Attributes
+    ----------
+    joints : ndarray of int, shape (k,)
+        Indices of these joints, ascending.
+    lower, upper : ndarray, shape (k,)
+        Ends of their loads: an interval (stationary), -inf and inf (failed or unsettled), NaN (pending).
+    """
+
+    joints: NDArray[np.intp]
+    lower: FloatArray
+    upper: FloatArray
+
+    def of(self, joints: NDArray[np.intp], values: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Ends of the loads of some joints, all of these among them, (m,) each; `values` are all loads."""
+        lower, upper = values[joints], values[joints]
+        place = np.searchsorted(joints, self.joints)
+        lower[place], upper[place] = self.lower, self.upper
+        return lower, upper
+
+
+def largest(loads: Iterable[tuple[Column, Inexact]]) -> tuple[Column, Inexact]:
+    """Largest of several loads of each joint, and of their ends; taken one after the other to save memory."""
+    each = iter(loads)
+    column, inexact = next(each)
+    values = column.values.copy()
+    for other, own in each:
+        joints = np.union1d(inexact.joints, own.joints)
+        ends = zip(inexact.of(joints, values), own.of(joints, other.values), strict=True)
+        inexact = Inexact(joints, *(np.maximum(*pair) for pair in ends))
+        np.maximum(values, other.values, out=values)
+    return Column(frozen(values)), inexact

@@ -11,9 +11,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from tolstat.analysis.estimates import Exceedance, Quantile
 from tolstat.analysis.independent import Independent
 from tolstat.analysis.listed import Listed
-from tolstat.analysis.sample import Ends, Exceedance, Quantile, Sample
+from tolstat.analysis.sample import Ends, Sample
 from tolstat.analysis.weighted import Weighted
 
 

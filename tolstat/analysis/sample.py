@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tolstat.analysis.column import Column, Mask, frozen
+from tolstat.analysis.column import Column, Inexact, Mask, largest
 from tolstat.analysis.design import Design
+from tolstat.analysis.estimates import CURVE, Exceedance, Quantile
 from tolstat.analysis.independent import Independent
 from tolstat.common.loads import FloatArray
-from tolstat.common.shown import shown, table
+from tolstat.common.shown import table
 from tolstat.common.tables import UNSETTLED, VALID, Status, worst_status
 
 CONFIDENCE = 0.95
@@ -24,102 +24,6 @@ Ends = tuple[ArrayLike, ArrayLike]
 """Lower and upper end of the load of each joint."""
 
 _IS_VALID, _IS_UNSETTLED = (np.isin(np.arange(256), states) for states in (VALID, UNSETTLED))
-
-
-@shown
-@dataclass(frozen=True)
-class Exceedance:
-    """Share of the joints whose load is above a level.
-
-    Attributes
-    ----------
-    level : float
-        Load level, in the unit of the values.
-    n : int
-        Joints simulated, the unresolved ones included.
-    n_failed, n_unsettled : int
-        Joints without a valid load: the solution failed, or had not settled at ``solver.max_revs``.
-    count : int
-        Valid joints above the level.
-    estimate : float
-        Share of the valid joints above the level; NaN when none is valid.
-    lower, upper : float
-        Interval of that share; NaN when the design gives none.
-    bound_lower, bound_upper : float
-        Share of all `n` joints above the level with every undecided joint counted below it, and above it. Undecided
-        are the unresolved joints, and stationary ones whose interval contains the level.
-    outer_lower, outer_upper : float
-        Lower end of the interval of ``bound_lower`` and upper end of that of ``bound_upper``: cover both uncertainties.
-    """
-
-    level: float
-    n: int
-    n_failed: int
-    n_unsettled: int
-    count: int
-    estimate: float
-    lower: float
-    upper: float
-    bound_lower: float
-    bound_upper: float
-    outer_lower: float
-    outer_upper: float
-
-
-CURVE = np.dtype([(f.name, "i8" if f.type == "int" else "f8") for f in fields(Exceedance)])
-"""A row of a curve: the fields of `Exceedance`."""
-
-
-@shown
-class Quantile(NamedTuple):
-    """Load that a share of the joints stays at or below.
-
-    Attributes
-    ----------
-    share : float
-        Share of the joints, between 0 and 1.
-    n, n_failed, n_unsettled : int
-        As in `Exceedance`.
-    estimate : float
-        Smallest value that at least `share` of the valid joints do not exceed; NaN when none is valid.
-    lower, upper : float
-        Two-sided interval from the valid joints, ±inf when they are too few; NaN when the design gives none.
-    bound_lower, bound_upper : float
-        The estimate with the lower and with the upper end of every load; ±inf if it falls among unresolved joints.
-    """
-
-    share: float
-    n: int
-    n_failed: int
-    n_unsettled: int
-    estimate: float
-    lower: float
-    upper: float
-    bound_lower: float
-    bound_upper: float
-
-
-class Inexact(NamedTuple):
-    """Joints whose load is no single number.
-
-    Attributes
-    ----------
-    joints : ndarray of int, shape (k,)
-        Indices of these joints, ascending.
-    lower, upper : ndarray, shape (k,)
-        Ends of their loads: an interval (stationary), -inf and inf (failed or unsettled), NaN (pending).
-    """
-
-    joints: NDArray[np.intp]
-    lower: FloatArray
-    upper: FloatArray
-
-    def of(self, joints: NDArray[np.intp], values: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Ends of the loads of some joints, all of these among them, (m,) each; `values` are all loads."""
-        lower, upper = values[joints], values[joints]
-        place = np.searchsorted(joints, self.joints)
-        lower[place], upper[place] = self.lower, self.upper
-        return lower, upper
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -439,24 +343,16 @@ def largest_of(name: str, parts: Sequence[Sample], of_ratios: bool = False) -> S
     Computed load by load, and ratios are not kept, to save memory. A joint that has no load in one part and is above a
     level in another is above it: its lower end is the largest of the lower ends.
     """
-    joints = np.unique(np.concatenate([part.inexact.joints for part in parts]))
-    loads = replace(parts[0], parts=tuple(parts), of_ratios=of_ratios).each()
-    first = next(loads)
-    values, nominal = first.values.copy(), first.nominal
-    lower, upper = first.inexact.of(joints, first.values)
-    for load in loads:
-        own = load.inexact.of(joints, load.values)
-        lower, upper = np.maximum(lower, own[0]), np.maximum(upper, own[1])
-        np.maximum(values, load.values, out=values)
-        nominal = max(nominal, load.nominal)
+    whole = replace(parts[0], parts=tuple(parts), of_ratios=of_ratios)
+    value, inexact = largest((load.value, load.inexact) for load in whole.each())
     return replace(
-        first,
+        next(whole.each()),
         name=name,
-        nominal=nominal,
-        value=Column(frozen(values)),
-        inexact=Inexact(joints, lower, upper),
+        nominal=max(part.nominal / (part.limit or 1.0) if of_ratios else part.nominal for part in parts),
+        value=value,
+        inexact=inexact,
         status=worst_status([part.status for part in parts]),
-        parts=tuple(parts),
+        parts=whole.parts,
         of_ratios=of_ratios,
     )
 

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.analysis import binomial
-from tolstat.analysis.column import Column
 from tolstat.analysis.independent import Independent
 from tolstat.analysis.sample import Sample
 from tolstat.campaign import checks, verify
@@ -340,7 +339,7 @@ def _limits(study: Study, results: Mapping[str, NDArray[np.void]]) -> list[Limit
     for name, level in study.limits.items():
         points = names_of(split(name)[1], list(results), "limits")
         values, status, inexact = worst.load_of([results[point] for point in points], load_of(name))
-        load = Sample(name, load_of(name).unit, level, np.nan, Column(values), inexact, status, Independent())
+        load = Sample(name, load_of(name).unit, level, np.nan, values, inexact, status, Independent())
         found = load.above(level, CONFIDENCE)
         valid = found.n - found.n_failed - found.n_unsettled
         nearest_half = min(max(0.5, found.lower), found.upper)  # the interval is widest at a share of one half

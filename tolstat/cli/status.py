@@ -149,7 +149,8 @@ def _summary(store: Reader) -> tuple[dict[str, Any], dict[str, NDArray[np.uint8]
         for name, values in loads.items():
             if all(point in results for point in at[name]):
                 own, state, inexact = worst.load_of([results[point] for point in at[name]], load_of(name))
-                values[:, slots], worst_states[name][slots] = (own, *inexact.of(np.arange(own.size), own)), state
+                values[:, slots] = own.values, *inexact.of(np.arange(len(state)), own.values)
+                worst_states[name][slots] = state
     found = np.bincount(worst_status(list(states.values())), minlength=max(Status) + 1)
     summary: dict[str, Any] = {"study": store.study_name, "joints": store.n}
     summary |= {state.label: int(found[state]) for state in Status}

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from tolstat.common.bisection import first
 from tolstat.joint.material import Array
 
 LOADS = 41
@@ -20,7 +21,7 @@ _x, _w = np.polynomial.legendre.leggauss(24)
 NODES, WEIGHTS = 0.5 * (_x + 1.0), 0.5 * _w
 """Gauss-Legendre quadrature from 0 to 1; over the loaded needles it is exact to 2e-7."""
 NARROW = 1e-6
-"""Width of the interval of log b, or of the logarithm of a displacement, at which a search ends."""
+"""Width of the interval of log b at which its search ends."""
 
 
 class Fit(NamedTuple):
@@ -105,14 +106,11 @@ def fit_needles(load: float, clearance: float, needles: int, length: float) -> F
 
 def displacement(load: float, clearance: float, needles: int, length: float) -> float:
     """Displacement (m) beyond first touch at which a bearing takes `load` (N); see `needle_force`."""
-    low, high = math.log(1e-12), 0.0  # 1e-12 m to 1 m
-    while high - low > NARROW:
-        middle = 0.5 * (low + high)
-        if needle_force(np.array([math.exp(middle)]), clearance, needles, length)[0] > load:
-            high = middle
-        else:
-            low = middle
-    return math.exp(high)
+
+    def exceeded(log_delta: float) -> bool:
+        return bool(needle_force(np.array([math.exp(log_delta)]), clearance, needles, length)[0] > load)
+
+    return math.exp(float(first(exceeded, math.log(1e-12), 0.0, halvings=25)))  # 1e-12 m to 1 m, to 1e-6 of itself
 
 
 def _least(function: Callable[[float], float], low: float, high: float) -> float:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tolstat.analysis import accuracy
-from tolstat.analysis.column import Column, frozen
+from tolstat.analysis.column import frozen
 from tolstat.analysis.design import SAMPLE, Claim, Design
 from tolstat.analysis.designs import Drawn, design_of
 from tolstat.analysis.sample import Sample, largest_of
@@ -205,10 +205,12 @@ class View:
             load, limit = LOADS[name], self.limits.get(name)
             nominal = float(load.of(self.nominal)[0]) if len(self.nominal) else np.nan
             values, _, inexact = worst.load_of([part.results for part in self.parts], load)
-            self._loads[name] = Sample(
-                name, load.unit, limit, nominal, Column(values), inexact, self.status, self.design
-            )
+            self._loads[name] = Sample(name, load.unit, limit, nominal, values, inexact, self.status, self.design)
         return self._loads[name]
+
+    def simulated(self, name: str) -> FloatArray:
+        """Largest load of each joint that has results, those of unsettled joints included, SI; NaN without, (n,)."""
+        return np.asarray(np.maximum.reduce([LOADS[name].of(part.results) for part in self.parts]))
 
     def loads(self, names: Sequence[str]) -> list[Sample]:
         """Several loads; see `load`."""

@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.analysis.column import frozen
-from tolstat.analysis.sample import Inexact, is_valid
+from tolstat.analysis.column import Column, Inexact, frozen, largest
+from tolstat.analysis.sample import is_valid
 from tolstat.common.load_kinds import SPAN
 from tolstat.common.loads import LOAD_FIELDS, LOADS, FloatArray, Limit, Load, Results, split
 from tolstat.common.tables import FAILED, RESULT, UNSETTLED, VALID, Status, deciding, without_results, worst_status
@@ -45,7 +45,7 @@ def together(parts: Sequence[Results]) -> dict[str, NDArray[Any]]:
     return found
 
 
-def load_of(parts: Sequence[Results], load: Load) -> tuple[FloatArray, NDArray[np.uint8], Inexact]:
+def load_of(parts: Sequence[Results], load: Load) -> tuple[Column, NDArray[np.uint8], Inexact]:
     """One load of the joints over some operating points, in arrays that cannot be written to.
 
     Parameters
@@ -57,36 +57,32 @@ def load_of(parts: Sequence[Results], load: Load) -> tuple[FloatArray, NDArray[n
 
     Returns
     -------
-    values : ndarray, shape (n,)
-        Largest value, SI; NaN unless the joint is valid at all points.
+    values : Column
+        Largest value, SI; NaN unless the joint is valid at all points. Of one point it shares the memory of `parts`.
     status : ndarray, shape (n,)
         See `tables.worst_status`.
     inexact : Inexact
         Joints that are stationary, failed or unsettled at a point: the largest of the lower ends, and of the upper
         ones.
     """
-    status, each = [part["status"] for part in parts], [load.of(part) for part in parts]
-    valid = [is_valid(own, state) for own, state in zip(each, status, strict=True)]
-    for k, (own, good) in enumerate(zip(each, valid, strict=True)):
-        if np.isfinite(own[~good]).any():
-            each[k] = np.where(good, own, np.nan)
-    values = np.maximum.reduce(each) if len(parts) > 1 else each[0]  # of one point a column of its results, no copy
-    lost = [~good & (state != Status.PENDING) for good, state in zip(valid, status, strict=True)]
-    inexact = [own | (state == Status.STATIONARY) for own, state in zip(lost, status, strict=True)]
-    joints = np.flatnonzero(np.logical_or.reduce(inexact))
-    names = [f"{load.kind.key}_{of}" for of in ("max", "lower", "upper")]
-    ends = []
-    for part, own, without in zip(parts, each, lost, strict=True):
-        exact, outside = own[joints], without[joints]
-        low, high = load.ends({name: part[name][joints] for name in names})
-        low, high = (np.where(np.isfinite(end + exact), end, exact) for end in (low, high))
-        ends.append((np.where(outside, -np.inf, low), np.where(outside, np.inf, high)))
-    lower, upper = (np.maximum.reduce(own) for own in zip(*ends, strict=True))
-    apart = (lower != values[joints]) | (upper != values[joints])
-    found = Inexact(joints[apart], lower[apart], upper[apart])
-    for array in (values, *found):
+    each = [_at_point(part, load) for part in parts]
+    value, inexact = each[0] if len(each) == 1 else largest(each)
+    for array in inexact:
         frozen(array)
-    return values, worst_status(status), found
+    return value, worst_status([part["status"] for part in parts]), inexact
+
+
+def _at_point(part: Results, load: Load) -> tuple[Column, Inexact]:
+    values, status = frozen(load.of(part)), part["status"]
+    valid = is_valid(values, status)
+    others = np.flatnonzero(~valid & np.isfinite(values))
+    joints = np.flatnonzero((~valid & (status != Status.PENDING)) | (status == Status.STATIONARY))
+    lost, exact = ~valid[joints], values[joints]
+    names = [f"{load.kind.key}_{of}" for of in ("max", "lower", "upper")]
+    ends = load.ends({name: part[name][joints] for name in names})
+    lower, upper = (np.where(np.isfinite(end), end, exact) for end in ends)
+    inexact = Inexact(joints, np.where(lost, -np.inf, lower), np.where(lost, np.inf, upper))
+    return Column(values).replaced(others, np.full(others.size, np.nan)), inexact
 
 
 def limit_of(parts: Mapping[str, NDArray[np.void]], limit: Limit) -> tuple[FloatArray, NDArray[np.uint8]]:
@@ -104,7 +100,7 @@ def limit_of(parts: Mapping[str, NDArray[np.void]], limit: Limit) -> tuple[Float
         where = split(name)[1]
         chosen = [parts[point] for point in where.split("+")] if where else list(parts.values())
         values, status, _ = load_of(chosen, LOADS[split(name)[0]])
-        found.append(values if limit.has_one_level else values / level)
+        found.append(values.values if limit.has_one_level else values.values / level)
         states.append(status)
     return np.maximum.reduce(found), worst_status(states)
 
@@ -142,8 +138,7 @@ class FirstPass(NamedTuple):
     Attributes
     ----------
     results : dict of str to ndarray, shape (n, ...)
-        Columns `LOAD_FIELDS` of the samples, loads of joints that are not valid NaN; the values of one load lie side by
-        side.
+        Columns `LOAD_FIELDS` of the samples; the values of one load lie side by side.
     nominal : ndarray of RESULT, shape (1,) or (0,)
         The nominal joint, if the file has one and its results are valid.
     without_load : ndarray of RESULT, shape (m,)
@@ -169,13 +164,11 @@ def first_pass(store: Reader, weights: FloatArray | None) -> FirstPass:
         if first == 0 and skip:
             nominal, block = block[:1][np.isin(block["status"][:1], VALID)].copy(), block[1:]
         begin = max(0, first - skip)
-        valid = np.isin(block["status"], VALID)
         for name in LOAD_FIELDS:
             results[name][begin : begin + len(block)] = block[name]
-            if name != "status":
-                results[name][begin : begin + len(block)][~valid] = np.nan
         if sum(map(len, kept)) < MAX_LISTED:
             kept.append(block[np.isin(block["status"], (*FAILED, *UNSETTLED))][:MAX_LISTED])
+        valid = np.isin(block["status"], VALID)
         weight = np.ones(len(block)) if weights is None else weights[begin : begin + len(block)]
         shares += np.tensordot(weight[valid], block["mode_share"][valid], 1)
         total += float(weight[valid].sum())

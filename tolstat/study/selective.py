@@ -16,11 +16,12 @@ from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
 from tolstat.common import units
+from tolstat.common.bisection import first
 from tolstat.common.errors import Fault
 from tolstat.common.load_kinds import PINS
 from tolstat.common.strict import Strict, refuse
 from tolstat.study.tolerances.accepted import scores_among
-from tolstat.study.tolerances.distributions import Array, Distribution, score
+from tolstat.study.tolerances.distributions import Array, Distribution, probability
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -28,8 +29,6 @@ if TYPE_CHECKING:
     from tolstat.study.tolerances.entry import Toleranced
 
 MAX_CLASSES = 20
-STEPS = 40
-"""Bisections of an edge between classes of equally many parts."""
 ROUNDING = 1e-8
 """Unmatched share below which it is the rounding of classes of equally many parts."""
 LEAST = 1e-300
@@ -119,8 +118,7 @@ class Range(NamedTuple):
         """Share of the parts."""
         if self.gauge:
             return _among(self)[2]
-        low, high = self._ends
-        return high - low
+        return float(np.diff(self._ends)[0])
 
     def scores(self, u: Array) -> Array:
         """Score, among all parts, of the diameter that is exceeded with probability 1 - u in the range; both (n,)."""
@@ -133,12 +131,9 @@ class Range(NamedTuple):
         return np.asarray(ndtri(np.clip(low + u * (high - low), LEAST, 1.0 - 2.0**-53)))
 
     @property
-    def _ends(self) -> tuple[float, float]:
+    def _ends(self) -> Array:
         """Probabilities that a diameter without gauge error is below each end."""
-        from scipy.special import ndtr
-
-        low, high = ndtr(score(self.distribution, np.clip([self.low, self.high], -1.0, 1.0))).tolist()
-        return (low if self.low > -np.inf else 0.0), (high if self.high < np.inf else 1.0)
+        return probability(self.distribution, np.array([self.low, self.high]))
 
 
 @lru_cache(maxsize=512)
@@ -277,19 +272,12 @@ def _edges(classes: int, gauge: float, split: str, kind: Kind, own: _Diameters) 
     else:
         count = len(kind.errors)
         below = parts ** (1.0 / count) if kind.worst > 0 else 1.0 - (1.0 - parts) ** (1.0 / count)
-        reach = own.distribution.ppf(np.array([1e-12, 1.0 - 1e-12])) + 9.0 * gauge * np.array([-1.0, 1.0])
-        inner = np.array([_quantile(own.distribution, gauge, share, *reach) for share in below])
+        inner = own.distribution.ppf(below)
+        if gauge:  # of the measured deviations
+            reach = own.distribution.ppf(np.array([1e-12, 1.0 - 1e-12])) + 9.0 * gauge * np.array([-1.0, 1.0])
+            upto = np.vectorize(lambda end: Range(own.distribution, gauge, -np.inf, float(end)).share, otypes=[float])
+            inner = first(lambda ends: upto(ends) >= below, reach[0], reach[1], halvings=40)
     return np.concatenate([[-np.inf], inner, [np.inf]])
-
-
-def _quantile(distribution: Distribution, gauge: float, share: float, low: float, high: float) -> float:
-    """Measured deviation that a share of the parts stays below."""
-    if not gauge:
-        return float(distribution.ppf(np.array([share]))[0])
-    for _ in range(STEPS):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if Range(distribution, gauge, -np.inf, middle).share < share else (low, middle)
-    return 0.5 * (low + high)
 
 
 def _bands(entries: Iterable[Toleranced]) -> dict[str, tuple[float, float] | None]:

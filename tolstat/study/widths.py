@@ -17,16 +17,14 @@ import numpy as np
 
 from tolstat.common import units
 from tolstat.common.errors import Fault, InputError, gather
-from tolstat.common.files import data_dir
 from tolstat.common.strict import did_you_mean
 from tolstat.joint import HOLE_OF_PIN
 from tolstat.study import scaling, selection
 from tolstat.study.axes import is_zone
 from tolstat.study.study import Study
-from tolstat.study.tolerances import fits, iso286
-from tolstat.study.tolerances.distributions import Array, Distribution, iso2768
+from tolstat.study.tolerances import fits, iso286, iso2768
+from tolstat.study.tolerances.distributions import Array, Distribution
 from tolstat.study.tolerances.entry import SingleEntry, Site, Toleranced, ToleranceEntry
-from tolstat.study.tolerances.moments import mean
 
 HALF, EXACT, FINER, COARSER = STEPS = ("half", "exact", "finer", "coarser")
 """Changes of a width: by one half, to zero, and by one class of ISO 286 or ISO 2768, finer or coarser."""
@@ -58,6 +56,13 @@ class Rescaled(Distribution):
     def ppf(self, u: Array) -> Array:
         """See `Distribution.ppf`."""
         return self.middle + self.shift + self.factor * (self.every.ppf(u) - self.middle)
+
+    def cdf(self, x: Array) -> Array:
+        """See `Distribution.cdf`."""
+        off = x - self.shift - self.middle
+        if self.factor == 0.0:
+            return np.where(off >= 0.0, 1.0, 0.0)
+        return self.every.cdf(self.middle + off / self.factor)
 
     def logpdf(self, x: Array) -> Array:
         """See `Distribution.logpdf`."""
@@ -255,7 +260,7 @@ def _classed(entry: Toleranced, site: Site, side: int) -> Width | None:
         return None
     other, kind = CLASSES[CLASSES.index(own) + side], "angular" if site.unit == "rad" else "linear"
     nominal = units.to_si(entry.keys["nominal"], "m")
-    old, new = (iso2768(data_dir() / "iso2768.csv", kind, one, nominal) for one in (own, other))
+    old, new = (iso2768.deviation(kind, one, nominal) for one in (own, other))
     return None if new == old else Width(new / old, 0.0, f"class {other}")
 
 
@@ -264,7 +269,7 @@ def _middle(name: str, site: Site, model: ToleranceEntry, distribution: Distribu
     if is_zone(name):
         return 0.0
     band = model.band(site) if isinstance(model, SingleEntry) else None
-    return mean(distribution) if band is None else 0.5 * (band[0] + band[1])
+    return distribution.moments.mean if band is None else 0.5 * (band[0] + band[1])
 
 
 def _free(study: Study, entry: Toleranced) -> bool:

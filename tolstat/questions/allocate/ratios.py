@@ -14,7 +14,7 @@ from tolstat import sampling
 from tolstat.common.loads import FloatArray
 from tolstat.study import Study
 from tolstat.study.scaling import Tolerance
-from tolstat.study.tolerances.density_ratio import Exact, exact, log_mean_square
+from tolstat.study.tolerances.density_ratio import Exact, of_error
 from tolstat.study.tolerances.distributions import Distribution, Normal
 from tolstat.study.tolerances.radial import Rayleigh
 
@@ -41,7 +41,8 @@ class DensityRatios:
         self._old = [t.distribution(t.entry) for t in tolerances]
         self._old_density = [self._log_density(i, old) for i, old in enumerate(self._old)]
         keep = lru_cache(maxsize=4 * len(tolerances))
-        self._one, self._one_mean_square = keep(self._log_ratio), keep(self._log_mean_square)
+        self._one = keep(self._log_ratio)
+        self._one_exact = keep(lambda i, factor: of_error(self._scaled(i, factor), self._old[i]))
 
     def log_ratios(self, factors: FloatArray) -> FloatArray:
         """Logarithms of the ratios for tolerances scaled by factors, (n,)."""
@@ -49,22 +50,21 @@ class DensityRatios:
 
     def log_mean_square(self, factors: FloatArray) -> float:
         """Logarithm of the mean square of the ratio; see `analysis.allocation.Problem.log_spread`."""
-        return float(
-            sum(len(t.names) * self._one_mean_square(i, float(factors[i])) for i, t in enumerate(self._tolerances))
-        )
+        return self.exact(factors).mean_square
 
     def exact(self, factors: FloatArray) -> Exact:
         """Exact numbers of the ratio for tolerances scaled by factors."""
-        new = (self._scaled(i, float(f)) for i, f in enumerate(factors))
-        return self._exact(new)
+        return self._sum(self._one_exact(i, float(f)) for i, f in enumerate(factors))
 
     def exact_of_entries(self, entries: Entries) -> Exact:
         """Exact numbers of the ratio for changed entries."""
-        return self._exact(t.distribution(entries.get(t.pattern, t.entry)) for t in self._tolerances)
+        new = [t.distribution(entries.get(t.pattern, t.entry)) for t in self._tolerances]
+        return self._sum(of_error(*pair) for pair in zip(new, self._old, strict=True))
 
-    def _exact(self, new: Iterable[Distribution]) -> Exact:
-        each = zip(self._tolerances, new, self._old, strict=True)
-        return exact((own, old) for t, own, old in each for _ in t.names)
+    def _sum(self, each: Iterable[Exact]) -> Exact:
+        """Sum over errors, of which a tolerance may have several."""
+        found = np.array([len(t.names) * np.array(own) for t, own in zip(self._tolerances, each, strict=True)])
+        return Exact(*found.sum(axis=0).tolist())
 
     def of_entries(self, entries: Entries) -> FloatArray:
         """Logarithms of the ratios for changed entries, (n,)."""
@@ -73,9 +73,6 @@ class DensityRatios:
 
     def _log_ratio(self, i: int, factor: float) -> FloatArray:
         return self._log_density(i, self._scaled(i, factor)) - self._old_density[i]
-
-    def _log_mean_square(self, i: int, factor: float) -> float:
-        return log_mean_square(self._scaled(i, factor), self._old[i])
 
     def _scaled(self, i: int, factor: float) -> Distribution:
         old, t = self._old[i], self._tolerances[i]

@@ -96,7 +96,7 @@ def below(lives: Lives, confidence: float = 0.95) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        One row per place of `PLACES`: ``place``, ``required`` (h), the fields of `analysis.sample.Exceedance` but
+        One row per place of `PLACES`: ``place``, ``required`` (h), the fields of `analysis.estimates.Exceedance` but
         its level (``count`` are the joints below the required life; bounds have joints without a life above and
         below), ``total_lower`` and ``total_upper`` (cover sampling, joints without a life and, if known, the numerical
         error), ``confidence``. No rows without a required life.

@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from tolstat.analysis.sample import CURVE
+from tolstat.analysis.estimates import CURVE
 from tolstat.common.load_kinds import Kind
 from tolstat.common.loads import PANELS, names_of
 from tolstat.display import drawing, style, text

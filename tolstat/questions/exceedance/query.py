@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.analysis.sample import CURVE, Sample, total_interval
+from tolstat.analysis.estimates import CURVE
+from tolstat.analysis.sample import Sample, total_interval
 from tolstat.common.loads import ALL_LIMITS, SHOWN_LOADS, load_of, unit_text
 from tolstat.common.once import once
 from tolstat.display import text
@@ -50,7 +51,7 @@ def limits(view: View, confidence: float = 0.95) -> pd.DataFrame:
     -------
     DataFrame
         One row per limit, in the study's order: ``load``, ``unit``, ``nominal``, then the fields of
-        `analysis.sample.Exceedance` (``level`` is the limit), then ``confidence``, the error budget, see
+        `analysis.estimates.Exceedance` (``level`` is the limit), then ``confidence``, the error budget, see
         `_error_budget`, and ``unsearched_upper``, the upper end whatever the proposals of importance sampling miss.
         Where tolerances are known from measured parts also ``both_lower``, ``both_upper`` and the fields `KNOWN`, see
         `known_share.KnownShare`: with unresolved joints and the numerical error; NaN without support.
@@ -150,7 +151,7 @@ def quantiles(view: View, confidence: float = 0.95) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        One row per load and share: ``load``, ``unit``, ``nominal``, the fields of `analysis.sample.Quantile`,
+        One row per load and share: ``load``, ``unit``, ``nominal``, the fields of `analysis.estimates.Quantile`,
         ``confidence``. Loads in SI units.
     """
     import pandas as pd
@@ -183,7 +184,7 @@ def curves(view: View, confidence: float = 0.95) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        ``load``, ``unit``, then the fields of `analysis.sample.Exceedance`; SI units, at most
+        ``load``, ``unit``, then the fields of `analysis.estimates.Exceedance`; SI units, at most
         `MAX_LEVELS` levels per load.
     """
     import pandas as pd

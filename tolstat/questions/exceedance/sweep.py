@@ -42,7 +42,7 @@ def table(view: View) -> pd.DataFrame:
     columns["status"] = [Status(int(code)).label for code in view.status]
     names = dict.fromkeys([*view.shown_loads, *(name for name in view.kept_loads if name == "psi")])
     for load in view.loads(list(names)):
-        columns[load.name if load.unit == "1" else f"{load.name} [{load.unit}]"] = load.values
+        columns[load.name if load.unit == "1" else f"{load.name} [{load.unit}]"] = view.simulated(load.name)
     return pd.DataFrame(columns)
 
 
@@ -113,7 +113,7 @@ def _lines(ax: Axes, view: View, axes: list[Axis], group: str, kind: Kind) -> No
         ax.text(0.5, 0.5, "not kept by the study", ha="center", transform=ax.transAxes)
         ax.set(xticks=[], yticks=[])
         return
-    loads = [load.values for load in view.loads(names)]
+    loads = [view.simulated(name) for name in names]
     if len(axes) == 1:
         for name, values in zip(names, loads, strict=True):
             i = number[name]

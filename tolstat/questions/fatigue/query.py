@@ -145,7 +145,7 @@ def equivalent_loads(loading: Loading, shares: Sequence[float] = SHARES, confide
     DataFrame
         One row per channel, exponent and share: ``channel``, ``unit``, ``m``, ``nominal``, ``lacking`` (upper bound of
         the relative increase of the sum of S^m by cycles that the file does not hold, maximum over the joints), the
-        fields of `analysis.sample.Quantile`, ``confidence``. Loads are ranges in SI units.
+        fields of `analysis.estimates.Quantile`, ``confidence``. Loads are ranges in SI units.
     """
     settings, rows = loading.settings, []
     for m in settings.exponents:
@@ -170,7 +170,7 @@ def damages(loading: Loading, confidence: float = 0.95, delivery: int = DELIVERY
     DataFrame
         One row per channel and, of several, `ANY` for joints with any of these damage sums above 1 (it has no line):
         ``channel``, ``m``, ``S0`` (N or N m), ``N0``, ``nominal`` (damage of the nominal joint), ``median`` (of the
-        joints), the fields of `analysis.sample.Exceedance` for the level 1, ``next_lower`` and ``next_upper``
+        joints), the fields of `analysis.estimates.Exceedance` for the level 1, ``next_lower`` and ``next_upper``
         (prediction interval for the joints above 1 in the next delivery), ``confidence``.
     """
     rows, worst = [], []
@@ -221,7 +221,7 @@ def spectra(
     -------
     DataFrame
         One row per channel, share and number: ``channel``, ``unit``, ``cycles`` (in the service life), ``nominal``, the
-        fields of `analysis.sample.Quantile`, ``confidence``. Ranges in SI units, ascending numbers.
+        fields of `analysis.estimates.Quantile`, ``confidence``. Ranges in SI units, ascending numbers.
     """
     rows = []
     for channel in loading.cycles.channels if channels is None else channels:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from tolstat.study.bonus import Bonus
-from tolstat.study.tolerances.distributions import Array, Distribution
+from tolstat.study.tolerances.distributions import Array, Distribution, score
 
 END, CELLS = 9.0, 3600
 """Range of scores, and number of cells of the table, in which the accepted share is constant."""
@@ -83,6 +83,13 @@ class Accepted(Distribution):
         z, own, _ = self._table
         among_all = ndtr(np.interp(ndtri(u), own, z))
         return self.every.ppf(np.where((u > 0.0) & (u < 1.0), among_all, u))
+
+    def cdf(self, x: Array) -> Array:
+        """See `Distribution.cdf`."""
+        from scipy.special import ndtr
+
+        z, own, _ = self._table
+        return np.asarray(ndtr(np.interp(score(self.every, x), z, own)))
 
     def logpdf(self, x: Array) -> Array:
         """See `Distribution.logpdf`."""

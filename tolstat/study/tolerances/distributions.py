@@ -1,31 +1,39 @@
-"""Distributions of errors: inverse distribution functions, densities, process capability, ISO 2768.
-
-No statistics of the errors of Cardan crosses are published; every distribution here is an assumption
-that a study makes and states.
-"""
+"""Distributions of errors: distribution functions and their inverses, densities, moments, normal scores."""
 
 from __future__ import annotations
 
-import csv
 import hashlib
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass, field
-from functools import cache
-from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-LOG_ROOT_2PI = 0.5 * math.log(2 * math.pi)
+NODES = np.linspace(-8.5, 8.5, 6801)
+"""Normal scores of the trapezoidal rule, which converges faster than any power of the step here."""
+NEGLIGIBLE = 1e-12
+"""Shares below this are rounding errors of 1 less a share."""
+
+
+class Moments(NamedTuple):
+    """Mean and standard deviation, SI."""
+
+    mean: float
+    deviation: float
+
+    @property
+    def mean_square(self) -> float:
+        """Mean of the square."""
+        return self.mean**2 + self.deviation**2
 
 
 class Distribution(ABC):
-    """Distribution of one error, in SI units, given by the inverse of its distribution function."""
+    """Distribution of one error, in SI units."""
 
     @abstractmethod
     def ppf(self, u: Array) -> Array:
@@ -44,18 +52,31 @@ class Distribution(ABC):
 
     @abstractmethod
     def logpdf(self, x: Array) -> Array:
-        """Logarithm of the density at `x`; for a discrete distribution, of the probability.
+        """Logarithm of the density at `x`, SI, elementwise; of a discrete distribution of the probability."""
 
-        Parameters
-        ----------
-        x : ndarray, (n,)
-            Values in the error's SI unit.
+    @abstractmethod
+    def cdf(self, x: Array) -> Array:
+        """Return the probability of values up to and including `x`, SI, elementwise."""
 
-        Returns
-        -------
-        ndarray, (n,)
-            -inf outside the support.
-        """
+    @property
+    def moments(self) -> Moments:
+        """Mean and standard deviation; by quadrature where a truncation leaves no closed form that keeps its digits."""
+        mean = self.expect(lambda x: x)
+        return Moments(mean, math.sqrt(self.expect(lambda x: (x - mean) ** 2)))
+
+    def expect(self, function: Callable[[Array], Array]) -> float:
+        """Return the mean of a function of the values, by the trapezoidal rule over their normal scores."""
+        from scipy.special import ndtr
+
+        # the upper half from its own tail would need a survival function: beyond a score of 8 ndtr rounds to 1
+        values = self.ppf(np.minimum(ndtr(NODES), 1.0 - 2.0**-53))
+        return float(np.average(function(values), weights=np.exp(-0.5 * NODES**2)))
+
+    def outside(self, lower: float, upper: float) -> float:
+        """Return the share outside the band from `lower` to `upper`, SI."""
+        below, up_to = self.cdf(np.array([lower, upper])).tolist()
+        share = below + (1.0 - up_to)
+        return share if share > NEGLIGIBLE else 0.0
 
     @property
     def discrete(self) -> bool:
@@ -76,14 +97,7 @@ class Described(Distribution):
         return {"distribution": type(self).__name__.lower(), **asdict(self)}
 
 
-class _Banded(Protocol):
-    @property
-    def lower(self) -> float: ...
-    @property
-    def upper(self) -> float: ...
-
-
-def _within(band: _Banded, x: Array, density: Array) -> Array:
+def _within(band: TruncatedNormal | Uniform | Triangular | Beta, x: Array, density: Array) -> Array:
     """Logarithmic density where x is in the band, -inf elsewhere."""
     return np.where((x >= band.lower) & (x <= band.upper), density, -np.inf)
 
@@ -101,41 +115,60 @@ class Normal(Described):
 
         return self.mean + self.sigma * ndtri(u)
 
+    def cdf(self, x: Array) -> Array:
+        """See `Distribution.cdf`."""
+        from scipy.special import ndtr
+
+        return np.asarray(ndtr((x - self.mean) / self.sigma))
+
     def logpdf(self, x: Array) -> Array:
         """See `Distribution.logpdf`."""
-        return -0.5 * ((x - self.mean) / self.sigma) ** 2 - math.log(self.sigma) - LOG_ROOT_2PI
+        return -0.5 * ((x - self.mean) / self.sigma) ** 2 - math.log(self.sigma) - 0.5 * math.log(2 * math.pi)
+
+    @property
+    def moments(self) -> Moments:
+        """See `Distribution.moments`."""
+        return Moments(self.mean, self.sigma)
 
 
 @dataclass(frozen=True)
 class TruncatedNormal(Described):
-    """Normal distribution truncated to the band, as if parts outside were rejected.
-
-    `mean` and `sigma` are those before the truncation.
-    """
+    """Normal distribution, with `mean` and `sigma` before parts outside the band are rejected."""
 
     mean: float
     sigma: float
     lower: float
     upper: float
 
+    @property
+    def _span(self) -> tuple[float, float, float]:
+        """Scores of both ends before the truncation, and the share between them."""
+        from scipy.special import ndtr
+
+        a, b = (self.lower - self.mean) / self.sigma, (self.upper - self.mean) / self.sigma
+        return a, b, float(ndtr(b) - ndtr(a) if a <= 0 else ndtr(-a) - ndtr(-b))
+
     def ppf(self, u: Array) -> Array:
         """See `Distribution.ppf`."""
         from scipy.special import ndtr, ndtri
 
-        a, b = (self.lower - self.mean) / self.sigma, (self.upper - self.mean) / self.sigma
+        a, b, _ = self._span
         # each half from its own tail: probabilities near 1 have fewer significant digits than those near 0
         low = ndtri(ndtr(a) + u * (ndtr(b) - ndtr(a)))
         high = -ndtri(ndtr(-b) + (1 - u) * (ndtr(-a) - ndtr(-b)))
-        z = np.where(low <= 0, low, high)
-        return np.clip(self.mean + self.sigma * z, self.lower, self.upper)
+        return np.clip(self.mean + self.sigma * np.where(low <= 0, low, high), self.lower, self.upper)
+
+    def cdf(self, x: Array) -> Array:
+        """See `Distribution.cdf`."""
+        from scipy.special import ndtr
+
+        a, b, share = self._span
+        z = np.clip((x - self.mean) / self.sigma, a, b)
+        return np.asarray((ndtr(z) - ndtr(a) if a <= 0 else ndtr(-a) - ndtr(-z)) / share)
 
     def logpdf(self, x: Array) -> Array:
         """See `Distribution.logpdf`."""
-        from scipy.special import ndtr
-
-        a, b = (self.lower - self.mean) / self.sigma, (self.upper - self.mean) / self.sigma
-        share = float(ndtr(b) - ndtr(a) if a <= 0 else ndtr(-a) - ndtr(-b))
-        return _within(self, x, Normal(self.mean, self.sigma).logpdf(x) - math.log(share))
+        return _within(self, x, Normal(self.mean, self.sigma).logpdf(x) - math.log(self._span[2]))
 
 
 @dataclass(frozen=True)
@@ -149,9 +182,18 @@ class Uniform(Described):
         """See `Distribution.ppf`."""
         return self.lower + (self.upper - self.lower) * u
 
+    def cdf(self, x: Array) -> Array:
+        """See `Distribution.cdf`."""
+        return np.clip((x - self.lower) / (self.upper - self.lower), 0.0, 1.0)
+
     def logpdf(self, x: Array) -> Array:
         """See `Distribution.logpdf`."""
         return _within(self, x, np.full_like(x, -math.log(self.upper - self.lower)))
+
+    @property
+    def moments(self) -> Moments:
+        """See `Distribution.moments`."""
+        return Moments(0.5 * (self.lower + self.upper), (self.upper - self.lower) / math.sqrt(12.0))
 
 
 @dataclass(frozen=True)
@@ -169,12 +211,26 @@ class Triangular(Described):
         above = self.upper - np.sqrt((1 - u) * width * fall)
         return np.where(u * width <= rise, below, above)
 
+    def cdf(self, x: Array) -> Array:
+        """See `Distribution.cdf`."""
+        x = np.clip(x, self.lower, self.upper)
+        width, rise, fall = self.upper - self.lower, self.peak - self.lower, self.upper - self.peak
+        below = (x - self.lower) ** 2 / (width * (rise or 1.0))
+        above = 1.0 - (self.upper - x) ** 2 / (width * (fall or 1.0))
+        return np.where(x < self.peak, below, above)
+
     def logpdf(self, x: Array) -> Array:
         """See `Distribution.logpdf`."""
         with np.errstate(divide="ignore", invalid="ignore"):
             rising, falling = (x - self.lower) / (self.peak - self.lower), (self.upper - x) / (self.upper - self.peak)
             height = np.log(np.where(x < self.peak, rising, np.where(x > self.peak, falling, 1.0)))
         return _within(self, x, height + math.log(2.0 / (self.upper - self.lower)))
+
+    @property
+    def moments(self) -> Moments:
+        """See `Distribution.moments`."""
+        rise, fall = self.peak - self.lower, self.upper - self.peak
+        return Moments((self.lower + self.upper + self.peak) / 3.0, math.sqrt((rise**2 + rise * fall + fall**2) / 18.0))
 
 
 @dataclass(frozen=True)
@@ -187,6 +243,11 @@ class LogNormal(Described):
     def ppf(self, u: Array) -> Array:
         """See `Distribution.ppf`."""
         return self.threshold + np.exp(self.log.ppf(u))
+
+    def cdf(self, x: Array) -> Array:
+        """See `Distribution.cdf`."""
+        above = x > self.threshold
+        return np.where(above, self.log.cdf(np.log(np.where(above, x - self.threshold, 1.0))), 0.0)
 
     def logpdf(self, x: Array) -> Array:
         """See `Distribution.logpdf`."""
@@ -210,6 +271,13 @@ class Beta(Described):
 
         return self.lower + (self.upper - self.lower) * betaincinv(self.a, self.b, u)
 
+    def cdf(self, x: Array) -> Array:
+        """See `Distribution.cdf`."""
+        from scipy.special import betainc
+
+        t = np.clip((x - self.lower) / (self.upper - self.lower), 0.0, 1.0)
+        return np.asarray(betainc(self.a, self.b, t))
+
     def logpdf(self, x: Array) -> Array:
         """See `Distribution.logpdf`."""
         from scipy.special import betaln, xlog1py, xlogy
@@ -218,6 +286,13 @@ class Beta(Described):
         t = np.clip((x - self.lower) / width, 0.0, 1.0)
         density = xlogy(self.a - 1, t) + xlog1py(self.b - 1, -t) - betaln(self.a, self.b) - math.log(width)
         return _within(self, x, np.asarray(density, dtype=float))
+
+    @property
+    def moments(self) -> Moments:
+        """See `Distribution.moments`."""
+        width, both = self.upper - self.lower, self.a + self.b
+        deviation = width * math.sqrt(self.a * self.b / (both + 1.0)) / both
+        return Moments(self.lower + width * self.a / both, deviation)
 
 
 @dataclass(frozen=True)
@@ -249,6 +324,10 @@ class Measured(Distribution):
         index = np.ceil(u * self.values.size).astype(np.intp) - 1
         return self.values[np.clip(index, 0, self.values.size - 1)]
 
+    def cdf(self, x: Array) -> Array:
+        """See `Distribution.cdf`."""
+        return np.asarray(np.searchsorted(self.values, x, "right") / self.values.size)
+
     def logpdf(self, x: Array) -> Array:
         """See `Distribution.logpdf`."""
         count = np.searchsorted(self.values, x, "right") - np.searchsorted(self.values, x, "left")
@@ -260,9 +339,19 @@ class Measured(Distribution):
         """See `Distribution.discrete`."""
         return True
 
+    def expect(self, function: Callable[[Array], Array]) -> float:
+        """See `Distribution.expect`; of the sample."""
+        return float(np.mean(function(self.values)))
+
     def describe(self) -> dict[str, Any]:
         """See `Distribution.describe`."""
         return {"distribution": "measured", "count": self.values.size, "digest": self.digest}
+
+
+def probability(distribution: Distribution, values: Array) -> Array:
+    """Probability of smaller values, elementwise; of a discrete distribution and half that of the value itself."""
+    up_to = distribution.cdf(values)
+    return up_to - 0.5 * np.exp(distribution.logpdf(values)) if distribution.discrete else up_to
 
 
 def score(distribution: Distribution, values: Array) -> Array:
@@ -281,20 +370,11 @@ def score(distribution: Distribution, values: Array) -> Array:
         z with ``ppf(Phi(z)) = value``, within +-9; for a normal distribution (value - mean) / sigma. Where a range of
         probabilities has one value (`Measured`), the score of the middle of that range.
     """
-    from scipy.special import ndtr, ndtri
+    from scipy.special import ndtri
 
-    if isinstance(distribution, Normal):
+    if isinstance(distribution, Normal):  # from the values: a probability near 1 has few digits of its tail
         return np.clip((values - distribution.mean) / distribution.sigma, -9.0, 9.0)
-    ends = []
-    for below in (np.less, np.less_equal):  # the least and the largest z that give the value
-        low, high = np.full(values.shape, -9.0), np.full(values.shape, 9.0)
-        for _ in range(60):
-            middle = 0.5 * (low + high)
-            under = below(distribution.ppf(ndtr(middle)), values)
-            low, high = np.where(under, middle, low), np.where(under, high, middle)
-        ends.append(0.5 * (low + high))
-    step: Array = ndtri(0.5 * (ndtr(ends[0]) + ndtr(ends[1])))
-    return np.where(ends[1] - ends[0] < 1e-6, ends[0], step)
+    return np.clip(ndtri(probability(distribution, values)), -9.0, 9.0)
 
 
 def sigma_of(lower: float, upper: float, mean: float, cpk: float) -> float:
@@ -303,65 +383,3 @@ def sigma_of(lower: float, upper: float, mean: float, cpk: float) -> float:
     Cpk = min(upper - mean, mean - lower) / (3 sigma), so the nearer limit decides.
     """
     return min(upper - mean, mean - lower) / (3 * cpk)
-
-
-class IsoRow(NamedTuple):
-    """One range of the ISO 2768-1 tables: sizes over `over` up to and including `up_to` (mm)."""
-
-    kind: str
-    grade: str
-    over: float
-    up_to: float
-    deviation: float
-
-
-@cache
-def iso2768_rows(path: Path) -> tuple[IsoRow, ...]:
-    """Read the general tolerances; deviations in m and rad."""
-    factor = {"mm": 1e-3, "arcmin": math.radians(1 / 60)}
-    with path.open(encoding="utf-8", newline="") as file:
-        return tuple(
-            IsoRow(
-                row["kind"],
-                row["class"],
-                float(row["over_mm"]),
-                float(row["up_to_mm"]),
-                float(row["deviation"]) * factor[row["unit"]],
-            )
-            for row in csv.DictReader(line for line in file if not line.startswith("#"))
-        )
-
-
-def iso2768(path: Path, kind: str, grade: str, nominal: float) -> float:
-    """Permissible deviation (plus and minus) of a dimension without individual tolerance.
-
-    Parameters
-    ----------
-    path : Path
-        The table, ``data/iso2768.csv``.
-    kind : str
-        ``"linear"`` or ``"angular"``.
-    grade : str
-        Tolerance class, ``"f"`` or ``"m"``.
-    nominal : float
-        Nominal size (m); for an angle the length of its shorter leg.
-
-    Returns
-    -------
-    float
-        Deviation in m or rad.
-
-    Raises
-    ------
-    ValueError
-        When the table has no such class or ends before that size; the text names the range that it covers.
-    """
-    rows = [row for row in iso2768_rows(path) if (row.kind, row.grade) == (kind, grade)]
-    if not rows:
-        raise ValueError(f"no {kind} table for class {grade!r}")
-    size = 1e3 * nominal
-    fits = (row for row in rows if size <= row.up_to * (1 + 1e-12))
-    row = next(fits, None) if size >= rows[0].over * (1 - 1e-12) else None
-    if row is None:
-        raise ValueError(f"outside the table ({rows[0].over:g} mm to {rows[-1].up_to:g} mm)")
-    return row.deviation

@@ -16,13 +16,11 @@ import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, WithJsonSchema, model_validator
 
 from tolstat.common import strict, units
-from tolstat.common.files import data_dir
 from tolstat.common.notation import PLUS_MINUS
 from tolstat.common.strict import refuse
-from tolstat.study.tolerances import distributions
+from tolstat.study.tolerances import iso2768
 from tolstat.study.tolerances.distributions import Distribution
 from tolstat.study.tolerances.lots import LotEntry
-from tolstat.study.tolerances.moments import outside, standard_deviation
 
 
 class Diameter(NamedTuple):
@@ -194,8 +192,8 @@ class SingleEntry(ToleranceEntry):
         """See `ToleranceEntry.meaning`."""
         found = self.build(site)
         band = self.band(site)
-        share = math.nan if band is None else outside(found, *band)
-        return [Meaning(self.number(site), (site.name,), site.unit, standard_deviation(found), share)]
+        share = math.nan if band is None else found.outside(*band)
+        return [Meaning(self.number(site), (site.name,), site.unit, found.moments.deviation, share)]
 
 
 class Toleranced(NamedTuple):
@@ -255,7 +253,7 @@ class HalfBand(SingleEntry):
             raise refuse(f"ISO 2768 has no tolerance for {site.name}", "give plus_minus")
         kind = "angular" if site.unit == "rad" else "linear"
         try:
-            return distributions.iso2768(data_dir() / "iso2768.csv", kind, self.iso2768, self.nominal)
+            return iso2768.deviation(kind, self.iso2768, self.nominal)
         except ValueError as error:
             raise refuse(f"nominal = {{nominal}}: {error}", "give plus_minus", "nominal") from error
 

@@ -10,7 +10,6 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
 
-import numpy as np
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator
 
 from tolstat.common import strict
@@ -22,7 +21,7 @@ from tolstat.display.text import percent
 from tolstat.study import selection
 from tolstat.study.selection import Entry
 from tolstat.study.tolerances import iso286, kinds
-from tolstat.study.tolerances.distributions import Distribution, Normal
+from tolstat.study.tolerances.distributions import Distribution
 from tolstat.study.tolerances.entry import PositiveLength, PositiveNumber, Site
 
 KEY = "fit"
@@ -36,8 +35,6 @@ _KEYS_OF = {"cpk": "normal", "truncate": "normal", "a": "beta", "b": "beta"}
 """Keys of one distribution, which others do not have."""
 NEGLIGIBLE = 1e-8
 """Probability of a misfit of one pair that is not told."""
-_POINTS = 4000
-"""Number of midpoints in probability of each diameter."""
 
 
 def _check_size(basic: float) -> float:
@@ -225,13 +222,9 @@ def larger(pin: Distribution, hole: Distribution, clearance: float) -> float:
     Returns
     -------
     float
-        In closed form for two normal distributions, otherwise from equally probable values of each.
+        By quadrature over the hole's diameters.
     """
-    if isinstance(pin, Normal) and isinstance(hole, Normal):
-        mean = clearance + hole.mean - pin.mean
-        return 0.5 * math.erfc(mean / (math.sqrt(2.0) * math.hypot(hole.sigma, pin.sigma)))
-    u = (np.arange(_POINTS) + 0.5) / _POINTS
-    return float(np.mean(np.searchsorted(np.sort(hole.ppf(u)), pin.ppf(u) - clearance)) / _POINTS)
+    return 1.0 - hole.expect(lambda deviation: pin.cdf(deviation + clearance))
 
 
 def _written(value: float) -> str:

@@ -30,7 +30,6 @@ from tolstat.study.tolerances.entry import (
     Value,
 )
 from tolstat.study.tolerances.measured import MeasuredEntry
-from tolstat.study.tolerances.moments import mean_square, outside
 from tolstat.study.tolerances.radial import Rayleigh
 from tolstat.study.tolerances.zones import CoaxialityEntry, OrientationEntry, PositionEntry
 
@@ -241,8 +240,8 @@ class RayleighEntry(HalfBand):
     def meaning(self, site: Site) -> list[Meaning]:
         """See `ToleranceEntry.meaning`."""
         found, band = self.build(site), self.band(site)
-        share = math.nan if band is None else outside(found, *band)
-        sigma = math.sqrt(0.5 * mean_square(found))
+        share = math.nan if band is None else found.outside(*band)
+        sigma = math.sqrt(0.5 * found.moments.mean_square)
         return [Meaning(self.number(site), columns_of(site.name), site.unit, sigma, share)]
 
 

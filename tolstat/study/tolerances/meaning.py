@@ -15,7 +15,6 @@ from tolstat.common.tables import HOLES
 from tolstat.study.tolerances.correlation import Copula
 from tolstat.study.tolerances.distributions import Array, Distribution, Normal
 from tolstat.study.tolerances.entry import Toleranced
-from tolstat.study.tolerances.moments import mean, standard_deviation
 
 NODES = 64
 """Number of Gauss–Hermite nodes of each of two normal scores."""
@@ -131,12 +130,12 @@ def pearson(one: Distribution, other: Distribution, rho: float) -> float:
     weight = weight / weight.sum()
 
     def values(found: Distribution, scores: Array) -> Array:
-        return found.ppf(np.clip(ndtr(scores), 2.0**-53, 1.0 - 2.0**-53)) - mean(found)
+        return found.ppf(np.clip(ndtr(scores), 2.0**-53, 1.0 - 2.0**-53)) - found.moments.mean
 
     second = rho * z[:, None] + math.sqrt(1.0 - rho**2) * z
     y = values(other, second.ravel()).reshape(second.shape)
     covariance = float((weight * values(one, z)) @ y @ weight)
-    return covariance / (standard_deviation(one) * standard_deviation(other))
+    return covariance / (one.moments.deviation * other.moments.deviation)
 
 
 def _pattern(keys: Sequence[str]) -> str:

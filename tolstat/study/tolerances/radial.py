@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tolstat.study.tolerances.distributions import Array, Described, Distribution, score
+from tolstat.study.tolerances.distributions import Array, Described, Distribution, Moments
 
 ROUNDING = 1.0 + 1e-9
 """A radius computed back from errors may exceed the zone's by rounding."""
@@ -23,19 +23,27 @@ class Rayleigh(Described):
     sigma: float
     upper: float | None = None
 
+    @property
+    def _share(self) -> float:
+        """Share that is not rejected."""
+        return 1.0 if self.upper is None else -math.expm1(-0.5 * (self.upper / self.sigma) ** 2)
+
     def ppf(self, u: Array) -> Array:
         """See `Distribution.ppf`."""
-        share = 1.0 if self.upper is None else -math.expm1(-0.5 * (self.upper / self.sigma) ** 2)
-        radius: Array = self.sigma * np.sqrt(-2 * np.log1p(-u * share))
+        radius: Array = self.sigma * np.sqrt(-2 * np.log1p(-u * self._share))
         return radius if self.upper is None else np.minimum(radius, self.upper)
+
+    def cdf(self, x: Array) -> Array:
+        """See `Distribution.cdf`."""
+        radius = np.clip(x, 0.0, self.upper)
+        return -np.expm1(-0.5 * (radius / self.sigma) ** 2) / self._share
 
     def logpdf(self, x: Array) -> Array:
         """See `Distribution.logpdf`."""
-        share = 1.0 if self.upper is None else -math.expm1(-0.5 * (self.upper / self.sigma) ** 2)
         inside = (x >= 0) & (x <= (math.inf if self.upper is None else self.upper * ROUNDING))
         with np.errstate(divide="ignore"):
             radius = np.log(np.where(inside, x, 0.0))
-        return radius - 0.5 * (x / self.sigma) ** 2 - 2 * math.log(self.sigma) - math.log(share)
+        return radius - 0.5 * (x / self.sigma) ** 2 - 2 * math.log(self.sigma) - math.log(self._share)
 
 
 @dataclass(frozen=True)
@@ -48,11 +56,20 @@ class Disc(Described):
         """See `Distribution.ppf`."""
         return np.asarray(self.upper * np.sqrt(u))
 
+    def cdf(self, x: Array) -> Array:
+        """See `Distribution.cdf`."""
+        return np.clip(x / self.upper, 0.0, 1.0) ** 2
+
     def logpdf(self, x: Array) -> Array:
         """See `Distribution.logpdf`."""
         inside = (x >= 0) & (x <= self.upper * ROUNDING)
         with np.errstate(divide="ignore"):
             return np.log(np.where(inside, 2.0 * x, 0.0)) - 2.0 * math.log(self.upper)
+
+    @property
+    def moments(self) -> Moments:
+        """See `Distribution.moments`."""
+        return Moments(self.upper / 1.5, self.upper / math.sqrt(18.0))
 
 
 def plane_scores(distribution: Distribution, vector: Array) -> Array:
@@ -73,10 +90,8 @@ def plane_scores(distribution: Distribution, vector: Array) -> Array:
     ndarray, (2, n)
         Components along the same directions.
     """
-    from scipy.special import log_ndtr
-
     radius = np.hypot(*vector)
     if isinstance(distribution, Rayleigh) and distribution.upper is None:
         return vector / distribution.sigma
-    size = np.sqrt(-2.0 * log_ndtr(-score(distribution, radius)))
+    size = np.sqrt(-2.0 * np.log1p(-np.minimum(distribution.cdf(radius), 1.0 - 2.0**-53)))
     return np.divide(size * vector, radius, out=np.zeros_like(vector), where=radius > 0)

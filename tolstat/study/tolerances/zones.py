@@ -32,7 +32,6 @@ from tolstat.study.tolerances.entry import (
     ToleranceEntry,
     Truncate,
 )
-from tolstat.study.tolerances.moments import average, mean, mean_square, outside
 from tolstat.study.tolerances.radial import Disc, Rayleigh
 
 
@@ -149,11 +148,11 @@ class ZoneEntry(ToleranceEntry):
 
     def _deviation(self) -> float:
         """Standard deviation of a component of a quantity."""
-        return math.sqrt(mean_square(self.build()) / (2.0 if self.zone.round else 1.0))
+        return math.sqrt(self.build().moments.mean_square / (2.0 if self.zone.round else 1.0))
 
     def _outside(self) -> float:
         """Share of one quantity outside the zone."""
-        return outside(self.build(), -1.0 if self.zone.round else -self.band, self.band)
+        return self.build().outside(-1.0 if self.zone.round else -self.band, self.band)
 
 
 def _round(entry: ZoneEntry) -> None:
@@ -212,7 +211,7 @@ class PositionEntry(ZoneEntry):
         feature, number = site.name.partition(".")[0], self.number()
         if (bonus := self.bonus(site)) is not None and site.diameter is not None:
             parts = Accepted(site.diameter.distribution, bonus)
-            end = math.sqrt(0.5 * average(parts, bonus.mean_square))
+            end = math.sqrt(0.5 * parts.expect(bonus.mean_square))
             rule = f"{100 * (1 - parts.share):.2g} % rejected" if bonus.rule == REJECT else "filled"
             number = f"⌀{units.shown(self.zone.size, 'm')} Ⓜ, {rule}"
         if isinstance(site.direction, OrientationEntry):
@@ -228,8 +227,8 @@ class PositionEntry(ZoneEntry):
         """Root mean square of the share of the zone's radius that the tilt leaves to the middle."""
         if not self.bounded:
             return 1.0
-        slope, taken = direction.build(), 0.5 * self.over / self.band
-        return math.sqrt(1.0 - 2.0 * taken * mean(slope) + taken**2 * mean_square(slope))
+        slope, taken = direction.build().moments, 0.5 * self.over / self.band
+        return math.sqrt(1.0 - 2.0 * taken * slope.mean + taken**2 * slope.mean_square)
 
 
 class OrientationEntry(ZoneEntry):

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
+from tolstat.common.bisection import first
 from tolstat.common.loads import FloatArray
 
 
@@ -108,18 +109,11 @@ def needed(share: float, accepted: float, confidence: float = 0.95) -> float:
     if share == accepted:
         return np.inf
 
-    def tells(n: float) -> bool:
+    def tells(n: NDArray[np.intp]) -> NDArray[np.bool_]:
         lower, upper = clopper_pearson(share * n, n, confidence)
-        return bool(upper <= accepted or lower > accepted)
+        return np.asarray((upper <= accepted) | (lower > accepted))
 
-    high = 1.0
-    while not tells(high) and high < 1e15:
-        high *= 2.0
-    low = 0.5 * high
-    while high - low > 1.0:  # bisection: with the share fixed, more joints make the interval narrower
-        middle = np.floor(0.5 * (low + high))
-        low, high = (low, middle) if tells(middle) else (middle, high)
-    return float(high)
+    return float(first(tells, 1, 10**15))  # with the share fixed, more joints make the interval narrower
 
 
 def unresolved_matter(count: int, n: int, n_unresolved: int, confidence: float = 0.95) -> bool:

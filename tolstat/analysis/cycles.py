@@ -30,7 +30,7 @@ class Cycles(NamedTuple):
         Range and mean of each cycle, N or N m; a range of 0 marks an empty place, NaN a joint without results.
     number : ndarray, shape (n, channels)
         Cycles per revolution, including those not stored among the k; NaN for joints without results.
-    weights : ndarray, shape (k,)
+    repeats : ndarray, shape (k,)
         Occurrences per revolution of the cycle in each place: 1, or the share of its operating point.
     omitted : ndarray, shape (n, channels, points)
         Cycles per revolution at each operating point that are not stored.
@@ -42,7 +42,7 @@ class Cycles(NamedTuple):
     ranges: NDArray[Any]
     means: NDArray[Any]
     number: FloatArray
-    weights: FloatArray
+    repeats: FloatArray
     omitted: FloatArray
     ceiling: FloatArray
 
@@ -99,7 +99,7 @@ def duty_cycle(parts: Sequence[Cycles], shares: Sequence[float]) -> Cycles:
         np.concatenate([part.ranges for part in parts], axis=2),
         np.concatenate([part.means for part in parts], axis=2),
         np.sum([share * part.number for part, share in zip(parts, shares, strict=True)], axis=0),
-        np.concatenate([share * part.weights for part, share in zip(parts, shares, strict=True)]),
+        np.concatenate([share * part.repeats for part, share in zip(parts, shares, strict=True)]),
         np.concatenate([share * part.omitted for part, share in zip(parts, shares, strict=True)], axis=2),
         np.concatenate([part.ceiling for part in parts], axis=2),
     )
@@ -124,7 +124,7 @@ def spectrum(cycles: Cycles, numbers: ArrayLike) -> FloatArray:
     wanted = np.atleast_1d(np.asarray(numbers, dtype=float)) * (1.0 - 1e-6)  # slack for rounded sums of shares
     order = np.argsort(-cycles.ranges, axis=2)
     ranges = np.take_along_axis(cycles.ranges, order, axis=2).astype(float)
-    reached = np.cumsum(cycles.weights[order], axis=2)
+    reached = np.cumsum(cycles.repeats[order], axis=2)
     values = np.empty((*cycles.number.shape, wanted.size))
     for q, number in enumerate(wanted):
         place = np.minimum((reached < number).sum(axis=2, keepdims=True), reached.shape[2] - 1)

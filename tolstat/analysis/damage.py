@@ -35,7 +35,7 @@ def moment(cycles: Cycles, m: float) -> FloatArray:
     """Sum of S^m over the cycles of a revolution, shape (n, channels); NaN for joints without results."""
     sums = np.empty(cycles.number.shape)
     for c in range(len(cycles.channels)):
-        sums[:, c] = cycles.ranges[:, c].astype(float) ** m @ cycles.weights
+        sums[:, c] = cycles.ranges[:, c].astype(float) ** m @ cycles.repeats
     return sums
 
 

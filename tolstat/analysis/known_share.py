@@ -9,7 +9,7 @@ counts with the share 0 at lower ends and 1 at upper ends.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +19,7 @@ from tolstat.analysis.column import Mask
 from tolstat.analysis.process import Draws, Known, Sums
 from tolstat.analysis.reweight import LARGEST_SPREAD, LEAST_ESS
 from tolstat.analysis.weighted import Side, Split
+from tolstat.common.bisection import first
 from tolstat.common.loads import FloatArray
 from tolstat.common.shown import shown
 
@@ -138,8 +139,8 @@ def tallies(
 def _weights(sums: Sequence[Sums], known: Sequence[Known], drawn: Draws, base: FloatArray) -> Iterator[FloatArray]:
     """Weights of all joints for some of the processes at a time, (n, k), up to a factor of each process."""
     step = max(1, BLOCK // len(base))
-    for first in range(0, len(drawn.mean), step):
-        here = slice(first, first + step)
+    for begin in range(0, len(drawn.mean), step):
+        here = slice(begin, begin + step)
         logs = base[:, None] + sum(
             process.log_ratios(own, entry.errors, drawn.mean[here, k], drawn.deviation[here, k])
             for k, (own, entry) in enumerate(zip(sums, known, strict=True))
@@ -182,18 +183,8 @@ def _upper_end(split: Split, side: int, usable: Mask, tail: float) -> float:
     own, other = split.far()[side]
     inner = usable & (split[1 - side].total > 0.0) & np.isfinite(own) & (own > 0.0) & (other > 0.0)
 
-    def not_above(share: float) -> float:
-        return float(
-            np.where(inner, betainc(np.where(inner, own, 1.0), np.where(inner, other, 1.0), share), 0.0).mean()
-        )
+    def covers(share: FloatArray) -> bool:
+        below = betainc(np.where(inner, own, 1.0), np.where(inner, other, 1.0), share)
+        return bool(np.where(inner, below, 0.0).mean() >= 1.0 - tail)
 
-    return _first(not_above, 1.0 - tail)
-
-
-def _first(rising: Callable[[float], float], value: float) -> float:
-    """Smallest share at which a function that rises with it reaches a value; 1 if it does not."""
-    low, high = 0.0, 1.0
-    for _ in range(STEPS):
-        middle = 0.5 * (low + high)
-        low, high = (low, middle) if rising(middle) >= value else (middle, high)
-    return high
+    return float(first(covers, 0.0, 1.0, STEPS))

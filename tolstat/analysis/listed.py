@@ -13,9 +13,9 @@ WITHOUT_INTERVAL = {"sobol": "Sobol' points", "lhs": "a Latin hypercube"}
 """Sampling methods of a production whose joints are not independent."""
 
 
-def without_interval(method: str, replicates: int = 1) -> str:
-    """Return why shares of a sampling method have no interval, and the remedy; empty if they have one."""
-    if method not in WITHOUT_INTERVAL or replicates > 1:
+def without_interval(method: str) -> str:
+    """Return why shares of one set of joints have no interval, and the remedy; empty if they have one."""
+    if method not in WITHOUT_INTERVAL:
         return ""
     remedy = 'set sampling.replicates = 8, or sampling.method = "random"'
     return f"shares of {WITHOUT_INTERVAL[method]} have no interval: {remedy} for a verdict"

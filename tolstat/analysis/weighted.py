@@ -19,6 +19,7 @@ from tolstat.analysis import pareto
 from tolstat.analysis.column import Column
 from tolstat.analysis.design import Claim, Design, Refusal, Shares
 from tolstat.analysis.independent import Independent
+from tolstat.common.bisection import first
 from tolstat.common.loads import FloatArray
 from tolstat.common.shown import shown
 
@@ -160,12 +161,12 @@ def _far_end(own: FloatArray, other: FloatArray, tail: float, least: float) -> F
     plain: FloatArray = np.asarray(betaincinv(own, other, 1.0 - tail), dtype=float)
     if not least:
         return plain
-    low, high = plain, np.ones_like(plain)
-    for _ in range(50):
-        middle = 0.5 * (low + high)
-        found = betainc(other, own, 1.0 - middle) / betainc(least, np.maximum(own + other - least, 1.0), 1.0 - middle)
-        low, high = np.where(found > tail, middle, low), np.where(found > tail, high, middle)
-    return np.where(other > least, high, 1.0)
+
+    def beyond(share: FloatArray) -> NDArray[np.bool_]:
+        looked_at = betainc(least, np.maximum(own + other - least, 1.0), 1.0 - share)
+        return np.asarray(betainc(other, own, 1.0 - share) / looked_at <= tail)
+
+    return np.where(other > least, first(beyond, plain, 1.0, 50), 1.0)
 
 
 class Weighted(Design):

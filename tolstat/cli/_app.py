@@ -241,7 +241,7 @@ def print_study_notes(path: Path, study: Study) -> None:
     print_warnings(path, study.joints, study.variants)
     for key, found, remedy in zones.short_axes(study.entries, study.joint.contact.z):
         warn(f"warning: {study.fault(key, found, remedy)}")
-    if said := without_interval(study.sampling.method, study.sampling.replicates):
+    if not study.sampling.has_replicates and (said := without_interval(study.sampling.method)):
         warn(f"warning: {said}")
 
 

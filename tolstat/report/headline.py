@@ -255,7 +255,7 @@ def _yield(view: View, records: Sequence[Row]) -> Headline:
         if row["load"] == ALL_LIMITS and worst["count"] and not np.isnan(worst["estimate"]):
             said += f". Most often {_limit(view, worst)}: {share_of(worst)}"
         return Headline("", share_of(row), said, notes, worst["load"])
-    found = capabilities.together(capability.limit_rows(view))
+    found = capabilities.together(capability.good(view), len(view.limits))
     if not found.decides:
         return Headline("none", WORDS["none"], _reason(view, [_decisive(view, records)]), notes)
     return Headline("", found.value, found.words, notes, exceedance.most_exceeded(view, records)["load"])

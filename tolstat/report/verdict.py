@@ -77,7 +77,7 @@ def _points(view: View) -> list[Table]:
         point = part.store.points[part.points[0]]
         row = {"point": point.name, "operation": point._replace(share=np.nan).in_words, "share": point.share}
         if part.sampled and part.limits and tells_yield(part):
-            found = capabilities.together(capability.limit_rows(part))
+            found = capabilities.together(capability.good(part), len(part.limits))
             row |= {"kept": found.value if found.decides else WORDS["none"]}
         rows.append(row)
     return [as_block("Operating points", POINTS, rows)]
@@ -115,13 +115,12 @@ def _cards(view: View, found: Headline | None) -> list[Card]:
     """Unless the verdict says it, the yield and the limit exceeded most; next delivery, number of joints, errors."""
     cards = []
     if found is not None and tells_yield(view):
-        rows = capability.limit_rows(view)
+        row = capability.good(view)
         if found.answer:
-            together = capabilities.together(rows)
+            together = capabilities.together(row, len(view.limits))
             cards.append(Card(together.value, together.words, "Yield"))
-        if predicted := capabilities.delivery(rows):
-            last = rows[-1]
-            interval = text.ends(last["next_lower"], last["next_upper"], ".0f")
+        if predicted := capabilities.delivery(row, len(view.limits)):
+            interval = text.ends(row["next_lower"], row["next_upper"], ".0f")
             cards.append(Card(interval, predicted, "95 % prediction interval"))
     if found is not None and found.load and found.load not in found.words:
         worst = next(row for row in exceedance.limit_rows(view) if row["load"] == found.load)
@@ -153,7 +152,7 @@ def _how(view: View, asked: Asked) -> list[str]:
         return [
             "Points: share of the joints with a valid load. Grey: with failed and unsettled joints counted below and "
             "above every limit.",
-            "No intervals: Clopper–Pearson holds for independent samples only; sampling.replicates gives intervals.",
+            text.sentence(view.design.without_interval("share")),
         ]
     said = f"{view.design.counting} ".lstrip()
     paragraphs = [

@@ -189,6 +189,11 @@ class Sampling(Strict):
         key("pins and holes are measured, sorted in classes, and matched class to class", {"classes": 3}),
     ] = None
 
+    @property
+    def has_replicates(self) -> bool:
+        """Whether the joints are several sets, independent of each other."""
+        return self.replicates > 1
+
     @model_serializer(mode="wrap")
     def _without_foreign_keys(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
         """Leave out `groups` unless the method is ``pick_freeze``, and `replicates` unless there are several.

@@ -51,26 +51,32 @@ def limits(view: View, confidence: float = 0.95, delivery: int = DELIVERY) -> pd
     return pd.DataFrame(limit_rows(view, confidence, delivery))
 
 
-@once
 def limit_rows(view: View, confidence: float = 0.95, delivery: int = DELIVERY) -> Sequence[Mapping[str, Any]]:
-    """Rows of the table `limits`, for reports without pandas."""
+    """Rows of the table `limits`."""
     rows = []
     for load in [*view.loads(list(view.limits)), view.load(ALL_LIMITS)]:
-        assert load.limit is not None
-        loads = error_budget.with_error(view, load)
-        c = capability.of_sample(load, load.limit, confidence)
-        row = {"load": load.name, "unit": load.unit, "limit": load.limit, "n": c.above.n}
-        row |= {key: getattr(c.above, key) for key in ("n_failed", "n_unsettled", "count")}
-        low, high = total_interval(loads, load.limit, confidence)
-        row |= {"good": 1.0 - c.above.estimate, "good_lower": 1.0 - high, "good_upper": 1.0 - low}
-        row |= {"ppm": 1e6 * c.above.estimate, "ppm_lower": 1e6 * low, "ppm_upper": 1e6 * high}
-        row |= error_budget.delivery(loads, load.limit, delivery, confidence)
+        row = dict(good(view, load.name, confidence, delivery))
+        c = capability.of_sample(load, row["limit"], confidence)
         names = [f"{key}{end}" for key in ("cpk", "cpk_normal") for end in ("", "_lower", "_upper")]
         row |= {key: getattr(c, key) for key in (*names, "normal_p", "needed")}
-        if binomial.unresolved_matter(c.above.count, c.above.n, c.above.n_failed + c.above.n_unsettled):
+        if binomial.unresolved_matter(row["count"], row["n"], row["n_failed"] + row["n_unsettled"]):
             row |= dict.fromkeys(names, np.nan)
         rows.append(row)
     return rows
+
+
+@once
+def good(view: View, name: str = ALL_LIMITS, confidence: float = 0.95, delivery: int = DELIVERY) -> Mapping[str, Any]:
+    """Yield, joints above in a million, and in the next delivery: the columns of `limits` that are no indices."""
+    load = view.load(name)
+    assert load.limit is not None
+    loads, above = error_budget.with_error(view, load), load.above(load.limit, confidence)
+    row = {"load": load.name, "unit": load.unit, "limit": load.limit, "n": above.n}
+    row |= {key: getattr(above, key) for key in ("n_failed", "n_unsettled", "count")}
+    low, high = total_interval(loads, load.limit, confidence)
+    row |= {"good": 1.0 - above.estimate, "good_lower": 1.0 - high, "good_upper": 1.0 - low}
+    row |= {"ppm": 1e6 * above.estimate, "ppm_lower": 1e6 * low, "ppm_upper": 1e6 * high}
+    return row | error_budget.delivery(loads, load.limit, delivery, confidence)
 
 
 def returns(view: View, names: Sequence[str], one_in: Sequence[float], confidence: float = 0.95) -> pd.DataFrame:

@@ -9,7 +9,7 @@ from tolstat.analysis.binomial import unresolved_matter
 from tolstat.analysis.prediction import DELIVERY
 from tolstat.common.loads import ALL_LIMITS
 from tolstat.display import text
-from tolstat.display.table import Column, Row, Rows
+from tolstat.display.table import Column, Row
 from tolstat.questions.capability.query import NOT_NORMAL
 
 if TYPE_CHECKING:
@@ -69,13 +69,12 @@ class Yield(NamedTuple):
     decides: bool
 
 
-def together(rows: Rows) -> Yield:
-    """Share of the joints that keep all limits, from the last of `query.limit_rows`."""
-    row = rows[-1]
+def together(row: Row, limits: int) -> Yield:
+    """Share of the joints that keep all of some limits, from `query.good`."""
     n, above = int(row["n"]), int(row["count"])
     unresolved = int(row["n_failed"] + row["n_unsettled"])
     valid, low, high = n - unresolved, row["good_lower"], row["good_upper"]
-    keep = f"keep all {len(rows) - 1} limits" if len(rows) > 2 else "keep the limit"
+    keep = f"keep all {limits} limits" if limits > 1 else "keep the limit"
     kind, known = "total interval", not math.isnan(low)
     if not known:
         low, high = ((valid - above) / n, 1.0 - above / n) if n else (0.0, 1.0)
@@ -87,10 +86,10 @@ def together(rows: Rows) -> Yield:
     return Yield(text.percent(row["good"]), f"of the joints {keep} ({counted}; {interval})", high - low < WIDEST)
 
 
-def delivery(rows: Rows) -> str:
-    """What the last of `query.limit_rows` predicts of the next `DELIVERY` joints; empty without an interval."""
-    limits = "at least one limit" if len(rows) > 2 else "the limit"
-    return "" if math.isnan(rows[-1]["next_lower"]) else f"of the next {DELIVERY} joints exceed {limits}"
+def delivery(row: Row, limits: int) -> str:
+    """What `query.good` predicts of the next `DELIVERY` joints; empty without an interval."""
+    exceeded = "at least one limit" if limits > 1 else "the limit"
+    return "" if math.isnan(row["next_lower"]) else f"of the next {DELIVERY} joints exceed {exceeded}"
 
 
 def note(table: pd.DataFrame) -> str:

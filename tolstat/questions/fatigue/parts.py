@@ -14,6 +14,7 @@ from tolstat.analysis.cycles import FloatArray
 from tolstat.analysis.prediction import DELIVERY
 from tolstat.analysis.sample import Sample
 from tolstat.analysis.strength import Collective, Failures, Line
+from tolstat.common.bisection import first
 from tolstat.common.tables import FAILED, Status
 from tolstat.questions.fatigue.stress import Stressed, Stresses
 from tolstat.study.fatigue import Fatigue
@@ -44,15 +45,15 @@ class Course(NamedTuple):
         Which joints were simulated; those without stresses among them have NaN.
     n_failed, n_unsettled : int
         Joints without stresses.
-    iid : bool
-        Whether the joints are independent samples.
+    has_interval : bool
+        Whether means over the joints have an interval.
     """
 
     points: Sequence[Evaluated]
     done: NDArray[np.bool_]
     n_failed: int
     n_unsettled: int
-    iid: bool
+    has_interval: bool
 
     def chances(self, lives: float = 1.0) -> FloatArray:
         """Probability for each simulated joint that a part has failed after so many service lives, (m,)."""
@@ -65,7 +66,7 @@ class Course(NamedTuple):
 
     def failures(self, lives: float = 1.0, confidence: float = 0.95) -> Failures:
         """Share of the parts that have failed after so many service lives."""
-        return strength.failures(self.chances(lives), self.n_failed, self.n_unsettled, confidence, self.iid)
+        return strength.failures(self.chances(lives), self.n_failed, self.n_unsettled, confidence, self.has_interval)
 
 
 def part_failures(stressed: Stressed, confidence: float = 0.95, delivery: int = DELIVERY) -> pd.DataFrame:
@@ -132,7 +133,7 @@ def evaluated(stresses: Stresses, settings: Fatigue) -> list[Evaluated]:
     for p, point in enumerate(settings.points):
         line, cycles = point.line, stresses.cycles
         ranges, means = cycles.ranges[:, p], cycles.means[:, p]
-        numbers = np.broadcast_to(cycles.weights * settings.revolutions, ranges.shape).copy()
+        numbers = np.broadcast_to(cycles.repeats * settings.revolutions, ranges.shape).copy()
         if settings.starts:
             joints = np.arange(len(ranges))
             numbers[joints, np.argmax(np.nan_to_num(ranges), axis=1)] -= settings.starts
@@ -183,19 +184,16 @@ def _life(course: Course, revolutions: float, confidence: float) -> dict[str, fl
     some = course.done.sum() > course.n_failed + course.n_unsettled
     if some:
         found["life"] = revolutions * _reaches(estimate)
-    if some and course.iid:
+    if some and course.has_interval:
         found["life_lower"], found["life_upper"] = (revolutions * _reaches(end) for end in (most, least))
     return found
 
 
 def _reaches(share: Callable[[float], float]) -> float:
     """Number of service lives at which a share that grows with them reaches `SHARE`; 0 or infinite beyond `LONGEST`."""
-    low, high = -np.log(LONGEST), np.log(LONGEST)
-    if share(np.exp(low)) >= SHARE:
+    longest = np.log(LONGEST)
+    if share(np.exp(-longest)) >= SHARE:
         return 0.0
-    if share(np.exp(high)) < SHARE:
+    if share(np.exp(longest)) < SHARE:
         return np.inf
-    while high - low > 1e-4:
-        middle = 0.5 * (low + high)
-        low, high = (low, middle) if share(np.exp(middle)) >= SHARE else (middle, high)
-    return float(np.exp(0.5 * (low + high)))
+    return float(np.exp(first(lambda log: share(float(np.exp(log))) >= SHARE, -longest, longest, 30)))

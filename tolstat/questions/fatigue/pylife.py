@@ -65,7 +65,7 @@ def pylife_series(
     values = {"range": cycles.ranges[joint, channel, place], "mean": cycles.means[joint, channel, place]}
     torque = np.array([CHANNELS[name].unit != "N" for name in cycles.channels], bool)[channel]
     rows = np.array(view.store.rows[first:])[joint]
-    frame = pd.DataFrame({"joint": rows, "channel": channel, "cycles": cycles.weights[place] * revolutions})
+    frame = pd.DataFrame({"joint": rows, "channel": channel, "cycles": cycles.repeats[place] * revolutions})
     for name in INTERVALS:
         frame[f"{name}_left"], frame[f"{name}_right"] = np.zeros((2, len(frame)))
         for kind in (torque, ~torque):

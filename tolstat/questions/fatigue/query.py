@@ -285,7 +285,7 @@ def _highest(table: pd.DataFrame) -> pd.DataFrame:
 def _numbers(part: Cycles) -> FloatArray:
     """Cycles per revolution at which the spectra of the joints have steps, thinned to `MAX_NUMBERS`."""
     order = np.argsort(-part.ranges[:, 0], axis=1)
-    steps = np.cumsum(part.weights[order], axis=1)[np.take_along_axis(part.ranges[:, 0], order, axis=1) > 0]
+    steps = np.cumsum(part.repeats[order], axis=1)[np.take_along_axis(part.ranges[:, 0], order, axis=1) > 0]
     numbers = np.unique(np.append(steps.round(9), 1.0))
     thinned = np.linspace(0, numbers.size - 1, min(numbers.size, MAX_NUMBERS)).round().astype(int)
     return np.asarray(numbers[thinned])

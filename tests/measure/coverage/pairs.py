@@ -1,4 +1,4 @@
-"""Experiments on two sides: comparison, what if, two fidelities."""
+"""Experiments on two sides: comparison, what if."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from tests.measure.coverage.trial import Asked, Experiment, Found, Law, Rng, fresh_share, laws
-from tolstat.analysis import difference, multifidelity
+from tests.measure.coverage.trial import Asked, Experiment, Found, Law, Rng, found, laws, sample_of
+from tolstat.analysis import difference
 from tolstat.common.loads import FloatArray
-from tolstat.analysis.multifidelity import Pairs
 
 SKEW = "means of skew loads: Student's interval is symmetric"
 
@@ -36,15 +36,10 @@ class Two(NamedTuple):
         """Share of B above a level."""
         return float(self.law.sf(self.from_b(level)))
 
-    def quantiles(self, share: float) -> tuple[float, float]:
-        """Quantiles of A and B."""
-        own = np.asarray(self.law.ppf(share), dtype=float)
-        return float(own), float(self.to_b(own))
-
-    def means(self) -> tuple[float, float]:
-        """Means of A and B, from points of equal probability."""
-        own = np.asarray(self.law.ppf((np.arange(100_000) + 0.5) / 100_000))
-        return float(own.mean()), float(self.to_b(own).mean())
+    def added(self, shares: ArrayLike) -> FloatArray:
+        """Quantiles of B less those of A."""
+        of_a = np.asarray(self.law.ppf(shares), dtype=float)
+        return np.asarray(self.to_b(of_a) - of_a)
 
 
 def sides(rho: float) -> list[Two]:
@@ -66,9 +61,6 @@ def experiments() -> Iterator[Experiment]:
     for rho in (0.9, 0.99):
         for two in sides(rho):
             yield _with_lost(two, 1024)
-    for rho in (0.99, 0.9, 0.3):
-        for two in sides(rho):
-            yield _fidelities(two, 200, 4000)
 
 
 def _compared(two: Two, n: int, paired: bool) -> Experiment:
@@ -79,18 +71,15 @@ def _compared(two: Two, n: int, paired: bool) -> Experiment:
     asked += [Asked("difference of quantiles", f"{name}, {share} %", n) for share in (50, 90)]
     asked.append(Asked("difference of means", name, n, known=SKEW if two.law.name == "lognormal" else ""))
     of_shares = [two.share_of_b(level) - float(two.law.sf(level)) for level in levels]
-    of_quantiles = [float(np.subtract(*two.quantiles(share)[::-1])) for share in (0.5, 0.9)]
-    of_means = float(np.subtract(*two.means()[::-1]))
+    of_quantiles = {share: float(two.added(share)) for share in (0.5, 0.9)}
+    of_means = float(two.added((np.arange(100_000) + 0.5) / 100_000).mean())
 
     def once(rng: Rng) -> list[Found]:
-        a, b = two.draw(rng, n)
-        shares = difference.shares(a, b, levels, paired)
-        found = [Found(*own) for own in zip(shares.lower, shares.upper, of_shares, strict=True)]
-        for share, truth in zip((0.5, 0.9), of_quantiles, strict=True):
-            own = difference.quantiles(a, b, share, paired)
-            found.append(Found(own.lower, own.upper, truth))
-        own = difference.means(a, b, paired)
-        return [*found, Found(own.lower, own.upper, of_means)]
+        a, b = (sample_of(side) for side in two.draw(rng, n))
+        own = found(difference.shares(a, b, levels, paired), of_shares)
+        for share, truth in of_quantiles.items():
+            own += found(difference.quantiles(a, b, share, paired), [truth])
+        return own + found(difference.means(a, b, paired), [of_means])
 
     return Experiment(tuple(asked), once)
 
@@ -101,37 +90,12 @@ def _with_lost(two: Two, n: int) -> Experiment:
     truth = two.share_of_b(level) - 0.05
 
     def once(rng: Rng) -> list[Found]:
-        a, b = (np.where(rng.random(n) < np.where(side > level, 0.1, 0.02), np.nan, side) for side in two.draw(rng, n))
+        a, b = (
+            sample_of(np.where(rng.random(n) < np.where(side > level, 0.1, 0.02), np.nan, side))
+            for side in two.draw(rng, n)
+        )
         own = difference.shares(a, b, [level], paired=True)
         return [Found(float(own.outer_lower[0]), float(own.outer_upper[0]), truth)]
 
     case = f"{two.name}, pairs correlated by {two.rho:g}, some lost"
     return Experiment((Asked("change of a share, what if", case, n),), once)
-
-
-def _fidelities(two: Two, m: int, n: int) -> Experiment:
-    """B is the load at the high fidelity of m of the n joints, A that at the low one of all."""
-    shares = (0.5, 0.05)
-    levels = [two.quantiles(1.0 - share)[1] for share in shares]
-    own = Law(two.name, lambda p: two.to_b(np.asarray(two.law.ppf(p))), lambda x: two.law.sf(two.from_b(x)))
-    name = f"{two.name}, correlated by {two.rho:g}"
-    asked = [Asked("share, two fidelities", f"{name}, {share:g}", m, fresh_share(m, share)) for share in shares]
-    asked += [
-        Asked("quantile, two fidelities", f"{name}, {100 * (1 - share):g} %", m, own.fresh_quantile(m, 1.0 - share))
-        for share in shares
-    ]
-    points = np.asarray(own.ppf((np.arange(100_000) + 0.5) / 100_000))
-    of_mean, known = 2.0 * 1.972 * float(points.std()) / np.sqrt(m), SKEW if two.law.name == "lognormal" else ""
-    asked.append(Asked("mean, two fidelities", name, m, of_mean, known))
-    mean = float(points.mean())
-
-    def once(rng: Rng) -> list[Found]:
-        low, high = two.draw(rng, n)
-        pairs = Pairs(high[:m], low, cost_high=1.0, cost_low=0.02)
-        found = [multifidelity.share_above(pairs, level) for level in levels]
-        found += [multifidelity.quantile(pairs, 1.0 - share) for share in shares]
-        found.append(multifidelity.mean(pairs))
-        truths = (*shares, *levels, mean)
-        return [Found(f.lower, f.upper, truth) for f, truth in zip(found, truths, strict=True)]
-
-    return Experiment(tuple(asked), once)

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
+from scipy.stats import norm
 
 from tests.measure.coverage.trial import Asked, Experiment, Found, Rng, found
 from tolstat.analysis import overrepresentation, pick_freeze, regression, sensitivity
@@ -115,8 +116,6 @@ def _pick_freeze(load: Load, n: int) -> Experiment:
 
 def _event(share: float, n: int) -> Experiment:
     """Indices of the event that a linear load is above a level."""
-    from scipy.stats import norm
-
     size = math.sqrt(float((WEIGHTS**2).sum()))
     z = float(norm.isf(share))
 
@@ -151,8 +150,6 @@ def _ranks(weights: FloatArray, n: int) -> Experiment:
 
 def _tail(share: float, n: int) -> Experiment:
     """Errors of joints above a limit beside those of the others, for a sum."""
-    from scipy.stats import norm
-
     size, z = math.sqrt(float((WEIGHTS**2).sum())), float(norm.isf(share))
     x = np.linspace(-8.0, 8.0, 16_001)
     direction, far = [], []

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.special import ndtr
 
 from tests.measure.coverage.trial import Asked, Experiment, Found, Law, Rng, found, laws, sample_of
 from tolstat.analysis import difference
@@ -26,8 +27,6 @@ class Two(NamedTuple):
 
     def draw(self, rng: Rng, n: int) -> tuple[FloatArray, FloatArray]:
         """Loads A and B of n joints."""
-        from scipy.special import ndtr
-
         z, own = rng.standard_normal((2, n))
         other = self.rho * z + np.sqrt(1.0 - self.rho**2) * own
         return np.asarray(self.law.ppf(ndtr(z))), self.to_b(np.asarray(self.law.ppf(ndtr(other))))

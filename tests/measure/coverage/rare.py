@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 
+from scipy.stats import chi2, norm
+
 from tests.measure.coverage.trial import Asked, Experiment, Found, Rng, found, fresh_share, laws, sample_of
 from tolstat.analysis import extreme
 from tolstat.analysis.subset import Settings, Walk
@@ -50,8 +52,6 @@ def _tail(name: str, n: int) -> Experiment:
 
 def _states() -> dict[str, tuple[int, Callable[[FloatArray], FloatArray], Callable[[float], float]]]:
     """Loads for subset simulation by name: number of errors, load, limit that a share of the joints exceeds."""
-    from scipy.stats import chi2, norm
-
     return {
         "sum of 10 errors": (10, lambda z: z.sum(axis=1) / math.sqrt(10.0), lambda p: float(norm.isf(p))),
         "sum of 44 errors": (44, lambda z: z.sum(axis=1) / math.sqrt(44.0), lambda p: float(norm.isf(p))),

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import stats
 
 from tolstat.analysis.binomial import clopper_pearson
 from tolstat.analysis.design import Design
@@ -201,8 +202,6 @@ def fresh_share(n: int, share: float) -> float:
 @cache
 def laws() -> dict[str, Law]:
     """Laws by name: symmetric, skew, bounded, with a heavy tail, and with ties."""
-    from scipy import stats
-
     own = {
         "normal": stats.norm(),
         "lognormal": stats.lognorm(1.0),

@@ -7,6 +7,8 @@ from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
+from scipy.optimize import brentq
+from scipy.stats import chi2, norm
 
 from tests.measure.coverage.trial import Asked, Experiment, Found, Law, Rng, found, fresh_share, sample_of
 from tolstat.analysis import allocation, known_share, process, reweight
@@ -43,8 +45,6 @@ class Load(NamedTuple):
 
 def loads() -> list[Load]:
     """Sum, sum of squares, and largest of the errors; laws by the factor on their deviation."""
-    from scipy.stats import chi2, norm
-
     root = math.sqrt(ERRORS)
 
     def largest(f: float) -> Law:
@@ -68,7 +68,7 @@ def experiments() -> Iterator[Experiment]:
     for load in loads():
         for factor, n in ((0.8, 256), (0.8, 1024), (1.1, 1024), (1.1, 4096), (1.15, 4096), (1.3, 4096)):
             yield _reweighted(load, factor, n)
-    for name in _ALLOCATED:
+    for name in _TOYS:
         for n in (2048, 4096):
             yield _allocated(name, n)
     for load in loads():
@@ -76,12 +76,20 @@ def experiments() -> Iterator[Experiment]:
             yield _known(load, parts, n, share)
 
 
-def ratios_of(x: FloatArray, factor: float) -> Ratios:
-    """Density ratios of standard normal errors, (n, d), for deviations `factor` times as large."""
-    d = x.shape[1]
-    exact = density_ratio.exact([(Normal(0.0, factor), Normal(0.0, 1.0))] * d)
-    logs = 0.5 * (1.0 - factor**-2) * (x**2).sum(axis=1) - d * math.log(factor)
-    return Ratios(np.exp(logs), exact.mean_square, exact.unbounded, float(np.exp(exact.largest)))
+def _exact(factors: FloatArray, errors: int) -> density_ratio.Exact:
+    """Of standard normal errors in groups of so many, for deviations `factors` times as large, (groups,)."""
+    one = [density_ratio.exact([(Normal(0.0, float(own)), Normal(0.0, 1.0))]) for own in factors]
+    return density_ratio.Exact(*(errors * float(sum(values)) for values in zip(*one, strict=True)))
+
+
+def _log_ratios(squares: FloatArray, factors: FloatArray, errors: int) -> FloatArray:
+    """Of joints whose squares of the errors have these sums, (n, groups); see `_exact`."""
+    return np.asarray(squares @ (0.5 * (1.0 - factors**-2.0)) - errors * np.log(factors).sum())
+
+
+def _ratios(squares: FloatArray, factors: FloatArray, errors: int) -> Ratios:
+    exact, values = _exact(factors, errors), np.exp(_log_ratios(squares, factors, errors))
+    return Ratios(values, exact.mean_square, exact.unbounded, float(np.exp(exact.largest)))
 
 
 def _reweighted(load: Load, factor: float, n: int) -> Experiment:
@@ -98,7 +106,8 @@ def _reweighted(load: Load, factor: float, n: int) -> Experiment:
 
     def once(rng: Rng) -> list[Found]:
         x = rng.standard_normal((n, ERRORS))
-        ratios, sample = ratios_of(x, factor), sample_of(load.of(x))
+        ratios = _ratios((x**2).sum(axis=1, keepdims=True), np.array([factor]), ERRORS)
+        sample = sample_of(load.of(x))
         shares_above = [reweight.share_above(sample, ratios, level) for level in levels]
         quantiles = [reweight.quantile(sample, ratios, 1.0 - share) for share in shares]
         return [
@@ -110,51 +119,25 @@ def _reweighted(load: Load, factor: float, n: int) -> Experiment:
 
 
 class _Toy(NamedTuple):
-    """A load of eight errors, and its share above a level by the factors of two groups of them."""
+    """A load of eight errors, and its share above a level by the factor of each error."""
 
     of: Callable[[FloatArray], FloatArray]
     share: Callable[[FloatArray, float], float]
 
 
-def _toys() -> dict[str, _Toy]:
-    from scipy.stats import norm
-
-    def of_largest(factors: FloatArray, level: float) -> float:
-        return float(1.0 - np.prod(norm.cdf(level / np.repeat(factors, EACH))))
-
-    def of_size(factors: FloatArray, level: float) -> float:
-        return float(1.0 - np.prod(1.0 - 2.0 * norm.sf(level / np.repeat(factors, EACH))))
-
-    return {
-        "sum": _Toy(
-            lambda x: x.sum(axis=1), lambda f, level: float(norm.sf(level / math.sqrt(float((EACH * f**2).sum()))))
-        ),
-        "largest": _Toy(lambda x: x.max(axis=1), of_largest),
-        "largest modulus": _Toy(lambda x: np.abs(x).max(axis=1), of_size),
-    }
-
-
-_ALLOCATED = ("sum", "largest", "largest modulus")
+_TOYS = {
+    "sum": _Toy(lambda x: x.sum(axis=1), lambda f, level: float(norm.sf(level / np.sqrt((f**2).sum())))),
+    "largest": _Toy(lambda x: x.max(axis=1), lambda f, level: float(1.0 - np.prod(norm.cdf(level / f)))),
+    "largest modulus": _Toy(
+        lambda x: np.abs(x).max(axis=1), lambda f, level: float(1.0 - np.prod(1.0 - 2.0 * norm.sf(level / f)))
+    ),
+}
 
 
 def _allocated(name: str, n: int, target: float = 0.02, drawn: float = 0.04) -> Experiment:
     """Halve the share above a limit at the least cost; a proposal that is said to hold, and does not, is a miss."""
-    from scipy.optimize import brentq
-
-    toy = _toys()[name]
-    level = float(brentq(lambda x: toy.share(np.ones(GROUPS), x) - drawn, 0.1, 30.0))
-
-    def log_ratios(squares: FloatArray, factors: FloatArray) -> FloatArray:
-        return np.asarray(squares @ (0.5 * (1.0 - factors**-2.0)) - EACH * np.log(factors).sum())
-
-    def exact_of(factors: FloatArray) -> density_ratio.Exact:
-        one = [density_ratio.exact([(Normal(0.0, float(own)), Normal(0.0, 1.0))]) for own in factors]
-        return density_ratio.Exact(*(EACH * float(sum(values)) for values in zip(*one, strict=True)))
-
-    def of(squares: FloatArray, factors: FloatArray) -> Ratios:
-        exact = exact_of(factors)
-        weights = np.exp(log_ratios(squares, factors))
-        return Ratios(weights, exact.mean_square, exact.unbounded, float(np.exp(exact.largest)))
+    toy = _TOYS[name]
+    level = float(brentq(lambda x: toy.share(np.ones(GROUPS * EACH), x) - drawn, 0.1, 30.0))
 
     def once(rng: Rng) -> list[Found]:
         x = rng.standard_normal((n, GROUPS * EACH))
@@ -162,9 +145,9 @@ def _allocated(name: str, n: int, target: float = 0.02, drawn: float = 0.04) -> 
         searched, checked = allocation.halves(np.arange(n), n)
         of_search = squares[searched]
         problem = allocation.Problem(
-            log_ratios=lambda f: log_ratios(of_search, f),
-            log_spread=lambda f: exact_of(f).mean_square,
-            usable=lambda f: of(of_search, f).usable,
+            log_ratios=lambda f: _log_ratios(of_search, f, EACH),
+            log_spread=lambda f: _exact(f, EACH).mean_square,
+            usable=lambda f: _ratios(of_search, f, EACH).usable,
             above=above[searched, None],
             targets=np.array([target]),
             cost=lambda f: float((1.0 / f).sum()),
@@ -173,9 +156,9 @@ def _allocated(name: str, n: int, target: float = 0.02, drawn: float = 0.04) -> 
             confidence=0.999,
         )
         factors = allocation.search(problem).factors
-        own = reweight.share_above(sample_of(above[checked]), of(squares[checked], factors), 0.5)
+        own = reweight.share_above(sample_of(above[checked]), _ratios(squares[checked], factors, EACH), 0.5)
         holds = own.support.usable and own.upper < target
-        return [Found(-np.inf, target, toy.share(factors, level), holds)]
+        return [Found(-np.inf, target, toy.share(np.repeat(factors, EACH), level), holds)]
 
     return Experiment((Asked("allocation holds", f"{name} of 8 errors, {drawn:g} to {target:g}", n),), once)
 

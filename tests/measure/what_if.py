@@ -28,7 +28,8 @@ from tolstat.common.loads import ALL_LIMITS, LOADS
 from tolstat.common.tables import VALID
 from tolstat.joint import perturb
 from tolstat.questions.what_if.query import what_if
-from tolstat.solver.simulation import simulate_rows, warm_up
+from tolstat.solver.compilation import warm_up
+from tolstat.solver.simulation import simulate_rows
 from tolstat.study import widths
 
 BLOCK, BATCH = 500, 2000

@@ -7,8 +7,9 @@ from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
+from scipy.stats import norm
 
-from tests.measure.coverage.trial import Asked, Experiment, Found, Rng
+from tests.measure.coverage.trial import Asked, Experiment, Found, Rng, found
 from tolstat.analysis import overrepresentation, pick_freeze, regression, sensitivity
 from tolstat.common.loads import FloatArray
 
@@ -90,41 +91,31 @@ def _given_data(load: Load, n: int) -> Experiment:
     def once(rng: Rng) -> list[Found]:
         x = load.draw(rng, (n, 3))
         first, total = sensitivity.first_and_total(x, load.of(x))
-        return [
-            *(Found(*own) for own in zip(first.lower, first.upper, load.first, strict=True)),
-            *(Found(*own) for own in zip(total.lower, total.upper, load.total, strict=True)),
-        ]
+        return found(first, load.first) + found(total, load.total)
 
     return Experiment(tuple(asked), once)
 
 
-def _exchanged(load: Callable[[FloatArray], FloatArray], ab: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Loads of points A and B, (2, n, 3), and of A with one error of B."""
-    a, b = ab
-    return load(a), load(b), load(np.stack([np.where(np.arange(3) == k, b, a) for k in range(3)], axis=1))
+def _exchanged(asked: list[Asked], estimator: Callable[..., pick_freeze.Indices], load: Load, n: int) -> Experiment:
+    """Indices from the loads of points A and B, and of A with one error of B."""
+
+    def once(rng: Rng) -> list[Found]:
+        a, b = load.draw(rng, (2, n, 3))
+        mixed = np.stack([np.where(np.arange(3) == k, b, a) for k in range(3)], axis=1)
+        own = estimator(load.of(a), load.of(b), load.of(mixed))
+        return found(own.first, load.first) + found(own.total, load.total)
+
+    return Experiment(tuple(asked), once, refusal=(ValueError,))
 
 
 def _pick_freeze(load: Load, n: int) -> Experiment:
     cases = [(f"{load.name}, error {k + 1}", n) for k in range(3)]
     asked = [Asked(f"{name}, exchanged", *case) for name in ("index alone", "index in all") for case in cases]
-
-    def once(rng: Rng) -> list[Found]:
-        try:
-            own = pick_freeze.indices(*_exchanged(load.of, load.draw(rng, (2, n, 3))))
-        except ValueError:
-            return [Found(math.nan, math.nan, 0.0)] * 6
-        return [
-            *(Found(*f) for f in zip(own.first.lower, own.first.upper, load.first, strict=True)),
-            *(Found(*f) for f in zip(own.total.lower, own.total.upper, load.total, strict=True)),
-        ]
-
-    return Experiment(tuple(asked), once)
+    return _exchanged(asked, pick_freeze.indices, load, n)
 
 
 def _event(share: float, n: int) -> Experiment:
     """Indices of the event that a linear load is above a level."""
-    from scipy.stats import norm
-
     size = math.sqrt(float((WEIGHTS**2).sum()))
     z = float(norm.isf(share))
 
@@ -139,25 +130,10 @@ def _event(share: float, n: int) -> Experiment:
         return float(density @ (given - share) ** 2) / (share * (1.0 - share))
 
     parts = WEIGHTS**2 / size**2
-    first, total = [of(float(p)) for p in parts], [1.0 - of(float(1.0 - p)) for p in parts]
-    asked = [
-        Asked("index of the event", f"linear, {share:g}, {word}, error {k + 1}", n)
-        for word in ("alone", "in all")
-        for k in range(3)
-    ]
-
-    def once(rng: Rng) -> list[Found]:
-        points = rng.standard_normal((2, n, 3))
-        try:
-            own = pick_freeze.of_event(*_exchanged(lambda x: (x @ WEIGHTS > z * size).astype(float), points))
-        except ValueError:
-            return [Found(math.nan, math.nan, 0.0)] * 6
-        return [
-            *(Found(*f) for f in zip(own.first.lower, own.first.upper, first, strict=True)),
-            *(Found(*f) for f in zip(own.total.lower, own.total.upper, total, strict=True)),
-        ]
-
-    return Experiment(tuple(asked), once)
+    first, total = (np.array([f(float(p)) for p in parts]) for f in (of, lambda p: 1.0 - of(1.0 - p)))
+    cases = [f"linear, {share:g}, {word}, error {k + 1}" for word in ("alone", "in all") for k in range(3)]
+    load = Load("event", _normal, lambda x: (x @ WEIGHTS > z * size).astype(float), first, total)
+    return _exchanged([Asked("index of the event", case, n) for case in cases], pick_freeze.of_event, load, n)
 
 
 def _ranks(weights: FloatArray, n: int) -> Experiment:
@@ -167,16 +143,13 @@ def _ranks(weights: FloatArray, n: int) -> Experiment:
 
     def once(rng: Rng) -> list[Found]:
         x = rng.standard_normal((n, 3))
-        own = regression.ranks(x, np.exp(x @ weights))
-        return [Found(*f) for f in zip(own.lower, own.upper, truth, strict=True)]
+        return found(regression.ranks(x, np.exp(x @ weights)), truth)
 
     return Experiment(tuple(Asked("rank regression", f"{name}, error {k + 1}", n) for k in range(3)), once)
 
 
 def _tail(share: float, n: int) -> Experiment:
     """Errors of joints above a limit beside those of the others, for a sum."""
-    from scipy.stats import norm
-
     size, z = math.sqrt(float((WEIGHTS**2).sum())), float(norm.isf(share))
     x = np.linspace(-8.0, 8.0, 16_001)
     direction, far = [], []
@@ -188,21 +161,15 @@ def _tail(share: float, n: int) -> Experiment:
 
     def once(rng: Rng) -> list[Found]:
         errors = rng.standard_normal((n, 3))
-        try:
-            own = overrepresentation.tail(errors, errors @ WEIGHTS > z * size)
-        except ValueError:
-            return [Found(math.nan, math.nan, 0.0)] * 6
-        return [
-            *(Found(*f) for f in zip(own.direction.lower, own.direction.upper, direction, strict=True)),
-            *(Found(*f) for f in zip(own.size.lower, own.size.upper, far, strict=True)),
-        ]
+        own = overrepresentation.tail(errors, errors @ WEIGHTS > z * size)
+        return found(own.direction, direction) + found(own.size, far)
 
     asked = [
         Asked("errors above a limit", f"linear, {share:g}, {word} of error {k + 1}", n)
         for word in ("direction", "size")
         for k in range(3)
     ]
-    return Experiment(tuple(asked), once)
+    return Experiment(tuple(asked), once, refusal=(ValueError,))
 
 
 def _larger(one: FloatArray, other: FloatArray, first: int = 0) -> float:
@@ -220,8 +187,7 @@ def _angles(n: int, m: int = 24) -> Experiment:
     def once(rng: Rng) -> list[Found]:
         x = rng.standard_normal((n, 3))
         y = (x + 0.3 * (x**2 - 1.0)) / math.sqrt(1.0 + 2.0 * 0.3**2) @ acts
-        own = sensitivity.over_revolution(x, y)[1]
-        return [Found(*f) for f in zip(own.lower, own.upper, truth, strict=True)]
+        return found(sensitivity.over_revolution(x, y)[1], truth)
 
     asked = (Asked("index over the revolution", f"error {k + 1}", n) for k in range(3))
     return Experiment(tuple(asked), once)

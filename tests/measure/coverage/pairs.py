@@ -6,8 +6,10 @@ from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
+from scipy.special import ndtr
 
-from tests.measure.coverage.trial import Asked, Experiment, Found, Law, Rng, laws
+from tests.measure.coverage.trial import Asked, Experiment, Found, Law, Rng, found, laws, sample_of
 from tolstat.analysis import difference
 from tolstat.common.loads import FloatArray
 
@@ -25,8 +27,6 @@ class Two(NamedTuple):
 
     def draw(self, rng: Rng, n: int) -> tuple[FloatArray, FloatArray]:
         """Loads A and B of n joints."""
-        from scipy.special import ndtr
-
         z, own = rng.standard_normal((2, n))
         other = self.rho * z + np.sqrt(1.0 - self.rho**2) * own
         return np.asarray(self.law.ppf(ndtr(z))), self.to_b(np.asarray(self.law.ppf(ndtr(other))))
@@ -35,15 +35,10 @@ class Two(NamedTuple):
         """Share of B above a level."""
         return float(self.law.sf(self.from_b(level)))
 
-    def quantiles(self, share: float) -> tuple[float, float]:
-        """Quantiles of A and B."""
-        own = np.asarray(self.law.ppf(share), dtype=float)
-        return float(own), float(self.to_b(own))
-
-    def means(self) -> tuple[float, float]:
-        """Means of A and B, from points of equal probability."""
-        own = np.asarray(self.law.ppf((np.arange(100_000) + 0.5) / 100_000))
-        return float(own.mean()), float(self.to_b(own).mean())
+    def added(self, shares: ArrayLike) -> FloatArray:
+        """Quantiles of B less those of A."""
+        of_a = np.asarray(self.law.ppf(shares), dtype=float)
+        return np.asarray(self.to_b(of_a) - of_a)
 
 
 def sides(rho: float) -> list[Two]:
@@ -75,18 +70,15 @@ def _compared(two: Two, n: int, paired: bool) -> Experiment:
     asked += [Asked("difference of quantiles", f"{name}, {share} %", n) for share in (50, 90)]
     asked.append(Asked("difference of means", name, n, known=SKEW if two.law.name == "lognormal" else ""))
     of_shares = [two.share_of_b(level) - float(two.law.sf(level)) for level in levels]
-    of_quantiles = [float(np.subtract(*two.quantiles(share)[::-1])) for share in (0.5, 0.9)]
-    of_means = float(np.subtract(*two.means()[::-1]))
+    of_quantiles = {share: float(two.added(share)) for share in (0.5, 0.9)}
+    of_means = float(two.added((np.arange(100_000) + 0.5) / 100_000).mean())
 
     def once(rng: Rng) -> list[Found]:
-        a, b = two.draw(rng, n)
-        shares = difference.shares(a, b, levels, paired)
-        found = [Found(*own) for own in zip(shares.lower, shares.upper, of_shares, strict=True)]
-        for share, truth in zip((0.5, 0.9), of_quantiles, strict=True):
-            own = difference.quantiles(a, b, share, paired)
-            found.append(Found(own.lower, own.upper, truth))
-        own = difference.means(a, b, paired)
-        return [*found, Found(own.lower, own.upper, of_means)]
+        a, b = (sample_of(side) for side in two.draw(rng, n))
+        own = found(difference.shares(a, b, levels, paired), of_shares)
+        for share, truth in of_quantiles.items():
+            own += found(difference.quantiles(a, b, share, paired), [truth])
+        return own + found(difference.means(a, b, paired), [of_means])
 
     return Experiment(tuple(asked), once)
 
@@ -97,7 +89,10 @@ def _with_lost(two: Two, n: int) -> Experiment:
     truth = two.share_of_b(level) - 0.05
 
     def once(rng: Rng) -> list[Found]:
-        a, b = (np.where(rng.random(n) < np.where(side > level, 0.1, 0.02), np.nan, side) for side in two.draw(rng, n))
+        a, b = (
+            sample_of(np.where(rng.random(n) < np.where(side > level, 0.1, 0.02), np.nan, side))
+            for side in two.draw(rng, n)
+        )
         own = difference.shares(a, b, [level], paired=True)
         return [Found(float(own.outer_lower[0]), float(own.outer_upper[0]), truth)]
 

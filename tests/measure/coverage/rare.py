@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 
-from tests.measure.coverage.trial import Asked, Experiment, Found, Rng, fresh_share, laws, ok
+from scipy.stats import chi2, norm
+
+from tests.measure.coverage.trial import Asked, Experiment, Found, Rng, found, fresh_share, laws, sample_of
 from tolstat.analysis import extreme
 from tolstat.analysis.subset import Settings, Walk
 from tolstat.common.loads import FloatArray
@@ -40,25 +42,16 @@ def _tail(name: str, n: int) -> Experiment:
     asked.append(Asked("share above, from the tail", f"{name}, {shares[0]:.2e}", n, of_share, SLOW.get(name, "")))
 
     def once(rng: Rng) -> list[Found]:
-        try:
-            tail = extreme.fit(law.draw(rng, n), ok(n))
-        except extreme.TooThinError:
-            return [Found(math.nan, math.nan, 0.0)] * 3
-        given = not tail.refusal
-        found = [tail.level(share) for share in shares]
-        rare = tail.probability(max(loads[0], tail.threshold))
-        return [
-            *(Found(own.lower, own.upper, load, given) for own, load in zip(found, loads, strict=True)),
-            Found(rare.lower, rare.upper, shares[0], given),
-        ]
+        tail = extreme.of_sample(sample_of(law.draw(rng, n)))
+        own = [*(tail.level(share) for share in shares), tail.probability(max(loads[0], tail.threshold))]
+        truths = (*loads, shares[0])
+        return [Found(e.lower, e.upper, truth, not tail.refusal) for e, truth in zip(own, truths, strict=True)]
 
-    return Experiment(tuple(asked), once)
+    return Experiment(tuple(asked), once, refusal=(extreme.TooThinError,))
 
 
 def _states() -> dict[str, tuple[int, Callable[[FloatArray], FloatArray], Callable[[float], float]]]:
     """Loads for subset simulation by name: number of errors, load, limit that a share of the joints exceeds."""
-    from scipy.stats import chi2, norm
-
     return {
         "sum of 10 errors": (10, lambda z: z.sum(axis=1) / math.sqrt(10.0), lambda p: float(norm.isf(p))),
         "sum of 44 errors": (44, lambda z: z.sum(axis=1) / math.sqrt(44.0), lambda p: float(norm.isf(p))),
@@ -94,6 +87,6 @@ def _stationary(name: str, revolutions: int, duration: int = 1000) -> Experiment
     def once(rng: Rng) -> list[Found]:
         own = stationary.largest(10.0 + law.draw(rng, revolutions)[:, None], duration)
         truth = 10.0 + float(law.draw(rng, duration).max())
-        return [Found(float(own.lower[0]), float(own.upper[0]), truth)]
+        return found(own, [truth])
 
     return Experiment((Asked("load that never repeats", f"{name}, {duration} revolutions", revolutions),), once)

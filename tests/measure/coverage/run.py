@@ -10,11 +10,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tests.measure.coverage import causes, pairs, rare, shares, weights
+from tests.measure.coverage import causes, derived, pairs, rare, shares, weights
 from tests.measure.coverage.statistics import CONTROL, STATISTICS
-from tests.measure.coverage.trial import Asked, Experiment, FloatArray, Found, Row, laws, ok
-from tolstat.analysis import exceedance
+from tests.measure.coverage.trial import Asked, Experiment, Found, Row, laws, sample_of
 from tolstat.common.errors import Fault, InputError
+from tolstat.common.loads import FloatArray
 from tolstat.common.strict import did_you_mean
 
 FULL, QUICK = 2000, 200
@@ -57,6 +57,7 @@ def experiments() -> tuple[Experiment, ...]:
     """Every experiment, the wrong estimator last."""
     return (
         *shares.experiments(),
+        *derived.experiments(),
         *weights.experiments(),
         *rare.experiments(),
         *pairs.experiments(),
@@ -72,7 +73,7 @@ def _controls() -> Iterator[Experiment]:
         level = float(law.ppf(1.0 - share))
 
         def once(rng: np.random.Generator, n: int = n, share: float = share, level: float = level) -> list[Found]:
-            own = exceedance.exceedance(law.draw(rng, n), ok(n), level).estimate
+            own = sample_of(law.draw(rng, n)).above(level).estimate
             half = 1.96 * np.sqrt(own * (1.0 - own) / n)
             return [Found(own - half, own + half, share)]
 

@@ -1,4 +1,4 @@
-"""Experiments on joints of equal weight: shares, quantiles, band, capability, damage, lives, replicates, lots."""
+"""Experiments on samples of each design: shares, quantiles, the band, the next delivery."""
 
 from __future__ import annotations
 
@@ -6,28 +6,35 @@ from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtri
+from scipy.stats import norm, qmc
 
-from tests.measure.coverage.trial import Asked, Experiment, Found, Law, Rng, fresh_share, laws, ok
-from tolstat.analysis import (
-    capability,
-    cycles,
-    damage,
-    exceedance,
-    lots,
-    prediction,
-    quantile,
-    replicates,
-    sequential,
-    sorted_loads,
-    strength,
+from tests.measure.coverage.trial import (
+    Asked,
+    Experiment,
+    Found,
+    Law,
+    Rng,
+    fresh_share,
+    laws,
+    quantiles_at,
+    sample_of,
+    shares_at,
 )
+from tolstat.analysis import clustered, prediction
+from tolstat.analysis.binomial import simultaneous
+from tolstat.analysis.clustered import Clustered
+from tolstat.analysis.independent import Independent
+from tolstat.analysis.replicated import Replicated
+from tolstat.analysis.sample import Sample, total_interval
+from tolstat.analysis.weighted import Weighted
 from tolstat.common.loads import FloatArray
-from tolstat.common.tables import Status
 
 SHARES, QUANTILES = (0.5, 0.05, 0.002), (0.5, 0.9, 0.99)
 JOINTS, DELIVERY = 20, 500
 """Joints of a lot, and of its next delivery."""
+OTHERS = 0.8
+"""Share of the joints of importance sampling that do not come from the tolerances."""
 
 
 def experiments() -> Iterator[Experiment]:
@@ -38,28 +45,25 @@ def experiments() -> Iterator[Experiment]:
             yield _independent(known[name], n)
     for n in (100, 1024):
         yield _unresolved(known["lognormal"], n)
-    for name in ("normal", "slightly skew", "exponential", "lognormal", "uniform"):
-        for n in (100, 1000, 4000):
-            yield _capability(known[name], n)
-    for exponent in (3.0, 5.0, 10.0):
-        for n in (60, 1024):
-            yield _equivalent(exponent, n)
-    for n in (60, 1024):
-        for part in _PARTS:
-            yield _of_revolution(part, n)
-            yield _failed(part, n)
     for method in ("Sobol'", "Latin hypercube"):
         for dimensions in (3, 10):
             for share in (0.5, 0.05, 0.005):
                 yield _replicated(method, dimensions, share)
     for share in SHARES:
-        yield _until(share)
         for n in (100, 1024):
             yield _delivered(share, n)
     for lot in _LOTS:
         for share in (0.5, 0.1, 0.02, 0.002):
             yield _of_lots(lot, share, 50)
         yield _of_lots(lot, 0.1, 30)
+    for beta in (2.0, 3.0, 4.75):
+        for n in (500, 2000):
+            yield _weighted("sum, moved to the limit", 10, n, beta, shift=beta)
+    for scale, beta, d in ((1.3, 3.0, 20), (1.6, 3.0, 5), (1.6, 4.0, 5)):
+        yield _weighted(f"sum, {scale:g} times as wide", d, 4000, beta, scale=scale)
+    yield _weighted("both sides, 1.6 times as wide", 5, 4000, 3.0, scale=1.6, both=True)
+    for beta in (3.0, 4.0):
+        yield _weighted("both sides, moved to one", 10, 2000, beta, shift=beta, both=True)
 
 
 def _independent(law: Law, n: int) -> Experiment:
@@ -67,28 +71,24 @@ def _independent(law: Law, n: int) -> Experiment:
     asked = [Asked("share", f"{law.name}, {share:g}", n) for share in SHARES]
     asked += [Asked("quantile", f"{law.name}, {100 * share:g} %", n) for share in QUANTILES]
     asked.append(Asked("band", law.name, n))
-    truths = [float(law.sf(level)) for level in levels]
+    shares = {level: float(law.sf(level)) for level in levels}
+    loads = {share: float(law.ppf(share)) for share in QUANTILES}
 
     def once(rng: Rng) -> list[Found]:
-        sample = sorted_loads.sort_out(law.draw(rng, n), ok(n))
-        rows = exceedance.curve_of(sample, levels)
-        found = [Found(row["lower"], row["upper"], truth) for row, truth in zip(rows, truths, strict=True)]
-        for share in QUANTILES:
-            own = quantile.of_sample(sample, share)
-            found.append(Found(own.lower, own.upper, float(law.ppf(share))))
-        return [*found, _band(law, sample)]
+        sample = sample_of(law.draw(rng, n))
+        return [*shares_at(sample, shares), *quantiles_at(sample, loads), _band(law, sample.valid)]
 
     return Experiment(tuple(asked), once)
 
 
-def _band(law: Law, sample: sorted_loads.Sample) -> Found:
+def _band(law: Law, valid: FloatArray) -> Found:
     """Interval of the largest difference of the truth from the estimate, on each side: it contains zero or not."""
-    half = exceedance.simultaneous(sample.n)
-    at, number = np.unique(sample.valid, return_counts=True)
-    above = sample.n - np.cumsum(number)
+    n, half = valid.size, simultaneous(valid.size)
+    at, number = np.unique(valid, return_counts=True)
+    above = n - np.cumsum(number)
     truth, just_before = law.sf(at), law.sf(np.nextafter(at, -np.inf))
-    over = float((above / sample.n - truth).max(initial=0.0))
-    under = float((just_before - (above + number) / sample.n).max(initial=0.0))
+    over = float((above / n - truth).max(initial=0.0))
+    under = float((just_before - (above + number) / n).max(initial=0.0))
     # the band is above the truth where the estimate less the half width is
     return Found(over - half, half - under, 0.0)
 
@@ -100,142 +100,46 @@ def _unresolved(law: Law, n: int) -> Experiment:
     def once(rng: Rng) -> list[Found]:
         loads = law.draw(rng, n)
         lost = rng.random(n) < np.where(loads > level, 0.5, 0.01)
-        row = exceedance.exceedance(loads, np.where(lost, int(Status.NEWTON_FAILED), ok(n)), level)
-        return [Found(row.outer_lower, row.outer_upper, 0.05)]
+        return [Found(*total_interval([sample_of(np.where(lost, np.nan, loads))], level, 0.95), 0.05)]
 
     return Experiment((Asked("share, joints without a load", f"{law.name}, 0.05, half of those above lost", n),), once)
-
-
-def _capability(law: Law, n: int) -> Experiment:
-    limit = float(law.ppf(0.999))
-    points = law.ppf((np.arange(100_000) + 0.5) / 100_000)
-    by_moments = (limit - points.mean()) / (3.0 * points.std())
-    middle, high = (float(law.ppf(share)) for share in (0.5, capability.REFERENCE))
-    by_quantiles = (limit - middle) / (high - middle)
-    asked = (
-        Asked("Cpk, normal", f"{law.name}, limit at 99.9 %", n),
-        Asked("Cpk from quantiles", f"{law.name}, limit at 99.9 %", n),
-        Asked("yield and ppm", f"{law.name}, limit at 99.9 %", n),
-    )
-
-    def once(rng: Rng) -> list[Found]:
-        own = capability.capability(law.draw(rng, n), ok(n), limit)
-        _, lower, upper = own.ppm
-        normal = Found(own.cpk_normal_lower, own.cpk_normal_upper, by_moments)
-        return [normal, Found(own.cpk_lower, own.cpk_upper, by_quantiles), Found(lower, upper, 1e3)]
-
-    return Experiment(asked, once)
-
-
-def _equivalent(exponent: float, n: int) -> Experiment:
-    """Two cycles a revolution, whose ranges are lognormal with one factor in common."""
-    known = laws()["lognormal"]
-
-    def once(rng: Rng) -> list[Found]:
-        ranges = known.draw(rng, n)[:, None, None] * np.array([1.0, 0.5])
-        counted = cycles.Cycles.of_revolution(("cross1.F",), ranges, ranges, np.full((n, 1), 2.0))
-        loads = damage.equivalent_load(counted, exponent)[:, 0]
-        found = []
-        for share in (0.5, 0.9):
-            own, truth = exceedance.quantile(loads, ok(n), share), float(known.ppf(share))
-            found.append(Found(own.lower, own.upper, truth * (1.0 + 0.5**exponent) ** (1.0 / exponent)))
-        return found
-
-    cases = (f"lognormal ranges, exponent {exponent:g}, {share}" for share in ("50 %", "90 %"))
-    return Experiment(tuple(Asked("equivalent load", case, n) for case in cases), once)
-
-
-class _Part(NamedTuple):
-    """A law of numbers between 0 and 1."""
-
-    name: str
-    draw: Callable[[Rng, int], FloatArray]
-    mean: float
-
-
-_PARTS = (
-    _Part("beta (1, 20)", lambda rng, n: rng.beta(1.0, 20.0, n), 1.0 / 21.0),
-    _Part("beta (2, 2)", lambda rng, n: rng.beta(2.0, 2.0, n), 0.5),
-    _Part("zero but in 1 of 10", lambda rng, n: np.where(rng.random(n) < 0.1, rng.random(n), 0.0), 0.05),
-    _Part(
-        "zero but in 1 of 200", lambda rng, n: np.where(rng.random(n) < 0.005, 1.0 - 0.5 * rng.random(n), 0.0), 0.00375
-    ),
-)
-
-
-def _of_revolution(part: _Part, n: int) -> Experiment:
-    """Mean time above a level, as `questions.time_above` has it."""
-
-    def once(rng: Rng) -> list[Found]:
-        time = part.draw(rng, n)
-        lower, upper = exceedance.clopper_pearson(time.sum(), time.size)
-        return [Found(float(lower), float(upper), part.mean)]
-
-    return Experiment((Asked("mean time above", part.name, n),), once)
-
-
-def _failed(part: _Part, n: int) -> Experiment:
-    """Share of the parts that fail, from probabilities of failure by joint."""
-
-    def once(rng: Rng) -> list[Found]:
-        own = strength.failures(part.draw(rng, n), 0, 0)
-        return [Found(own.lower, own.upper, part.mean)]
-
-    return Experiment((Asked("share of failed parts", part.name, n, fresh_share(n, part.mean)),), once)
-
-
-def _replicated(method: str, dimensions: int, share: float, n: int = 1024, parts: int = 8) -> Experiment:
-    """Sum of normal errors, drawn in eight randomisations of a design."""
-    law = laws()["normal"]
-    level = float(law.ppf(1.0 - share))
-    name = f"{method}, sum of {dimensions} errors, {share:g}"
-    asked = (
-        Asked("share, replicates", name, n, fresh_share(n, share)),
-        Asked("quantile, replicates", name, n, law.fresh_quantile(n, 1.0 - share)),
-    )
-
-    def once(rng: Rng) -> list[Found]:
-        from scipy.special import ndtri
-        from scipy.stats import qmc
-
-        engine = qmc.Sobol if method == "Sobol'" else qmc.LatinHypercube
-        points = [engine(dimensions, rng=rng).random(n // parts) for _ in range(parts)]
-        samples = [sorted_loads.sort_out(ndtri(x).sum(axis=1) / np.sqrt(dimensions), ok(len(x))) for x in points]
-        whole = sorted_loads.sort_out(np.concatenate([own.valid for own in samples]), ok(n))
-        row = replicates.curve_of(whole, samples, [level])[0]
-        own = replicates.quantile_of(whole, samples, 1.0 - share)
-        return [Found(row["lower"], row["upper"], share), Found(own.lower, own.upper, level)]
-
-    return Experiment(asked, once)
 
 
 def _delivered(share: float, n: int) -> Experiment:
     """Joints above a limit in the next delivery, a random number itself."""
     number = prediction.DELIVERY
     case = f"any law, {share:g}, {number} joints delivered"
+    designs = Independent(), Weighted(np.ones(n), 1.0)  # from counts, and from an interval of the share
 
     def once(rng: Rng) -> list[Found]:
         above, truth = int(rng.binomial(n, share)), float(rng.binomial(number, share))
-        lower, upper = exceedance.clopper_pearson(above, n, prediction.half(0.95))
-        ends = prediction.of_counts(above, above, n, number), prediction.of_share(float(lower), float(upper), number)
-        return [Found(*own, truth) for own in ends]
+        samples = (sample_of(np.arange(n) < above, design) for design in designs)
+        return [Found(*sample.delivery(0.5, number), truth) for sample in samples]
 
     return Experiment((Asked("next delivery", case, n), Asked("next delivery, from a share", case, n)), once)
 
 
-def _until(share: float, width: float = 0.02, most: int = 20_000) -> Experiment:
-    """A campaign that looks at its interval until it is narrow."""
+def _of_normal(design: str, case: str, n: int, share: float) -> tuple[list[Asked], Callable[[Sample], list[Found]]]:
+    """Share above a level, and load that the other joints stay at or below, of standard normal loads."""
+    law, level = laws()["normal"], float(norm.isf(share))
+    asked = [
+        Asked(f"share, {design}", case, n, fresh_share(n, share)),
+        Asked(f"quantile, {design}", case, n, law.fresh_quantile(n, 1.0 - share)),
+    ]
+    return asked, lambda sample: [*shares_at(sample, {level: share}), *quantiles_at(sample, {1.0 - share: level})]
+
+
+def _replicated(method: str, dimensions: int, share: float, n: int = 1024, parts: int = 8) -> Experiment:
+    """Sum of normal errors, drawn in eight randomisations of a design."""
+    asked, judged = _of_normal("replicates", f"{method}, sum of {dimensions} errors, {share:g}", n, share)
+    engine = qmc.Sobol if method == "Sobol'" else qmc.LatinHypercube
+    design = Replicated(n, parts, method)
 
     def once(rng: Rng) -> list[Found]:
-        above = joints = 0
-        for look in sequential.looks(most):
-            above, joints = above + int(rng.binomial(look - joints, share)), look
-            if sequential.narrow(width, above, 0, joints):
-                break
-        lower, upper = sequential.interval(above, 0, joints)
-        return [Found(float(lower), float(upper), share)]
+        points = np.concatenate([engine(dimensions, rng=rng).random(n // parts) for _ in range(parts)])
+        return judged(sample_of(ndtri(points).sum(axis=1) / np.sqrt(dimensions), design))
 
-    return Experiment((Asked("share at a stop", f"any law, {share:g}, narrower than {width:g}", most),), once)
+    return Experiment(tuple(asked), once)
 
 
 class _Lots(NamedTuple):
@@ -277,20 +181,41 @@ _LOTS = (
 def _of_lots(law: _Lots, share: float, number: int) -> Experiment:
     level, n = float(norm.isf(share)), number * JOINTS
     case = f"{law.name}, {share:g}, {number} lots"
-    asked = (
-        Asked("share, lots", case, n, fresh_share(n, share)),
-        Asked("quantile, lots", case, n, laws()["normal"].fresh_quantile(n, 1.0 - share)),
-        Asked("next delivery, lots", case, n),
-    )
+    asked, judged = _of_normal("lots", case, n, share)
+    design = Clustered(np.arange(n) // JOINTS)
 
     def once(rng: Rng) -> list[Found]:
-        loads = law.draw(rng, number, JOINTS, share)
-        parts = [sorted_loads.sort_out(own, ok(JOINTS)) for own in loads]
-        whole = sorted_loads.sort_out(loads.ravel(), ok(n))
-        row, middle = lots.curve_of(whole, parts, [level])[0], lots.quantile_of(whole, parts, 1.0 - share)
-        counts = (loads > level).sum(axis=1)
-        ends = lots.law_of(counts, np.full(number, JOINTS)).delivery(DELIVERY).ends()
+        sample = sample_of(law.draw(rng, number, JOINTS, share).ravel(), design)
+        above, joints = design.counts(sample.value, [level])
+        ends = clustered.law_of(above[:, 0], joints).delivery(DELIVERY).ends()
         truth = float((law.draw(rng, 1, DELIVERY, share) > level).sum())
-        return [Found(row["lower"], row["upper"], share), Found(middle.lower, middle.upper, level), Found(*ends, truth)]
+        return [*judged(sample), Found(*ends, truth)]
 
-    return Experiment(asked, once)
+    return Experiment((*asked, Asked("next delivery, lots", case, n)), once)
+
+
+def _weighted(
+    name: str, d: int, n: int, beta: float, shift: float = 0.0, scale: float = 1.0, both: bool = False
+) -> Experiment:
+    """Importance sampling of a sum of `d` normal errors above `beta`, or beyond it on both sides.
+
+    Proposals are moved by `shift` along the sum, or `scale` times as wide; moved ones do not reach the other side.
+    """
+    m, kept, step = round(OTHERS * n), 1.0 - OTHERS, shift / np.sqrt(d)
+    share = float((1 + both) * norm.sf(beta))
+    searched = not (both and shift)
+
+    def once(rng: Rng) -> list[Found]:
+        x = np.concatenate([step + scale * rng.standard_normal((m, d)), rng.standard_normal((n - m, d))])
+        ratio = np.exp(0.5 * (x**2 - ((x - step) / scale) ** 2).sum(axis=1)) / scale**d
+        loads = x.sum(axis=1) / np.sqrt(d)
+        design = Weighted(1.0 / (kept + OTHERS * ratio), 1.0 / kept, np.arange(n) >= m)
+        sample = sample_of(np.abs(loads) if both else loads, design)
+        missed = Found(-np.inf, sample.upper_if_missed(beta), share)
+        return [missed, *shares_at(sample, {beta: share})] if searched else [missed]
+
+    case = f"{name}, {share:.1e}"
+    asked = [Asked("share, whatever proposals miss", case, n)]
+    if searched:
+        asked.append(Asked("share, importance sampling", case, n, fresh_share(n, share)))
+    return Experiment(tuple(asked), once)

@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import stats
 
 from tolstat.analysis.binomial import clopper_pearson
+from tolstat.analysis.design import Design
+from tolstat.analysis.sample import Sample
+from tolstat.common.loads import FloatArray
 from tolstat.common.tables import Status
 
-FloatArray = NDArray[np.float64]
 SURE = 0.9999
 """Confidence level at which an interval is said to miss: hundreds of cases are judged, by both sides."""
-
-
 Rng = np.random.Generator
 
 
@@ -54,6 +56,22 @@ class Found(NamedTuple):
     given: bool = True
 
 
+def found(own: Any, truths: Iterable[float]) -> list[Found]:
+    """Intervals with ends `lower` and `upper`, (m,) or a single one, and the truths."""
+    return [Found(*each) for each in zip(np.atleast_1d(own.lower), np.atleast_1d(own.upper), truths, strict=True)]
+
+
+def shares_at(sample: Sample, truths: Mapping[float, float]) -> list[Found]:
+    """Shares of the joints above levels, with the true share of each level; refused where the design has a doubt."""
+    rows = sample.curve(list(truths))
+    return [Found(r["lower"], r["upper"], truths[r["level"]], not sample.doubt(r["level"])) for r in rows]
+
+
+def quantiles_at(sample: Sample, truths: Mapping[float, float]) -> list[Found]:
+    """Loads that shares of the joints stay at or below, with the true load of each share."""
+    return [own for share, truth in truths.items() for own in found(sample.quantile(share), [truth])]
+
+
 class Experiment(NamedTuple):
     """Intervals that are asked of the same samples.
 
@@ -65,11 +83,14 @@ class Experiment(NamedTuple):
         Maps a random generator to what an estimator finds from one sample: `Found`, in the order of `asked`.
     most : int
         Largest number of seeds; less than the default for samples that take a second.
+    refusal : tuple of type
+        Exceptions with which the estimators refuse a sample.
     """
 
     asked: tuple[Asked, ...]
     once: Callable[[np.random.Generator], Sequence[Found]]
     most: int = 1_000_000
+    refusal: tuple[type[Exception], ...] = ()
 
     def run(self, seeds: range) -> FloatArray:
         """Repeat with samples of several seeds.
@@ -87,7 +108,10 @@ class Experiment(NamedTuple):
         own = zlib.crc32(f"{self.asked[0].statistic}, {self.asked[0].case}, {self.asked[0].n}".encode())
         rows = []
         for seed in seeds:
-            found = self.once(np.random.default_rng([seed, own]))
+            try:
+                found = self.once(np.random.default_rng([seed, own]))
+            except self.refusal:
+                found = [Found(np.nan, np.nan, np.nan)] * len(self.asked)
             if len(found) != len(self.asked):
                 raise ValueError(f"{len(found)} intervals for {len(self.asked)} that are asked")
             rows.append([_judged(one) for one in found])
@@ -175,10 +199,9 @@ def fresh_share(n: int, share: float) -> float:
     return float(upper - lower)
 
 
+@cache
 def laws() -> dict[str, Law]:
     """Laws by name: symmetric, skew, bounded, with a heavy tail, and with ties."""
-    from scipy import stats
-
     own = {
         "normal": stats.norm(),
         "lognormal": stats.lognorm(1.0),
@@ -198,6 +221,6 @@ def laws() -> dict[str, Law]:
     return found
 
 
-def ok(n: int) -> FloatArray:
-    """Status of n valid joints."""
-    return np.full(n, int(Status.OK))
+def sample_of(loads: FloatArray | NDArray[np.bool_], design: Design | None = None) -> Sample:
+    """Valid joints with these loads; by default independent."""
+    return Sample.of(loads, np.full(len(loads), int(Status.OK)), design)

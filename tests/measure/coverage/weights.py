@@ -1,4 +1,4 @@
-"""Experiments on joints of unequal weight: other tolerances, allocation, importance sampling, measured parts."""
+"""Experiments on joints counted by other weights: other tolerances, allocation, measured parts."""
 
 from __future__ import annotations
 
@@ -7,19 +7,20 @@ from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
+from scipy.optimize import brentq
+from scipy.stats import chi2, norm
 
-from tests.measure.coverage.trial import Asked, Experiment, Found, Law, Rng, fresh_share, ok
-from tolstat.analysis import allocation, exceedance, known_share, process, reweight, weighted
+from tests.measure.coverage.trial import Asked, Experiment, Found, Law, Rng, found, fresh_share, sample_of
+from tolstat.analysis import allocation, known_share, process, reweight
 from tolstat.analysis.known_share import Event, Mixture
 from tolstat.analysis.process import Known, Sums
 from tolstat.analysis.reweight import Ratios
+from tolstat.analysis.weighted import Weighted
 from tolstat.common.loads import FloatArray
 from tolstat.study.tolerances import density_ratio
 from tolstat.study.tolerances.distributions import Normal
 
 ERRORS = 10
-OTHERS = 0.8
-"""Share of the joints of importance sampling that do not come from the tolerances."""
 GROUPS, EACH = 2, 4
 """Groups of errors whose tolerances are allocated, and errors in each."""
 ENTRIES = 2
@@ -44,8 +45,6 @@ class Load(NamedTuple):
 
 def loads() -> list[Load]:
     """Sum, sum of squares, and largest of the errors; laws by the factor on their deviation."""
-    from scipy.stats import chi2, norm
-
     root = math.sqrt(ERRORS)
 
     def largest(f: float) -> Law:
@@ -69,107 +68,86 @@ def experiments() -> Iterator[Experiment]:
     for load in loads():
         for factor, n in ((0.8, 256), (0.8, 1024), (1.1, 1024), (1.1, 4096), (1.15, 4096), (1.3, 4096)):
             yield _reweighted(load, factor, n)
-    for name in _ALLOCATED:
+    for name in _TOYS:
         for n in (2048, 4096):
             yield _allocated(name, n)
-    yield from _important()
     for load in loads():
         for parts, n, share in PARTS:
             yield _known(load, parts, n, share)
 
 
-def ratios_of(x: FloatArray, factor: float) -> Ratios:
-    """Density ratios of standard normal errors, (n, d), for deviations `factor` times as large."""
-    d = x.shape[1]
-    exact = density_ratio.exact([(Normal(0.0, factor), Normal(0.0, 1.0))] * d)
-    logs = 0.5 * (1.0 - factor**-2) * (x**2).sum(axis=1) - d * math.log(factor)
-    return Ratios(np.exp(logs), exact.mean_square, exact.unbounded, float(np.exp(exact.largest)))
+def _exact(factors: FloatArray, errors: int) -> density_ratio.Exact:
+    """Of standard normal errors in groups of so many, for deviations `factors` times as large, (groups,)."""
+    one = [density_ratio.exact([(Normal(0.0, float(own)), Normal(0.0, 1.0))]) for own in factors]
+    return density_ratio.Exact(*(errors * float(sum(values)) for values in zip(*one, strict=True)))
+
+
+def _log_ratios(squares: FloatArray, factors: FloatArray, errors: int) -> FloatArray:
+    """Of joints whose squares of the errors have these sums, (n, groups); see `_exact`."""
+    return np.asarray(squares @ (0.5 * (1.0 - factors**-2.0)) - errors * np.log(factors).sum())
+
+
+def _ratios(squares: FloatArray, factors: FloatArray, errors: int) -> Ratios:
+    exact, values = _exact(factors, errors), np.exp(_log_ratios(squares, factors, errors))
+    return Ratios(values, exact.mean_square, exact.unbounded, float(np.exp(exact.largest)))
 
 
 def _reweighted(load: Load, factor: float, n: int) -> Experiment:
     law, shares = load.law(factor), (0.5, 0.05, 0.005)
     levels = [float(law.ppf(1.0 - share)) for share in shares]
     names = [f"{load.name} of {ERRORS} errors, {factor:g} times as wide, {share:g}" for share in shares]
-    asked = [Asked("share, other tolerances", *own, fresh_share(n, share)) for own, share in _with(names, n, shares)]
-    asked += [
-        Asked("quantile, other tolerances", *own, law.fresh_quantile(n, 1.0 - share))
-        for own, share in _with(names, n, shares)
+    of_shares = [fresh_share(n, share) for share in shares]
+    of_quantiles = [law.fresh_quantile(n, 1.0 - share) for share in shares]
+    asked = [
+        Asked(f"{statistic}, other tolerances", name, n, width)
+        for statistic, widths in (("share", of_shares), ("quantile", of_quantiles))
+        for name, width in zip(names, widths, strict=True)
     ]
 
     def once(rng: Rng) -> list[Found]:
         x = rng.standard_normal((n, ERRORS))
-        ratios = ratios_of(x, factor)
-        sample = reweight.sort_out(load.of(x), ok(n), ratios)
-        of_shares = [reweight.share_above(sample, ratios, level) for level in levels]
-        of_loads = [reweight.quantile(sample, ratios, 1.0 - share) for share in shares]
+        ratios = _ratios((x**2).sum(axis=1, keepdims=True), np.array([factor]), ERRORS)
+        sample = sample_of(load.of(x))
+        shares_above = [reweight.share_above(sample, ratios, level) for level in levels]
+        quantiles = [reweight.quantile(sample, ratios, 1.0 - share) for share in shares]
         return [
-            *(Found(f.lower, f.upper, share, f.support.usable) for f, share in zip(of_shares, shares, strict=True)),
-            *(Found(f.lower, f.upper, level, f.usable) for f, level in zip(of_loads, levels, strict=True)),
+            *(Found(f.lower, f.upper, share, f.support.usable) for f, share in zip(shares_above, shares, strict=True)),
+            *(Found(f.lower, f.upper, level, f.usable) for f, level in zip(quantiles, levels, strict=True)),
         ]
 
     return Experiment(tuple(asked), once)
 
 
-def _with(names: list[str], n: int, shares: tuple[float, ...]) -> Iterator[tuple[tuple[str, int], float]]:
-    return (((name, n), share) for name, share in zip(names, shares, strict=True))
-
-
 class _Toy(NamedTuple):
-    """A load of eight errors, and its share above a level by the factors of two groups of them."""
+    """A load of eight errors, and its share above a level by the factor of each error."""
 
     of: Callable[[FloatArray], FloatArray]
     share: Callable[[FloatArray, float], float]
 
 
-def _toys() -> dict[str, _Toy]:
-    from scipy.stats import norm
-
-    def of_largest(factors: FloatArray, level: float) -> float:
-        return float(1.0 - np.prod(norm.cdf(level / np.repeat(factors, EACH))))
-
-    def of_size(factors: FloatArray, level: float) -> float:
-        return float(1.0 - np.prod(1.0 - 2.0 * norm.sf(level / np.repeat(factors, EACH))))
-
-    return {
-        "sum": _Toy(
-            lambda x: x.sum(axis=1), lambda f, level: float(norm.sf(level / math.sqrt(float((EACH * f**2).sum()))))
-        ),
-        "largest": _Toy(lambda x: x.max(axis=1), of_largest),
-        "largest modulus": _Toy(lambda x: np.abs(x).max(axis=1), of_size),
-    }
-
-
-_ALLOCATED = ("sum", "largest", "largest modulus")
+_TOYS = {
+    "sum": _Toy(lambda x: x.sum(axis=1), lambda f, level: float(norm.sf(level / np.sqrt((f**2).sum())))),
+    "largest": _Toy(lambda x: x.max(axis=1), lambda f, level: float(1.0 - np.prod(norm.cdf(level / f)))),
+    "largest modulus": _Toy(
+        lambda x: np.abs(x).max(axis=1), lambda f, level: float(1.0 - np.prod(1.0 - 2.0 * norm.sf(level / f)))
+    ),
+}
 
 
 def _allocated(name: str, n: int, target: float = 0.02, drawn: float = 0.04) -> Experiment:
     """Halve the share above a limit at the least cost; a proposal that is said to hold, and does not, is a miss."""
-    from scipy.optimize import brentq
-
-    toy = _toys()[name]
-    level = float(brentq(lambda x: toy.share(np.ones(GROUPS), x) - drawn, 0.1, 30.0))
-
-    def log_ratios(squares: FloatArray, factors: FloatArray) -> FloatArray:
-        return np.asarray(squares @ (0.5 * (1.0 - factors**-2.0)) - EACH * np.log(factors).sum())
-
-    def exact_of(factors: FloatArray) -> density_ratio.Exact:
-        one = [density_ratio.exact([(Normal(0.0, float(own)), Normal(0.0, 1.0))]) for own in factors]
-        return density_ratio.Exact(*(EACH * float(sum(values)) for values in zip(*one, strict=True)))
-
-    def of(squares: FloatArray, factors: FloatArray) -> Ratios:
-        exact = exact_of(factors)
-        weights = np.exp(log_ratios(squares, factors))
-        return Ratios(weights, exact.mean_square, exact.unbounded, float(np.exp(exact.largest)))
+    toy = _TOYS[name]
+    level = float(brentq(lambda x: toy.share(np.ones(GROUPS * EACH), x) - drawn, 0.1, 30.0))
 
     def once(rng: Rng) -> list[Found]:
         x = rng.standard_normal((n, GROUPS * EACH))
         above, squares = toy.of(x) > level, (x**2).reshape(n, GROUPS, EACH).sum(axis=2)
-        searched, checked = allocation.halves(n, n)
+        searched, checked = allocation.halves(np.arange(n), n)
         of_search = squares[searched]
         problem = allocation.Problem(
-            log_ratios=lambda f: log_ratios(of_search, f),
-            log_spread=lambda f: exact_of(f).mean_square,
-            usable=lambda f: of(of_search, f).usable,
+            log_ratios=lambda f: _log_ratios(of_search, f, EACH),
+            log_spread=lambda f: _exact(f, EACH).mean_square,
+            usable=lambda f: _ratios(of_search, f, EACH).usable,
             above=above[searched, None],
             targets=np.array([target]),
             cost=lambda f: float((1.0 / f).sum()),
@@ -178,89 +156,11 @@ def _allocated(name: str, n: int, target: float = 0.02, drawn: float = 0.04) -> 
             confidence=0.999,
         )
         factors = allocation.search(problem).factors
-        own = of(squares[checked], factors)
-        sample = reweight.sort_out(above[checked].astype(float), ok(len(checked)), own)
-        found = reweight.share_above(sample, own, 0.5)
-        holds = found.support.usable and found.upper < target
-        return [Found(-np.inf, target, toy.share(factors, level), holds)]
+        own = reweight.share_above(sample_of(above[checked]), _ratios(squares[checked], factors, EACH), 0.5)
+        holds = own.support.usable and own.upper < target
+        return [Found(-np.inf, target, toy.share(np.repeat(factors, EACH), level), holds)]
 
     return Experiment((Asked("allocation holds", f"{name} of 8 errors, {drawn:g} to {target:g}", n),), once)
-
-
-class _Proposal(NamedTuple):
-    """Importance sampling: joints are drawn from the tolerances and from other distributions of the errors.
-
-    `draw` gives the errors that do not come from the tolerances; `ratio` their density over that of the tolerances;
-    `searched` is whether the proposals reach every way to the level.
-    """
-
-    name: str
-    dimensions: int
-    n: int
-    draw: Callable[[Rng, int, int], FloatArray]
-    ratio: Callable[[FloatArray], FloatArray]
-    load: Callable[[FloatArray], FloatArray]
-    level: float
-    share: float
-    searched: bool = True
-
-
-def _important() -> Iterator[Experiment]:
-    from scipy.stats import norm
-
-    def along(beta: float, d: int) -> tuple[Callable[[Rng, int, int], FloatArray], Callable[[FloatArray], FloatArray]]:
-        step = beta / math.sqrt(d)
-        return (
-            lambda rng, m, d: rng.standard_normal((m, d)) + step,
-            lambda x: np.exp(step * x.sum(axis=1) - 0.5 * beta**2),
-        )
-
-    def widened(s: float) -> tuple[Callable[[Rng, int, int], FloatArray], Callable[[FloatArray], FloatArray]]:
-        return (
-            lambda rng, m, d: s * rng.standard_normal((m, d)),
-            lambda x: np.exp(0.5 * (1.0 - s**-2) * (x**2).sum(axis=1)) / s ** x.shape[1],
-        )
-
-    def total(x: FloatArray) -> FloatArray:
-        return np.asarray(x.sum(axis=1) / math.sqrt(x.shape[1]))
-
-    def modulus(x: FloatArray) -> FloatArray:
-        return np.abs(total(x))
-
-    for beta in (2.0, 3.0, 4.75):
-        for n in (500, 2000):
-            share = float(norm.sf(beta))
-            yield _of_proposal(_Proposal("sum, moved to the limit", 10, n, *along(beta, 10), total, beta, share))
-    for s, beta, d in ((1.3, 3.0, 20), (1.6, 3.0, 5), (1.6, 4.0, 5)):
-        share = float(norm.sf(beta))
-        yield _of_proposal(_Proposal(f"sum, {s:g} times as wide", d, 4000, *widened(s), total, beta, share))
-    both = float(2.0 * norm.sf(3.0))
-    yield _of_proposal(_Proposal("both sides, 1.6 times as wide", 5, 4000, *widened(1.6), modulus, 3.0, both))
-    for beta in (3.0, 4.0):
-        both, moved = float(2.0 * norm.sf(beta)), along(beta, 10)
-        yield _of_proposal(_Proposal("both sides, moved to one", 10, 2000, *moved, modulus, beta, both, False))
-
-
-def _of_proposal(own: _Proposal) -> Experiment:
-    def once(rng: Rng) -> list[Found]:
-        m = round(OTHERS * own.n)
-        x = np.concatenate([own.draw(rng, m, own.dimensions), rng.standard_normal((own.n - m, own.dimensions))])
-        kept = 1.0 - OTHERS
-        weights = 1.0 / (kept + OTHERS * own.ratio(x))
-        loads = own.load(x)
-        of_tolerances = exceedance.exceedance(loads[m:], ok(own.n - m), own.level)
-        told = [Found(-np.inf, of_tolerances.outer_upper, own.share)]
-        if own.searched:
-            found = exceedance.weighted_exceedance(loads, ok(own.n), weights, own.level, heaviest=1.0 / kept)
-            trust = weighted.trust(loads, ok(own.n), weights, own.level, 1.0 / kept)
-            told.append(Found(found.lower, found.upper, own.share, trust.usable))
-        return told
-
-    case = f"{own.name}, {own.share:.1e}"
-    asked = [Asked("share, whatever proposals miss", case, own.n)]
-    if own.searched:
-        asked.append(Asked("share, importance sampling", case, own.n, fresh_share(own.n, own.share)))
-    return Experiment(tuple(asked), once)
 
 
 def _known(load: Load, parts: int, n: int, share: float) -> Experiment:
@@ -282,9 +182,9 @@ def _known(load: Load, parts: int, n: int, share: float) -> Experiment:
         errors = center[:, None, None] + spread[:, None, None] * z
         above = load.of(np.concatenate(list(errors), axis=1)) > level
         (split,) = known_share.tallies(sums, known, drawn, weights, [Event(above, np.ones(n, dtype=bool))])
-        found = known_share.intervals(split, [split], [split], usable)
-        stated = exceedance.weighted_exceedance(above, ok(n), weights, 0.5, heaviest=1.0 / TOLERANCES)
-        return [Found(found.lower, found.upper, share), Found(stated.lower, stated.upper, share)]
+        own = known_share.intervals(split, [split], [split], usable)
+        stated = sample_of(above, Weighted(weights, 1.0 / TOLERANCES)).above(0.5)
+        return found(own, [share]) + found(stated, [share])
 
     case = f"{load.name} of {ERRORS} errors, {parts} parts, {share:g}"
     fresh = fresh_share(n, share)

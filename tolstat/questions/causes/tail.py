@@ -126,7 +126,7 @@ def _with_errors(
     joints = []
     for i, row in enumerate(view.rows(samples).tolist()):
         own = {name: float(z[i]) for name, z in scores.items()}
-        ordered = dict(sorted(own.items(), key=lambda item: -abs(item[1])))
+        ordered = dict(sorted(own.items(), key=lambda item: -round(abs(item[1]), 9)))  # equal ones as they come
         joints.append(TailJoint(row, float(values[i]), Status(view.status[samples[i]]), points[i], ordered))
     return joints
 

@@ -1,0 +1,128 @@
+"""Experiments on what is computed from independent joints: capability, damage, time above a level, failures, stops."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from tests.measure.coverage.trial import (
+    Asked,
+    Experiment,
+    Found,
+    Law,
+    Rng,
+    found,
+    fresh_share,
+    laws,
+    quantiles_at,
+    sample_of,
+)
+from tolstat.analysis import capability, cycles, damage, sequential, strength
+from tolstat.analysis.binomial import clopper_pearson
+from tolstat.common.loads import FloatArray
+
+
+def experiments() -> Iterator[Experiment]:
+    """All of this file."""
+    known = laws()
+    for name in ("normal", "slightly skew", "exponential", "lognormal", "uniform"):
+        for n in (100, 1000, 4000):
+            yield _capability(known[name], n)
+    for exponent in (3.0, 5.0, 10.0):
+        for n in (60, 1024):
+            yield _equivalent(exponent, n)
+    for n in (60, 1024):
+        for part in _PARTS:
+            yield _of_revolution(part, n)
+            yield _failed(part, n)
+    for share in (0.5, 0.05, 0.002):
+        yield _until(share)
+
+
+def _capability(law: Law, n: int) -> Experiment:
+    limit = float(law.ppf(0.999))
+    points = law.ppf((np.arange(100_000) + 0.5) / 100_000)
+    by_moments = (limit - points.mean()) / (3.0 * points.std())
+    middle, high = (float(law.ppf(share)) for share in (0.5, capability.REFERENCE))
+    by_quantiles = (limit - middle) / (high - middle)
+    asked = (
+        Asked("Cpk, normal", f"{law.name}, limit at 99.9 %", n),
+        Asked("Cpk from quantiles", f"{law.name}, limit at 99.9 %", n),
+        Asked("yield and ppm", f"{law.name}, limit at 99.9 %", n),
+    )
+
+    def once(rng: Rng) -> list[Found]:
+        own = capability.of_sample(sample_of(law.draw(rng, n)), limit)
+        _, lower, upper = own.ppm
+        normal = Found(own.cpk_normal_lower, own.cpk_normal_upper, by_moments)
+        return [normal, Found(own.cpk_lower, own.cpk_upper, by_quantiles), Found(lower, upper, 1e3)]
+
+    return Experiment(asked, once)
+
+
+def _equivalent(exponent: float, n: int) -> Experiment:
+    """Two cycles a revolution, whose ranges are lognormal with one factor in common."""
+    known, factor = laws()["lognormal"], (1.0 + 0.5**exponent) ** (1.0 / exponent)
+
+    def once(rng: Rng) -> list[Found]:
+        ranges = known.draw(rng, n)[:, None, None] * np.array([1.0, 0.5])
+        counted = cycles.Cycles.of_revolution(("cross1.F",), ranges, ranges, np.full((n, 1), 2.0))
+        sample = sample_of(damage.equivalent_load(counted, exponent)[:, 0])
+        return quantiles_at(sample, {share: factor * float(known.ppf(share)) for share in (0.5, 0.9)})
+
+    cases = (f"lognormal ranges, exponent {exponent:g}, {share}" for share in ("50 %", "90 %"))
+    return Experiment(tuple(Asked("equivalent load", case, n) for case in cases), once)
+
+
+class _Part(NamedTuple):
+    """A law of numbers between 0 and 1."""
+
+    name: str
+    draw: Callable[[Rng, int], FloatArray]
+    mean: float
+
+
+_PARTS = (
+    _Part("beta (1, 20)", lambda rng, n: rng.beta(1.0, 20.0, n), 1.0 / 21.0),
+    _Part("beta (2, 2)", lambda rng, n: rng.beta(2.0, 2.0, n), 0.5),
+    _Part("zero but in 1 of 10", lambda rng, n: np.where(rng.random(n) < 0.1, rng.random(n), 0.0), 0.05),
+    _Part(
+        "zero but in 1 of 200", lambda rng, n: np.where(rng.random(n) < 0.005, 1.0 - 0.5 * rng.random(n), 0.0), 0.00375
+    ),
+)
+
+
+def _of_revolution(part: _Part, n: int) -> Experiment:
+    """Mean time above a level, as `questions.time_above` has it."""
+
+    def once(rng: Rng) -> list[Found]:
+        lower, upper = clopper_pearson(part.draw(rng, n).sum(), n)
+        return [Found(float(lower), float(upper), part.mean)]
+
+    return Experiment((Asked("mean time above", part.name, n),), once)
+
+
+def _failed(part: _Part, n: int) -> Experiment:
+    """Share of the parts that fail, from probabilities of failure by joint."""
+
+    def once(rng: Rng) -> list[Found]:
+        return found(strength.failures(part.draw(rng, n), 0, 0), [part.mean])
+
+    return Experiment((Asked("share of failed parts", part.name, n, fresh_share(n, part.mean)),), once)
+
+
+def _until(share: float, width: float = 0.02, most: int = 20_000) -> Experiment:
+    """A campaign that looks at its interval until it is narrow."""
+
+    def once(rng: Rng) -> list[Found]:
+        above, joints = 0, 0
+        for look in sequential.looks(most):
+            above, joints = above + int(rng.binomial(look - joints, share)), look
+            if sequential.narrow(width, above, 0, joints):
+                break
+        lower, upper = sequential.interval(above, 0, joints)
+        return [Found(float(lower), float(upper), share)]
+
+    return Experiment((Asked("share at a stop", f"any law, {share:g}, narrower than {width:g}", most),), once)

@@ -157,7 +157,7 @@ def test_a_duty_cycle_of_one_file_is_that_of_a_file_for_each_point(tmp_path, who
     assert [name for name, _ in one.duty] == [point.name for point in points]
     np.testing.assert_allclose([share for _, share in one.duty], [0.5 / 1.9, 0.6 / 1.9, 0.8 / 1.9])
     np.testing.assert_array_equal(one.cycles.ranges, several.cycles.ranges)
-    np.testing.assert_allclose(one.cycles.weights, several.cycles.weights)
+    np.testing.assert_allclose(one.cycles.repeats, several.cycles.repeats)
     with (
         ResultFile.open(whole) as store,
         pytest.raises(InputError, match=r"without a share of the time\n.*--point low"),

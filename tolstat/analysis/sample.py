@@ -358,14 +358,13 @@ def largest_of(name: str, parts: Sequence[Sample], of_ratios: bool = False) -> S
 
 
 def _first(holds: Callable[[NDArray[np.intp]], Mask], n: int, at_once: int) -> int:
-    """Find the first of the ranks 0 to n - 1 from which on a condition holds; n if it never does."""
+    """Find the first of the ranks 0 to n - 1 from which on a condition holds; n if it does not at the last."""
     begin, end = 0, n
     while begin < end:
         ranks = np.arange(begin, end, -(-(end - begin) // at_once))
-        held = np.flatnonzero(holds(ranks))
-        begin, end = (
-            (int(ranks[held[0] - 1]) + 1 if held[0] else int(ranks[0]), int(ranks[held[0]]))
-            if held.size
-            else (int(ranks[-1]) + 1, end)
-        )
+        fails = np.flatnonzero(~holds(ranks))
+        if not fails.size:
+            return begin
+        last = fails[-1]
+        begin, end = int(ranks[last]) + 1, int(ranks[last + 1]) if last + 1 < ranks.size else end
     return end

@@ -196,6 +196,7 @@ class Weighted(Design):
         "would be as sure"
     )
     counting = "Joints are counted by their weights."
+    ranks_at_once = 200
 
     def __init__(
         self,

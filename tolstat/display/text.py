@@ -15,6 +15,10 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+LEAST_SHARE = 1e-9
+"""Smallest share that is shown: one joint in a billion is beyond what any campaign tells."""
+
+
 def records(table: pd.DataFrame) -> list[dict[str, Any]]:
     """Rows of a frame for JSON; NaN and infinity, which JSON lacks, become None."""
 
@@ -138,10 +142,14 @@ def delivery(row: Mapping[Any, Any]) -> str:
 
 
 def percent(share: float) -> str:
-    """Format a share in per cent, three digits; NaN gives a dash."""
-    return "-" if math.isnan(share) else f"{100.0 * share:.3g} %"
+    """Format a share in per cent, three digits; below `LEAST_SHARE` it is no more than that; NaN gives a dash."""
+    return "-" if math.isnan(share) else f"{'< ' if 0.0 < share < LEAST_SHARE else ''}{_in_percent(share)} %"
+
+
+def _in_percent(share: float) -> str:
+    return f"{100.0 * (LEAST_SHARE if 0.0 < share < LEAST_SHARE else share) + 0.0:.3g}"  # no -0
 
 
 def span(low: float, high: float) -> str:
     """Format an interval of shares in per cent; NaN gives a dash."""
-    return "-" if math.isnan(low) else f"{100.0 * low:.3g} .. {percent(high)}"
+    return "-" if math.isnan(low) else f"{_in_percent(0.0 if 0.0 < low < LEAST_SHARE else low)} .. {percent(high)}"

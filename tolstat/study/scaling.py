@@ -38,6 +38,8 @@ class Tolerance(NamedTuple):
         Unit and middle of the errors.
     width : float
         The tolerance t, SI: half the band, or 3 standard deviations for an entry without a band; of a zone its size.
+    mark : str
+        What the width is: see `mark`.
     """
 
     pattern: str
@@ -45,6 +47,7 @@ class Tolerance(NamedTuple):
     entry: dict[str, Any]
     site: Site
     width: float
+    mark: str
 
     @property
     def fixed(self) -> float | None:
@@ -112,14 +115,24 @@ def tolerances(study: Study) -> list[Tolerance]:
     """
     found = []
     for entry in study.entries:
-        site, _ = entry.models[0]
+        site, model = entry.models[0]
         names = tuple(entry.quantities)
         own = not site.name.startswith(("operation.", "material."))
         refined = any(one.shared and one.name.endswith(".position") for one, _ in entry.models)
         refined |= any(study.has_bonus(one.name) for one, _ in entry.models)
         if own and not refined and entry.keys["distribution"] in SCALED and not set(names) & set(study.copula.names):
-            found.append(Tolerance(entry.pattern, names, dict(entry.keys), site, width(entry.keys, site)))
+            found.append(Tolerance(entry.pattern, names, dict(entry.keys), site, width(entry.keys, site), mark(model)))
     return found
+
+
+def mark(model: object) -> str:
+    """Sign of a width on a drawing: ``"⌀"`` of a round zone, ``"wide"`` of a zone between planes, else ``"±"``."""
+    return ("⌀" if model.zone.round else "wide") if isinstance(model, ZoneEntry) else "±"
+
+
+def marked(mark: str, width: str) -> str:
+    """Width with its sign: ``"±0.5 deg"``, ``"⌀0.1 mm"``, ``"0.05 mm wide"``."""
+    return f"{width} wide" if mark == "wide" else f"{mark}{width}"
 
 
 def width(entry: Mapping[str, Any], site: Site) -> float:

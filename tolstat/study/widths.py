@@ -221,8 +221,8 @@ def size(study: Study, line: Line, factor: float = 1.0) -> str:
         if name in line.names:
             if entry.keys["distribution"] not in scaling.SCALED:
                 return ""
-            mark = "±" if isinstance(model, SingleEntry) else "⌀"
-            found.add(f"{mark}{units.shown(factor * scaling.width(entry.keys, site), site.unit)}")
+            size = units.shown(factor * scaling.width(entry.keys, site), site.unit)
+            found.add(scaling.marked(scaling.mark(model), size))
     return found.pop() if len(found) == 1 else ""
 
 

@@ -49,8 +49,9 @@ class Allocation(NamedTuple):
     study : Study
         The study as it is.
     tolerances : DataFrame
-        One row per tolerance that may change: ``tolerance`` (pattern), ``errors`` (how many), ``unit``, ``before`` and
-        ``proposed`` (half band, SI), ``factor``, ``cost_before``, ``cost``.
+        One row per tolerance that may change: ``tolerance`` (pattern), ``errors`` (how many), ``unit``, ``mark`` (what
+        widths are: ``±`` half the band, ``⌀`` or ``wide`` size of the zone), ``before`` and ``proposed`` (widths, SI),
+        ``factor``, ``cost_before``, ``cost``.
     limits : DataFrame
         One row per limit, and `ALL_LIMITS` for a joint above any of several (its target is NaN), from joints that the
         search did not use: ``limit``, ``target``, ``before`` (share of all joints as drawn), ``estimate``, ``lower``,
@@ -331,6 +332,7 @@ def _tolerances(request: _Request, entries: Entries) -> pd.DataFrame:
             "tolerance": t.pattern,
             "errors": len(t.names),
             "unit": t.site.unit,
+            "mark": t.mark,
             "before": t.width,
             "proposed": width,
         }

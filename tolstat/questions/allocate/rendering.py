@@ -5,18 +5,19 @@ from __future__ import annotations
 from tolstat.common.units import DISPLAY_UNITS
 from tolstat.display import text
 from tolstat.display.table import Column, Row
+from tolstat.study.scaling import marked
 
 
 def _width(row: Row, key: str) -> str:
     unit, factor = DISPLAY_UNITS.get(row["unit"], (row["unit"], 1.0))
-    return f"{factor * row[key]:.4g} {unit}".rstrip()
+    return marked(row["mark"], f"{factor * row[key]:.4g} {unit}".rstrip())
 
 
 TOLERANCES = (
     Column("tolerance", lambda row: str(row["tolerance"])),
     Column("errors", lambda row: str(row["errors"]), rank=1),
-    Column("± before", lambda row: _width(row, "before")),
-    Column("± proposed", lambda row: _width(row, "proposed")),
+    Column("before", lambda row: _width(row, "before")),
+    Column("proposed", lambda row: _width(row, "proposed")),
     Column("factor", lambda row: f"{row['factor']:.3g}"),
     Column("cost before", lambda row: f"{row['cost_before']:.4g}"),
     Column("cost", lambda row: f"{row['cost']:.4g}"),

@@ -50,3 +50,12 @@ def test_tables_are_written_as_pandas_writes_them(tmp_path):
     for table, name in ((frame, "frame"), (rows, "rows")):
         path = text.csv(table, tmp_path / "stem", name)
         assert path.read_bytes() == (tmp_path / "pandas.csv").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("share", "shown"), [(0.0, "0 %"), (-0.0, "0 %"), (1.5e-40, "< 1e-07 %"), (3.2e-7, "3.2e-05 %"), (0.5, "50 %")]
+)
+def test_shares_below_one_in_a_billion_are_no_more_than_that(share, shown):
+    assert text.percent(share) == shown
+    assert text.span(1e-40, 0.5) == "0 .. 50 %"
+    assert text.span(-0.02, 0.5) == "-2 .. 50 %"

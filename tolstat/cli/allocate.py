@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from shlex import quote
 from typing import Annotated
 
 import typer
@@ -102,4 +103,4 @@ def allocate(
     if unknown:
         say(unknown)
     if out is not None:
-        say(f"wrote {out}\nnext: tolstat run {out}")
+        say(f"wrote {out}\nnext: tolstat run {quote(str(out))}")

@@ -164,7 +164,7 @@ def causes(
     elif not found.from_design:
         say(f"which line of the drawing to change: tolstat causes {file} --run")
     print_table(rendering.columns(found), rendering.largest(found, top), wide)
-    say(rendering.note(found, logarithm))
+    say(rendering.note(found, logarithm, lines is not None))
 
 
 def _run_lines(path: Path, by: str | None, each: Each, groups: list[str], budget: str, workers: int | None) -> None:

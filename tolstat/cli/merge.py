@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from shlex import quote
 from typing import Annotated
 
 import typer
@@ -38,5 +39,5 @@ def merge(
     lines += [dropped] * bool(merged.dropped)
     again = f"{pending} {counts.counted} are pending; to simulate them: tolstat run STUDY --out {out}"
     lines += [again] * bool(pending)
-    lines += [f"next: tolstat report {out} --out {out.with_suffix('.html')}"] * (not pending)
+    lines += [f"next: tolstat report {quote(str(out))} --out {quote(str(out.with_suffix('.html')))}"] * (not pending)
     say("\n".join(lines))

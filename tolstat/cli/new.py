@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from shlex import quote
 from typing import Annotated
 
 import typer
@@ -33,4 +34,4 @@ def new(
     path = name if name.suffix == ".toml" else name.with_name(f"{name.name}.toml")
     for file in starter.write(path, joint):
         say(f"wrote {file}")
-    say(f"next: tolstat plan {path}")
+    say(f"next: tolstat plan {quote(str(path))}")

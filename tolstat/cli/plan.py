@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -45,7 +46,7 @@ def plan(
     with progress() as shown:
         made = plans.plan(loaded, workers, pilot, shown.stage)
     typer.echo(as_text(asdict(made) | {"seconds": made.seconds}) if as_json else _lines(made))
-    say(f"next: tolstat run {study_file}" + ("" if n is None else f" --n {n}"))
+    say(f"next: tolstat run {quote(str(study_file))}" + ("" if n is None else f" --n {n}"))
 
 
 def _lines(made: Plan) -> str:

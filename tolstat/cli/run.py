@@ -221,11 +221,12 @@ def conclude(path: Path, report: bool, wide: bool, study: str = "STUDY") -> None
 
 def _next(store: Reader, path: Path) -> str:
     """Command that follows the run of a campaign."""
+    file, csv, page = (quote(str(name)) for name in (path, path.with_suffix(".csv"), path.with_suffix(".html")))
     if not store.whole:
-        return f"tolstat merge {path} OTHER_SLICES --out WHOLE.h5"
+        return f"tolstat merge {file} OTHER_SLICES --out WHOLE.h5"
     if store.case_names:
-        return f"tolstat export {path} --csv {path.with_suffix('.csv')}"
-    return f"tolstat report {path} --out {path.with_suffix('.html')}"
+        return f"tolstat export {file} --csv {csv}"
+    return f"tolstat report {file} --out {page}"
 
 
 def _campaign(plan: Study, path: Path, **choices: Any) -> Counts:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from shlex import quote
 from typing import Annotated
 
 import typer
@@ -39,5 +40,5 @@ def worst(
     print_table(rendering.worst_columns(found), rendering.worst_rows(found), wide)
     if found.joints:
         first = found.joints[0]
-        where = f" --point {first.point}" if first.point else ""
-        say(f"next: tolstat replay {file} --row {first.row}{where} --out trace.csv")
+        where = f" --point {quote(first.point)}" if first.point else ""
+        say(f"next: tolstat replay {quote(str(file))} --row {first.row}{where} --out trace.csv")

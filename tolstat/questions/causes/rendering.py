@@ -67,8 +67,8 @@ def heading(causes: Causes) -> str:
     return f"scatter of {causes.load} over all joints, not of exceeding a limit:"
 
 
-def note(causes: Causes, log: bool = False) -> str:
-    """Notes to the table: number of joints, explained variance, restrictions."""
+def note(causes: Causes, log: bool = False, exchanged: bool = False) -> str:
+    """Notes to the table: joints, explained variance, restrictions; `exchanged`: whether shares of lines are given."""
     unit = unit_text(causes.unit)
     std = f"{causes.std:.4g}, of the logarithm" if log else f"{causes.std:.4g} {unit}".rstrip()
     if causes.from_design:
@@ -88,7 +88,8 @@ def note(causes: Causes, log: bool = False) -> str:
     if causes.table["total"].isna().all():
         lines.append("errors are correlated: shares overlap, and shares in all are not given")
     elif not causes.from_design and not has_narrow_bounds(causes.table):
-        lines.append("no shares in all: given joints bound them too widely; tolstat causes --run gives them")
+        remedy = "" if exchanged else "; tolstat causes --run gives them"
+        lines.append(f"no shares in all: given joints bound them too widely{remedy}")
     if causes.table["first_lower"].isna().all():
         lines.append("no intervals: they hold for independent samples only")
     return "\n".join(lines)

@@ -71,7 +71,7 @@ def cycles_of(store: Reader, slots: NDArray[np.intp], names: Sequence[str] | Non
         When the file holds no histories.
     """
     if not store.history_specs:
-        remedy = 'set histories = "cycles" in [output] of the study and run it anew'
+        remedy = 'set histories = "cycles" in [output] of the study: tolstat run STUDY --out OTHER.h5'
         raise StoreError(str(Fault(str(store.path), "holds neither cycles nor load histories", remedy)))
     names = SHOWN if names is None else tuple(names)
     histories = histories_of(names)

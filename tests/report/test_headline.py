@@ -192,7 +192,7 @@ def test_the_verdict_is_on_the_joints_that_exceed_any_limit():
     assert found.answer == "no"
     assert found.words == (
         f"6 % of the joints exceed at least one limit (total interval {100 * low:.3g} .. {100 * high:.3g} %); "
-        "4 % is accepted. Most often 700 N on cross1.F: 3 %"
+        "4 % is accepted. Most often 700 N on cross1.F: 3 %, 1 other limit as often"
     )
     assert found.notes == ("of 2 limits, each by itself: 2 kept",)
 

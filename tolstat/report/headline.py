@@ -193,7 +193,7 @@ def _judged(view: View, records: Sequence[Row], accepted: float) -> Headline:
     if alone:
         notes += (_untold(view, records),)
     elif several and worst["count"] and not np.isnan(worst["estimate"]):
-        said += f". Most often {_limit(view, worst)}: {share_of(worst)}"
+        said += _most_often(view, records, worst)
     if answer == "no":
         from tolstat.questions.what_if import rendering as what_if  # draws, which other verdicts need not wait for
 
@@ -233,6 +233,13 @@ def _limit(view: View, row: Row) -> str:
     return f"{said} (most often at {point_of(view, row['load'])})" if several else said
 
 
+def _most_often(view: View, records: Sequence[Row], worst: Row) -> str:
+    """Sentence on the limit that most joints exceed, and how many others they exceed as often."""
+    alike = sum(row["estimate"] == worst["estimate"] for row in records) - 1
+    others = f", {alike} other limit{'s' if alike > 1 else ''} as often" if alike else ""
+    return f". Most often {_limit(view, worst)}: {share_of(worst)}{others}"
+
+
 def _yield(view: View, records: Sequence[Row]) -> Headline:
     """Without an accepted share: share of the joints that keep all limits; of weighted joints, that exceed any."""
     without = view.design.without_interval("share")
@@ -253,7 +260,7 @@ def _yield(view: View, records: Sequence[Row]) -> Headline:
         most = ", the limit exceeded most" if row is worst else ""
         said = f"of the joints exceed {_words(view, row)}{most} ({interval}{missed})"
         if row["load"] == ALL_LIMITS and worst["count"] and not np.isnan(worst["estimate"]):
-            said += f". Most often {_limit(view, worst)}: {share_of(worst)}"
+            said += _most_often(view, records, worst)
         return Headline("", share_of(row), said, notes, worst["load"])
     found = capabilities.together(capability.good(view), len(view.limits))
     if not found.decides:

@@ -143,7 +143,8 @@ def _interval(row: Row, name: str, factor: float = 1.0) -> str:
     value = row[name]
     if math.isnan(value):
         return "-"
-    own = f"{factor * value:.1f}" if factor > 1 else f"{value:+.2f}"
+    # estimates of shares may scatter beyond 0 and 1, where no share is
+    own = f"{factor * min(max(value, 0.0), 1.0):.1f}" if factor > 1 else f"{value:+.2f}"
     return own if math.isnan(row[f"{name}_lower"]) else f"{own} ({_ends(row, name, factor)})"
 
 

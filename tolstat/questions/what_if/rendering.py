@@ -315,7 +315,8 @@ def _change(row: Row, step: str) -> str:
 
 
 def _index(row: Row, name: str) -> str:
-    return _interval(row, name, name)
+    """Share of the variance: estimates may scatter beyond 0 and 1, where no share is."""
+    return _interval({**row, name: np.clip(row[name], 0.0, 1.0) + 0.0}, name, name)
 
 
 def _interval(row: Row, name: str, ends: str) -> str:

@@ -145,6 +145,7 @@ class Clustered(Design):
     covers = f"bands: pointwise 95 % intervals of the settled joints, {interval}"
     of_quantiles = "over lots"
     ranks_at_once = 2000
+    innermost = True  # a share has a higher end with no joint above than with one
 
     def __init__(self, lots: NDArray[np.intp]) -> None:
         self.numbers, self._lots = np.unique(lots, return_inverse=True)

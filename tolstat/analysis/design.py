@@ -67,6 +67,8 @@ class Design(ABC):
     ranks_at_once : int
         Number of ranks at which an end of the interval of a quantile is searched at once: many where the ends of shares
         may rise with the level.
+    innermost : bool
+        Whether that end is then the innermost load, not the outermost, at which shares exclude the quantile.
     """
 
     is_sample: bool = True
@@ -77,6 +79,7 @@ class Design(ABC):
     counting: ClassVar[str] = ""
     of_quantiles: ClassVar[str] = "of order statistics"
     ranks_at_once: ClassVar[int] = 16
+    innermost: ClassVar[bool] = False
 
     @abstractmethod
     def shares(self, x: Column, levels: FloatArray, confidence: float) -> Shares:

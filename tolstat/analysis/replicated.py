@@ -97,6 +97,7 @@ class Replicated(Design):
     claims = frozenset(("share", "quantile", "delivery"))
     of_quantiles = "over replicates"
     ranks_at_once = 2000
+    innermost = True  # ends of shares are wider where few joints are above
 
     def __init__(self, n: int, number: int, method: str) -> None:
         self._blocks = np.arange(n) // (n // number)

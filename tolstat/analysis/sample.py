@@ -249,8 +249,8 @@ class Sample:
             """From the largest load down: whether surely enough joints are at this load or above."""
             return np.asarray(self.design.shares(self.value, below[n - 1 - ranks], confidence).lower >= 1.0 - share)
 
-        at_once = self.design.ranks_at_once
-        upper, lower = _first(high_enough, n, at_once), n - 1 - _first(low_enough, n, at_once)
+        how = self.design.ranks_at_once, self.design.innermost
+        upper, lower = _first(high_enough, n, *how), n - 1 - _first(low_enough, n, *how)
         return float(loads[lower]) if lower >= 0 else -np.inf, float(loads[upper]) if upper < n else np.inf
 
     def doubt(self, level: float) -> str:
@@ -357,14 +357,12 @@ def largest_of(name: str, parts: Sequence[Sample], of_ratios: bool = False) -> S
     )
 
 
-def _first(holds: Callable[[NDArray[np.intp]], Mask], n: int, at_once: int) -> int:
-    """Find the first of the ranks 0 to n - 1 from which on a condition holds; n if it does not at the last."""
+def _first(holds: Callable[[NDArray[np.intp]], Mask], n: int, at_once: int, ever: bool = False) -> int:
+    """Find the first of the ranks 0 to n - 1 from which on a condition holds, or at which it `ever` does; n if none."""
     begin, end = 0, n
     while begin < end:
         ranks = np.arange(begin, end, -(-(end - begin) // at_once))
-        fails = np.flatnonzero(~holds(ranks))
-        if not fails.size:
-            return begin
-        last = fails[-1]
-        begin, end = int(ranks[last]) + 1, int(ranks[last + 1]) if last + 1 < ranks.size else end
+        held = holds(ranks)
+        place = int(np.argmax(held)) if ever and held.any() else int(np.flatnonzero(~held).max(initial=-1)) + 1
+        begin, end = int(ranks[place - 1]) + 1 if place else begin, int(ranks[place]) if place < ranks.size else end
     return end

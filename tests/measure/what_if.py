@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 import tolstat
 from tolstat.analysis.binomial import clopper_pearson
 from tolstat.campaign import what_if as sets
-from tolstat.common.loads import ALL_LIMITS, LOADS
+from tolstat.common.loads import ANY_LIMIT, LOADS
 from tolstat.common.tables import VALID
 from tolstat.joint import perturb
 from tolstat.questions.what_if.query import what_if
@@ -92,7 +92,7 @@ def compare(path: Path, found: dict[str, list[int]]) -> None:
     """Print each value of all limits beside that of the fresh joints, and the misses of each load."""
     with tolstat.open(path) as store:
         view = store.view()
-        names = [*view.limits, ALL_LIMITS]
+        names = [*view.limits, ANY_LIMIT]
         tornados = {name: what_if(view, name) for name in names}
     misses = dict.fromkeys(names, 0)
     values = 0
@@ -108,7 +108,7 @@ def compare(path: Path, found: dict[str, list[int]]) -> None:
             beyond = np.hypot(row["share_upper"] - row["share"], share - low)
             missed = not row["share"] - below <= share <= row["share"] + beyond
             misses[name] += missed
-            if name == ALL_LIMITS:
+            if name == ANY_LIMIT:
                 values += 1
                 own = f"{100 * row['share']:.1f} ({100 * row['share_lower']:.1f} .. {100 * row['share_upper']:.1f})"
                 line = f"| `{row['line']}` | {row['words']} | {row['n']} | {own} | {n} | {100 * share:.2f} |"

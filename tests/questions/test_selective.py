@@ -53,7 +53,7 @@ def test_table_has_yield_and_unmatched_parts_by_number_of_classes(folder):
     with tolstat.open(folder / "k1.h5") as plain, tolstat.open(folder / "k3.h5") as of_three:
         views = [of_three.view(), plain.view()]
         found = tolstat.assembled(views)
-        classes, load = query.classes_of(views[0]), views[0].load("all limits")
+        classes, load = query.classes_of(views[0]), views[0].load("any limit")
     one, three = found.table.to_dict("records")
     assert (one["classes"], one["unmatched"], three["classes"]) == (1, 0.0, 3)
     assert three["unmatched"] == classes.unmatched == 1.0 - classes.shares.min(axis=0).sum() > 0.3

@@ -391,13 +391,13 @@ def test_of_several_limits_verdict_command_and_page_are_about_all_together(tmp_p
     runner.simulate(path, budget=60.0, workers=1)
     with ResultFile.open(path) as store:
         view = store.view()
-        both, second = (query.what_if(view, by) for by in ("all limits", "cross2.F"))  # the first is never reached
+        both, second = (query.what_if(view, by) for by in ("any limit", "cross2.F"))  # the first is never reached
         np.testing.assert_array_equal(both.table["share"], second.table["share"])
         assert (both.share, both.level) == (second.share, 1.0)
         found = headline(view, 0.1)
         (section,) = sections(view, Asked(path, accepted=0.1))
         view.altered = {name: one for name, one in view.altered.items() if one.about.get("step") != EXACT}
-        told = rendering.absent(query.what_if(view, "all limits")._replace(left_out=("pin*.position",)))
+        told = rendering.absent(query.what_if(view, "any limit")._replace(left_out=("pin*.position",)))
     assert "Most often 700 N on cross2.F: 22.2 %. Halve the tilt tolerance of the pins" in found.words
     assert found.words.endswith(" exceed at least one limit")
     assert section.blocks[0].text.startswith(
@@ -406,7 +406,7 @@ def test_of_several_limits_verdict_command_and_page_are_about_all_together(tmp_p
     assert told == [rendering.absent(both._replace(left_out=("pin*.position",)))[0]]
     assert told[0].startswith("left out: pin*.position; the width of their zone depends on other errors")
     shown = [
-        CliRunner().invoke(app, ["causes", str(path), "--top", "2", *more]) for more in ([], ["--by", "all limits"])
+        CliRunner().invoke(app, ["causes", str(path), "--top", "2", *more]) for more in ([], ["--by", "any limit"])
     ]
     assert shown[0].stdout == shown[1].stdout
     assert shown[0].stdout.startswith("at least one limit exceeded: 22.2 % ")

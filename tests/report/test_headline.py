@@ -217,7 +217,7 @@ def test_the_joint_verdict_covers_joints_without_a_load():
 def test_where_the_weights_support_no_joint_share_one_limit_can_only_be_missed(monkeypatch, accepted, answer):
     made = apart(100)
     few = "few joints have most of the weight: 1 effective"
-    monkeypatch.setattr(Sample, "doubt", lambda self, level: few if self.name == "all limits" else "")
+    monkeypatch.setattr(Sample, "doubt", lambda self, level: few if self.name == "any limit" else "")
     found = headline.headline(made, accepted)
     assert found.answer == answer
     if answer == "no":

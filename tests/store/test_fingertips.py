@@ -80,7 +80,7 @@ def test_what_is_opened_for_reading_cannot_write(store):
 def test_a_load_is_a_column_of_what_is_read_and_ratios_are_not_kept(store):
     """Copies of loads, their ends and their ratios to limits once took a page of a million joints to 2.7 GB."""
     view = store.view()
-    load, whole = view.load("cross1.F"), view.load("all limits")
+    load, whole = view.load("cross1.F"), view.load("any limit")
     for part in (load, *whole.parts):
         held = getattr(part.value, "base", part.value).values  # beside joints that are not valid
         computed = LOADS[part.name].kind.parts  # the largest of a pin's contact forces

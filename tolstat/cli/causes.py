@@ -47,7 +47,7 @@ def causes(
         typer.Option(
             "--by",
             metavar="LOAD",
-            help='Load, such as cross1.F or psi, or "all limits"; default: all limits, or the only one.',
+            help='Load, such as cross1.F or psi, or "any limit"; default: all limits, or the only one.',
         ),
     ] = None,
     top: Annotated[int, typer.Option("--top", metavar="N", min=1, help="Number of errors in the printed table.")] = 12,

@@ -77,7 +77,7 @@ class Limit(NamedTuple):
     Attributes
     ----------
     name : str
-        ``cross1.F``, the pattern ``cross*.F``, or `ALL_LIMITS`.
+        ``cross1.F``, the pattern ``cross*.F``, or `ANY_LIMIT`.
     loads : tuple of str
         Names of the loads; a joint is above the limit if any of them is above its level.
     levels : tuple of float
@@ -91,7 +91,7 @@ class Limit(NamedTuple):
     @property
     def has_one_level(self) -> bool:
         """Whether all loads have the same level, of the same kind."""
-        return self.name != ALL_LIMITS and len(set(self.levels)) == 1
+        return self.name != ANY_LIMIT and len(set(self.levels)) == 1
 
     @property
     def level(self) -> float:
@@ -176,7 +176,7 @@ PANELS = tuple((group, kind) for group in ("cross", "fork") for kind in LOAD_KIN
 """Groups of bushings and kinds of loads; figures of a whole campaign have a panel for each."""
 QUANTITY = {"N": "force", "N*m": "torque"}
 """What loads of a unit are called."""
-ALL_LIMITS, ANY_LIMIT = "all limits", "any limit"
-"""Name of all limits of a study together, and how a rule names a joint above at least one of them."""
+ANY_LIMIT = "any limit"
+"""Name of all limits of a study together: a joint is above it if it is above at least one of them."""
 LOAD_FIELDS = ("status", *(f"{key}_{of}" for key in SPAN for of in ("max", "lower", "upper")))
 """Fields of the results that loads and their intervals are read from, and the status."""

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tolstat.common.files import atomic_write
-from tolstat.common.loads import ALL_LIMITS, ANY_LIMIT, unit_text
+from tolstat.common.loads import ANY_LIMIT, unit_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -95,7 +95,8 @@ def value(x: float, unit: str) -> str:
 
 def limit(row: Mapping[Any, Any]) -> str:
     """Words for a row with ``load``, ``level`` and ``unit``: ``cross1.F > 1500 N``, ``any limit``."""
-    return ANY_LIMIT if row["load"] == ALL_LIMITS else f"{row['load']} > {value(row['level'], row['unit'])}"
+    name = row["load"]
+    return ANY_LIMIT if name == ANY_LIMIT else f"{name} > {value(row['level'], row['unit'])}"
 
 
 def number(x: float) -> str:

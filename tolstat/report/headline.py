@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tolstat.analysis import binomial
-from tolstat.common.loads import ALL_LIMITS
+from tolstat.common.loads import ANY_LIMIT
 from tolstat.common.tables import FAILED, STATUS_TEXT, UNSETTLED, VALID
 from tolstat.display import text
 from tolstat.questions.capability import query as capability
@@ -223,7 +223,7 @@ def _untold(view: View, records: Sequence[Row]) -> str:
 
 def _words(view: View, row: Row) -> str:
     """What joints exceed, in words: one limit, or ``at least one limit``."""
-    return "at least one limit" if row["load"] == ALL_LIMITS else _limit(view, row)
+    return "at least one limit" if row["load"] == ANY_LIMIT else _limit(view, row)
 
 
 def _limit(view: View, row: Row) -> str:
@@ -259,7 +259,7 @@ def _yield(view: View, records: Sequence[Row]) -> Headline:
         missed = "" if np.isnan(missed) else f"; whatever the proposals miss, at most {text.percent(missed)}"
         most = ", the limit exceeded most" if row is worst else ""
         said = f"of the joints exceed {_words(view, row)}{most} ({interval}{missed})"
-        if row["load"] == ALL_LIMITS and worst["count"] and not np.isnan(worst["estimate"]):
+        if row["load"] == ANY_LIMIT and worst["count"] and not np.isnan(worst["estimate"]):
             said += _most_often(view, records, worst)
         return Headline("", share_of(row), said, notes, worst["load"])
     found = capabilities.together(capability.good(view), len(view.limits))

@@ -12,7 +12,7 @@ from tolstat.analysis import prediction
 from tolstat.analysis.accuracy import LEAST_NEAR, OBSERVABLES, corrected, corrections, size
 from tolstat.analysis.column import frozen
 from tolstat.analysis.sample import Sample, largest_of
-from tolstat.common.loads import ALL_LIMITS, ANY_LIMIT, LOADS, FloatArray
+from tolstat.common.loads import ANY_LIMIT, LOADS, FloatArray
 from tolstat.common.once import once
 from tolstat.store.view import View
 
@@ -112,7 +112,7 @@ def relative(view: View, name: str) -> float:
 
     Of all limits that of the load whose error is the largest.
     """
-    if name == ALL_LIMITS:
+    if name == ANY_LIMIT:
         return float(np.max([relative(view, own) for own in view.limits]))
     narrowed, plain = view.narrowed(name)
     return narrowed.numerical_error.get(LOADS[plain].kind.key, np.nan)

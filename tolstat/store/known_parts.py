@@ -12,7 +12,7 @@ from tolstat.analysis.column import Mask
 from tolstat.analysis.known_share import Event, KnownShare, Mixture
 from tolstat.analysis.process import Known, Sums
 from tolstat.analysis.weighted import Split
-from tolstat.common.loads import ALL_LIMITS
+from tolstat.common.loads import ANY_LIMIT
 from tolstat.common.once import once
 from tolstat.common.tables import Status
 from tolstat.store import error_budget
@@ -57,7 +57,7 @@ class KnownParts:
     entries: tuple[KnownEntry, ...]
 
     def share(self, name: str, confidence: float) -> KnownShare:
-        """Share above the limit of a load, or above at least one limit (`ALL_LIMITS`).
+        """Share above the limit of a load, or above at least one limit (`ANY_LIMIT`).
 
         Numbers are NaN where so many likely processes are not supported that the upper end would be 1.
         """
@@ -110,7 +110,7 @@ class KnownParts:
     def _tallies(self) -> dict[str, tuple[Split, list[Split], list[Split]]]:
         """Weights above each limit: of joints with a valid load; for the lower end; and for the upper end."""
         view, done = self.view, self._done
-        names = [*view.limits, ALL_LIMITS]
+        names = [*view.limits, ANY_LIMIT]
         events: list[Event] = []
         places = []
         for load in view.loads(names):

@@ -20,7 +20,7 @@ from tolstat.common import selected_results
 from tolstat.common.counts import Counts
 from tolstat.common.draw_records import METHODS
 from tolstat.common.errors import Fault, InputError, StoreError
-from tolstat.common.loads import ALL_LIMITS, LOADS, SHOWN_LOADS, FloatArray, Limit, limits_in_words, split
+from tolstat.common.loads import ANY_LIMIT, LOADS, SHOWN_LOADS, FloatArray, Limit, limits_in_words, split
 from tolstat.common.shown import table
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import ERROR, Status
@@ -182,7 +182,7 @@ class View:
     def load(self, name: str) -> Sample:
         """Largest load over the revolution of every joint, by its name; ``"cross1.F at cruise"`` at that point only.
 
-        ``"all limits"`` is the largest ratio of load to limit of each joint, see `together`.
+        ``"any limit"`` is the largest ratio of load to limit of each joint, see `together`.
 
         Its limit is the one of that name or, without it, the one that holds at these points. Raises an `InputError` if
         there is no such load or the study does not keep it, a `StoreError` for levels of a subset simulation.
@@ -190,7 +190,7 @@ class View:
         if name not in self._loads:
             if self.method == "subset":
                 self.check("share")
-            if name == ALL_LIMITS and self.limits:
+            if name == ANY_LIMIT and self.limits:
                 return self._loads.setdefault(name, self.together)
             view, plain = self.narrowed(name)
             if view is not self:
@@ -243,7 +243,7 @@ class View:
     @property
     def together(self) -> Sample:
         """Largest ratio of load to limit of each joint over all limits of the study; above 1, a limit is exceeded."""
-        return self.load_of(Limit(ALL_LIMITS, tuple(self.limits), tuple(self.limits.values())))
+        return self.load_of(Limit(ANY_LIMIT, tuple(self.limits), tuple(self.limits.values())))
 
     @cached_property
     def leading(self) -> tuple[str, ...]:
@@ -265,8 +265,8 @@ class View:
 
     @property
     def decisive(self) -> str:
-        """What a verdict is about: of several limits all together, ``"all limits"``; else `most_exceeded`."""
-        return ALL_LIMITS if len(self.limits) > 1 else self.most_exceeded
+        """What a verdict is about: of several limits all together, ``"any limit"``; else `most_exceeded`."""
+        return ANY_LIMIT if len(self.limits) > 1 else self.most_exceeded
 
     @property
     def most_exceeded(self) -> str:

@@ -277,7 +277,7 @@ class Subset(Sampling):
     p0 : float
         Share of them that seeds the next level.
     load : str
-        Name of the limit whose exceedance is estimated: ``cross1.F``, ``cross*.F``, ``all limits``.
+        Name of the limit whose exceedance is estimated: ``cross1.F``, ``cross*.F``, ``any limit``.
     levels : dict of str to float
         Level of each load of the limit, SI.
     unresolved : str

@@ -9,7 +9,7 @@ from contextlib import suppress
 from typing import NamedTuple
 
 from tolstat.common.errors import Fault, InputError, gather
-from tolstat.common.loads import ALL_LIMITS, ANY_LIMIT, UNIT_OF_LOAD, Limit
+from tolstat.common.loads import ANY_LIMIT, UNIT_OF_LOAD, Limit
 from tolstat.common.strict import did_you_mean
 from tolstat.study.selection import Entry, quantity, resolve
 
@@ -58,7 +58,10 @@ def limit_of(text: str, limits: Mapping[str, float], option: str, example: str) 
     if text.split() == ANY_LIMIT.split():
         if not limits:
             raise InputError([Fault(option, "the study has no limits", f"add [limits] to it, or {example}")])
-        return Limit(ALL_LIMITS, tuple(limits), tuple(limits.values()))
+        return Limit(ANY_LIMIT, tuple(limits), tuple(limits.values()))
+    if text.split() == ["all", "limits"]:
+        remedy = f'write "{ANY_LIMIT}": a joint counts if it is above at least one'
+        raise InputError([Fault(option, f"{text.strip()!r} is not a limit", remedy)])
     found = _LIMIT.fullmatch(text)
     if found is None:
         raise InputError([Fault(option, f"{text.strip()!r} is not a limit", example)])

@@ -17,7 +17,7 @@ from tolstat.analysis.reweight import Ratios
 from tolstat.analysis.sample import Sample
 from tolstat.common import selected_results
 from tolstat.common.errors import Fault, InputError, StoreError, gather
-from tolstat.common.loads import ALL_LIMITS
+from tolstat.common.loads import ANY_LIMIT
 from tolstat.common.shown import shown
 from tolstat.common.tables import Status
 from tolstat.questions.allocate.ratios import DensityRatios, Entries
@@ -53,7 +53,7 @@ class Allocation(NamedTuple):
         widths are: ``±`` half the band, ``⌀`` or ``wide`` size of the zone), ``before`` and ``proposed`` (widths, SI),
         ``factor``, ``cost_before``, ``cost``.
     limits : DataFrame
-        One row per limit, and `ALL_LIMITS` for a joint above any of several (its target is NaN), from joints that the
+        One row per limit, and `ANY_LIMIT` for a joint above any of several (its target is NaN), from joints that the
         search did not use: ``limit``, ``target``, ``before`` (share of all joints as drawn), ``estimate``, ``lower``,
         ``upper`` (with the numerical error near the limit where ``numerical``, that is, where it is known),
         ``next_lower``, ``next_upper`` (prediction interval for the joints above in the next delivery), ``ess``,
@@ -308,7 +308,7 @@ def _limits(
     if len(statements) > 1:
         known = all(ends)
         worst = [np.any(parts, axis=0) for parts in zip(*ends, strict=True)] if known else []
-        columns.append((ALL_LIMITS, np.nan, np.any(above, 1), [np.any(above_checked, 1), *worst], known))
+        columns.append((ANY_LIMIT, np.nan, np.any(above, 1), [np.any(above_checked, 1), *worst], known))
     rows = []
     for name, target, own, checked, known in columns:
         found = [share(one, confidence) for one in checked]

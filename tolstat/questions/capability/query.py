@@ -10,7 +10,7 @@ import numpy as np
 from tolstat.analysis import binomial, capability, extreme
 from tolstat.analysis.prediction import DELIVERY
 from tolstat.analysis.sample import total_interval
-from tolstat.common.loads import ALL_LIMITS
+from tolstat.common.loads import ANY_LIMIT
 from tolstat.common.once import once
 from tolstat.display import text
 from tolstat.store import error_budget
@@ -42,7 +42,7 @@ def limits(view: View, confidence: float = 0.95, delivery: int = DELIVERY) -> pd
         ``good`` and ``ppm`` with ``_lower`` and ``_upper``, total intervals: they cover sampling, unresolved joints
         and, if known, the numerical error; ``cpk`` (from quantiles) and ``cpk_normal`` with their ends, ``normal_p``,
         ``needed``; ``next_lower`` and ``next_upper``, prediction interval for the joints above the limit in the
-        delivery. The last row, `ALL_LIMITS`, is for the largest ratio of load to limit of each joint. ``cpk_normal`` is
+        delivery. The last row, `ANY_LIMIT`, is for the largest ratio of load to limit of each joint. ``cpk_normal`` is
         NaN where the load has a long tail (`capability.LONGEST_TAIL`), both indices where unresolved joints matter
         (`analysis.binomial.unresolved_matter`).
     """
@@ -54,7 +54,7 @@ def limits(view: View, confidence: float = 0.95, delivery: int = DELIVERY) -> pd
 def limit_rows(view: View, confidence: float = 0.95, delivery: int = DELIVERY) -> Sequence[Mapping[str, Any]]:
     """Rows of the table `limits`."""
     rows = []
-    for load in [*view.loads(list(view.limits)), view.load(ALL_LIMITS)]:
+    for load in [*view.loads(list(view.limits)), view.load(ANY_LIMIT)]:
         row = dict(good(view, load.name, confidence, delivery))
         c = capability.of_sample(load, row["limit"], confidence)
         names = [f"{key}{end}" for key in ("cpk", "cpk_normal") for end in ("", "_lower", "_upper")]
@@ -66,7 +66,7 @@ def limit_rows(view: View, confidence: float = 0.95, delivery: int = DELIVERY) -
 
 
 @once
-def good(view: View, name: str = ALL_LIMITS, confidence: float = 0.95, delivery: int = DELIVERY) -> Mapping[str, Any]:
+def good(view: View, name: str = ANY_LIMIT, confidence: float = 0.95, delivery: int = DELIVERY) -> Mapping[str, Any]:
     """Yield, joints above in a million, and in the next delivery: the columns of `limits` that are no indices."""
     load = view.load(name)
     assert load.limit is not None

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from tolstat.analysis.binomial import unresolved_matter
 from tolstat.analysis.prediction import DELIVERY
-from tolstat.common.loads import ALL_LIMITS
+from tolstat.common.loads import ANY_LIMIT
 from tolstat.display import text
 from tolstat.display.table import Column, Row
 from tolstat.questions.capability.query import NOT_NORMAL
@@ -22,7 +22,7 @@ def _with_ends(row: Row, key: str, form: str) -> str:
 
 LIMITS = (
     Column("load", lambda row: str(row["load"])),
-    Column("limit", lambda row: "-" if row["load"] == ALL_LIMITS else text.value(row["limit"], row["unit"])),
+    Column("limit", lambda row: "-" if row["load"] == ANY_LIMIT else text.value(row["limit"], row["unit"])),
     Column("above", lambda row: f"{row['count']} of {row['n'] - row['n_failed'] - row['n_unsettled']}"),
     Column("yield", lambda row: text.percent(row["good"])),
     Column("total interval", lambda row: text.span(row["good_lower"], row["good_upper"])),

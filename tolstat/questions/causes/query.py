@@ -14,7 +14,7 @@ from tolstat import sampling
 from tolstat.analysis import overrepresentation, pick_freeze, regression, sensitivity
 from tolstat.analysis.sample import Sample
 from tolstat.common.errors import Fault, InputError, StoreError
-from tolstat.common.loads import ALL_LIMITS
+from tolstat.common.loads import ANY_LIMIT
 from tolstat.common.shown import shown
 from tolstat.store.view import View
 
@@ -130,7 +130,7 @@ def _of_samples(view: View, load: Sample, confidence: float, log: bool) -> Cause
     values = load.values[samples]
     needed = max(MIN_JOINTS, len(sampling.streams(study)) + 2 * regression.GROUPS)
     if samples.size < needed:
-        what = "load on all limits" if load.name == ALL_LIMITS else load.name
+        what = "load on all limits" if load.name == ANY_LIMIT else load.name
         found = f"has {samples.size} joints with a valid {what}"
         raise StoreError(str(Fault(str(view.path), found, f"run {needed} joints or more")))
     if np.ptp(values) == 0:

@@ -16,7 +16,7 @@ from tolstat.analysis.sample import Sample
 from tolstat.common.counts import Counts
 from tolstat.common.draw_records import DRAWN
 from tolstat.common.errors import Fault, InputError, StoreError
-from tolstat.common.loads import ALL_LIMITS
+from tolstat.common.loads import ANY_LIMIT
 from tolstat.common.shown import shown
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import Status
@@ -110,7 +110,7 @@ class Comparison(NamedTuple):
     changes : list of Change
         What differs between the studies.
     shares : DataFrame
-        One row per limit of either study, and `ALL_LIMITS` if both have some (each side against its own): ``load``,
+        One row per limit of either study, and `ANY_LIMIT` if both have some (each side against its own): ``load``,
         ``unit``, ``level`` (SI), fields of `difference.ShareDifference`.
     loads : DataFrame
         One row per load and ``statistic`` (``mean``, ``50 %`` ...): ``load``, ``unit``, ``statistic``, then the fields
@@ -240,7 +240,7 @@ def _share(sides: Sides, name: str, level: float, confidence: float) -> dict[str
 def _together(sides: Sides, confidence: float) -> dict[str, object]:
     """Joints above any limit of their own study: one less the yields."""
     a, b = (side.view.together.only(side.samples) for side in (sides.a, sides.b))
-    return _shares(a, b, 1.0, sides.paired, confidence) | {"load": ALL_LIMITS, "level": 1.0}
+    return _shares(a, b, 1.0, sides.paired, confidence) | {"load": ANY_LIMIT, "level": 1.0}
 
 
 def _shares(a: Sample, b: Sample, level: float, paired: bool, confidence: float) -> dict[str, object]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tolstat.analysis.estimates import CURVE
 from tolstat.analysis.sample import Sample, total_interval
-from tolstat.common.loads import ALL_LIMITS, SHOWN_LOADS, load_of, unit_text
+from tolstat.common.loads import ANY_LIMIT, SHOWN_LOADS, load_of, unit_text
 from tolstat.common.once import once
 from tolstat.display import text
 from tolstat.store import error_budget, known_parts
@@ -76,11 +76,11 @@ def most_exceeded(view: View, rows: Sequence[Mapping[Any, Any]]) -> Mapping[Any,
 
 @once
 def all_limits(view: View, confidence: float = 0.95) -> dict[str, Any]:
-    """Share of the joints above at least one limit of the study: a row as those of `limits`, of the load `ALL_LIMITS`.
+    """Share of the joints above at least one limit of the study: a row as those of `limits`, of the load `ANY_LIMIT`.
 
     Its level is 1, and its loads are the largest ratios of load to limit.
     """
-    return _above_limit(view, view.load(ALL_LIMITS), confidence)
+    return _above_limit(view, view.load(ANY_LIMIT), confidence)
 
 
 def _above_limit(view: View, load: Sample, confidence: float) -> dict[str, Any]:

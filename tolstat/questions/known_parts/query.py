@@ -6,7 +6,7 @@ from typing import Any
 
 import pandas as pd
 
-from tolstat.common.loads import ALL_LIMITS
+from tolstat.common.loads import ANY_LIMIT
 from tolstat.store import known_parts
 from tolstat.store.view import View
 
@@ -24,13 +24,13 @@ def intervals(view: View, confidence: float = 0.95) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        One row for `ALL_LIMITS`, if there are several, and for each limit, those exceeded most first: ``load``,
+        One row for `ANY_LIMIT`, if there are several, and for each limit, those exceeded most first: ``load``,
         ``unit``, ``level``; ``estimate``, ``lower``, ``upper``, share at the tolerances as stated with the interval of
         the joints; the fields of `known_share.KnownShare`, the last two ends with ``both_`` before them. Empty if the
         tolerances are taken as exact.
     """
     rows: list[dict[str, Any]] = []
-    for load in view.loads([*view.limits, *([ALL_LIMITS] if len(view.limits) > 1 else [])]):
+    for load in view.loads([*view.limits, *([ANY_LIMIT] if len(view.limits) > 1 else [])]):
         known = known_parts.of(view)
         if known is None or load.limit is None:
             continue
@@ -39,5 +39,5 @@ def intervals(view: View, confidence: float = 0.95) -> pd.DataFrame:
         row |= {"estimate": own.estimate, "lower": own.lower, "upper": own.upper, "expected": found.expected}
         row |= {"parts_lower": found.parts_lower, "parts_upper": found.parts_upper}
         rows.append(row | {"both_lower": found.lower, "both_upper": found.upper, "unsupported": found.unsupported})
-    rows.sort(key=lambda row: (row["load"] != ALL_LIMITS, -row["estimate"]))
+    rows.sort(key=lambda row: (row["load"] != ANY_LIMIT, -row["estimate"]))
     return pd.DataFrame(rows)

@@ -15,7 +15,7 @@ from tolstat.analysis.column import Column
 from tolstat.analysis.design import Design
 from tolstat.analysis.sample import Sample, total_interval
 from tolstat.common.errors import Fault, StoreError
-from tolstat.common.loads import ALL_LIMITS
+from tolstat.common.loads import ANY_LIMIT
 from tolstat.common.shown import shown
 from tolstat.store import error_budget
 from tolstat.store.view import View
@@ -110,10 +110,10 @@ def lots_of(
     """
     check(view)
     rows, every, known = [], {}, dict[bytes, Delivery]()
-    for own in [*view.loads(list(view.limits)), view.load(ALL_LIMITS)]:
+    for own in [*view.loads(list(view.limits)), view.load(ANY_LIMIT)]:
         every[own.name] = counted(own, own.value)
         rows.append(_row(view, own, known, (delivery, from_lots, accepted, confidence)))
-    above, n = every[ALL_LIMITS]
+    above, n = every[ANY_LIMIT]
     lots = _lots_of(view.design)
     shares = {"lot": lots.numbers[lots.counts(own.upper, [1.0])[1] > 0], "n": n}
     shares |= {name: own[0] for name, own in every.items()}
@@ -129,7 +129,7 @@ def check(view: View) -> None:
     elif not view.limits:
         found = "is of a study without [limits]"
     else:
-        load = view.load(ALL_LIMITS)
+        load = view.load(ANY_LIMIT)
         done = len(counted(load, load.value)[1])
         if done < clustered.LEAST:
             found = f"has joints of {done} lots simulated, and fewer than {clustered.LEAST} have no interval"

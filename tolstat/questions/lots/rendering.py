@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tolstat.common.loads import ALL_LIMITS
+from tolstat.common.loads import ANY_LIMIT
 from tolstat.display import drawing, style, text
 from tolstat.display.table import Column, has
 from tolstat.questions.lots.query import Lots
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 COLUMNS = (
     Column("load", lambda row: str(row["load"])),
-    Column("limit", lambda row: "-" if row["load"] == ALL_LIMITS else text.value(row["limit"], row["unit"])),
+    Column("limit", lambda row: "-" if row["load"] == ANY_LIMIT else text.value(row["limit"], row["unit"])),
     Column("above", lambda row: text.percent(row["estimate"])),
     Column("total interval", lambda row: text.span(row["lower"], row["upper"])),
     Column("lots without", lambda row: text.percent(row["without"]), rank=2),
@@ -50,10 +50,10 @@ def draw(ax: Axes, found: Lots) -> None:
     from scipy.stats import binom
 
     own, size = found.shares, found.joints_per_lot
-    share = np.sort((own[ALL_LIMITS] / own["n"]).to_numpy())
+    share = np.sort((own[ANY_LIMIT] / own["n"]).to_numpy())
     top = max(2, int(np.ceil(size * min(1.0, share[-1] * 1.15 + 1.0 / size))))
     at = np.arange(top + 1)
-    mean = float(own[ALL_LIMITS].sum() / own["n"].sum())
+    mean = float(own[ANY_LIMIT].sum() / own["n"].sum())
     expected = np.cumsum(found.law.delivery(size).probability)[at]
     alone = binom.cdf(at, size, mean)
     x = np.append(at / size, (top + 1) / size)

@@ -58,7 +58,7 @@ class Reweighted(NamedTuple):
     changed : list of str
         Errors whose distribution changes.
     table : DataFrame
-        One row per limit, and `ALL_LIMITS` for all of them together: ``load``, ``unit``, ``level``, ``before`` (share
+        One row per limit, and `ANY_LIMIT` for all of them together: ``load``, ``unit``, ``level``, ``before`` (share
         of the joints as drawn), ``estimate``, ``lower``, ``upper``, ``bound_lower`` and ``bound_upper`` (joints without
         a valid load counted below and above), ``total_lower`` and ``total_upper`` (also with the numerical error; NaN
         where that is not known, see `store.error_budget.near`), ``next_lower`` and ``next_upper`` (prediction interval

@@ -11,7 +11,7 @@ import pandas as pd
 
 from tolstat.analysis.sample import total_interval
 from tolstat.common.errors import Fault, InputError, StoreError
-from tolstat.common.loads import ALL_LIMITS
+from tolstat.common.loads import ANY_LIMIT
 from tolstat.common.shown import shown
 from tolstat.joint.perturbation import HOLE_OF_PIN
 from tolstat.store import error_budget
@@ -99,7 +99,7 @@ def _row(view: View, confidence: float) -> dict[str, Any]:
     if not view.limits:
         remedy = "add [limits] to the study, and run the same command again"
         raise StoreError(str(Fault(str(view.path), "is of a study without [limits]", remedy)))
-    classes, own = classes_of(view), view.load(ALL_LIMITS)
+    classes, own = classes_of(view), view.load(ANY_LIMIT)
     above = own.above(1.0, confidence)
     low, high = total_interval(error_budget.with_error(view, own), 1.0, confidence)
     unmatched = 0.0 if classes is None else classes.unmatched

@@ -13,7 +13,7 @@ import pandas as pd
 from tolstat.analysis.sample import Sample, total_interval
 from tolstat.analysis.weighted import Weighted
 from tolstat.common.errors import Fault, StoreError
-from tolstat.common.loads import ALL_LIMITS, FloatArray
+from tolstat.common.loads import ANY_LIMIT, FloatArray
 from tolstat.common.shown import shown
 from tolstat.store import error_budget
 from tolstat.store.view import View
@@ -109,7 +109,7 @@ def sorted_joints(view: View, cost_file: Path | None = None, confidence: float =
         passed = _accepted(view, study.rejects)
         share = float(np.average(passed, weights=base * kept))
         stages.append(_Stage(INSPECTED, kept * passed, 1.0 - share, assembled / share))
-    names = [*([ALL_LIMITS] if len(view.limits) > 1 else []), *view.limits]
+    names = [*([ANY_LIMIT] if len(view.limits) > 1 else []), *view.limits]
     rows = [_row(view, load, stage, confidence) for load in view.loads(names) for stage in stages]
     return Sorted(pd.DataFrame(rows), parts)
 

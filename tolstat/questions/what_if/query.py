@@ -14,7 +14,7 @@ from tolstat.analysis.sample import Sample
 from tolstat.campaign import what_if as sets
 from tolstat.campaign.what_if import EXCHANGE, WIDTH
 from tolstat.common.errors import Fault, InputError, StoreError
-from tolstat.common.loads import ALL_LIMITS, FloatArray
+from tolstat.common.loads import ANY_LIMIT, FloatArray
 from tolstat.common.shown import shown
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import Status
@@ -58,7 +58,7 @@ class WhatIf(NamedTuple):
     Attributes
     ----------
     load, unit : str
-        The load, and its SI unit; ``"all limits"`` for the largest ratio of load to limit.
+        The load, and its SI unit; ``"any limit"`` for the largest ratio of load to limit.
     level : float
         The limit; without one, the 90 % quantile of the load.
     n : int
@@ -105,7 +105,7 @@ def what_if(view: View, by: str, confidence: float = 0.95) -> WhatIf | None:
     view : View
         A campaign whose joints are drawn from tolerances.
     by : str
-        A load that can have a limit (``cross1.F``, ``pin2.contact``, ``psi``), or ``"all limits"`` of the study.
+        A load that can have a limit (``cross1.F``, ``pin2.contact``, ``psi``), or ``"any limit"`` of the study.
     confidence : float
         Confidence level of all intervals.
 
@@ -184,7 +184,7 @@ def names_at_points(view: View, load: str) -> tuple[str, ...]:
 
 def measure(view: View, load: str) -> Measure:
     """Measure of a load, or of all limits together."""
-    if load == ALL_LIMITS:
+    if load == ANY_LIMIT:
         return Measure(tuple((names_at_points(view, name), level) for name, level in view.limits.items()))
     return Measure(((names_at_points(view, load), 1.0),))
 

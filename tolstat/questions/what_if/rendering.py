@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.markers import CARETDOWN, CARETLEFT
 from matplotlib.patches import Patch
 
-from tolstat.common.loads import ALL_LIMITS
+from tolstat.common.loads import ANY_LIMIT
 from tolstat.display import drawing, style, text
 from tolstat.display.blocks import Panel
 from tolstat.display.table import Column, Row, has
@@ -54,7 +54,7 @@ def columns(found: WhatIf) -> list[Column]:
 
 def index_columns(found: WhatIf) -> list[Column]:
     """Columns of the table `indices` of a result: Sobol' indices of the load and of the event, with intervals."""
-    load = "largest load over its limit" if found.load == ALL_LIMITS else found.load
+    load = "largest load over its limit" if found.load == ANY_LIMIT else found.load
     load = f"log {load}" if found.logarithmic else load
     heads = {"alone": f"{load}: alone, %", "in_all": "in all, %"}
     heads |= {"above_alone": f"{_above(found)}: alone, %", "above_in_all": "in all, %"}
@@ -119,13 +119,13 @@ def absent(found: WhatIf) -> list[str]:
 
 def event(found: WhatIf) -> str:
     """What the share is about: ``cross1.F > 1500 N``, or ``at least one limit exceeded``."""
-    if found.load == ALL_LIMITS:
+    if found.load == ANY_LIMIT:
         return "at least one limit exceeded"
     return text.limit({"load": found.load, "level": found.level, "unit": found.unit})
 
 
 def _above(found: WhatIf) -> str:
-    return "above at least one limit" if found.load == ALL_LIMITS else "above the limit"
+    return "above at least one limit" if found.load == ANY_LIMIT else "above the limit"
 
 
 def joints(found: WhatIf) -> str:
@@ -145,7 +145,7 @@ def sentence(found: WhatIf, accepted: float = np.nan) -> str:
         return ""
     line = f"{phrase(row)} ({row['size']})" if row["size"] else phrase(row)
     if not row["share"] > accepted:
-        limit = "at least one limit" if found.load == ALL_LIMITS else "the limit"
+        limit = "at least one limit" if found.load == ANY_LIMIT else "the limit"
         return f"Halve the {line} and {_share_in_words(row)} exceed {limit}"
     exact = {own["line"]: own for own in found.table.to_dict("records") if own["step"] == EXACT}
     least = min(exact.values(), key=lambda own: float(own["share"]), default=None)

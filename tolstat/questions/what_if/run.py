@@ -14,7 +14,7 @@ from tolstat.campaign.what_if import Asked, Wanted
 from tolstat.common.cores import available_cores
 from tolstat.common.counts import Counts
 from tolstat.common.errors import Fault, StoreError
-from tolstat.common.loads import ALL_LIMITS, split
+from tolstat.common.loads import ANY_LIMIT, split
 from tolstat.display.progress import clock, silent
 from tolstat.questions.what_if import query
 from tolstat.solver.compilation import warm_up
@@ -95,7 +95,7 @@ def simulate(
     path : Path
         Result file of a campaign whose joints are drawn from tolerances.
     by : str, optional
-        Load whose limit orders the lines; by default ``"all limits"`` together if there are several.
+        Load whose limit orders the lines; by default ``"any limit"`` together if there are several.
     each : {"entry", "feature", "error"}
         What a line is: an entry of ``[tolerances]``, a pin with its hole, or an error.
     groups : sequence of str
@@ -233,7 +233,7 @@ class _Run:
 def points_of(view: View, by: str) -> tuple[str, ...]:
     """Operating points that a load, a limit or joints in the file are about; all of them if there is no limit."""
     every = tuple(view.store.points)
-    asked = () if by == ALL_LIMITS else (by,)
+    asked = () if by == ANY_LIMIT else (by,)
     names = [*asked, *(view.limits or ("",)), *(name for one in view.altered.values() for name in one.names)]
     chosen = {point for name in names for point in names_of(split(name)[1], every, name)}
     return tuple(point for point in every if point in chosen)

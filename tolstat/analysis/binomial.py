@@ -144,6 +144,15 @@ def unresolved_matter(count: int, n: int, n_unresolved: int, confidence: float =
     return bool(n_unresolved / n >= 0.5 * (upper - lower))
 
 
+def log_beta_binomial(k: ArrayLike, n: ArrayLike, a: ArrayLike, b: ArrayLike) -> FloatArray:
+    """Logarithm of the probability of k of n joints whose share is a beta variate with the parameters a and b."""
+    from scipy.special import betaln
+
+    k, n, a, b = (np.asarray(own, dtype=float) for own in (k, n, a, b))
+    choose = -np.log(n + 1.0) - betaln(k + 1.0, n - k + 1.0)
+    return np.asarray(choose + betaln(k + a, n - k + b) - betaln(a, b))
+
+
 def wilks(share: float, confidence: float = 0.95) -> int:
     """Return the least number of joints whose largest load bounds the quantile from above (Wilks 1941, first order).
 

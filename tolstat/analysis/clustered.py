@@ -8,13 +8,13 @@ the beta-binomial law, too.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tolstat.analysis import prediction
-from tolstat.analysis.binomial import clopper_pearson
+from tolstat.analysis.binomial import clopper_pearson, log_beta_binomial
 from tolstat.analysis.column import Column
 from tolstat.analysis.design import Design, Shares, counts_by_group
 from tolstat.common.loads import FloatArray
@@ -105,25 +105,37 @@ def interval(above: ArrayLike, joints: ArrayLike, confidence: float = 0.95) -> L
 
 
 def _credible(k: FloatArray, n: FloatArray, confidence: float) -> tuple[FloatArray, FloatArray]:
-    """Credible interval of the mean share of m limits, k of n joints in each lot, both (lots, m), as `law_of` has it.
-
-    All limits share the grid of means, so that the density is computed once for each pair of k and n.
-    """
+    """Credible interval of the mean share of m limits, k of n joints in each lot, both (lots, m)."""
     from scipy.special import expit, logit
 
     p = k.sum(axis=0) / n.sum(axis=0)
-    means = np.arange(logit(p.min()) - REACH, logit(p.max()) + REACH, STEP)
-    mean, r = np.meshgrid(expit(means), expit(SPREADS[::2]), indexing="ij")
+    means, spreads = np.arange(logit(p.min()) - REACH, logit(p.max()) + REACH, STEP), SPREADS[::2]
+    below = _posterior(k, n, means, spreads)[2].reshape(len(p), len(means), -1).sum(axis=2).cumsum(axis=1)
+    tail = 0.5 * (1.0 - confidence)
+    ends = np.array([np.interp([tail, 1.0 - tail], own, means + 0.5 * STEP) for own in below])
+    return expit(ends[:, 0]), expit(ends[:, 1])
+
+
+def _posterior(
+    k: NDArray[Any], n: NDArray[Any], means: FloatArray, spreads: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Beta distributions of the lots' shares, (points,), and their probabilities for each of m limits, (m, points).
+
+    k of n joints in each lot are above a limit, both (lots, m). The points are a grid of logits of the mean and of the
+    correlation of two joints of a lot; all limits share it, so that the density is computed once for each pair of k and
+    n. The prior distribution of the mean is Jeffreys' of a share, that of the correlation uniform.
+    """
+    from scipy.special import expit
+
+    mean, r = (own.ravel() for own in np.meshgrid(expit(means), expit(spreads), indexing="ij"))
     a, b = mean * (1.0 - r) / r, (1.0 - mean) * (1.0 - r) / r
     pairs, which = np.unique(np.stack([k.ravel(), n.ravel()]), axis=1, return_inverse=True)
     times = np.zeros((k.shape[1], pairs.shape[1]))
     np.add.at(times, (np.tile(np.arange(k.shape[1]), len(k)), which.ravel()), 1.0)
-    log = times @ np.array([_log_pmf(one, of, a, b).ravel() for one, of in pairs.T]) + _log_prior(mean, r).ravel()
-    density = np.exp(log - log.max(axis=1, keepdims=True)).reshape(len(log), *mean.shape).sum(axis=2)
-    below = np.cumsum(density, axis=1) / density.sum(axis=1, keepdims=True)
-    tail = 0.5 * (1.0 - confidence)
-    ends = np.array([np.interp([tail, 1.0 - tail], own, means + 0.5 * STEP) for own in below])
-    return expit(ends[:, 0]), expit(ends[:, 1])
+    log = times @ np.array([log_beta_binomial(above, of, a, b) for above, of in pairs.T])
+    log += 0.5 * np.log(mean * (1.0 - mean)) + np.log(r * (1.0 - r))
+    weight = np.exp(log - log.max(axis=1, keepdims=True))
+    return a, b, weight / weight.sum(axis=1, keepdims=True)
 
 
 class Clustered(Design):
@@ -212,7 +224,8 @@ class Law(NamedTuple):
         for size, count in ((small, lots - more), (small + 1, more)):
             if count and size:
                 padded = np.zeros((self.weight.size, number + 1))
-                padded[:, : size + 1] = np.exp(_log_pmf(np.arange(size + 1), size, self.a[:, None], self.b[:, None]))
+                log = log_beta_binomial(np.arange(size + 1), size, self.a[:, None], self.b[:, None])
+                padded[:, : size + 1] = np.exp(log)
                 spectrum = spectrum * np.fft.rfft(padded) ** count
         pmf = np.fft.irfft(self.weight @ spectrum, number + 1).clip(0.0)
         return Delivery(np.asarray(pmf / pmf.sum()), self.counts)
@@ -261,35 +274,13 @@ def law_of(above: ArrayLike, joints: ArrayLike) -> Law:
     -------
     Law
     """
-    from scipy.special import expit, logit
+    from scipy.special import logit
 
     k, n = np.asarray(above, dtype=np.intp), np.asarray(joints, dtype=np.intp)
-    pairs, times = np.unique(np.column_stack([k, n]), axis=0, return_counts=True)
     p = (k.sum() + 0.5) / (n.sum() + 1.0)
-    shares = interval(k, n)
-    spread = max(float(np.nan_to_num(shares.correlation)), 0.05)
+    spread = max(float(np.nan_to_num(interval(k, n).correlation)), 0.05)
     error = np.sqrt((1.0 + (n.mean() - 1.0) * spread) / (n.sum() * p * (1.0 - p)))
     means = logit(p) + np.linspace(-REACH, REACH, GRID) * min(float(error), 1.0)
-    mean, r = (own.ravel() for own in np.meshgrid(expit(means), expit(SPREADS)))
-    a, b = mean * (1.0 - r) / r, (1.0 - mean) * (1.0 - r) / r
-    log = _log_prior(mean, r)
-    for (one, of), count in zip(pairs, times, strict=True):
-        log += count * _log_pmf(one, of, a, b)
-    weight = np.exp(log - log.max())
-    weight /= weight.sum()
+    a, b, (weight,) = _posterior(k[:, None], n[:, None], means, SPREADS)
     kept = weight > NEGLIGIBLE
     return Law(a[kept], b[kept], weight[kept] / weight[kept].sum(), (int(k.sum()), int(n.sum())))
-
-
-def _log_prior(mean: FloatArray, correlation: FloatArray) -> FloatArray:
-    """Logarithm of the prior density of the logits of mean and correlation: Jeffreys' of a share, and uniform."""
-    return np.asarray(0.5 * np.log(mean * (1.0 - mean)) + np.log(correlation * (1.0 - correlation)))
-
-
-def _log_pmf(k: ArrayLike, n: ArrayLike, a: FloatArray, b: FloatArray) -> FloatArray:
-    """Logarithm of the beta-binomial probability of k of n."""
-    from scipy.special import betaln, gammaln
-
-    k, n = np.asarray(k, dtype=float), np.asarray(n, dtype=float)
-    choose = gammaln(n + 1.0) - gammaln(k + 1.0) - gammaln(n - k + 1.0)
-    return np.asarray(choose + betaln(k + a, n - k + b) - betaln(a, b))

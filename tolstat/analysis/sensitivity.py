@@ -128,15 +128,8 @@ def first_order(x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: bool 
     [0.2, 0.8]
     """
     errors, loads = _checked(x, y)
-    centred = (loads - loads.mean(axis=0)).reshape(len(loads), -1)
-    variance, wider = centred.var(axis=0), _wider(centred**2)
-    found = np.full((2, errors.shape[1], centred.shape[1]), np.nan)
-    for i, column in enumerate(errors.T):
-        if np.ptp(column) > 0:
-            own = _fit(column, centred)
-            found[0, i], found[1, i] = own.share, _error(own.influence, own.chance) * wider
-    estimate, error = found.reshape(2, errors.shape[1], *loads.shape[1:])
-    return _with_ends(estimate, error, variance.reshape(loads.shape[1:]), confidence, iid)
+    found, _ = over_revolution(errors, loads.reshape(len(loads), -1), confidence, iid)
+    return FirstOrder(*(own.reshape(own.shape[:-1] + loads.shape[1:]) for own in found))
 
 
 def over_revolution(
@@ -305,7 +298,9 @@ def _interactions(errors: FloatArray, left: FloatArray, variance: float) -> tupl
     of single errors. The influence functions lack the term of the estimated variance.
     """
     n, d = errors.shape
-    p = _polynomials(errors).reshape(n, d * DEGREE)
+    u = 2.0 * (ranks(errors) - 0.5) / n - 1.0
+    basis = [np.sqrt(2 * k + 1) * np.polynomial.Legendre.basis(k)(u) for k in range(1, DEGREE + 1)]
+    p = np.stack(basis, axis=2).reshape(n, d * DEGREE)
     c = (p * left[:, None]).T @ p / n
     square = p**2
     spread = (square * (left**2)[:, None]).T @ square / n
@@ -319,14 +314,6 @@ def _interactions(errors: FloatArray, left: FloatArray, variance: float) -> tupl
     of_pairs = 2.0 * left[:, None] * weighted.reshape(n, d, DEGREE).sum(axis=2) / variance
     chance: FloatArray = 2.0 * (spread**2).reshape(blocks).sum(axis=(1, 3)) / (n * variance) ** 2
     return pairs, of_pairs, chance
-
-
-def _polynomials(errors: FloatArray) -> FloatArray:
-    """Legendre polynomials of the degrees 1 to `DEGREE` of the errors' ranks, orthonormal; shape (n, d, DEGREE)."""
-    u = 2.0 * (ranks(errors) - 0.5) / len(errors) - 1.0
-    degrees = range(1, DEGREE + 1)
-    basis = [np.sqrt(2 * k + 1) * np.polynomial.Legendre.basis(k)(u) for k in degrees]
-    return np.stack(basis, axis=2)
 
 
 def _chance(share: FloatArray, degrees: int, n: int) -> FloatArray:

@@ -138,7 +138,7 @@ class _States(NamedTuple):
 
     def part(self, rows: slice | NDArray[np.bool_]) -> _States:
         """Some of the states."""
-        return _States(self.scores[rows], self.loads[rows], self.number[rows], self.families[rows], self.first[rows])
+        return _States._make(own[rows] for own in self)
 
 
 class Walk:
@@ -213,14 +213,9 @@ class Walk:
             before = self._start.part(slice(loads.size))
             moved = loads > self._threshold
             self._accepted += int(moved.sum())
-            here = _States(
-                np.where(moved[:, None], here.scores, before.scores),
-                np.where(moved, loads, before.loads),
-                np.where(moved, numbers, before.number),
-                before.families,
-                before.first,
-            )
-            self._start = here
+            scores = np.where(moved[:, None], here.scores, before.scores)
+            loads, numbers = np.where(moved, loads, before.loads), np.where(moved, numbers, before.number)
+            self._start = here = before._replace(scores=scores, loads=loads, number=numbers)
         self._parts.append(here)
         if sum(part.loads.size for part in self._parts) == self.settings.n:
             self._finish_level()

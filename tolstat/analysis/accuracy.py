@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tolstat.analysis.binomial import half_width
 from tolstat.common.load_kinds import LOAD_KINDS, SPAN, Kind, measure_of
 from tolstat.common.loads import LOADS, FloatArray, Results, of_kind
 from tolstat.common.tables import SIMULATED, Status
@@ -195,9 +196,7 @@ def corrected(
     >>> bool((low > 100.9).all() and (high < 102.1).all() and (low < high).all())
     True
     """
-    from scipy.special import stdtrit
-
-    margin = float(stdtrit(found.size - 1, 0.5 * (1.0 + confidence))) * float(found.std(ddof=1)) / np.sqrt(found.size)
+    margin = float(half_width(confidence, found.size - 1)) * float(found.std(ddof=1)) / np.sqrt(found.size)
     drawn = found[np.random.default_rng(2024).integers(found.size, size=values.size)]
     return values + sizes * (drawn - margin), values + sizes * (drawn + margin)
 

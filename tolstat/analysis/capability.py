@@ -16,7 +16,6 @@ from numpy.typing import ArrayLike
 
 from tolstat.analysis import binomial, exceedance
 from tolstat.analysis.estimates import Exceedance
-from tolstat.analysis.independent import Independent
 from tolstat.analysis.listed import Listed
 from tolstat.analysis.sample import Ends, Sample
 from tolstat.common.loads import FloatArray
@@ -121,7 +120,7 @@ def capability(
     >>> round(found.cpk_normal, 1), found.above.count, found.needed
     (1.3, 0, 3244)
     """
-    return of_sample(Sample.of(values, status, Independent() if iid else Listed(""), ends), limit, confidence)
+    return of_sample(Sample.of(values, status, None if iid else Listed(""), ends), limit, confidence)
 
 
 def of_sample(sample: Sample, limit: float, confidence: float = 0.95) -> Capability:

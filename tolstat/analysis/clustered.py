@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tolstat.analysis import prediction
-from tolstat.analysis.binomial import clopper_pearson, log_beta_binomial
+from tolstat.analysis.binomial import clopper_pearson, half_width, log_beta_binomial
 from tolstat.analysis.column import Column
 from tolstat.analysis.design import Design, Shares, counts_by_group
 from tolstat.common.loads import FloatArray
@@ -22,8 +22,7 @@ from tolstat.common.loads import FloatArray
 LEAST = 30
 """Number of lots from which on intervals over lots hold; with fewer there are none."""
 FEW = 20
-"""Number of joints on a side of a level below which an interval contains that of independent joints, too, and effective
-number below which it contains that of the beta-binomial law."""
+"""Effective number of joints on a side of a level below which an interval contains that of the beta-binomial law."""
 STEP = 0.2
 """Distance of the mean shares, on the logit scale, at which the posterior density of that law is computed."""
 GRID, REACH = 33, 5.0
@@ -74,7 +73,7 @@ def interval(above: ArrayLike, joints: ArrayLike, confidence: float = 0.95) -> L
         is Clopper and Pearson's for lots. Where the joints on a side of the limit, (sum of k)² / sum of k² over the
         lots, are effectively fewer than `FEW`, the interval contains `_credible`, too. NaN for fewer than `LEAST` lots.
     """
-    from scipy.special import expit, logit, stdtrit
+    from scipy.special import expit, logit
 
     k = np.asarray(above, dtype=float)
     n = np.asarray(joints, dtype=float)
@@ -83,7 +82,7 @@ def interval(above: ArrayLike, joints: ArrayLike, confidence: float = 0.95) -> L
     with np.errstate(divide="ignore", invalid="ignore"):
         p = k.sum(axis=0) / total
         between = ((k - p * n) ** 2).sum(axis=0) * lots / (lots - 1.0)
-        half = stdtrit(lots - 1, 0.5 * (1.0 + confidence)) * np.sqrt(between) / total / (p * (1.0 - p))
+        half = half_width(confidence, lots - 1) * np.sqrt(between) / total / (p * (1.0 - p))
         lower, upper = np.asarray(expit(logit(p) - half)), np.asarray(expit(logit(p) + half))
         none = float(clopper_pearson(0, lots, confidence)[1])
         sides = np.stack([k, n - k])
@@ -162,21 +161,12 @@ class Clustered(Design):
         self.numbers, self._lots = np.unique(lots, return_inverse=True)
 
     def shares(self, x: Column, levels: FloatArray, confidence: float) -> Shares:
-        """See `Design.shares`: `interval` over the lots; none for fewer than `LEAST` lots.
-
-        With fewer than `FEW` joints on a side of a level it contains the interval of as many independent joints
-        (Clopper and Pearson), too.
-        """
+        """See `Design.shares`: `interval` over the lots; none for fewer than `LEAST` lots."""
         above, joints = self.counts(x, levels)
         above, joints = above[joints > 0], joints[joints > 0]
         if not joints.size:
             return Shares.counted(x, levels)
-        found = interval(above, joints, confidence)
-        count = above.sum(axis=0)
-        low, high = clopper_pearson(count, x.n, confidence)
-        few = np.minimum(count, x.n - count) < FEW
-        lower, upper = np.minimum(found.lower, low), np.maximum(found.upper, high)
-        return Shares(found.estimate, np.where(few, lower, found.lower), np.where(few, upper, found.upper))
+        return Shares(*interval(above, joints, confidence)[:3]).with_independent(x, levels, confidence)
 
     def counts(self, x: Column, levels: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Joints above each level, (lots, m), and joints that count, (lots,), of each lot of `numbers`."""

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tolstat.analysis.binomial import clopper_pearson
+from tolstat.analysis.binomial import clopper_pearson, half_width
 from tolstat.analysis.column import Column
 from tolstat.analysis.design import Claim, Design
 from tolstat.analysis.sample import Sample
@@ -188,8 +188,6 @@ def means(a: Sample, b: Sample, paired: bool, confidence: float = 0.95) -> Diffe
     ValueError
         As `shares`.
     """
-    from scipy.special import stdtrit
-
     a, b = _valid(a, b, paired)
     x, y = a.values, b.values
     of_a, of_b = float(x.mean()), float(y.mean())
@@ -202,7 +200,7 @@ def means(a: Sample, b: Sample, paired: bool, confidence: float = 0.95) -> Diffe
         error = float(np.sqrt(parts.sum()))
         weights = (parts**2 / np.array([x.size - 1.0, y.size - 1.0])).sum()
         degrees = parts.sum() ** 2 / weights if weights else x.size + y.size - 2.0
-    half = float(stdtrit(degrees, 0.5 * (1.0 + confidence))) * error
+    half = float(half_width(confidence, degrees)) * error
     return Difference(of_a, of_b, of_b - of_a, of_b - of_a - half, of_b - of_a + half)
 
 
@@ -256,10 +254,9 @@ def _recovered(
     ends = []
     for one, other in ((of_b[0], of_a[1]), (of_b[1], of_a[0])):
         i, j = np.asarray(one, dtype=float), np.asarray(other, dtype=float)
-        infinite = np.isinf(i) | np.isinf(j)
-        i, j = np.where(infinite, 0.0, i), np.where(infinite, 0.0, j)
-        length = np.sqrt(np.maximum(i**2 + j**2 - 2.0 * np.asarray(rho) * i * j, 0.0))
-        ends.append(np.where(infinite, np.inf, length))
+        with np.errstate(invalid="ignore"):
+            length = np.sqrt(np.maximum(i**2 + j**2 - 2.0 * np.asarray(rho) * i * j, 0.0))
+        ends.append(np.where(np.isinf(i) | np.isinf(j), np.inf, length))
     return ends[0], ends[1]
 
 

@@ -158,8 +158,3 @@ def shape_of_weights(weights: ArrayLike) -> float:
     if not tail[0] > 0:  # equal weights at the threshold: of those above it, as many as there are
         tail = tail[tail > 0]
     return float((fit(tail)[0] * tail.size + 0.5 * 10.0) / (tail.size + 10.0)) if tail.size >= 5 else 0.5
-
-
-def allowed_shape(n: int) -> float:
-    """Largest k at which an estimate from n weights has converged, min(1 - 1 / log10 n, 0.7) (Vehtari et al. 2024)."""
-    return float(min(1.0 - 1.0 / np.log10(max(n, 11)), 0.7))

@@ -194,7 +194,8 @@ def support(load: Sample, ratios: Ratios, level: float) -> Support:
     effective = [float(side[0]) for side in Split.by(above, w).effective]
     k = float(np.fmax(pareto.shape_of_weights(w[above]), pareto.shape_of_weights(w[~above])))
     beside = np.isfinite(ratios.heaviest) or min(effective) >= LEAST_BESIDE
-    usable = ratios.usable and bool(beside) and not k > pareto.allowed_shape(w.size)
+    converged = min(1.0 - 1.0 / np.log10(max(w.size, 11)), 0.7)  # largest k allowed (Vehtari et al. 2024)
+    usable = ratios.usable and bool(beside) and not k > converged
     return Support(effective[0], effective[1], k, usable)
 
 

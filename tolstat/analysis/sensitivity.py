@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tolstat.analysis.binomial import half_width
 from tolstat.analysis.ranks import ranks
 from tolstat.common.loads import FloatArray
 from tolstat.common.shown import shown
@@ -234,7 +235,7 @@ def first_and_total(x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: b
     errors_lower = _error(own, chance + chance_of_pairs.sum(axis=1)) * wider
     without = chance.sum() - chance + 0.5 * chance_of_pairs.sum() - chance_of_pairs.sum(axis=1)
     errors_upper = _error(own - everything[:, None], without) * wider
-    z = normal_half(confidence) if iid else np.nan
+    z = half_width(confidence) if iid else np.nan
     np.fill_diagonal(pairs, np.nan)
     lower = np.clip(estimate - z * errors_lower, 0, 1)
     upper = np.clip(np.maximum(estimate + rest + z * errors_upper, estimate + z * errors_lower), 0, 1)
@@ -244,7 +245,7 @@ def first_and_total(x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: b
 def _with_ends(
     estimate: FloatArray, error: FloatArray, variance: FloatArray, confidence: float, iid: bool
 ) -> FirstOrder:
-    half = WIDER * normal_half(confidence) * error if iid else np.full(estimate.shape, np.nan)
+    half = WIDER * half_width(confidence) * error if iid else np.full(estimate.shape, np.nan)
     return FirstOrder(estimate, np.clip(estimate - half, 0, 1), np.clip(estimate + half, 0, 1), variance)
 
 
@@ -335,18 +336,3 @@ def _wider(square: FloatArray) -> FloatArray:
     """
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.asarray(1.0 + FEW * (square**2).sum(axis=0) / square.sum(axis=0) ** 2)
-
-
-def normal_half(confidence: float) -> float:
-    """Half the width of a normal interval, in standard errors.
-
-    Raises
-    ------
-    ValueError
-        When the confidence is not between 0 and 1.
-    """
-    from scipy.special import ndtri
-
-    if not 0.0 < confidence < 1.0:
-        raise ValueError(f"confidence {confidence} must lie between 0 and 1")
-    return float(ndtri(0.5 * (1.0 + confidence)))

@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.analysis.binomial import clopper_pearson
+from tolstat.analysis.binomial import clopper_pearson, half_width
 from tolstat.common.loads import FloatArray
 from tolstat.common.shown import shown
 
@@ -220,15 +220,12 @@ class Walk:
         if sum(part.loads.size for part in self._parts) == self.settings.n:
             self._finish_level()
         if not self.done:
-            self.next = self._move()
-
-    def _move(self) -> Candidates:
-        assert self._start is not None
-        first = sum(part.loads.size for part in self._parts)
-        count = min(self._start.loads.size, self.settings.n - first)
-        noise = self._noise(len(self.levels), self._simulated, count)
-        scores = math.sqrt(1.0 - self._step**2) * self._start.scores[:count] + self._step * noise
-        return Candidates(len(self.levels), scores, self._start.number[:count])
+            assert self._start is not None
+            first = sum(part.loads.size for part in self._parts)
+            start = self._start.part(slice(self.settings.n - first))
+            noise = self._noise(len(self.levels), self._simulated, start.loads.size)
+            scores = math.sqrt(1.0 - self._step**2) * start.scores + self._step * noise
+            self.next = Candidates(len(self.levels), scores, start.number)
 
     def _finish_level(self) -> None:
         states = _States(*map(np.concatenate, zip(*self._parts, strict=True)))
@@ -285,11 +282,9 @@ class Walk:
         The interval is Student's on the logarithm, with one degree of freedom per `FAMILIES` seeds, centred at the
         logarithm plus half its variance: the product is unbiased, so its logarithm is biased low by that much.
         """
-        from scipy.special import stdtrit
-
         share = math.prod(level.share for level in self.levels if level.share)
         freedom = max(1.0, self.settings.n * self.settings.p0 / FAMILIES)
-        half = float(stdtrit(freedom, 0.5 * (1.0 + confidence))) * math.sqrt(self._variance)
+        half = float(half_width(confidence, freedom)) * math.sqrt(self._variance)
         lower, upper = (min(1.0, share * math.exp(0.5 * self._variance + sign * half)) for sign in (-1, 1))
         if not self.reached:
             return Estimate(math.nan, 0.0, upper, math.nan)

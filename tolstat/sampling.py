@@ -358,7 +358,7 @@ def _proposed(study: Study, names: Sequence[str], numbers: range) -> tuple[dict[
             first = one.streams[0]
             u, v = (_stream(study.sampling.seed, f"{of} {first}", numbers.start) for of in ("deviation", "mean"))
             spread = process.deviation(np.maximum(u.random(len(numbers))[here], 2.0**-54), one.parts)
-            middle = process.mean(ndtri(np.maximum(v.random(len(numbers))[here], 2.0**-54)), spread, one.parts)
+            middle = spread * ndtri(np.maximum(v.random(len(numbers))[here], 2.0**-54)) / np.sqrt(one.parts)
             for name in one.streams:
                 scores[name][here] = middle + spread * scores[name][here]
     return scores, part

@@ -14,18 +14,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tolstat.analysis.binomial import half_width
 from tolstat.common.load_kinds import LOAD_KINDS, SPAN, Kind, measure_of
-from tolstat.common.loads import LOADS, Results, of_kind
+from tolstat.common.loads import LOADS, FloatArray, Results, of_kind
 from tolstat.common.tables import SIMULATED, Status
-
-FloatArray = NDArray[np.float64]
 
 OBSERVABLES = tuple(name for kind in LOAD_KINDS for _, name in kind.loads())
 """Largest loads of a joint whose error is evaluated: all that can have a limit, kind by kind."""
 _KEYS = tuple(SPAN)
 KIND_OF = np.array([_KEYS.index(LOADS[name].kind.key) for name in OBSERVABLES])
 """Number of the kind of each, in the order of the registry."""
-_MEASURE = np.array([_KEYS.index(measure_of(kind).key) for kind in LOAD_KINDS])
 
 REFERENCE, FIDELITY = "reference", "fidelity"
 HALF_STEP_SHARE = 4 / 3
@@ -61,35 +59,24 @@ def loads(results: NDArray[np.void]) -> FloatArray:
 
 def sizes(results: NDArray[np.void]) -> FloatArray:
     """Reference value of each observable in each joint: the largest load of its measure, (m, loads), SI."""
-    largest = _largest(loads(results))
-    known = np.asarray(~np.isnan(largest).all(axis=0))
-    measure = np.where(known[_MEASURE], _MEASURE, np.arange(len(_KEYS)))
-    return np.asarray(largest[:, measure[KIND_OF]])
+    return np.column_stack([_size(results, kind) for kind in LOAD_KINDS])[:, KIND_OF]
 
 
 def size(results: Results, observable: str) -> FloatArray:
     """Reference value of one observable in each joint, (m,), SI: a column of `sizes`."""
-    kind = LOADS[observable].kind
-    found = _size(results, measure_of(kind))
-    return found if kind == measure_of(kind) or not np.isnan(found).all() else _size(results, kind)
+    return _size(results, LOADS[observable].kind)
 
 
 def _size(results: Results, kind: Kind) -> FloatArray:
-    """Largest load of a kind in each joint, (m,), of those that are stored."""
-    values = of_kind(results, kind)
-    held = ~np.isnan(values).all(axis=0)
-    return values[:, held].max(axis=1) if held.any() else np.full(len(values), np.nan)
+    """Reference value of the observables of a kind in each joint, (m,)."""
+    found = _largest(of_kind(results, measure_of(kind)))
+    return found if kind == measure_of(kind) or not np.isnan(found).all() else _largest(of_kind(results, kind))
 
 
 def _largest(values: FloatArray) -> FloatArray:
-    """Largest value of each kind, (m, loads) -> (m, kinds); NaN propagates unless a load is NaN in all joints."""
+    """Largest of several values of each joint, (m, loads) -> (m,); NaN propagates unless in all joints."""
     known = ~np.isnan(values).all(axis=0)
-    largest = np.full((len(values), len(_KEYS)), np.nan)
-    for kind in range(len(_KEYS)):
-        of_kind = values[:, known & (kind == KIND_OF)]
-        if of_kind.shape[1]:
-            largest[:, kind] = of_kind.max(axis=1)
-    return largest
+    return values[:, known].max(axis=1) if known.any() else np.full(len(values), np.nan)
 
 
 def differences(base: NDArray[np.void], other: NDArray[np.void]) -> FloatArray:
@@ -144,12 +131,7 @@ def numerical(base: NDArray[np.void], checks: Mapping[str, NDArray[np.void]]) ->
         Relative, not negative; NaN where neither is available.
     """
     changes = {name: differences(base, results) for name, results in checks.items()}
-    found = estimate(changes)
-    if REFERENCE in changes:
-        measured = np.abs(changes[REFERENCE])
-        settled = (checks[REFERENCE]["status"] == Status.OK)[:, None] & np.isfinite(measured)
-        found = np.where(settled, measured, found)
-    return found
+    return np.abs(_measured_or(estimate(changes), changes, checks))
 
 
 def corrections(base: NDArray[np.void], checks: Mapping[str, NDArray[np.void]]) -> FloatArray:
@@ -172,10 +154,17 @@ def corrections(base: NDArray[np.void], checks: Mapping[str, NDArray[np.void]]) 
     found = HALF_STEP_SHARE * changes["half_step"]
     for name in ("newton", "settling", FIDELITY):
         found = found + changes.get(name, 0.0)
-    if REFERENCE in changes:
-        settled = (checks[REFERENCE]["status"] == Status.OK)[:, None] & np.isfinite(changes[REFERENCE])
-        found = np.where(settled, changes[REFERENCE], found)
-    return np.asarray(found)
+    return _measured_or(found, changes, checks)
+
+
+def _measured_or(
+    estimated: FloatArray, changes: Mapping[str, FloatArray], checks: Mapping[str, NDArray[np.void]]
+) -> FloatArray:
+    """Difference to the reference where that settled, otherwise what is estimated, (m, loads)."""
+    if REFERENCE not in changes:
+        return estimated
+    settled = (checks[REFERENCE]["status"] == Status.OK)[:, None] & np.isfinite(changes[REFERENCE])
+    return np.where(settled, changes[REFERENCE], estimated)
 
 
 def corrected(
@@ -207,9 +196,7 @@ def corrected(
     >>> bool((low > 100.9).all() and (high < 102.1).all() and (low < high).all())
     True
     """
-    from scipy.special import stdtrit
-
-    margin = float(stdtrit(found.size - 1, 0.5 * (1.0 + confidence))) * float(found.std(ddof=1)) / np.sqrt(found.size)
+    margin = float(half_width(confidence, found.size - 1)) * float(found.std(ddof=1)) / np.sqrt(found.size)
     drawn = found[np.random.default_rng(2024).integers(found.size, size=values.size)]
     return values + sizes * (drawn - margin), values + sizes * (drawn + margin)
 
@@ -222,7 +209,7 @@ def usual(base: NDArray[np.void], checks: Mapping[str, NDArray[np.void]]) -> dic
 
 def by_kind(errors: FloatArray) -> FloatArray:
     """Largest error of each kind in each joint, (m, loads) -> (m, kinds); NaN as in `_largest`."""
-    return _largest(np.abs(errors))
+    return np.column_stack([_largest(np.abs(errors[:, kind == KIND_OF])) for kind in range(len(_KEYS))])
 
 
 def spread(errors: FloatArray) -> Spread:

@@ -144,6 +144,30 @@ def unresolved_matter(count: int, n: int, n_unresolved: int, confidence: float =
     return bool(n_unresolved / n >= 0.5 * (upper - lower))
 
 
+def half_width(confidence: float, freedom: float | FloatArray = np.inf) -> FloatArray:
+    """Half the width of Student's interval, in standard errors; of the normal one without degrees of freedom.
+
+    Raises
+    ------
+    ValueError
+        When the confidence is not between 0 and 1.
+    """
+    from scipy.special import stdtrit
+
+    if not 0.0 < confidence < 1.0:
+        raise ValueError(f"confidence {confidence} must lie between 0 and 1")
+    return np.asarray(stdtrit(freedom, 0.5 * (1.0 + confidence)), dtype=float)
+
+
+def log_beta_binomial(k: ArrayLike, n: ArrayLike, a: ArrayLike, b: ArrayLike) -> FloatArray:
+    """Logarithm of the probability of k of n joints whose share is a beta variate with the parameters a and b."""
+    from scipy.special import betaln
+
+    k, n, a, b = (np.asarray(own, dtype=float) for own in (k, n, a, b))
+    choose = -np.log(n + 1.0) - betaln(k + 1.0, n - k + 1.0)
+    return np.asarray(choose + betaln(k + a, n - k + b) - betaln(a, b))
+
+
 def wilks(share: float, confidence: float = 0.95) -> int:
     """Return the least number of joints whose largest load bounds the quantile from above (Wilks 1941, first order).
 

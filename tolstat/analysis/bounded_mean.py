@@ -47,19 +47,13 @@ def interval(values: ArrayLike, confidence: float = 0.95) -> tuple[float, float]
 
 def _lower(x: FloatArray, confidence: float) -> float:
     gain = math.log(2.0 / (1.0 - confidence))
-    bets = _bets(x, gain)
-    mean = float(x.mean())
+    mean, n = float(x.mean()), np.arange(1, x.size + 1)
+    # each bet by mean and variance of the values before it (predictable plug-in of the source)
+    deviations = np.cumsum((x - (0.5 + np.cumsum(x)) / (n + 1)) ** 2)
+    before = np.append(0.25, (0.25 + deviations[:-1]) / n[1:])
+    bets = np.sqrt(2.0 * gain / (x.size * before))
 
     def rejected(m: float) -> bool:
         return bool(np.log1p(np.minimum(bets, STAKE / m) * (x - m)).sum() >= gain)
 
     return mean - float(first(lambda less: rejected(mean - float(less)), 0.0, mean, halvings=40))
-
-
-def _bets(x: FloatArray, gain: float) -> FloatArray:
-    """Bet on each value, by mean and variance of the values before it (predictable plug-in of the source)."""
-    n = np.arange(1, x.size + 1)
-    mean = (0.5 + np.cumsum(x)) / (n + 1)
-    variance = (0.25 + np.cumsum((x - mean) ** 2)) / (n + 1)
-    before = np.concatenate([[0.25], variance[:-1]])
-    return np.asarray(np.sqrt(2.0 * gain / (x.size * before)))

@@ -16,7 +16,6 @@ from numpy.typing import ArrayLike
 
 from tolstat.analysis import binomial, exceedance
 from tolstat.analysis.estimates import Exceedance
-from tolstat.analysis.independent import Independent
 from tolstat.analysis.listed import Listed
 from tolstat.analysis.sample import Ends, Sample
 from tolstat.common.loads import FloatArray
@@ -121,20 +120,22 @@ def capability(
     >>> round(found.cpk_normal, 1), found.above.count, found.needed
     (1.3, 0, 3244)
     """
-    return of_sample(Sample.of(values, status, Independent() if iid else Listed(""), ends), limit, confidence)
+    return of_sample(Sample.of(values, status, None if iid else Listed(""), ends), limit, confidence)
 
 
 def of_sample(sample: Sample, limit: float, confidence: float = 0.95) -> Capability:
     """Capability of the load of joints that count equally; other parameters as in `capability`."""
+    from scipy.stats import normaltest
+
     valid, iid = sample.valid, sample.design.has_interval("index")
-    above = sample.above(limit, confidence)
-    blank = (np.nan, np.nan, np.nan)
-    scatters = valid.size > 1 and np.ptp(valid) > 0
-    normal = _normal(valid, limit, confidence, iid) if scatters else blank
-    general = _of_quantiles(valid, limit, confidence, iid) if scatters else blank
+    normal = general = (np.nan, np.nan, np.nan)
+    p = np.nan
+    if valid.size > 1 and np.ptp(valid) > 0:
+        normal, general = (index(valid, limit, confidence, iid) for index in (_normal, _of_quantiles))
+        p = float(normaltest(valid).pvalue) if valid.size >= 20 else np.nan
     # Bonferroni over two quantiles with two ends each: a quarter of the error probability for this upper end
     needed = binomial.wilks(REFERENCE, 1.0 - 0.25 * (1.0 - confidence))
-    return Capability(above, *normal, _normality(valid) if scatters else np.nan, *general, needed)
+    return Capability(sample.above(limit, confidence), *normal, p, *general, needed)
 
 
 def cpk_interval(cpk: ArrayLike, n: int, confidence: float = 0.95) -> tuple[FloatArray, FloatArray]:
@@ -184,13 +185,6 @@ def _normal(valid: FloatArray, limit: float, confidence: float, iid: bool) -> tu
     wider = WIDER * np.sqrt(max(1.0, factor))
     lower, upper = (float(end) for end in cpk_interval(index, n, confidence))
     return index, index - wider * (index - lower), index + wider * (upper - index)
-
-
-def _normality(valid: FloatArray) -> float:
-    """p-value of the test by skewness and kurtosis (D'Agostino and Pearson 1973); NaN for fewer than 20 joints."""
-    from scipy.stats import normaltest
-
-    return float(normaltest(valid).pvalue) if valid.size >= 20 else np.nan
 
 
 def _of_quantiles(valid: FloatArray, limit: float, confidence: float, iid: bool) -> tuple[float, float, float]:

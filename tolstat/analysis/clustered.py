@@ -8,13 +8,13 @@ the beta-binomial law, too.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tolstat.analysis import prediction
-from tolstat.analysis.binomial import clopper_pearson
+from tolstat.analysis.binomial import clopper_pearson, half_width, log_beta_binomial
 from tolstat.analysis.column import Column
 from tolstat.analysis.design import Design, Shares, counts_by_group
 from tolstat.common.loads import FloatArray
@@ -22,8 +22,7 @@ from tolstat.common.loads import FloatArray
 LEAST = 30
 """Number of lots from which on intervals over lots hold; with fewer there are none."""
 FEW = 20
-"""Number of joints on a side of a level below which an interval contains that of independent joints, too, and effective
-number below which it contains that of the beta-binomial law."""
+"""Effective number of joints on a side of a level below which an interval contains that of the beta-binomial law."""
 STEP = 0.2
 """Distance of the mean shares, on the logit scale, at which the posterior density of that law is computed."""
 GRID, REACH = 33, 5.0
@@ -74,7 +73,7 @@ def interval(above: ArrayLike, joints: ArrayLike, confidence: float = 0.95) -> L
         is Clopper and Pearson's for lots. Where the joints on a side of the limit, (sum of k)² / sum of k² over the
         lots, are effectively fewer than `FEW`, the interval contains `_credible`, too. NaN for fewer than `LEAST` lots.
     """
-    from scipy.special import expit, logit, stdtrit
+    from scipy.special import expit, logit
 
     k = np.asarray(above, dtype=float)
     n = np.asarray(joints, dtype=float)
@@ -83,7 +82,7 @@ def interval(above: ArrayLike, joints: ArrayLike, confidence: float = 0.95) -> L
     with np.errstate(divide="ignore", invalid="ignore"):
         p = k.sum(axis=0) / total
         between = ((k - p * n) ** 2).sum(axis=0) * lots / (lots - 1.0)
-        half = stdtrit(lots - 1, 0.5 * (1.0 + confidence)) * np.sqrt(between) / total / (p * (1.0 - p))
+        half = half_width(confidence, lots - 1) * np.sqrt(between) / total / (p * (1.0 - p))
         lower, upper = np.asarray(expit(logit(p) - half)), np.asarray(expit(logit(p) + half))
         none = float(clopper_pearson(0, lots, confidence)[1])
         sides = np.stack([k, n - k])
@@ -105,25 +104,37 @@ def interval(above: ArrayLike, joints: ArrayLike, confidence: float = 0.95) -> L
 
 
 def _credible(k: FloatArray, n: FloatArray, confidence: float) -> tuple[FloatArray, FloatArray]:
-    """Credible interval of the mean share of m limits, k of n joints in each lot, both (lots, m), as `law_of` has it.
-
-    All limits share the grid of means, so that the density is computed once for each pair of k and n.
-    """
+    """Credible interval of the mean share of m limits, k of n joints in each lot, both (lots, m)."""
     from scipy.special import expit, logit
 
     p = k.sum(axis=0) / n.sum(axis=0)
-    means = np.arange(logit(p.min()) - REACH, logit(p.max()) + REACH, STEP)
-    mean, r = np.meshgrid(expit(means), expit(SPREADS[::2]), indexing="ij")
+    means, spreads = np.arange(logit(p.min()) - REACH, logit(p.max()) + REACH, STEP), SPREADS[::2]
+    below = _posterior(k, n, means, spreads)[2].reshape(len(p), len(means), -1).sum(axis=2).cumsum(axis=1)
+    tail = 0.5 * (1.0 - confidence)
+    ends = np.array([np.interp([tail, 1.0 - tail], own, means + 0.5 * STEP) for own in below])
+    return expit(ends[:, 0]), expit(ends[:, 1])
+
+
+def _posterior(
+    k: NDArray[Any], n: NDArray[Any], means: FloatArray, spreads: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Beta distributions of the lots' shares, (points,), and their probabilities for each of m limits, (m, points).
+
+    k of n joints in each lot are above a limit, both (lots, m). The points are a grid of logits of the mean and of the
+    correlation of two joints of a lot; all limits share it, so that the density is computed once for each pair of k and
+    n. The prior distribution of the mean is Jeffreys' of a share, that of the correlation uniform.
+    """
+    from scipy.special import expit
+
+    mean, r = (own.ravel() for own in np.meshgrid(expit(means), expit(spreads), indexing="ij"))
     a, b = mean * (1.0 - r) / r, (1.0 - mean) * (1.0 - r) / r
     pairs, which = np.unique(np.stack([k.ravel(), n.ravel()]), axis=1, return_inverse=True)
     times = np.zeros((k.shape[1], pairs.shape[1]))
     np.add.at(times, (np.tile(np.arange(k.shape[1]), len(k)), which.ravel()), 1.0)
-    log = times @ np.array([_log_pmf(one, of, a, b).ravel() for one, of in pairs.T]) + _log_prior(mean, r).ravel()
-    density = np.exp(log - log.max(axis=1, keepdims=True)).reshape(len(log), *mean.shape).sum(axis=2)
-    below = np.cumsum(density, axis=1) / density.sum(axis=1, keepdims=True)
-    tail = 0.5 * (1.0 - confidence)
-    ends = np.array([np.interp([tail, 1.0 - tail], own, means + 0.5 * STEP) for own in below])
-    return expit(ends[:, 0]), expit(ends[:, 1])
+    log = times @ np.array([log_beta_binomial(above, of, a, b) for above, of in pairs.T])
+    log += 0.5 * np.log(mean * (1.0 - mean)) + np.log(r * (1.0 - r))
+    weight = np.exp(log - log.max(axis=1, keepdims=True))
+    return a, b, weight / weight.sum(axis=1, keepdims=True)
 
 
 class Clustered(Design):
@@ -151,21 +162,12 @@ class Clustered(Design):
         self.numbers, self._lots = np.unique(lots, return_inverse=True)
 
     def shares(self, x: Column, levels: FloatArray, confidence: float) -> Shares:
-        """See `Design.shares`: `interval` over the lots; none for fewer than `LEAST` lots.
-
-        With fewer than `FEW` joints on a side of a level it contains the interval of as many independent joints
-        (Clopper and Pearson), too.
-        """
+        """See `Design.shares`: `interval` over the lots; none for fewer than `LEAST` lots."""
         above, joints = self.counts(x, levels)
         above, joints = above[joints > 0], joints[joints > 0]
         if not joints.size:
             return Shares.counted(x, levels)
-        found = interval(above, joints, confidence)
-        count = above.sum(axis=0)
-        low, high = clopper_pearson(count, x.n, confidence)
-        few = np.minimum(count, x.n - count) < FEW
-        lower, upper = np.minimum(found.lower, low), np.maximum(found.upper, high)
-        return Shares(found.estimate, np.where(few, lower, found.lower), np.where(few, upper, found.upper))
+        return Shares(*interval(above, joints, confidence)[:3]).with_independent(x, levels, confidence)
 
     def counts(self, x: Column, levels: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Joints above each level, (lots, m), and joints that count, (lots,), of each lot of `numbers`."""
@@ -213,7 +215,8 @@ class Law(NamedTuple):
         for size, count in ((small, lots - more), (small + 1, more)):
             if count and size:
                 padded = np.zeros((self.weight.size, number + 1))
-                padded[:, : size + 1] = np.exp(_log_pmf(np.arange(size + 1), size, self.a[:, None], self.b[:, None]))
+                log = log_beta_binomial(np.arange(size + 1), size, self.a[:, None], self.b[:, None])
+                padded[:, : size + 1] = np.exp(log)
                 spectrum = spectrum * np.fft.rfft(padded) ** count
         pmf = np.fft.irfft(self.weight @ spectrum, number + 1).clip(0.0)
         return Delivery(np.asarray(pmf / pmf.sum()), self.counts)
@@ -262,35 +265,13 @@ def law_of(above: ArrayLike, joints: ArrayLike) -> Law:
     -------
     Law
     """
-    from scipy.special import expit, logit
+    from scipy.special import logit
 
     k, n = np.asarray(above, dtype=np.intp), np.asarray(joints, dtype=np.intp)
-    pairs, times = np.unique(np.column_stack([k, n]), axis=0, return_counts=True)
     p = (k.sum() + 0.5) / (n.sum() + 1.0)
-    shares = interval(k, n)
-    spread = max(float(np.nan_to_num(shares.correlation)), 0.05)
+    spread = max(float(np.nan_to_num(interval(k, n).correlation)), 0.05)
     error = np.sqrt((1.0 + (n.mean() - 1.0) * spread) / (n.sum() * p * (1.0 - p)))
     means = logit(p) + np.linspace(-REACH, REACH, GRID) * min(float(error), 1.0)
-    mean, r = (own.ravel() for own in np.meshgrid(expit(means), expit(SPREADS)))
-    a, b = mean * (1.0 - r) / r, (1.0 - mean) * (1.0 - r) / r
-    log = _log_prior(mean, r)
-    for (one, of), count in zip(pairs, times, strict=True):
-        log += count * _log_pmf(one, of, a, b)
-    weight = np.exp(log - log.max())
-    weight /= weight.sum()
+    a, b, (weight,) = _posterior(k[:, None], n[:, None], means, SPREADS)
     kept = weight > NEGLIGIBLE
     return Law(a[kept], b[kept], weight[kept] / weight[kept].sum(), (int(k.sum()), int(n.sum())))
-
-
-def _log_prior(mean: FloatArray, correlation: FloatArray) -> FloatArray:
-    """Logarithm of the prior density of the logits of mean and correlation: Jeffreys' of a share, and uniform."""
-    return np.asarray(0.5 * np.log(mean * (1.0 - mean)) + np.log(correlation * (1.0 - correlation)))
-
-
-def _log_pmf(k: ArrayLike, n: ArrayLike, a: FloatArray, b: FloatArray) -> FloatArray:
-    """Logarithm of the beta-binomial probability of k of n."""
-    from scipy.special import betaln, gammaln
-
-    k, n = np.asarray(k, dtype=float), np.asarray(n, dtype=float)
-    choose = gammaln(n + 1.0) - gammaln(k + 1.0) - gammaln(n - k + 1.0)
-    return np.asarray(choose + betaln(k + a, n - k + b) - betaln(a, b))

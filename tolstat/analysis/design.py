@@ -9,12 +9,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tolstat.analysis import prediction
+from tolstat.analysis.binomial import clopper_pearson
 from tolstat.analysis.column import Column
 from tolstat.common.loads import FloatArray
 
 Claim = Literal["share", "quantile", "mean", "difference", "index", "tail", "band", "delivery", "reweighting"]
 """What is estimated from joints. An index is one of capability or of sensitivity, or a number of joints needed; a band
 holds for a whole curve; reweighting counts the joints by other weights."""
+FEW = 20
+"""Number of joints on a side of a level below which an interval over units contains that of independent joints, too."""
 SAMPLE = 'give the file of a study with sampling.method "random", "sobol" or "lhs"'
 
 
@@ -36,6 +39,14 @@ class Shares(NamedTuple):
         """Make shares of joints that count equally, without an interval."""
         none = np.full(levels.shape, np.nan)
         return cls(_counted(x, levels), none, none)
+
+    def with_independent(self, x: Column, levels: FloatArray, confidence: float) -> Shares:
+        """Contain Clopper and Pearson's interval, too, where fewer than `FEW` joints are on a side of a level."""
+        count = x.above(levels)
+        low, high = clopper_pearson(count, x.n, confidence)
+        few = np.minimum(count, x.n - count) < FEW
+        lower = np.where(few, np.minimum(self.lower, low), self.lower)
+        return Shares(self.estimate, lower, np.where(few, np.maximum(self.upper, high), self.upper))
 
 
 class Refusal(NamedTuple):

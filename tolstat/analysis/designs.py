@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -43,32 +42,12 @@ class Drawn(NamedTuple):
     from_tolerances: NDArray[np.bool_] | None = None
 
 
-def _weighted(drawn: Drawn) -> Design | None:
-    if drawn.weights is None:
-        return None
-    return Weighted(drawn.weights, drawn.heaviest, drawn.from_tolerances)
-
-
-def _clustered(drawn: Drawn) -> Design | None:
-    return Clustered(np.asarray(drawn.samples) // drawn.joints_per_lot) if drawn.joints_per_lot > 1 else None
-
-
-def _replicated(drawn: Drawn) -> Design | None:
-    return Replicated(len(drawn.samples), drawn.replicates, drawn.method) if drawn.replicates > 1 else None
-
-
-def _independent(drawn: Drawn) -> Design | None:
-    return Independent() if drawn.method == "random" else None
-
-
-def _listed(drawn: Drawn) -> Design | None:
-    return Listed(drawn.method)
-
-
-DESIGNS: tuple[Callable[[Drawn], Design | None], ...] = (_weighted, _clustered, _replicated, _independent, _listed)
-"""Each makes its design of a campaign, or nothing; the first that does is the campaign's."""
-
-
 def design_of(drawn: Drawn) -> Design:
-    """Return the design of a campaign."""
-    return next(design for make in DESIGNS if (design := make(drawn)) is not None)
+    """Return the design of a campaign: the first that recognises how its joints were drawn."""
+    if drawn.weights is not None:
+        return Weighted(drawn.weights, drawn.heaviest, drawn.from_tolerances)
+    if drawn.joints_per_lot > 1:
+        return Clustered(np.asarray(drawn.samples) // drawn.joints_per_lot)
+    if drawn.replicates > 1:
+        return Replicated(len(drawn.samples), drawn.replicates, drawn.method)
+    return Independent() if drawn.method == "random" else Listed(drawn.method)

@@ -8,12 +8,12 @@ variance estimates recovery, Newcombe 1998, Zou and Donner 2008), so rare or ske
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tolstat.analysis.binomial import clopper_pearson
+from tolstat.analysis.binomial import clopper_pearson, half_width
 from tolstat.analysis.column import Column
 from tolstat.analysis.design import Claim, Design
 from tolstat.analysis.sample import Sample
@@ -110,6 +110,8 @@ def shares(a: Sample, b: Sample, levels: ArrayLike, paired: bool, confidence: fl
     >>> found.only_a.tolist(), found.only_b.tolist(), found.estimate.tolist(), found.p.tolist()
     ([0], [1], [0.25], [1.0])
     """
+    from scipy.special import bdtr
+
     _valid(a, b, paired)
     level = np.atleast_1d(np.asarray(levels, dtype=float))
     kind = _pairs if paired else _apart
@@ -117,9 +119,11 @@ def shares(a: Sample, b: Sample, levels: ArrayLike, paired: bool, confidence: fl
         kind(x, y, a.design, b.design, level, confidence)
         for x, y in ((a.value, b.value), (a.upper, b.lower), (a.lower, b.upper))
     )
-    return found._replace(
-        bound_lower=least.estimate, bound_upper=most.estimate, outer_lower=least.lower, outer_upper=most.upper
-    )
+    p = np.full(level.shape, np.nan)
+    if paired and _have_interval(a.design, b.design, "difference"):
+        only_a, only_b = found[3:5]
+        p = np.minimum(2.0 * bdtr(np.minimum(only_a, only_b) + 0.0, np.maximum(only_a + only_b, 1), 0.5), 1.0)
+    return ShareDifference._make((*found, p, least[5], most[5], least[6], most[7]))
 
 
 def quantiles(a: Sample, b: Sample, share: float, paired: bool, confidence: float = 0.95) -> Difference:
@@ -149,13 +153,14 @@ def quantiles(a: Sample, b: Sample, share: float, paired: bool, confidence: floa
     of_a, of_b = (side.quantile(share, confidence) for side in (a, b))
     estimate = of_b.estimate - of_a.estimate
     lower, upper = np.nan, np.nan
-    known = _known(a, b, "difference" if paired else "quantile")
+    known = _have_interval(a.design, b.design, "difference" if paired else "quantile")
     if known and paired and min(share, 1.0 - share) * x.size >= BEYOND:
         tail = 0.5 * (1.0 - confidence)
         resampled = np.quantile(_resampled(x, y, share), [tail, 1.0 - tail], method="inverted_cdf")
         lower, upper = min(float(resampled[0]), estimate), max(float(resampled[1]), estimate)
     elif known:
-        rho = _correlation(x <= of_a.estimate, y <= of_b.estimate) if paired else 0.0
+        with np.errstate(divide="ignore", invalid="ignore"):  # NaN where all are below a quantile
+            rho = np.nan_to_num(np.corrcoef(x <= of_a.estimate, y <= of_b.estimate)[0, 1]) if paired else 0.0
         below, above = _recovered(
             (of_b.estimate - of_b.lower, of_b.upper - of_b.estimate),
             (of_a.estimate - of_a.lower, of_a.upper - of_a.estimate),
@@ -183,12 +188,10 @@ def means(a: Sample, b: Sample, paired: bool, confidence: float = 0.95) -> Diffe
     ValueError
         As `shares`.
     """
-    from scipy.special import stdtrit
-
     a, b = _valid(a, b, paired)
     x, y = a.values, b.values
     of_a, of_b = float(x.mean()), float(y.mean())
-    if not _known(a, b, "difference") or min(x.size, y.size) < 2:
+    if not _have_interval(a.design, b.design, "difference") or min(x.size, y.size) < 2:
         return Difference(of_a, of_b, of_b - of_a, np.nan, np.nan)
     if paired:
         error, degrees = float(np.std(y - x, ddof=1) / np.sqrt(x.size)), x.size - 1.0
@@ -197,13 +200,12 @@ def means(a: Sample, b: Sample, paired: bool, confidence: float = 0.95) -> Diffe
         error = float(np.sqrt(parts.sum()))
         weights = (parts**2 / np.array([x.size - 1.0, y.size - 1.0])).sum()
         degrees = parts.sum() ** 2 / weights if weights else x.size + y.size - 2.0
-    half = float(stdtrit(degrees, 0.5 * (1.0 + confidence))) * error
+    half = float(half_width(confidence, degrees)) * error
     return Difference(of_a, of_b, of_b - of_a, of_b - of_a - half, of_b - of_a + half)
 
 
-def _known(a: Sample, b: Sample, claim: Claim) -> bool:
-    """Whether both designs give intervals of a claim."""
-    return a.design.has_interval(claim) and b.design.has_interval(claim)
+def _have_interval(a: Design, b: Design, claim: Claim) -> bool:
+    return a.has_interval(claim) and b.has_interval(claim)
 
 
 def _valid(a: Sample, b: Sample, paired: bool) -> tuple[Sample, Sample]:
@@ -218,8 +220,8 @@ def _valid(a: Sample, b: Sample, paired: bool) -> tuple[Sample, Sample]:
     return a.only(of_a), b.only(of_b)
 
 
-def _pairs(x: Column, y: Column, a: Design, b: Design, level: FloatArray, confidence: float) -> ShareDifference:
-    """Shares, counts, estimate, interval and p-value of pairs; the other fields are NaN."""
+def _pairs(x: Column, y: Column, a: Design, b: Design, level: FloatArray, confidence: float) -> tuple[Any, ...]:
+    """Fields of `ShareDifference` up to the interval, of pairs."""
     both = ~np.isnan(x.values) & ~np.isnan(y.values)
     one, other = x.values[both], y.values[both]
     n, up, down = one.size, other > one, other < one
@@ -230,21 +232,19 @@ def _pairs(x: Column, y: Column, a: Design, b: Design, level: FloatArray, confid
     with np.errstate(divide="ignore", invalid="ignore"):  # multinomial counts: negatively correlated
         correlation = -np.nan_to_num(np.sqrt(p * q / ((1.0 - p) * (1.0 - q))))
     lower, upper = _recovered((q - lower_q, upper_q - q), (p - lower_p, upper_p - p), correlation)
-    none, d = np.full(level.shape, np.nan), q - p
+    if not _have_interval(a, b, "difference"):
+        lower = upper = np.full(level.shape, np.nan)
     shares = Column(one).above(level) / n, Column(other).above(level) / n
-    if not (a.has_interval("difference") and b.has_interval("difference")):
-        return ShareDifference(*shares, n, only_a, only_b, d, *[none] * 7)
-    return ShareDifference(*shares, n, only_a, only_b, d, d - lower, d + upper, _mcnemar(only_a, only_b), *[none] * 4)
+    return *shares, n, only_a, only_b, q - p, q - p - lower, q - p + upper
 
 
-def _apart(x: Column, y: Column, a: Design, b: Design, level: FloatArray, confidence: float) -> ShareDifference:
-    """Shares, counts, estimate and interval of joints that are no pairs; the other fields are NaN."""
+def _apart(x: Column, y: Column, a: Design, b: Design, level: FloatArray, confidence: float) -> tuple[Any, ...]:
+    """Fields of `ShareDifference` up to the interval, of joints that are no pairs."""
     p, q = a.shares(x, level, confidence), b.shares(y, level, confidence)
     below, above = (q.estimate - q.lower, q.upper - q.estimate), (p.estimate - p.lower, p.upper - p.estimate)
     lower, upper = _recovered(below, above, 0.0)
-    d, none = q.estimate - p.estimate, np.full(level.shape, np.nan)
-    counts = x.above(level), y.above(level)
-    return ShareDifference(p.estimate, q.estimate, min(x.n, y.n), *counts, d, d - lower, d + upper, *[none] * 5)
+    d = q.estimate - p.estimate
+    return p.estimate, q.estimate, min(x.n, y.n), x.above(level), y.above(level), d, d - lower, d + upper
 
 
 def _recovered(
@@ -254,25 +254,10 @@ def _recovered(
     ends = []
     for one, other in ((of_b[0], of_a[1]), (of_b[1], of_a[0])):
         i, j = np.asarray(one, dtype=float), np.asarray(other, dtype=float)
-        infinite = np.isinf(i) | np.isinf(j)
-        i, j = np.where(infinite, 0.0, i), np.where(infinite, 0.0, j)
-        length = np.sqrt(np.maximum(i**2 + j**2 - 2.0 * np.asarray(rho) * i * j, 0.0))
-        ends.append(np.where(infinite, np.inf, length))
+        with np.errstate(invalid="ignore"):
+            length = np.sqrt(np.maximum(i**2 + j**2 - 2.0 * np.asarray(rho) * i * j, 0.0))
+        ends.append(np.where(np.isinf(i) | np.isinf(j), np.inf, length))
     return ends[0], ends[1]
-
-
-def _correlation(one: NDArray[np.bool_], other: NDArray[np.bool_]) -> float:
-    if one.all() or other.all():
-        return 0.0
-    return float(np.corrcoef(one, other)[0, 1])
-
-
-def _mcnemar(only_a: NDArray[np.intp], only_b: NDArray[np.intp]) -> FloatArray:
-    from scipy.special import bdtr
-
-    least, both = np.minimum(only_a, only_b), only_a + only_b
-    found: FloatArray = np.minimum(2.0 * bdtr(least.astype(float), np.maximum(both, 1), 0.5), 1.0)
-    return np.where(both > 0, found, 1.0)
 
 
 def _resampled(x: FloatArray, y: FloatArray, share: float) -> FloatArray:

@@ -9,7 +9,7 @@ counts with the share 0 at lower ends and 1 at upper ends.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +18,7 @@ from tolstat.analysis import process
 from tolstat.analysis.column import Mask
 from tolstat.analysis.process import Draws, Known, Sums
 from tolstat.analysis.reweight import LARGEST_SPREAD, LEAST_ESS
-from tolstat.analysis.weighted import Side, Split
+from tolstat.analysis.weighted import Split
 from tolstat.common.bisection import first
 from tolstat.common.loads import FloatArray
 from tolstat.common.shown import shown
@@ -127,17 +127,6 @@ def tallies(
     sides = [mask for event in events for mask in (event.above & event.counted, ~event.above & event.counted)]
     members = np.stack(sides).astype(float)
     tables: list[list[FloatArray]] = []
-    for block in _weights(sums, known, drawn, base):
-        largest = np.stack([block[mask].max(axis=0, initial=0.0) for mask in sides])
-        every = np.broadcast_to(block.max(axis=0), largest.shape)
-        tables.append([members @ block, members @ np.square(block), largest, every])
-    total, squares, largest, every = (np.concatenate(parts, axis=1) for parts in zip(*tables, strict=True))
-    made = [Side.of(*(table[k] for table in (total, squares, largest, every))) for k in range(len(sides))]
-    return [Split(*made[2 * k : 2 * k + 2]) for k in range(len(events))]
-
-
-def _weights(sums: Sequence[Sums], known: Sequence[Known], drawn: Draws, base: FloatArray) -> Iterator[FloatArray]:
-    """Weights of all joints for some of the processes at a time, (n, k), up to a factor of each process."""
     step = max(1, BLOCK // len(base))
     for begin in range(0, len(drawn.mean), step):
         here = slice(begin, begin + step)
@@ -145,7 +134,12 @@ def _weights(sums: Sequence[Sums], known: Sequence[Known], drawn: Draws, base: F
             process.log_ratios(own, entry.errors, drawn.mean[here, k], drawn.deviation[here, k])
             for k, (own, entry) in enumerate(zip(sums, known, strict=True))
         )
-        yield np.exp(logs - logs.max(axis=0))
+        block = np.exp(logs - logs.max(axis=0))  # weights, up to a factor of each process
+        largest = np.stack([block[mask].max(axis=0, initial=0.0) for mask in sides])
+        every = np.broadcast_to(block.max(axis=0), largest.shape)
+        tables.append([members @ block, members @ np.square(block), largest, every])
+    *found, every = (np.concatenate(parts, axis=1) for parts in zip(*tables, strict=True))
+    return [Split.of([own[k : k + 2] for own in found], every[k : k + 2]) for k in range(0, len(sides), 2)]
 
 
 def intervals(
@@ -180,8 +174,8 @@ def _upper_end(split: Split, side: int, usable: Mask, tail: float) -> float:
     """Largest share of a side, above (0) or below (1), that is exceeded with the probability `tail`."""
     from scipy.special import betainc
 
-    own, other = split.far()[side]
-    inner = usable & (split[1 - side].total > 0.0) & np.isfinite(own) & (own > 0.0) & (other > 0.0)
+    own, other = (parameter[side] for parameter in split.far())
+    inner = usable & (split.total[1 - side] > 0.0) & np.isfinite(own) & (own > 0.0) & (other > 0.0)
 
     def covers(share: FloatArray) -> bool:
         below = betainc(np.where(inner, own, 1.0), np.where(inner, other, 1.0), share)

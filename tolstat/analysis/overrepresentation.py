@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tolstat.analysis.binomial import half_width
 from tolstat.analysis.ranks import from_places, places
 from tolstat.common.loads import FloatArray
 
@@ -84,8 +85,11 @@ def tail(scores: ArrayLike, above: ArrayLike, confidence: float = 0.95, iid: boo
     if (np.ptp(z, axis=0) == 0).any():
         raise ValueError("give errors that scatter")
     both = places(np.concatenate([z, np.abs(z)], axis=1))
-    p = mannwhitneyu(both[:, over], both[:, ~over], axis=1, method="asymptotic").pvalue
-    found = Part(*_larger(both, over, confidence), _holm(np.asarray(p)))
+    p = np.asarray(mannwhitneyu(both[:, over], both[:, ~over], axis=1, method="asymptotic").pvalue)
+    order = np.argsort(p)
+    adjusted = np.empty_like(p)
+    adjusted[order] = np.minimum(np.maximum.accumulate(p[order] * np.arange(p.size, 0, -1)), 1.0)  # Holm
+    found = Part(*_larger(both, over, confidence), adjusted)
     if not iid:
         found = found._replace(lower=np.full(len(both), np.nan), upper=np.full(len(both), np.nan))
     d = z.shape[1]
@@ -98,7 +102,7 @@ def _larger(found: NDArray[np.intp], over: BoolArray, confidence: float) -> tupl
     The quantile is Student's, with Welch's (1947) degrees of freedom. `found` has the `ranks.places` of all joints,
     (d, n).
     """
-    from scipy.special import expit, logit, stdtrit
+    from scipy.special import expit, logit
 
     m, k = int(over.sum()), int((~over).sum())
     joint = from_places(found)
@@ -110,12 +114,5 @@ def _larger(found: NDArray[np.intp], over: BoolArray, confidence: float) -> tupl
     error = np.sqrt(one + other) * (1.0 + WIDER / min(m, k))
     degrees = (one + other) ** 2 / (one**2 / (m - 1) + other**2 / (k - 1))
     inside = np.clip(estimate, least, 1.0 - least)
-    half = stdtrit(degrees, 0.5 * (1.0 + confidence)) * error / (inside * (1.0 - inside))
+    half = half_width(confidence, degrees) * error / (inside * (1.0 - inside))
     return estimate, expit(logit(inside) - half), expit(logit(inside) + half)
-
-
-def _holm(p: FloatArray) -> FloatArray:
-    order = np.argsort(p)
-    adjusted = np.empty_like(p)
-    adjusted[order] = np.maximum.accumulate(p[order] * np.arange(p.size, 0, -1))
-    return np.minimum(adjusted, 1.0)

@@ -31,14 +31,9 @@ def fit(excesses: ArrayLike) -> tuple[FloatArray, FloatArray]:
     k, sigma : ndarray, shape (...)
         Shape, and scale in the unit of the excesses.
     """
-    x = np.sort(np.asarray(excesses, dtype=float), axis=-1)
-    n = x.shape[-1]
-    m = 30 + int(np.sqrt(n))
-    quartile, largest = x[..., int(n / 4 + 0.5) - 1, None], x[..., -1, None]
-    # grid of b = -k / sigma over the range of high likelihood
-    b = 1.0 / largest + (1.0 - np.sqrt(m / (np.arange(1, m + 1) - 0.5))) / (3.0 * quartile)
-    k = np.stack([np.log1p(-b[..., j, None] * x).mean(axis=-1) for j in range(m)], axis=-1)
-    likelihood = n * (np.log(-b / k) - k - 1.0)
+    m = 30 + int(np.sqrt(np.shape(excesses)[-1]))
+    x, b = _grid(excesses, (np.arange(1, m + 1) - 0.5) / m)
+    likelihood = _profile(x, b)[1]
     weight = np.exp(likelihood - likelihood.max(axis=-1, keepdims=True))
     mean = (b * weight).sum(axis=-1) / weight.sum(axis=-1)
     shape = np.log1p(-mean[..., None] * x).mean(axis=-1)
@@ -61,21 +56,32 @@ def most_likely(excesses: ArrayLike) -> tuple[FloatArray, FloatArray]:
     k, sigma : ndarray, shape (...)
         Shape, and scale in the unit of the excesses.
     """
-    x = np.sort(np.asarray(excesses, dtype=float), axis=-1)
-    n = x.shape[-1]
-    quartile, largest = x[..., int(n / 4 + 0.5) - 1, None], x[..., -1, None]
     part = np.linspace(0.0, 1.0, 12)
-    # from the end of the tail at the largest excess to one far beyond: equal steps of a root, as in `fit`
-    b = 1.0 / largest + (1.0 - np.sqrt(1.0 / np.linspace(1e-3, 0.999, 20)[::-1])) / (3.0 * quartile)
+    x, b = _grid(excesses, np.linspace(1e-3, 0.999, 20)[::-1])
     for _ in range(4):
-        b = np.where(np.abs(b) * largest < STRAIGHT, -STRAIGHT / largest, b)
-        k = np.stack([np.log1p(-b[..., j, None] * x).mean(axis=-1) for j in range(b.shape[-1])], axis=-1)
-        likelihood = np.where(k >= LEAST_SHAPE, n * (np.log(-b / k) - k - 1.0), -np.inf)
-        best = np.argmax(likelihood, axis=-1)[..., None]
+        b = np.where(np.abs(b) * x[..., -1:] < STRAIGHT, -STRAIGHT / x[..., -1:], b)
+        k, likelihood = _profile(x, b)
+        best = np.argmax(np.where(k >= LEAST_SHAPE, likelihood, -np.inf), axis=-1)[..., None]
         at = [np.take_along_axis(b, np.clip(best + step, 0, b.shape[-1] - 1), axis=-1) for step in (-1, 1)]
         shape, own = (np.take_along_axis(values, best, axis=-1)[..., 0] for values in (k, b))
         b = at[0] + (at[1] - at[0]) * part
     return shape, -shape / own
+
+
+def _grid(excesses: ArrayLike, u: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Excesses ascending, (..., n), and values of b = -k / sigma over the range of high likelihood, (..., m).
+
+    They go from the end of the tail at the largest excess to one far beyond: equal steps `u` of a root.
+    """
+    x = np.sort(np.asarray(excesses, dtype=float), axis=-1)
+    quartile = x[..., int(x.shape[-1] / 4 + 0.5) - 1, None]
+    return x, 1.0 / x[..., -1:] + (1.0 - np.sqrt(1.0 / u)) / (3.0 * quartile)
+
+
+def _profile(x: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Most likely k given b = -k / sigma, and the log-likelihood, (..., m) each."""
+    k = np.stack([np.log1p(-b[..., j, None] * x).mean(axis=-1) for j in range(b.shape[-1])], axis=-1)
+    return k, x.shape[-1] * (np.log(-b / k) - k - 1.0)
 
 
 def log_likelihood(excesses: FloatArray, k: ArrayLike, sigma: ArrayLike) -> FloatArray:
@@ -93,35 +99,28 @@ def log_likelihood(excesses: FloatArray, k: ArrayLike, sigma: ArrayLike) -> Floa
     ndarray
         Of the shape of the broadcast.
     """
-    shape, scale = np.broadcast_arrays(np.asarray(k, dtype=float), np.asarray(sigma, dtype=float))
-    straight = np.abs(shape) < STRAIGHT
-    safe = np.where(straight, 1.0, shape)
+    shape = np.asarray(k, dtype=float)
+    shape = np.where(np.abs(shape) < STRAIGHT, STRAIGHT, shape)
     with np.errstate(invalid="ignore", divide="ignore"):
-        ratio = np.atleast_1d(safe / scale)
+        ratio = np.atleast_1d(shape / sigma)
         sums = np.stack([np.log1p(row[..., None] * excesses).sum(axis=-1) for row in ratio])  # row by row, for memory
-        bent = (1.0 + 1.0 / safe) * sums.reshape(safe.shape)
-    loss = np.where(straight, excesses.sum() / scale, bent)
-    return np.where(np.isnan(loss), -np.inf, -excesses.size * np.log(scale) - loss)
+        loss = (1.0 + 1.0 / shape) * sums.reshape(np.broadcast_shapes(shape.shape, np.shape(sigma)))
+    return np.where(np.isnan(loss), -np.inf, -excesses.size * np.log(sigma) - loss)
 
 
 def upper_share(x: ArrayLike, k: ArrayLike, sigma: ArrayLike) -> FloatArray:
     """1 - F(x), broadcast."""
-    excess, shape, scale = np.broadcast_arrays(*(np.asarray(a, dtype=float) for a in (x, k, sigma)))
-    straight = np.abs(shape) < STRAIGHT
-    safe = np.where(straight, 1.0, shape)
-    with np.errstate(divide="ignore"):
-        bent = np.exp(-np.log1p(np.maximum(safe * excess / scale, -1.0)) / safe)
-    return np.asarray(np.where(straight, np.exp(-excess / scale), bent))
+    from scipy.special import inv_boxcox
+
+    with np.errstate(invalid="ignore"):  # NaN beyond the end of the tail
+        return np.nan_to_num(1.0 / inv_boxcox(np.divide(x, sigma), k))
 
 
 def quantile(share_above: ArrayLike, k: ArrayLike, sigma: ArrayLike) -> FloatArray:
     """Excess x with 1 - F(x) = `share_above`, broadcast."""
-    log, shape, scale = np.broadcast_arrays(
-        np.log(np.asarray(share_above, dtype=float)), np.asarray(k, dtype=float), np.asarray(sigma, dtype=float)
-    )
-    straight = np.abs(shape) < STRAIGHT
-    safe = np.where(straight, 1.0, shape)
-    return np.asarray(np.where(straight, -scale * log, scale * np.expm1(-safe * log) / safe))
+    from scipy.special import boxcox
+
+    return np.asarray(-np.asarray(sigma) * boxcox(np.asarray(share_above, dtype=float), np.negative(k)))
 
 
 def anderson_darling(excesses: FloatArray, k: ArrayLike, sigma: ArrayLike) -> FloatArray:
@@ -159,8 +158,3 @@ def shape_of_weights(weights: ArrayLike) -> float:
     if not tail[0] > 0:  # equal weights at the threshold: of those above it, as many as there are
         tail = tail[tail > 0]
     return float((fit(tail)[0] * tail.size + 0.5 * 10.0) / (tail.size + 10.0)) if tail.size >= 5 else 0.5
-
-
-def allowed_shape(n: int) -> float:
-    """Largest k at which an estimate from n weights has converged, min(1 - 1 / log10 n, 0.7) (Vehtari et al. 2024)."""
-    return float(min(1.0 - 1.0 / np.log10(max(n, 11)), 0.7))

@@ -11,8 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tolstat.analysis.binomial import clopper_pearson
-from tolstat.analysis.sensitivity import normal_half
+from tolstat.analysis.binomial import clopper_pearson, half_width
 from tolstat.common.loads import FloatArray
 from tolstat.common.shown import shown
 
@@ -93,7 +92,7 @@ def indices(a: ArrayLike, b: ArrayLike, ab: ArrayLike, confidence: float = 0.95)
     x, y = x - middle, y - middle
     square = 0.5 * (x**2 + y**2)
     moved = mixed - middle - x[:, None]
-    half = normal_half(confidence)
+    half = float(half_width(confidence))
     first, total = (_index(term, square, half) for term in (moved * y[:, None], 0.5 * moved**2))
     return Indices(first, total, float(square.mean()), len(x))
 

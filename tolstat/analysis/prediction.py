@@ -56,11 +56,10 @@ def of_counts(least: int, most: int, n: int, number: int, confidence: float = 0.
 def _quantile(share: float, number: int, a: int, b: int) -> float:
     """Quantile of the beta-binomial distribution: least count whose distribution function reaches `share`."""
     import numpy as np
-    from scipy.special import betaln
 
-    counts = np.arange(number + 1.0)
-    log = betaln(counts + a, number - counts + b) - betaln(counts + 1.0, number - counts + 1.0) - betaln(a, b)
-    reached = np.cumsum(np.exp(log)) / (number + 1.0)
+    from tolstat.analysis.binomial import log_beta_binomial
+
+    reached = np.cumsum(np.exp(log_beta_binomial(np.arange(number + 1), number, a, b)))
     return float(min(int(np.searchsorted(reached, share)), number))
 
 

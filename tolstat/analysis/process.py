@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from tolstat.analysis.column import frozen
 from tolstat.common.loads import FloatArray
 
 LEAST_PARTS, MOST_PARTS = 5, 100_000
@@ -49,15 +50,13 @@ class Sums(NamedTuple):
 
 
 def deviation(u: FloatArray, parts: int) -> FloatArray:
-    """Deviation of the scores of a process with the probability `u` in (0, 1), (n,); it grows with `u`."""
+    """Deviation b of the scores of a process with the probability `u` in (0, 1), (n,); it grows with `u`.
+
+    The mean is normal about 0 with the deviation b / sqrt(parts).
+    """
     from scipy.special import chdtri
 
     return np.asarray(np.sqrt((parts - 1) / chdtri(parts - 1, u)))
-
-
-def mean(z: FloatArray, deviation: FloatArray, parts: int) -> FloatArray:
-    """Mean of the scores of a process of known deviation, from a standard normal number `z`; all (n,)."""
-    return np.asarray(deviation * z / math.sqrt(parts))
 
 
 @cache
@@ -69,11 +68,7 @@ def draws(parts: tuple[int, ...]) -> Draws:
     points = qmc.Sobol(2 * len(parts), seed=np.random.default_rng(SEED)).random(DRAWS)
     points = np.clip(points, 0.5 / DRAWS, 1.0 - 0.5 / DRAWS)
     b = np.column_stack([deviation(u, n) for u, n in zip(points.T[::2], parts, strict=True)])
-    z = ndtri(points[:, 1::2])
-    a = np.column_stack([mean(*own, n) for own, n in zip(zip(z.T, b.T, strict=True), parts, strict=True)])
-    for array in (a, b):
-        array.flags.writeable = False
-    return Draws(a, b)
+    return Draws(frozen(b * ndtri(points[:, 1::2]) / np.sqrt(parts)), frozen(b))
 
 
 def log_student(sums: Sums, known: Known) -> FloatArray:

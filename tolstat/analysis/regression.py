@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tolstat.analysis.binomial import half_width
 from tolstat.analysis.ranks import from_places, places
 from tolstat.common.loads import FloatArray
 
@@ -60,8 +61,6 @@ def ranks(x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: bool = True
     ValueError
         When there are fewer than d + 2 `GROUPS` joints, or an error does not scatter.
     """
-    from scipy.special import stdtrit
-
     errors, load = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
     if len(load) < errors.shape[1] + 2 * GROUPS:
         found = f"{len(load)} joints are too few for {errors.shape[1]} errors"
@@ -75,7 +74,7 @@ def ranks(x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: bool = True
     group = np.arange(len(load)) % GROUPS
     without = np.array([_coefficients(place[:, group != g])[0] for g in range(GROUPS)])
     spread = np.sqrt((GROUPS - 1) / GROUPS * ((without - estimate) ** 2).sum(axis=0))
-    half = stdtrit(GROUPS - 1, 0.5 * (1.0 + confidence)) * spread
+    half = half_width(confidence, GROUPS - 1) * spread
     return RankRegression(estimate, estimate - half, estimate + half, r2)
 
 

@@ -12,14 +12,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tolstat.analysis.binomial import half_width
 from tolstat.analysis.column import Column
 from tolstat.analysis.design import Design, Shares, counts_by_group
-from tolstat.analysis.independent import Independent
 from tolstat.analysis.listed import Listed
 from tolstat.common.loads import FloatArray
-
-FEW = 20
-"""Number of joints on a side of a level below which shares of replicates are too skew for Student's t alone."""
 
 
 class Mean(NamedTuple):
@@ -74,10 +71,8 @@ def interval(estimates: ArrayLike, confidence: float = 0.95, least: float = -np.
 
 
 def _students_t(values: FloatArray, confidence: float, least: float, most: float) -> Mean:
-    from scipy.special import stdtrit
-
     n, mean = len(values), values.mean(axis=0)
-    half = stdtrit(n - 1, 0.5 * (1.0 + confidence)) * values.std(axis=0, ddof=1) / np.sqrt(n)
+    half = half_width(confidence, n - 1) * values.std(axis=0, ddof=1) / np.sqrt(n)
     return Mean(mean, np.maximum(mean - half, least), np.minimum(mean + half, most), n)
 
 
@@ -108,18 +103,16 @@ class Replicated(Design):
     def shares(self, x: Column, levels: FloatArray, confidence: float) -> Shares:
         """See `Design.shares`: Student's t over the shares of the replicates.
 
-        With fewer than `FEW` joints on a side of a level the interval contains that of as many independent joints
-        (Clopper and Pearson), too: no joint above in any replicate does not mean that none can be.
+        It contains the share of all joints, and where few are on a side of a level (`design.FEW`) the interval of as
+        many independent joints: no joint above in any replicate does not mean that none can be.
         """
         above, joints = counts_by_group(x, self._blocks, levels)
-        whole = Independent().shares(x, levels, confidence)
+        estimate = self.estimate(x, levels)
         with np.errstate(invalid="ignore"):
             each = _students_t(above / joints[:, None], confidence, 0.0, 1.0)
-        lower, upper = np.fmin(each.lower, whole.estimate), np.fmax(each.upper, whole.estimate)
-        count = above.sum(axis=0)
-        few = np.minimum(count, x.n - count) < FEW
-        lower = np.where(few, np.fmin(lower, whole.lower), lower)
-        return Shares(whole.estimate, lower, np.where(few, np.fmax(upper, whole.upper), upper))
+        lower = np.fmin(each.lower, np.nan_to_num(estimate, nan=0.0))
+        upper = np.fmax(each.upper, np.nan_to_num(estimate, nan=1.0))
+        return Shares(estimate, lower, upper).with_independent(x, levels, confidence)
 
     def only(self, joints: NDArray[np.intp] | NDArray[np.bool_]) -> Design:
         """See `Design.only`: parts of replicates are no replicates."""

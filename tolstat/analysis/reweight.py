@@ -191,15 +191,12 @@ def _ess(load: Sample, ratios: Ratios, level: float) -> float:
 def support(load: Sample, ratios: Ratios, level: float) -> Support:
     """Tell whether the share above a level is usable; parameters as in `share_above`."""
     w, above = _sides(load, ratios, level)
-    effective = [float(side.effective[0]) for side in Split.by(above, w)]
-    k = max((pareto.shape_of_weights(w[mask]) for mask in (above, ~above)), key=_rank)
+    effective = [float(side[0]) for side in Split.by(above, w).effective]
+    k = float(np.fmax(pareto.shape_of_weights(w[above]), pareto.shape_of_weights(w[~above])))
     beside = np.isfinite(ratios.heaviest) or min(effective) >= LEAST_BESIDE
-    usable = ratios.usable and bool(beside) and not k > pareto.allowed_shape(w.size)
+    converged = min(1.0 - 1.0 / np.log10(max(w.size, 11)), 0.7)  # largest k allowed (Vehtari et al. 2024)
+    usable = ratios.usable and bool(beside) and not k > converged
     return Support(effective[0], effective[1], k, usable)
-
-
-def _rank(k: float) -> float:
-    return -np.inf if np.isnan(k) else k
 
 
 def quantile(load: Sample, ratios: Ratios, share: float, confidence: float = 0.95) -> Load:

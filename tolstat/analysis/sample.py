@@ -272,31 +272,17 @@ class Sample:
 
     def shifted(self, by: FloatArray) -> Sample:
         """Return the load of the same joints with `by`, (n,), added; a change that is not known counts as none."""
-        at = np.nan_to_num(by[self.inexact.joints])
-        inexact = Inexact(self.inexact.joints, self.inexact.lower + at, self.inexact.upper + at)
-        return replace(self, value=Column(self.values + by), inexact=inexact)
-
-    def scaled(self, factor: float) -> Sample:
-        """Return the load of the same joints times a factor, not negative."""
-        joints, lower, upper = self.inexact
-        with np.errstate(invalid="ignore"):
-            lower, upper = (np.where(np.isinf(end), end, factor * end) for end in (lower, upper))
-        return replace(self, value=Column(factor * self.values), inexact=Inexact(joints, lower, upper))
+        joints, *ends = self.inexact
+        lower, upper = (end + np.nan_to_num(by[joints]) for end in ends)
+        return replace(self, value=Column(self.values + by), inexact=Inexact(joints, lower, upper))
 
     def of_limit(self) -> Sample:
         """Return the ratio of load to limit of the same joints; its limit is 1."""
         assert self.limit is not None
-        limit = self.limit
-        joints, lower, upper = self.inexact
-        return replace(
-            self,
-            value=Column(self.values / limit),
-            inexact=Inexact(joints, lower / limit, upper / limit),
-            unit="1",
-            limit=1.0,
-            nominal=self.nominal / limit,
-            scale=self.scale * limit,
-        )
+        limit, (joints, lower, upper) = self.limit, self.inexact
+        inexact = Inexact(joints, lower / limit, upper / limit)
+        own = replace(self, value=Column(self.values / limit), inexact=inexact, unit="1", limit=1.0)
+        return replace(own, nominal=self.nominal / limit, scale=self.scale * limit)
 
     def only(self, joints: NDArray[np.intp] | Mask) -> Sample:
         """Return the load of some of the joints."""

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tolstat.analysis.binomial import half_width
 from tolstat.analysis.ranks import ranks
 from tolstat.common.loads import FloatArray
 from tolstat.common.shown import shown
@@ -128,15 +129,8 @@ def first_order(x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: bool 
     [0.2, 0.8]
     """
     errors, loads = _checked(x, y)
-    centred = (loads - loads.mean(axis=0)).reshape(len(loads), -1)
-    variance, wider = centred.var(axis=0), _wider(centred**2)
-    found = np.full((2, errors.shape[1], centred.shape[1]), np.nan)
-    for i, column in enumerate(errors.T):
-        if np.ptp(column) > 0:
-            own = _fit(column, centred)
-            found[0, i], found[1, i] = own.share, _error(own.influence, own.chance) * wider
-    estimate, error = found.reshape(2, errors.shape[1], *loads.shape[1:])
-    return _with_ends(estimate, error, variance.reshape(loads.shape[1:]), confidence, iid)
+    found, _ = over_revolution(errors, loads.reshape(len(loads), -1), confidence, iid)
+    return FirstOrder(*(own.reshape(own.shape[:-1] + loads.shape[1:]) for own in found))
 
 
 def over_revolution(
@@ -241,7 +235,7 @@ def first_and_total(x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: b
     errors_lower = _error(own, chance + chance_of_pairs.sum(axis=1)) * wider
     without = chance.sum() - chance + 0.5 * chance_of_pairs.sum() - chance_of_pairs.sum(axis=1)
     errors_upper = _error(own - everything[:, None], without) * wider
-    z = normal_half(confidence) if iid else np.nan
+    z = half_width(confidence) if iid else np.nan
     np.fill_diagonal(pairs, np.nan)
     lower = np.clip(estimate - z * errors_lower, 0, 1)
     upper = np.clip(np.maximum(estimate + rest + z * errors_upper, estimate + z * errors_lower), 0, 1)
@@ -251,7 +245,7 @@ def first_and_total(x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: b
 def _with_ends(
     estimate: FloatArray, error: FloatArray, variance: FloatArray, confidence: float, iid: bool
 ) -> FirstOrder:
-    half = WIDER * normal_half(confidence) * error if iid else np.full(estimate.shape, np.nan)
+    half = WIDER * half_width(confidence) * error if iid else np.full(estimate.shape, np.nan)
     return FirstOrder(estimate, np.clip(estimate - half, 0, 1), np.clip(estimate + half, 0, 1), variance)
 
 
@@ -305,7 +299,9 @@ def _interactions(errors: FloatArray, left: FloatArray, variance: float) -> tupl
     of single errors. The influence functions lack the term of the estimated variance.
     """
     n, d = errors.shape
-    p = _polynomials(errors).reshape(n, d * DEGREE)
+    u = 2.0 * (ranks(errors) - 0.5) / n - 1.0
+    basis = [np.sqrt(2 * k + 1) * np.polynomial.Legendre.basis(k)(u) for k in range(1, DEGREE + 1)]
+    p = np.stack(basis, axis=2).reshape(n, d * DEGREE)
     c = (p * left[:, None]).T @ p / n
     square = p**2
     spread = (square * (left**2)[:, None]).T @ square / n
@@ -319,14 +315,6 @@ def _interactions(errors: FloatArray, left: FloatArray, variance: float) -> tupl
     of_pairs = 2.0 * left[:, None] * weighted.reshape(n, d, DEGREE).sum(axis=2) / variance
     chance: FloatArray = 2.0 * (spread**2).reshape(blocks).sum(axis=(1, 3)) / (n * variance) ** 2
     return pairs, of_pairs, chance
-
-
-def _polynomials(errors: FloatArray) -> FloatArray:
-    """Legendre polynomials of the degrees 1 to `DEGREE` of the errors' ranks, orthonormal; shape (n, d, DEGREE)."""
-    u = 2.0 * (ranks(errors) - 0.5) / len(errors) - 1.0
-    degrees = range(1, DEGREE + 1)
-    basis = [np.sqrt(2 * k + 1) * np.polynomial.Legendre.basis(k)(u) for k in degrees]
-    return np.stack(basis, axis=2)
 
 
 def _chance(share: FloatArray, degrees: int, n: int) -> FloatArray:
@@ -348,18 +336,3 @@ def _wider(square: FloatArray) -> FloatArray:
     """
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.asarray(1.0 + FEW * (square**2).sum(axis=0) / square.sum(axis=0) ** 2)
-
-
-def normal_half(confidence: float) -> float:
-    """Half the width of a normal interval, in standard errors.
-
-    Raises
-    ------
-    ValueError
-        When the confidence is not between 0 and 1.
-    """
-    from scipy.special import ndtri
-
-    if not 0.0 < confidence < 1.0:
-        raise ValueError(f"confidence {confidence} must lie between 0 and 1")
-    return float(ndtri(0.5 * (1.0 + confidence)))

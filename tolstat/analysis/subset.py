@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.analysis.binomial import clopper_pearson
+from tolstat.analysis.binomial import clopper_pearson, half_width
 from tolstat.common.loads import FloatArray
 from tolstat.common.shown import shown
 
@@ -138,7 +138,7 @@ class _States(NamedTuple):
 
     def part(self, rows: slice | NDArray[np.bool_]) -> _States:
         """Some of the states."""
-        return _States(self.scores[rows], self.loads[rows], self.number[rows], self.families[rows], self.first[rows])
+        return _States._make(own[rows] for own in self)
 
 
 class Walk:
@@ -213,27 +213,19 @@ class Walk:
             before = self._start.part(slice(loads.size))
             moved = loads > self._threshold
             self._accepted += int(moved.sum())
-            here = _States(
-                np.where(moved[:, None], here.scores, before.scores),
-                np.where(moved, loads, before.loads),
-                np.where(moved, numbers, before.number),
-                before.families,
-                before.first,
-            )
-            self._start = here
+            scores = np.where(moved[:, None], here.scores, before.scores)
+            loads, numbers = np.where(moved, loads, before.loads), np.where(moved, numbers, before.number)
+            self._start = here = before._replace(scores=scores, loads=loads, number=numbers)
         self._parts.append(here)
         if sum(part.loads.size for part in self._parts) == self.settings.n:
             self._finish_level()
         if not self.done:
-            self.next = self._move()
-
-    def _move(self) -> Candidates:
-        assert self._start is not None
-        first = sum(part.loads.size for part in self._parts)
-        count = min(self._start.loads.size, self.settings.n - first)
-        noise = self._noise(len(self.levels), self._simulated, count)
-        scores = math.sqrt(1.0 - self._step**2) * self._start.scores[:count] + self._step * noise
-        return Candidates(len(self.levels), scores, self._start.number[:count])
+            assert self._start is not None
+            first = sum(part.loads.size for part in self._parts)
+            start = self._start.part(slice(self.settings.n - first))
+            noise = self._noise(len(self.levels), self._simulated, start.loads.size)
+            scores = math.sqrt(1.0 - self._step**2) * start.scores + self._step * noise
+            self.next = Candidates(len(self.levels), scores, start.number)
 
     def _finish_level(self) -> None:
         states = _States(*map(np.concatenate, zip(*self._parts, strict=True)))
@@ -290,11 +282,9 @@ class Walk:
         The interval is Student's on the logarithm, with one degree of freedom per `FAMILIES` seeds, centred at the
         logarithm plus half its variance: the product is unbiased, so its logarithm is biased low by that much.
         """
-        from scipy.special import stdtrit
-
         share = math.prod(level.share for level in self.levels if level.share)
         freedom = max(1.0, self.settings.n * self.settings.p0 / FAMILIES)
-        half = float(stdtrit(freedom, 0.5 * (1.0 + confidence))) * math.sqrt(self._variance)
+        half = float(half_width(confidence, freedom)) * math.sqrt(self._variance)
         lower, upper = (min(1.0, share * math.exp(0.5 * self._variance + sign * half)) for sign in (-1, 1))
         if not self.reached:
             return Estimate(math.nan, 0.0, upper, math.nan)

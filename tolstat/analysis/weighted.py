@@ -3,13 +3,14 @@
 The weight of a joint is the density of its errors under the tolerances over that under the proposal. Shares are ratios
 of sums of weights; their variance is that of such a ratio. The interval is Clopper and Pearson's for the effective
 number of joints (Korn and Graubard 1998). Each end is computed with one joint added on the side that moves it outward,
-with the largest weight on that side, or among the outermost twenty (after Fay and Feuer 1997). With equal weights the
+with the largest weight on that side (after Fay and Feuer 1997). With equal weights the
 interval is exactly Clopper and Pearson's. Where fewer than twenty effective joints are on a side, the joint added has
 the largest weight that a joint can have or, if no bound is known, that any joint has.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +22,6 @@ from tolstat.analysis.design import Claim, Design, Refusal, Shares
 from tolstat.analysis.independent import Independent
 from tolstat.common.bisection import first
 from tolstat.common.loads import FloatArray
-from tolstat.common.shown import shown
 
 LEAST_EFFECTIVE = 20.0
 """Minimum effective number of joints above a level for a trusted share."""
@@ -29,34 +29,14 @@ LARGEST_SHAPE = 0.7
 """Shape of the tail of the weights, from which on a share is not trusted."""
 
 
-@shown
-class Trust(NamedTuple):
-    """Diagnostics of the weights above a level.
+class Split(NamedTuple):
+    """Weights of the joints above each of m levels (row 0 of each array), and of the others (row 1).
 
     Attributes
     ----------
-    effective : float
-        Effective number of joints above the level, (sum of weights)^2 / sum of squares (Kish 1965).
-    k : float
-        Shape of the tail of their weights, see `pareto.shape_of_weights`.
-    usable : bool
-        Whether `effective` is at least `LEAST_EFFECTIVE`, or the weights have a bound, which the interval then uses;
-        and k, if known, is below 0.7.
-    """
-
-    effective: float
-    k: float
-    usable: bool
-
-
-class Side(NamedTuple):
-    """Weights of the joints on one side of each of some levels.
-
-    Attributes
-    ----------
-    total, squares : ndarray
+    total, squares : ndarray, shape (2, m)
         Sum of the weights, and of their squares.
-    added : ndarray
+    added : ndarray, shape (2, m)
         Weight of the joint added where an end moves outward to this side.
     """
 
@@ -65,52 +45,38 @@ class Side(NamedTuple):
     added: FloatArray
 
     @classmethod
-    def of(cls, total: ArrayLike, squares: ArrayLike, largest: ArrayLike, heaviest: float) -> Side:
-        """Make a side; `largest` is the largest weight of its joints, `heaviest` that of any joint."""
-        side = cls(*(np.atleast_1d(np.asarray(v, dtype=float)) for v in (total, squares, largest)))
-        return side._replace(added=np.where(side.effective < LEAST_EFFECTIVE, heaviest, side.added))
-
-    @property
-    def effective(self) -> FloatArray:
-        """Effective number of joints (Kish 1965)."""
-        found: FloatArray = np.square(self.total) / np.where(self.total > 0, self.squares, 1.0)
-        return found
-
-
-class Split(NamedTuple):
-    """Weights of the joints above each level, and of the others."""
-
-    above: Side
-    below: Side
+    def of(cls, sums: Iterable[FloatArray], heaviest: ArrayLike) -> Split:
+        """Make a split of total, squares and the largest weight on each side; `heaviest` is that of any joint."""
+        split = cls(*sums)
+        return split._replace(added=np.where(split.effective < LEAST_EFFECTIVE, heaviest, split.added))
 
     @classmethod
     def at(cls, first: NDArray[np.intp], weights: FloatArray, heaviest: float) -> Split:
-        """Count weights from index `first` on as above the level, earlier ones as below.
-
-        The largest weight of a side is that of the outermost `LEAST_EFFECTIVE` joints at least.
-        """
+        """Count weights from index `first` on as above the level, earlier ones as below."""
         sides = []
-        every = heaviest if np.isfinite(heaviest) else weights.max(initial=0.0)
         for w, number in ((weights[::-1], weights.size - first), (weights, first)):
-            sums, squares, largest = (
-                np.insert(f, 0, 0.0) for f in (w.cumsum(), (w**2).cumsum(), np.maximum.accumulate(w))
-            )
-            most = largest[np.clip(number, min(int(LEAST_EFFECTIVE), w.size), None)]
-            sides.append(Side.of(sums[number], squares[number], most, every))
-        return cls(*sides)
+            sums = w.cumsum(), (w**2).cumsum(), np.maximum.accumulate(w)
+            sides.append([np.insert(own, 0, 0.0)[number] for own in sums])
+        every = heaviest if np.isfinite(heaviest) else weights.max(initial=0.0)
+        return cls.of(np.swapaxes(sides, 0, 1), every)
 
     @classmethod
-    def by(cls, is_above: NDArray[np.bool_], weights: FloatArray, heaviest: float = np.inf) -> Split:
+    def by(cls, is_above: NDArray[np.bool_], weights: FloatArray) -> Split:
         """Split by a mask, (n,), in place of a level."""
-        every = heaviest if np.isfinite(heaviest) else weights.max(initial=0.0)
-        parts = (weights[mask] for mask in (is_above, ~is_above))
-        return cls(*(Side.of(w.sum(), (w**2).sum(), w.max(initial=0.0), every) for w in parts))
+        sides = np.where([is_above, ~is_above], weights, 0.0)
+        sums = sides.sum(axis=1), (sides**2).sum(axis=1), sides.max(axis=1, initial=0.0)
+        return cls.of([own[:, None] for own in sums], weights.max(initial=0.0))
+
+    @property
+    def effective(self) -> FloatArray:
+        """Effective number of joints on each side, (2, m) (Kish 1965)."""
+        return np.asarray(np.square(self.total) / np.where(self.total > 0, self.squares, 1.0))
 
     @property
     def share(self) -> FloatArray:
-        """Share above; NaN where no joint has any weight."""
+        """Share above, (m,); NaN where no joint has any weight."""
         with np.errstate(invalid="ignore"):
-            return np.asarray(self.above.total / (self.above.total + self.below.total))
+            return np.asarray(self.total[0] / self.total.sum(axis=0))
 
     def interval(self, confidence: float, least: float = 0.0) -> tuple[FloatArray, FloatArray]:
         """Ends of the interval of the share.
@@ -121,52 +87,39 @@ class Split(NamedTuple):
             Confidence level.
         least : float
             Effective number of joints on a side below which the share is withheld. Shares that are given are then those
-            with many joints there; the end on the other side is that of the distribution of such shares alone.
+            with many joints there; the end on the other side is that of the distribution of such shares alone: the
+            share at which as many as found have the probability of the tail, if only cases with `least` or more are
+            looked at.
         """
+        from scipy.special import betainc, betaincinv
+
         tail = 0.5 * (1.0 - confidence)
-        ends = []
-        for (own, beside), (_, other) in zip(
-            self.far(), ((self.above, self.below), (self.below, self.above)), strict=True
-        ):
-            with np.errstate(invalid="ignore"):
-                end = _far_end(own, beside, tail, least)
-            ends.append(np.where((other.total == 0) | np.isnan(end), 1.0, end))
+        own, other = self.far()
+
+        def beyond(share: FloatArray) -> NDArray[np.bool_]:
+            looked_at = betainc(least, np.maximum(own + other - least, 1.0), 1.0 - share)
+            return np.asarray(betainc(other, own, 1.0 - share) / looked_at <= tail)
+
+        with np.errstate(invalid="ignore"):
+            ends = betaincinv(own, other, 1.0 - tail)
+            if least:
+                ends = np.where(other > least, first(beyond, ends, 1.0, 50), 1.0)
+        ends = np.where((self.total[::-1] == 0) | np.isnan(ends), 1.0, ends)
         return 1.0 - ends[1], ends[0]
 
-    def far(self) -> list[tuple[FloatArray, FloatArray]]:
-        """Effective joints on its own side and on the other, for the upper end of the share above, and below.
+    def far(self) -> tuple[FloatArray, FloatArray]:
+        """Effective joints on its own side and on the other, (2, m), for the upper end of the share on each side.
 
         They are the parameters of the beta distribution that the end is a quantile of; NaN where no joint has weight.
         """
-        found = []
-        for own, other in ((self.above, self.below), (self.below, self.above)):
-            # add one joint on the side that this end enlarges
-            first, squares = own.total + own.added, own.squares + own.added**2
-            with np.errstate(invalid="ignore", divide="ignore"):
-                share = first / (first + other.total)
-                variance = ((1.0 - share) ** 2 * squares + share**2 * other.squares) / (first + other.total) ** 2
-                effective = share * (1.0 - share) / variance
-                found.append((share * effective, (1.0 - share) * effective))
-        return found
-
-
-def _far_end(own: FloatArray, other: FloatArray, tail: float, least: float) -> FloatArray:
-    """Largest share of a side of `own` effective joints, (m,), with `other` on the other side: least of these if > 0.
-
-    It is the share at which `other` joints or more would be found with the probability `tail`, if only cases with
-    `least` or more are looked at.
-    """
-    from scipy.special import betainc, betaincinv
-
-    plain: FloatArray = np.asarray(betaincinv(own, other, 1.0 - tail), dtype=float)
-    if not least:
-        return plain
-
-    def beyond(share: FloatArray) -> NDArray[np.bool_]:
-        looked_at = betainc(least, np.maximum(own + other - least, 1.0), 1.0 - share)
-        return np.asarray(betainc(other, own, 1.0 - share) / looked_at <= tail)
-
-    return np.where(other > least, first(beyond, plain, 1.0, 50), 1.0)
+        other = self.total[::-1]
+        # add one joint on the side that this end enlarges
+        first, squares = self.total + self.added, self.squares + self.added**2
+        with np.errstate(invalid="ignore", divide="ignore"):
+            share = first / (first + other)
+            variance = ((1.0 - share) ** 2 * squares + share**2 * self.squares[::-1]) / (first + other) ** 2
+            effective = share * (1.0 - share) / variance
+            return share * effective, (1.0 - share) * effective
 
 
 class Weighted(Design):
@@ -252,21 +205,15 @@ class Weighted(Design):
         """See `Design.each`."""
         return self.weights
 
-    def trust(self, x: Column, level: float) -> Trust:
-        """Diagnose whether the share above a level can be trusted."""
+    def doubt(self, x: Column, level: float) -> str:
+        """See `Design.doubt`: too few effective joints for weights without a bound, or too heavy a tail of weights."""
         w = self.weights[x.values > level]
         effective = float(w.sum() ** 2 / (w**2).sum()) if w.any() else 0.0
         k = pareto.shape_of_weights(w)
-        enough = effective >= LEAST_EFFECTIVE or np.isfinite(self.heaviest)
-        return Trust(effective, k, bool(enough and not k >= LARGEST_SHAPE))
-
-    def doubt(self, x: Column, level: float) -> str:
-        """See `Design.doubt`."""
-        found = self.trust(x, level)
-        if found.usable:
+        if (effective >= LEAST_EFFECTIVE or np.isfinite(self.heaviest)) and not k >= LARGEST_SHAPE:
             return ""
-        tail = "" if np.isnan(found.k) else f", Pareto k {found.k:.2f}, {LARGEST_SHAPE:g} allowed"
-        return f"few joints have most of the weight: {found.effective:.0f} effective{tail}"
+        tail = "" if np.isnan(k) else f", Pareto k {k:.2f}, {LARGEST_SHAPE:g} allowed"
+        return f"few joints have most of the weight: {effective:.0f} effective{tail}"
 
     def upper_if_missed(self, x: Column, level: float, confidence: float) -> float:
         """See `Design.upper_if_missed`: that of the joints drawn from the tolerances themselves."""

@@ -202,6 +202,6 @@ def _joints(rng: Rng, n: int, entry: Known) -> FloatArray:
     """Scores of n joints from the mixture, (ENTRIES, n, errors of an entry)."""
     z = rng.standard_normal((ENTRIES, n, entry.errors))
     b = process.deviation(rng.random((ENTRIES, n)), entry.parts)
-    a = process.mean(rng.standard_normal((ENTRIES, n)), b, entry.parts)
+    a = b * rng.standard_normal((ENTRIES, n)) / np.sqrt(entry.parts)
     of_parts = rng.random(n) >= TOLERANCES
     return np.where(of_parts[None, :, None], a[:, :, None] + b[:, :, None] * z, z)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from tolstat.analysis import accuracy
 from tolstat.analysis.accuracy import KIND_OF, OBSERVABLES
 from tolstat.common.load_kinds import LOAD_KINDS
-from tolstat.common.loads import UNIT_OF_LOAD
+from tolstat.common.loads import UNIT_OF_LOAD, FloatArray
 from tolstat.common.tables import Status
 from tolstat.store.verification import Verification
 from tolstat.store.view import View
@@ -33,7 +33,7 @@ def _held(verification: Verification) -> NDArray[np.bool_]:
     return np.asarray(held | ~held.any())
 
 
-def errors(verification: Verification) -> dict[str, accuracy.FloatArray]:
+def errors(verification: Verification) -> dict[str, FloatArray]:
     """Errors, (m, loads), by check, as of `accuracy.differences`; last `TOTAL`, from `accuracy.numerical`."""
     results = _results(verification)
     found = {name: accuracy.differences(verification.base, other) for name, other in results.items()}

@@ -117,7 +117,7 @@ def _with_error(rate: Sample, error: float) -> tuple[Sample, ...]:
     if np.isnan(error):
         return (rate,)
     factors = (max(0.0, 1.0 - error) ** LIFE_EXPONENT, (1.0 + error) ** LIFE_EXPONENT)
-    return rate, *map(rate.scaled, factors)
+    return rate, *(rate.shifted((factor - 1.0) * rate.values) for factor in factors)
 
 
 def contacts(view: View, confidence: float = 0.95) -> pd.DataFrame:

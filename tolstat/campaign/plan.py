@@ -20,7 +20,7 @@ from tolstat.common.loads import load_of, split
 from tolstat.common.tables import FAILED, RESULT, UNSETTLED, Options, Simulation, Status
 from tolstat.display import text
 from tolstat.display.progress import Tell, silent
-from tolstat.joint import ideal, perturb
+from tolstat.joint import ideal
 from tolstat.sampling import dimensions, draw, streams
 from tolstat.solver import refinement
 from tolstat.solver.compilation import stage_name, warm_up
@@ -223,7 +223,7 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT, stage: Te
     choice = choose_fidelity(study) if study.solver.fidelity == "auto" else {}
     own = [settings(solver, choice) for solver in study.solvers]
     options = [own[number] for number in variants(study, rows)]
-    at = {point.name: perturbed(study.at(point.name), rows, errors, perturb) for point in study.points}
+    at = {point.name: perturbed(study.at(point.name), rows, errors) for point in study.points}
     timed = {name: simulate_timed(study, params, options) for name, params in at.items()}
     each = sum(seconds for _, seconds in timed.values()) / len(rows)
     stage("check of the numerical error")
@@ -280,7 +280,7 @@ def fit_in_words(study: Study) -> list[str]:
 def _assembly(study: Study, iid: bool) -> Assembly:
     rows = np.arange(study.first_sample, min(study.rows, study.first_sample + DRAWN))
     errors = draw(study, range(rows[0], rows[-1] + 1))
-    misfits = int((perturbed(study, rows, errors, perturb)["clearance"] < 0.0).any(axis=1).sum())
+    misfits = int((perturbed(study, rows, errors)["clearance"] < 0.0).any(axis=1).sum())
     lower, upper = binomial.clopper_pearson(misfits, rows.size, CONFIDENCE)
     return Assembly(misfits, rows.size, (float(lower), float(upper)) if iid else None)
 

@@ -107,12 +107,19 @@ def _checksum(group: h5py.Group) -> str:
     return digest.hexdigest()
 
 
-def write(store: Writer, verification: Verification, name: str = VERIFY) -> None:
-    """Write a verification to a group of a result file, replacing an earlier one; otherwise as `write_all`."""
-    write_all([(store, verification)], name)
+def together(parts: Sequence[Verification]) -> Verification:
+    """Verifications as one, joints one after the other, with the checks that all of them have."""
+    first = parts[0]
+    checks = {
+        name: check._replace(results=np.concatenate([part.checks[name].results for part in parts]))
+        for name, check in first.checks.items()
+        if all(name in part.checks for part in parts)
+    }
+    rows, base = np.concatenate([part.rows for part in parts]), np.concatenate([part.base for part in parts])
+    return Verification(first.seed, rows, base, checks)
 
 
-def write_all(found: Sequence[tuple[Writer, Verification]], name: str = VERIFY) -> None:
+def write(found: Sequence[tuple[Writer, Verification]], name: str = VERIFY) -> None:
     """Write verifications at operating points of one file, replacing earlier ones; the file is replaced once for all.
 
     Raises

@@ -108,16 +108,17 @@ class View:
     @cached_property
     def verification(self) -> Verification | None:
         """The verification that the file holds, if any."""
-        if len(self.parts) > 1:
-            return worst.checks([part.verification for part in self.parts])
-        return verification.read(self.store)
+        return self._verified(verification.VERIFY)
 
     @cached_property
     def near(self) -> Verification | None:
         """The verification of joints near limits that the file holds, if any."""
-        if len(self.parts) > 1:
-            return worst.checks([part.near for part in self.parts])
-        return verification.read(self.store, verification.NEAR)
+        return self._verified(verification.NEAR)
+
+    def _verified(self, group: str) -> Verification | None:
+        """Verifications of all operating points; None if one of them has none."""
+        found = [one for part in self.parts if (one := verification.read(part.store, group)) is not None]
+        return verification.together(found) if len(found) == len(self.parts) else None
 
     @cached_property
     def altered(self) -> dict[str, Altered]:

@@ -14,7 +14,6 @@ from tolstat.common.load_kinds import SPAN
 from tolstat.common.loads import LOAD_FIELDS, LOADS, FloatArray, Limit, Load, Results, split
 from tolstat.common.tables import FAILED, RESULT, UNSETTLED, VALID, Status, deciding, without_results, worst_status
 from tolstat.store.reader import Reader
-from tolstat.store.verification import Verification
 
 AT_ONCE = 16_384
 """Rows read at once. They are written to a table column by column, faster where it fits the processor's cache."""
@@ -113,23 +112,6 @@ def nominal(parts: Sequence[NDArray[np.void]]) -> NDArray[np.void]:
     for name in LOAD_FIELDS:
         found[name] = loads[name]
     return found
-
-
-def checks(parts: Sequence[Verification | None]) -> Verification | None:
-    """Verifications of several operating points as one, joints one after the other; None if one of them has none."""
-    own = [part for part in parts if part is not None]
-    if len(own) < len(parts):
-        return None
-    names = [name for name in own[0].checks if all(name in part.checks for part in own)]
-    return Verification(
-        own[0].seed,
-        np.concatenate([part.rows for part in own]),
-        np.concatenate([part.base for part in own]),
-        {
-            name: own[0].checks[name]._replace(results=np.concatenate([part.checks[name].results for part in own]))
-            for name in names
-        },
-    )
 
 
 class FirstPass(NamedTuple):

@@ -21,7 +21,7 @@ from tolstat.campaign import pool
 from tolstat.campaign.pool import BlockT, Lost, ResultT, Work, WorkerDied
 from tolstat.common.cores import one_thread_each
 from tolstat.common.errors import Fault, InputError
-from tolstat.store.provenance import versions
+from tolstat.store.provenance import differing, versions
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -147,15 +147,11 @@ def check(expected: Mapping[str, str], found: Mapping[str, str], where: str) -> 
     InputError
         With all differences.
     """
-    lines = [
-        f"{name}: {value} here, {found.get(name)} on the worker"
-        for name, value in expected.items()
-        if found.get(name) != value
-    ]
+    lines = differing(found, expected, "on the worker", "here")
     if lines:
-        differing = "\n    ".join([f"{where} has other software versions", *lines])
+        lines = [f"{where} has other software versions", *lines]
         remedy = "install the same versions there, and restart the workers"
-        raise InputError([Fault("--executor dask", differing, remedy)])
+        raise InputError([Fault("--executor dask", "\n    ".join(lines), remedy)])
 
 
 def _checked(client: Client) -> dict[str, str]:

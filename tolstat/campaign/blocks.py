@@ -148,7 +148,7 @@ def simulate_pending(
                 pace.note(len(block.slots), result.seconds, time.perf_counter() - begin)
 
 
-def simulate_beside(params: NDArray[np.void], options: Options, **_: Any) -> Simulation:
+def simulate_beside(params: NDArray[np.void], options: Options) -> Simulation:
     """Simulate joints, (m,) table PARAM, in one worker and without histories; those that crash get no results."""
     compile_missing(options)
     results = without_results(len(params), Status.PENDING)

@@ -147,11 +147,9 @@ def check(expected: Mapping[str, str], found: Mapping[str, str], where: str) -> 
     InputError
         With all differences.
     """
-    lines = differing(found, expected, "on the worker", "here")
-    if lines:
-        lines = [f"{where} has other software versions", *lines]
-        remedy = "install the same versions there, and restart the workers"
-        raise InputError([Fault("--executor dask", "\n    ".join(lines), remedy)])
+    if lines := differing(found, expected, "on the worker", "here"):
+        text = "\n    ".join([f"{where} has other software versions", *lines])
+        raise InputError([Fault("--executor dask", text, "install the same versions there, and restart the workers")])
 
 
 def _checked(client: Client) -> dict[str, str]:
@@ -178,9 +176,7 @@ def _client(scheduler: str | None, workers: int) -> Iterator[Client]:
         raise InputError([Fault("--executor dask", "Dask's distributed is not installed", remedy)]) from error
     if scheduler is None:
         with one_thread_each(), pool.signals_blocked():
-            cluster = LocalCluster(
-                n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None, host=LOOPBACK
-            )
+            cluster = LocalCluster(workers, threads_per_worker=1, dashboard_address=None, host=LOOPBACK)
         with cluster, Client(cluster) as client:
             yield client
         return

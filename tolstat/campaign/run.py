@@ -306,8 +306,8 @@ def _check_same(store: Reader, study: Study, rows: range) -> None:
     if not differing:
         found, remedy = OTHER_CODE, f"run the study into another file (--out OTHER.h5), or resume with {code_of(store)}"
     differing += differing_code(store.versions)
-    if held_n := _other_number(store, study, differing):
-        raise StoreError(str(_of_number(store, held_n, study.samples)))
+    if len(differing) == 1 and differing[0].startswith("sampling.n:") and store.whole:
+        raise StoreError(str(_of_number(store, study.samples)))
     if not differing and store.rows != rows:
         held, asked = (f"{r.start}:{r.stop}" for r in (store.rows, rows))
         raise StoreError(str(Fault(str(store.path), f"holds rows {held}, not {asked}", f"give --rows {held}")))
@@ -316,14 +316,10 @@ def _check_same(store: Reader, study: Study, rows: range) -> None:
         raise StoreError(str(Fault(str(store.path), lines, remedy)))
 
 
-def _other_number(store: Reader, study: Study, differing: list[str]) -> int:
-    """Number of joints that the file is for if nothing else differs from the study; 0 otherwise."""
-    numbers = len(differing) == 1 and differing[0].startswith("sampling.n:") and store.whole
-    return int(store.sampling["n"]) if numbers else 0
-
-
-def _of_number(store: Reader, held: int, asked: int) -> Fault:
-    path, found = store.path, f"is the result file of this study with {held} joints, not {asked}"
+def _of_number(store: Reader, asked: int) -> Fault:
+    """Fault of a file of this study with another number of joints."""
+    path, held = store.path, int(store.sampling["n"])
+    found = f"is the result file of this study with {held} joints, not {asked}"
     method = store.sampling["method"]
     if asked < held:
         return Fault(str(path), found, f"read it as it is: tolstat report {path}, or give another file: --out OTHER.h5")

@@ -41,12 +41,14 @@ def copy_results(file: h5py.File, sources: Sequence[Reader]) -> None:
 def _copy(file: h5py.File, source: Reader) -> Iterator[tuple[int, str]]:
     """Copy finished joints; yield row and column of those that the file has already with another result."""
     place = layout.place_of(source.point or "") or "/"
+    columns = [("ledger", "attempt"), *(("histories", name) for name in source.history_specs)]
+    columns += [("results", c.name) for c in source.columns]  # the status last: it says what a file holds
     for first in range(0, source.n, BLOCK):
         own = slice(first, min(first + BLOCK, source.n))
         there = slice(source.row(own.start), source.row(own.stop))
         done = source.status(own) != Status.PENDING
         held = file[place]["results/status"][there] != Status.PENDING
-        for group, name in _columns(source):
+        for group, name in columns:
             dataset = file[place][group][name]
             for part in _parts(own, dataset):
                 here = slice(part.start - own.start, part.stop - own.start)
@@ -60,13 +62,6 @@ def _copy(file: h5py.File, source: Reader) -> Iterator[tuple[int, str]]:
                     yield int(target.start + np.flatnonzero(both)[np.argmin(same)]), name
                 before[new] = values[new]
                 dataset[target] = before
-
-
-def _columns(source: Reader) -> Iterator[tuple[str, str]]:
-    """Yield group and name of the datasets of an operating point, the status last: it says what a file holds."""
-    yield "ledger", "attempt"
-    yield from (("histories", name) for name in source.history_specs)
-    yield from (("results", c.name) for c in source.columns)
 
 
 def _parts(rows: slice, dataset: h5py.Dataset) -> Iterator[slice]:

@@ -26,7 +26,7 @@ from tolstat.common.tables import Motion, Status
 from tolstat.joint import Operation
 from tolstat.store import layout, metadata
 from tolstat.store.checksums import ROWS, CheckedFile, Integrity
-from tolstat.store.hdf5 import BLOCK, RUN_AGAIN, TOGETHER, is_locked, open_hdf5, pick, store_error, told_as_damage
+from tolstat.store.hdf5 import RUN_AGAIN, TOGETHER, is_locked, open_hdf5, pick, store_error, told_as_damage
 from tolstat.study.points import Point, only_one
 
 LOG = logging.getLogger("tolstat.store")
@@ -201,8 +201,7 @@ class Reader:
         each = self.each()
         counts = Counts(self.n * len(each), 0, 0, 0, points=len(each))
         for one in each:
-            for first in range(0, self.n, BLOCK):
-                counts = counts.after(one.status(slice(first, first + BLOCK)))
+            counts = counts.after(one.status())
         return counts
 
     def session(self) -> Session | None:
@@ -356,12 +355,6 @@ class Reader:
         checked = self._checked.number % 2 == 0
         found = self._checked.check()
         return Integrity(checked, {path: [self._rows_of(b) for b in own.tolist()] for path, own in found.items()})
-
-    def check_errors(self) -> None:
-        """Compare errors, and how joints were drawn, with their checksums; `StoreError` if they are damaged."""
-        for path in self._checked.stored:
-            if not layout.is_at_point(path):
-                self._refuse(path, self._checked.damaged((path,), 0, self.n))
 
     def results_checksum(self) -> str:
         """Number that is equal for files with the same joints and results; empty while they have no checksums."""

@@ -257,11 +257,8 @@ class View:
         found: dict[str, tuple[tuple[float, float], str]] = {}
         for load in self.loads(list(self.limits) or self.bushing_loads):
             if load.valid.size:
-                limit = 1.0 if load.limit is None else load.limit
-                share = 0.0 if load.limit is None else load.above(limit).estimate
-                rank = (share, float(load.valid[int(0.99 * (load.valid.size - 1))]) / limit)
-                kind = LOADS[split(load.name)[0]].kind.key
-                found[kind] = max(found.get(kind, (rank, load.name)), (rank, load.name), key=lambda item: item[0])
+                kind, own = LOADS[split(load.name)[0]].kind.key, (worst.rank(load, load.limit), load.name)
+                found[kind] = max(found.get(kind, own), own, key=lambda item: item[0])
         return tuple(name for _, name in found.values())
 
     @property

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.analysis.column import Column, Inexact, frozen, largest
-from tolstat.analysis.sample import is_valid
+from tolstat.analysis.sample import Sample, is_valid
 from tolstat.common.load_kinds import SPAN
 from tolstat.common.loads import LOAD_FIELDS, LOADS, FloatArray, Limit, Load, Results, split
 from tolstat.common.tables import FAILED, RESULT, UNSETTLED, VALID, Status, deciding, without_results, worst_status
@@ -112,6 +112,14 @@ def nominal(parts: Sequence[NDArray[np.void]]) -> NDArray[np.void]:
     for name in LOAD_FIELDS:
         found[name] = loads[name]
     return found
+
+
+def rank(load: Sample, limit: float | None) -> tuple[float, float]:
+    """Share of the joints above a limit, and the load that 99 % do not exceed, relative to the limit if any."""
+    if not load.valid.size:
+        return 0.0, 0.0
+    share = 0.0 if limit is None else float(np.nan_to_num(load.above(limit).estimate))
+    return share, float(load.valid[int(0.99 * (load.valid.size - 1))]) / (1.0 if limit is None else limit)
 
 
 class FirstPass(NamedTuple):

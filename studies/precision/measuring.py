@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat import joint, sampling
+from tolstat import sampling
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.files import atomic_write
 from tolstat.store.recorded import perturbed
@@ -26,7 +26,7 @@ def parameters(study: Study, rows: NDArray[np.intp]) -> NDArray[np.void]:
     whole = study.sampling.method == "lhs"  # its joints cannot be drawn one by one
     first, end = (0, study.rows) if whole else (int(rows.min()), int(rows.max()) + 1)
     errors = sampling.draw(study, range(first, end))[rows - first]
-    return perturbed(study, rows, errors, joint.perturb)
+    return perturbed(study, rows, errors)
 
 
 def choose(study: Study, n: int, seed: int, block: int) -> tuple[NDArray[np.void], int]:

@@ -284,7 +284,7 @@ def test_edited_limits_are_taken_over_and_nothing_is_simulated_again(tmp_path: P
 def test_another_version_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     fakes.run(fakes.Study(), tmp_path / "a.h5", 1)
     monkeypatch.setattr("tolstat.__version__", "99.0")
-    with pytest.raises(StoreError, match=r"tolstat: version .* in the file, 99.0 now"):
+    with pytest.raises(StoreError, match=r"tolstat: .* in the file, 99.0 now"):
         fakes.run(fakes.Study(), tmp_path / "a.h5", 1)
 
 

@@ -124,9 +124,7 @@ def test_a_file_of_other_code_does_not_grow(tmp_path: Path, make: Make, monkeypa
     path = run(make(40), tmp_path / "a.h5")
     before = path.read_bytes()
     monkeypatch.setattr(provenance, "source_hash", lambda: "0")
-    says = (
-        r"another version of the code\n    sources: hash \w+ in the file, 0 now\n  hint: .*STUDY --n 80 --out OTHER.h5"
-    )
+    says = r"another version of the code\n    sources: \w+ in the file, 0 now\n  hint: .*STUDY --n 80 --out OTHER.h5"
     with pytest.raises(InputError, match=says):
         extend.extend(path, 80)
     assert path.read_bytes() == before

@@ -39,7 +39,7 @@ def test_the_interval_of_corrected_loads_covers_and_that_of_the_loads_does_not()
 def path(tmp_path, monkeypatch):
     """File whose joints, verified, have 2 % larger forces."""
 
-    def check_slots(store, parameters, slots, names, **_):
+    def check_slots(store, slots, *_):
         base = store.results()[slots]
         other = base.copy()
         other["F_max"] *= 1.02
@@ -79,8 +79,8 @@ def test_a_check_that_fails_near_the_limit_does_not_hide_what_the_others_tell(pa
     """Of 60 joints verified, the nearest one has no result in the checks: the 59 others give the correction."""
     whole = verify.check_slots
 
-    def check_but_one(store, parameters, slots, *args, **how):
-        found = whole(store, parameters, slots, *args, **how)
+    def check_but_one(store, slots, *args):
+        found = whole(store, slots, *args)
         nearest = np.argmin(np.abs(found.base["F_max"][:, 0] - 720.0))
         for check in found.checks.values():
             check.results["F_max"][nearest] = np.nan

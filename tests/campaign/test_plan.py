@@ -269,7 +269,7 @@ def test_a_plan_simulates_variants_as_they_are(tmp_path: Path, monkeypatch: pyte
     assert (found.rows, found.pilot, found.failed, found.unsettled) == (6, 6, 0, 0)
     campaign.run(loaded, tmp_path / "v.h5", 1, check=False)
     with ResultFile.open(tmp_path / "v.h5") as store:
-        np.testing.assert_array_equal(made[0][0].results["F_max"], store.results()["F_max"])
+        np.testing.assert_array_equal(made[0][0]["F_max"], store.results()["F_max"])
 
 
 @pytest.mark.slow

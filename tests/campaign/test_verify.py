@@ -144,7 +144,7 @@ def test_all_joints_are_those_that_settled_and_the_one_without_errors(tmp_path):
     campaign.run(study.load(written(tmp_path), n=4), tmp_path / "a.h5", workers=1, check=False)
     with damage.rewritten(tmp_path / "a.h5") as file:
         file["results/status"][2] = Status.NOT_SETTLED
-    assert verify.check_file(tmp_path / "a.h5", "all", names=("newton",)).rows.tolist() == [0, 1, 3, 4]
+    assert verify.check_file(tmp_path / "a.h5", None, names=("newton",)).rows.tolist() == [0, 1, 3, 4]
     assert verify.check_file(tmp_path / "a.h5", 9, names=("newton",)).rows.tolist() == [1, 3, 4]
 
 
@@ -179,7 +179,7 @@ def test_a_run_checks_a_few_joints_and_a_file_gives_them_back(tmp_path):
         assert np.array_equal(check.results, expected)
         assert from_names(check.options) == checks.options_of_check(Options(steps_per_rev=30), name)
     with Writer.open(path) as store:
-        verification.write(store, found._replace(rows=found.rows[:1], checks={}))
+        verification.write([(store, found._replace(rows=found.rows[:1], checks={}))])
         again = verification.read(store)
     assert again is not None
     assert (again.rows.tolist(), again.checks) == ([found.rows[0]], {})
@@ -197,9 +197,10 @@ def test_a_slice_keeps_the_rows_of_the_campaign(tmp_path, monkeypatch):
     with Writer.create(tmp_path / "b.h5", plan, [sampling.draw(plan, rows)], rows=rows) as store:
         store.write(np.arange(10), Simulation(results, {}))
         solve = lambda slots, *_, **__: Simulation(results[slots], {})  # noqa: E731
+        monkeypatch.setattr(verify, "parameters", lambda store, slots: slots)
         monkeypatch.setattr(verify, "run_checks", partial(checks.run_checks, simulate=solve))
-        checked = verify.check_campaign(store, lambda slots: slots, ("newton",), 3, 7)
-        verification.write(store, checked)
+        checked = verify.check_campaign(store, ("newton",), 3, 7, 1, checks.no_progress)
+        verification.write([(store, checked)])
     with ResultFile.open(tmp_path / "b.h5") as store:
         found = verification.read(store)
     assert set(found.rows.tolist()) <= set(rows)
@@ -214,7 +215,7 @@ def off_by(path, factor, rows=(5, 9)):
         for name in ("F_max", "T_max", "contact_max", "psi_max"):
             true[name] *= factor
         made = {name: Check("", {}, base) for name in checks.QUICK_CHECKS} | {"reference": Check("", {}, true)}
-        verification.write(store, Verification(1, np.array(rows), base, made))
+        verification.write([(store, Verification(1, np.array(rows), base, made))])
 
 
 @pytest.mark.slow
@@ -343,8 +344,8 @@ def test_what_cannot_be_verified_is_exit_code_2(tmp_path, monkeypatch):
         for word in [*words, "hint: "]:
             assert word in done.stderr
     with pytest.raises(InputError, match="less than one"):
-        verify.check_study(study.load(written(tmp_path)), joints=-1)
+        verify.check(written(tmp_path), joints=-1)
     other = synthetic.store(tmp_path, name="other")
     monkeypatch.setattr(provenance, "source_hash", lambda: "0")
     with pytest.raises(StoreError, match="was made by another version of the code"):
-        verify.check_file(other)
+        verify.check_file(other, 24)

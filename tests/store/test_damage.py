@@ -310,7 +310,7 @@ def test_damaged_checks_of_joints_near_a_limit_are_told_with_their_command(path:
     with Writer.open(path) as store:
         held = verification.read(store)
         assert held is not None
-        verification.write(store, held, verification.NEAR)
+        verification.write([(store, held)], verification.NEAR)
     damage.flip_in(path, f"{verification.NEAR}/newton/cross1.F_max", 0)
     done = call(path, "status --check")
     assert done.exit_code == 2

@@ -307,7 +307,7 @@ def test_other_sources_of_the_same_version_are_refused(tmp_path: Path, monkeypat
     fakes.run(fakes.Study(), path, 1, check=True)  # the same code in another place
     for name in ("kernel/contact.py", "joint/material.py", "tolerance.py"):
         (package / name).write_text("# edited")
-        says = rf"a.h5: was begun by another version.*\n    sources: hash .*, {provenance.source_hash()} now\n  hint: "
+        says = rf"a.h5: was begun by another version.*\n    sources: .*, {provenance.source_hash()} now\n  hint: "
         with pytest.raises(StoreError, match=says):
             fakes.run(fakes.Study(), path, 1, check=True)
 
@@ -316,14 +316,14 @@ def test_wrong_blocks_are_bugs(tmp_path: Path, study: fakes.Study) -> None:
     rows = np.arange(3)
     part = simulation(study, rows)
     with new_store(tmp_path / "a.h5", study) as store:
-        with pytest.raises(ValueError, match="3 results for 2 rows"):
+        with pytest.raises(ValueError, match="each row of a block needs"):
             store.write(rows[:2], part)
-        with pytest.raises(ValueError, match=r"histories \[\] given"):
+        with pytest.raises(ValueError, match="each row of a block needs"):
             store.write(rows, Simulation(part.results, {}))
-        with pytest.raises(ValueError, match="history mode: shape"):
+        with pytest.raises(ValueError, match="each row of a block needs"):
             store.write(rows, Simulation(part.results, part.histories | {"mode": np.zeros((3, 2), np.uint8)}))
         part.results["status"][1] = Status.PENDING
-        with pytest.raises(ValueError, match="must not have the status PENDING"):
+        with pytest.raises(ValueError, match="not pending"):
             store.write(rows, part)
         assert store.pending().size == 12
         with pytest.raises(StoreError, match="holds no histories 'heat'"):

@@ -9,7 +9,7 @@ import pytest
 
 from tests.conftest import joint_with_law
 from tests.support import synthetic
-from tolstat import joint, sampling, study
+from tolstat import sampling, study
 from tolstat.common.errors import InputError
 from tolstat.common.tables import Simulation
 from tolstat.joint.derived import DERIVED
@@ -85,7 +85,7 @@ def test_a_file_replays_its_sweep(tmp_path: Path) -> None:
         store.write(rows, Simulation(synthetic.results(s.rows), {}))
     with ResultFile.open(tmp_path / "a.h5") as store:
         again = recorded.parameters(store, rows)
-        assert again.tobytes() == recorded.perturbed(s, rows, errors, joint.perturb).tobytes()
+        assert again.tobytes() == recorded.perturbed(s, rows, errors).tobytes()
         assert recorded.recall(store).identity() == s.identity()
         frame = store.to_pandas(nominal=True)
         axes = swept_axes(store.view())

@@ -20,7 +20,7 @@ import numpy as np
 import pytest
 
 from tests.support.environment import environment as environment
-from tolstat.campaign import blocks
+from tolstat.campaign import blocks, verify
 from tolstat.campaign import run as campaign
 from tolstat.common import selected_results
 from tolstat.common.columns import Column
@@ -39,6 +39,7 @@ from tolstat.common.tables import (
 )
 from tolstat.joint import Operation
 from tolstat.solver import stationary
+from tolstat.store import Reader, recorded
 from tolstat.study.design import flat
 from tolstat.study.model import Sampling
 from tolstat.study.points import Point
@@ -194,6 +195,10 @@ def perturb(joint: Any, operation: Operation, errors: np.ndarray) -> np.ndarray:
     return params
 
 
+def parameters(store: Reader, slots: np.ndarray) -> np.ndarray:
+    return perturb(None, store.operation, store.errors()[slots])
+
+
 def history_specs(options: Options, histories: str, n_harmonics: int) -> dict[str, HistorySpec]:
     return SPECS if histories == "full" else {}
 
@@ -249,6 +254,7 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
     "origin_blocks": lambda *_: None,
     "dimensions": lambda: {"pin1.offset_e": 0},
     "perturb": perturb,
+    "parameters": parameters,
     "history_specs": history_specs,
     "simulate_rows": simulate,
     "warm_up": warm_up,
@@ -263,7 +269,7 @@ SOLVER = {name: FUNCTIONS[name] for name in ("simulate_rows", "warm_up", "is_com
 
 def replace_functions(patch: pytest.MonkeyPatch, **functions: Callable[..., Any]) -> None:
     """Let campaigns call other functions; workers find `simulate_rows` and `warm_up` in the modules they are from."""
-    for module in (campaign, blocks):
+    for module in (campaign, blocks, verify, recorded):
         for name, function in functions.items():
             if hasattr(module, name):
                 patch.setattr(module, name, function)

@@ -34,6 +34,9 @@ class FakeStore(Reader):
     def operation(self):
         return self.points[self.point].operation
 
+    def group(self, name, at_point=True):
+        return None
+
     def at(self, point):
         found = copy(self)
         found.point = point
@@ -59,7 +62,6 @@ def view(n=201, method="random", limits=None, columns=RESULT_COLUMNS, change=Non
     if alpha is not None:
         errors["operation.alpha"] = alpha - OPERATION.alpha
     made = View(FakeStore(method, limits, errors, results, columns=columns, joint=joint))
-    made.verification, made.near, made.altered = None, None, {}
     return made
 
 
@@ -71,11 +73,7 @@ def at_points(results, limits=None, method="random", joint=None, points=()):
     n = len(next(iter(results.values())))
     store = FakeStore(method, limits or {}, synthetic.errors(n), results, joint=joint)
     store.points |= {point.name: point for point in points}
-    made = View(store)
-    for part in made.parts:
-        part.verification = part.near = None
-    made.altered = {}
-    return made
+    return View(store)
 
 
 def swept(second=1, limits=None, named=True, columns=RESULT_COLUMNS, change=None):
@@ -90,5 +88,4 @@ def swept(second=1, limits=None, named=True, columns=RESULT_COLUMNS, change=None
         change(results[1:])
     keys = '[sweep]\n"pin*.diameter" = { from = "-0.1 mm" }\npin1.tilt_z = { from = "0.5 deg" }\n' if named else ""
     made = View(FakeStore("sweep", limits or {}, errors, results, keys, columns))
-    made.verification, made.near, made.altered = None, None, {}
     return made

@@ -26,15 +26,12 @@ class Block(NamedTuple):
         Their parameters.
     options : Options
         Their solver options.
-    histories : bool
-        Whether to keep the load histories that the study asks for, or none.
     """
 
     point: str
     slots: NDArray[np.intp]
     params: NDArray[np.void]
     options: Options
-    histories: bool = True
 
     def split(self) -> list[Block]:
         """Split into halves; a block of one joint is its only piece."""
@@ -69,8 +66,6 @@ def simulate_block(
 ) -> Timed:
     """Simulate the joints of a block and measure the time; those whose parameters are not finite get INVALID_INPUT."""
     begin = time.perf_counter()
-    if not block.histories:
-        histories, n_harmonics, specs = "none", 0, {}
     good = _finite(block.params)
     whole = without_simulation(len(good), Status.INVALID_INPUT, specs)
     if good.any():

@@ -7,7 +7,7 @@ from collections.abc import Callable, Generator, Iterator
 from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,6 @@ from tolstat.campaign.pool import Lost, Work
 from tolstat.common.cores import available_cores
 from tolstat.common.solver_options import from_names
 from tolstat.common.tables import Options, Simulation, Status, without_results
-from tolstat.joint import perturb
 from tolstat.solver.compilation import is_compiled, warm_up
 from tolstat.solver.simulation import simulate_rows
 from tolstat.store import Reader
@@ -105,35 +104,6 @@ class Pace:
         self._size = max(1, min(MAX_BLOCK, round(step)))
 
 
-class Finished(NamedTuple):
-    """Operating point, file slots, their simulation, and why they were given up; empty if they were not."""
-
-    point: str
-    slots: NDArray[np.intp]
-    simulation: Simulation
-    trouble: str
-
-
-def pending(store: Reader, stop_slot: int) -> Iterator[tuple[Reader, NDArray[np.intp]]]:
-    """Yield the pending file slots below `stop_slot` with the file at their operating point.
-
-    Of `MAX_BLOCK` rows at a time those of all points: after an interruption few joints are done at some points only.
-    """
-    each = store.each()
-    for first in range(0, stop_slot, MAX_BLOCK):
-        for one in each:
-            status = one.status(slice(first, min(first + MAX_BLOCK, stop_slot)))
-            slots = first + np.flatnonzero(status == Status.PENDING)
-            if slots.size:
-                yield one, slots
-
-
-def work_of(study: Study, store: Reader) -> BlockWork:
-    """Return how a worker simulates the blocks of a campaign."""
-    kept = study.output.histories, study.output.harmonics, store.history_specs
-    return _work(settings_in_use(study, store), *kept)
-
-
 def _work(options: list[Options], *kept: Any) -> BlockWork:
     """How a worker simulates blocks with these options and histories."""
     return Work(partial(simulate_block, simulate_rows, *kept), Block.split, partial(load_kernels, warm_up, options))
@@ -141,23 +111,25 @@ def _work(options: list[Options], *kept: Any) -> BlockWork:
 
 def simulate_pending(
     study: Study, store: Reader, stop_slot: int, execution: Execution, stop: Callable[[], bool]
-) -> Generator[Finished, None, None]:
+) -> Generator[tuple[Block, Simulation, str], None, None]:
     """Simulate the joints in the pending file slots below `stop_slot`, until `stop` returns true.
 
-    Close the generator (`contextlib.closing`) when leaving it early.
+    Yields each block, its simulation, and why its joint was given up, which is empty if it was not. Close the generator
+    (`contextlib.closing`) when leaving it early.
 
     Raises
     ------
     WorkerDied
         When worker processes die whichever block they work on.
     """
-    todo = sum(len(slots) for _, slots in pending(store, stop_slot))
+    todo = sum(len(slots) for _, slots in store.pending_blocks(stop_slot))
     workers = execution.workers or available_cores()
     size = execution.block or default_block(todo, workers)
     if not todo:
         return
     pace = Pace(todo, workers, execution.block)
-    work, blocks = work_of(study, store), _blocks(study, store, stop_slot, pace)
+    kept = study.output.histories, study.output.harmonics, store.history_specs
+    work, blocks = _work(settings_in_use(study, store), *kept), _blocks(study, store, stop_slot, pace)
     if execution.kind == "dask":
         from tolstat.campaign.cluster import map_on_cluster
 
@@ -168,19 +140,19 @@ def simulate_pending(
         for block, result in results:
             if isinstance(result, Lost):
                 blank = without_simulation(len(block.slots), Status.CRASHED, store.history_specs)
-                yield Finished(block.point, block.slots, blank, result.reason)
+                yield block, blank, result.reason
             else:
                 begin = time.perf_counter()
                 # the caller writes the block to the file before it asks for the next one
-                yield Finished(block.point, block.slots, result.simulation, "")
+                yield block, result.simulation, ""
                 pace.note(len(block.slots), result.seconds, time.perf_counter() - begin)
 
 
-def simulate_beside(params: NDArray[np.void], options: Options, **_: Any) -> Simulation:
+def simulate_beside(params: NDArray[np.void], options: Options) -> Simulation:
     """Simulate joints, (m,) table PARAM, in one worker and without histories; those that crash get no results."""
     compile_missing(options)
     results = without_results(len(params), Status.PENDING)
-    whole = Block("", np.arange(len(params)), params, options, histories=False)
+    whole = Block("", np.arange(len(params)), params, options)
     with closing(pool.map_blocks(work_beside(options), [whole], 1)) as done:
         for block, result in done:
             results[block.slots] = results_of(block, result)
@@ -209,18 +181,12 @@ def compile_missing(options: Options, params: NDArray[np.void] | None = None) ->
         warm_up(options, params)
 
 
-def parameters(study: Study, store: Reader, slots: NDArray[np.intp]) -> NDArray[np.void]:
-    """Return the parameters of the joints in file slots at the operating point of `store`, (m,) table PARAM."""
-    errors = np.concatenate([store.errors(slice(slot, slot + 1)) for slot in slots.tolist()])
-    return perturbed(study.at(store.point or ""), store.row(slots), errors, perturb)
-
-
 def some_joints(study: Study, store: Reader) -> NDArray[np.void]:
     """Return the parameters of some joints at each point: kernels that none of them needs are not compiled ahead."""
     first = min(store.n, READ)
     slots = np.unique(np.linspace(0, first - 1, min(first, SOME)).astype(np.intp))
     errors = store.errors(slice(0, first))[slots]
-    each = [perturbed(study.at(one.point or ""), one.row(slots), errors, perturb) for one in store.each()]
+    each = [perturbed(study.at(one.point or ""), one.row(slots), errors) for one in store.each()]
     return np.concatenate(each)
 
 
@@ -230,7 +196,7 @@ def _blocks(study: Study, store: Reader, stop_slot: int, pace: Pace) -> Iterator
     variant_options = [settings(solver, store.fidelity) for solver in study.solvers]
     retry_options = [from_names(retry["options"]) for retry in store.retries]
     distinct = settings_in_use(study, store)
-    for one, slots in pending(store, stop_slot):
+    for one, slots in store.pending_blocks(stop_slot):
         read = slice(slots[0], slots[-1] + 1)
         errors, attempt = store.errors(read), one.attempt(read)[slots - slots[0]]
         point = one.point or ""
@@ -244,5 +210,5 @@ def _blocks(study: Study, store: Reader, stop_slot: int, pace: Pace) -> Iterator
             left = slots[option == number]
             while left.size:
                 some, left = np.split(left, [pace.take(left.size)])
-                params = perturbed(studies[point], store.row(some), errors[some - slots[0]], perturb)
+                params = perturbed(studies[point], store.row(some), errors[some - slots[0]])
                 yield Block(point, some, params, distinct[number])

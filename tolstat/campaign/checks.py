@@ -142,5 +142,5 @@ def simulate_each(
     results = np.empty(len(params), RESULT)
     for one in dict.fromkeys(options):
         here = np.array([own == one for own in options])
-        results[here] = simulate(params[here], one, histories="none", n_harmonics=0).results
+        results[here] = simulate(params[here], one).results
     return results

@@ -21,7 +21,7 @@ from tolstat.campaign import pool
 from tolstat.campaign.pool import BlockT, Lost, ResultT, Work, WorkerDied
 from tolstat.common.cores import one_thread_each
 from tolstat.common.errors import Fault, InputError
-from tolstat.store.provenance import versions
+from tolstat.store.provenance import differing, versions
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -147,15 +147,9 @@ def check(expected: Mapping[str, str], found: Mapping[str, str], where: str) -> 
     InputError
         With all differences.
     """
-    lines = [
-        f"{name}: {value} here, {found.get(name)} on the worker"
-        for name, value in expected.items()
-        if found.get(name) != value
-    ]
-    if lines:
-        differing = "\n    ".join([f"{where} has other software versions", *lines])
-        remedy = "install the same versions there, and restart the workers"
-        raise InputError([Fault("--executor dask", differing, remedy)])
+    if lines := differing(found, expected, "on the worker", "here"):
+        text = "\n    ".join([f"{where} has other software versions", *lines])
+        raise InputError([Fault("--executor dask", text, "install the same versions there, and restart the workers")])
 
 
 def _checked(client: Client) -> dict[str, str]:
@@ -182,9 +176,7 @@ def _client(scheduler: str | None, workers: int) -> Iterator[Client]:
         raise InputError([Fault("--executor dask", "Dask's distributed is not installed", remedy)]) from error
     if scheduler is None:
         with one_thread_each(), pool.signals_blocked():
-            cluster = LocalCluster(
-                n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None, host=LOOPBACK
-            )
+            cluster = LocalCluster(workers, threads_per_worker=1, dashboard_address=None, host=LOOPBACK)
         with cluster, Client(cluster) as client:
             yield client
         return

@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
-from itertools import chain
+from functools import partial
+from itertools import accumulate, chain
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -17,12 +18,12 @@ from tolstat.common.draw_records import columns
 from tolstat.common.errors import Fault, InputError
 from tolstat.sampling import draw_blocks, origin_blocks
 from tolstat.store import Reader, Writer, what_if
-from tolstat.store.assembly import OTHER_FILE, DifferingResults, assemble
+from tolstat.store.assembly import copy_results
 from tolstat.store.hdf5 import BLOCK
-from tolstat.store.provenance import differing_code
+from tolstat.store.provenance import differing, differing_code
 from tolstat.store.recorded import differing_keys, recall
 from tolstat.store.what_if import Altered
-from tolstat.store.writer import check_free
+from tolstat.store.writer import check_free, write_new
 
 if TYPE_CHECKING:
     from tolstat.study import Study
@@ -34,6 +35,8 @@ NOT_EXTENDABLE = {
     "subset": "the levels of a subset simulation determine its number of joints",
 }
 """Sampling methods whose campaigns cannot be extended, and the reason."""
+OTHER_FILE = "give another file: --out OTHER.h5"
+"""Remedy where a file exists already."""
 OTHER_CODE = "was begun by another version of the code"
 """Fault of a file that gets no further results, because they could differ."""
 
@@ -130,7 +133,8 @@ def grow(
         n=study.rows,
     )
     drawn = None if origin is None else chain(_blocks(store, store.origin), origin)
-    assemble(store.path, held, [store], chain(_blocks(store, store.errors), errors), origin=drawn, overwrite=True)
+    every, fill = chain(_blocks(store, store.errors), errors), partial(copy_results, sources=[store])
+    write_new(store.path, held, OTHER_FILE, every, origin=drawn, fill=fill, overwrite=True)
 
 
 def merge(paths: Sequence[Path], out: Path) -> Merged:
@@ -164,17 +168,13 @@ def merge(paths: Sequence[Path], out: Path) -> Merged:
         _check_one_campaign(stores)
         rows = stores[0].campaign_rows
         held = stores[0].metadata.changed(stop={}, first_row=0, n=rows)
-        design = np.concatenate([s.design()[a:] for s, a in _shares(stores)]) if stores[0].variants else None
-        errors = (block for store, begin in _shares(stores) for block in _blocks(store, store.errors, begin))
-        origin = (block for store, begin in _shares(stores) for block in _blocks(store, store.origin, begin))
+        # each file that adds rows to those of the files before it, and the first file slot that does
+        shares = [(s, s.slot(end)) for s, end in zip(stores, _ends(stores), strict=False) if s.rows.stop > end]
+        design = np.concatenate([s.design()[begin:] for s, begin in shares]) if stores[0].variants else None
+        errors = (block for store, begin in shares for block in _blocks(store, store.errors, begin))
+        origin = (block for store, begin in shares for block in _blocks(store, store.origin, begin))
         drawn = origin if columns(stores[0].sampling) else None
-        try:
-            assemble(out, held, stores, errors, design, drawn)
-        except DifferingResults as error:
-            holding = [str(store.path) for store in stores if error.row in store.rows]
-            found = f"hold different results of row {error.row}: {error.column} differs"
-            remedy = f"find the file that is wrong, and leave it out: tolstat replay {holding[0]} --row {error.row}"
-            raise InputError([Fault(" and ".join(holding), found, remedy)]) from None
+        write_new(out, held, OTHER_FILE, errors, design, drawn, partial(copy_results, sources=stores))
         twice = sum(len(store.rows) for store in stores) - rows
         altered, dropped = what_if.common(what_if.read(store) for store in stores)
     _keep(out, altered)
@@ -213,18 +213,16 @@ def _check_one_campaign(stores: Sequence[Reader]) -> None:
     faults = []
     for store in stores[1:]:
         lines = differing_keys(store.identity, first.identity)
-        lines += [
-            f"{name}: {store.versions.get(name)} in the file, {first.versions.get(name)} in {first.path}"
-            for name in ("tolstat", "sources")
-            if store.versions.get(name) != first.versions.get(name)
-        ]
+        code = {name: first.versions[name] for name in ("tolstat", "sources")}
+        lines += differing(store.versions, code, "in the file", f"in {first.path}")
         lines = [line.replace("in the study", f"in {first.path}") for line in lines]
         if store.retries != first.retries:
             lines.append(f"its retries differ from those of {first.path}")
         if lines:
             found = "\n    ".join([f"belongs to another campaign than {first.path}", *lines])
             faults.append(Fault(str(store.path), found, "leave it out, or run it again with the same study and code"))
-    missing = _missing(stores)
+    begins = [*(store.rows.start for store in stores), first.campaign_rows]
+    missing = [range(end, begin) for end, begin in zip(_ends(stores), begins, strict=True) if begin > end]
     if missing:
         listed = ", ".join(f"{part.start}:{part.stop}" for part in missing)
         remedy = f"simulate them: tolstat run STUDY --rows {missing[0].start}:{missing[0].stop} --out FILE"
@@ -233,25 +231,9 @@ def _check_one_campaign(stores: Sequence[Reader]) -> None:
         raise InputError(faults)
 
 
-def _missing(stores: Sequence[Reader]) -> list[range]:
-    """Rows of the campaign that no file holds."""
-    missing, covered = [], 0
-    for store in stores:
-        if store.rows[0] > covered:
-            missing.append(range(covered, store.rows[0]))
-        covered = max(covered, store.rows.stop)
-    if covered < stores[0].campaign_rows:
-        missing.append(range(covered, stores[0].campaign_rows))
-    return missing
-
-
-def _shares(stores: Sequence[Reader]) -> Iterator[tuple[Reader, int]]:
-    """Yield each file that adds rows to those of the files before it, and the first file slot that does."""
-    covered = 0
-    for store in stores:
-        if store.rows.stop > covered:
-            yield store, store.slot(covered)
-            covered = store.rows.stop
+def _ends(stores: Sequence[Reader]) -> list[int]:
+    """First row that no file before the first one, the second one, ... holds, and that none of all holds."""
+    return list(accumulate((store.rows.stop for store in stores), max, initial=0))
 
 
 def _blocks(store: Reader, read: Callable[[slice], NDArray[np.void]], begin: int = 0) -> Iterator[NDArray[np.void]]:

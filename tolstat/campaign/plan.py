@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,10 +18,10 @@ from tolstat.campaign import checks, verify
 from tolstat.campaign.run import choose_fidelity
 from tolstat.common.cores import available_cores
 from tolstat.common.loads import load_of, split
-from tolstat.common.tables import FAILED, RESULT, UNSETTLED, Options, Simulation, Status
+from tolstat.common.tables import FAILED, UNSETTLED, Options, Status
 from tolstat.display import text
 from tolstat.display.progress import Tell, silent
-from tolstat.joint import ideal, perturb
+from tolstat.joint import ideal
 from tolstat.sampling import dimensions, draw, streams
 from tolstat.solver import refinement
 from tolstat.solver.compilation import stage_name, warm_up
@@ -223,12 +224,12 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT, stage: Te
     choice = choose_fidelity(study) if study.solver.fidelity == "auto" else {}
     own = [settings(solver, choice) for solver in study.solvers]
     options = [own[number] for number in variants(study, rows)]
-    at = {point.name: perturbed(study.at(point.name), rows, errors, perturb) for point in study.points}
+    at = {point.name: perturbed(study.at(point.name), rows, errors) for point in study.points}
     timed = {name: simulate_timed(study, params, options) for name, params in at.items()}
     each = sum(seconds for _, seconds in timed.values()) / len(rows)
     stage("check of the numerical error")
-    check = sum(_check(study, at[name], simulation, options) for name, (simulation, _) in timed.items())
-    results = {name: simulation.results for name, (simulation, _) in timed.items()}
+    results = {name: own for name, (own, _) in timed.items()}
+    check = sum(_check(study, at[name], own, options) for name, own in results.items())
     slower = min(_loop() for _ in range(LOOPS)) / LOOP_S
     stages = {"start": slower * START_S, "joints": each * study.rows / workers, "check": check}
     stages["report"] = slower * (REPORT_S + REPORT_S_PER_JOINT * study.rows)
@@ -280,14 +281,14 @@ def fit_in_words(study: Study) -> list[str]:
 def _assembly(study: Study, iid: bool) -> Assembly:
     rows = np.arange(study.first_sample, min(study.rows, study.first_sample + DRAWN))
     errors = draw(study, range(rows[0], rows[-1] + 1))
-    misfits = int((perturbed(study, rows, errors, perturb)["clearance"] < 0.0).any(axis=1).sum())
+    misfits = int((perturbed(study, rows, errors)["clearance"] < 0.0).any(axis=1).sum())
     lower, upper = binomial.clopper_pearson(misfits, rows.size, CONFIDENCE)
     return Assembly(misfits, rows.size, (float(lower), float(upper)) if iid else None)
 
 
-def _check(study: Study, params: NDArray[np.void], simulation: Simulation, options: list[Options]) -> float:
+def _check(study: Study, params: NDArray[np.void], results: NDArray[np.void], options: list[Options]) -> float:
     """Time of the check at the end of the run, from one on as many settled joints of the pilot, s."""
-    settled = np.flatnonzero(simulation.results["status"] == Status.OK)[: verify.few(study.rows)]
+    settled = np.flatnonzero(results["status"] == Status.OK)[: verify.few(study.rows)]
     if not settled.size:
         return 0.0
     begin = time.process_time()
@@ -311,22 +312,13 @@ def _errors(study: Study, rows: NDArray[np.intp]) -> NDArray[np.void]:
     return np.concatenate([draw(study, range(row, row + 1)) for row in rows])
 
 
-def simulate_timed(study: Study, params: NDArray[np.void], options: list[Options]) -> tuple[Simulation, float]:
+def simulate_timed(study: Study, params: NDArray[np.void], options: list[Options]) -> tuple[NDArray[np.void], float]:
     """Simulate each joint with its own options; also return the total processor time, s, without compilation."""
-    kinds = study.output.histories, study.output.harmonics
-    specs = history_specs(options[0], *kinds)
-    whole = Simulation(np.empty(len(params), RESULT), {name: spec.blank(len(params)) for name, spec in specs.items()})
-    seconds = 0.0
     for one in dict.fromkeys(options):
-        here = np.array([other == one for other in options])
-        simulate_rows(params[here][:1], one)  # compiles, or loads, what these options need
-        begin = time.process_time()
-        part = simulate_rows(params[here], one, *kinds)
-        seconds += time.process_time() - begin
-        whole.results[here] = part.results
-        for name, values in part.histories.items():
-            whole.histories[name][here] = values
-    return whole, seconds
+        simulate_rows(params[[options.index(one)]], one)  # compiles, or loads, what these options need
+    kept = partial(simulate_rows, histories=study.output.histories, n_harmonics=study.output.harmonics)
+    begin = time.process_time()
+    return checks.simulate_each(params, options, kept), time.process_time() - begin
 
 
 def _width(share: float, n: int) -> float:

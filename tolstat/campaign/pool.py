@@ -187,7 +187,8 @@ class _Worker(Generic[BlockT]):
             message: tuple[str, Any] = self.connection.recv()
         except (EOFError, OSError):
             self.process.join(1.0)
-            return DIED, _cause(self.process.exitcode)
+            code = self.process.exitcode or 0
+            return DIED, f"killed by {signal.Signals(-code).name}" if code < 0 else f"ended with exit code {code}"
         return message
 
     def end(self) -> None:
@@ -288,14 +289,6 @@ class _Map(Generic[BlockT, ResultT]):
 
 def _reason(failure: str | Exception) -> str:
     return failure if isinstance(failure, str) else f"{type(failure).__name__}: {failure}"
-
-
-def _cause(exit_code: int | None) -> str:
-    if exit_code is None:
-        return "closed its pipe"
-    if exit_code < 0:
-        return f"killed by {signal.Signals(-exit_code).name}"
-    return f"ended with exit code {exit_code}"
 
 
 @contextmanager

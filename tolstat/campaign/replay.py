@@ -21,7 +21,7 @@ from tolstat.common.tables import Motion, Options, Simulation, Status
 from tolstat.solver.compilation import warm_up
 from tolstat.solver.simulation import simulate_rows
 from tolstat.store import Reader
-from tolstat.store.provenance import versions
+from tolstat.store.provenance import differing, versions
 from tolstat.store.recorded import options_of, parameters
 
 if TYPE_CHECKING:
@@ -248,9 +248,7 @@ def replay(store: Reader, row: int) -> Replay:
     differences = _different_results(store.columns, stored, simulation.results)
     if store.history_specs:
         differences += _different_histories(store, here.start, params, options)
-    now = versions()
-    code = [f"{name}: {store.versions.get(name)} in the file, {new} now" for name, new in now.items()]
-    changed = [line for line, name in zip(code, now, strict=True) if store.versions.get(name) != now[name]]
+    changed = differing(store.versions, versions(), "in the file", "now")
     return Replay(row, result, Status(stored["status"][0]), differences, changed)
 
 

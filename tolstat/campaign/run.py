@@ -7,7 +7,6 @@ import signal
 import threading
 from collections.abc import Iterable, Iterator
 from contextlib import closing, contextmanager
-from functools import partial
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Any
@@ -15,12 +14,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tolstat.campaign import verify
+from tolstat.campaign.block import Block
 from tolstat.campaign.blocks import (
     Execution,
-    Finished,
     compile_missing,
-    parameters,
-    pending,
     settings_in_use,
     simulate_beside,
     simulate_pending,
@@ -31,9 +28,8 @@ from tolstat.campaign.pool import WorkerDied, kept_workers
 from tolstat.campaign.remedy import Retry, begin_retry
 from tolstat.common.counts import Counts
 from tolstat.common.errors import Fault, InputError, StoreError
-from tolstat.common.tables import Status
+from tolstat.common.tables import Simulation, Status
 from tolstat.display.progress import JOINTS, Reporter, Tell, note, silent
-from tolstat.joint import perturb
 from tolstat.sampling import dimensions, draw_blocks, origin_blocks
 from tolstat.solver import fidelity, rainflow
 from tolstat.solver.compilation import stage_name
@@ -204,7 +200,7 @@ def run(
         counts = store.counts()
         last = store.n if until_row is None else store.slot(until_row)
         try:
-            if next(pending(store, last), None) is not None:
+            if next(store.pending_blocks(last), None) is not None:
                 stage(stage_name())
                 examples = some_joints(study, store)
                 for options in settings_in_use(study, store):
@@ -216,7 +212,7 @@ def run(
                 counts = _write_blocks(store, finished, counts, progress, tell)
             if check:
                 stage("check of the numerical error")
-                verify.check_few(store, partial(parameters, study))
+                verify.check_few(store)
             store.finish()
         except KeyboardInterrupt:
             raise Interrupted(path, store.counts(), stop.number) from None
@@ -224,24 +220,27 @@ def run(
             held = store.counts()
             kept = f"{path} holds the results of {held.done} of {held.total} joints"
             raise WorkerDied(f"{error}\n  {kept}; to resume, run the same command again") from error
-        if next(pending(store, last), None) is not None:
+        if next(store.pending_blocks(last), None) is not None:
             raise Interrupted(path, counts, stop.number)
         return counts
 
 
 def _write_blocks(
-    store: Writer, finished: Iterable[Finished], counts: Counts, progress: Reporter | None, tell: Tell
+    store: Writer,
+    finished: Iterable[tuple[Block, Simulation, str]],
+    counts: Counts,
+    progress: Reporter | None,
+    tell: Tell,
 ) -> Counts:
     """Write blocks to the file as they are finished; return the numbers of joints by status after the last one."""
     if progress:
         progress(counts)
-    for done in finished:
-        store.at(done.point).write(done.slots, done.simulation)
-        counts = counts.after(done.simulation.results["status"])
-        if done.trouble:
-            status = Status(done.simulation.results["status"][0])
-            place = f"row {store.rows[done.slots[0]]}" + (f" at {done.point}" if done.point else "")
-            tell(f"{place}: {status.label}: {done.trouble}")
+    for block, simulation, trouble in finished:
+        store.at(block.point).write(block.slots, simulation)
+        counts = counts.after(simulation.results["status"])
+        if trouble:
+            place = f"row {store.rows[block.slots[0]]}" + (f" at {block.point}" if block.point else "")
+            tell(f"{place}: {Status.CRASHED.label}: {trouble}")
         if progress:
             progress(counts)
     return counts
@@ -287,7 +286,7 @@ def choose_fidelity(study: Study) -> dict[str, Any]:
     options = study.solver.options()
     rows = fidelity.pilot(study.rows, study.first_sample, study.sampling.seed)
     errors = np.concatenate([part for row in rows.tolist() for part in draw_blocks(study, range(row, row + 1))])
-    each = [perturbed(study.at(point.name), rows, errors, perturb) for point in study.points]
+    each = [perturbed(study.at(point.name), rows, errors) for point in study.points]
     params = np.concatenate(each)  # one choice for all points
     budget, min_steps = study.solver.error_budget, _min_steps(*_history_options(study))
     with kept_workers():
@@ -307,8 +306,8 @@ def _check_same(store: Reader, study: Study, rows: range) -> None:
     if not differing:
         found, remedy = OTHER_CODE, f"run the study into another file (--out OTHER.h5), or resume with {code_of(store)}"
     differing += differing_code(store.versions)
-    if held_n := _other_number(store, study, differing):
-        raise StoreError(str(_of_number(store, held_n, study.samples)))
+    if len(differing) == 1 and differing[0].startswith("sampling.n:") and store.whole:
+        raise StoreError(str(_of_number(store, study.samples)))
     if not differing and store.rows != rows:
         held, asked = (f"{r.start}:{r.stop}" for r in (store.rows, rows))
         raise StoreError(str(Fault(str(store.path), f"holds rows {held}, not {asked}", f"give --rows {held}")))
@@ -317,14 +316,10 @@ def _check_same(store: Reader, study: Study, rows: range) -> None:
         raise StoreError(str(Fault(str(store.path), lines, remedy)))
 
 
-def _other_number(store: Reader, study: Study, differing: list[str]) -> int:
-    """Number of joints that the file is for if nothing else differs from the study; 0 otherwise."""
-    numbers = len(differing) == 1 and differing[0].startswith("sampling.n:") and store.whole
-    return int(store.sampling["n"]) if numbers else 0
-
-
-def _of_number(store: Reader, held: int, asked: int) -> Fault:
-    path, found = store.path, f"is the result file of this study with {held} joints, not {asked}"
+def _of_number(store: Reader, asked: int) -> Fault:
+    """Fault of a file of this study with another number of joints."""
+    path, held = store.path, int(store.sampling["n"])
+    found = f"is the result file of this study with {held} joints, not {asked}"
     method = store.sampling["method"]
     if asked < held:
         return Fault(str(path), found, f"read it as it is: tolstat report {path}, or give another file: --out OTHER.h5")

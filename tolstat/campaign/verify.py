@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,16 +11,16 @@ from numpy.typing import NDArray
 from tolstat.analysis.accuracy import LEAST_NEAR
 from tolstat.campaign.checks import ALL_CHECKS, QUICK_CHECKS, Progress, no_progress, run_checks, simulate_each
 from tolstat.common import selected_results
-from tolstat.common.errors import Fault, InputError, StoreError, gather
+from tolstat.common.errors import Fault, InputError, gather
 from tolstat.common.loads import LOADS, Limit, load_of, split
 from tolstat.common.tables import Status
-from tolstat.store import Reader, Writer, recorded, verification, worst
+from tolstat.sampling import draw
+from tolstat.store import Reader, Writer, verification
+from tolstat.store.hdf5 import pick, store_error
 from tolstat.store.provenance import differing_code
-from tolstat.store.verification import Check, Verification
-from tolstat.study import rule
-
-if TYPE_CHECKING:
-    from tolstat.study import Study
+from tolstat.store.recorded import options_of, parameters, perturbed, variants
+from tolstat.store.verification import Verification
+from tolstat.study import Study, load, rule
 
 EXAMPLE = 'write --near "cross1.F > 700 N", or --near "any limit"'
 JOINTS_PER_CHECKED, MAX_CHECKED = 400, 16
@@ -38,13 +36,7 @@ def choose(rows: NDArray[np.intp], joints: int | None, seed: int) -> NDArray[np.
 
 
 def check_campaign(
-    store: Reader,
-    parameters: Callable[[NDArray[np.intp]], NDArray[np.void]],
-    names: Iterable[str],
-    joints: int | None,
-    seed: int,
-    workers: int = 1,
-    progress: Progress = no_progress,
+    store: Reader, names: Iterable[str], joints: int | None, seed: int, workers: int, progress: Progress
 ) -> Verification | None:
     """Check settled joints of a campaign.
 
@@ -52,8 +44,6 @@ def check_campaign(
     ----------
     store : Reader
         Result file of the campaign.
-    parameters : callable
-        File slots (m,) -> their parameters, (m,) table PARAM.
     names, workers, progress
         As in `run_checks`.
     joints : int or None
@@ -64,33 +54,24 @@ def check_campaign(
     Returns
     -------
     Verification or None
-        None when no joint is settled.
+        None if no joint is settled.
     """
     settled = np.flatnonzero(store.status() == Status.OK)
     if joints is not None and len(settled) > 1:
         settled = settled[settled >= store.first_sample]  # the nominal joint is not in the statistics either
     slots = choose(settled, joints, seed)
-    if not slots.size:
-        return None
-    return check_slots(store, parameters, slots, names, seed, workers, progress)
+    return check_slots(store, slots, names, seed, workers, progress) if slots.size else None
 
 
 def check_slots(
-    store: Reader,
-    parameters: Callable[[NDArray[np.intp]], NDArray[np.void]],
-    slots: NDArray[np.intp],
-    names: Iterable[str],
-    seed: int = 0,
-    workers: int = 1,
-    progress: Progress = no_progress,
+    store: Reader, slots: NDArray[np.intp], names: Iterable[str], seed: int, workers: int, progress: Progress
 ) -> Verification:
     """Check the joints in file slots, (m,) ascending; parameters otherwise as in `check_campaign`."""
-    options = [recorded.options_of(store, slot) for slot in slots.tolist()]
-    checks = run_checks(parameters(slots), options, names, workers=workers, progress=progress)
+    options = [options_of(store, slot) for slot in slots.tolist()]
+    checks = run_checks(parameters(store, slots), options, names, workers=workers, progress=progress)
     for check in checks.values():
         selected_results.blank_others(check.results, store.columns)
-    base = np.concatenate([store.results(slice(slot, slot + 1)) for slot in slots.tolist()])
-    return Verification(seed, store.row(slots), base, checks)
+    return Verification(seed, store.row(slots), pick(store.results, slots), checks)
 
 
 def few(rows: int) -> int:
@@ -98,19 +79,18 @@ def few(rows: int) -> int:
     return min(max(rows // JOINTS_PER_CHECKED, 1), MAX_CHECKED)
 
 
-def check_few(store: Writer, parameters: Callable[[Writer, NDArray[np.intp]], NDArray[np.void]]) -> None:
+def check_few(store: Writer) -> None:
     """Check a few joints of a campaign at each operating point at which it is complete, and store the checks.
 
-    Does nothing if the file is a slice, and leaves checks that it has as they are. `parameters` is called with the file
-    at an operating point, and file slots; otherwise as in `check_campaign`.
+    Does nothing if the file is a slice, and leaves checks that it has as they are.
     """
     seed, made = int(store.sampling["seed"]), []
     for one in store.each() if store.whole else ():
         if one.complete and verification.read(one) is None:
-            found = check_campaign(one, partial(parameters, one), QUICK_CHECKS, few(one.n), seed)
+            found = check_campaign(one, QUICK_CHECKS, few(one.n), seed, 1, no_progress)
             made += [(one, found)] if found else []
     if made:
-        verification.write_all(made)
+        verification.write(made)
 
 
 def check(
@@ -123,26 +103,31 @@ def check(
 ) -> Verification:
     """Check joints of a study file (``.toml``) or of a result file; see `check_study` and `check_file`.
 
-    `on_start` is called after the input has been validated, before the simulations.
-    """
-    from tolstat.study import load
+    `joints` is a number, or ``"all"`` for all settled joints, the nominal one included. `on_start` is called after the
+    input has been validated, before the simulations.
 
-    if path.suffix != ".toml":
-        return check_file(path, joints, seed, on_start=on_start, workers=workers, progress=progress)
+    Raises
+    ------
+    InputError
+        When `joints` is neither a positive integer nor ``"all"``, or with the faults of the study.
+    """
     faults: list[Fault] = []
     with gather(faults):
-        parse_joints(joints)
-    with gather(faults):
-        plan = load(path)
+        number = parse_joints(joints)
+    if path.suffix == ".toml":
+        with gather(faults):
+            study = load(path)
     if faults:
         raise InputError(faults)
+    if path.suffix != ".toml":
+        return check_file(path, number, seed, ALL_CHECKS, on_start, workers, progress)
     on_start()
-    return check_study(plan, joints, seed, workers=workers, progress=progress)
+    return check_study(study, number, seed, ALL_CHECKS, workers, progress)
 
 
 def check_file(
     path: Path,
-    joints: int | str = 24,
+    joints: int | None,
     seed: int | None = None,
     names: Iterable[str] = ALL_CHECKS,
     on_start: Callable[[], None] = lambda: None,
@@ -155,8 +140,8 @@ def check_file(
     ----------
     path : Path
         The file; its campaign may be unfinished.
-    joints : int or "all"
-        Number of joints; ``"all"`` for all settled joints, including the nominal joint.
+    joints : int or None
+        Number of joints; None for all settled joints, including the nominal joint.
     seed : int, optional
         Seed of the random choice; the campaign's own seed without it.
     names : iterable of str
@@ -174,31 +159,30 @@ def check_file(
     ------
     StoreError
         When the file cannot be used, was made by other code, or has no settled joint.
-    InputError
-        When `joints` is neither a positive integer nor ``"all"``.
     """
-    number = parse_joints(joints)
     with Writer.open(path) as store:
         check_version(store)
         seed = int(store.sampling["seed"]) if seed is None else seed
         if not any((one.status() == Status.OK).any() for one in store.each()):
-            remedy = f"run the campaign first: tolstat run STUDY --out {path}"
-            raise StoreError(str(Fault(str(path), "has no settled joint", remedy)))
+            raise store_error(path, "has no settled joint", f"run the campaign first: tolstat run STUDY --out {path}")
         on_start()
         for one in store.each():
-            params = partial(recorded.parameters, one)
-            if found := check_campaign(one, params, names, number, seed, workers, progress):
-                verification.write(one, found)
-        checked = worst.checks([one for one in map(verification.read, store.each()) if one is not None])
-        assert checked is not None
-    return checked
+            if found := check_campaign(one, names, joints, seed, workers, progress):
+                verification.write([(one, found)])
+        return _stored(store, verification.VERIFY)
+
+
+def _stored(store: Reader, name: str) -> Verification:
+    """Verifications of a group at all operating points at which the file has one."""
+    found = [verification.read(one, name) for one in store.each()]
+    return verification.together([one for one in found if one is not None])
 
 
 def check_version(store: Reader) -> None:
     """Raise a StoreError for a file that other code made."""
     if differing_code(store.versions):
         remedy = "verify it with that version, or run the campaign again: tolstat run STUDY --out OTHER.h5"
-        raise StoreError(str(Fault(str(store.path), "was made by another version of the code", remedy)))
+        raise store_error(store.path, "was made by another version of the code", remedy)
 
 
 def nearest(store: Reader, limit: Limit, joints: int) -> NDArray[np.intp]:
@@ -221,12 +205,11 @@ def check_near(
     path: Path,
     text: str,
     joints: int | str = LEAST_NEAR,
-    names: Iterable[str] = QUICK_CHECKS,
     on_start: Callable[[], None] = lambda: None,
     workers: int = 1,
     progress: Progress = no_progress,
 ) -> Verification:
-    """Check the joints of a result file nearest to a limit, and add the checks to those that the file holds.
+    """Make the `QUICK_CHECKS` of the joints of a result file nearest to a limit, and add them to those that it holds.
 
     Parameters
     ----------
@@ -236,8 +219,6 @@ def check_near(
         ``"cross*.F > 700 N"``, or ``"any limit"``.
     joints : int
         Number of joints for each load of the limit, at least `LEAST_NEAR`.
-    names : iterable of str
-        As in `checks.run_checks`, the same at each call.
     on_start, workers, progress
         As in `check_file`.
 
@@ -264,41 +245,32 @@ def check_near(
             remedy = "give loads that it keeps, see tolstat status"
             raise InputError([Fault("--near", f"the file does not keep {', '.join(lacking)}", remedy)])
         check_version(store)
-        chosen = [nearest(one, limit, number) for one in store.each()]
-        fewest = min(slots.size for slots in chosen if slots.size) if any(slots.size for slots in chosen) else 0
+        chosen = [(one, nearest(one, limit, number)) for one in store.each()]
+        fewest = min((slots.size for _, slots in chosen if slots.size), default=0)
         if fewest < LEAST_NEAR:
             found = f"has {fewest} settled joints; {LEAST_NEAR} are needed"
-            raise StoreError(str(Fault(str(path), found, f"add joints: tolstat extend {path}")))
+            raise store_error(path, found, f"add joints: tolstat extend {path}")
         on_start()
-        for one, slots in zip(store.each(), chosen, strict=True):
+        for one, slots in chosen:
             before = verification.read(one, verification.NEAR)
             new = slots if before is None else slots[~np.isin(one.row(slots), before.rows)]
             if new.size:
-                params = partial(recorded.parameters, one)
-                made = check_slots(one, params, new, names, workers=workers, progress=progress)
-                verification.write(one, made if before is None else _merged(before, made), verification.NEAR)
-        held = [verification.read(one, verification.NEAR) for one in store.each()]
-        checked = worst.checks([one for one in held if one is not None])
-    assert checked is not None
-    return checked
+                made = check_slots(one, new, QUICK_CHECKS, 0, workers, progress)
+                verification.write([(one, made if before is None else _merged(before, made))], verification.NEAR)
+        return _stored(store, verification.NEAR)
 
 
-def _merged(one: Verification, other: Verification) -> Verification:
+def _merged(*both: Verification) -> Verification:
     """Joints of both, ascending."""
-    rows = np.concatenate([one.rows, other.rows])
-    order = np.argsort(rows)
-    checks = {
-        name: Check(
-            check.description, check.options, np.concatenate([check.results, other.checks[name].results])[order]
-        )
-        for name, check in one.checks.items()
-    }
-    return Verification(one.seed, rows[order], np.concatenate([one.base, other.base])[order], checks)
+    found = verification.together(both)
+    order = np.argsort(found.rows)
+    checks = {name: check._replace(results=check.results[order]) for name, check in found.checks.items()}
+    return found._replace(rows=found.rows[order], base=found.base[order], checks=checks)
 
 
 def check_study(
-    plan: Study,
-    joints: int | str = 24,
+    study: Study,
+    joints: int | None = 24,
     seed: int | None = None,
     names: Iterable[str] = ALL_CHECKS,
     workers: int = 1,
@@ -306,35 +278,30 @@ def check_study(
 ) -> Verification:
     """Check joints of a study that has not been run: simulate them with its own settings and for each check.
 
-    Parameters, returns and raises as `check_file`; the joints returned include those that do not settle. Of several
-    operating points the joints follow one another.
+    Parameters and returns as `check_file`; the joints returned include those that do not settle. Of several operating
+    points the joints follow one another.
+
+    Raises
+    ------
+    InputError
+        When the study chooses its fidelity with ``auto``.
     """
-    each = [_check_at(plan.at(point.name), joints, seed, names, workers, progress) for point in plan.points]
-    found = worst.checks(each)
-    assert found is not None
-    return found
-
-
-def _check_at(
-    plan: Study, joints: int | str, seed: int | None, names: Iterable[str], workers: int, progress: Progress
-) -> Verification:
-    """Check joints of a study with one operating point."""
-    from tolstat.joint import perturb
-    from tolstat.sampling import draw
-
-    number, seed = parse_joints(joints), plan.sampling.seed if seed is None else seed
-    if plan.solver.fidelity == "auto":
+    if study.solver.fidelity == "auto":
         found, remedy = "'auto' is resolved when the campaign runs", "run the study, and verify its result file"
-        raise InputError([plan.fault("solver.fidelity", found, remedy)])
-    first = 0 if number is None else plan.first_sample
-    rows = choose(np.arange(first, plan.rows), number, seed)
-    params = recorded.perturbed(plan, rows, draw(plan)[rows], perturb)
-    options = [plan.solvers[number].options() for number in recorded.variants(plan, rows).tolist()]
-    base = simulate_each(params, options)
-    checks = run_checks(params, options, names, workers=workers, progress=progress)
-    for results in (base, *(check.results for check in checks.values())):
-        selected_results.blank_others(results, plan.output.columns)
-    return Verification(seed, rows, base, checks)
+        raise InputError([study.fault("solver.fidelity", found, remedy)])
+    seed = study.sampling.seed if seed is None else seed
+    rows = choose(np.arange(0 if joints is None else study.first_sample, study.rows), joints, seed)
+    errors = draw(study)[rows]
+    options = [study.solvers[number].options() for number in variants(study, rows).tolist()]
+    each = []
+    for point in study.points:
+        params = perturbed(study.at(point.name), rows, errors)
+        base = simulate_each(params, options)
+        checks = run_checks(params, options, names, workers=workers, progress=progress)
+        for results in (base, *(check.results for check in checks.values())):
+            selected_results.blank_others(results, study.output.columns)
+        each.append(Verification(seed, rows, base, checks))
+    return verification.together(each)
 
 
 def parse_joints(joints: int | str) -> int | None:

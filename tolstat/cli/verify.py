@@ -55,7 +55,6 @@ def verify(
     """
     from tolstat.analysis.accuracy import LEAST_NEAR
     from tolstat.campaign import verify as verification
-    from tolstat.campaign.checks import QUICK_CHECKS
     from tolstat.campaign.verify import check_near
     from tolstat.common.cores import available_cores
     from tolstat.common.files import check_target
@@ -68,7 +67,7 @@ def verify(
         if near is None:
             found = verification.check(what, joints or 24, seed, announce_compilation, count, progress=shown)
         else:
-            found = check_near(what, near, joints or LEAST_NEAR, QUICK_CHECKS, announce_compilation, count, shown)
+            found = check_near(what, near, joints or LEAST_NEAR, announce_compilation, count, shown)
     if as_json:
         typer.echo(as_text(_summary(found)))
     else:

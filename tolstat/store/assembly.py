@@ -1,92 +1,54 @@
-"""Make one result file from others: merge the files of slices, or add pending rows to a file."""
+"""Copy the results of files with rows of a campaign to the new file of the whole campaign."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from pathlib import Path
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from tolstat.common.errors import Fault, InputError
 from tolstat.common.tables import Status
 from tolstat.store import layout
 from tolstat.store.hdf5 import BLOCK
-from tolstat.store.metadata import Metadata
 from tolstat.store.reader import Reader
-from tolstat.store.writer import write_new
 
-OTHER_FILE = "give another file: --out OTHER.h5"
-"""Remedy where a file exists already."""
 COPY_BYTES = 1 << 25
 """Approximate number of bytes of a column that are copied at a time."""
 
 
-class DifferingResults(Exception):
-    """Two files hold different results for the same joint.
+def copy_results(file: h5py.File, sources: Sequence[Reader]) -> None:
+    """Copy finished joints from files with rows of a campaign to the new file of the whole campaign.
 
-    Attributes
-    ----------
-    row : int
-        Row of the campaign.
-    column : str
-        The first column that differs.
-    """
-
-    def __init__(self, row: int, column: str) -> None:
-        self.row, self.column = row, column
-        super().__init__(f"row {row}: {column} differs")
-
-
-def assemble(
-    path: Path,
-    metadata: Metadata,
-    sources: Sequence[Reader],
-    errors: Iterable[NDArray[np.void]],
-    design: NDArray[np.void] | None = None,
-    origin: Iterable[NDArray[np.void]] | None = None,
-    overwrite: bool = False,
-) -> None:
-    """Create the result file of a whole campaign from files that hold parts of its rows.
-
-    Parameters
-    ----------
-    path : Path
-        The file to create. It is written under a temporary name and renamed when complete.
-    metadata : Metadata
-        Metadata of the new file.
-    sources : sequence of Reader
-        Files with rows of the campaign; for a row in several files, a finished result takes precedence over pending.
-    errors, design, origin
-        Of all rows, see `layout.create`.
-    overwrite : bool
-        Whether to replace a file at `path`.
+    For a row in several of them, a finished result takes precedence over pending.
 
     Raises
     ------
-    DifferingResults
-        When two sources hold different results of one row.
-    StoreError
-        When `path` exists and must not be replaced, or cannot be written.
+    InputError
+        When two of them hold different results of one row.
     """
+    for source in sources:
+        for one in source.each():
+            for row, column in _copy(file, one):
+                holding = [str(store.path) for store in sources if row in store.rows]
+                found = f"hold different results of row {row}: {column} differs"
+                remedy = f"find the file that is wrong, and leave it out: tolstat replay {holding[0]} --row {row}"
+                raise InputError([Fault(" and ".join(holding), found, remedy)])
 
-    def copy_all(file: h5py.File) -> None:
-        for source in (one for whole in sources for one in whole.each()):
-            _copy(file, source)
 
-    write_new(path, metadata, OTHER_FILE, errors, design, origin, copy_all, overwrite)
-
-
-def _copy(file: h5py.File, source: Reader) -> None:
-    """Copy finished joints, and compare the results of those that the file has already."""
+def _copy(file: h5py.File, source: Reader) -> Iterator[tuple[int, str]]:
+    """Copy finished joints; yield row and column of those that the file has already with another result."""
     place = layout.place_of(source.point or "") or "/"
+    columns = [("ledger", "attempt"), *(("histories", name) for name in source.history_specs)]
+    columns += [("results", c.name) for c in source.columns]  # the status last: it says what a file holds
     for first in range(0, source.n, BLOCK):
         own = slice(first, min(first + BLOCK, source.n))
         there = slice(source.row(own.start), source.row(own.stop))
         done = source.status(own) != Status.PENDING
         held = file[place]["results/status"][there] != Status.PENDING
-        for group, name in _columns(source):
+        for group, name in columns:
             dataset = file[place][group][name]
             for part in _parts(own, dataset):
                 here = slice(part.start - own.start, part.stop - own.start)
@@ -97,16 +59,9 @@ def _copy(file: h5py.File, source: Reader) -> None:
                     new = ~held[here]
                 same = (_bytes(values[both]) == _bytes(before[both])).all(axis=1)
                 if group != "ledger" and not same.all():
-                    raise DifferingResults(int(target.start + np.flatnonzero(both)[np.argmin(same)]), name)
+                    yield int(target.start + np.flatnonzero(both)[np.argmin(same)]), name
                 before[new] = values[new]
                 dataset[target] = before
-
-
-def _columns(source: Reader) -> Iterator[tuple[str, str]]:
-    """Yield group and name of the datasets of an operating point, the status last: it says what a file holds."""
-    yield "ledger", "attempt"
-    yield from (("histories", name) for name in source.history_specs)
-    yield from (("results", c.name) for c in source.columns)
 
 
 def _parts(rows: slice, dataset: h5py.Dataset) -> Iterator[slice]:

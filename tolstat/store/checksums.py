@@ -12,15 +12,14 @@ import hashlib
 import zlib
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import h5py
 import numpy as np
-from h5py import h5d, h5s
 from numpy.typing import NDArray
 
 from tolstat.store import layout
-from tolstat.store.hdf5 import put_attributes, told_as_damage
+from tolstat.store.hdf5 import put_attributes, put_scale, told_as_damage
 from tolstat.store.layout import Stored
 from tolstat.store.metadata import Metadata
 
@@ -129,9 +128,8 @@ class CheckedFile:
     def digest(self, paths: Sequence[str]) -> str:
         """SHA-256 of the checksums of some datasets."""
         with told_as_damage(self.path):
-            return hashlib.sha256(
-                self.file[GROUP]["crc"][:][[self._index[path] for path in paths]].tobytes()
-            ).hexdigest()
+            known = self.file[GROUP]["crc"][:][[self._index[path] for path in paths]]
+            return hashlib.sha256(known.tobytes()).hexdigest()
 
 
 def blocks_of(n: int) -> int:
@@ -146,15 +144,9 @@ def create(file: h5py.File, metadata: Metadata) -> None:
     crc = group.create_dataset("crc", data=np.zeros((len(stored), len(blocks)), "u8"))
     put_attributes(group, {"description": "CRC-32 of each column and block of rows, plus 2^32; 0 if never computed"})
     put_attributes(crc, {"units": "1", "description": "of path, type, shape and first slot as text, then the bytes"})
-    scales = {
-        "column": (np.array([one.path.encode() for one in stored]), "path of the dataset in this file"),
-        "block": (blocks, "first file slot of the block"),
-    }
-    for k, (name, (values, about)) in enumerate(scales.items()):
-        scale = group.create_dataset(name, data=values)
-        scale.make_scale(name)
-        put_attributes(scale, {"units": "1", "description": about})
-        crc.dims[k].attach_scale(scale)
+    columns = np.array([one.path.encode() for one in stored])
+    crc.dims[0].attach_scale(put_scale(group, "column", columns, "1", "path of the dataset in this file"))
+    crc.dims[1].attach_scale(put_scale(group, "block", blocks, "1", "first file slot of the block"))
     update(file, metadata, False, np.arange(len(blocks)))
 
 
@@ -171,21 +163,19 @@ def computed(file: h5py.File, stored: Sequence[Stored], blocks: NDArray[np.intp]
     found = np.empty((len(stored), len(blocks)), np.uint64)
     runs = np.split(np.arange(len(blocks)), np.flatnonzero(np.diff(blocks) != 1) + 1) if len(blocks) else []
     for k, own in enumerate(stored):
-        dataset = h5d.open(file.id, own.path.encode())
         for run in runs:
-            found[k, run] = _of_run(dataset, own, int(blocks[run[0]]), int(blocks[run[-1]]) + 1)
+            found[k, run] = _of_run(file[own.path], own, int(blocks[run[0]]), int(blocks[run[-1]]) + 1)
     return found
 
 
-def _of_run(dataset: h5d.DatasetID, stored: Stored, first: int, last: int) -> list[int]:
+def _of_run(dataset: h5py.Dataset, stored: Stored, first: int, last: int) -> list[int]:
     """Checksums of consecutive blocks; several are read together, or one in pieces if it is large."""
     n, stop = stored.shape[0], min(last * ROWS, stored.shape[0])
-    step = (
-        1 << ((READ_BYTES // stored.row_bytes) or 1).bit_length() - 1
-    )  # a power of two, as ROWS: one divides the other
+    # a power of two, as ROWS: one divides the other
+    step = 1 << ((READ_BYTES // stored.row_bytes) or 1).bit_length() - 1
     found, crc = [], 0
     for begin in range(first * ROWS, stop, step):
-        values = _read(dataset, stored, begin, min(begin + step, stop))
+        values = dataset[begin : min(begin + step, stop)]
         for start in range(begin, begin + len(values), ROWS):
             if start % ROWS == 0:
                 shape = (min(start + ROWS, n) - start, *stored.shape[1:])
@@ -195,11 +185,3 @@ def _of_run(dataset: h5d.DatasetID, stored: Stored, first: int, last: int) -> li
             if end % ROWS == 0 or end == n:
                 found.append(crc + KNOWN)
     return found
-
-
-def _read(dataset: h5d.DatasetID, stored: Stored, begin: int, end: int) -> NDArray[Any]:
-    values = np.empty((end - begin, *stored.shape[1:]), stored.dtype)
-    there = dataset.get_space()
-    there.select_hyperslab((begin, *(0,) * (len(stored.shape) - 1)), values.shape)
-    dataset.read(h5s.create_simple(values.shape), there, values)
-    return values

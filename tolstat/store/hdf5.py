@@ -6,14 +6,13 @@ import errno
 import os
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
-from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
-from h5py import h5a, h5d, h5f, h5g, h5p, h5s, h5t
+from h5py import h5d, h5f, h5p, h5s
 from numpy.typing import NDArray
 
 from tolstat.common.errors import Fault, StoreError
@@ -185,25 +184,18 @@ def put(group: h5py.Group, rows: NDArray[np.intp], columns: Mapping[str, NDArray
 def put_attributes(holder: h5py.Group | h5py.Dataset, values: Mapping[str, str | int | float]) -> None:
     """Write attributes; texts are fixed-length UTF-8, which MATLAB and Fortran can read, except very long ones."""
     for name, value in values.items():
-        if isinstance(value, str) and len(value.encode()) <= MAX_FIXED_TEXT:
-            put_text(holder.id, name, value)
+        if isinstance(value, str) and len(data := value.encode()) <= MAX_FIXED_TEXT:
+            holder.attrs.create(name, np.bytes_(data), dtype=h5py.string_dtype("utf-8", max(1, len(data))))
         else:
             holder.attrs.create(name, value)
 
 
-def put_text(held: h5d.DatasetID | h5g.GroupID, name: str, value: str) -> None:
-    """Write a text of at most `MAX_FIXED_TEXT` bytes as an attribute, without h5py's objects: each column has two."""
-    data, own = value.encode(), name.encode()
-    size = max(1, len(data))
-    stored = _text_type(size)
-    if h5a.exists(held, own):
-        h5a.delete(held, own)
-    h5a.create(held, own, stored, h5s.create(h5s.SCALAR)).write(np.array(data, f"S{size}"), mtype=stored)
-
-
-@lru_cache(256)
-def _text_type(size: int) -> h5t.TypeID:
-    return h5t.py_create(h5py.string_dtype("utf-8", size), logical=True)
+def put_scale(group: h5py.Group, name: str, values: NDArray[Any], unit: str, description: str) -> h5py.Dataset:
+    """Create a dimension scale: the values along an axis of other datasets."""
+    scale = group.create_dataset(name, data=values, dtype=h5py.string_dtype() if values.dtype.kind == "O" else None)
+    scale.make_scale(name)
+    put_attributes(scale, {"units": unit, "description": description})
+    return scale
 
 
 def text(attrs: h5py.AttributeManager, name: str) -> str:

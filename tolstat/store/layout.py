@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import h5py
 import numpy as np
-from h5py import h5d, h5ds, h5p, h5s, h5t
+from h5py import h5d, h5p
 from numpy.typing import NDArray
 
 from tolstat.common import draw_records, selected_results
@@ -21,7 +21,7 @@ from tolstat.common.columns import DESIGN_COLUMNS, ERROR_COLUMNS, LEDGER_COLUMNS
 from tolstat.common.load_kinds import BUSHINGS, CONTACTS, PINS, SHAFTS
 from tolstat.common.tables import SCHEMA_VERSION, HistorySpec, Mode, Motion, Status
 from tolstat.store import metadata as documents
-from tolstat.store.hdf5 import BLOCK, put, put_attributes, put_text, store_error
+from tolstat.store.hdf5 import BLOCK, put, put_attributes, put_scale, store_error
 from tolstat.store.metadata import Metadata
 
 FILETYPE = "tolstat campaign"
@@ -221,16 +221,9 @@ def create_table(
         group[link] = holder.file[link]
     if scale is not None:
         group[scale.name.rpartition("/")[2]] = scale
-    extent, codes = h5s.create_simple((n,)), MEANINGS if codes is None else codes
-    blank = blocks is None
-    types = {c.dtype: (h5t.py_create(np.dtype(c.dtype), logical=True), _allocated(c.dtype, blank)) for c in columns}
+    codes = MEANINGS if codes is None else codes
     for c in columns:
-        held = h5d.create(group.id, c.name.encode(), types[c.dtype][0], extent, types[c.dtype][1])
-        h5ds.attach_scale(held, row.id, 0)
-        put_text(held, "units", c.unit)
-        put_text(held, "description", c.description)
-        if c.name in codes:
-            put_meanings(h5py.Dataset(held), codes[c.name])
+        _create(group, c.name, (n,), c, row, codes, blocks is None)
     first = 0
     for block in blocks or ():
         put(group, np.arange(first, first + len(block)), {c.name: c.of(block) for c in columns})
@@ -245,12 +238,25 @@ def _create_histories(place: h5py.Group, metadata: Metadata) -> None:
     for link in LINKED:
         group[link] = place.file[link]
     for name, spec in metadata.histories.items():
-        shape = (metadata.n, *spec.shape)
-        dataset = group.create_dataset(name, shape, spec.dtype, dcpl=_allocated(spec.dtype, blank=True))
-        put_attributes(dataset, {"units": spec.unit, "description": spec.description})
-        if name in MEANINGS:
-            put_meanings(dataset, MEANINGS[name])
-        attach_scales(dataset, row, spec)
+        attach_scales(_create(group, name, (metadata.n, *spec.shape), spec, row, MEANINGS), spec)
+
+
+def _create(
+    group: h5py.Group,
+    name: str,
+    shape: tuple[int, ...],
+    about: Column | HistorySpec,
+    row: h5py.Dataset,
+    codes: Mapping[str, Mapping[int, str]],
+    blank: bool = True,
+) -> h5py.Dataset:
+    """Create a dataset with a row for each joint; see `_allocated` for its values."""
+    dataset = group.create_dataset(name, shape, about.dtype, dcpl=_allocated(about.dtype, blank))
+    dataset.dims[0].attach_scale(row)
+    put_attributes(dataset, {"units": about.unit, "description": about.description})
+    if name in codes:
+        put_meanings(dataset, codes[name])
+    return dataset
 
 
 def _allocated(dtype: str | None, blank: bool = False) -> h5p.PropDCID:
@@ -283,18 +289,13 @@ AXES: dict[str, tuple[tuple[str, ...], str]] = {
 """Names along an axis of a history, and what they name, by axis."""
 
 
-def attach_scales(dataset: h5py.Dataset, row: h5py.Dataset, spec: HistorySpec) -> None:
-    """Attach dimension scales to a history: `row` to the first axis, those named in `spec` to the others."""
-    dataset.dims[0].attach_scale(row)
+def attach_scales(dataset: h5py.Dataset, spec: HistorySpec) -> None:
+    """Attach dimension scales to a history: those named in `spec` to all axes but the first."""
     name = dataset.name.rpartition("/")[2]
     given = spec.axes or tuple(f"{name}_axis{k}" for k in range(1, dataset.ndim))
     for k, (axis, size) in enumerate(zip(given, spec.shape, strict=True), 1):
         if axis not in dataset.parent:
-            values, unit, description = scale_of(axis, size)
-            text = h5py.string_dtype() if values.dtype.kind == "O" else None
-            scale = dataset.parent.create_dataset(axis, data=values, dtype=text)
-            scale.make_scale(axis)
-            put_attributes(scale, {"units": unit, "description": description})
+            put_scale(dataset.parent, axis, *scale_of(axis, size))
         dataset.dims[k].attach_scale(dataset.parent[axis])
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import FloatArray
 from tolstat.store.view import View
+from tolstat.store.worst import rank
 
 
 def point_of(view: View, name: str) -> str:
@@ -26,13 +27,7 @@ def point_of(view: View, name: str) -> str:
     """
     at, plain = view.narrowed(name)
     limit = view.load(name).limit
-
-    def rank(part: View) -> tuple[float, float]:
-        load = part.load(plain)
-        share = 0.0 if limit is None else float(np.nan_to_num(load.above(limit).estimate))
-        return share, float(load.valid[int(0.99 * (load.valid.size - 1))]) if load.valid.size else 0.0
-
-    return max(at.parts, key=rank).points[0]
+    return max(at.parts, key=lambda part: rank(part.load(plain), limit)).points[0]
 
 
 def shares_of_time(view: View) -> FloatArray:

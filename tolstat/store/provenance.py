@@ -26,25 +26,18 @@ def versions() -> dict[str, str]:
     return found | {name: metadata.version(name) for name in LIBRARIES}
 
 
-def differing_code(held: Mapping[str, str]) -> list[str]:
-    """Compare the code that began a file with that of now: only equal code adds joints to a file.
-
-    Parameters
-    ----------
-    held : mapping of str to str
-        Versions in the file, see `versions`.
-
-    Returns
-    -------
-    list of str
-        ``"tolstat: version 0.1.0 in the file, 0.2.0 now"`` for each difference.
-    """
-    now = {"tolstat": ("version", tolstat.__version__), "sources": ("hash", source_hash())}
+def differing(held: Mapping[str, str], other: Mapping[str, str], here: str, there: str) -> list[str]:
+    """Compare two records of `versions`: ``"numpy: 2.1.0 in the file, 2.2.0 now"`` for each of `other` that differs."""
     return [
-        f"{name}: {noun} {held.get(name, 'unknown')} in the file, {own} now"
-        for name, (noun, own) in now.items()
+        f"{name}: {held.get(name, 'unknown')} {here}, {own} {there}"
+        for name, own in other.items()
         if held.get(name) != own
     ]
+
+
+def differing_code(held: Mapping[str, str]) -> list[str]:
+    """Compare the code that began a file with that of now: only equal code adds joints to a file."""
+    return differing(held, {"tolstat": tolstat.__version__, "sources": source_hash()}, "in the file", "now")
 
 
 def source_hash() -> str:

@@ -26,7 +26,7 @@ from tolstat.common.tables import Motion, Status
 from tolstat.joint import Operation
 from tolstat.store import layout, metadata
 from tolstat.store.checksums import ROWS, CheckedFile, Integrity
-from tolstat.store.hdf5 import BLOCK, RUN_AGAIN, is_locked, open_hdf5, pick, store_error, told_as_damage
+from tolstat.store.hdf5 import RUN_AGAIN, TOGETHER, is_locked, open_hdf5, pick, store_error, told_as_damage
 from tolstat.study.points import Point, only_one
 
 LOG = logging.getLogger("tolstat.store")
@@ -194,15 +194,14 @@ class Reader:
     @property
     def complete(self) -> bool:
         """Whether no row is pending, at any operating point."""
-        return all(next(one.pending_blocks(), None) is None for one in self.each())
+        return next(self.pending_blocks(), None) is None
 
     def counts(self) -> Counts:
         """Count the joints of the file by status; each at every operating point."""
         each = self.each()
         counts = Counts(self.n * len(each), 0, 0, 0, points=len(each))
         for one in each:
-            for first in range(0, self.n, BLOCK):
-                counts = counts.after(one.status(slice(first, first + BLOCK)))
+            counts = counts.after(one.status())
         return counts
 
     def session(self) -> Session | None:
@@ -225,15 +224,21 @@ class Reader:
         return self._codes(found, Status)
 
     def pending(self) -> NDArray[np.intp]:
-        """File slots still to be simulated, ascending."""
-        return np.concatenate([np.empty(0, np.intp), *self.pending_blocks()])
+        """File slots still to be simulated at the operating point, ascending."""
+        return np.flatnonzero(self.status() == Status.PENDING)
 
-    def pending_blocks(self) -> Iterator[NDArray[np.intp]]:
-        """Yield the file slots still to be simulated, ascending, in non-empty arrays of at most `BLOCK`."""
-        for first in range(0, self.n, BLOCK):
-            found = np.flatnonzero(self.status(slice(first, first + BLOCK)) == Status.PENDING)
-            if found.size:
-                yield found + first
+    def pending_blocks(self, stop: int | None = None) -> Iterator[tuple[Self, NDArray[np.intp]]]:
+        """Yield the pending file slots below `stop`, ascending, with the file at their operating point.
+
+        Of `TOGETHER` rows at a time those of all points: after an interruption few joints are done at some points only.
+        """
+        each, stop = self.each(), self.n if stop is None else stop
+        for first in range(0, stop, TOGETHER):
+            for one in each:
+                status = one.status(slice(first, min(first + TOGETHER, stop)))
+                slots = first + np.flatnonzero(status == Status.PENDING)
+                if slots.size:
+                    yield one, slots
 
     def results(self, slots: slice = slice(None), fields: Sequence[str] | None = None) -> NDArray[np.void]:
         """Results of every joint, (n,) table RESULT, or of a slice of file slots.
@@ -350,12 +355,6 @@ class Reader:
         checked = self._checked.number % 2 == 0
         found = self._checked.check()
         return Integrity(checked, {path: [self._rows_of(b) for b in own.tolist()] for path, own in found.items()})
-
-    def check_errors(self) -> None:
-        """Compare errors, and how joints were drawn, with their checksums; `StoreError` if they are damaged."""
-        for path in self._checked.stored:
-            if not layout.is_at_point(path):
-                self._refuse(path, self._checked.damaged((path,), 0, self.n))
 
     def results_checksum(self) -> str:
         """Number that is equal for files with the same joints and results; empty while they have no checksums."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -129,9 +129,7 @@ def parameters(store: Reader, rows: NDArray[np.intp]) -> NDArray[np.void]:
     return params
 
 
-def perturbed(
-    study: Study, rows: NDArray[np.intp], errors: NDArray[np.void], perturb: Callable[..., NDArray[np.void]]
-) -> NDArray[np.void]:
+def perturbed(study: Study, rows: NDArray[np.intp], errors: NDArray[np.void]) -> NDArray[np.void]:
     """Parameters of `rows` of the campaign, (m,) table PARAM, each computed from the joint and point of its variant."""
     params = np.empty(len(rows), PARAM)
     variant = variants(study, rows)

@@ -13,7 +13,6 @@ from tolstat.common.aside import Aside
 from tolstat.common.channels import BUSHING_LOADS, CHANNELS, LOAD_HISTORIES, MEASURING, LoadHistory, histories_of
 from tolstat.common.errors import Fault, StoreError
 from tolstat.common.shown import shown
-from tolstat.common.tables import Options
 from tolstat.joint import perturb
 from tolstat.solver.compilation import is_compiled, warm_up
 from tolstat.solver.harmonics import restore
@@ -227,26 +226,15 @@ def _again(store: Reader, slots: NDArray[np.intp]) -> tuple[Loads, float]:
 
 
 def _simulated(store: Reader, slots: NDArray[np.intp]) -> Again:
-    """Read from the file what it takes to simulate joints again, and do so."""
-    first = int(slots[0])
+    """Simulate joints again with what the file holds of them, and compare with its results."""
+    first, steps = int(slots[0]), int(store.options["steps_per_rev"])
     params = perturb(joint_of(store, first), operation_of(store, first), pick(store.errors, slots))
-    attempts = pick(store.attempt, slots)
-    stored = pick(store.results, slots)[LARGEST].copy()
-    settings = [(here, options_of(store, int(slots[here[0]]))) for here in _alike(attempts)]
-    return _simulate(params, settings, stored, int(store.options["steps_per_rev"]))
-
-
-def _alike(attempts: NDArray[np.int32]) -> list[NDArray[np.intp]]:
-    return [np.flatnonzero(attempts == attempt) for attempt in np.unique(attempts)]
-
-
-def _simulate(
-    params: NDArray[np.void], settings: list[tuple[NDArray[np.intp], Options]], stored: NDArray[np.void], steps: int
-) -> Again:
-    loads = {h.name: np.empty((len(params), steps, *h.shape), np.float32) for h in LOAD_HISTORIES}
-    apart = np.zeros(len(params))
-    for here, options in settings:
-        found = simulate_rows(params[here], options, "full")
+    attempts, stored = pick(store.attempt, slots), pick(store.results, slots)[LARGEST].copy()
+    loads = {h.name: np.empty((len(slots), steps, *h.shape), np.float32) for h in LOAD_HISTORIES}
+    apart = np.zeros(len(slots))
+    for attempt in np.unique(attempts):
+        here = np.flatnonzero(attempts == attempt)
+        found = simulate_rows(params[here], options_of(store, int(slots[here[0]])), "full")
         for name, values in loads.items():
             samples = found.histories[name]
             values[here] = samples[:, np.arange(steps) * samples.shape[1] // steps]

@@ -15,7 +15,7 @@ from tolstat.common import selected_results, tables
 from tolstat.common.columns import Column
 from tolstat.common.shown import shown
 from tolstat.store import layout
-from tolstat.store.hdf5 import DAMAGE_ERRORS, pick, put_attributes, store_error, text
+from tolstat.store.hdf5 import DAMAGE_ERRORS, pick, put_attributes, put_scale, store_error, text
 from tolstat.store.metadata import CHECKSUM
 from tolstat.store.reader import Reader
 from tolstat.store.writer import Writer
@@ -107,12 +107,19 @@ def _checksum(group: h5py.Group) -> str:
     return digest.hexdigest()
 
 
-def write(store: Writer, verification: Verification, name: str = VERIFY) -> None:
-    """Write a verification to a group of a result file, replacing an earlier one; otherwise as `write_all`."""
-    write_all([(store, verification)], name)
+def together(parts: Sequence[Verification]) -> Verification:
+    """Verifications as one, joints one after the other, with the checks that all of them have."""
+    first = parts[0]
+    checks = {
+        name: check._replace(results=np.concatenate([part.checks[name].results for part in parts]))
+        for name, check in first.checks.items()
+        if all(name in part.checks for part in parts)
+    }
+    rows, base = np.concatenate([part.rows for part in parts]), np.concatenate([part.base for part in parts])
+    return Verification(first.seed, rows, base, checks)
 
 
-def write_all(found: Sequence[tuple[Writer, Verification]], name: str = VERIFY) -> None:
+def write(found: Sequence[tuple[Writer, Verification]], name: str = VERIFY) -> None:
     """Write verifications at operating points of one file, replacing earlier ones; the file is replaced once for all.
 
     Raises
@@ -135,9 +142,8 @@ def _write(holder: h5py.Group, place: str, verification: Verification, columns: 
     about = "joints of the campaign simulated again in other ways, to know its numerical error"
     names = " ".join(verification.checks)
     put_attributes(group, {"description": about, "seed": verification.seed, "checks": names})
-    rows = group.create_dataset("rows", data=verification.rows.astype("i8"))
-    rows.make_scale("rows")
-    put_attributes(rows, {"units": "1", "description": "rows of the joints in the campaign, counted from 0"})
+    about = "rows of the joints in the campaign, counted from 0"
+    rows = put_scale(group, "rows", verification.rows.astype("i8"), "1", about)
     for name, check in verification.checks.items():
         layout.create_table(group, name, columns, len(rows), [check.results], scale=rows)
         options = json.dumps(check.options, allow_nan=False)

@@ -108,16 +108,17 @@ class View:
     @cached_property
     def verification(self) -> Verification | None:
         """The verification that the file holds, if any."""
-        if len(self.parts) > 1:
-            return worst.checks([part.verification for part in self.parts])
-        return verification.read(self.store)
+        return self._verified(verification.VERIFY)
 
     @cached_property
     def near(self) -> Verification | None:
         """The verification of joints near limits that the file holds, if any."""
-        if len(self.parts) > 1:
-            return worst.checks([part.near for part in self.parts])
-        return verification.read(self.store, verification.NEAR)
+        return self._verified(verification.NEAR)
+
+    def _verified(self, group: str) -> Verification | None:
+        """Verifications of all operating points; None if one of them has none."""
+        found = [one for part in self.parts if (one := verification.read(part.store, group)) is not None]
+        return verification.together(found) if len(found) == len(self.parts) else None
 
     @cached_property
     def altered(self) -> dict[str, Altered]:
@@ -256,11 +257,8 @@ class View:
         found: dict[str, tuple[tuple[float, float], str]] = {}
         for load in self.loads(list(self.limits) or self.bushing_loads):
             if load.valid.size:
-                limit = 1.0 if load.limit is None else load.limit
-                share = 0.0 if load.limit is None else load.above(limit).estimate
-                rank = (share, float(load.valid[int(0.99 * (load.valid.size - 1))]) / limit)
-                kind = LOADS[split(load.name)[0]].kind.key
-                found[kind] = max(found.get(kind, (rank, load.name)), (rank, load.name), key=lambda item: item[0])
+                kind, own = LOADS[split(load.name)[0]].kind.key, (worst.rank(load, load.limit), load.name)
+                found[kind] = max(found.get(kind, own), own, key=lambda item: item[0])
         return tuple(name for _, name in found.values())
 
     @property

@@ -9,12 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.analysis.column import Column, Inexact, frozen, largest
-from tolstat.analysis.sample import is_valid
+from tolstat.analysis.sample import Sample, is_valid
 from tolstat.common.load_kinds import SPAN
 from tolstat.common.loads import LOAD_FIELDS, LOADS, FloatArray, Limit, Load, Results, split
 from tolstat.common.tables import FAILED, RESULT, UNSETTLED, VALID, Status, deciding, without_results, worst_status
 from tolstat.store.reader import Reader
-from tolstat.store.verification import Verification
 
 AT_ONCE = 16_384
 """Rows read at once. They are written to a table column by column, faster where it fits the processor's cache."""
@@ -115,21 +114,12 @@ def nominal(parts: Sequence[NDArray[np.void]]) -> NDArray[np.void]:
     return found
 
 
-def checks(parts: Sequence[Verification | None]) -> Verification | None:
-    """Verifications of several operating points as one, joints one after the other; None if one of them has none."""
-    own = [part for part in parts if part is not None]
-    if len(own) < len(parts):
-        return None
-    names = [name for name in own[0].checks if all(name in part.checks for part in own)]
-    return Verification(
-        own[0].seed,
-        np.concatenate([part.rows for part in own]),
-        np.concatenate([part.base for part in own]),
-        {
-            name: own[0].checks[name]._replace(results=np.concatenate([part.checks[name].results for part in own]))
-            for name in names
-        },
-    )
+def rank(load: Sample, limit: float | None) -> tuple[float, float]:
+    """Share of the joints above a limit, and the load that 99 % do not exceed, relative to the limit if any."""
+    if not load.valid.size:
+        return 0.0, 0.0
+    share = 0.0 if limit is None else float(np.nan_to_num(load.above(limit).estimate))
+    return share, float(load.valid[int(0.99 * (load.valid.size - 1))]) / (1.0 if limit is None else limit)
 
 
 class FirstPass(NamedTuple):

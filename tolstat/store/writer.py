@@ -112,7 +112,9 @@ class Writer(Reader):
         """Compare everything with its checksums: errors must match, joints with damaged results become pending."""
         found = self._checked.check()
         self._written = np.full(blocks_of(self.n), self._checked.number % 2 == 1)
-        self.check_errors()
+        for path in found:
+            if not layout.is_at_point(path):
+                self._refuse(path, found[path])
         block = np.arange(self.n) // ROWS
         for one in self.each():
             places = [layout.path_of(one.point or "", group, "") for group in layout.AT_POINTS]
@@ -146,7 +148,10 @@ class Writer(Reader):
             When the file cannot be written, e.g. because the disk is full.
         """
         results, histories = simulation
-        self._check_block(rows, simulation)
+        expected = {name: (len(rows), *spec.shape) for name, spec in self.history_specs.items()}
+        shapes = {name: values.shape for name, values in histories.items()}
+        if len(results) != len(rows) or shapes != expected or np.any(results["status"] == Status.PENDING):
+            raise ValueError("each row of a block needs a result that is not pending, and the histories of the file")
         kept = {c.name: c.of(results) for c in self.columns}
         status = {"status": kept.pop("status")}
         with self._told("cannot be written", "free disk space, " + KEPT):
@@ -251,20 +256,6 @@ class Writer(Reader):
 
         self.replace(both)
         self._describe(held)
-
-    def _check_block(self, rows: NDArray[np.intp], simulation: Simulation) -> None:
-        """Refuse what `write` must not be called with."""
-        results, histories = simulation
-        if len(results) != len(rows):
-            raise ValueError(f"{len(results)} results for {len(rows)} rows")
-        if np.any(results["status"] == Status.PENDING):
-            raise ValueError("a simulated joint must not have the status PENDING")
-        if set(histories) != set(self.history_specs):
-            raise ValueError(f"histories {sorted(histories)} given, {sorted(self.history_specs)} expected")
-        for name, spec in self.history_specs.items():
-            if histories[name].shape != (len(rows), *spec.shape):
-                expected = (len(rows), *spec.shape)
-                raise ValueError(f"history {name}: shape {histories[name].shape}, {expected} expected")
 
     def _begin_writing(self, rows: NDArray[np.intp]) -> None:
         """Tell readers, on the disk, that checksums of results do not hold until `finish`."""

@@ -297,7 +297,7 @@ def test_every_fault_of_a_question_is_told(tmp_path):
     for options, text in (
         ([], "--limit: is missing"),
         (["--limit", "cross1.F"], "'cross1.F' is not a limit"),
-        (["--limit", "any limit"], 'write "any limit"'),
+        (["--limit", "all limits"], 'write "any limit"'),
         (["--limit", "cross9.F > 1 N"], "'cross9.F' is not a load"),
         (["--limit", "cross1.F > 1 mm"], "--limit: cross1.F"),
         (["--limit", "fork1.T > 1 N*m"], "leaves out fork1.T"),

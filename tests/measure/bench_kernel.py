@@ -13,7 +13,7 @@ from tests.measure.kernel_parts import STATES, TIMES, Once
 from tests.support.environment import ROOT
 from tests.support.kernel_states import into_lanes, sample, snapshots
 from tolstat import study
-from tolstat.common.tables import Fidelity
+from tolstat.common.tables import Fidelity, Status
 from tolstat.solver import simulation
 
 pytest.importorskip("pytest_benchmark")
@@ -38,27 +38,38 @@ def test_part_of_one_joint(benchmark, these, snaps, part):
     par = snap.params.view(np.recarray)[0]
     which = getattr(kernel_parts, part.upper())
     benchmark(kernel_parts.repeat, which, TIMES, snap.t, snap.cv, snap.ca, state, par, these.options, work)
+    assert np.isfinite(state.residual).all()
+    assert state.residual.any()
 
 
 @pytest.mark.parametrize("part", Once._fields)
 def test_part_in_lanes(benchmark, these, snaps, part):
     batch = into_lanes(snaps, these.options)
     benchmark(kernel_parts.repeat_in_lanes, getattr(kernel_parts, part.upper()), TIMES, these.options, batch)
+    residual = batch.motion["residual"]
+    assert np.isfinite(residual).all()
+    assert residual.any()
 
 
 def test_start(benchmark, these):
     rows = these.params.view(np.recarray)
-    benchmark(kernel_parts.start, rows, these.options, simulation.scratch(these.options))
+    scratch = simulation.scratch(these.options)
+    benchmark(kernel_parts.start, rows, these.options, scratch)
+    assert np.isfinite(scratch[1].q).all()
+    assert scratch[1].q.any()
 
 
 def test_joints_in_lanes(benchmark, these):
-    benchmark(simulation.simulate_rows, these.params, these.options)
+    found = benchmark(simulation.simulate_rows, these.params, these.options)
+    assert (found.results["status"] == Status.OK).all()
 
 
 def test_joints_one_at_a_time(benchmark, these):
-    benchmark(kernel_parts.alone, these.params, these.options)
+    results = benchmark(kernel_parts.alone, these.params, these.options)
+    assert (results["status"] == Status.OK).all()
 
 
 def test_quasistatic_joints(benchmark, these):
     static = these.options._replace(fidelity=int(Fidelity.QUASISTATIC))
-    benchmark(simulation.simulate_rows, these.params, static)
+    found = benchmark(simulation.simulate_rows, these.params, static)
+    assert (found.results["status"] == Status.OK).all()

@@ -22,7 +22,7 @@ def drawn(folder, change=lambda text: text):
     text = change(text.replace("[tolerances]", f"[tolerances]{TOLERANCES}"))
     with ResultFile.open(synthetic.store(folder, text)) as store:
         made = store.view()
-        return query.drawn(made), made.errors(np.arange(made.n)), made.design.each(made.n)
+        return query.drawn(made), made.errors(np.arange(made.n)), made.design.counts_as(made.n)
 
 
 def test_errors_of_an_entry_are_counted_together_against_their_band(tmp_path):

@@ -223,10 +223,10 @@ def test_where_the_weights_support_no_joint_share_one_limit_can_only_be_missed(m
     if answer == "no":
         assert "exceed 700 N on cross1.F" in found.words
         assert found.notes[-1].startswith(
-            "No share of the joints that exceed at least one limit: above any limit few joints"
+            "No share of the joints that exceed at least one limit: above any limit, few joints"
         )
     else:
-        assert "above any limit few joints have most of the weight" in found.words
+        assert "above any limit, few joints have most of the weight" in found.words
 
 
 def test_of_limits_that_are_exceeded_equally_often_the_leading_load_is_named_and_marked():

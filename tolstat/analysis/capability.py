@@ -120,7 +120,7 @@ def capability(
     >>> round(found.cpk_normal, 1), found.above.count, found.needed
     (1.3, 0, 3244)
     """
-    return of_sample(Sample.of(values, status, None if iid else Listed(""), ends), limit, confidence)
+    return of_sample(Sample.of(values, status, None if iid else Listed(), ends), limit, confidence)
 
 
 def of_sample(sample: Sample, limit: float, confidence: float = 0.95) -> Capability:

@@ -120,7 +120,7 @@ class Design(ABC):
 
     def without_interval(self, claim: Claim) -> str:
         """Return why an estimate has no interval, with the remedy; empty if it has one."""
-        return "" if claim in self.claims else f"joints of this design give no interval of a {claim}"
+        return "" if claim in self.claims else f"the joints depend on each other: a {claim} has no interval"
 
     def has_interval(self, claim: Claim) -> bool:
         """Whether a claim has an interval."""
@@ -130,8 +130,8 @@ class Design(ABC):
         """Number of the unit of each of n joints, (n,): units are independent of each other."""
         return np.arange(n)
 
-    def each(self, n: int) -> FloatArray:
-        """What each of n joints counts, (n,); the mean is 1."""
+    def counts_as(self, n: int) -> FloatArray:
+        """What each of n joints counts as, (n,); the mean is 1."""
         return np.ones(n)
 
     def doubt(self, x: Column, level: float) -> str:

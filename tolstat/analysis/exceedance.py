@@ -60,7 +60,7 @@ def exceedance(
     >>> found.bound_lower, found.bound_upper
     (0.25, 0.5)
     """
-    return Sample.of(values, status, None if iid else Listed(""), ends).above(level, confidence)
+    return Sample.of(values, status, None if iid else Listed(), ends).above(level, confidence)
 
 
 def quantile(
@@ -95,7 +95,7 @@ def quantile(
     >>> found.estimate, found.lower, found.upper
     (90.0, 84.0, 96.0)
     """
-    return Sample.of(values, status, None if iid else Listed("")).quantile(share, confidence)
+    return Sample.of(values, status, None if iid else Listed()).quantile(share, confidence)
 
 
 def weighted_exceedance(

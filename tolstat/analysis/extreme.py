@@ -191,7 +191,7 @@ def fit(
     TooThinError
         When fewer than `MIN_EXCESSES` joints are above the threshold.
     """
-    return of_sample(Sample.of(values, status, None if iid else Listed("")), share, confidence)
+    return of_sample(Sample.of(values, status, None if iid else Listed()), share, confidence)
 
 
 def of_sample(sample: Sample, share: float | None = None, confidence: float = 0.95) -> Tail:
@@ -239,7 +239,7 @@ def stability(
     TooThinError
         When a share has fewer than `MIN_EXCESSES` joints.
     """
-    sample = Sample.of(values, status, None if iid else Listed(""))
+    sample = Sample.of(values, status, None if iid else Listed())
     n = sample.valid.size
     least = min(0.3, (MIN_EXCESSES + 1) / max(n, 1))
     asked = np.geomspace(0.3, least, 8) if shares is None else np.sort(np.atleast_1d(shares))[::-1]

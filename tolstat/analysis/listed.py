@@ -30,7 +30,7 @@ class Listed(Design):
         Sampling method.
     """
 
-    def __init__(self, method: str) -> None:
+    def __init__(self, method: str = "") -> None:
         self._method = method
         self.is_sample = method in (*WITHOUT_INTERVAL, "random")
 

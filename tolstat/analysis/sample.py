@@ -154,9 +154,9 @@ class Sample:
         return lost.size - unsettled, unsettled
 
     @property
-    def counting(self) -> FloatArray:
-        """What each valid joint counts, in the order of the joints."""
-        return self.design.each(self.values.size)[self.is_valid]
+    def counts_as(self) -> FloatArray:
+        """What each valid joint counts as, in the order of the joints."""
+        return self.design.counts_as(self.values.size)[self.is_valid]
 
     @property
     def long_tailed(self) -> bool:

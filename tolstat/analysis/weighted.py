@@ -201,8 +201,8 @@ class Weighted(Design):
         remedy = 'use tolstat report {path}, or write sampling.method = "random" in the study'
         return Refusal("holds weighted joints (importance sampling), which this statistic does not support", remedy)
 
-    def each(self, n: int) -> FloatArray:
-        """See `Design.each`."""
+    def counts_as(self, n: int) -> FloatArray:
+        """See `Design.counts_as`."""
         return self.weights
 
     def doubt(self, x: Column, level: float) -> str:

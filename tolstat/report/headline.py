@@ -278,7 +278,7 @@ def _reason(view: View, records: Sequence[Row]) -> str:
     n = max(row["n"] for row in records)
     poor = [row for row in records if row["n"] > lost and np.isnan(row["estimate"])]
     if poor:
-        return f"above {text.limit(poor[0])} {view.load(poor[0]['load']).doubt(poor[0]['level'])}"
+        return f"above {text.limit(poor[0])}, {view.load(poor[0]['load']).doubt(poor[0]['level'])}"
     known = known_parts.of(view)
     if known is not None and np.isnan(ends(records[0])[0]):
         unsupported = text.percent(records[0]["unsupported"])

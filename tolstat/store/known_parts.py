@@ -121,7 +121,7 @@ class KnownParts:
             places.append((len(events), len(ends)))
             events += own
         events = [Event(event.above[done], event.counted[done]) for event in events]
-        weights = view.design.each(view.n)[done]
+        weights = view.design.counts_as(view.n)[done]
         found = known_share.tallies(self._sums(), self._known, self._drawn, weights, events)
         return {
             name: (found[k], found[k + 1 : k + 1 + m], found[k + 1 + m : k + 1 + 2 * m])

@@ -84,7 +84,7 @@ def drawn(view: View) -> list[Drawn]:
         return []
     samples = np.arange(min(view.n, JOINTS))
     table = view.errors(samples, sorted({name for names in found.values() for name in names}))
-    weights = view.design.each(view.n)[: len(samples)]
+    weights = view.design.counts_as(view.n)[: len(samples)]
     return [
         _drawn(pattern, number, tuple(dict.fromkeys(names)), unit, band, table, weights)
         for (pattern, number, unit, band), names in found.items()
@@ -113,7 +113,7 @@ def _drawn(
 
 def of_load(load: Sample) -> Histogram:
     """Histogram of a load over its valid joints, counted by weight; bins of equal ratio where it has a long tail."""
-    values, weights = load.values[load.is_valid], load.counting
+    values, weights = load.values[load.is_valid], load.counts_as
     low, high = float(values.min()), float(values.max())
     high = high if high > low else low + max(1e-3 * abs(low), 1e-12)
     edges = np.geomspace(low, high, BINS + 1) if load.long_tailed else np.linspace(low, high, BINS + 1)

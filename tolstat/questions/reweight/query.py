@@ -212,7 +212,7 @@ def _log_ratios(view: View, new: Mapping[str, Distribution], names: Sequence[str
     columns = [column for name in dict.fromkeys((*names, *study.copula.names)) for column in columns_of(name)]
     blocks = view.error_blocks(columns)  # the errors of a million joints would be half a gigabyte
     logs = np.concatenate([_block_log_ratios(study, new, names, errors) for errors in blocks])
-    return logs + np.log(view.design.each(view.n))
+    return logs + np.log(view.design.counts_as(view.n))
 
 
 def _block_log_ratios(

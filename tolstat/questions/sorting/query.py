@@ -91,7 +91,7 @@ def sorted_joints(view: View, cost_file: Path | None = None, confidence: float =
         remedy = 'write sampling.method = "random"'
         raise StoreError(str(Fault(str(view.path), "holds joints that are not independent", remedy)))
     of_part = {part: _accepted(view, [own for own in scrap if own.part == part]) for part in PARTS}
-    base = view.design.each(view.n)
+    base = view.design.counts_as(view.n)
     used = {part: float(np.average(kept, weights=base)) for part, kept in of_part.items()}
     price = _prices(study, costs.of(scaling.tolerances(study), cost_file))
     parts = pd.DataFrame(

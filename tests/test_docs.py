@@ -13,6 +13,7 @@ import tolstat
 from tests.conftest import CHEAP
 from tests.support.environment import ROOT
 from tolstat import cli
+from tolstat.cli import LISTED
 from tolstat.questions import PUBLIC
 from tolstat.questions.lots import query as lots
 from tolstat.questions.selective import query as selective
@@ -24,9 +25,7 @@ PAGES = [
     *sorted(path for path in DOCS.rglob("*.md") if path.parent.name != "api"),
 ]
 NOTEBOOKS = sorted((DOCS / "notebooks").glob("*.ipynb"))
-QUESTIONS = sorted(
-    folder.name for folder in (ROOT / "tolstat" / "questions").iterdir() if (folder / "__init__.py").exists()
-)
+QUESTIONS = sorted(path.stem for path in (ROOT / "tolstat" / "questions").iterdir() if not path.stem.startswith("__"))
 PARTS = ["Intervals", "From Python", "On the page", "Limits of validity"]
 """Headings that each page of a question has, after its commands."""
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -98,11 +97,11 @@ def test_every_page_is_in_the_index() -> None:
 
 
 def test_every_command_is_in_the_index_and_every_heading_of_the_help_in_the_readme() -> None:
-    commands = {name.replace("_", "-") for names in cli.COMMANDS.values() for name in names}
+    commands = set(LISTED)
     named = set(re.findall(r"`tolstat ([a-z-]+)[^`]*`", (DOCS / "index.md").read_text("utf-8")))
     assert named - {"COMMAND"} == commands
     headings = re.findall(r"^\| \*\*(.*?)\*\* \|", README, flags=re.MULTILINE)
-    assert headings == [*cli.COMMANDS]
+    assert headings == [*cli.PLAIN]
 
 
 def test_every_public_name_is_in_the_reference() -> None:

@@ -20,7 +20,6 @@ from typing import TYPE_CHECKING, Any
 from tolstat.questions import PUBLIC
 
 if TYPE_CHECKING:
-    from tolstat.analysis.capability import capability as capability
     from tolstat.analysis.exceedance import exceedance as exceedance
     from tolstat.analysis.exceedance import quantile as quantile
     from tolstat.analysis.exceedance import weighted_exceedance as weighted_exceedance
@@ -50,7 +49,6 @@ _HOMES = {
     "Status": "tolstat.common.tables:Status",
     "StoreError": "tolstat.common.errors:StoreError",
     "TolstatError": "tolstat.common.errors:TolstatError",
-    "capability": "tolstat.analysis.capability:capability",
     "draw": "tolstat.sampling:draw",
     "exceedance": "tolstat.analysis.exceedance:exceedance",
     "load": "tolstat.study:load",

@@ -11,7 +11,7 @@ from tolstat.campaign import checks, verify
 from tolstat.cli import app
 from tolstat.common.errors import InputError
 from tolstat.common.tables import Status
-from tolstat.questions.capability import query as capability
+from tolstat.questions.capability import capability
 from tolstat.questions.exceedance import query as exceeded
 from tolstat.questions.reweight import query as reweight
 from tolstat.store import ResultFile, error_budget
@@ -100,7 +100,7 @@ def test_ppm_and_reweighting_carry_it(path):
         with ResultFile.open(path) as store:
             view = store.view()
             other = reweight.reweighted(view, ["pin1.offset_t.cpk=1.05"]).table
-            return capability.limits(view).set_index("load"), other.set_index("load")
+            return capability(view).frame("limits").set_index("load"), other.set_index("load")
 
     before, reweighted = tables()
     assert reweighted["total_upper"].isna().all()

@@ -14,9 +14,9 @@ from typer.testing import CliRunner, Result
 import tolstat
 from tests.support import synthetic
 from tests.support.environment import ROOT
-from tolstat import cli
+from tolstat.cli import LISTED, app
 
-COMMANDS = [name.replace("_", "-") for names in cli.COMMANDS.values() for name in names]
+COMMANDS = list(LISTED)
 STUDY = (ROOT / "studies" / "iso2768_f.toml").read_text(encoding="utf-8")
 SHORT = {
     "lots": ("--lots", "30", "--joints", "2"),
@@ -28,7 +28,7 @@ SHORT = {
 
 def call(*args: object) -> Result:
     """Run a command in this process."""
-    return CliRunner().invoke(cli.app, [str(arg) for arg in args])
+    return CliRunner().invoke(app, [str(arg) for arg in args])
 
 
 def example(command: str) -> list[str]:

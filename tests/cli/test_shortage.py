@@ -93,8 +93,7 @@ def test_a_page_that_does_not_fit_the_disk_leaves_the_old_one(tmp_path: Path, mo
 
     (tmp_path / "page.html").write_text("the old one")
     template = SimpleNamespace(render=lambda **_: "the new one")
-    made = SimpleNamespace(globals={}, filters={}, get_template=lambda _: template)
-    monkeypatch.setattr(html.templates, "environment", lambda: made)
+    monkeypatch.setattr(html, "environment", lambda _: SimpleNamespace(get_template=lambda _: template))
 
     def full(*_: object, **__: object) -> None:
         raise NO_SPACE

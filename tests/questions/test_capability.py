@@ -11,13 +11,22 @@ from tests.support.views import view
 from tolstat.analysis import binomial, capability, extreme, prediction
 from tolstat.common.loads import ANY_LIMIT
 from tolstat.common.tables import Status
-from tolstat.questions.capability import query, rendering
+from tolstat.display.answer import Sentence
+from tolstat.questions import capability as question
 from tolstat.questions.exceedance.query import limits
 
 SEEDS = 2000
 LIMIT = 3.0
 TRUE_CPK = 1.0
 """Of a standard normal load."""
+
+
+def limits_of(made):
+    return question.capability(made).frame("limits")
+
+
+def notes_of(made):
+    return " ".join(part.text for part in question.capability(made).parts if isinstance(part, Sentence))
 
 
 def within(lower, upper, truth):
@@ -147,7 +156,7 @@ def test_limit_below_the_median_is_a_negative_index():
 
 def test_a_joint_is_good_when_no_load_is_above_its_limit():
     made = view(limits={"cross1.F": 700.0, "fork3.T": 26.0}, failed=7, unsettled=5)
-    together = query.limits(made).iloc[-1]
+    together = limits_of(made).iloc[-1]
     above = (made.load("cross1.F").values > 700.0) | (made.load("fork3.T").values > 26.0)
     assert together["load"] == ANY_LIMIT
     assert 0 < above[:188].sum() < 188
@@ -158,35 +167,38 @@ def test_a_joint_is_good_when_no_load_is_above_its_limit():
 def test_yields_have_the_total_interval_of_the_limits_table_with_the_numerical_error():
     made = view(limits={"cross1.F": 700.0, "fork3.T": 26.0}, failed=2)
     made.numerical_error = {"F": 0.02, "T": 0.01}
-    table, of_limits = query.limits(made), limits(made)
+    table, of_limits = limits_of(made), limits(made)
     np.testing.assert_allclose(1.0 - table["good_lower"][:2], of_limits["total_upper"])
     np.testing.assert_allclose(table["ppm_lower"][:2], 1e6 * of_limits["total_lower"])
     made = view(limits={"cross1.F": 700.0, "fork3.T": 26.0}, failed=2)
     made.numerical_error = {}
-    assert (table["good_lower"] <= query.limits(made)["good_lower"]).all()
-    assert table["good_lower"].iloc[-1] < query.limits(made)["good_lower"].iloc[-1]
+    assert (table["good_lower"] <= limits_of(made)["good_lower"]).all()
+    assert table["good_lower"].iloc[-1] < limits_of(made)["good_lower"].iloc[-1]
 
 
 def test_indices_that_must_not_be_used_are_not_given():
-    table = query.limits(view(limits={"cross1.F": 700.0}, n=2001))
-    assert (table["normal_p"] < query.NOT_NORMAL).all()
-    assert "'Cpk by sigma' tells no share above" in rendering.note(table)
+    made = view(limits={"cross1.F": 700.0}, n=2001)
+    table = limits_of(made)
+    assert (table["normal_p"] < question.NOT_NORMAL).all()
+    assert "'Cpk by sigma' tells no share above" in notes_of(made)
     assert table["cpk"].notna().all()
-    many = query.limits(view(limits={"cross1.F": 700.0}, failed=60))
-    assert many[["cpk", "cpk_lower", "cpk_normal"]].isna().all(axis=None)
-    assert "as uncertain as sampling" in rendering.note(many)
+    made = view(limits={"cross1.F": 700.0}, failed=60)
+    assert limits_of(made)[["cpk", "cpk_lower", "cpk_normal"]].isna().all(axis=None)
+    assert "as uncertain as sampling" in notes_of(made)
 
 
 def test_a_tail_that_is_not_generalised_pareto_is_not_extrapolated(monkeypatch):
     made = view(limits={"cross1.F": 700.0}, n=2001)
-    good = query.returns(made, ["cross1.F"], [1000.0])
-    assert np.isfinite(good["estimate"]).all()
-    assert rendering.no_tail(good) == ""
+    good = question.capability(made, one_in=[1000.0])
+    assert np.isfinite(good.frame("one_in")["estimate"]).all()
+    assert [part for part in good.parts if isinstance(part, Sentence) and part.place == "warning"] == []
     monkeypatch.setattr(extreme, "NO_TAIL", 1.1)
-    poor = query.returns(made, ["cross1.F"], [1000.0])
-    assert poor.loc[0, "estimate":"shape_upper"].isna().all()
-    assert poor["p"].notna().all()
-    assert rendering.no_tail(poor).startswith("cross1.F: the tail is not generalised Pareto")
+    poor = question.capability(made, one_in=[1000.0])
+    table = poor.frame("one_in")
+    assert table.loc[0, "estimate":"shape_upper"].isna().all()
+    assert table["p"].notna().all()
+    (warning,) = (part.text for part in poor.parts if isinstance(part, Sentence) and part.place == "warning")
+    assert warning.startswith("cross1.F: the tail is not generalised Pareto")
 
 
 @pytest.mark.parametrize("n", [20, 61, 3000])

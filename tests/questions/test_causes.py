@@ -14,7 +14,7 @@ from tolstat.common.loads import ANY_LIMIT
 from tolstat.common.tables import SIMULATED, Simulation, Status
 from tolstat.display.asked import Asked
 from tolstat.display.text import value
-from tolstat.questions.capability import query as capability
+from tolstat.questions.capability import capability
 from tolstat.questions.causes import query, rendering, tail_section
 from tolstat.questions.causes.query import causes_of
 from tolstat.questions.causes.section import sections
@@ -190,7 +190,7 @@ def test_page_leaves_out_what_a_file_cannot_tell(tmp_path):
 def test_capability_of_each_limit_and_of_all_together(path):
     with ResultFile.open(path) as store:
         known = store.view()
-        table = capability.limits(known).set_index("load")
+        table = capability(known).frame("limits").set_index("load")
         loads = known.loads(list(known.limits))
     assert list(table.index) == [*known.limits, ANY_LIMIT]
     share = exceedance.exceedance(known.load("cross1.F").values, known.status, known.limits["cross1.F"])
@@ -211,7 +211,7 @@ def test_capability_command_prints_indices_and_return_loads(path):
     for text in ("no Cp", "5 of 3000 joints without a valid load", "lower ends of Cpk need 3244", "not normal"):
         assert text in done.stderr
     found = json.loads(run("capability", path, "--one-in", 1000, "--json").stdout)
-    row = found["one_in"][0]
+    row = found["tables"]["one_in"]["rows"][0]
     assert row["lower"] < row["estimate"] < row["upper"]
     assert row["bound_upper"] is None  # five lost joints of 3000 alone may be one in 1000
 

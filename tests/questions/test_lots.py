@@ -21,7 +21,7 @@ from tolstat.common.tables import Status
 from tolstat.display import drawing
 from tolstat.display.asked import Asked
 from tolstat.display.table import as_text
-from tolstat.questions.capability.query import limits
+from tolstat.questions.capability import capability
 from tolstat.questions.lots import query, rendering, section
 
 LIMIT = {"cross1.F": 700.0, "fork1.T": 40.0}
@@ -88,8 +88,8 @@ def test_joints_that_share_lots_are_not_independent_anywhere():
     independent = exceedance.exceedance(load.values, load.status, 700.0)
     assert load.above(700.0).lower != independent.lower
     assert np.isnan(load.delivery(700.0, 1000)).all()
-    assert limits(made)["cpk_lower"].isna().all()
-    assert np.isfinite(limits(made)["ppm_lower"]).all()
+    assert capability(made).frame("limits")["cpk_lower"].isna().all()
+    assert np.isfinite(capability(made).frame("limits")["ppm_lower"]).all()
     assert load.quantile(0.5).lower < load.quantile(0.5).estimate
 
 

@@ -20,6 +20,7 @@ from tolstat.common.errors import StoreError
 from tolstat.common.tables import Status
 from tolstat.display.asked import Asked
 from tolstat.display.blocks import Section
+from tolstat.display.html import bound, grouped
 from tolstat.questions.accuracy import rendering
 from tolstat.questions.exceedance import query
 from tolstat.questions.joints import query as joints
@@ -227,15 +228,15 @@ def test_only_the_script_of_the_page_may_run(html):
 
 
 def test_digits_are_grouped_in_whole_numbers_only():
-    assert writer.grouped("73310 of 999999 ppm") == "73\u202f310 of 999\u202f999 ppm"
-    assert writer.grouped("1234 0.12345 a12345 12345e3") == "1234 0.12345 a12345 12345e3"
+    assert grouped("73310 of 999999 ppm") == "73\u202f310 of 999\u202f999 ppm"
+    assert grouped("1234 0.12345 a12345 12345e3") == "1234 0.12345 a12345 12345e3"
 
 
 def test_a_number_stays_with_its_unit_and_an_interval_on_one_line():
-    assert writer.bound("60 N m in 3 % (1 .. 4 %), 5 joints") == (
+    assert bound("60 N m in 3 % (1 .. 4 %), 5 joints") == (
         "60\u00a0N\u00a0m in 3\u00a0% (1\u00a0..\u00a04\u00a0%), 5 joints"
     )
-    assert writer.bound("0.1 mm 5 min of 5 minutes N") == "0.1\u00a0mm 5\u00a0min of 5 minutes N"
+    assert bound("0.1 mm 5 min of 5 minutes N") == "0.1\u00a0mm 5\u00a0min of 5 minutes N"
 
 
 def test_a_small_numerical_error_is_not_given_in_digits():

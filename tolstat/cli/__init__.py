@@ -1,26 +1,65 @@
-"""The command line: one file per command, shared parts in `_app` and `_talk`."""
+"""The command line: commands of questions are made by `_questions`, the others are one file each."""
 
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
 from importlib import import_module
+from typing import Any
 
-from tolstat import questions
-from tolstat.cli._app import GROUPS, OneCommand, app, command, main
+from tolstat.cli._app import LISTED, Listed, app, main
+from tolstat.questions import QUESTIONS, Question
 
-__all__ = ["COMMANDS", "app", "main"]
+__all__ = ["LISTED", "PLAIN", "app", "main"]
 
-COMMANDS = {
-    "Plan": ("new", "schema", *questions.commands("Plan"), "simulate", "plan"),
-    "Run": ("run", "extend", "merge", "status", "verify", "replay"),
-    "Read": ("report", *questions.commands("Read")),
-    "Decide": questions.commands("Decide"),
-    "Share": ("export", "docs", "cache"),
+PLAIN = {
+    "Plan": {
+        "new": "Write a study with comments that runs as it stands.",
+        "schema": "Print the JSON schema of a file, for editors.",
+        "show": "Draw a joint, its errors, or one joint of a campaign.",
+        "simulate": "Simulate one joint, with and without its errors.",
+        "plan": "Predict time, memory and precision of a campaign.",
+    },
+    "Run": {
+        "run": "Simulate the joints of a study and print a report.",
+        "extend": "Add joints to a campaign and simulate them.",
+        "merge": "Merge the slices of a campaign into one result file.",
+        "status": "Print the number of joints by status.",
+        "verify": "Estimate the numerical error on some joints.",
+        "replay": "Simulate one joint again and compare with the file.",
+    },
+    "Read": {"report": "Report the share of joints above each load."},
+    "Decide": {},
+    "Share": {
+        "export": "Export joints, load cycles or statistics to files.",
+        "docs": "Print a page of the documents, or open their site.",
+        "cache": "Show where compiled kernels are kept, or remove them.",
+    },
 }
-"""Headings of ``tolstat --help`` in the order of the work, and under each the files of this package with the commands,
-each with a function of the same name; on the command line ``-`` stands for ``_``. Commands of questions come from their
-registry."""
+"""Commands that are no question, by heading of the help: files of this package, each with a function of the same name,
+and the first line of its docstring."""
 
-for heading, names in COMMANDS.items():
-    for name in names:
-        app.command(name.replace("_", "-"), cls=OneCommand)(
-            command(getattr(import_module(f"tolstat.cli.{name}"), name))
-        )
-    GROUPS[heading] = tuple(name.replace("_", "-") for name in names)
+
+def _plain(name: str) -> Callable[..., None]:
+    function: Callable[..., None] = getattr(import_module(f"tolstat.cli.{name}"), name)
+    return function
+
+
+def _of_question(question: Question) -> Callable[..., None]:
+    made: Any = import_module("tolstat.cli._questions")
+    function: Callable[..., None] = made.command_of(question)
+    return function
+
+
+for heading, commands in PLAIN.items():
+    for name, summary in commands.items():
+        LISTED[name.replace("_", "-")] = Listed(heading, summary, partial(_plain, name))
+    for question in QUESTIONS:
+        if isinstance(question, Question):
+            if question.heading == heading:
+                made = partial(_of_question, question)
+                LISTED[question.name.replace("_", "-")] = Listed(heading, question.summary, made)
+        elif question.heading == heading:
+            for name in question.commands:
+                if name not in commands:
+                    LISTED[name.replace("_", "-")] = Listed(heading, "", partial(_plain, name))

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 from typer.core import TyperArgument, TyperCommand, TyperGroup
@@ -30,29 +30,56 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from tolstat.common.tables import Variant
-    from tolstat.display.table import Column
+    from tolstat.display.table import Column, Rows
     from tolstat.joint import Joint
     from tolstat.report import Report
     from tolstat.study import Study
 
 ABOUT = "Monte Carlo tolerance analysis of Cardan joints: which share of the joints exceeds a load."
+CONTEXT = {"help_option_names": ["-h", "--help"]}
 EPILOG = (
     "Exit codes: 0 success, 1 internal error (replay: results differ), 2 input that cannot be used, "
     "128 + N stopped by signal N (130 after Ctrl-C)."
 )
 
 
-GROUPS: dict[str, tuple[str, ...]] = {}
-"""Headings of the help, and the commands under each; `tolstat.cli` fills it."""
+class Listed(NamedTuple):
+    """A command before it is imported: heading and line in the help, and what makes its function."""
+
+    heading: str
+    summary: str
+    make: Callable[[], Callable[..., None]]
+
+
+LISTED: dict[str, Listed] = {}
+"""Commands by name in the order of the help; `tolstat.cli` fills it."""
 
 
 class _Commands(TyperGroup):
-    """Commands, listed in help under the headings of `GROUPS`."""
+    """Commands under their headings; each is imported when it is used."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """Names of all commands."""
+        return list(LISTED)
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """A command by its name; None if there is none."""
+        if cmd_name in LISTED and cmd_name not in self.commands:
+            one = typer.Typer(rich_markup_mode=None, pretty_exceptions_enable=False, add_completion=False)
+            function = command(LISTED[cmd_name].make())
+            one.command(cmd_name, cls=OneCommand, context_settings=CONTEXT)(function)
+            self.commands[cmd_name] = typer.main.get_command(one)
+        return self.commands.get(cmd_name)
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
-        width = max(map(len, self.commands))
-        for heading, names in GROUPS.items():
-            rows = [(f"{name:{width}}", self.commands[name].get_short_help_str(formatter.width)) for name in names]
+        """Write the commands, one heading after the other."""
+        width = max(map(len, LISTED))
+        for heading in dict.fromkeys(one.heading for one in LISTED.values()):
+            rows = [
+                (f"{name:{width}}", one.summary or self.get_command(ctx, name).get_short_help_str(formatter.width))
+                for name, one in LISTED.items()
+                if one.heading == heading
+            ]
             with formatter.section(heading):
                 formatter.write_dl(rows)
 
@@ -81,7 +108,7 @@ app = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
-    context_settings={"help_option_names": ["-h", "--help"]},
+    context_settings=CONTEXT,
 )
 
 ResultPath = Annotated[Path, typer.Argument(metavar="FILE", help="Result file (HDF5) of a campaign.")]
@@ -282,7 +309,7 @@ def width_of(wide: bool) -> int | None:
     return None if wide else WIDTH
 
 
-def print_table(columns: Sequence[Column], frame: pd.DataFrame, wide: bool) -> None:
+def print_table(columns: Sequence[Column], frame: Rows | pd.DataFrame, wide: bool) -> None:
     """Print a table on standard output, and on standard error the columns left out to fit the line."""
     from tolstat.display import table
 

@@ -67,3 +67,7 @@ def gather(faults: list[Fault]) -> Iterator[None]:
 
 class StoreError(TolstatError):
     """A result file that cannot be used as requested: not a tolstat file, too new, of another study, or locked."""
+
+
+class NotApplicable(StoreError):
+    """A question that does not apply to a result file: its command says why, and the page does not show it."""

@@ -7,23 +7,26 @@ import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from html import escape
-from typing import Any, NamedTuple
-
-import matplotlib as mpl
-from matplotlib.artist import Artist
-from matplotlib.axes import Axes
-from matplotlib.axis import Axis
-from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from tolstat.display import schemes, style, text
 from tolstat.display.blocks import Panel
+from tolstat.display.mpl import figure as figures
+from tolstat.display.mpl import mpl, ticker
 from tolstat.display.unseen import visible
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
 
 BOTTOM, RIGHT = 0.5, 0.12
 """Margins below and beside the axes, inches; `Panel.left` and `Panel.top` are the others."""
 WIDTH = 4.9
 """Usual width of a panel, inches."""
+TITLE = 0.34
+"""Room for the title above a panel in a file of its own, inches."""
 LETTER, KEY = 0.071, 0.5
 """Width of a letter of a legend, and of the rest of an entry, inches."""
 GREY = "#B8B8B8"
@@ -79,7 +82,7 @@ def _place(panel: Panel) -> tuple[float, float, float, float]:
 def svg(panel: Panel) -> tuple[str, Frame]:
     """Draw a panel as inline SVG: the same panel gives the same bytes, and all ids are unique on the page."""
     with settings():
-        figure = Figure(figsize=panel.size, dpi=72)
+        figure = figures.Figure(figsize=panel.size, dpi=72)
         ax = figure.add_axes(_place(panel))
         panel.draw(ax)
         buffer = io.StringIO()
@@ -88,6 +91,18 @@ def svg(panel: Panel) -> tuple[str, Frame]:
     low, high = ax.get_xlim()
     frame = Frame(box.x0, box.x1, height - box.y1, height - box.y0, low, high)
     return _inline(buffer.getvalue(), panel), frame
+
+
+def save(panel: Panel, stem: Path) -> list[Path]:
+    """Write a panel as PNG and SVG with its title above it; returns the files written."""
+    width, height = panel.size
+    with settings():
+        figure = figures.Figure(figsize=(width, height + TITLE))
+        left, bottom, wide, high = _place(panel)
+        shrink = height / (height + TITLE)
+        panel.draw(figure.add_axes((left, bottom * shrink, wide, high * shrink)))
+        figure.text(0.02, 1.0 - 0.5 * TITLE / (height + TITLE), panel.title, va="center", fontsize=10, wrap=True)
+    return style.save(figure, stem)
 
 
 def switched(artist: Artist, name: str) -> None:
@@ -152,7 +167,7 @@ def loads_axis(axis: Axis, typical: float, unit: str) -> str:
     """Let an axis of loads show the multiple of their unit that a load has, see `text.multiple`; return its text."""
     size, name = text.multiple(typical, unit)
     if size != 1.0:
-        axis.set_major_formatter(FuncFormatter(lambda x, _: f"{x / size:g}"))
+        axis.set_major_formatter(ticker.FuncFormatter(lambda x, _: f"{x / size:g}"))
     return name
 
 
@@ -161,9 +176,9 @@ def log_loads(ax: Axes, low: float, high: float, typical: float, unit: str) -> s
     size, name = text.multiple(typical, unit)
     ax.set_xscale("log")
     ax.set_xlim(low, high)
-    ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < 200.0 * low else (1.0,)))
-    ax.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x / size:g}"))
-    ax.xaxis.set_minor_formatter(NullFormatter())
+    ax.xaxis.set_major_locator(ticker.LogLocator(subs=(1.0, 2.0, 5.0) if high < 200.0 * low else (1.0,)))
+    ax.xaxis.set_major_formatter(ticker.FuncFormatter(lambda x, _: f"{x / size:g}"))
+    ax.xaxis.set_minor_formatter(ticker.NullFormatter())
     return name
 
 

@@ -5,20 +5,20 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib import colormaps
-from matplotlib.artist import Artist
-from matplotlib.axes import Axes
-from matplotlib.colors import to_hex
-from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from tolstat.common.files import atomic_write
 from tolstat.common.load_kinds import Kind
 from tolstat.common.loads import PANELS, QUANTITY
+from tolstat.display.mpl import figure as figures
+from tolstat.display.mpl import mpl, ticker
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#56B4E9")
 """Colours of bushings 1 to 4: the four of Okabe and Ito's colours (2008) that dichromats tell apart best."""
@@ -30,10 +30,35 @@ DASHES: tuple[Dash, ...] = (
     (0.0, (1.2, 0.9)),
 )
 """Dashes of bushings 1 to 4: where curves coincide, the lower one shows through the gaps."""
-SHADES, DARK_SHADES = (
-    tuple(to_hex(colormaps["viridis"](x)) for x in np.linspace(*ends, 12)) for ends in ((0.0, 0.88), (1.0, 0.35))
+SHADES = (
+    "#440154",
+    "#481d6f",
+    "#453781",
+    "#3c4f8a",
+    "#32648e",
+    "#2a788e",
+    "#228b8d",
+    "#1f9f88",
+    "#2cb17e",
+    "#4ec36b",
+    "#7ad151",
+    "#b0dd2f",
 )
-"""Colours in order, which stay in order in grey and for colour-blind readers, on white and on dark paper."""
+DARK_SHADES = (
+    "#fde725",
+    "#d8e219",
+    "#b0dd2f",
+    "#89d548",
+    "#65cb5e",
+    "#46c06f",
+    "#2eb37c",
+    "#21a585",
+    "#1f968b",
+    "#23888e",
+    "#297a8e",
+    "#2f6c8e",
+)
+"""Colours of viridis in order, which stay in order in grey and for colour-blind readers, on white and on dark paper."""
 INK, FAINT = "#222222", "#777777"
 
 _SETTINGS: Any = {
@@ -84,7 +109,7 @@ def panels(title: str, subtitle: str) -> tuple[Figure, list[tuple[str, Kind, Axe
     panels : list of (group, kind, Axes)
         One for each of `loads.PANELS`.
     """
-    figure = Figure(figsize=(11.0, 8.5))
+    figure = figures.Figure(figsize=(11.0, 8.5))
     axes = figure.subplots(2, 2)
     figure.subplots_adjust(left=0.085, right=0.975, top=0.82, bottom=0.125, hspace=0.42, wspace=0.16)
     figure.text(0.02, 0.972, title, fontsize=15, fontweight="bold", va="top")
@@ -106,23 +131,17 @@ def share_axis(ax: Axes, low: float, which: str = "y", high: float = 1.0) -> Non
     (ax.set_ylim if upright else ax.set_xlim)(low, high * (high / low) ** 0.04)
     axis = ax.yaxis if upright else ax.xaxis
     if high < 100.0 * low:
-        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axis.set_major_formatter(FuncFormatter(lambda x, _: f"{100.0 * x:g} %"))
-    axis.set_minor_locator(_NearView())
-    axis.set_minor_formatter(NullFormatter())
+        axis.set_major_locator(ticker.LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter(ticker.FuncFormatter(lambda x, _: f"{100.0 * x:g} %"))
+    axis.set_minor_locator(_near_view(*sorted(axis.get_view_interval())))
+    axis.set_minor_formatter(ticker.NullFormatter())
 
 
-class _NearView(LogLocator):
-    """Minor marks in the view: those beyond it, up to a decade on either side, would be made but not drawn."""
-
-    def __init__(self) -> None:
-        super().__init__(subs=None)
-
-    def __call__(self) -> Any:
-        assert self.axis is not None
-        low, high = sorted(self.axis.get_view_interval())
-        marks = np.asarray(super().__call__(), float)
-        return marks[(marks > 0.8 * low) & (marks < 1.25 * high)]  # matplotlib draws those half a pixel outside
+def _near_view(low: float, high: float) -> ticker.FixedLocator:
+    """Minor marks of a logarithmic axis in the view: those up to a decade beyond it would be made but not drawn."""
+    decades = np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)))
+    marks = np.outer(10.0**decades, np.arange(2.0, 10.0)).ravel()
+    return ticker.FixedLocator(marks[(marks > 0.999 * low) & (marks < 1.001 * high)].tolist())
 
 
 def mark(ax: Axes, x: float, y: float, colour: str) -> None:

@@ -51,6 +51,13 @@ def csv(table: Mapping[str, Sequence[Any]] | pd.DataFrame, stem: Path, what: str
     return path
 
 
+def write(content: str, path: Path) -> Path:
+    """Write a text file; returns its path."""
+    with atomic_write(path) as temporary:
+        temporary.write_text(content, encoding="utf-8")
+    return path
+
+
 def csv_rows(columns: Iterable[Sequence[Any]]) -> Iterable[tuple[Any, ...]]:
     """Rows of a CSV file from its columns: NaN becomes an empty cell, text is no formula."""
     return zip(*map(_written, columns), strict=True)
@@ -118,7 +125,8 @@ def span_of(low: float, high: float, unit: str) -> str:
 def sentence(words: str) -> str:
     """Make words a sentence: capital letter (unless the first word has a digit, as names of loads) and full stop."""
     first = words.partition(" ")[0]
-    return (words if any(letter.isdigit() for letter in first) else words[:1].upper() + words[1:]) + "."
+    words = words if any(letter.isdigit() for letter in first) else words[:1].upper() + words[1:]
+    return words if words.endswith((".", "?", "!")) else f"{words}."
 
 
 def formed(x: float, form: str = ".3g") -> str:

@@ -144,8 +144,7 @@ def _pictures(view: View, stem: Path) -> list[Path]:
 
 
 def _numbers(view: View, stem: Path, width: int | None, accepted: float) -> Report:
-    from tolstat.questions.capability import query as capability
-    from tolstat.questions.capability import rendering as capabilities
+    from tolstat.questions import capability
     from tolstat.questions.exceedance import query, rendering
     from tolstat.report.headline import headline, tells_yield
 
@@ -164,7 +163,7 @@ def _numbers(view: View, stem: Path, width: int | None, accepted: float) -> Repo
             shown += f"\n\n{rendering.AT_POINTS}\n{table.as_text(rendering.at_points(view), points, width)}"
     shown = _headed(shown, view.store, width, verdict.sentence if verdict else "")
     if verdict and verdict.answer and tells_yield(view):
-        kept = capabilities.together(capability.good(view), len(view.limits))
+        kept = capability.together(capability.good(view), len(view.limits))
         shown += f"\n\nyield: {kept.value} {kept.words}"
     notes = [*(verdict.notes if verdict else ()), more, view.head(), rendering.note(view), _accuracy(view)]
     return Report(shown, "\n".join(note for note in notes if note), files)

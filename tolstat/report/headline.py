@@ -11,8 +11,7 @@ from tolstat.analysis import binomial
 from tolstat.common.loads import ANY_LIMIT
 from tolstat.common.tables import FAILED, STATUS_TEXT, UNSETTLED, VALID
 from tolstat.display import text
-from tolstat.questions.capability import query as capability
-from tolstat.questions.capability import rendering as capabilities
+from tolstat.questions import capability
 from tolstat.questions.exceedance import query as exceedance
 from tolstat.questions.joints import query as joints
 from tolstat.store import known_parts
@@ -262,14 +261,14 @@ def _yield(view: View, records: Sequence[Row]) -> Headline:
         if row["load"] == ANY_LIMIT and worst["count"] and not np.isnan(worst["estimate"]):
             said += _most_often(view, records, worst)
         return Headline("", share_of(row), said, notes, worst["load"])
-    found = capabilities.together(capability.good(view), len(view.limits))
+    found = capability.together(capability.good(view), len(view.limits))
     if not found.decides:
         return Headline("none", WORDS["none"], _reason(view, [_decisive(view, records)]), notes)
     return Headline("", found.value, found.words, notes, exceedance.most_exceeded(view, records)["load"])
 
 
 def _undecided(records: Sequence[Row]) -> bool:
-    return max(high - low for low, high in map(ends, records)) >= capabilities.WIDEST
+    return max(high - low for low, high in map(ends, records)) >= capability.WIDEST
 
 
 def _reason(view: View, records: Sequence[Row]) -> str:

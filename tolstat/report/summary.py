@@ -17,15 +17,13 @@ if TYPE_CHECKING:
     from tolstat.store.view import View
 
 
-def statistics(view: View, confidence: float = 0.95, accepted: float = math.nan) -> dict[str, Any]:
+def statistics(view: View, accepted: float = math.nan) -> dict[str, Any]:
     """Collect the statistics of a campaign.
 
     Parameters
     ----------
     view : View
         Campaign of a study whose joints are drawn from tolerances.
-    confidence : float
-        Confidence level of all intervals; the verdict's are of 95 %.
     accepted : float
         Accepted share: share of the joints that may be above each limit; NaN if none is given.
 
@@ -35,8 +33,8 @@ def statistics(view: View, confidence: float = 0.95, accepted: float = math.nan)
         JSON values in SI units, null if unknown: ``study``, ``method``, ``confidence``; ``verdict``, with ``answer``
         (null without an accepted share), ``sentence`` and ``notes``, null without limits; ``joints``, numbers by
         status;
-        ``limits`` (share above each), ``quantiles`` of every load kept, ``capability`` (empty for weighted joints),
-        each the rows of the table that the question of this name returns; ``numerical_error`` by kind of load;
+        ``limits`` (share above each), ``quantiles`` of every load kept; ``capability``, the answer of this name (null
+        for weighted joints); ``numerical_error`` by kind of load;
         ``joint``, mounting of the shafts and contact law in words; ``fidelity``, a sentence on the fidelity of the
         results; ``provenance``.
 
@@ -60,7 +58,7 @@ def statistics(view: View, confidence: float = 0.95, accepted: float = math.nan)
     head = {
         "study": view.name,
         "method": view.method,
-        "confidence": confidence,
+        "confidence": 0.95,
         "verdict": None if verdict is None else verdict.values(),
         "joints": {status.label: count for status in Status if (count := view.count(status))},
     }
@@ -71,6 +69,6 @@ def statistics(view: View, confidence: float = 0.95, accepted: float = math.nan)
         "sampling": store.sampling,
         "stop": store.stop,
     }
-    found = questions.summary(view, confidence)
+    found = questions.summary(view)
     stands_on = {"joint": in_words(*recorded.mountings(store)), "fidelity": sentence(store.options, store.fidelity)}
     return head | found | stands_on | {"provenance": provenance}

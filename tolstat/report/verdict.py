@@ -15,9 +15,8 @@ from tolstat.display import drawing, style, text
 from tolstat.display.asked import Asked
 from tolstat.display.blocks import Card, Decision, Panel, Panels, Section, Table, Text
 from tolstat.display.table import Column, Rows, as_block, has
+from tolstat.questions import capability
 from tolstat.questions.accuracy import rendering as accuracy
-from tolstat.questions.capability import query as capability
-from tolstat.questions.capability import rendering as capabilities
 from tolstat.questions.exceedance import query as exceedance
 from tolstat.questions.exceedance.curves_figure import LIMIT_DASH
 from tolstat.questions.exceedance.rendering import AT_POINTS, LIMITS, above, at_points
@@ -77,7 +76,7 @@ def _points(view: View) -> list[Table]:
         point = part.store.points[part.points[0]]
         row = {"point": point.name, "operation": point._replace(share=np.nan).in_words, "share": point.share}
         if part.sampled and part.limits and tells_yield(part):
-            found = capabilities.together(capability.good(part), len(part.limits))
+            found = capability.together(capability.good(part), len(part.limits))
             row |= {"kept": found.value if found.decides else WORDS["none"]}
         rows.append(row)
     return [as_block("Operating points", POINTS, rows)]
@@ -117,9 +116,9 @@ def _cards(view: View, found: Headline | None) -> list[Card]:
     if found is not None and tells_yield(view):
         row = capability.good(view)
         if found.answer:
-            together = capabilities.together(row, len(view.limits))
+            together = capability.together(row, len(view.limits))
             cards.append(Card(together.value, together.words, "Yield"))
-        if predicted := capabilities.delivery(row, len(view.limits)):
+        if predicted := capability.delivered(row, len(view.limits)):
             interval = text.ends(row["next_lower"], row["next_upper"], ".0f")
             cards.append(Card(interval, predicted, "95 % prediction interval"))
     if found is not None and found.load and found.load not in found.words:

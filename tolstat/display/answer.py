@@ -1,0 +1,194 @@
+"""The answer to a question: tables, figures and sentences in reading order, and facts by name.
+
+A question returns an `Answer`; terminal, page, JSON, CSV and notebook are generic functions of it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from tolstat.display import text
+from tolstat.display.blocks import Block, Facts, Listing, Panels, Text
+from tolstat.display.table import Column, Rows, as_block
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Place = Literal["lead", "note", "warning"]
+
+
+@dataclass(frozen=True)
+class Sentence:
+    """One or several sentences.
+
+    Attributes
+    ----------
+    text : str
+        The words; of a note, capital letter and full stop may be missing.
+    place : str
+        ``lead`` (part of the answer itself), ``note`` (definitions, restrictions), ``warning``.
+    """
+
+    text: str
+    place: Place = "note"
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table: all its rows as numbers, and how people see them.
+
+    Attributes
+    ----------
+    name : str
+        Key in JSON, and end of the name of its CSV file.
+    title : str
+        What it shows.
+    columns : sequence of Column
+        Columns that people see.
+    rows : sequence of mapping
+        Values by key in SI units, the same keys in each row; a row with values of one unit may have a key ``unit``.
+    units : mapping
+        Units by key, where rows have none of their own.
+    seen : sequence of mapping, optional
+        What `columns` take their cells from: some of the rows, or rows arranged for people; by default all rows.
+    verdicts : sequence of str
+        Verdict of each row, see `blocks.Table`.
+    """
+
+    name: str
+    title: str
+    columns: Sequence[Column]
+    rows: Rows
+    units: Mapping[str, str] = field(default_factory=dict)
+    seen: Rows | None = None
+    verdicts: Sequence[str] = ()
+
+    @property
+    def for_people(self) -> Rows:
+        """Rows that people see."""
+        return self.rows if self.seen is None else self.seen
+
+
+@dataclass(frozen=True)
+class Document:
+    """Text of a file that `Answer.write` writes, such as a study with other tolerances; `ending` ends its name."""
+
+    ending: str
+    text: str
+
+
+Part = Sentence | Table | Panels | Listing | Document
+
+
+@dataclass(frozen=True)
+class Answer:
+    """The answer to a question.
+
+    Attributes
+    ----------
+    name : str
+        Name of the question.
+    title : str
+        Heading on the page.
+    parts : sequence of Sentence, Table, Panels, Listing or Document
+        In reading order.
+    facts : mapping
+        Single values by name: numbers in SI units, words, None if unknown.
+    """
+
+    name: str
+    title: str
+    parts: Sequence[Part]
+    facts: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def tables(self) -> dict[str, Table]:
+        """Tables by name."""
+        return {part.name: part for part in self.parts if isinstance(part, Table)}
+
+    def frame(self, name: str) -> pd.DataFrame:
+        """Rows of a table as a frame.
+
+        Raises
+        ------
+        KeyError
+            When there is no table of this name.
+        """
+        import pandas as pd
+
+        return pd.DataFrame(list(self.tables[name].rows))
+
+    def values(self) -> dict[str, Any]:
+        """JSON values: ``facts``, ``sentences`` and ``tables``; numbers that are not finite are None."""
+        sentences = [{"place": part.place, "text": part.text} for part in self.parts if isinstance(part, Sentence)]
+        tables = {name: {"units": dict(table.units), "rows": plain(table.rows)} for name, table in self.tables.items()}
+        return {"facts": plain(self.facts), "sentences": sentences, "tables": tables}
+
+    def blocks(self) -> list[Block]:
+        """Blocks of a page."""
+        return [block for part in self.parts if (block := _block(part)) is not None]
+
+    def write(self, stem: Path) -> list[Path]:
+        """Write each table as ``STEM_NAME_table.csv``, pictures as PNG and SVG beside them, and documents.
+
+        Returns
+        -------
+        list of Path
+            The files written.
+
+        Raises
+        ------
+        OSError
+            When a file cannot be written.
+        """
+        files: list[Path] = []
+        stem = stem.with_name(f"{stem.name}_{self.name.replace('-', '_')}")
+        for part in self.parts:
+            if isinstance(part, Table):
+                files.append(text.csv(text.columns_of(part.rows), stem, part.name))
+            elif isinstance(part, Panels):
+                from tolstat.display import drawing
+
+                for panel in part.panels:
+                    files += drawing.save(panel, stem.with_name(f"{stem.name}_{panel.key}"))
+            elif isinstance(part, Document):
+                files.append(text.write(part.text, stem.with_name(f"{stem.name}{part.ending}")))
+        return files
+
+    def _repr_html_(self) -> str:
+        from tolstat.display import html
+
+        return html.fragment(self.title, [*self.blocks(), *self._facts()])
+
+    def _facts(self) -> list[Block]:
+        items = [(name.replace("_", " "), _short(value)) for name, value in self.facts.items()]
+        return [Facts(items)] if items else []
+
+
+def plain(value: Any) -> Any:
+    """Value for JSON: containers and numbers of Python, None for what is not finite."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(item) for item in value]
+    value = value.tolist() if hasattr(value, "tolist") else value
+    if isinstance(value, list):
+        return [plain(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _block(part: Part) -> Block | None:
+    if isinstance(part, Sentence):
+        lead = part.place == "lead"
+        return Text(part.text if lead else text.sentence(part.text), small=not lead)
+    if isinstance(part, Table):
+        return as_block(part.title, part.columns, part.for_people, part.verdicts)
+    return None if isinstance(part, Document) else part
+
+
+def _short(value: Any) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)

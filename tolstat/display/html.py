@@ -1,0 +1,84 @@
+"""Blocks as HTML: the environment of the templates, pictures as inline SVG, an answer in a notebook."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import jinja2
+from markupsafe import Markup
+
+from tolstat.common.aside import mapped
+from tolstat.display import drawing, schemes
+from tolstat.display.blocks import Block, Decision, Panel, Panels
+from tolstat.display.unseen import visible
+
+TEMPLATES = Path(__file__).parent / "templates"
+
+_TORQUE = re.compile(r"\bN m\b")
+_BEFORE_UNIT = re.compile(r"(?<=\d) (?=(?:k?N|mm|[µu]m|m?rad|deg|rpm|rad/s|[MG]Pa|ms|min|[smh])\b|[%°])")
+
+
+def environment(figure: Callable[[Panel], dict[str, Any]]) -> jinja2.Environment:
+    """Make the Jinja environment of the templates: inserted values are escaped, unseen characters shown.
+
+    Parameters
+    ----------
+    figure : callable
+        Picture of a panel, as `figures` gives it.
+    """
+    files = jinja2.FileSystemLoader(TEMPLATES)
+    made = jinja2.Environment(loader=files, autoescape=True, trim_blocks=True, lstrip_blocks=True, finalize=_shown)
+    made.globals |= {"figure": figure, "schemes": Markup(schemes.style_sheet())}
+    made.filters |= {"data": _data, "grouped": grouped, "bound": bound}
+    return made
+
+
+def fragment(title: str, blocks: Sequence[Block]) -> str:
+    """Blocks as an element for notebooks, with their style."""
+    made = environment(figures(blocks, 1))
+    return made.get_template("fragment.html.j2").render(title=title, blocks=blocks)
+
+
+def figures(blocks: Sequence[Block], processes: int) -> Callable[[Panel], dict[str, Any]]:
+    """Draw the pictures of some blocks; the function returned gives a panel's ``svg`` and the ``frame`` of its axes."""
+    panels = [panel for block in blocks for panel in _panels(block)]
+    drawn = mapped([partial(_figure, panel) for panel in panels], processes)
+    by_key = {panel.key: figure for panel, figure in zip(panels, drawn, strict=True)}
+    return lambda panel: by_key[panel.key]
+
+
+def grouped(words: str) -> str:
+    """Group the digits of whole numbers from 10 000 on by narrow spaces."""
+    return re.sub(r"(?<![\w.])\d{5,}(?!\w)", lambda found: f"{int(found[0]):,}".replace(",", "\u202f"), words)
+
+
+def bound(words: str) -> str:
+    """Keep numbers with their units, and intervals, on one line: no-break spaces in them."""
+    words = _BEFORE_UNIT.sub("\u00a0", _TORQUE.sub("N\u00a0m", words))
+    return words.replace(" .. ", "\u00a0..\u00a0")
+
+
+def _panels(block: Block) -> Sequence[Panel]:
+    if isinstance(block, Panels):
+        return block.panels
+    return [block.picture] if isinstance(block, Decision) and block.picture else []
+
+
+def _figure(panel: Panel) -> dict[str, Any]:
+    picture, frame = drawing.svg(panel)
+    return {"svg": Markup(picture), "frame": " ".join(f"{x:.7g}" for x in frame)}
+
+
+def _data(value: Any) -> Markup:
+    """JSON for a script element, escaped so that no string can close the element."""
+    text = json.dumps(value, allow_nan=False, separators=(",", ":"), ensure_ascii=True)
+    return Markup(text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026"))
+
+
+def _shown(value: Any) -> Any:
+    return visible(value) if isinstance(value, str) and not isinstance(value, Markup) else value

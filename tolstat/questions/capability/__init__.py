@@ -1,1 +1,0 @@
-"""Which specification limits the process meets."""

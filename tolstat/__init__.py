@@ -20,9 +20,6 @@ from typing import TYPE_CHECKING, Any
 from tolstat.questions import PUBLIC
 
 if TYPE_CHECKING:
-    from tolstat.analysis.exceedance import exceedance as exceedance
-    from tolstat.analysis.exceedance import quantile as quantile
-    from tolstat.analysis.exceedance import weighted_exceedance as weighted_exceedance
     from tolstat.campaign.replay import simulate_case as simulate_case
     from tolstat.campaign.run import run as run
     from tolstat.common.errors import InputError as InputError
@@ -31,7 +28,7 @@ if TYPE_CHECKING:
     from tolstat.common.tables import Status as Status
     from tolstat.joint import perturb as perturb
     from tolstat.questions import *
-    from tolstat.report import write_report as write_report
+    from tolstat.report.answer import write_report as write_report
     from tolstat.report.page import write_page as write_page
     from tolstat.report.summary import statistics as statistics
     from tolstat.sampling import draw as draw
@@ -50,19 +47,16 @@ _HOMES = {
     "StoreError": "tolstat.common.errors:StoreError",
     "TolstatError": "tolstat.common.errors:TolstatError",
     "draw": "tolstat.sampling:draw",
-    "exceedance": "tolstat.analysis.exceedance:exceedance",
     "load": "tolstat.study:load",
     "load_case": "tolstat.study:load_case",
     "open": "tolstat.store:ResultFile.open",
     "perturb": "tolstat.joint:perturb",
-    "quantile": "tolstat.analysis.exceedance:quantile",
     "run": "tolstat.campaign.run:run",
     "simulate_case": "tolstat.campaign.replay:simulate_case",
     "simulate_rows": "tolstat.solver.simulation:simulate_rows",
     "statistics": "tolstat.report.summary:statistics",
-    "weighted_exceedance": "tolstat.analysis.exceedance:weighted_exceedance",
     "write_page": "tolstat.report.page:write_page",
-    "write_report": "tolstat.report:write_report",
+    "write_report": "tolstat.report.answer:write_report",
 } | {name: f"{module}:{name}" for name, module in PUBLIC.items()}
 
 __all__ = sorted(_HOMES)

@@ -12,7 +12,7 @@ from tolstat.cli import app
 from tolstat.common.errors import InputError
 from tolstat.common.tables import Status
 from tolstat.questions.capability import capability
-from tolstat.questions.exceedance import query as exceeded
+from tolstat.questions.exceedance import answer as exceeded
 from tolstat.questions.reweight import query as reweight
 from tolstat.store import ResultFile, error_budget
 from tolstat.store.verification import Check, Verification
@@ -89,7 +89,7 @@ def test_a_check_that_fails_near_the_limit_does_not_hide_what_the_others_tell(pa
     monkeypatch.setattr(verify, "check_slots", check_but_one)
     verify.check_near(path, "cross1.F > 720 N", joints=60)
     with ResultFile.open(path) as store:
-        row = exceeded.limits(store.view()).set_index("load").loc["cross1.F"]
+        row = exceeded.exceedance(store.view()).frame("limits").set_index("load").loc["cross1.F"]
     assert row["numerical_lower"] > row["estimate"]  # all loads are 2 % too small
     assert row["total_lower"] <= row["numerical_lower"] <= row["numerical_upper"] <= row["total_upper"]
 

@@ -12,9 +12,9 @@ import pytest
 from typer.testing import CliRunner
 
 from tests.campaign.test_campaign import datasets
-from tests.support import fakes, synthetic
+from tests.support import fakes, reports, synthetic
 from tests.support.synthetic import HEAD
-from tolstat import cli, report, study
+from tolstat import cli, study
 from tolstat.analysis import binomial, exceedance, sequential
 from tolstat.campaign import plan, stop_rule
 from tolstat.campaign import run as campaign
@@ -147,7 +147,7 @@ def test_the_report_says_that_the_campaign_was_stopped(tmp_path: Path) -> None:
     look = stop_rule.Look(39, 0, 4, 0.1, 0.02, 0.25)
     with Writer.open(path) as store:
         store.record_stop(stop_rule.Outcome(True, look, [20, 39, 60]).record(stop_rule.parse(RULE, {})))
-    notes = report.build(path).notes
+    notes = reports.build(path).notes
     assert f"stopped by {RULE} at 39 joints: 95 % interval 0.02000 to 0.25000, valid after any number of looks" in notes
     assert "share 0.10000, biased high if few joints are above (11 % of itself with 10)" in notes
 

@@ -23,7 +23,7 @@ from tolstat.common.solver_options import from_names
 from tolstat.common.tables import Method, Options, Simulation, Start, Status
 from tolstat.questions.accuracy import query as tables
 from tolstat.questions.accuracy import rendering
-from tolstat.questions.exceedance import query as exceedance
+from tolstat.questions.exceedance.answer import exceedance
 from tolstat.store import ResultFile, Writer, provenance, recorded, verification
 from tolstat.store.verification import Check, Verification
 
@@ -222,10 +222,10 @@ def off_by(path, factor, rows=(5, 9)):
 def test_report_moves_every_load_by_the_numerical_error(tmp_path):
     path = synthetic.store(tmp_path)
     with ResultFile.open(path) as store:
-        assert exceedance.limits(store.view())["numerical_lower"].isna().all()
+        assert exceedance(store.view()).frame("limits")["numerical_lower"].isna().all()
     off_by(path, 1.25)
     with ResultFile.open(path) as store:
-        limits = exceedance.limits(store.view()).set_index("load").loc["cross1.F"]
+        limits = exceedance(store.view()).frame("limits").set_index("load").loc["cross1.F"]
         results = store.results()[1:]
     assert limits["numerical_error"] == pytest.approx(0.2)
     moved = 0.2 * results["F_max"].max(axis=1)

@@ -16,7 +16,8 @@ from studies.cirelli2021 import page_equations as paper_equations
 from studies.cirelli2021 import page_source as paper_source
 from studies.cirelli2021 import reproduce
 from studies.cirelli2021.page import context
-from tolstat import report, study
+from tests.support import reports
+from tolstat import study
 from tolstat.campaign import run as campaign
 from tolstat.common.tables import Status
 from tolstat.store import ResultFile
@@ -206,7 +207,7 @@ def test_other_cases_get_a_plain_table(result, tmp_path):
     campaign.run(study.load(tmp_path / "own.toml"), tmp_path / "own.h5", workers=1)
     with pytest.raises(ValueError, match="does not hold the paper's cases"):
         reproduce.build(tmp_path / "own.h5", tmp_path / "own")
-    built = report.build(tmp_path / "own.h5")
+    built = reports.build(tmp_path / "own.h5")
     assert [p.name for p in built.files] == ["own_cases.csv"]
     table = pd.read_csv(built.files[0])
     assert table["case"].tolist() == ["ideal", "bent"] * 2

@@ -62,7 +62,7 @@ def test_people_see_the_rows_meant_for_them_in_columns_that_have_something_to_sh
 
 
 def test_files_hold_every_row_and_no_formula(answer: Answer, tmp_path: Path) -> None:
-    files = answer.write(tmp_path / "file")
+    files = answer.write(tmp_path / "file_known")
     assert [path.name for path in files] == [
         "file_known_loads.csv",
         "file_known_curve.png",

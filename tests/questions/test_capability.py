@@ -13,7 +13,7 @@ from tolstat.common.loads import ANY_LIMIT
 from tolstat.common.tables import Status
 from tolstat.display.answer import Sentence
 from tolstat.questions import capability as question
-from tolstat.questions.exceedance.query import limits
+from tolstat.questions.exceedance.answer import limits
 
 SEEDS = 2000
 LIMIT = 3.0
@@ -167,7 +167,7 @@ def test_a_joint_is_good_when_no_load_is_above_its_limit():
 def test_yields_have_the_total_interval_of_the_limits_table_with_the_numerical_error():
     made = view(limits={"cross1.F": 700.0, "fork3.T": 26.0}, failed=2)
     made.numerical_error = {"F": 0.02, "T": 0.01}
-    table, of_limits = limits_of(made), limits(made)
+    table, of_limits = limits_of(made), limits(made).frame("limits")
     np.testing.assert_allclose(1.0 - table["good_lower"][:2], of_limits["total_upper"])
     np.testing.assert_allclose(table["ppm_lower"][:2], 1e6 * of_limits["total_lower"])
     made = view(limits={"cross1.F": 700.0, "fork3.T": 26.0}, failed=2)

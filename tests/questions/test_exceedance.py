@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from tests.support import synthetic
-from tolstat.display.asked import Asked
 from tolstat.display.blocks import Table
-from tolstat.questions.exceedance import section
+from tolstat.questions.exceedance.answer import quantiles
 from tolstat.store import ResultFile
 
 
@@ -15,7 +14,7 @@ def tolerance_limit(folder, joints):
     path = synthetic.store(folder, synthetic.STUDY.replace("n = 60", f"n = {joints}"))
     with ResultFile.open(path) as store:
         view = store.view()
-        blocks = [block for one in section.sections(view, Asked(path)) for block in one.blocks]
+        blocks = quantiles(view).blocks()
         loads = np.sort(view.load("cross1.F").values)
     (table,) = [block for block in blocks if isinstance(block, Table) and "tolerance limits (Wilks)" in block.title]
     (row,) = [row for row in table.rows if row[0] == "cross1.F"]

@@ -7,16 +7,17 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from tests.support import synthetic
+from tests.support import reports, synthetic
 from tests.support.views import view
-from tolstat import report, sampling
+from tolstat import sampling
 from tolstat.analysis import prediction
 from tolstat.analysis.binomial import clopper_pearson, needed
 from tolstat.analysis.sample import Sample
 from tolstat.cli import app
 from tolstat.common.tables import RESULT, Simulation, Status
 from tolstat.display.asked import Asked
-from tolstat.questions.exceedance import query as exceedance
+from tolstat.questions.exceedance import rows as exceedance
+from tolstat.questions.exceedance.verdicts import WORDS, ends, verdict
 from tolstat.report import headline, page, summary
 from tolstat.store import ResultFile, Writer
 from tolstat.study import load
@@ -78,13 +79,14 @@ MISLEADING = {
 
 @pytest.fixture(autouse=True)
 def _without_pictures(monkeypatch):
-    monkeypatch.setattr("tolstat.report._pictures", lambda view, stem: [])
+    monkeypatch.setattr("tolstat.display.style.save", lambda figure, stem: [])
+    monkeypatch.setattr("tolstat.questions.exceedance.curves.sheet", lambda view, subtitle: None)
     monkeypatch.setattr("tolstat.questions.sections", lambda view, asked: [])
 
 
 def everywhere(path, accepted):
     """Sentence of the verdict in text, JSON and first card of the page."""
-    text = report.build(path, width=None, accepted=accepted)
+    text = reports.build(path, *([] if np.isnan(accepted) else ["--accept", str(accepted)]))
     with ResultFile.open(path) as store:
         made = store.view()
         json_ = summary.statistics(made, accepted=accepted)["verdict"]
@@ -103,7 +105,7 @@ def everywhere(path, accepted):
 def test_no_verdict_says_more_than_the_file(tmp_path, name):
     make, answer, words = MISLEADING[name]
     said, card = everywhere(make(tmp_path), 0.01)
-    assert said["answer"] == headline.WORDS[answer]
+    assert said["answer"] == WORDS[answer]
     assert words in said["sentence"]
     assert card.verdict == "open"
     assert "100 % of the joints keep" not in said["sentence"]
@@ -186,7 +188,7 @@ def apart(each):
 
 def test_the_verdict_is_on_the_joints_that_exceed_any_limit():
     made = apart(60)
-    assert [headline.verdict(row, 0.04) for row in exceedance.limits(made).to_dict("records")] == ["yes", "yes"]
+    assert [verdict(row, 0.04) for row in exceedance.limit_rows(made)] == ["yes", "yes"]
     found = headline.headline(made, 0.04)
     low, high = clopper_pearson(120, 2000)
     assert found.answer == "no"
@@ -210,7 +212,7 @@ def test_joints_that_would_decide_are_given_for_the_joint_verdict_only():
 def test_the_joint_verdict_covers_joints_without_a_load():
     row = exceedance.all_limits(view(failed=3, limits={"cross1.F": 2000.0, "cross2.F": 3000.0}))
     assert (row["count"], row["n_failed"]) == (0, 3)
-    assert headline.ends(row)[1] == pytest.approx(clopper_pearson(3, 200)[1])
+    assert ends(row)[1] == pytest.approx(clopper_pearson(3, 200)[1])
 
 
 @pytest.mark.parametrize(("accepted", "answer"), [(0.02, "no"), (0.5, "none")])
@@ -251,11 +253,11 @@ def test_a_share_that_joints_without_a_result_decide_is_shown_as_its_interval(fa
 
 def test_joints_that_would_decide_count_those_without_a_result():
     made = view(failed=2, limits={"cross1.F": 2000.0})
-    row = exceedance.limits(made).to_dict("records")[0]
+    row = exceedance.limit_rows(made)[0]
     said = headline.deciding(row, 0.02)
     assert said.endswith(f"stayed the same: {needed(2 / 200, 0.02):.0f}")
     assert needed(2 / 200, 0.02) > needed(0.0, 0.02)
-    near = exceedance.limits(view(failed=1, limits={"cross1.F": 2000.0})).to_dict("records")[0]
+    near = exceedance.limit_rows(view(failed=1, limits={"cross1.F": 2000.0}))[0]
     assert headline.deciding(near, 0.003).endswith("no number of them")
 
 

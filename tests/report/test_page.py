@@ -22,7 +22,7 @@ from tolstat.display.asked import Asked
 from tolstat.display.blocks import Section
 from tolstat.display.html import bound, grouped
 from tolstat.questions.accuracy import rendering
-from tolstat.questions.exceedance import query
+from tolstat.questions.exceedance import rows
 from tolstat.questions.joints import query as joints
 from tolstat.report import headline as verdict
 from tolstat.report import html as writer
@@ -97,14 +97,12 @@ def test_page_is_well_formed_and_loads_nothing(html):
             "verdict",
             "limits",
             "exceedance",
-            "histograms",
+            "failed",
+            "quantiles",
             "capability",
             "causes",
             "worst",
-            "drawn",
-            "joint",
             "modes",
-            "failed",
             "provenance",
         ],
     )
@@ -193,12 +191,21 @@ def test_other_bushings_and_the_band_of_the_whole_curve_are_drawn_on_switches(vi
         assert drawn.count(f'class="{name}"') == count
 
 
-def test_a_section_that_leads_stands_below_the_verdict(path, monkeypatch):
-    found = [Section("one", "One"), Section("what-if", "What if", lead=True)]
-    monkeypatch.setattr("tolstat.questions.sections", lambda view, asked: found)
-    with ResultFile.open(path) as store:
-        made = page.compose(store.view(), Asked(path, 0.05))
-    assert [section.key for section in made.sections] == ["verdict", "what-if", "limits", "one", "provenance"]
+def test_folded_sections_stand_below_the_others_and_open_where_all_is_asked_for(path, tmp_path, monkeypatch):
+    found = [Section("one", "One", folded=True), Section("two", "Two")]
+    monkeypatch.setattr("tolstat.questions.sections", lambda view, asked: list(found))
+    for full in (False, True):
+        page.write_page(path, tmp_path / "page.html", full=full)
+        made = (tmp_path / "page.html").read_text(encoding="utf-8")
+        assert Reading(made).sections == ["verdict", "two", "one", "provenance"]
+        assert made.count('<details class="fold" open>') == full
+        assert made.count('<details class="fold') == 1
+
+
+def test_a_brief_page_has_the_verdict_and_the_line_to_change(path, tmp_path):
+    page.write_page(path, tmp_path / "page.html", accepted=0.05, brief=True)
+    read = Reading((tmp_path / "page.html").read_text(encoding="utf-8"))
+    assert read.sections == ["verdict", "lines", "provenance"]
 
 
 def test_text_of_the_study_is_shown_and_not_run(html):
@@ -278,12 +285,12 @@ def test_a_limit_is_kept_when_the_whole_interval_is_below_what_is_accepted(low, 
 
 
 def test_reader_holds_the_shares_that_are_counted(view):
-    curves = query.readings(view)
+    curves = rows.readings(view)
     assert list(curves) == [*view.bushing_loads, "pin1.contact", "psi"]
     status = view.status
     for name, curve in curves.items():
         values = view.load(name).values
-        assert 100 < len(curve["x"]) <= 3 * query.READER_LEVELS
+        assert 100 < len(curve["x"]) <= 3 * rows.READER_LEVELS
         assert curve["x"][curve["start"]] == view.limits.get(name, curve["x"][curve["start"]])
         for i in (0, 7, curve["start"], -1):
             share = exceedance.exceedance(values, status, curve["x"][i])

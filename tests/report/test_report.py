@@ -1,5 +1,6 @@
 """Reports: tables against hand-counted shares, files of every kind of campaign, pictures that can be read."""
 
+import json
 import subprocess
 import sys
 from types import SimpleNamespace
@@ -9,21 +10,27 @@ import pandas as pd
 import pytest
 from matplotlib.text import Text
 
-from tests.support import synthetic
+from tests.support import reports, synthetic
 from tests.support.environment import ROOT
 from tests.support.views import swept, view
-from tolstat import joint, report
+from tolstat import joint
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.load_kinds import BUSHINGS
 from tolstat.common.tables import Status
 from tolstat.display import style
 from tolstat.display.table import as_text
 from tolstat.joint.derived import DERIVED
-from tolstat.questions.exceedance import curves_figure, query, sweep
-from tolstat.questions.exceedance import rendering as exceedance
-from tolstat.questions.exceedance.swept_axes import swept_axes
+from tolstat.questions import sweep
+from tolstat.questions.exceedance import answer as exceedance
+from tolstat.questions.exceedance import curves, rows
+from tolstat.questions.sweep import swept_axes
 from tolstat.report import joint_values
+from tolstat.report.answer import write_report
 from tolstat.store import ResultFile
+
+
+def sheet(made):
+    return curves.sheet(made, f"{made.head()}\n{exceedance.note(made)}")
 
 
 def texts(figure):
@@ -32,7 +39,7 @@ def texts(figure):
 
 def test_every_limit_has_a_row_with_its_share_and_the_nominal_load():
     made = view(limits={"fork3.T": 18.0, "pin2.contact": 650.0, "psi": 1.1e-4})
-    table = query.limits(made)
+    table = exceedance.limits(made).frame("limits")
     assert list(table["load"]) == ["fork3.T", "pin2.contact", "psi"]
     assert list(table["unit"]) == ["N*m", "N", "1"]
     assert list(table["count"]) == [
@@ -44,34 +51,34 @@ def test_every_limit_has_a_row_with_its_share_and_the_nominal_load():
 
 
 def test_failed_and_unsettled_joints_are_counted_both_ways():
-    table = query.limits(view(failed=7, unsettled=5))
+    table = exceedance.limits(view(failed=7, unsettled=5)).frame("limits")
     row = table.iloc[0]
     assert (row["n"], row["n_failed"], row["n_unsettled"]) == (200, 7, 5)
     assert row["bound_upper"] - row["bound_lower"] == pytest.approx(12 / 200)
     assert "with unresolved joints" in as_text(exceedance.LIMITS, table, None)
-    assert "with unresolved joints" not in as_text(exceedance.LIMITS, query.limits(view()), None)
+    assert "with unresolved joints" not in as_text(exceedance.LIMITS, rows.limit_rows(view()), None)
 
 
 def test_dependent_samples_have_no_interval_and_the_note_says_why():
     made = view(method="sobol", failed=2)
-    assert query.limits(made)[["lower", "upper", "outer_upper"]].isna().all(axis=None)
-    assert query.limits(made)["bound_upper"].notna().all()
+    assert exceedance.limits(made).frame("limits")[["lower", "upper", "outer_upper"]].isna().all(axis=None)
+    assert exceedance.limits(made).frame("limits")["bound_upper"].notna().all()
     assert "independent samples only" in exceedance.note(made)
-    assert "95 % band" not in texts(curves_figure.figure(made))
+    assert "95 % band" not in texts(curves.sheet(made, ""))
 
 
 def test_quantiles_rise_with_the_share():
-    table = query.quantiles(view())
-    assert len(table) == 16 * len(query.SHARES)
+    table = pd.DataFrame(rows.quantile_rows(view()))
+    assert len(table) == 16 * len(rows.SHARES)
     for _, part in table.groupby("load"):
         assert part["estimate"].is_monotonic_increasing
 
 
 def test_curves_fall_from_every_load_to_none_and_are_thinned():
-    table = query.curves(view(4001))
+    table = pd.DataFrame(rows.curve_rows(view(4001)))
     assert table["load"].nunique() == 16
     for _, part in table.groupby("load"):
-        assert len(part) <= query.MAX_LEVELS
+        assert len(part) <= rows.MAX_LEVELS
         assert part["level"].is_monotonic_increasing
         assert part["estimate"].is_monotonic_decreasing
         assert part["estimate"].iloc[-1] == 0.0
@@ -85,7 +92,7 @@ def test_unknown_load_names_what_there_is():
 
 def test_picture_states_study_numbers_units_and_limits():
     made = view(failed=3, unsettled=2, limits={"cross1.F": 700.0, "cross2.F": 705.0, "fork1.T": 500.0})
-    figure = curves_figure.figure(made)
+    figure = sheet(made)
     said = texts(figure)
     assert any(t.startswith("made up") for t in said)
     assert any("200 joints (random sampling), 3 failed, 2 not settled" in t for t in said)
@@ -131,10 +138,10 @@ def overlapping(figure):
 @pytest.mark.parametrize(
     "draw",
     [
-        lambda: curves_figure.figure(view(failed=3, unsettled=2, limits={f"{b}.F": 700.0 for b in BUSHINGS})),
-        lambda: curves_figure.figure(view(limits={f"cross{i}.T": 16.0 + i for i in (1, 2, 3, 4)})),
-        lambda: sweep.figure(swept(limits={"cross1.F": 800.0})),
-        lambda: sweep.figure(swept(9)),
+        lambda: sheet(view(failed=3, unsettled=2, limits={f"{b}.F": 700.0 for b in BUSHINGS})),
+        lambda: sheet(view(limits={f"cross{i}.T": 16.0 + i for i in (1, 2, 3, 4)})),
+        lambda: sweep.sheet(swept(limits={"cross1.F": 800.0})),
+        lambda: sweep.sheet(swept(9)),
     ],
 )
 def test_no_text_lies_on_another_or_leaves_the_page(draw):
@@ -147,11 +154,11 @@ def test_a_campaign_without_a_valid_joint_still_gets_a_page(status):
         results["status"] = status
 
     made = view(21, change=change)
-    assert texts(curves_figure.figure(made)).count("no joint with a valid result") == 4
-    assert query.curves(made).empty
-    share = query.limits(made)["estimate"]
+    assert texts(curves.sheet(made, "")).count("no joint with a valid result") == 4
+    assert not rows.curve_rows(made)
+    share = exceedance.limits(made).frame("limits")["estimate"]
     assert share.isna().all()
-    assert "-" in as_text(exceedance.LIMITS, query.limits(made))
+    assert "-" in as_text(exceedance.LIMITS, rows.limit_rows(made))
 
 
 def test_joints_that_are_all_alike_can_be_drawn():
@@ -159,7 +166,7 @@ def test_joints_that_are_all_alike_can_be_drawn():
         results["F_max"] = 640.0
 
     made = view(21, change=change)
-    assert len(curves_figure.figure(made).axes) == 4
+    assert len(curves.sheet(made, "").axes) == 4
 
 
 def test_sweep_finds_its_axes_and_their_units():
@@ -178,17 +185,18 @@ def two_without_load(results):
 
 def test_sweep_table_keeps_every_joint_with_its_status():
     made = swept(change=two_without_load)
-    table = sweep.table(made)
+    found = sweep.sweep(made)
+    table = found.frame("sweep")
     assert len(table) == 11
     assert list(table["status"][[2, 5]]) == ["outside_model", "not_settled"]
     np.testing.assert_array_equal(table["cross1.F [N]"], made.results["F_max"][:, 0])
-    short = sweep.worst(made)
-    assert list(short["fork.T [N*m]"]) == list(made.results["T_max"][:, 4:].max(axis=1))
+    short = found.tables["sweep"].for_people
+    assert [row["fork.T [N*m]"] for row in short] == list(made.results["T_max"][:, 4:].max(axis=1))
 
 
 def test_sweep_page_shows_unsettled_and_failed_joints():
     made = swept(change=two_without_load)
-    said = texts(sweep.figure(made))
+    said = texts(sweep.sheet(made))
     assert "not settled" in said
     assert "no result" in said
     assert said.count("pin*.diameter [mm]") == 4
@@ -198,20 +206,19 @@ def test_sweep_page_shows_unsettled_and_failed_joints():
 def test_numbers_need_neither_pandas_nor_matplotlib(tmp_path):
     path = synthetic.store(tmp_path)
     code = (
-        "import sys, pathlib; from tolstat import report; from tolstat.store import ResultFile\n"
-        "path = pathlib.Path(sys.argv[1])\n"
-        "with ResultFile.open(path) as store:\n"
-        "    found = report._numbers(store.view(), path.with_suffix(''), 80, float('nan'))\n"
-        "print(len(found.files), 'pandas' in sys.modules, 'matplotlib' in sys.modules)"
+        "import sys; from tolstat.cli import app; app([*sys.argv[1:]], standalone_mode=False)\n"
+        "print('pandas' in sys.modules, 'matplotlib' in sys.modules, file=sys.stderr)"
     )
-    done = subprocess.run([sys.executable, "-c", code, path], capture_output=True, text=True, check=True, cwd=ROOT)
-    assert done.stdout.split() == ["3", "False", "False"]
+    argv = [sys.executable, "-c", code, "report", path, "--json"]
+    done = subprocess.run(argv, capture_output=True, text=True, check=True, cwd=ROOT)
+    assert done.stderr.split() == ["False", "False"]
+    assert len(json.loads(done.stdout)["tables"]) == 3
 
 
 @pytest.mark.slow
 def test_report_of_a_random_view(tmp_path):
     path = synthetic.store(tmp_path, failed=2)
-    made = report.build(path, width=None)
+    made = reports.build(path)
     names = [f"small_{what}" for what in ("exceedance.png", "exceedance.svg", "exceedance.csv")]
     names += ["small_quantiles.csv", "small_limits.csv"]
     assert [file.name for file in made.files] == names
@@ -228,12 +235,12 @@ def test_report_of_a_random_view(tmp_path):
 
 @pytest.mark.slow
 def test_report_of_a_campaign_under_way_counts_what_is_pending(tmp_path):
-    made = report.build(synthetic.store(tmp_path, simulated=31))
+    made = reports.build(synthetic.store(tmp_path, simulated=31))
     assert "30 joints (random sampling), 0 failed, 0 not settled, 30 still pending" in made.notes
 
 
 def test_report_of_a_file_that_has_just_been_made(tmp_path):
-    made = report.build(synthetic.store(tmp_path, simulated=0))
+    made = reports.build(synthetic.store(tmp_path, simulated=0))
     assert "0 joints" in made.notes
     assert len(made.files) == 5
 
@@ -241,7 +248,7 @@ def test_report_of_a_file_that_has_just_been_made(tmp_path):
 @pytest.mark.slow
 def test_report_without_limits_prints_quantiles(tmp_path):
     plain = synthetic.STUDY.partition("[limits]")[0]
-    made = report.build(synthetic.store(tmp_path, plain))
+    made = reports.build(synthetic.store(tmp_path, plain))
     assert "95 % interval of 99 %" in made.table
     assert len(made.table.splitlines()) == 2 + 1 + 16
     assert not (tmp_path / "small_limits.csv").exists()
@@ -250,7 +257,7 @@ def test_report_without_limits_prints_quantiles(tmp_path):
 def test_report_of_a_sweep_into_another_folder(tmp_path):
     elsewhere = tmp_path / "pictures"
     elsewhere.mkdir()
-    files = report.write_report(synthetic.store(tmp_path, synthetic.SWEEP, "clearance"), elsewhere)
+    files = write_report(synthetic.store(tmp_path, synthetic.SWEEP, "clearance"), elsewhere)
     assert [f.name for f in files] == [f"clearance_sweep.{kind}" for kind in ("png", "svg", "csv")]
     table = pd.read_csv(elsewhere / "clearance_sweep.csv")
     assert table["pin*.diameter [mm]"].iloc[[0, -1]].tolist() == pytest.approx([-0.1, 0.1])
@@ -259,22 +266,22 @@ def test_report_of_a_sweep_into_another_folder(tmp_path):
 @pytest.mark.slow
 def test_same_file_same_bytes(tmp_path):
     path = synthetic.store(tmp_path)
-    first = [file.read_bytes() for file in report.write_report(path)]
-    assert [file.read_bytes() for file in report.write_report(path)] == first
+    first = [file.read_bytes() for file in write_report(path)]
+    assert [file.read_bytes() for file in write_report(path)] == first
     with ResultFile.open(path) as store:
         for source in (store, store.view()):
-            assert [file.read_bytes() for file in report.write_report(source)] == first
+            assert [file.read_bytes() for file in write_report(source)] == first
 
 
 @pytest.mark.slow
 def test_folder_that_cannot_be_made_and_file_that_is_not_ours(tmp_path):
     path = synthetic.store(tmp_path)
-    assert report.write_report(path, tmp_path / "new")[0].parent == tmp_path / "new"
+    assert write_report(path, tmp_path / "new")[0].parent == tmp_path / "new"
     with pytest.raises(InputError, match="another folder"):
-        report.build(path, path / "nowhere")
+        write_report(path, path / "nowhere")
     (tmp_path / "other.h5").write_text("not HDF5")
     with pytest.raises(StoreError):
-        report.build(tmp_path / "other.h5")
+        write_report(tmp_path / "other.h5")
 
 
 @pytest.mark.slow
@@ -282,7 +289,7 @@ def test_drawing_leaves_the_callers_settings_alone_and_needs_no_pyplot():
     code = (
         "import sys, matplotlib as m; before = m.rcParams.copy();"
         "from tests.report import test_report as t;"
-        "t.curves_figure.figure(t.view(21));"
+        "t.sheet(t.view(21));"
         "print(dict.__eq__(before, m.rcParams), 'matplotlib.pyplot' in sys.modules)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)

@@ -19,7 +19,7 @@ from tolstat.campaign import extend
 from tolstat.cli import app
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.tables import Simulation, Status
-from tolstat.questions.exceedance import query as exceeded
+from tolstat.questions.exceedance import answer as exceeded
 from tolstat.questions.reweight import query as reweighting
 from tolstat.report import headline
 from tolstat.store import ResultFile, Writer
@@ -261,7 +261,7 @@ def test_a_verdict_is_kept_only_if_nothing_that_is_missed_could_change_it():
 def test_joints_without_a_load_count_above_for_the_end_whatever_the_proposals_miss(tmp_path):
     path = synthetic.store(tmp_path, PLAN.replace("n = 4000", "n = 400"), "small", failed=60, unsettled=20)
     with ResultFile.open(path) as store:
-        row = exceeded.limits(store.view()).iloc[0]
+        row = exceeded.exceedance(store.view()).frame("limits").iloc[0]
         own, results = store.origin()["component"][1:] == 0, store.results()[1:]
     lost = results["status"] != Status.OK
     count = ((results["F_max"][:, 0] > 700.0) | lost)[own].sum()
@@ -272,7 +272,7 @@ def test_joints_without_a_load_count_above_for_the_end_whatever_the_proposals_mi
 @pytest.mark.slow
 def test_the_report_of_importance_sampling_has_both_ends(stored):
     with ResultFile.open(stored) as store:
-        row = exceeded.limits(store.view()).iloc[0]
+        row = exceeded.exceedance(store.view()).frame("limits").iloc[0]
         own = store.origin()["component"][1:] == 0
         count = (store.results()["F_max"][1:, 0][own] > 700.0).sum()
     assert row["unsearched_upper"] == pytest.approx(binomial.clopper_pearson(count, own.sum())[1])

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from tests.support.environment import ROOT
+from tests.support.reports import build
 from tolstat import joint, sampling, study
 from tolstat.campaign import run as campaign
 from tolstat.campaign import verify
@@ -15,10 +16,12 @@ from tolstat.campaign.remedy import remedy
 from tolstat.common.errors import InputError
 from tolstat.common.load_kinds import LOAD_KINDS
 from tolstat.common.tables import FAILED, RESULT, RESULT_FIELDS, SIMULATED, Motion, Options, Status
-from tolstat.report import build, cases
+from tolstat.display.answer import Answer, Document
+from tolstat.questions.cases import cases
 from tolstat.solver.simulation import simulate_rows
 from tolstat.store import ResultFile, Writer, verification
 from tolstat.store.verification import Check, Verification
+from tolstat.store.view import View
 
 pytestmark = pytest.mark.slow
 
@@ -186,10 +189,15 @@ def test_joints_are_verified_with_the_settings_of_their_variant(tmp_path: Path) 
         assert (check.results["steps_per_rev"] == 2 * found.base["steps_per_rev"]).all()
 
 
+def markdown(answer: Answer) -> str:
+    (document,) = (part for part in answer.parts if isinstance(part, Document))
+    return document.text
+
+
 def test_the_table_holds_the_errors_against_the_reference(tmp_path: Path) -> None:
     campaign.run(load(tmp_path), tmp_path / "s.h5", workers=1, check=False)
     with Writer.open(tmp_path / "s.h5") as store:
-        before = cases.table(store)
+        before = cases(View(store))
         rows = np.array([0, 1, 2, 3, 4])
         true = store.results()[rows]
         worst = true["F_max"][0].max()
@@ -198,13 +206,14 @@ def test_the_table_holds_the_errors_against_the_reference(tmp_path: Path) -> Non
         true["status"][3:] = Status.NOT_SETTLED, Status.NEWTON_FAILED
         true["closure"][3] = 2e-4
         verification.write([(store, Verification(4, rows, true, {"reference": Check("", {}, true)}))])
-        table = cases.table(store)
+        checked = cases(View(store))
+    table = checked.frame("cases")
     largest = max(worst, true["F_max"][0].max())
     assert table["error_F"][0] == pytest.approx(1e-3 * worst / largest)
     assert table["error_T"][:4].tolist() == pytest.approx([0, 0.2, 0, 0])
     assert table["error_F"].isna().tolist() == 4 * [False] + 2 * [True]
-    assert "reference" not in before
-    lines = cases.markdown(table).splitlines()
+    assert "reference" not in before.frame("cases")
+    lines = markdown(checked).splitlines()
     assert {line.count("|") for line in lines} == {11}
     assert [line.split("| ")[-2:] for line in lines[2:]] == [
         ["1e-03 ", "0e+00 |"],
@@ -214,7 +223,7 @@ def test_the_table_holds_the_errors_against_the_reference(tmp_path: Path) -> Non
         ["reference gave up ", "– |"],
         ["not compared ", "– |"],
     ]
-    assert cases.markdown(before).splitlines()[2].count("|") == 9
+    assert markdown(before).splitlines()[2].count("|") == 9
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from tolstat.common.columns import ERROR_COLUMNS
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.loads import SHOWN_LOADS
 from tolstat.questions.capability import capability
-from tolstat.questions.exceedance import query as exceedance
+from tolstat.questions.exceedance.answer import exceedance
 from tolstat.report import summary
 from tolstat.store import ResultFile, result_file
 
@@ -30,16 +30,15 @@ def test_json_has_all_statistics_as_the_reports_have_them(tmp_path):
     found = json.loads(out.read_text(encoding="utf-8"))
     with ResultFile.open(path) as store:
         view = store.view()
-        tables = (("limits", exceedance.limits(view)), ("capability", capability(view).frame("limits")))
+        tables = (("exceedance", exceedance(view).frame("limits")), ("capability", capability(view).frame("limits")))
         assert found["provenance"]["versions"] == store.versions
     assert found["joints"] == {"ok": 295, "not_settled": 2, "newton_failed": 3}
-    found["capability"] = found["capability"]["tables"]["limits"]["rows"]
     for key, table in tables:
-        told = pd.DataFrame(found[key]).astype(table.dtypes.to_dict())
+        told = pd.DataFrame(found[key]["tables"]["limits"]["rows"]).astype(table.dtypes.to_dict())
         pd.testing.assert_frame_equal(
             told, table.replace([float("inf"), -float("inf")], float("nan")), check_exact=False
         )
-    assert len(found["quantiles"]) == 4 * len(SHOWN_LOADS)
+    assert len(found["exceedance"]["tables"]["quantiles"]["rows"]) == 4 * len(SHOWN_LOADS)
     assert found["causes"]["cross1.F"]["table"][0]["error"] == "pin1.offset_t"
 
 

@@ -13,19 +13,20 @@ import pytest
 from tests.campaign.test_campaign import datasets
 from tests.campaign.test_extend import run, slices, small
 from tests.report.test_report import texts
-from tests.support import damage, fakes, synthetic
+from tests.support import damage, fakes, reports, synthetic
 from tests.support.views import swept, view
-from tolstat import report, study
+from tolstat import study
 from tolstat.analysis import accuracy
 from tolstat.campaign import extend, replay, stop_rule, verify
 from tolstat.campaign import run as campaign
 from tolstat.common import selected_results as kept
 from tolstat.common.columns import RESULT_COLUMNS
 from tolstat.common.errors import InputError, StoreError
+from tolstat.questions import sweep
 from tolstat.questions.accuracy import query as accuracy_tables
 from tolstat.questions.accuracy import rendering
 from tolstat.questions.causes.tail import worst_joints
-from tolstat.questions.exceedance import curves_figure, query, sweep
+from tolstat.questions.exceedance import curves, rows
 from tolstat.store import ResultFile, layout, metadata, verification
 
 CROSS_F = [f"cross{i}.F_max" for i in (1, 2, 3, 4)]
@@ -219,36 +220,36 @@ def test_reports_show_what_there_is() -> None:
     held = columns(*CROSS_F, "fork2.T_max")
     made = view(columns=held, change=lambda results: kept.blank_others(results, held))
     held = ["cross1.F", "cross2.F", "cross3.F", "cross4.F", "fork2.T"]
-    assert list(query.quantiles(made)["load"].unique()) == held
-    assert list(query.curves(made)["load"].unique()) == held
-    assert texts(curves_figure.figure(made)).count("not kept by the study") == 2
-    assert "cross1.T, cross2.T" in query.not_kept(made)
-    assert query.limits(made)["estimate"].between(0, 1).all()
+    assert list(dict.fromkeys(row["load"] for row in rows.quantile_rows(made))) == held
+    assert list(dict.fromkeys(row["load"] for row in rows.curve_rows(made))) == held
+    assert texts(curves.sheet(made, "")).count("not kept by the study") == 2
+    assert "cross1.T, cross2.T" in rows.not_kept(made)
+    assert all(0 <= row["estimate"] <= 1 for row in rows.limit_rows(made))
 
 
 @pytest.mark.parametrize("second", [1, 3])
 def test_sweeps_show_what_there_is(second: int) -> None:
     held = columns("cross1.F_max", "fork2.T_max", "psi_max")
     made = swept(second, columns=held, change=lambda results: kept.blank_others(results, held))
-    loads = [name for name in sweep.table(made).columns if name.startswith(("cross", "fork", "psi"))]
+    loads = [name for name in sweep.sweep(made).frame("sweep").columns if name.startswith(("cross", "fork", "psi"))]
     assert loads == ["cross1.F [N]", "fork2.T [N*m]", "psi"]
-    short = sweep.worst(made)
-    assert list(short["cross.F [N]"]) == list(made.results["F_max"][:, 0])
-    assert not {"cross.T [N*m]", "fork.F [N]"} & set(short.columns)
-    assert texts(sweep.figure(made)).count("not kept by the study") == 2
+    short = sweep.sweep(made).tables["sweep"].for_people
+    assert [row["cross.F [N]"] for row in short] == list(made.results["F_max"][:, 0])
+    assert not {"cross.T [N*m]", "fork.F [N]"} & set(short[0])
+    assert texts(sweep.sheet(made)).count("not kept by the study") == 2
 
 
 def test_reports_without_any_force_or_torque(tmp_path: Path) -> None:
-    psi = report.build(synthetic.store(tmp_path, text("psi_max", body=PLAIN), "psi"))
+    psi = reports.build(synthetic.store(tmp_path, text("psi_max", body=PLAIN), "psi"))
     assert [file.name for file in psi.files] == ["psi_exceedance.csv", "psi_quantiles.csv"]
-    assert psi.table.splitlines()[3].startswith("psi ")
+    assert psi.table.splitlines()[4].startswith("psi ")
     assert "not kept, see [output] results of the study: cross1.F" in psi.notes
-    means = report.build(synthetic.store(tmp_path, text("*.F_mean", body=PLAIN), "means"))
+    means = reports.build(synthetic.store(tmp_path, text("*.F_mean", body=PLAIN), "means"))
     assert means.files == []
     assert means.table.splitlines()[2].startswith("no largest load is kept")
-    turned = report.build(synthetic.store(tmp_path, text("psi_max", body=synthetic.SWEEP), "turned"))
+    turned = reports.build(synthetic.store(tmp_path, text("psi_max", body=synthetic.SWEEP), "turned"))
     assert [file.name for file in turned.files] == ["turned_sweep.csv"]
-    assert turned.table.splitlines()[2].split()[-1] == "psi"
+    assert turned.table.splitlines()[3].split()[-1] == "psi"
 
 
 def test_reports_of_cases(tmp_path: Path) -> None:
@@ -256,13 +257,13 @@ def test_reports_of_cases(tmp_path: Path) -> None:
         '[sampling]\nmethod = "cases"\n[[case]]\nname = "a"\nerrors.hole4.offset_t = "0.1 mm"\n'
         '[[variant]]\nname = "plain"\nnote = "as drawn"\n'
     )
-    made = report.build(synthetic.store(tmp_path, text("cross*.F_max", body=cases), "cases"))
+    made = reports.build(synthetic.store(tmp_path, text("cross*.F_max", body=cases), "cases"))
     full = pd.read_csv(tmp_path / "cases_cases.csv")
     assert [name for name in full.columns if "[N*m]" in name or "fork" in name] == []
     assert "Gamma_F [%]" in made.table
     assert "Gamma_T" not in made.table
     assert "–" in (tmp_path / "cases_cases.md").read_text(encoding="utf-8")
-    bare = report.build(synthetic.store(tmp_path, text("psi_max", body=cases), "bare"))
+    bare = reports.build(synthetic.store(tmp_path, text("psi_max", body=cases), "bare"))
     assert "Gamma" not in bare.table
 
 

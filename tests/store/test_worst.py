@@ -7,8 +7,7 @@ from tests.support import synthetic, views
 from tolstat.common.tables import Status
 from tolstat.display.asked import Asked
 from tolstat.questions.causes.tail import worst_joints
-from tolstat.questions.exceedance import section as exceedance
-from tolstat.questions.exceedance.query import at_points, limits
+from tolstat.questions.exceedance.answer import exceedance, exceedance_on_page, limits_on_page
 from tolstat.report import verdict
 from tolstat.report.headline import headline
 from tolstat.solver import stationary
@@ -48,7 +47,7 @@ def test_a_joint_is_resolved_only_if_it_is_at_all_points(view):
     expected = {2: Status.NEWTON_FAILED, 4: Status.NOT_SETTLED, 6: Status.CRASHED, 8: Status.STATIONARY}
     assert {k: Status(status[k]) for k in np.flatnonzero(status != Status.OK).tolist()} == expected
     assert view.load("cross1.F at one").status[4] == Status.OK
-    row = limits(view).iloc[0]
+    row = exceedance(view).frame("limits").iloc[0]
     assert (row["n_failed"], row["n_unsettled"]) == (2, 1)
     assert view.first_without_load["status"].tolist() == [Status.NEWTON_FAILED, Status.NOT_SETTLED, Status.CRASHED]
 
@@ -68,7 +67,7 @@ def test_the_interval_of_a_stationary_joint_covers_both_points(view, tables):
 
 
 def test_limits_hold_at_the_points_that_they_name(view, tables):
-    table = limits(view).set_index("load")
+    table = exceedance(view).frame("limits").set_index("load")
     counts = {
         "cross1.F": ((tables["one"]["F_max"][1:, 0] > 700) | (tables["two"]["F_max"][1:, 0] > 700), 3),
         "cross1.F at two": (tables["two"]["F_max"][1:, 0] > 900, 2),
@@ -84,12 +83,12 @@ def test_limits_hold_at_the_points_that_they_name(view, tables):
 
 
 def test_shares_at_each_point(view, tables):
-    found = at_points(view).set_index("load")
+    found = exceedance(view).frame("at_points").set_index("load")
     assert found.index.tolist() == ["cross1.F"]  # the other limits hold at one point
     for name, table in tables.items():
         own = table[1:][np.isin(table["status"][1:], (Status.OK, Status.STATIONARY))]
         assert found.loc["cross1.F", name] == np.mean(own["F_max"][:, 0] > 700)
-    assert not len(at_points(view.at("one")))
+    assert "at_points" not in exceedance(view.at("one")).tables
 
 
 def test_the_worst_joints_name_their_point(view, monkeypatch):
@@ -129,10 +128,10 @@ def test_a_limit_of_all_points_holds_at_each(view):
 def test_the_page_names_points(tables):
     limits = {"cross1.F": 700.0, "fork1.T at one": 50.0, "fork1.T at two": 50.0}
     view = views.at_points(tables, limits)
-    (panels, _, at_each) = verdict.limits(view, Asked(view.path))[0].blocks
+    (panels, _, at_each, *_) = limits_on_page(view, Asked(view.path)).blocks()
     assert at_each.head == ["load", "limit", "one", "two"]
     assert any("largest load over all of them" in text.text for text in panels.beside)
-    found = exceedance.sections(view, Asked(view.path))[0].blocks
+    found = exceedance_on_page(view, Asked(view.path)).blocks()
     leading = found[0].panels
     assert [panel.key for panel in leading if " " in panel.key] == []
     (torque,) = [panel.reads for panel in leading if panel.reads[0].startswith("fork1.T at ")]
@@ -146,8 +145,8 @@ def test_the_page_names_a_point_without_a_valid_joint(tables):
     view = views.at_points(tables, {"cross1.F": 700.0})
     (table,) = verdict._points(view)
     kept = table.head.index("keep all limits there")
-    assert table.rows[1][kept] == verdict.WORDS["none"]
-    assert table.rows[0][kept] != verdict.WORDS["none"]
+    assert table.rows[1][kept] == "no verdict"
+    assert table.rows[0][kept] != "no verdict"
 
 
 def test_contact_modes_of_several_points_are_not_averaged(view):

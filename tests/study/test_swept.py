@@ -13,7 +13,7 @@ from tolstat import sampling, study
 from tolstat.common.errors import InputError
 from tolstat.common.tables import Simulation
 from tolstat.joint.derived import DERIVED
-from tolstat.questions.exceedance.swept_axes import swept_axes
+from tolstat.questions.sweep import swept_axes
 from tolstat.store import ResultFile, Writer, recorded
 from tolstat.study import swept
 from tolstat.study.swept import KEYS

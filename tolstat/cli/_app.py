@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from tolstat.common.tables import Variant
     from tolstat.display.table import Column, Rows
     from tolstat.joint import Joint
-    from tolstat.report import Report
     from tolstat.study import Study
 
 ABOUT = "Monte Carlo tolerance analysis of Cardan joints: which share of the joints exceeds a load."
@@ -292,14 +291,6 @@ def parse_share(text: str) -> float:
         remedy = 'write --accept "0.1 %", --accept "1000 ppm" or --accept 0.001'
         raise InputError([Fault("--accept", f"{text!r} is not a share between 0 and 1", remedy)])
     return share
-
-
-def tell(report: Report) -> None:
-    """Print the table of a report on standard output, its notes and files on standard error."""
-    typer.echo(report.table)
-    say(report.notes)
-    for path in report.files:
-        say(f"wrote {path}")
 
 
 def width_of(wide: bool) -> int | None:

@@ -110,7 +110,7 @@ def command_of(question: Question) -> Callable[..., None]:
             views = [_view(stack, path, given) for path in sources]
             with progress(question.name):
                 answer = asked.answer(*views, **options)
-            _deliver(answer, "_".join(path.stem for path in sources[:2]), given)
+            _deliver(answer, "_".join([*(path.stem for path in sources[:2]), question.name]), given)
 
     made: Any = run
     made.__name__, made.__doc__ = question.name, prose(asked.docstring)
@@ -128,7 +128,7 @@ def show(answer: Answer, wide: bool) -> None:
 
     first = True
     for part in answer.parts:
-        if isinstance(part, Table):
+        if isinstance(part, Table) and not part.hidden:
             if not first:
                 typer.echo(f"\n{part.title}")
             print_table(part.columns, part.for_people, wide)

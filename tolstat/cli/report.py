@@ -10,14 +10,13 @@ import typer
 
 from tolstat.cli._app import (
     Accept,
+    AsJson,
     AtPoints,
     ResultPath,
     Wide,
     announce_compilation,
-    make_folder,
+    as_text,
     parse_share,
-    tell,
-    width_of,
 )
 from tolstat.cli._talk import progress, say
 from tolstat.common.errors import Fault, InputError, gather
@@ -46,8 +45,13 @@ def report(
             "has no load histories; default: 1000, but none is simulated again if FILE has pending joints.",
         ),
     ] = None,
+    full: Annotated[bool, typer.Option("--full", help="With an HTML page: open all its sections.")] = False,
+    brief: Annotated[
+        bool, typer.Option("--brief", help="With an HTML page: verdict and line to change only, on one printed sheet.")
+    ] = False,
     point: AtPoints = None,
     wide: Wide = False,
+    as_json: AsJson = False,
 ) -> None:
     """Report the share of joints above each load.
 
@@ -60,24 +64,30 @@ def report(
     Example: tolstat report iso2768_f.h5 --out page.html --accept "1 %"
     """
     if out is not None and out.suffix.lower() in PAGES:
-        _page(file, out, accept, again, point or "")
+        _page(file, out, accept, again, point or "", full, brief)
         return
-    from tolstat.report import build
-    from tolstat.store import ResultFile, recorded, viewed
-
     accepted = math.nan if accept is None else parse_share(accept)
-    if out is not None:
-        ResultFile.open(file).close()  # check the file before the folder is created
-        make_folder(out)
+    from tolstat.cli._questions import show
+    from tolstat.report.answer import report as answer
+    from tolstat.report.answer import write
+    from tolstat.store import recorded, viewed
+
     with viewed(file) as view:
-        with progress("report") as shown:
-            made = build(view, out, width_of(wide), shown.stage, accepted, point or "")
-        tell(made)
+        with progress("report"):
+            made = answer(view.at(point or ""), accepted)
+        if as_json:
+            typer.echo(as_text(made.values()))
+            return
+        show(made, wide)
         if note := recorded.note_on_mounting(view.store):
             say(f"note: {note}")
+        with progress("files") as shown:
+            files = write(made, view.path, out, point or "", shown.stage)
+    for path in files:
+        say(f"wrote {path}")
 
 
-def _page(file: Path, out: Path, accept: str | None, again: int | None, point: str) -> None:
+def _page(file: Path, out: Path, accept: str | None, again: int | None, point: str, full: bool, brief: bool) -> None:
     from tolstat.common.cores import available_cores
     from tolstat.common.draw_records import DRAWN
     from tolstat.common.files import check_target
@@ -103,5 +113,5 @@ def _page(file: Path, out: Path, accept: str | None, again: int | None, point: s
         if again and store.sampling["method"] in DRAWN and not held:
             announce_compilation()
         with progress("page") as shown:
-            page.write_page(view, out, accepted, again, shown.stage, point, available_cores())
+            page.write_page(view, out, accepted, again, shown.stage, point, available_cores(), full, brief)
     say(f"wrote {out}")

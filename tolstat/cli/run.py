@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tolstat.cli._app import Wide, Workers, announce_compilation, print_study_notes, tell, width_of
+from tolstat.cli._app import Wide, Workers, announce_compilation, print_study_notes
 from tolstat.cli._shortage import check_memory
 from tolstat.cli._talk import fail, progress, say
 from tolstat.common.errors import Fault, InputError, gather
@@ -202,15 +202,21 @@ def conclude(path: Path, report: bool, wide: bool, study: str = "STUDY") -> None
     `study` is the study file as the user gave it, with its settings.
     """
     from tolstat.campaign.remedy import reasons
+    from tolstat.cli._questions import show
+    from tolstat.report.answer import report as answer
+    from tolstat.report.answer import write
     from tolstat.store import ResultFile
 
     with ResultFile.open(path) as store:
         if report:
             with progress("report") as shown:
-                from tolstat.report import build
-
-                made = build(store, None, width_of(wide), shown.stage)
-            tell(made)
+                view = store.view()
+                made = answer(view)
+                shown.stage("files")
+                files = write(made, path)
+            show(made, wide)
+            for file in files:
+                say(f"wrote {file}")
         found = reasons(store, {one.point or "": one.status() for one in store.each()})
         for reason in found:
             say(reason.text)

@@ -6,17 +6,18 @@ A question returns an `Answer`; terminal, page, JSON, CSV and notebook are gener
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from tolstat.display import text
-from tolstat.display.blocks import Block, Facts, Listing, Panels, Text
+from tolstat.display import drawing, style, text
+from tolstat.display.blocks import Block, Facts, Listing, Panels, Reader, Text
 from tolstat.display.table import Column, Rows, as_block
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.figure import Figure
 
 Place = Literal["lead", "note", "warning"]
 
@@ -55,6 +56,7 @@ class Table:
         Units by key, where rows have none of their own.
     seen : sequence of mapping, optional
         What `columns` take their cells from: some of the rows, or rows arranged for people; by default all rows.
+        Without any, the table is in JSON and CSV only.
     verdicts : sequence of str
         Verdict of each row, see `blocks.Table`.
     """
@@ -72,6 +74,11 @@ class Table:
         """Rows that people see."""
         return self.rows if self.seen is None else self.seen
 
+    @property
+    def hidden(self) -> bool:
+        """Whether people see nothing of it."""
+        return self.seen is not None and not self.seen
+
 
 @dataclass(frozen=True)
 class Document:
@@ -81,7 +88,15 @@ class Document:
     text: str
 
 
-Part = Sentence | Table | Panels | Listing | Document
+@dataclass(frozen=True)
+class Sheet:
+    """A picture of several panels that `Answer.write` writes in their place; `name` ends the names of its files."""
+
+    name: str
+    draw: Callable[[], Figure]
+
+
+Part = Sentence | Table | Panels | Reader | Sheet | Listing | Document
 
 
 @dataclass(frozen=True)
@@ -133,7 +148,7 @@ class Answer:
         return [block for part in self.parts if (block := _block(part)) is not None]
 
     def write(self, stem: Path) -> list[Path]:
-        """Write each table as ``STEM_NAME_table.csv``, pictures as PNG and SVG beside them, and documents.
+        """Write each table as ``STEM_TABLE.csv``, pictures as PNG and SVG beside them, and documents.
 
         Returns
         -------
@@ -146,15 +161,15 @@ class Answer:
             When a file cannot be written.
         """
         files: list[Path] = []
-        stem = stem.with_name(f"{stem.name}_{self.name.replace('-', '_')}")
+        sheets = [part for part in self.parts if isinstance(part, Sheet)]
         for part in self.parts:
             if isinstance(part, Table):
                 files.append(text.csv(text.columns_of(part.rows), stem, part.name))
-            elif isinstance(part, Panels):
-                from tolstat.display import drawing
-
+            elif isinstance(part, Panels) and not sheets:
                 for panel in part.panels:
                     files += drawing.save(panel, stem.with_name(f"{stem.name}_{panel.key}"))
+            elif isinstance(part, Sheet):
+                files += style.save(part.draw(), stem.with_name(f"{stem.name}_{part.name}"))
             elif isinstance(part, Document):
                 files.append(text.write(part.text, stem.with_name(f"{stem.name}{part.ending}")))
         return files
@@ -186,8 +201,8 @@ def _block(part: Part) -> Block | None:
         lead = part.place == "lead"
         return Text(part.text if lead else text.sentence(part.text), small=not lead)
     if isinstance(part, Table):
-        return as_block(part.title, part.columns, part.for_people, part.verdicts)
-    return None if isinstance(part, Document) else part
+        return None if part.hidden else as_block(part.title, part.columns, part.for_people, part.verdicts)
+    return None if isinstance(part, Document | Sheet) else part
 
 
 def _short(value: Any) -> str:

@@ -143,13 +143,13 @@ class Panels:
 
 
 @dataclass(frozen=True)
-class ResultFile:
+class Reader:
     """Interactive tool that shows the exceedance at a chosen load.
 
     Attributes
     ----------
     curves : mapping
-        As `questions.exceedance.query.readings` returns them.
+        As `questions.exceedance.rows.readings` returns them.
     start : str
         The load shown first; empty for the first of `curves`.
     """
@@ -161,10 +161,11 @@ class ResultFile:
 
 @dataclass(frozen=True)
 class Facts:
-    """Names and values, one below the other."""
+    """Names and values, one below the other; with a title they are collapsed until the reader opens them."""
 
     kind: ClassVar[str] = "facts"
     items: Sequence[tuple[str, str]]
+    title: str = ""
 
 
 @dataclass(frozen=True)
@@ -176,17 +177,17 @@ class Listing:
     text: str
 
 
-Block = Text | Decision | Table | Panels | ResultFile | Facts | Listing
+Block = Text | Decision | Table | Panels | Reader | Facts | Listing
 
 
 @dataclass(frozen=True)
 class Section:
-    """A part of the page with a heading; one with `lead` stands directly below the verdict, before the contents."""
+    """A part of the page with a heading; a `folded` one shows its heading until the reader opens it."""
 
     key: str
     title: str
     blocks: Sequence[Block] = field(default_factory=tuple)
-    lead: bool = False
+    folded: bool = False
 
 
 @dataclass(frozen=True)
@@ -198,10 +199,19 @@ class Page:
     title, description, subtitle : str
         Name of the study, text about its joint, and sentences on its mounting and contact law and the number of joints.
     sections : sequence of Section
-        In reading order; none is empty.
+        In reading order, the verdict first; none is empty.
+    provenance : str
+        One line on how the numbers were made.
+    listings : sequence of Facts or Listing
+        What they were made from, always printed.
+    full : bool
+        Whether folded sections are open.
     """
 
     title: str
     description: str
     subtitle: str
     sections: Sequence[Section]
+    provenance: str = ""
+    listings: Sequence[Facts | Listing] = ()
+    full: bool = False

@@ -123,7 +123,12 @@ class Folder(NamedTuple):
 
 QUESTIONS = (
     Folder("what_if", ("query.what_if",), has_section=True),
-    Folder("exceedance", has_section=True, has_summary=True),
+    Question("limits", "", "Estimate the share of the joints above each limit.", "open", "exceedance.answer"),
+    Question(
+        "exceedance", "", "Estimate which share of the joints exceeds each load.", "open", "exceedance.answer", True
+    ),
+    Question("sweep", "", "Compare the largest loads of the joints of a sweep.", "open"),
+    Question("quantiles", "", "Estimate quantiles and tolerance limits of each load.", "folded", "exceedance.answer"),
     Folder("known_parts", has_section=True),
     Folder("sorting", ("query.sorted_joints",), "Decide", ("sorting",), has_section=True),
     Folder("histograms", has_section=True),
@@ -196,7 +201,7 @@ def sections(view: View, asked: Asked) -> list[Section]:
             asked.stage(f"page: {question.name}")
             with asked.noting(f"{question.name} is left out"), suppress(NotApplicable):
                 answer = question.on_page(view, asked)
-                found.append(Section(question.name, answer.title, answer.blocks()))
+                found.append(Section(question.name, answer.title, answer.blocks(), question.page == "folded"))
     return found
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,22 +11,14 @@ from tolstat.analysis import binomial
 from tolstat.common.loads import ANY_LIMIT
 from tolstat.common.tables import FAILED, STATUS_TEXT, UNSETTLED, VALID
 from tolstat.display import text
+from tolstat.display.table import Row
 from tolstat.questions import capability
-from tolstat.questions.exceedance import query as exceedance
+from tolstat.questions.exceedance import rows as exceedance
+from tolstat.questions.exceedance.verdicts import WORDS, ends, share_of, unresolved_matter, verdict
 from tolstat.questions.joints import query as joints
 from tolstat.store import known_parts
 from tolstat.store.points import point_of
 from tolstat.store.view import View
-
-WORDS = {
-    "yes": "kept",
-    "searched": "consistent with what was searched",
-    "no": "not kept",
-    "open": "open",
-    "none": "no verdict",
-}
-"""Answers of `verdict` in words."""
-Row = Mapping[Any, Any]
 
 
 class Headline(NamedTuple):
@@ -83,56 +75,8 @@ def headline(view: View, accepted: float = np.nan) -> Headline | None:
         return Headline("none", WORDS["none"], "no joint has been simulated", _pending(view))
     records = exceedance.limit_rows(view)
     found = _yield(view, records) if np.isnan(accepted) else _judged(view, records, accepted)
-    unresolved = _causes(view) if _matter([_decisive(view, records)]) else ()
+    unresolved = _causes(view) if unresolved_matter(_decisive(view, records)) else ()
     return found._replace(notes=(*unresolved, *found.notes, *_pending(view)))
-
-
-def verdict(row: Row, accepted: float) -> str:
-    """Verdict on a limit, or on all together: whether the interval `ends` lies below or above the accepted share.
-
-    Parameters
-    ----------
-    row : mapping
-        A row of `exceedance.limits`, or `exceedance.all_limits`.
-    accepted : float
-        Accepted share: share of the joints that may be above the limit; NaN if none is given.
-
-    Returns
-    -------
-    str
-        ``yes`` (below), ``no`` (above), ``searched`` (below if the proposals of importance sampling reach every way to
-        the limit; whatever they miss, it may be above), ``open`` (neither), ``none``: no interval, or joints without a
-        valid load decide, so that more joints do not help; empty without an accepted share.
-    """
-    if np.isnan(accepted):
-        return ""
-    low, high = ends(row)
-    if np.isnan(low):
-        return "none"
-    if high <= accepted or low > accepted:
-        missed = row["unsearched_upper"] > accepted  # False for joints of equal weight
-        return "no" if low > accepted else "searched" if missed else "yes"
-    undecided = row["bound_lower"] <= accepted < row["bound_upper"]
-    return "none" if not row["n"] or (undecided and _matter([row])) else "open"
-
-
-def ends(row: Row) -> tuple[float, float]:
-    """Interval that covers sampling, unresolved joints and, if known, the numerical error.
-
-    Where tolerances are known from measured parts it covers what these leave open, too.
-    """
-    if "both_lower" in row:
-        return row["both_lower"], row["both_upper"]
-    wide = (row["total_lower"], row["total_upper"])
-    return (row["outer_lower"], row["outer_upper"]) if np.isnan(wide[0]) else wide
-
-
-def share_of(row: Row) -> str:
-    """Share above a limit or, where unresolved joints matter, its interval or bounds."""
-    if not _matter([row]):
-        return text.percent(row["estimate"])
-    low, high = ends(row)
-    return text.span(low, high) if not np.isnan(low) else text.span(row["bound_lower"], row["bound_upper"])
 
 
 def deciding(row: Row, accepted: float) -> str:
@@ -177,7 +121,7 @@ def _judged(view: View, records: Sequence[Row], accepted: float) -> Headline:
     interval = f"total interval {text.span(*ends(row))}"
     if answer == "no":
         share = share_of(row)
-        interval = "total interval" if _matter([row]) else interval
+        interval = "total interval" if unresolved_matter(row) else interval
         said = f"{share} of the joints exceed {limit} ({interval}); {most} is accepted"
     elif answer == "searched":
         missed = text.percent(row["unsearched_upper"])
@@ -253,7 +197,7 @@ def _yield(view: View, records: Sequence[Row]) -> Headline:
             row = worst = exceedance.most_exceeded(view, known)
         if _undecided([row]) or np.isnan(ends(row)[0]):
             return Headline("none", WORDS["none"], _reason(view, [row]), notes)
-        interval = "total interval" if _matter([row]) else f"total interval {text.span(*ends(row))}"
+        interval = "total interval" if unresolved_matter(row) else f"total interval {text.span(*ends(row))}"
         missed = row["unsearched_upper"]
         missed = "" if np.isnan(missed) else f"; whatever the proposals miss, at most {text.percent(missed)}"
         most = ", the limit exceeded most" if row is worst else ""
@@ -283,18 +227,12 @@ def _reason(view: View, records: Sequence[Row]) -> str:
         unsupported = text.percent(records[0]["unsupported"])
         found = f"the joints do not support {unsupported} of the processes that the measured parts leave open"
         return f"{found}. {known.remedy}"
-    if _matter(records):
+    if any(map(unresolved_matter, records)):
         what = "valid result" if view.count(*UNSETTLED) else "result"
         return f"{text.percent(lost / n)} of the joints have no {what} ({lost} of {n})"
     if without := view.design.without_interval("share"):
         return without
     return f"{n} {'joint is' if n == 1 else 'joints are'} too few"
-
-
-def _matter(records: Sequence[Row] | list[Row]) -> bool:
-    return any(
-        binomial.unresolved_matter(row["count"], row["n"], row["n_failed"] + row["n_unsettled"]) for row in records
-    )
 
 
 def _causes(view: View) -> Iterator[str]:

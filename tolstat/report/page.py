@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tolstat import questions
-from tolstat.common.errors import Fault, StoreError
+from tolstat.common.errors import Fault, NotApplicable, StoreError
 from tolstat.common.tables import SCHEMA_VERSION
 from tolstat.display.asked import Asked, silent
-from tolstat.display.blocks import Facts, Listing, Page, Section
+from tolstat.display.blocks import Facts, Listing, Page, Panels, Section, Text
 from tolstat.display.text import sentence
 from tolstat.joint.mounting import in_words
 from tolstat.questions.causes import ahead
+from tolstat.questions.what_if import section as what_if
+from tolstat.report import joint_values
 from tolstat.solver import fidelity
 from tolstat.store import recorded, viewed
 from tolstat.store.points import point_of
@@ -37,6 +40,8 @@ def write_page(
     stage: Callable[[str], None] = silent,
     point: str = "",
     processes: int = 1,
+    full: bool = False,
+    brief: bool = False,
 ) -> Path:
     """Write the report of a result file as one page; the campaign may be unfinished.
 
@@ -57,6 +62,10 @@ def write_page(
         Operating point, ``"cruise"``, or the worst of some, ``"cruise+start"``; the worst of all by default.
     processes : int
         Number of processes: on Linux, joints are simulated again and pictures are drawn in forks of this one.
+    full : bool
+        Whether all sections are open; otherwise what supports the answer is folded.
+    brief : bool
+        Whether the page has the verdict and the line of the drawing to change only, and prints on one sheet.
 
     Returns
     -------
@@ -77,7 +86,8 @@ def write_page(
         if view.store.case_names:
             remedy = "leave the ending .html out: tolstat report FILE writes their table"
             raise StoreError(str(Fault(str(view.path), "lists its joints one by one", remedy)))
-        made = compose(view.at(point), Asked(view.path, accepted, replay, stage=stage, processes=processes))
+        asked = Asked(view.path, accepted, replay, stage=stage, processes=processes)
+        made = compose_brief(view.at(point), asked) if brief else compose(view.at(point), asked, full)
         stage("page: pictures")  # drawn from the view
         from tolstat.report import html
 
@@ -85,34 +95,66 @@ def write_page(
     return Path(out)
 
 
-def compose(view: View, asked: Asked) -> Page:
-    """Compose the page: verdict, the sections that stand with it, the others, provenance.
+def compose(view: View, asked: Asked, full: bool = False) -> Page:
+    """Compose the page: verdict, open sections, folded sections, provenance.
 
     What cannot be evaluated is left out, and a note in the first section says why.
     """
     ahead.begin(view, asked)
-    from tolstat.report import joint_values, verdict  # draw, and take long to import: joints are being simulated
+    from tolstat.report import verdict  # draws, and takes long to import: joints are being simulated
 
-    stands_on = fidelity.sentence(view.store.options, view.store.fidelity)
-    asked.notes.extend(note for note in (stands_on, _stopped(view), recorded.note_on_mounting(view.store)) if note)
+    asked.notes.extend(_notes(view))
     if len(view.points) > 1:
         point = point_of(view, view.most_exceeded) if view.leading else view.points[0]
         remedy = f"tolstat report {asked.path.name} --point {point} --out PAGE.html"
         asked.notes.append(f"loads over the input angle are on the page of one operating point: {remedy}")
-    sections = [*verdict.limits(view, asked), *questions.sections(view, asked)]
-    facts = Facts(tuple(_facts(view.store)))
-    text = Listing("The study as it was run", view.store.study_text)
-    provenance = Section("provenance", "Provenance", [facts, joint_values.listing(view.store), text])
-    lead = [section for section in sections if section.lead]
-    rest = [section for section in sections if not section.lead]
-    described = joint_of(view.store, 0).description
-    mounted = sentence(in_words(*recorded.mountings(view.store)))
+    sections = questions.sections(view, asked)
+    sections.sort(key=lambda section: section.folded)
+    return _page(view, [verdict.section(view, asked), *sections], full)
+
+
+def compose_brief(view: View, asked: Asked) -> Page:
+    """Compose the page that prints on one sheet: verdict with its drawing, and the line of the drawing to change."""
+    from tolstat.report import verdict
+
+    asked.notes.extend(_notes(view))
+    sections = [verdict.section(view, asked)]
+    with asked.noting("nothing on the lines of the drawing"), suppress(NotApplicable):
+        found = what_if.sections(view, asked)
+        blocks = [block for own in found for block in own.blocks if isinstance(block, Text | Panels)]
+        sections += [Section("lines", found[0].title, blocks[:2])] if found else []
+    return _page(view, sections)
+
+
+def _page(view: View, sections: Sequence[Section], full: bool = False) -> Page:
+    store = view.store
+    listings = (
+        Facts(tuple(_facts(store)), "Provenance"),
+        joint_values.listing(store),
+        Listing("The study as it was run", store.study_text),
+    )
+    mounted = sentence(in_words(*recorded.mountings(store)))
     return Page(
         view.name,
-        described,
+        joint_of(store, 0).description,
         f"{mounted} {sentence(view.head())}",
-        [verdict.section(view, asked), *lead, *rest, provenance],
+        sections,
+        f"Sampling {store.sampling['method']}, seed {store.sampling['seed']}; begun {store.created}; "
+        f"tolstat {store.versions.get('tolstat', 'of unknown version')}; result file {view.path.name}.",
+        listings,
+        full,
     )
+
+
+def _notes(view: View) -> Iterator[str]:
+    """What restricts the numbers of the whole page."""
+    for note in (
+        fidelity.sentence(view.store.options, view.store.fidelity),
+        _stopped(view),
+        recorded.note_on_mounting(view.store),
+    ):
+        if note:
+            yield note
 
 
 def _stopped(view: View) -> str:

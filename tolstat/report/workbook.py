@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import load_of
 from tolstat.display.text import cell
-from tolstat.questions.exceedance.query import limits
+from tolstat.questions.exceedance.rows import limit_rows
 from tolstat.store import Reader
 from tolstat.store.result_file import described
 from tolstat.store.view import View
@@ -75,11 +75,8 @@ def _limits(view: View) -> Iterable[Sequence[object]]:
     if not view.sampled:  # joints of a sweep or a list are no sample, whose shares would mean something
         return [(name, limit, load_of(name).unit) for name, limit in view.limits.items()]
     names = ("load", "level", "unit", "count", "valid", "estimate", "lower", "upper", "confidence", "nominal")
-    found = limits(view)
-    if found.empty:
-        return []
-    found["valid"] = found["n"] - found["n_failed"] - found["n_unsettled"]
-    return zip(*(found[name].tolist() for name in names), strict=True)
+    rows = [{**row, "valid": row["n"] - row["n_failed"] - row["n_unsettled"]} for row in limit_rows(view)]
+    return [[row[name] for name in names] for row in rows]
 
 
 def _sheet(book: Any, name: str, heads: Sequence[str], rows: Iterable[Sequence[object]]) -> None:

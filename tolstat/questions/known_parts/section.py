@@ -43,7 +43,7 @@ def sections(view: View, asked: Asked) -> list[Section]:
     if len(given) < min(len(table), DRAWN):
         most = text.percent(float(np.max(table["unsupported"])))
         blocks.append(Text(f"The joints do not support {most} of the likely processes. {known.remedy}."))
-    return [Section("known-parts", "Tolerances known from measured parts", blocks, lead=True)]
+    return [Section("known-parts", "Tolerances known from measured parts", blocks)]
 
 
 def _how(view: View) -> list[str]:

@@ -35,7 +35,7 @@ def sections(view: View, asked: Asked) -> list[Section]:
             as_block("Parts", rendering.PARTS, found.parts),
             as_block("Shares above the limits, and what a joint costs", rendering.STAGES, shown),
         ]
-        return [Section("sorting", "Parts scrapped, joints rejected", blocks, lead=True)]
+        return [Section("sorting", "Parts scrapped, joints rejected", blocks)]
     return []
 
 

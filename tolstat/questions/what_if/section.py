@@ -26,7 +26,7 @@ def sections(view: View, asked: Asked) -> list[Section]:
     with asked.noting("nothing on the lines of the drawing"):
         found = query.what_if(view, view.decisive)
         blocks = _missing(asked) if found is None else _blocks(found, asked)
-        return [Section("what-if", TITLE, blocks, lead=True)]
+        return [Section("what-if", TITLE, blocks)]
     return []
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,12 +12,9 @@ from tolstat.analysis.estimates import CURVE
 from tolstat.analysis.sample import Sample, total_interval
 from tolstat.common.loads import ANY_LIMIT, SHOWN_LOADS, load_of, unit_text
 from tolstat.common.once import once
-from tolstat.display import text
+from tolstat.display.table import Row, Rows
 from tolstat.store import error_budget, known_parts
 from tolstat.store.view import View
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 SHARES = (0.5, 0.9, 0.95, 0.99)
 COVERED = 0.99
@@ -37,7 +34,8 @@ READER_LEVELS = 240
 """Approximate number of levels at which the reader tool of the page has values; the levels are round numbers."""
 
 
-def limits(view: View, confidence: float = 0.95) -> pd.DataFrame:
+@once
+def limit_rows(view: View, confidence: float = 0.95) -> Rows:
     """Share of the joints above each of the study's limits.
 
     Parameters
@@ -49,7 +47,7 @@ def limits(view: View, confidence: float = 0.95) -> pd.DataFrame:
 
     Returns
     -------
-    DataFrame
+    sequence of mapping
         One row per limit, in the study's order: ``load``, ``unit``, ``nominal``, then the fields of
         `analysis.estimates.Exceedance` (``level`` is the limit), then ``confidence``, the error budget, see
         `_error_budget`, and ``unsearched_upper``, the upper end whatever the proposals of importance sampling miss.
@@ -58,25 +56,17 @@ def limits(view: View, confidence: float = 0.95) -> pd.DataFrame:
         Loads in SI units. Shares and intervals are NaN where weighted joints do not support them, see
         `Sample.doubt`.
     """
-    import pandas as pd
-
-    return pd.DataFrame(limit_rows(view, confidence))
-
-
-@once
-def limit_rows(view: View, confidence: float = 0.95) -> Sequence[Mapping[str, Any]]:
-    """Rows of the table `limits`: plain ones, since pandas takes longer to import than a report to be written."""
     return [_above_limit(view, view.load(name), confidence) for name in view.limits]
 
 
-def most_exceeded(view: View, rows: Sequence[Mapping[Any, Any]]) -> Mapping[Any, Any]:
-    """Row of `limits` whose limit the largest share of the joints exceeds; of equal shares that of a leading load."""
+def most_exceeded(view: View, rows: Rows) -> Row:
+    """Row of `limit_rows` with the largest share of joints above its limit; of equal ones that of a leading load."""
     return max(rows, key=lambda row: (np.nan_to_num(row["estimate"], nan=-1.0), row["load"] in view.leading))
 
 
 @once
 def all_limits(view: View, confidence: float = 0.95) -> dict[str, Any]:
-    """Share of the joints above at least one limit of the study: a row as those of `limits`, of the load `ANY_LIMIT`.
+    """Share of the joints above at least one limit: a row as those of `limit_rows`, of the load `ANY_LIMIT`.
 
     Its level is 1, and its loads are the largest ratios of load to limit.
     """
@@ -99,23 +89,16 @@ def _above_limit(view: View, load: Sample, confidence: float) -> dict[str, Any]:
     return row | dict.fromkeys(WITHHELD, np.nan) if load.doubt(level) else row
 
 
-def at_points(view: View) -> pd.DataFrame:
+def point_rows(view: View) -> Rows:
     """Share of the joints above each limit at each of the operating points that it holds at.
 
     Returns
     -------
-    DataFrame
+    sequence of mapping
         One row per limit that holds at several points, in the study's order: ``load``, ``unit``, ``level``, and under
         the name of each point of the view the share there; NaN where the limit does not hold, or weighted joints do not
         support it. No rows for a view of one point.
     """
-    import pandas as pd
-
-    return pd.DataFrame(point_rows(view), columns=["load", "unit", "level", *view.points])
-
-
-def point_rows(view: View) -> list[dict[str, Any]]:
-    """Rows of the table `at_points`."""
     rows = []
     for name, level in view.limits.items():
         at, plain = view.narrowed(name)
@@ -145,22 +128,15 @@ def _error_budget(view: View, loads: Sequence[Sample], level: float, confidence:
     return {"numerical_error": error, **dict(zip(ERROR_BUDGET, bounds, strict=True))}
 
 
-def quantiles(view: View, confidence: float = 0.95) -> pd.DataFrame:
+def quantile_rows(view: View, confidence: float = 0.95) -> Rows:
     """Quantiles of the loads that tables show, see `View.shown_loads`.
 
     Returns
     -------
-    DataFrame
+    sequence of mapping
         One row per load and share: ``load``, ``unit``, ``nominal``, the fields of `analysis.estimates.Quantile`,
         ``confidence``. Loads in SI units.
     """
-    import pandas as pd
-
-    return pd.DataFrame(quantile_rows(view, confidence))
-
-
-def quantile_rows(view: View, confidence: float = 0.95) -> list[dict[str, Any]]:
-    """Rows of the table `quantiles`."""
     rows = []
     for load in view.loads(view.shown_loads):
         head = {"load": load.name, "unit": load.unit, "nominal": load.nominal}
@@ -178,30 +154,21 @@ def tolerance_limits(view: View) -> dict[str, float]:
     return {load.name: load.quantile(COVERED, 0.9).upper for load in view.loads(view.shown_loads)}
 
 
-def curves(view: View, confidence: float = 0.95) -> pd.DataFrame:
+def curve_rows(view: View, confidence: float = 0.95) -> Rows:
     """Exceedance curves of the loads that tables show, as one table.
 
     Returns
     -------
-    DataFrame
+    sequence of mapping
         ``load``, ``unit``, then the fields of `analysis.estimates.Exceedance`; SI units, at most
         `MAX_LEVELS` levels per load.
     """
-    import pandas as pd
-
-    return pd.DataFrame(curve_columns(view, confidence))
-
-
-def curve_columns(view: View, confidence: float = 0.95) -> dict[str, list[Any]]:
-    """Columns of the table `curves`."""
-    columns: dict[str, list[Any]] = {name: [] for name in ("load", "unit", *(CURVE.names or ()))}
-    for load in view.loads(view.shown_loads):
-        table = curve(load, confidence, MAX_LEVELS)
-        columns["load"] += [load.name] * len(table)
-        columns["unit"] += [load.unit] * len(table)
-        for field in CURVE.names or ():
-            columns[field] += table[field].tolist()
-    return columns
+    names = CURVE.names or ()
+    return [
+        {"load": load.name, "unit": load.unit} | dict(zip(names, point, strict=True))
+        for load in view.loads(view.shown_loads)
+        for point in curve(load, confidence, MAX_LEVELS).tolist()
+    ]
 
 
 def curve(load: Sample, confidence: float, max_levels: int) -> NDArray[np.void]:
@@ -256,15 +223,6 @@ def _round_levels(low: float, high: float, limit: float | None) -> NDArray[np.fl
     step = power * next(m for m in (1, 2, 5, 10) if m * power >= raw)
     marks = step * np.arange(np.floor(low / step), np.ceil(high / step) + 1)
     return np.unique(marks if limit is None else np.append(marks, limit))
-
-
-def summary(view: View, confidence: float) -> dict[str, Any]:
-    """JSON values: ``limits``, ``at_points`` and ``quantiles``, the rows of the tables of these names."""
-    return {
-        "limits": text.records(limits(view, confidence)) if view.limits else [],
-        "at_points": text.records(at_points(view)),
-        "quantiles": text.records(quantiles(view, confidence)) if view.shown_loads else [],
-    }
 
 
 def not_kept(view: View) -> str:

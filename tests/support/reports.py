@@ -1,0 +1,27 @@
+"""What ``tolstat report`` says and writes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+from typer.testing import CliRunner
+
+from tolstat.cli import app
+
+
+class Report(NamedTuple):
+    """Standard output, messages without line breaks in sentences, and the files written."""
+
+    table: str
+    notes: str
+    files: list[Path]
+
+
+def build(path: Path, *options: object) -> Report:
+    """Run the command on a result file, all columns printed."""
+    done = CliRunner().invoke(app, ["report", *map(str, (path, "--wide", *options))])
+    assert done.exit_code == 0, done.output
+    lines = done.stderr.replace("\n    ", " ").splitlines()
+    files = [Path(line.removeprefix("wrote ")) for line in lines if line.startswith("wrote ")]
+    return Report(done.stdout, "\n".join(lines), files)

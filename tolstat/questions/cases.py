@@ -1,0 +1,173 @@
+"""A study that lists its joints: largest loads of every joint, and their change due to its errors (Gamma)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from tolstat.analysis import accuracy
+from tolstat.analysis.gamma import gamma as relative_errors
+from tolstat.campaign.remedy import remedy
+from tolstat.common import selected_results
+from tolstat.common.errors import Fault, NotApplicable
+from tolstat.common.load_kinds import BUSHINGS
+from tolstat.common.tables import Motion, Status, Variant
+from tolstat.display import text
+from tolstat.display.answer import Answer, Document, Part, Sentence, Table
+from tolstat.display.table import Column, Row, Rows
+from tolstat.solver import refinement
+from tolstat.store import Reader, recorded, verification
+from tolstat.store.view import View
+from tolstat.study.design import IDEAL
+
+RANKED = ("status", "alpha [deg]", "motion")
+"""Columns that a narrow terminal leaves out, the last first."""
+
+
+def cases(view: View) -> Answer:
+    """Compare the largest loads of the listed joints.
+
+    Parameters
+    ----------
+    view : View
+        A file of a study whose method is ``cases``.
+
+    Returns
+    -------
+    Answer
+        Table ``cases``, one row per joint: ``variant``, the ``values`` that define it, ``note``, ``alpha [deg]``,
+        ``case``, ``status``, ``motion``, ``revolutions``, ``cost`` (`refinement.work` relative to the first joint),
+        ``remedy``; force and torque of each bushing, SI, and their Gamma, eq. (14), per cent; loads that the study does
+        not keep are left out. If the file holds a comparison with the reference (``tolstat verify``), also
+        ``reference`` (status of the reference simulation, empty for joints that were not compared),
+        ``reference_change`` (its closure), ``error_F`` and ``error_T`` (error of the largest load of the worst bushing,
+        relative to the largest of the kind).
+
+    Raises
+    ------
+    NotApplicable
+        When the study lists no joints.
+    """
+    store = view.store
+    if not store.case_names:
+        remedy = "give the result file of a study that lists its joints"
+        raise NotApplicable(str(Fault(str(view.path), "does not list its joints", remedy)))
+    rows = _rows(store)
+    seen = [_worst(row) for row in rows]
+    title, counts = "Change of the loads by the errors of each joint", store.counts()
+    parts: list[Part] = [Table("cases", title, _columns(seen), rows, seen=seen)]
+    parts.append(Sentence(f"{counts.done} of {counts.total} joints, {counts.shortfall}"))
+    parts += [Sentence(f"{row['variant']}, {row['case']}: {row['remedy']}") for row in rows if row["remedy"]]
+    if any(row["note"] for row in rows):
+        parts.append(Document("_cases.md", _markdown(rows)))
+    return Answer("cases", "Listed joints", parts)
+
+
+def _rows(store: Reader) -> Rows:
+    design, results = store.design(), store.results()
+    work = refinement.work(results)
+    variants = [store.variants[i] for i in design["variant"]]
+    columns: dict[str, Sequence[Any]] = {
+        "variant": [variant.family for variant in variants],
+        "values": ["; ".join(f"{key} = {value}" for key, value in variant.values.items()) for variant in variants],
+        "note": [variant.note for variant in variants],
+        "alpha [deg]": np.degrees(recorded.operating_points(store)["alpha"]).tolist(),
+        "case": [store.case_names[i] for i in design["case"]],
+        "status": [Status(int(code)).label for code in results["status"]],
+        "motion": [_motion(row) for row in results],
+        "revolutions": results["revolutions"].tolist(),
+        "cost": (work / max(1.0, float(work[0]))).tolist(),
+        "remedy": [remedy(row, store.options | _own(v, "solver")) for row, v in zip(results, variants, strict=True)],
+    }
+    gamma = relative_errors(results, design["group"])
+    for b, bushing in enumerate(BUSHINGS):
+        for load, (letter, unit) in enumerate((("F", "N"), ("T", "N*m"))):
+            if selected_results.holds(store.columns, f"{bushing}.{letter}"):
+                columns[f"{bushing}.{letter} [{unit}]"] = results[f"{letter}_max"][:, b].tolist()
+                columns[f"{bushing}.Gamma_{letter} [%]"] = gamma[:, b, load].tolist()
+    columns |= _reference(store)
+    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+
+
+def _reference(store: Reader) -> dict[str, Sequence[Any]]:
+    """Columns that compare every joint with the tight reference; none if the file holds no comparison."""
+    found = verification.read(store)
+    if found is None or accuracy.REFERENCE not in found.checks:
+        return {}
+    true = found.checks[accuracy.REFERENCE].results
+    error, change, state = np.full((store.n, 2), np.nan), np.full(store.n, np.nan), np.full(store.n, "", object)
+    slots = store.slot(found.rows)
+    error[slots] = accuracy.by_kind(accuracy.differences(found.base, true))[:, :2]
+    change[slots] = true["closure"]
+    state[slots] = [Status(int(code)).label for code in true["status"]]
+    columns = {"reference": state, "reference_change": change, "error_F": error[:, 0], "error_T": error[:, 1]}
+    return {name: values.tolist() for name, values in columns.items()}
+
+
+def _motion(row: np.void) -> str:
+    motion = Motion(int(row["motion"]))
+    return f"{motion.label} {row['period']}" if motion == Motion.SUBHARMONIC else motion.label
+
+
+def _own(variant: Variant, section: str) -> dict[str, Any]:
+    """Values of a variant in one section of the study, by key."""
+    return {k.partition(".")[2]: value for k, value in variant.values.items() if k.startswith(f"{section}.")}
+
+
+def _worst(row: Row) -> dict[str, Any]:
+    """Row for people: Gamma of the largest modulus among the bushings kept, signed, for force and for torque."""
+    short = {key: row[key] for key in ("variant", "alpha [deg]", "case", "status", "motion")}
+    for letter in "FT":
+        gamma = _of_bushings(row, f"Gamma_{letter} [%]")
+        if gamma:
+            short[f"Gamma_{letter} [%]"] = max(gamma, key=lambda x: -1.0 if np.isnan(x) else abs(x))
+    return short
+
+
+def _of_bushings(row: Row, what: str) -> list[float]:
+    return [row[name] for bushing in BUSHINGS if (name := f"{bushing}.{what}") in row]
+
+
+def _columns(rows: Rows) -> list[Column]:
+    names = list(rows[0]) if rows else []
+    words = {name for row in rows for name in names if isinstance(row[name], str)}
+    ranks = {name: RANKED.index(name) + 1 for name in names if name in RANKED}
+    return [Column(name, partial(_cell, name), words=name in words, rank=ranks.get(name, 0)) for name in names]
+
+
+def _cell(name: str, row: Row) -> str:
+    value = row[name]
+    return text.formed(value, ".5g") if isinstance(value, float) else str(value)
+
+
+def _markdown(rows: Rows) -> str:
+    """Markdown table: why each joint is difficult, and its results.
+
+    One line per joint: status, largest force and torque, their errors if known, and its cost relative to the first
+    joint.
+    """
+    heads = ["joint", "what makes it hard", "status", "motion", "revolutions", "max F (N)", "max T (N m)", "cost"]
+    checked = "reference" in rows[0]
+    heads += ["error of F", "error of T"] if checked else []
+    lines = [f"| {' | '.join(heads)} |", f"|{'---|' * len(heads)}"]
+    for row in rows:
+        name = row["variant"] if row["case"] == IDEAL else f"{row['variant']}, {row['case']}"
+        note = row["note"] if row["case"] == IDEAL else ""
+        largest = (float(np.fmax.reduce(_of_bushings(row, load), initial=np.nan)) for load in ("F [N]", "T [N*m]"))
+        numbers = (f"{x:.3g}" for x in (row["revolutions"], *largest, row["cost"]))
+        cells = [name, note, row["status"], row["motion"], *numbers, *(_errors(row) if checked else [])]
+        lines.append(f"| {' | '.join(cells)} |".replace("nan", "–"))
+    return "\n".join(lines) + "\n"
+
+
+def _errors(row: Row) -> list[str]:
+    """Cells with the errors of F and T, or the reason why they are missing."""
+    if not row["reference"]:
+        return ["nothing to compare" if row["status"] != Status.OK.label else "not compared", "nan"]
+    if row["reference"] == Status.NEWTON_FAILED.label:
+        return ["reference gave up", "nan"]
+    wanders = f" ± {row['reference_change']:.0e}" if row["reference"] == Status.NOT_SETTLED.label else ""
+    return [f"{row[key]:.0e}{wanders}" for key in ("error_F", "error_T")]

@@ -1,0 +1,327 @@
+"""Which load is exceeded by which share of the joints: limits, quantiles, curves."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from functools import partial
+
+from tolstat.common.errors import Fault, NotApplicable
+from tolstat.common.tables import VALID, Status
+from tolstat.display import text
+from tolstat.display.answer import Answer, Part, Sentence, Table
+from tolstat.display.asked import Asked
+from tolstat.display.blocks import Panels, Text
+from tolstat.display.options import Accepted
+from tolstat.display.table import Column, Row, Rows, has, has_unresolved
+from tolstat.joint.arms import one_force
+from tolstat.questions.exceedance import rows as of
+from tolstat.questions.exceedance.curves import forest_panel, leading_panel, reader
+from tolstat.questions.exceedance.verdicts import WORDS, verdict
+from tolstat.store import known_parts
+from tolstat.store.recorded import joint_of
+from tolstat.store.view import View
+
+
+def _differs(rows: Rows) -> bool:
+    """Whether the interval of sampling says something beside the total one."""
+    shown = [(text.span(row["lower"], row["upper"]), text.span(row["total_lower"], row["total_upper"])) for row in rows]
+    return any(own != total for own, total in shown)
+
+
+def _outer(row: Row) -> str:
+    kind = "bound" if math.isnan(row["outer_lower"]) else "outer"
+    return text.span(row[f"{kind}_lower"], row[f"{kind}_upper"])
+
+
+def above(row: Row) -> str:
+    """Joints above a limit, and of how many with a valid load."""
+    return f"{row['count']} of {row['n'] - row['n_failed'] - row['n_unsettled']}"
+
+
+LIMITS = (
+    Column("load", lambda row: str(row["load"])),
+    Column("kept by itself", lambda row: str(row["verdict"]), shown=has("verdict")),
+    Column("limit", lambda row: text.value(row["level"], row["unit"])),
+    Column("nominal", lambda row: text.value(row["nominal"], row["unit"]), rank=1),
+    Column("above", above),
+    Column("share", lambda row: text.percent(row["estimate"])),
+    Column("95 % interval", lambda row: text.span(row["lower"], row["upper"]), shown=_differs, rank=3),
+    Column("with unresolved joints", _outer, shown=has_unresolved, rank=2),
+    Column(
+        "total interval",
+        lambda row: text.span(row["total_lower"], row["total_upper"]),
+        shown=has("numerical_error"),
+    ),
+    Column(
+        "with measured parts",
+        lambda row: text.span(row["both_lower"], row["both_upper"]),
+        shown=lambda rows: bool(rows) and "both_lower" in rows[0],
+        rank=1,
+    ),
+    Column(
+        "at most, if ways are missed",
+        lambda row: text.percent(row["unsearched_upper"]),
+        shown=has("unsearched_upper"),
+    ),
+)
+"""Columns of the table ``limits``. Joints above are counted among the valid ones, as the share is; the last columns
+count failed and unsettled joints below, then above the limit, and shift every load by the numerical error."""
+BUDGET = (
+    Column("limit", text.limit),
+    Column("share", lambda row: text.percent(row["estimate"])),
+    Column("sampling, ±", lambda row: text.percent(0.5 * (row["upper"] - row["lower"]))),
+    Column("numerical error, up to", lambda row: text.percent(_numerical(row))),
+    Column("failed and unsettled, width", lambda row: text.percent(row["bound_upper"] - row["bound_lower"])),
+)
+"""Contributions to the uncertainty of each share above a limit."""
+NOTABLE = 0.1
+"""Part of the interval of sampling from which on another contribution to the uncertainty is shown."""
+
+
+def exceedance(view: View, accepted: Accepted = math.nan) -> Answer:
+    """Estimate which share of the joints exceeds each load.
+
+    Parameters
+    ----------
+    view : View
+        A campaign; it may be unfinished.
+    accepted : float
+        Accepted share: share of the joints that may be above each limit, for a verdict on each.
+
+    Returns
+    -------
+    Answer
+        Tables ``limits``, see `rows.limit_rows`, ``at_points``, see `rows.point_rows`, and ``quantiles``, see
+        `rows.quantile_rows`; pictures of the leading loads.
+
+    Raises
+    ------
+    NotApplicable
+        When the joints are those of a sweep, or listed.
+    """
+    if view.method in ("sweep", "cases"):
+        remedy = 'give the result file of a study with sampling.method "random", "sobol" or "lhs"'
+        raise NotApplicable(str(Fault(str(view.path), "its joints are no sample of a production", remedy)))
+    parts: list[Part] = [*limit_tables(view, accepted), *quantile_tables(view)]
+    pictures = [leading_panel(view, name) for name in view.leading] if view.count(*VALID) else []
+    parts += [Panels(pictures)] if pictures else []
+    return Answer("exceedance", "Which load is exceeded by which share", [*parts, Sentence(note(view))])
+
+
+def exceedance_on_page(view: View, asked: Asked) -> Answer:
+    """Curves of the leading loads, and the reader."""
+    if not (view.method != "sweep" and view.shown_loads and view.count(*VALID)):
+        raise NotApplicable
+    parts: list[Part] = [Panels([leading_panel(view, name) for name in view.leading])] if view.leading else []
+    return Answer("exceedance", "Which load is exceeded by which share", [*parts, Sentence(_note(view)), reader(view)])
+
+
+def limits(view: View, accepted: Accepted = math.nan) -> Answer:
+    """Estimate the share of the joints above each limit.
+
+    Parameters
+    ----------
+    view : View
+        A campaign of a study with limits.
+    accepted : float
+        Accepted share: share of the joints that may be above each limit, for a verdict on each.
+
+    Returns
+    -------
+    Answer
+        Tables ``limits``, see `rows.limit_rows`, and ``at_points``, see `rows.point_rows`.
+
+    Raises
+    ------
+    NotApplicable
+        When the study has no limits, or its joints are no sample of a production.
+    """
+    if not (view.sampled and view.limits):
+        remedy = "give the result file of a study with [limits] whose joints are drawn from tolerances"
+        raise NotApplicable(str(Fault(str(view.path), "has no limits, or its joints are no sample", remedy)))
+    table, *others = limit_tables(view, accepted)
+    panel = forest_panel(table.for_people, accepted)
+    how = [Text(line, small=True) for line in _how(view, accepted)]
+    return Answer("limits", "Each limit", [Panels([panel], beside=how), table, *others, *_uncertain(view)])
+
+
+def limits_on_page(view: View, asked: Asked) -> Answer:
+    """Share above each limit, judged by the accepted share of the page."""
+    return limits(view, asked.accepted)
+
+
+def quantiles(view: View) -> Answer:
+    """Estimate quantiles and tolerance limits of each load.
+
+    Parameters
+    ----------
+    view : View
+        A campaign.
+
+    Returns
+    -------
+    Answer
+        Table ``quantiles``, see `rows.quantile_rows`.
+
+    Raises
+    ------
+    NotApplicable
+        When the joints are those of a sweep, or none is valid.
+    """
+    if not (view.method != "sweep" and view.shown_loads and view.count(*VALID)):
+        raise NotApplicable(str(Fault(str(view.path), "has no sample of valid loads", "simulate more joints")))
+    rows = of.quantile_rows(view)
+    title = f"Quantiles with 95 % intervals {view.design.of_quantiles}, and one-sided tolerance limits (Wilks)"
+    title = title if view.design.has_interval("quantile") else "Quantiles"
+    columns = _quantile_columns(of.tolerance_limits(view))
+    return Answer("quantiles", "Quantiles", [Table("quantiles", title, columns, rows, seen=_by_load(rows))])
+
+
+def limit_tables(view: View, accepted: float = math.nan) -> list[Table]:
+    """Tables of the share above each limit, and at each operating point; none without limits."""
+    if not view.limits:
+        return []
+    rows = of.limit_rows(view)
+    if not math.isnan(accepted):
+        rows = [{**row, "verdict": WORDS[verdict(row, accepted)]} for row in rows]
+    seen = one_force(rows, "level", "estimate")
+    verdicts = [verdict(row, accepted) for row in seen] if not math.isnan(accepted) else ()
+    found = [Table("limits", "Joints above each limit", LIMITS, rows, seen=seen, verdicts=verdicts)]
+    if points := of.point_rows(view):
+        title = "Share of the joints above each limit at each operating point"
+        shown = one_force(points, "level", view.points[0])
+        found.append(Table("at_points", title, _point_columns(view), points, seen=shown))
+    return found
+
+
+def quantile_tables(view: View) -> list[Table]:
+    """Table of quantiles with the interval of the largest share; none where no load is shown."""
+    if not view.shown_loads:
+        return []
+    rows = of.quantile_rows(view)
+    return [Table("quantiles", "Quantiles of the largest loads", _quantile_columns(), rows, seen=_by_load(rows))]
+
+
+def note(view: View) -> str:
+    """Sentence on what the intervals cover."""
+    doubts = [(name, view.load(name).doubt(level)) for name, level in view.limits.items()]
+    poor = [f"{name} ({doubt})" for name, doubt in doubts if doubt]
+    said = view.design.covers
+    said += f"; no share, needs more joints or other proposals: {', '.join(poor)}" if poor else ""
+    said += f"; {view.design.caveat}" if view.design.caveat else ""
+    if view.count(*VALID, Status.PENDING) < view.n:
+        said += "; light bands: with the others counted below and above every x"
+    return said
+
+
+def _note(view: View) -> str:
+    said = text.sentence(note(view))
+    if len(view.nominal):
+        said += f" Triangle: the joint without errors.{_beyond(view)}"
+    if len(view.points) > 1:
+        said += " Loads are the largest over all operating points, unless they name some."
+    missing = of.not_kept(view)
+    return f"{said} {text.sentence(missing)}" if missing else said
+
+
+def _beyond(view: View) -> str:
+    """Why the force without errors is smaller than T/(2 R); empty where it is not, or at several operating points."""
+    forces = [view.load(name).nominal for name in ("cross1.F", "cross2.F") if name in view.bushing_loads]
+    if not forces or len(view.points) > 1:
+        return ""
+    torque, radius = abs(view.store.operation.torque), joint_of(view.store, 0).cross.R
+    if not max(forces) < torque / (2.0 * radius):
+        return ""
+    at_middle = text.value(torque / (2.0 * radius), "N")
+    return f" Its force on the cross is below T/(2 R) = {at_middle}: without errors pins bear at their outer ends."
+
+
+def _how(view: View, accepted: float) -> Iterator[str]:
+    """Paragraphs on what the picture shows, and what decides."""
+    if not view.design.has_interval("share"):
+        yield "Points: share of the joints with a valid load. Grey: with failed and unsettled joints below and above."
+        yield text.sentence(view.design.without_interval("share"))
+        return
+    said = f"{view.design.counting} ".lstrip()
+    yield (
+        f"{said}Points: share of the joints with a valid load. Blue: its interval ({view.design.interval}), 95 % "
+        "for each limit by itself. Grey: the total interval. Failed and unsettled joints are counted below the limit "
+        "at its lower end and above it at its upper end; it covers the numerical error, too, where it is known."
+    )
+    if known_parts.of(view) is not None:
+        yield "Grey covers what the measured parts leave open of the process, too."
+    if len(view.points) > 1:
+        yield "A limit that names no operating point is about the largest load over all of them."
+    if not math.isnan(accepted):
+        yield (
+            f"Each limit by itself: kept if its total interval lies below {text.percent(accepted)}, not kept if "
+            "it lies above. It has no verdict where joints without a valid load decide, and is open otherwise. The "
+            "verdict at the top is on the joints that exceed at least one limit."
+        )
+
+
+def _uncertain(view: View) -> list[Part]:
+    """What makes the shares uncertain, where a part exceeds a tenth of sampling."""
+    rows = [row for row in of.limit_rows(view) if not math.isnan(row["numerical_lower"])]
+    if not any(
+        max(_numerical(row), row["bound_upper"] - row["bound_lower"]) > NOTABLE * 0.5 * (row["upper"] - row["lower"])
+        for row in rows
+    ):
+        return []
+    title = "What makes the shares above limits uncertain, in per cent of the joints"
+    return [Table("uncertainty", title, BUDGET, rows, seen=one_force(rows, "level", "estimate"))]
+
+
+def _numerical(row: Row) -> float:
+    """Largest change of a share by the numerical error."""
+    return max(float(abs(row[f"numerical_{end}"] - row["estimate"])) for end in ("lower", "upper"))
+
+
+def _point_columns(view: View) -> tuple[Column, ...]:
+    head = (Column("load", lambda row: str(row["load"])), Column("limit", lambda r: text.value(r["level"], r["unit"])))
+    return (*head, *(Column(point, partial(_share_at, point)) for point in view.points))
+
+
+def _share_at(point: str, row: Row) -> str:
+    return text.percent(row[point])
+
+
+def _quantile_columns(tolerance: dict[str, float] | None = None) -> tuple[Column, ...]:
+    """Columns of the rows `_by_load`: quantiles with intervals and, if given, tolerance limits by load."""
+
+    def limit(row: Row) -> str:
+        upper = (tolerance or {})[row["load"]]
+        return "needs more joints" if math.isinf(upper) else text.value(upper, row["unit"])
+
+    def quantile(share: float) -> Column:
+        def cell(row: Row) -> str:
+            own, lower, upper = row[share]
+            size = text.multiple(own, row["unit"])[0]
+            ends = f" ({text.number(lower / size)} .. {text.number(upper / size)})"
+            ends = ends if tolerance and not math.isnan(lower) else ""
+            return text.value(own, row["unit"]) + ends
+
+        rank = {of.SHARES[-1]: 0, of.SHARES[0]: 0}.get(share, 3)
+        return Column(f"{100 * share:g} %" + (" stay below" if tolerance else ""), cell, rank=rank)
+
+    def interval(row: Row) -> str:
+        _, lower, upper = row[of.SHARES[-1]]
+        return text.span_of(lower, upper, row["unit"])
+
+    head = (
+        Column("load", lambda row: str(row["load"])),
+        Column("nominal", lambda r: text.value(r["nominal"], r["unit"]), rank=1),
+    )
+    last = Column(f"95 % interval of {100 * of.SHARES[-1]:g} %", interval) if tolerance is None else None
+    last = last or Column("tolerance limit 99 % / 95 %", limit)
+    return (*head, *(quantile(share) for share in of.SHARES), last)
+
+
+def _by_load(quantiles: Rows) -> Rows:
+    """One row per load: for each share (estimate, lower, upper)."""
+    rows: dict[str, dict[object, object]] = {}
+    for row in quantiles:
+        own = rows.setdefault(row["load"], {name: row[name] for name in ("load", "unit", "nominal")})
+        own[row["share"]] = (row["estimate"], row["lower"], row["upper"])
+    return list(rows.values())

@@ -1,0 +1,172 @@
+"""The report of a result file as one answer: verdict, what it stands on, and the numbers that the study asks for."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tolstat.common.errors import Fault, InputError
+from tolstat.display import text
+from tolstat.display.answer import Answer, Part, Sentence, Sheet, Table
+from tolstat.display.asked import silent
+from tolstat.joint.mounting import in_words
+from tolstat.questions import capability
+from tolstat.questions.accuracy import rendering as accuracy
+from tolstat.questions.cases import cases
+from tolstat.questions.exceedance import answer as exceedance
+from tolstat.questions.exceedance import curves
+from tolstat.questions.exceedance.rows import curve_rows, not_kept
+from tolstat.questions.sweep import sweep
+from tolstat.report.headline import headline, tells_yield
+from tolstat.solver import fidelity
+from tolstat.store import Reader, recorded, viewed
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from tolstat.store.view import View
+
+
+def report(view: View, accepted: float = math.nan) -> Answer:
+    """Report the share of joints above each load.
+
+    Parameters
+    ----------
+    view : View
+        A campaign; it may be unfinished.
+    accepted : float
+        Accepted share: share of the joints that may be above each limit; NaN if none is given.
+
+    Returns
+    -------
+    Answer
+        Verdict, mounting of the shafts and contact law. Tables ``limits`` and ``at_points``, where the study sets
+        limits, ``quantiles`` and, with at most `rows.MAX_LEVELS` levels of a load, ``exceedance``; for a sweep the
+        table ``sweep``, for listed joints ``cases``. Loads that the study does not keep are left out.
+    """
+    store = view.store
+    stands_on = [Sentence(text.sentence(in_words(*recorded.mountings(store))), "lead")]
+    if store.case_names or view.method == "sweep":
+        found = cases(view) if store.case_names else sweep(view)
+        notes = [] if store.case_names else [*_notes(view)]
+        return Answer("report", view.name, [*stands_on, *found.parts, *notes, *_run(view)])
+    verdict = headline(view, accepted)
+    lead = [Sentence(text.sentence(verdict.sentence), "lead")] if verdict else []
+    causes = [Sentence(note) for note in verdict.notes] if verdict else []
+    facts: dict[str, Any] = {"verdict": verdict.values()} if verdict else {}
+    parts = [*lead, *stands_on, *_tables(view, accepted), *_yield(view, bool(verdict and verdict.answer))]
+    return Answer("report", view.name, [*parts, *causes, *_notes(view), *_run(view)], facts)
+
+
+def write_report(
+    source: str | Path | Reader | View,
+    out_dir: str | Path | None = None,
+    accepted: float = math.nan,
+    point: str = "",
+) -> list[Path]:
+    """Write the report of a result file: tables as CSV, curves as PNG and SVG.
+
+    Parameters
+    ----------
+    source : str, Path, ResultFile or View
+        The result file: its path, what `tolstat.open` returns, or a view.
+    out_dir : str or Path, optional
+        Folder, made if missing; by default that of the file.
+    accepted : float
+        Accepted share: share of the joints that may be above each limit; NaN if none is given.
+    point : str
+        Operating point, ``"cruise"``, or the worst of some, ``"cruise+start"``; names of files end in it. The worst of
+        all by default.
+
+    Returns
+    -------
+    list of Path
+        The files written: for ``FILE.h5`` ``FILE_exceedance.png``, ``.svg`` and ``.csv``, ``FILE_quantiles.csv`` and,
+        with limits, ``FILE_limits.csv``; for a sweep ``FILE_sweep.png``, ``.svg`` and ``.csv``; for listed joints
+        ``FILE_cases.csv`` and, where variants have notes, ``FILE_cases.md``.
+
+    Raises
+    ------
+    StoreError
+        When the file cannot be read.
+    InputError
+        When the folder cannot be written to.
+    """
+    with viewed(source) as view:
+        return write(report(view.at(point), accepted), view.path, out_dir, point)
+
+
+def write(
+    made: Answer,
+    path: Path,
+    out_dir: str | Path | None = None,
+    point: str = "",
+    stage: Callable[[str], None] = silent,
+) -> list[Path]:
+    """Write the files of a report beside the result file `path`, or to a folder; see `write_report`."""
+    folder = path.parent if out_dir is None else Path(out_dir)
+    stage("files")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        return made.write(folder / (f"{path.stem}_{point}" if point else path.stem))
+    except OSError as error:
+        found = f"cannot be written to: {error.strerror or error}"
+        raise InputError([Fault(str(folder), found, "give another folder with --out")]) from error
+
+
+def _tables(view: View, accepted: float) -> Iterator[Part]:
+    """Tables for people, limits or else quantiles; the other ones and the curves as numbers, and their picture."""
+    if view.bushing_loads:
+        yield Sheet("exceedance", partial(_sheet, view))
+    if not view.shown_loads:
+        yield Sentence("no largest load is kept; the results that are: tolstat export", "lead")
+    for table in exceedance.quantile_tables(view):
+        yield Table("exceedance", "Exceedance curves", (), curve_rows(view), seen=())
+        yield replace(table, seen=()) if view.limits else table
+    yield from exceedance.limit_tables(view, accepted)
+
+
+def _sheet(view: View) -> Figure:
+    return curves.sheet(view, f"{view.head()}\n{exceedance.note(view)}")
+
+
+def _yield(view: View, judged: bool) -> Iterator[Part]:
+    """Share of the joints that keep all limits, unless the verdict says it."""
+    if judged and tells_yield(view):
+        kept = capability.together(capability.good(view), len(view.limits))
+        yield Sentence(f"Yield: {kept.value} {kept.words}.", "lead")
+
+
+def _notes(view: View) -> Iterator[Part]:
+    """How many joints were evaluated, what intervals cover, and the numerical error."""
+    yield Sentence(view.head())
+    if view.method != "sweep":
+        yield Sentence(exceedance.note(view))
+    if view.verification:
+        yield Sentence(accuracy.note(view.verification, view.limits))
+
+
+def _run(view: View) -> Iterator[Part]:
+    """Restrictions that come from how the campaign was run."""
+    store = view.store
+    stopped = _stopped(store.stop) if store.stop.get("reached") else ""
+    missing = "" if store.case_names else not_kept(view)
+    for note in (missing, stopped, fidelity.sentence(store.options, store.fidelity)):
+        if note:
+            yield Sentence(note)
+
+
+def _stopped(stop: dict[str, Any]) -> str:
+    """Sentences about a campaign that its stop rule ended."""
+    from tolstat.campaign.stop_rule import BIASED
+
+    confidence = f"{100 * stop['confidence']:.0f} %"
+    return (
+        f"stopped by {stop['rule']} at {stop['joints']} joints: {confidence} interval {stop['lower']:.5f} to "
+        f"{stop['upper']:.5f}, valid after any number of looks; share {stop['estimate']:.5f}, {BIASED}. Shares and "
+        "intervals above are not corrected for the stop."
+    )

@@ -13,8 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tolstat.analysis.binomial import clopper_pearson
-from tolstat.analysis.bounded_mean import interval
+from tolstat.analysis.binomial import clopper_pearson, mean_interval
 from tolstat.analysis.column import Mask
 from tolstat.common.loads import FloatArray
 
@@ -216,7 +215,7 @@ def failures(
         Numbers of these.
     confidence : float
         Confidence level of the intervals: Clopper and Pearson (1934) where no strength scatters, so that the
-        probabilities are 0 or 1, else `bounded_mean.interval`.
+        probabilities are 0 or 1, else `binomial.mean_interval`.
     iid : bool
         Whether the joints are independent samples.
 
@@ -241,4 +240,4 @@ def _ends(chances: FloatArray, confidence: float) -> tuple[float, float]:
     if counts.all():
         lower, upper = clopper_pearson(chances.sum(), chances.size, confidence)
         return float(lower), float(upper)
-    return interval(chances, confidence)
+    return mean_interval(chances, confidence)

@@ -12,10 +12,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tolstat.analysis import accuracy
+from tolstat.analysis.clustered import Clustered
 from tolstat.analysis.column import frozen
 from tolstat.analysis.design import SAMPLE, Claim, Design
-from tolstat.analysis.designs import Drawn, design_of
+from tolstat.analysis.independent import Independent
+from tolstat.analysis.listed import Listed
+from tolstat.analysis.replicated import Replicated
 from tolstat.analysis.sample import Sample, largest_of
+from tolstat.analysis.weighted import Weighted
 from tolstat.common import selected_results
 from tolstat.common.counts import Counts
 from tolstat.common.draw_records import METHODS
@@ -276,7 +280,7 @@ class View:
     @cached_property
     def design(self) -> Design:
         """How the joints were drawn, and what they allow to conclude."""
-        return design_of(drawn(self.store, self._weights, bool(self.count(Status.PENDING))))
+        return design_of(self.store, self._weights, bool(self.count(Status.PENDING)))
 
     @property
     def sampled(self) -> bool:
@@ -365,8 +369,8 @@ class View:
         return f"{text}, {self.counts.shortfall}" + (f", {pending} still pending" if pending else "")
 
 
-def drawn(store: Reader, weights: FloatArray | None, unfinished: bool) -> Drawn:
-    """How the joints of a file were drawn.
+def design_of(store: Reader, weights: FloatArray | None, unfinished: bool) -> Design:
+    """Sampling design of a file: the first that recognises how its joints were drawn.
 
     Parameters
     ----------
@@ -378,17 +382,14 @@ def drawn(store: Reader, weights: FloatArray | None, unfinished: bool) -> Drawn:
         Whether joints are pending; replicates are then unequal, and do not count as such.
     """
     sampling, skip = store.sampling, store.first_sample
-    whole = store.n - skip == sampling.get("n") and not unfinished
-    own = None
-    # proposals of processes alone leave out no way to a limit
-    if weights is not None and any(set(changed) != {"parts"} for _, changed in store.identity["proposal"]):
-        own = frozen(store.origin()["component"][skip:] == 0)
-    return Drawn(
-        str(sampling["method"]),
-        store.samples,
-        int(sampling.get("joints_per_lot", 1)),
-        int(sampling.get("replicates", 1)) if whole else 1,
-        weights,
-        store.heaviest,
-        own,
-    )
+    method, n = str(sampling["method"]), store.n - skip
+    if weights is not None:
+        # proposals of processes alone leave out no way to a limit
+        others = any(set(changed) != {"parts"} for _, changed in store.identity["proposal"])
+        own = frozen(store.origin()["component"][skip:] == 0) if others else None
+        return Weighted(weights, store.heaviest, own)
+    if sampling.get("joints_per_lot", 1) > 1:
+        return Clustered(np.asarray(store.samples) // int(sampling["joints_per_lot"]))
+    if sampling.get("replicates", 1) > 1 and n == sampling["n"] and not unfinished:
+        return Replicated(n, int(sampling["replicates"]), method)
+    return Independent() if method == "random" else Listed(method)

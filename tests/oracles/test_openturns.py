@@ -5,6 +5,7 @@ import pytest
 from scipy import stats
 
 from tolstat.analysis import extreme, sensitivity
+from tolstat.analysis.sample import Sample
 from tolstat.analysis.subset import Settings, Walk
 from tolstat.common.tables import Status
 
@@ -20,7 +21,7 @@ def loads_of(shape, n, seed=5):
 
 
 def ours(loads):
-    return extreme.fit(loads, np.full(loads.size, Status.OK))
+    return extreme.fit(Sample.of(loads, np.full(loads.size, Status.OK)))
 
 
 def ends(result):

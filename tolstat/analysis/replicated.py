@@ -7,36 +7,20 @@ are consecutive blocks of its joints.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tolstat.analysis.binomial import half_width
 from tolstat.analysis.column import Column
 from tolstat.analysis.design import Design, Shares, counts_by_group
+from tolstat.analysis.estimates import Estimate
 from tolstat.analysis.listed import Listed
 from tolstat.common.loads import FloatArray
 
 
-class Mean(NamedTuple):
-    """Mean of the replicates' estimates.
-
-    Attributes
-    ----------
-    estimate, lower, upper : ndarray, shape (...)
-        Mean of the replicates and its interval, in the unit of the estimates.
-    n : int
-        Replicates.
-    """
-
-    estimate: FloatArray
-    lower: FloatArray
-    upper: FloatArray
-    n: int
-
-
-def interval(estimates: ArrayLike, confidence: float = 0.95, least: float = -np.inf, most: float = np.inf) -> Mean:
+def interval(
+    estimates: ArrayLike, confidence: float = 0.95, least: float = -np.inf, most: float = np.inf
+) -> Estimate[FloatArray]:
     """Student's t interval of the expectation of an estimator, from independent replicates (Owen 2013, 17.4).
 
     The expectation is the true value for shares and means, which are unbiased. A quantile of few joints is biased, and
@@ -53,8 +37,8 @@ def interval(estimates: ArrayLike, confidence: float = 0.95, least: float = -np.
 
     Returns
     -------
-    Mean
-        Estimates and intervals.
+    Estimate of ndarray, shape (...)
+        Mean of the replicates and its interval.
 
     Raises
     ------
@@ -70,10 +54,10 @@ def interval(estimates: ArrayLike, confidence: float = 0.95, least: float = -np.
     return _students_t(values, confidence, least, most)
 
 
-def _students_t(values: FloatArray, confidence: float, least: float, most: float) -> Mean:
+def _students_t(values: FloatArray, confidence: float, least: float, most: float) -> Estimate[FloatArray]:
     n, mean = len(values), values.mean(axis=0)
     half = half_width(confidence, n - 1) * values.std(axis=0, ddof=1) / np.sqrt(n)
-    return Mean(mean, np.maximum(mean - half, least), np.minimum(mean + half, most), n)
+    return Estimate(mean, np.maximum(mean - half, least), np.minimum(mean + half, most))
 
 
 class Replicated(Design):

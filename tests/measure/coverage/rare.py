@@ -42,7 +42,7 @@ def _tail(name: str, n: int) -> Experiment:
     asked.append(Asked("share above, from the tail", f"{name}, {shares[0]:.2e}", n, of_share, SLOW.get(name, "")))
 
     def once(rng: Rng) -> list[Found]:
-        tail = extreme.of_sample(sample_of(law.draw(rng, n)))
+        tail = extreme.fit(sample_of(law.draw(rng, n)))
         own = [*(tail.level(share) for share in shares), tail.probability(max(loads[0], tail.threshold))]
         truths = (*loads, shares[0])
         return [Found(e.lower, e.upper, truth, not tail.refusal) for e, truth in zip(own, truths, strict=True)]

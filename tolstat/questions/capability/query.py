@@ -111,7 +111,7 @@ def returns(view: View, names: Sequence[str], one_in: Sequence[float], confidenc
     rows = []
     for name in names:
         load = view.load(name)
-        tail = extreme.of_sample(load, None, confidence)
+        tail = extreme.fit(load, None, confidence)
         for number in one_in:
             row: dict[str, object] = {"load": name, "unit": load.unit, "one_in": number}
             row |= tail.level(1.0 / number)._asdict()

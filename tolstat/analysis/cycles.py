@@ -210,14 +210,12 @@ def equivalent_load(cycles: Cycles, m: float, revolutions: float = 1.0, referenc
     ndarray, shape (n, channels)
         Range, N or N m; NaN for joints without results.
     """
-    equivalent: FloatArray = (revolutions / reference_cycles * moment(cycles, m)) ** (1.0 / m)
-    return equivalent
+    return np.asarray((revolutions / reference_cycles * moment(cycles, m)) ** (1.0 / m))
 
 
 def damage(cycles: Cycles, line: Line, revolutions: float) -> FloatArray:
     """Damage sum of `revolutions` (Palmgren 1924, Miner 1945), shape (n, channels); failure is expected at 1."""
-    total: FloatArray = revolutions / line.N0 * moment(cycles, line.m) / line.S0**line.m
-    return total
+    return np.asarray(revolutions / line.N0 * moment(cycles, line.m) / line.S0**line.m)
 
 
 def truncation_bound(cycles: Cycles, m: float) -> FloatArray:
@@ -228,5 +226,4 @@ def truncation_bound(cycles: Cycles, m: float) -> FloatArray:
     some = cycles.omitted > 1e-9  # NaN for joints without results
     with np.errstate(invalid="ignore"):
         most = np.sum(cycles.omitted * cycles.ceiling**m, axis=2, where=some)
-        bound: FloatArray = np.where(some.any(axis=2), most / moment(cycles, m), 0.0)
-    return bound
+        return np.asarray(np.where(some.any(axis=2), most / moment(cycles, m), 0.0))

@@ -5,9 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.analysis.column import Column
-from tolstat.analysis.design import SAMPLE, Claim, Design, Refusal, Shares
-from tolstat.common.loads import FloatArray
+from tolstat.analysis.design import SAMPLE, Claim, Design, Refusal
 
 WITHOUT_INTERVAL = {"sobol": "Sobol' points", "lhs": "a Latin hypercube"}
 """Sampling methods of a production whose joints are not independent."""
@@ -33,10 +31,6 @@ class Listed(Design):
     def __init__(self, method: str = "") -> None:
         self._method = method
         self.is_sample = method in (*WITHOUT_INTERVAL, "random")
-
-    def shares(self, x: Column, levels: FloatArray, confidence: float) -> Shares:
-        """See `Design.shares`."""
-        return Shares.counted(x, levels)
 
     def only(self, joints: NDArray[np.intp] | NDArray[np.bool_]) -> Listed:
         """See `Design.only`."""

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tolstat.analysis.binomial import half_width
 from tolstat.analysis.column import Column
-from tolstat.analysis.design import Design, Shares, counts_by_group
+from tolstat.analysis.design import Design, counts_by_group, or_independent
 from tolstat.analysis.estimates import Estimate
 from tolstat.analysis.listed import Listed
 from tolstat.common.loads import FloatArray
@@ -84,7 +84,7 @@ class Replicated(Design):
         self.interval = f"Student's t over {number} replicates"
         self.covers = f"bands: pointwise 95 % intervals of the settled joints, {self.interval}"
 
-    def shares(self, x: Column, levels: FloatArray, confidence: float) -> Shares:
+    def shares(self, x: Column, levels: FloatArray, confidence: float) -> Estimate[FloatArray]:
         """See `Design.shares`: Student's t over the shares of the replicates.
 
         It contains the share of all joints, and where few are on a side of a level (`design.FEW`) the interval of as
@@ -96,7 +96,7 @@ class Replicated(Design):
             each = _students_t(above / joints[:, None], confidence, 0.0, 1.0)
         lower = np.fmin(each.lower, np.nan_to_num(estimate, nan=0.0))
         upper = np.fmax(each.upper, np.nan_to_num(estimate, nan=1.0))
-        return Shares(estimate, lower, upper).with_independent(x, levels, confidence)
+        return or_independent(Estimate(estimate, lower, upper), x, levels, confidence)
 
     def only(self, joints: NDArray[np.intp] | NDArray[np.bool_]) -> Design:
         """See `Design.only`: parts of replicates are no replicates."""

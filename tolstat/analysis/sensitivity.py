@@ -288,8 +288,7 @@ def _hats(column: FloatArray) -> FloatArray:
     part = (column - knots[piece]) / np.diff(knots)[piece]
     hats, rows = np.zeros((n, len(knots))), np.arange(n)
     hats[rows, piece], hats[rows, piece + 1] = 1.0 - part, part
-    found: FloatArray = hats[:, 1:] - hats[:, 1:].mean(axis=0)
-    return found
+    return np.asarray(hats[:, 1:] - hats[:, 1:].mean(axis=0))
 
 
 def _interactions(errors: FloatArray, left: FloatArray, variance: float) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -319,8 +318,7 @@ def _interactions(errors: FloatArray, left: FloatArray, variance: float) -> tupl
 
 def _chance(share: FloatArray, degrees: int, n: int) -> FloatArray:
     """Variance of an estimated share in the absence of any effect, where the influence function vanishes."""
-    found: FloatArray = 2.0 * degrees * ((1.0 - share) / n) ** 2
-    return found
+    return np.asarray(2.0 * degrees * ((1.0 - share) / n) ** 2)
 
 
 def _error(influence: FloatArray, chance: FloatArray) -> NDArray[np.float64]:

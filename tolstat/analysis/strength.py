@@ -155,8 +155,7 @@ def damage_at(collective: Collective, line: Line, factor: float = 1.0) -> FloatA
     """Damage sum of each joint in a part whose strength is `factor` times the median, (n,); NaN without results."""
     i = (collective.knots >= factor).sum(axis=1)[:, None]
     above, below = (np.take_along_axis(sums, i, axis=1)[:, 0] for sums in (collective.above, collective.below))
-    total: FloatArray = above * factor**-line.k + below * factor**-line.k_2
-    return total
+    return np.asarray(above * factor**-line.k + below * factor**-line.k_2)
 
 
 def critical_factor(collective: Collective, line: Line, lives: float = 1.0) -> FloatArray:

@@ -18,7 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from tolstat.analysis import pareto
 from tolstat.analysis.column import Column
-from tolstat.analysis.design import Claim, Design, Refusal, Shares
+from tolstat.analysis.design import Claim, Design, Refusal
+from tolstat.analysis.estimates import Estimate
 from tolstat.analysis.independent import Independent
 from tolstat.common.bisection import first
 from tolstat.common.loads import FloatArray
@@ -168,10 +169,10 @@ class Weighted(Design):
                 "tolerances alone, whatever they miss"
             )
 
-    def shares(self, x: Column, levels: FloatArray, confidence: float) -> Shares:
+    def shares(self, x: Column, levels: FloatArray, confidence: float) -> Estimate[FloatArray]:
         """See `Design.shares` and the head of this file."""
         split = self._split(x, levels)
-        return Shares(split.share, *split.interval(confidence, self._withheld))
+        return Estimate(split.share, *split.interval(confidence, self._withheld))
 
     def estimate(self, x: Column, levels: FloatArray) -> FloatArray:
         """See `Design.estimate`."""

@@ -69,13 +69,8 @@ class Capability:
     needed: int
 
     @property
-    def good(self) -> tuple[float, float, float]:
-        """Yield: estimate, lower and upper end, unresolved joints counted both ways (NaN for dependent samples)."""
-        return 1 - self.above.estimate, 1 - self.above.outer_upper, 1 - self.above.outer_lower
-
-    @property
     def ppm(self) -> tuple[float, float, float]:
-        """Joints above the limit in a million: estimate, lower and upper end as in `good`."""
+        """Joints above the limit in a million: estimate, lower and upper end, unresolved joints counted both ways."""
         return 1e6 * self.above.estimate, 1e6 * self.above.outer_lower, 1e6 * self.above.outer_upper
 
 

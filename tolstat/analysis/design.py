@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import ClassVar, Literal, NamedTuple
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,13 +20,6 @@ holds for a whole curve; reweighting counts the joints by other weights."""
 FEW = 20
 """Number of joints on a side of a level below which an interval over units contains that of independent joints, too."""
 SAMPLE = 'give the file of a study with sampling.method "random", "sobol" or "lhs"'
-
-
-class Refusal(NamedTuple):
-    """Why joints give no estimate: what is found in the file, and the remedy; ``{path}`` stands for the file."""
-
-    found: str
-    remedy: str
 
 
 class Design(ABC):
@@ -89,8 +82,8 @@ class Design(ABC):
     def only(self, joints: NDArray[np.intp] | NDArray[np.bool_]) -> Design:
         """Return the design of some of the joints."""
 
-    def refuses(self, claim: Claim) -> Refusal | None:
-        """Return why the joints give no estimate of a claim; None if they do."""
+    def refuses(self, claim: Claim) -> tuple[str, str] | None:
+        """Return why the joints give no estimate of a claim, and the remedy, of file ``{path}``; None if they do."""
         return None
 
     def without_interval(self, claim: Claim) -> str:

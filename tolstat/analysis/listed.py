@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.analysis.design import SAMPLE, Claim, Design, Refusal
+from tolstat.analysis.design import SAMPLE, Claim, Design
 
 WITHOUT_INTERVAL = {"sobol": "Sobol' points", "lhs": "a Latin hypercube"}
 """Sampling methods of a production whose joints are not independent."""
@@ -36,13 +36,13 @@ class Listed(Design):
         """See `Design.only`."""
         return self
 
-    def refuses(self, claim: Claim) -> Refusal | None:
+    def refuses(self, claim: Claim) -> tuple[str, str] | None:
         """See `Design.refuses`."""
         if self._method == "subset":
             remedy = "print its probability: tolstat rare {path}"
-            return Refusal("holds the levels of a subset simulation, no random sample", remedy)
+            return "holds the levels of a subset simulation, no random sample", remedy
         if self._method in ("cases", "sweep"):
-            return Refusal("holds joints that are no sample of a production", SAMPLE)
+            return "holds joints that are no sample of a production", SAMPLE
         return None
 
     def without_interval(self, claim: Claim) -> str:

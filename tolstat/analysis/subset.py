@@ -27,7 +27,6 @@ from tolstat.analysis.binomial import clopper_pearson, half_width
 from tolstat.common.loads import FloatArray
 from tolstat.common.shown import shown
 
-Noise = Callable[[int, int, int], FloatArray]
 FIRST_STEP = 0.6
 """Step of level 1 (Papaioannou et al. 2015)."""
 ACCEPTANCE = 0.44
@@ -181,7 +180,7 @@ class Walk:
     (True, 5)
     """
 
-    def __init__(self, settings: Settings, noise: Noise) -> None:
+    def __init__(self, settings: Settings, noise: Callable[[int, int, int], FloatArray]) -> None:
         self.settings, self._noise = settings, noise
         self.levels: list[Level] = []
         self.done = self.reached = False

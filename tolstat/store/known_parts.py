@@ -9,7 +9,7 @@ import numpy as np
 
 from tolstat.analysis import known_share, process
 from tolstat.analysis.column import Mask
-from tolstat.analysis.known_share import Event, KnownShare, Mixture
+from tolstat.analysis.known_share import KnownShare, Mixture
 from tolstat.analysis.process import Known, Sums
 from tolstat.analysis.weighted import Split
 from tolstat.common.loads import ANY_LIMIT
@@ -111,16 +111,16 @@ class KnownParts:
         """Weights above each limit: of joints with a valid load; for the lower end; and for the upper end."""
         view, done = self.view, self._done
         names = [*view.limits, ANY_LIMIT]
-        events: list[Event] = []
+        events: list[tuple[Mask, Mask]] = []
         places = []
         for load in view.loads(names):
             ends, limit = error_budget.with_error(view, load), float(load.limit or np.nan)
-            own = [Event(load.values > limit, load.is_valid)]
-            own += [Event(end.lower.values > limit, done) for end in ends]
-            own += [Event(end.upper.values > limit, done) for end in ends]
+            own = [(load.values > limit, load.is_valid)]
+            own += [(end.lower.values > limit, done) for end in ends]
+            own += [(end.upper.values > limit, done) for end in ends]
             places.append((len(events), len(ends)))
             events += own
-        events = [Event(event.above[done], event.counted[done]) for event in events]
+        events = [(above[done], counted[done]) for above, counted in events]
         weights = view.design.counts_as(view.n)[done]
         found = known_share.tallies(self._sums(), self._known, self._drawn, weights, events)
         return {

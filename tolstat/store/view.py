@@ -23,13 +23,13 @@ from tolstat.analysis.weighted import Weighted
 from tolstat.common import selected_results
 from tolstat.common.counts import Counts
 from tolstat.common.draw_records import METHODS
-from tolstat.common.errors import Fault, InputError, StoreError
+from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import ANY_LIMIT, LOADS, SHOWN_LOADS, FloatArray, Limit, limits_in_words, split
 from tolstat.common.shown import table
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import ERROR, Status
 from tolstat.store import verification, what_if, worst
-from tolstat.store.hdf5 import BLOCK
+from tolstat.store.hdf5 import BLOCK, store_error
 from tolstat.store.reader import Reader
 from tolstat.store.recorded import recall
 from tolstat.store.verification import Verification
@@ -291,13 +291,13 @@ class View:
         """Raise a `StoreError` if the joints give no estimate of a claim."""
         refusal = self.design.refuses(claim)
         if refusal is not None:
-            remedy = refusal.remedy.format(path=self.path)
-            raise StoreError(str(Fault(str(self.path), refusal.found, remedy)))
+            found, remedy = refusal
+            raise store_error(self.path, found, remedy.format(path=self.path))
 
     def check_drawn(self) -> None:
         """Raise a StoreError for joints that were not drawn from tolerances."""
         if not self.study.tolerances:
-            raise StoreError(str(Fault(str(self.path), "holds joints that are not drawn from tolerances", SAMPLE)))
+            raise store_error(self.path, "holds joints that are not drawn from tolerances", SAMPLE)
 
     def rows(self, samples: ArrayLike) -> NDArray[np.intp]:
         """Rows of the campaign of samples."""

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tolstat.analysis.binomial import clopper_pearson
+from tolstat.analysis.binomial import clopper_pearson, half_width
 from tolstat.analysis.column import Column
 from tolstat.analysis.design import Claim, Design
 from tolstat.analysis.sample import Sample
@@ -188,17 +188,20 @@ def means(a: Sample, b: Sample, paired: bool, confidence: float = 0.95) -> Diffe
     ValueError
         As `shares`.
     """
-    from scipy.stats import ttest_ind, ttest_rel
-
     a, b = _valid(a, b, paired)
     x, y = a.values, b.values
     of_a, of_b = float(x.mean()), float(y.mean())
-    lower, upper = np.nan, np.nan
-    if _have_interval(a.design, b.design, "difference") and min(x.size, y.size) > 1:
-        with np.errstate(divide="ignore", invalid="ignore"):  # of loads that do not scatter
-            test = ttest_rel(y, x) if paired else ttest_ind(y, x, equal_var=False)
-            lower, upper = (float(end) for end in test.confidence_interval(confidence))
-    return Difference(of_a, of_b, of_b - of_a, lower, upper)
+    if not _have_interval(a.design, b.design, "difference") or min(x.size, y.size) < 2:
+        return Difference(of_a, of_b, of_b - of_a, np.nan, np.nan)
+    if paired:
+        error, degrees = float(np.std(y - x, ddof=1) / np.sqrt(x.size)), x.size - 1.0
+    else:
+        parts = np.array([x.var(ddof=1) / x.size, y.var(ddof=1) / y.size])
+        error = float(np.sqrt(parts.sum()))
+        weights = (parts**2 / np.array([x.size - 1.0, y.size - 1.0])).sum()
+        degrees = parts.sum() ** 2 / weights if weights else x.size + y.size - 2.0
+    half = float(half_width(confidence, degrees)) * error
+    return Difference(of_a, of_b, of_b - of_a, of_b - of_a - half, of_b - of_a + half)
 
 
 def _have_interval(a: Design, b: Design, claim: Claim) -> bool:

@@ -16,7 +16,7 @@ from tests.campaign.test_campaign import datasets
 from tests.support import fakes, synthetic
 from tolstat import sampling, study
 from tolstat.analysis import subset
-from tolstat.analysis.subset import Settings, Walk
+from tolstat.analysis.subset import Walk
 from tolstat.campaign import run as campaign
 from tolstat.campaign.blocks import Execution
 from tolstat.cli import app
@@ -44,7 +44,7 @@ def walk_of(load, n, limit, seed, dimensions=6):
         stream = streams.setdefault(level, np.random.default_rng([seed, level]))
         return stream.standard_normal((count, dimensions))
 
-    walk = Walk(Settings(n, 0.1, limit), noise)
+    walk = Walk(n, 0.1, limit, noise)
     while not walk.done:
         walk.take(load(walk.next.scores))
     return walk

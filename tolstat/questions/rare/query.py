@@ -20,7 +20,7 @@ import numpy as np
 from tolstat import sampling
 from tolstat.analysis import prediction
 from tolstat.analysis.sample import is_valid
-from tolstat.analysis.subset import Candidates, Estimate, Level, Settings, Walk
+from tolstat.analysis.subset import Candidates, Estimate, Level, Walk
 from tolstat.campaign import run as campaign
 from tolstat.campaign.blocks import Execution
 from tolstat.campaign.extend import grow
@@ -241,7 +241,7 @@ def _run(
 ) -> RareEvent:
     settings = plan.sampling
     assert isinstance(settings, Subset)
-    walk = Walk(Settings(settings.per_level, settings.p0, settings.limit.level), lambda *which: _noise(plan, *which))
+    walk = Walk(settings.per_level, settings.p0, settings.limit.level, lambda *which: _noise(plan, *which))
     unresolved: list[int] = []
     first, told = plan.first_sample, 0
     rows = _rows(out) or first + settings.per_level

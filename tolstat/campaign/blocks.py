@@ -5,22 +5,14 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Generator, Iterator
 from contextlib import closing
-from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.campaign import pool
-from tolstat.campaign.block import (
-    Block,
-    BlockWork,
-    load_kernels,
-    results_of,
-    simulate_block,
-    without_simulation,
-)
+from tolstat.campaign.block import Block, BlockWork, load_kernels, results_of, simulate_block, without_simulation
 from tolstat.campaign.pool import Lost, Work
 from tolstat.common.cores import available_cores
 from tolstat.common.solver_options import from_names
@@ -29,10 +21,10 @@ from tolstat.solver.compilation import is_compiled, warm_up
 from tolstat.solver.simulation import simulate_rows
 from tolstat.store import Reader
 from tolstat.store.recorded import perturbed, settings, variants
+from tolstat.study import Study
 
-if TYPE_CHECKING:
-    from tolstat.study import Study
-
+Executor = Literal["processes", "dask"]
+"""Worker processes on this machine, or a cluster."""
 MAX_FIRST_BLOCK, MAX_BLOCK = 256, 2048
 """Largest default number of joints in a block, before and after the time per joint is known: enough to keep the lanes
 busy, and at most 90 MB of histories."""
@@ -46,28 +38,6 @@ writing: beyond a quarter the workers begin to wait for the parent. Writing a bl
 together, whatever the block's size."""
 SOME, READ = 64, 4096
 """Number of joints that tell which kernels a campaign needs, and of the first rows that they are from."""
-
-
-@dataclass(frozen=True)
-class Execution:
-    """Where and how the joints are simulated; does not affect results.
-
-    Attributes
-    ----------
-    kind : {"processes", "dask"}
-        Worker processes on this machine, or a cluster.
-    workers : int, optional
-        Number of processes; without it the number of cores.
-    block : int, optional
-        Joints per block; without it as many as take some seconds, see `Pace`.
-    scheduler : str, optional
-        Address of a Dask scheduler, such as ``tcp://host:8786``; without it a cluster is started on this machine.
-    """
-
-    kind: Literal["processes", "dask"] = "processes"
-    workers: int | None = None
-    block: int | None = None
-    scheduler: str | None = None
 
 
 class Pace:
@@ -110,9 +80,16 @@ def _work(options: list[Options], *kept: Any) -> BlockWork:
 
 
 def simulate_pending(
-    study: Study, store: Reader, stop_slot: int, execution: Execution, stop: Callable[[], bool]
+    study: Study,
+    store: Reader,
+    stop_slot: int,
+    workers: int | None,
+    block: int | None,
+    executor: Executor,
+    scheduler: str | None,
+    stop: Callable[[], bool],
 ) -> Generator[tuple[Block, Simulation, str], None, None]:
-    """Simulate the joints in the pending file slots below `stop_slot`, until `stop` returns true.
+    """Simulate the joints in the pending file slots below `stop_slot`, until `stop` returns true; see `run.run`.
 
     Yields each block, its simulation, and why its joint was given up, which is empty if it was not. Close the generator
     (`contextlib.closing`) when leaving it early.
@@ -123,29 +100,29 @@ def simulate_pending(
         When worker processes die whichever block they work on.
     """
     todo = sum(len(slots) for _, slots in store.pending_blocks(stop_slot))
-    workers = execution.workers or available_cores()
-    size = execution.block or default_block(todo, workers)
+    workers = workers or available_cores()
+    size = block or default_block(todo, workers)
     if not todo:
         return
-    pace = Pace(todo, workers, execution.block)
+    pace = Pace(todo, workers, block)
     kept = study.output.histories, study.output.harmonics, store.history_specs
     work, blocks = _work(settings_in_use(study, store), *kept), _blocks(study, store, stop_slot, pace)
-    if execution.kind == "dask":
+    if executor == "dask":
         from tolstat.campaign.cluster import map_on_cluster
 
-        results = map_on_cluster(work, blocks, execution.scheduler, workers, stop)
+        results = map_on_cluster(work, blocks, scheduler, workers, stop)
     else:
         results = pool.map_blocks(work, blocks, max(1, min(workers, -(-todo // size))), stop)
     with closing(results):
-        for block, result in results:
+        for done, result in results:
             if isinstance(result, Lost):
-                blank = without_simulation(len(block.slots), Status.CRASHED, store.history_specs)
-                yield block, blank, result.reason
+                blank = without_simulation(len(done.slots), Status.CRASHED, store.history_specs)
+                yield done, blank, result.reason
             else:
                 begin = time.perf_counter()
                 # the caller writes the block to the file before it asks for the next one
-                yield block, result.simulation, ""
-                pace.note(len(block.slots), result.seconds, time.perf_counter() - begin)
+                yield done, result.simulation, ""
+                pace.note(len(done.slots), result.seconds, time.perf_counter() - begin)
 
 
 def simulate_beside(params: NDArray[np.void], options: Options) -> Simulation:

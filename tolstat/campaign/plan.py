@@ -6,7 +6,7 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,12 +28,9 @@ from tolstat.solver.compilation import stage_name, warm_up
 from tolstat.solver.simulation import history_specs, simulate_rows
 from tolstat.store import layout, metadata, worst
 from tolstat.store.recorded import perturbed, settings, variants
-from tolstat.study import swept
+from tolstat.study import Study, swept
 from tolstat.study.points import names_of
 from tolstat.study.tolerances import meaning
-
-if TYPE_CHECKING:
-    from tolstat.study import Study
 
 PILOT = 128
 """Default number of joints in the pilot: fewer would not fill the lanes as a campaign does."""

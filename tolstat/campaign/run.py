@@ -9,14 +9,14 @@ from collections.abc import Iterable, Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from tolstat.campaign import verify
 from tolstat.campaign.block import Block
 from tolstat.campaign.blocks import (
-    Execution,
+    Executor,
     compile_missing,
     settings_in_use,
     simulate_beside,
@@ -37,10 +37,7 @@ from tolstat.solver.simulation import Histories, history_specs
 from tolstat.store import Reader, Writer
 from tolstat.store.provenance import differing_code
 from tolstat.store.recorded import differing_keys, perturbed, settings
-
-if TYPE_CHECKING:
-    from tolstat.study import Study
-
+from tolstat.study import Study
 
 CAUGHT = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 
@@ -133,7 +130,8 @@ def run(
     progress: Reporter | None = None,
     rows: range | None = None,
     until_row: int | None = None,
-    execution: Execution | None = None,
+    executor: Executor = "processes",
+    scheduler: str | None = None,
     retry: Retry | None = None,
     tell: Tell = note,
     check: bool = True,
@@ -150,16 +148,20 @@ def run(
     out : str or Path
         Result file; created if it does not exist. Otherwise its pending rows are simulated, and its limits, study
         text and study name are updated from `study`.
-    workers, block : int, optional
-        Shorthand for an `Execution` with these; ignored if `execution` is given.
+    workers : int, optional
+        Number of processes; without it the number of cores.
+    block : int, optional
+        Joints per block; without it as many as take some seconds, see `blocks.Pace`.
     progress : Reporter, optional
         Called with the counts at the start and after every block.
     rows : range, optional
         Rows of the campaign that the file holds, if a slice; all without it.
     until_row : int, optional
         Rows of the campaign from this one on are left pending.
-    execution : Execution, optional
-        Where and how to simulate.
+    executor : {"processes", "dask"}
+        Worker processes on this machine, or a cluster.
+    scheduler : str, optional
+        Address of a Dask scheduler, such as ``tcp://host:8786``; without it a cluster is started on this machine.
     retry : Retry, optional
         Joints that are simulated again, and how.
     tell : callable, optional
@@ -185,15 +187,10 @@ def run(
     WorkerDied
         When worker processes die whichever block they work on; the file holds all finished blocks.
     """
-    execution = execution or Execution(workers=workers, block=block)
-    _check_positive(workers=execution.workers, block=execution.block)
+    _check_positive(workers=workers, block=block)
     path = Path(out)
     stage("drawing the errors" if not path.exists() else "opening the file")
-    with (
-        signals_caught() as stop,
-        _create_or_resume(study, path, rows, tell) as store,
-        kept_workers(),
-    ):
+    with signals_caught() as stop, _create_or_resume(study, path, rows, tell) as store, kept_workers():
         if retry:
             retry = retry.chosen(store.fidelity)
             begin_retry(store, retry, history_specs(retry.options, *_history_options(study)), tell)
@@ -207,7 +204,7 @@ def run(
                     compile_missing(options, examples)
                 store.begin_session(counts.done)
             stage(JOINTS)
-            finished = simulate_pending(study, store, last, execution, stop)
+            finished = simulate_pending(study, store, last, workers, block, executor, scheduler, stop)
             with stop.deferred(), closing(finished):
                 counts = _write_blocks(store, finished, counts, progress, tell)
             if check:

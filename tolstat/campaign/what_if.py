@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,12 +22,9 @@ from tolstat.joint import perturb
 from tolstat.store import Writer, what_if
 from tolstat.store.recorded import settings
 from tolstat.store.what_if import Altered
-from tolstat.study import axes, widths
+from tolstat.study import Study, axes, widths
 from tolstat.study.points import at
 from tolstat.study.widths import Line
-
-if TYPE_CHECKING:
-    from tolstat.study import Study
 
 WIDTH, EXCHANGE, AS_DRAWN = "width", "exchange", "as drawn"
 """Kinds of sets: a line with another width; a line's errors from another joint; no change."""

@@ -6,7 +6,6 @@ Damaged errors refuse the file. Damaged results make the joints of their block (
 from __future__ import annotations
 
 import logging
-import math
 import time
 from collections.abc import Iterator, Sequence
 from copy import copy
@@ -185,11 +184,6 @@ class Reader:
     def whole(self) -> bool:
         """Whether the file holds all rows of its campaign, not a slice."""
         return self.rows == range(self.campaign_rows)
-
-    @property
-    def heaviest(self) -> float:
-        """Largest weight that a joint of importance sampling can have: one over the share of the tolerances, else 1."""
-        return 1.0 / (1.0 - math.fsum(share for share, _ in self.identity.get("proposal", ())))
 
     @property
     def complete(self) -> bool:

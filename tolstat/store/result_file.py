@@ -91,7 +91,13 @@ class ResultFile(Reader):
     @property
     def nominal(self) -> pd.Series[float]:
         """Largest loads of the nominal joint by name, SI; NaN where the file has none or its results are not valid."""
-        return self.loads.nominal()
+        import pandas as pd
+
+        names, held = list(self.loads), self.loads.view.nominal
+        values = [float(LOADS[name].of(held)[0]) if len(held) else np.nan for name in names]
+        series = pd.Series(values, pd.Index(names, name="load"), dtype=float, name="nominal")
+        series.attrs["units"] = {name: LOADS[name].unit for name in names}
+        return series
 
     def to_pandas(self, nominal: bool = False) -> pd.DataFrame:
         """Export errors and results as one DataFrame, one row per joint, pending and failed joints included.
@@ -144,7 +150,7 @@ class NamedLoads:
     """
 
     def __init__(self, view: View) -> None:
-        self._view = view
+        self.view = view
 
     def __getitem__(self, name: str) -> pd.Series[float]:
         """Largest load over the revolution of each joint, SI.
@@ -167,25 +173,15 @@ class NamedLoads:
         """
         import pandas as pd
 
-        load, store = self._view.load(name), self._view.store
+        load, store = self.view.load(name), self.view.store
         index = pd.RangeIndex(store.rows[store.first_sample :], name="row")
         series = pd.Series(load.values, index, name=name)
         series.attrs["units"] = load.unit
         return series
 
-    def nominal(self) -> pd.Series[float]:
-        """Loads of the nominal joint by name, SI; see `Reader.nominal`."""
-        import pandas as pd
-
-        held = self._view.nominal
-        values = [float(LOADS[name].of(held)[0]) if len(held) else np.nan for name in self.keys()]
-        series = pd.Series(values, pd.Index(self.keys(), name="load"), dtype=float, name="nominal")
-        series.attrs["units"] = {name: LOADS[name].unit for name in self.keys()}
-        return series
-
     def keys(self) -> tuple[str, ...]:
         """Names of the loads that the study keeps."""
-        return self._view.kept_loads
+        return self.view.kept_loads
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.keys())
@@ -202,7 +198,7 @@ class NamedLoads:
     def __repr__(self) -> str:
         names = self.keys()
         named = ", ".join(names) if len(names) <= 3 else f"{names[0]}, {names[1]}, ..., {names[-1]}"
-        return f"<{len(names)} loads of {self._view.n} joints: {named}>"
+        return f"<{len(names)} loads of {self.view.n} joints: {named}>"
 
     def _repr_html_(self) -> str:
         return table(repr(self)[1:-1], [("load", ", ".join(self.keys()))])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -384,10 +385,11 @@ def design_of(store: Reader, weights: FloatArray | None, unfinished: bool) -> De
     sampling, skip = store.sampling, store.first_sample
     method, n = str(sampling["method"]), store.n - skip
     if weights is not None:
+        shares, changes = zip(*store.identity["proposal"], strict=True)
         # proposals of processes alone leave out no way to a limit
-        others = any(set(changed) != {"parts"} for _, changed in store.identity["proposal"])
+        others = any(set(changed) != {"parts"} for changed in changes)
         own = frozen(store.origin()["component"][skip:] == 0) if others else None
-        return Weighted(weights, store.heaviest, own)
+        return Weighted(weights, 1.0 / (1.0 - math.fsum(shares)), own)  # one over the share of the tolerances
     if sampling.get("joints_per_lot", 1) > 1:
         return Clustered(np.asarray(store.samples) // int(sampling["joints_per_lot"]))
     if sampling.get("replicates", 1) > 1 and n == sampling["n"] and not unfinished:

@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 import h5py
 import numpy as np
@@ -26,9 +26,7 @@ from tolstat.store.checksums import ROWS, blocks_of
 from tolstat.store.hdf5 import copy_open, is_at, put, replace, store_error
 from tolstat.store.metadata import Metadata
 from tolstat.store.reader import Reader
-
-if TYPE_CHECKING:
-    from tolstat.study import Study
+from tolstat.study import Study
 
 KEPT = "and run the same command again; finished joints are kept"
 

@@ -232,7 +232,9 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT, stage: Te
     stages["report"] = slower * (REPORT_S + REPORT_S_PER_JOINT * study.rows)
     iid = study.sampling.method == "random" and study.sampling.joints_per_lot == 1
     valid = slice(study.first_sample, None)
-    status = worst.together(list(results.values()))["status"]
+    status, solver = worst.together(list(results.values()))["status"], settings(study.solver, choice)
+    specs = history_specs(solver, study.output.histories, study.output.harmonics)
+    held = metadata.of_study(study, range(study.rows), specs, dimensions(), solver, choice)
     return Plan(
         rows=study.rows,
         points=list(at),
@@ -245,7 +247,7 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT, stage: Te
         workers=workers,
         stages=stages,
         process_bytes=_process_bytes(),
-        file_bytes=_file_bytes(study, settings(study.solver, choice), choice),
+        file_bytes=layout.size_of(held) + len(held.model_dump_json()),
         widths={share: _width(share, study.samples) for share in SHARES} if iid else {},
         limits=_limits(study, {name: own[valid] for name, own in results.items()}) if iid else [],
         wilks={share: binomial.wilks(share, CONFIDENCE) for share in QUANTILES},
@@ -334,12 +336,6 @@ def _limits(study: Study, results: Mapping[str, NDArray[np.void]]) -> list[Limit
         nearest_half = min(max(0.5, found.lower), found.upper)  # the interval is widest at a share of one half
         plans.append(LimitPlan(name, level, found.count, valid, _width(nearest_half, study.samples)))
     return plans
-
-
-def _file_bytes(study: Study, options: Options, choice: Mapping[str, Any]) -> int:
-    specs = history_specs(options, study.output.histories, study.output.harmonics)
-    held = metadata.of_study(study, range(study.rows), specs, dimensions(), options, choice)
-    return layout.size_of(held) + len(held.model_dump_json())
 
 
 def _process_bytes() -> int:

@@ -242,8 +242,11 @@ def parse_retry(statuses: str, settings: Sequence[str], study: Study) -> Retry:
     changed: dict[str, Any] = {}
     for text in settings:
         with gather(faults):
-            key, value = _setting(text)
-            changed[key] = value
+            key, equals, value = text.partition("=")
+            if not (equals and key.startswith("solver.")):
+                remedy = "write --set solver.steps_per_rev=360"
+                raise InputError([Fault("--set", f"{text!r} is not a solver setting", remedy)])
+            changed[key.strip()] = given(value)
     solver = study.solver
     with gather(faults):
         new = {key.removeprefix("solver."): value for key, value in changed.items()}
@@ -254,13 +257,6 @@ def parse_retry(statuses: str, settings: Sequence[str], study: Study) -> Retry:
         raise InputError(faults)
     chosen = tuple(labels[name] for name in dict.fromkeys(names))
     return Retry(chosen, changed, solver.options(), auto=solver.fidelity == "auto")
-
-
-def _setting(text: str) -> tuple[str, Any]:
-    key, equals, value = text.partition("=")
-    if not (equals and key.startswith("solver.")):
-        raise InputError([Fault("--set", f"{text!r} is not a solver setting", "write --set solver.steps_per_rev=360")])
-    return key.strip(), given(value)
 
 
 def begin_retry(store: Writer, retry: Retry, specs: Mapping[str, HistorySpec], tell: Callable[[str], None]) -> None:

@@ -35,6 +35,7 @@ from tolstat.solver import fidelity, rainflow
 from tolstat.solver.compilation import stage_name
 from tolstat.solver.simulation import Histories, history_specs
 from tolstat.store import Reader, Writer
+from tolstat.store.hdf5 import store_error
 from tolstat.store.provenance import differing_code
 from tolstat.store.recorded import differing_keys, perturbed, settings
 from tolstat.study import Study
@@ -245,7 +246,9 @@ def _write_blocks(
 
 def _create_or_resume(study: Study, path: Path, rows: range | None, tell: Tell) -> Writer:
     rows = range(study.rows) if rows is None else rows
-    _check_part(rows, study.rows)
+    if not (0 <= rows.start < rows.stop <= study.rows and rows.step == 1):
+        found = f"{rows.start}:{rows.stop} is no part of the rows 0:{study.rows} of the study"
+        raise InputError([Fault("rows", found, f"write --rows A:B with 0 <= A < B <= {study.rows}")])
     if not path.exists():
         choice = choose_fidelity(study) if study.solver.fidelity == "auto" else {}
         if choice:
@@ -265,13 +268,6 @@ def _create_or_resume(study: Study, path: Path, rows: range | None, tell: Tell) 
     return store
 
 
-def _check_part(part: range, n: int) -> None:
-    """Refuse what is not a part, without gaps, of the n rows of a study."""
-    if not (0 <= part.start < part.stop <= n and part.step == 1):
-        found = f"{part.start}:{part.stop} is no part of the rows 0:{n} of the study"
-        raise InputError([Fault("rows", found, f"write --rows A:B with 0 <= A < B <= {n}")])
-
-
 def choose_fidelity(study: Study) -> dict[str, Any]:
     """Choose the fidelity of a new campaign from a pilot of its joints, simulated as in the campaign.
 
@@ -285,16 +281,12 @@ def choose_fidelity(study: Study) -> dict[str, Any]:
     errors = np.concatenate([part for row in rows.tolist() for part in draw_blocks(study, range(row, row + 1))])
     each = [perturbed(study.at(point.name), rows, errors) for point in study.points]
     params = np.concatenate(each)  # one choice for all points
-    budget, min_steps = study.solver.error_budget, _min_steps(*_history_options(study))
+    histories, n_harmonics = _history_options(study)
+    least = [2 * n_harmonics + 1] * ("harmonics" in histories) + [rainflow.MIN_SAMPLES] * ("cycles" in histories)
+    budget, min_steps = study.solver.error_budget, max(least, default=0)  # steps from which histories can be computed
     with kept_workers():
         closed_form = not study.has_axial_force
         return fidelity.choose(params, options, budget, study.asked, simulate_beside, min_steps, closed_form).record
-
-
-def _min_steps(histories: str, n_harmonics: int) -> int:
-    """Minimum steps per revolution from which the kept histories can be computed."""
-    harmonics = 2 * n_harmonics + 1 if "harmonics" in histories else 0
-    return max(harmonics, rainflow.MIN_SAMPLES if "cycles" in histories else 0)
 
 
 def _check_same(store: Reader, study: Study, rows: range) -> None:
@@ -304,25 +296,23 @@ def _check_same(store: Reader, study: Study, rows: range) -> None:
         found, remedy = OTHER_CODE, f"run the study into another file (--out OTHER.h5), or resume with {code_of(store)}"
     differing += differing_code(store.versions)
     if len(differing) == 1 and differing[0].startswith("sampling.n:") and store.whole:
-        raise StoreError(str(_of_number(store, study.samples)))
+        raise _of_number(store, study.samples)
     if not differing and store.rows != rows:
         held, asked = (f"{r.start}:{r.stop}" for r in (store.rows, rows))
-        raise StoreError(str(Fault(str(store.path), f"holds rows {held}, not {asked}", f"give --rows {held}")))
+        raise store_error(store.path, f"holds rows {held}, not {asked}", f"give --rows {held}")
     if differing:
-        lines = "\n    ".join([found, *differing])
-        raise StoreError(str(Fault(str(store.path), lines, remedy)))
+        raise store_error(store.path, "\n    ".join([found, *differing]), remedy)
 
 
-def _of_number(store: Reader, asked: int) -> Fault:
-    """Fault of a file of this study with another number of joints."""
-    path, held = store.path, int(store.sampling["n"])
-    found = f"is the result file of this study with {held} joints, not {asked}"
-    method = store.sampling["method"]
+def _of_number(store: Reader, asked: int) -> StoreError:
+    """Error of a file of this study with another number of joints."""
+    path, held, method = store.path, int(store.sampling["n"]), store.sampling["method"]
+    remedy = f"simulate more of its joints: tolstat extend {path} --n {asked}"
     if asked < held:
-        return Fault(str(path), found, f"read it as it is: tolstat report {path}, or give another file: --out OTHER.h5")
-    if method in NOT_EXTENDABLE:
-        return Fault(str(path), found, f"give another file: --out OTHER.h5; {NOT_EXTENDABLE[method]}")
-    return Fault(str(path), found, f"simulate more of its joints: tolstat extend {path} --n {asked}")
+        remedy = f"read it as it is: tolstat report {path}, or give another file: --out OTHER.h5"
+    elif method in NOT_EXTENDABLE:
+        remedy = f"give another file: --out OTHER.h5; {NOT_EXTENDABLE[method]}"
+    return store_error(path, f"is the result file of this study with {held} joints, not {asked}", remedy)
 
 
 def _check_positive(**numbers: int | None) -> None:

@@ -208,16 +208,12 @@ class _Table:
             if own.stop > own.start:
                 name, states = what_if.key(change.about), list(self.status[own].T)
                 status = worst_status(states)
-                loads = self.loads[own].reshape(-1, len(self.names))
-                found[name] = _joined(held.get(name), Altered(change.about, numbers.start, self.names, loads, status))
+                loads, old = self.loads[own].reshape(-1, len(self.names)), held.get(name)
+                found[name] = Altered(change.about, numbers.start, self.names, loads, status)
+                if old is not None and (old.end, old.names) == (numbers.start, self.names):
+                    joined = np.concatenate([old.loads, loads]), np.concatenate([old.status, status])
+                    found[name] = old._replace(loads=joined[0], status=joined[1])
         return found
-
-
-def _joined(old: Altered | None, new: Altered) -> Altered:
-    if old is None or old.end != new.first or old.names != new.names:
-        return new
-    loads, status = np.concatenate([old.loads, new.loads]), np.concatenate([old.status, new.status])
-    return old._replace(loads=loads, status=status)
 
 
 def _blocks(

@@ -51,18 +51,23 @@ class Pace:
         Number of processes.
     fixed : int, optional
         Constant number of joints per block, if one was asked for.
+
+    Attributes
+    ----------
+    size : int
+        Joints of the next block, unless fewer are left.
     """
 
     def __init__(self, n_pending: int, workers: int, fixed: int | None) -> None:
         self._left = n_pending
         self._workers = workers
         self._fixed = fixed
-        self._size = fixed or default_block(n_pending, workers)
+        self.size = fixed or default_block(n_pending, workers)
 
     def take(self, available: int) -> int:
         """Return the size of the next block, and count its joints as handed out."""
-        last = max(self._left // (MIN_BLOCKS_PER_WORKER * self._workers), -(-self._size // 4))  # shorter at the end
-        size = min(available, self._fixed or min(self._size, last))
+        last = max(self._left // (MIN_BLOCKS_PER_WORKER * self._workers), -(-self.size // 4))  # shorter at the end
+        size = min(available, self._fixed or min(self.size, last))
         self._left -= size
         return size
 
@@ -70,8 +75,8 @@ class Pace:
         """Adapt the size of blocks to the time a worker took for a block and the parent took to write it."""
         target_s = writing_s * max(1 / MAX_WRITE_SHARE, self._workers / MAX_PARENT_SHARE)
         wanted = min(max(target_s, MIN_BLOCK_S), MAX_BLOCK_S) * joints / max(simulating_s, 1e-9)
-        step = min(max(wanted, 0.5 * self._size), 2.0 * self._size)  # limits the effect of one untypical block
-        self._size = max(1, min(MAX_BLOCK, round(step)))
+        step = min(max(wanted, 0.5 * self.size), 2.0 * self.size)  # limits the effect of one untypical block
+        self.size = max(1, min(MAX_BLOCK, round(step)))
 
 
 def _work(options: list[Options], *kept: Any) -> BlockWork:
@@ -101,7 +106,6 @@ def simulate_pending(
     """
     todo = sum(len(slots) for _, slots in store.pending_blocks(stop_slot))
     workers = workers or available_cores()
-    size = block or default_block(todo, workers)
     if not todo:
         return
     pace = Pace(todo, workers, block)
@@ -112,7 +116,7 @@ def simulate_pending(
 
         results = map_on_cluster(work, blocks, scheduler, workers, stop)
     else:
-        results = pool.map_blocks(work, blocks, max(1, min(workers, -(-todo // size))), stop)
+        results = pool.map_blocks(work, blocks, max(1, min(workers, -(-todo // pace.size))), stop)
     with closing(results):
         for done, result in results:
             if isinstance(result, Lost):
@@ -127,7 +131,7 @@ def simulate_pending(
 
 def simulate_beside(params: NDArray[np.void], options: Options) -> Simulation:
     """Simulate joints, (m,) table PARAM, in one worker and without histories; those that crash get no results."""
-    compile_missing(options)
+    _compile_missing(options)
     results = without_results(len(params), Status.PENDING)
     whole = Block("", np.arange(len(params)), params, options)
     with closing(pool.map_blocks(work_beside(options), [whole], 1)) as done:
@@ -152,19 +156,20 @@ def settings_in_use(study: Study, store: Reader) -> list[Options]:
     return list(dict.fromkeys([*(settings(solver, store.fidelity) for solver in study.solvers), *retried]))
 
 
-def compile_missing(options: Options, params: NDArray[np.void] | None = None) -> None:
+def _compile_missing(options: Options, params: NDArray[np.void] | None = None) -> None:
     """Compile what joints with these options need, such as `params`, unless it lies in the cache."""
     if not is_compiled(options, params):
         warm_up(options, params)
 
 
-def some_joints(study: Study, store: Reader) -> NDArray[np.void]:
-    """Return the parameters of some joints at each point: kernels that none of them needs are not compiled ahead."""
+def compile_for(study: Study, store: Reader) -> None:
+    """Compile what some joints at each point need: kernels that none of them needs are not compiled ahead."""
     first = min(store.n, READ)
     slots = np.unique(np.linspace(0, first - 1, min(first, SOME)).astype(np.intp))
     errors = store.errors(slice(0, first))[slots]
     each = [perturbed(study.at(one.point or ""), one.row(slots), errors) for one in store.each()]
-    return np.concatenate(each)
+    for options in settings_in_use(study, store):
+        _compile_missing(options, np.concatenate(each))
 
 
 def _blocks(study: Study, store: Reader, stop_slot: int, pace: Pace) -> Iterator[Block]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from functools import partial
@@ -270,7 +271,9 @@ def _copy(file: h5py.File, source: Reader) -> Iterator[tuple[int, str]]:
         held = file[place]["results/status"][there] != Status.PENDING
         for group, name in columns:
             dataset = file[place][group][name]
-            for part in _parts(own, dataset):
+            size = max(1, COPY_BYTES // max(1, dataset.dtype.itemsize * math.prod(dataset.shape[1:])))
+            for begin in range(own.start, own.stop, size):
+                part = slice(begin, min(begin + size, own.stop))
                 here = slice(part.start - own.start, part.stop - own.start)
                 target = slice(source.row(part.start), source.row(part.stop))
                 values, before = source.column(group, name, part), dataset[target]
@@ -284,13 +287,7 @@ def _copy(file: h5py.File, source: Reader) -> Iterator[tuple[int, str]]:
                 dataset[target] = before
 
 
-def _parts(rows: slice, dataset: h5py.Dataset) -> Iterator[slice]:
-    size = max(1, COPY_BYTES // max(1, dataset.dtype.itemsize * int(np.prod(dataset.shape[1:]))))
-    for first in range(rows.start, rows.stop, size):
-        yield slice(first, min(first + size, rows.stop))
-
-
 def _bytes(values: NDArray[Any]) -> NDArray[np.uint8]:
     """Bytes of each row, (m, size), so that a NaN compares equal to the same NaN."""
-    size = values.dtype.itemsize * int(np.prod(values.shape[1:]))
+    size = values.dtype.itemsize * math.prod(values.shape[1:])
     return np.ascontiguousarray(values).view(np.uint8).reshape(len(values), size)

@@ -15,14 +15,7 @@ import numpy as np
 
 from tolstat.campaign import verify
 from tolstat.campaign.block import Block
-from tolstat.campaign.blocks import (
-    Executor,
-    compile_missing,
-    settings_in_use,
-    simulate_beside,
-    simulate_pending,
-    some_joints,
-)
+from tolstat.campaign.blocks import Executor, compile_for, simulate_beside, simulate_pending
 from tolstat.campaign.extend import NOT_EXTENDABLE, OTHER_CODE, code_of
 from tolstat.campaign.pool import WorkerDied, kept_workers
 from tolstat.campaign.remedy import Retry, begin_retry
@@ -200,9 +193,7 @@ def run(
         try:
             if next(store.pending_blocks(last), None) is not None:
                 stage(stage_name())
-                examples = some_joints(study, store)
-                for options in settings_in_use(study, store):
-                    compile_missing(options, examples)
+                compile_for(study, store)
                 store.begin_session(counts.done)
             stage(JOINTS)
             finished = simulate_pending(study, store, last, workers, block, executor, scheduler, stop)

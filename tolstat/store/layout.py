@@ -216,14 +216,11 @@ def create_table(
     scale : h5py.Dataset, optional
         Dimension scale of the rows; ``row`` of the file without it, which the group then has with ``nominal``.
     """
-    group, row = holder.create_group(name), scale or holder.file["row"]
-    for link in LINKED if scale is None else ():
-        group[link] = holder.file[link]
-    if scale is not None:
-        group[scale.name.rpartition("/")[2]] = scale
-    codes = MEANINGS if codes is None else codes
+    group = holder.create_group(name)
+    for link in LINKED if scale is None else (scale.name,):
+        group[link.rpartition("/")[2]] = holder.file[link]
     for c in columns:
-        _create(group, c.name, (n,), c, row, codes, blocks is None)
+        _create(group, c.name, (n,), c, scale or holder.file["row"], codes or MEANINGS, blocks is None)
     first = 0
     for block in blocks or ():
         put(group, np.arange(first, first + len(block)), {c.name: c.of(block) for c in columns})

@@ -16,8 +16,9 @@ from tolstat.common.columns import ERROR_COLUMNS, Column
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import LOADS, limits_in_words
 from tolstat.common.shown import table
-from tolstat.common.tables import Motion, Status
+from tolstat.common.tables import Status
 from tolstat.store import recorded
+from tolstat.store.layout import MEANINGS
 from tolstat.store.reader import Reader
 from tolstat.store.view import View
 
@@ -27,11 +28,6 @@ if TYPE_CHECKING:
 
 AT_ONCE = 8192
 """Maximum number of rows of a block of `in_blocks`."""
-LABELS = {
-    "status": {status.value: status.label for status in Status},
-    "motion": {motion.value: motion.name.lower() for motion in Motion},
-}
-"""Columns that an export holds as text: label of each code."""
 OPERATING = {
     "operation.alpha": "misalignment of the shafts",
     "operation.speed": "angular velocity of the input shaft",
@@ -240,8 +236,8 @@ def _frame(store: Reader, rows: slice, nominal: bool, listed: Mapping[str, NDArr
     data |= {c.name: c.of(results) for c in store.columns}
     if store.retries:
         data["attempt"] = store.attempt(rows)
-    for name, labels in LABELS.items():
-        data[name] = np.array([labels[code] for code in data[name].tolist()], dtype=object)
+    for name in ("status", "motion"):
+        data[name] = np.array([MEANINGS[name][code] for code in data[name].tolist()], dtype=object)
     frame = pd.DataFrame(data, index=pd.RangeIndex(store.rows[rows], name="row"))
     columns = described(store)
     frame.attrs["units"] = {name: columns[name].unit if name in columns else "1" for name in data}

@@ -121,7 +121,12 @@ class Writer(Reader):
             if damaged.size:
                 one._left_out.update(damaged.tolist())
                 ledger = found.get(layout.path_of(one.point or "", "ledger", "attempt"), damaged[:0])
-                one._make_pending(*(np.flatnonzero(np.isin(block, own)) for own in (damaged, ledger)))
+                rows, again = (np.flatnonzero(np.isin(block, own)) for own in (damaged, ledger))
+                one._begin_writing(rows)
+                put(one._place("results"), rows, {"status": np.full(rows.size, Status.PENDING, np.uint8)})
+                # attempts that are damaged: again with the study's settings
+                put(one._place("ledger"), again, {"attempt": np.zeros(again.size, np.int32)})
+                one._sync()
         self._tell("pending again", "run its study to simulate these joints: tolstat run STUDY")
 
     def close(self) -> None:
@@ -270,13 +275,6 @@ class Writer(Reader):
 
     def _place(self, group: str) -> h5py.Group:
         return self._checked.file[layout.path_of(self._point(), group, "")]
-
-    def _make_pending(self, rows: NDArray[np.intp], again: NDArray[np.intp]) -> None:
-        """Mark rows as pending; `again`, whose attempts are damaged, with the study's settings."""
-        self._begin_writing(rows)
-        put(self._place("results"), rows, {"status": np.full(rows.size, Status.PENDING, np.uint8)})
-        put(self._place("ledger"), again, {"attempt": np.zeros(again.size, np.int32)})
-        self._sync()
 
     def _sync(self) -> None:
         self._checked.file.flush()

@@ -131,9 +131,10 @@ def grow(
         campaign_rows=study.rows,
         n=study.rows,
     )
-    drawn = None if origin is None else chain(_blocks(store, store.origin), origin)
-    every, fill = chain(_blocks(store, store.errors), errors), partial(_copy_results, sources=[store])
-    write_new(store.path, held, OTHER_FILE, every, origin=drawn, fill=fill, overwrite=True)
+    tables = {"errors": chain(_blocks(store, store.errors), errors)}
+    if origin is not None:
+        tables["origin"] = chain(_blocks(store, store.origin), origin)
+    write_new(store.path, held, OTHER_FILE, tables, partial(_copy_results, sources=[store]), overwrite=True)
 
 
 def merge(paths: Sequence[Path], out: Path) -> Merged:
@@ -169,11 +170,12 @@ def merge(paths: Sequence[Path], out: Path) -> Merged:
         held = stores[0].metadata.changed(stop={}, first_row=0, n=rows)
         # each file that adds rows to those of the files before it, and the first file slot that does
         shares = [(s, s.slot(end)) for s, end in zip(stores, _ends(stores), strict=False) if s.rows.stop > end]
-        design = np.concatenate([s.design()[begin:] for s, begin in shares]) if stores[0].variants else None
-        errors = (block for store, begin in shares for block in _blocks(store, store.errors, begin))
-        origin = (block for store, begin in shares for block in _blocks(store, store.origin, begin))
-        drawn = origin if columns(stores[0].sampling) else None
-        write_new(out, held, OTHER_FILE, errors, design, drawn, partial(_copy_results, sources=stores))
+        tables = {"errors": (block for store, begin in shares for block in _blocks(store, store.errors, begin))}
+        if stores[0].variants:
+            tables["design"] = (s.design()[begin:] for s, begin in shares)
+        if columns(stores[0].sampling):
+            tables["origin"] = (block for store, begin in shares for block in _blocks(store, store.origin, begin))
+        write_new(out, held, OTHER_FILE, tables, partial(_copy_results, sources=stores))
         twice = sum(len(store.rows) for store in stores) - rows
         altered, dropped = what_if.common(what_if.read(store) for store in stores)
     _keep(out, altered)

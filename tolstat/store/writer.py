@@ -24,6 +24,7 @@ from tolstat.common.tables import HistorySpec, Options, Simulation, Status
 from tolstat.store import checksums, layout, metadata
 from tolstat.store.checksums import ROWS, blocks_of
 from tolstat.store.hdf5 import copy_open, is_at, put, replace, store_error
+from tolstat.store.layout import Tables
 from tolstat.store.metadata import Metadata
 from tolstat.store.reader import Reader
 from tolstat.study import Study
@@ -78,9 +79,13 @@ class Writer(Reader):
         """
         rows = range(study.rows) if rows is None else rows
         held = metadata.of_study(study, rows, histories or {}, dimensions or {}, options, fidelity)
-        design = study.design[rows.start : rows.stop] if study.variants else None
+        tables = {"errors": errors}
+        if study.variants:
+            tables["design"] = [study.design[rows.start : rows.stop]]
+        if origin is not None:
+            tables["origin"] = origin
         exists = "resume it with its own study, or give another file: --out OTHER.h5"
-        write_new(Path(path), held, exists, errors, design, origin)
+        write_new(Path(path), held, exists, tables)
         return cls.open(path)
 
     @classmethod
@@ -311,9 +316,7 @@ def write_new(
     path: Path,
     held: Metadata,
     exists: str,
-    errors: Iterable[NDArray[np.void]],
-    design: NDArray[np.void] | None = None,
-    origin: Iterable[NDArray[np.void]] | None = None,
+    tables: Tables,
     fill: Callable[[h5py.File], None] | None = None,
     overwrite: bool = False,
 ) -> None:
@@ -327,7 +330,7 @@ def write_new(
         Its metadata.
     exists : str
         Remedy if the file exists.
-    errors, design, origin
+    tables : Tables
         See `layout.create`.
     fill : callable, optional
         Called with the file, to write results to it; their checksums are written then.
@@ -345,7 +348,7 @@ def write_new(
         make_parent(path)
         check_disk_space(path, layout.size_of(held))
         with atomic_write(path, overwrite=overwrite) as temporary, h5py.File(temporary, "w") as file:
-            layout.create(file, held, errors, design, origin)
+            layout.create(file, held, tables)
             checksums.create(file, held)
             if fill is not None:
                 fill(file)

@@ -5,14 +5,17 @@ import pytest
 from scipy.stats import expon, genpareto, norm
 
 from tolstat.analysis import extreme, pareto
+from tolstat.analysis.listed import Listed
+from tolstat.analysis.sample import Sample
 from tolstat.common.tables import Status
 
 SEEDS = 500
 LEAST = 0.95 - 3.0 * np.sqrt(0.95 * 0.05 / SEEDS)
 
 
-def fit(values, **options):
-    return extreme.fit(values, np.full(len(values), Status.OK), **options)
+def fit(values, status=None, iid=True, **options):
+    states = np.full(len(values), Status.OK) if status is None else status
+    return extreme.fit(Sample.of(values, states, None if iid else Listed()), **options)
 
 
 @pytest.mark.parametrize("k", [-0.4, 0.0, 0.3])
@@ -109,28 +112,25 @@ def test_more_joints_have_a_smaller_share_in_the_tail(n, above):
 
 
 @pytest.mark.slow
-def test_stability_follows_the_threshold():
+def test_the_shape_at_several_thresholds_tells_where_the_tail_begins():
     values = np.concatenate(
         [-(norm.rvs(size=3000, random_state=1) ** 2), genpareto.rvs(0.1, size=1000, random_state=1)]
     )
-    tails = extreme.stability(values, np.ones(4000), [0.5, 0.2, 0.05])
+    tails = [fit(values, share=share) for share in (0.5, 0.2, 0.05)]
     assert np.all(np.diff([t.threshold for t in tails]) > 0)
     assert tails[0].p < 0.05 < tails[1].p
     assert tails[1].shape.lower < 0.1 < tails[1].shape.upper
-    default = extreme.stability(values, np.ones(4000))
-    assert len(default) == 8
-    assert default[-1].n_above >= extreme.MIN_EXCESSES
 
 
 def test_a_thin_tail_is_refused_with_the_joints_needed():
     values, status = np.random.default_rng(1).normal(size=500), np.full(500, Status.OK)
     with pytest.raises(extreme.TooThinError, match="49 joints above the threshold, 50") as refusal:
-        extreme.fit(values[:499], status[:499])
+        fit(values[:499], status[:499])
     assert refusal.value.needed == 500
-    assert extreme.fit(values, status).n_above == 50
+    assert fit(values, status).n_above == 50
     status[100:] = Status.NEWTON_FAILED
     with pytest.raises(extreme.TooThinError) as refusal:
-        extreme.fit(values, status)
+        fit(values, status)
     assert refusal.value.needed == 2500
     with pytest.raises(extreme.TooThinError):
         fit(np.round(values))
@@ -138,10 +138,10 @@ def test_a_thin_tail_is_refused_with_the_joints_needed():
 
 def test_unresolved_joints_bound_a_return_load_and_alone_decide_a_rarer_one():
     values, status = np.random.default_rng(2).exponential(size=2000), np.full(2000, Status.OK)
-    complete = extreme.fit(values, status)
+    complete = fit(values, status)
     assert complete.bounds(1e-3) == (complete.level(1e-3).estimate,) * 2
     status[::400] = Status.NOT_SETTLED
-    tail = extreme.fit(values, status)
+    tail = fit(values, status)
     low, high = tail.bounds(0.01)
     assert low < tail.level(0.01).estimate < high < np.inf
     assert tail.bounds(1e-3)[1] == np.inf

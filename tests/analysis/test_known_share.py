@@ -5,7 +5,7 @@ import pytest
 from scipy import stats
 
 from tolstat.analysis import known_share, process, weighted
-from tolstat.analysis.known_share import Event, Mixture
+from tolstat.analysis.known_share import Mixture
 from tolstat.analysis.process import Draws, Known, Sums
 
 KNOWN = Known(parts=12, errors=4)
@@ -54,7 +54,7 @@ def test_with_very_many_parts_both_is_the_interval_of_the_joints():
     z, known, drawn = rng.standard_normal((2000, 3)), (Known(100_000, 3),), process.draws((100_000,))
     weights, above = rng.uniform(0.5, 2.0, 2000), z.sum(axis=1) > 2.5
     counted = np.arange(2000) % 7 > 0
-    (split,) = known_share.tallies([sums(z)], known, drawn, weights, [Event(above, counted)])
+    (split,) = known_share.tallies([sums(z)], known, drawn, weights, [(above, counted)])
     found = known_share.intervals(split, [split], [split], np.ones(1024, dtype=bool))
     one = weighted.Split.by(above[counted], weights[counted])
     lower, upper = one.interval(0.95)
@@ -65,7 +65,7 @@ def test_with_very_many_parts_both_is_the_interval_of_the_joints():
 
 def test_processes_without_support_count_at_both_ends():
     z = np.random.default_rng(5).standard_normal((500, 2))
-    event = Event(z[:, 0] > 1.0, z[:, 0] < 9.0)
+    event = (z[:, 0] > 1.0, z[:, 0] < 9.0)
     (split,) = known_share.tallies([sums(z)], (Known(30, 2),), process.draws((30,)), np.ones(500), [event])
     some = np.arange(1024) >= 10
     few = known_share.intervals(split, [split], [split], some)

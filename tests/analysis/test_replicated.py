@@ -33,7 +33,6 @@ def test_interval_covers_over_seeds_and_a_normal_one_does_not(shares):
 def test_shares_stay_between_none_and_all():
     found = replicated.interval([[0.0, 0.2], [0.02, 0.21], [0.0, 0.19]], least=0.0, most=1.0)
     assert found.lower[0] == 0.0
-    assert found.n == 3
     assert found.estimate == pytest.approx([0.02 / 3, 0.2])
     # t(0.975, 2) = 4.3027; the standard deviation is 0.01
     assert found.upper[1] == pytest.approx(0.2 + 4.3027 * 0.01 / np.sqrt(3), abs=1e-6)

@@ -5,7 +5,7 @@ import pytest
 from scipy import stats
 from scipy.stats import norm
 
-from tolstat.analysis import overrepresentation, ranks, regression, sensitivity
+from tolstat.analysis import ranks, sensitivity
 
 SEEDS = 500
 LEAST = 0.95 - 3.0 * np.sqrt(0.95 * 0.05 / SEEDS)
@@ -151,21 +151,21 @@ def test_rank_coefficients_cover_over_seeds_and_without_the_groups_number_they_d
     rho = SLOPES / np.sqrt(SLOPES @ SLOPES)
     truth = 6.0 / np.pi * np.arcsin(0.5 * rho)  # Spearman's of a normal pair; the errors are independent
     for _ in range(SEEDS):
-        found = regression.ranks(*linear(200, rng))
+        found = ranks.regression(*linear(200, rng))
         half = 0.5 * (found.upper - found.lower)
         covered.append(np.abs(found.estimate - truth) <= half)
-        narrow.append(np.abs(found.estimate - truth) <= half / np.sqrt(regression.GROUPS))
+        narrow.append(np.abs(found.estimate - truth) <= half / np.sqrt(ranks.GROUPS))
     assert np.all(np.mean(covered, axis=0) >= LEAST)
     assert np.all(np.mean(narrow, axis=0) < LEAST)
 
 
 def test_rank_coefficients_do_not_see_how_a_monotone_load_is_bent():
     x, y = linear(500, np.random.default_rng(1))
-    straight, bent = regression.ranks(x, y), regression.ranks(x, np.exp(5.0 * y))
+    straight, bent = ranks.regression(x, y), ranks.regression(x, np.exp(5.0 * y))
     assert bent.estimate == pytest.approx(straight.estimate)
     assert np.sign(bent.estimate[:3]).tolist() == [1, 1, -1]
     assert straight.r2 > 0.9
-    assert regression.ranks(x, y**2).r2 < 0.1
+    assert ranks.regression(x, y**2).r2 < 0.1
 
 
 @pytest.mark.slow
@@ -176,7 +176,7 @@ def test_probability_of_the_larger_error_covers_and_a_binomial_interval_does_not
     for _ in range(2 * SEEDS):
         z = rng.standard_normal((300, 2))
         z[above, 0] += shift
-        part = overrepresentation.tail(z, above).direction
+        part = ranks.tail(z, above).direction
         covered.append([part.lower[0] <= truth <= part.upper[0], part.lower[1] <= 0.5 <= part.upper[1]])
         half = 1.96 * np.sqrt(part.estimate[0] * (1.0 - part.estimate[0]) / 300)
         narrow.append(abs(part.estimate[0] - truth) <= half)
@@ -191,7 +191,7 @@ def test_errors_that_play_no_part_are_rarely_blamed_and_without_holm_often():
     above = np.arange(200) < 30
     least = []
     for _ in range(SEEDS):
-        found = overrepresentation.tail(rng.standard_normal((200, 20)), above)
+        found = ranks.tail(rng.standard_normal((200, 20)), above)
         least.append(min(found.direction.p.min(), found.size.p.min()))
     most = 0.05 + 3.0 * np.sqrt(0.05 * 0.95 / SEEDS)
     assert np.mean(np.array(least) < 0.05) <= most
@@ -201,7 +201,7 @@ def test_errors_that_play_no_part_are_rarely_blamed_and_without_holm_often():
 def test_direction_and_size_are_told_apart():
     rng = np.random.default_rng(3)
     z = rng.standard_normal((2000, 3))
-    found = overrepresentation.tail(z, z[:, 0] + z[:, 1] ** 2 > 3.0)
+    found = ranks.tail(z, z[:, 0] + z[:, 1] ** 2 > 3.0)
     assert found.direction.estimate[0] > 0.6
     assert found.direction.p[1] > 0.05
     assert found.size.estimate[1] > 0.8
@@ -215,9 +215,9 @@ def test_direction_and_size_are_told_apart():
         (lambda: sensitivity.first_order(np.zeros((60, 2)), np.zeros(50)), "one length"),
         (lambda: sensitivity.first_order(np.zeros((60, 2)), np.full(60, np.nan)), "valid load"),
         (lambda: sensitivity.first_order(np.eye(60), np.arange(60.0), 1.0), "confidence"),
-        (lambda: regression.ranks(np.zeros((30, 2)), np.arange(30)), "too few"),
-        (lambda: regression.ranks(np.zeros((80, 2)), np.arange(80)), "scatter"),
-        (lambda: overrepresentation.tail(np.eye(60), np.arange(60) < 3), "3 of 60 joints"),
+        (lambda: ranks.regression(np.zeros((30, 2)), np.arange(30)), "too few"),
+        (lambda: ranks.regression(np.zeros((80, 2)), np.arange(80)), "scatter"),
+        (lambda: ranks.tail(np.eye(60), np.arange(60) < 3), "3 of 60 joints"),
     ],
 )
 def test_misuse_is_refused(call, message):
@@ -239,7 +239,7 @@ def test_p_values_in_the_tail_are_those_of_mann_whitney():
     above = x[:, 0] + rng.standard_normal(200) > 1.0
     both = np.column_stack([x, np.abs(x)])
     p = stats.mannwhitneyu(both[above], both[~above], method="asymptotic").pvalue
-    found = overrepresentation.tail(x, above)
+    found = ranks.tail(x, above)
     ours = np.concatenate([found.direction.p, found.size.p])
     smallest = np.argmin(p)
     assert ours[smallest] == pytest.approx(4 * p[smallest], rel=1e-12)  # Holm's factor of the smallest
@@ -249,5 +249,5 @@ def test_p_values_in_the_tail_are_those_of_mann_whitney():
 def test_dependent_samples_have_no_interval():
     x, y = linear(300, np.random.default_rng(6))
     ends = [sensitivity.first_order(x, y, iid=False).lower, sensitivity.first_and_total(x, y, iid=False)[1].upper]
-    ends += [regression.ranks(x, y, iid=False).lower, overrepresentation.tail(x, y > 0.8, iid=False).size.upper]
+    ends += [ranks.regression(x, y, iid=False).lower, ranks.tail(x, y > 0.8, iid=False).size.upper]
     assert np.isnan(ends).all()

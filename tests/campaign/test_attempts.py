@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from tests.support import fakes
-from tolstat.campaign.blocks import Execution
 from tolstat.common.tables import Options, Simulation, Status
 from tolstat.store import ResultFile
 
@@ -38,9 +37,8 @@ def test_a_joint_whose_worker_dies_twice_when_it_is_alone_is_crashed(
     tried.mkdir()
     deadly = fakes.draw(plan)["pin1.offset_t"][5]
     simulate = partial(simulate_deadly, folder=tried, deadly=deadly, alone=alone)
-    execution = Execution("processes", workers=2, block=block)
     told: list[str] = []
-    counts = fakes.run(plan, path, simulate_rows=simulate, execution=execution, tell=told.append)
+    counts = fakes.run(plan, path, simulate_rows=simulate, workers=2, block=block, tell=told.append)
     assert counts.done == 8
     with ResultFile.open(path) as store:
         status = store.status()

@@ -19,7 +19,6 @@ import pytest
 
 from tests.campaign.test_campaign import datasets
 from tests.support import fakes
-from tolstat.campaign.blocks import Execution
 from tolstat.campaign.pool import Work, WorkerDied, never_stop
 from tolstat.common.counts import Counts
 from tolstat.common.errors import InputError
@@ -75,8 +74,8 @@ def test_a_killed_dask_worker_changes_no_byte(tmp_path: Path, cluster: Cluster) 
             cluster.workers[0].kill()
 
     slow = partial(fakes.simulate, seconds=0.02)
-    execution = Execution("dask", block=2, scheduler=cluster.address)
-    counts = fakes.run(fakes.Study(), path, check=True, simulate_rows=slow, execution=execution, progress=kill)
+    where = {"executor": "dask", "block": 2, "scheduler": cluster.address}
+    counts = fakes.run(fakes.Study(), path, check=True, simulate_rows=slow, **where, progress=kill)
     assert counts.done == 40
     assert cluster.workers[0].poll() == -signal.SIGKILL
     assert datasets(path) == reference(tmp_path / "b.h5")
@@ -87,8 +86,7 @@ def test_a_cluster_of_this_machine_finds_bad_joints(tmp_path: Path) -> None:
     study, path = fakes.Study(), tmp_path / "a.h5"
     values = fakes.draw(study)["pin1.offset_t"]
     bad = partial(fakes.simulate_badly, kills=values[17], raises=values[30])
-    execution = Execution("dask", workers=2, block=5)
-    assert fakes.run(study, path, simulate_rows=bad, execution=execution).done == 40
+    assert fakes.run(study, path, simulate_rows=bad, executor="dask", workers=2, block=5).done == 40
     with ResultFile.open(path) as store:
         assert np.flatnonzero(store.status() == Status.CRASHED).tolist() == [17, 30]
 
@@ -98,7 +96,7 @@ def test_the_first_blocks_that_fail_are_no_fault_of_the_cluster(tmp_path: Path) 
     """A block comes through before there are too many; this machine shows which joints crash."""
     study, path, bad = fakes.Study(n=12), tmp_path / "a.h5", [0, 4, 8]
     simulate = partial(simulate_or_raise, bad=fakes.draw(study)["pin1.offset_t"][bad])
-    fakes.run(study, path, simulate_rows=simulate, execution=Execution("dask", workers=1, block=3))
+    fakes.run(study, path, simulate_rows=simulate, executor="dask", workers=1, block=3)
     with ResultFile.open(path) as store:
         assert np.flatnonzero(store.status() == Status.CRASHED).tolist() == bad
 
@@ -233,10 +231,9 @@ OVER_TLS = """
 import sys
 from pathlib import Path
 from tests.support import fakes
-from tolstat.campaign.blocks import Execution
 if __name__ == "__main__":
-    execution = Execution("dask", block=10, scheduler=sys.argv[2])
-    fakes.run(fakes.Study(), Path(sys.argv[1]), check=True, execution=execution)
+    where = {"executor": "dask", "block": 10, "scheduler": sys.argv[2]}
+    fakes.run(fakes.Study(), Path(sys.argv[1]), check=True, **where)
 """
 
 

@@ -59,7 +59,7 @@ def simulate(path: Path, job: Job) -> NDArray[np.int64]:
     study, options, limits = _campaign(path)
     fresh = replace(study, sampling=study.sampling.model_copy(update={"seed": job.seed}))
     line = next(one for one in widths.lines(study) if one.label == job.line)
-    errors = sets.narrowed(fresh, line, job.step).draw(job.numbers)
+    errors = sets.narrowed(fresh, line, job.step, job.numbers).draw(job.numbers)
     results = simulate_rows(perturb(study.joint, study.operation, errors), options).results
     valid = np.isin(results["status"], VALID)
     above = np.column_stack([LOADS[name].of(results) > level for name, level in limits.items()]) & valid[:, None]

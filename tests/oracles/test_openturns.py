@@ -5,7 +5,8 @@ import pytest
 from scipy import stats
 
 from tolstat.analysis import extreme, sensitivity
-from tolstat.analysis.subset import Settings, Walk
+from tolstat.analysis.sample import Sample
+from tolstat.analysis.subset import Walk
 from tolstat.common.tables import Status
 
 ot = pytest.importorskip("openturns", reason="pip install .[oracles]")
@@ -20,7 +21,7 @@ def loads_of(shape, n, seed=5):
 
 
 def ours(loads):
-    return extreme.fit(loads, np.full(loads.size, Status.OK))
+    return extreme.fit(Sample.of(loads, np.full(loads.size, Status.OK)))
 
 
 def ends(result):
@@ -169,7 +170,7 @@ def test_subset_simulation_of_a_plane():
         result = simulation.getResult()
         p, length = result.getProbabilityEstimate(), result.getConfidenceLength(0.95)
         theirs[:, seed] = p, p - 0.5 * length, p + 0.5 * length
-        walk = Walk(Settings(n, 0.1, beta), noise_of(seed, d))
+        walk = Walk(n, 0.1, beta, noise_of(seed, d))
         while not walk.done:
             walk.take(weight * walk.next.scores.sum(axis=1))
         found[:, seed] = walk.estimate()[:3]

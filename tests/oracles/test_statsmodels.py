@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from tolstat.analysis import difference, overrepresentation
+from tolstat.analysis import difference, ranks
 from tolstat.analysis.sample import Sample
 
 pytest.importorskip("statsmodels", reason="pip install .[oracles]")
@@ -84,7 +84,7 @@ def larger(above, others):
     """Our probability that a joint above the limit has the larger error."""
     over = np.arange(len(above) + len(others)) < len(above)
     errors = np.concatenate([above, others])
-    return overrepresentation.tail(errors.reshape(len(over), -1), over).direction
+    return ranks.tail(errors.reshape(len(over), -1), over).direction
 
 
 @pytest.mark.parametrize(("m", "k"), [(10, 1000), (20, 200), (100, 900), (500, 500)])

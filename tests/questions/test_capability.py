@@ -128,8 +128,8 @@ def test_unresolved_joints_lower_the_yield():
     loads, status = np.arange(100.0), np.full(100, Status.OK)
     status[:4] = Status.NOT_SETTLED
     found = capability.capability(loads, status, 89.5)
-    assert found.good[0] == pytest.approx(1 - 10 / 96)
-    assert found.good[1] == 1 - binomial.clopper_pearson(14, 100)[1]
+    assert found.ppm[0] == pytest.approx(1e6 * 10 / 96)
+    assert found.ppm[2] == 1e6 * binomial.clopper_pearson(14, 100)[1]
     assert found.ppm[1] == pytest.approx(1e6 * binomial.clopper_pearson(10, 100)[0])
 
 
@@ -138,7 +138,7 @@ def test_dependent_samples_have_no_interval():
     assert np.isfinite([found.cpk, found.cpk_normal]).all()
     many = capability.capability(np.arange(2000.0), np.ones(2000), 2100.0, iid=False)
     assert (np.isfinite(many.cpk_normal), np.isnan(many.cpk_normal_lower)) == (True, True)
-    ends = (*found.good[1:], found.cpk_lower, found.cpk_upper, found.cpk_normal_lower, found.cpk_normal_upper)
+    ends = (*found.ppm[1:], found.cpk_lower, found.cpk_upper, found.cpk_normal_lower, found.cpk_normal_upper)
     assert np.isnan(ends).all()
 
 

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.support import naive
-from tolstat.analysis import cycles, damage
+from tolstat.analysis import cycles
 from tolstat.analysis.cycles import Cycles
 from tolstat.common.channels import BUSHING_LOADS, SHAFT_LOADS, channels_of
 from tolstat.common.load_kinds import SHAFTS
@@ -184,21 +184,21 @@ def test_equivalent_load_and_damage_of_constant_amplitude():
     wave = 50.0 * np.cos(2 * np.pi * 3 * np.arange(60) / 60) + 7.0  # three cycles of range 100
     here = of_signals(wave, np.full(60, 5.0))
     assert here.number.tolist() == [[3], [0]]
-    load = damage.equivalent_load(here, 5.0, revolutions=1e6, reference_cycles=2e6)
+    load = cycles.equivalent_load(here, 5.0, revolutions=1e6, reference_cycles=2e6)
     assert load[:, 0] == pytest.approx([100.0 * 1.5**0.2, 0.0])
-    line = damage.Line(m=4.0, S0=200.0, N0=2e6)
-    assert damage.damage(here, line, revolutions=1e6)[:, 0] == pytest.approx([3e6 / (2e6 * 2.0**4), 0.0])
+    line = cycles.Line(m=4.0, S0=200.0, N0=2e6)
+    assert cycles.damage(here, line, revolutions=1e6)[:, 0] == pytest.approx([3e6 / (2e6 * 2.0**4), 0.0])
 
 
 def test_a_duty_cycle_adds_damage_not_loads():
     parts = [of_signals(noise(seed), noise(seed + 10)) for seed in (1, 2)]
     shares = [0.3, 0.7]
     both = cycles.duty_cycle(parts, shares)
-    line = damage.Line(3.0, 4.0, 1e6)
-    separate = sum(s * damage.damage(p, line, 1e6) for s, p in zip(shares, parts, strict=True))
-    np.testing.assert_allclose(damage.damage(both, line, 1e6), separate)
-    power = sum(s * damage.equivalent_load(p, 3.0) ** 3 for s, p in zip(shares, parts, strict=True))
-    np.testing.assert_allclose(damage.equivalent_load(both, 3.0), power ** (1 / 3))
+    line = cycles.Line(3.0, 4.0, 1e6)
+    separate = sum(s * cycles.damage(p, line, 1e6) for s, p in zip(shares, parts, strict=True))
+    np.testing.assert_allclose(cycles.damage(both, line, 1e6), separate)
+    power = sum(s * cycles.equivalent_load(p, 3.0) ** 3 for s, p in zip(shares, parts, strict=True))
+    np.testing.assert_allclose(cycles.equivalent_load(both, 3.0), power ** (1 / 3))
     np.testing.assert_allclose(cycles.duty_cycle([parts[0]] * 2, [0.5, 0.5]).number, parts[0].number)
     for wrong in ([1.0], [0.5, 0.6], [0.0, 1.0]):
         with pytest.raises(ValueError, match="shares"):
@@ -230,9 +230,9 @@ def largest(signal, k):
 
 def test_what_is_not_stored_is_bounded():
     kept, others = largest(noise(), 16)
-    lost = np.sum(others**3) / damage.moment(kept, 3.0)[0, 0]
-    assert lost <= damage.truncation_bound(kept, 3.0)[0, 0] < 100 * lost
-    assert damage.truncation_bound(of_signals(noise()), 3.0)[0, 0] == 0.0
+    lost = np.sum(others**3) / cycles.moment(kept, 3.0)[0, 0]
+    assert lost <= cycles.truncation_bound(kept, 3.0)[0, 0] < 100 * lost
+    assert cycles.truncation_bound(of_signals(noise()), 3.0)[0, 0] == 0.0
 
 
 def test_what_is_not_stored_of_a_duty_cycle_is_bounded():
@@ -240,9 +240,9 @@ def test_what_is_not_stored_of_a_duty_cycle_is_bounded():
     large, others = largest(noise(), 16)
     small, _ = largest(1e-3 * noise(2, 20), 16)
     both = cycles.duty_cycle([large, small], [0.4, 0.6])
-    lost = 0.4 * np.sum(others**3) / damage.moment(both, 3.0)[0, 0]
-    assert lost <= damage.truncation_bound(both, 3.0)[0, 0] < 100 * lost
-    assert damage.truncation_bound(both, 3.0)[0, 0] == pytest.approx(damage.truncation_bound(large, 3.0)[0, 0])
+    lost = 0.4 * np.sum(others**3) / cycles.moment(both, 3.0)[0, 0]
+    assert lost <= cycles.truncation_bound(both, 3.0)[0, 0] < 100 * lost
+    assert cycles.truncation_bound(both, 3.0)[0, 0] == pytest.approx(cycles.truncation_bound(large, 3.0)[0, 0])
 
 
 def test_joints_without_results_have_no_values():
@@ -250,8 +250,8 @@ def test_joints_without_results_have_no_values():
     for table in (here.ranges, here.means, here.number):
         table[1] = np.nan
     values = [
-        damage.equivalent_load(here, 3.0),
-        damage.damage(here, damage.Line(3.0, 1.0, 1e6), 1e6),
+        cycles.equivalent_load(here, 3.0),
+        cycles.damage(here, cycles.Line(3.0, 1.0, 1e6), 1e6),
         cycles.spectrum(here, [1.0])[..., 0],
         cycles.share_of_revolution_above([noise(1), [np.nan] * 500], 0.0)[:, None],
     ]

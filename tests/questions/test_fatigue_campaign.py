@@ -15,7 +15,7 @@ import tolstat
 from tests.questions.test_fatigue import needs
 from tests.support import synthetic
 from tests.support.environment import ROOT
-from tolstat.analysis import damage
+from tolstat.analysis.cycles import Line, damage, equivalent_load, moment
 from tolstat.common.channels import CHANNELS
 from tolstat.common.errors import InputError, StoreError
 from tolstat.display.asked import Asked
@@ -49,7 +49,7 @@ exponents = [4]
 revolutions = 1e7
 line."cross*.F_[et]" = {{ m = 5, S0 = "1 kN", N0 = 2e6 }}
 """
-LINE = damage.Line(5.0, 1000.0, 2e6)
+LINE = Line(5.0, 1000.0, 2e6)
 
 
 @pytest.fixture(scope="module")
@@ -93,12 +93,12 @@ def test_the_same_cycles_from_worker_and_histories(campaign):
     assert counted.number[valid].max() >= 2
     both, _ = cycles(campaign("harmonics+cycles"))
     np.testing.assert_array_equal(both.ranges, counted.ranges)
-    load = damage.equivalent_load(counted, 4.0)[valid]
+    load = equivalent_load(counted, 4.0)[valid]
     torque = np.array([CHANNELS[name].unit != "N" for name in counted.channels])
     scale = np.where(torque, load[:, torque].max(), load[:, ~torque].max())
     for histories, tolerance in (("full", 1e-6), ("harmonics", 5e-3)):
         other, _ = cycles(campaign(histories))
-        difference = np.abs(damage.equivalent_load(other, 4.0)[valid] - load) / scale
+        difference = np.abs(equivalent_load(other, 4.0)[valid] - load) / scale
         assert difference.max() < tolerance
         if histories == "harmonics":
             assert difference.max() > 1e-6  # truncation shows: the comparison sees a difference
@@ -107,7 +107,7 @@ def test_the_same_cycles_from_worker_and_histories(campaign):
 def test_cycles_of_shafts_are_evaluated_where_they_are_asked_for(campaign, tmp_path):
     asked = ["output.moment", "input.f_x", "cross1.F_t", "output.axial"]
     found = {kind: load_cycles([campaign(kind)], names=asked) for kind in ("cycles", "full", "harmonics")}
-    whole = {kind: damage.equivalent_load(loading.cycles, 4.0) for kind, loading in found.items()}
+    whole = {kind: equivalent_load(loading.cycles, 4.0) for kind, loading in found.items()}
     valid = found["cycles"].status == tolstat.Status.OK
     assert (whole["cycles"][valid] > 0).all()
     np.testing.assert_allclose(whole["full"][valid], whole["cycles"][valid], rtol=1e-5)
@@ -124,8 +124,8 @@ def test_cycles_of_shafts_are_evaluated_where_they_are_asked_for(campaign, tmp_p
     source.write_text(text + 'line."output.moment" = { m = 5, S0 = "20 N*m", N0 = 2e6 }\n', encoding="utf-8")
     tolstat.run(tolstat.load(source), out, workers=1)
     loading = load_cycles([out])
-    line = damage.Line(5.0, 20.0, 2e6)
-    sums = damage.damage(found["cycles"].cycles.of("output.moment"), line, 1e7)[:, 0]
+    line = Line(5.0, 20.0, 2e6)
+    sums = damage(found["cycles"].cycles.of("output.moment"), line, 1e7)[:, 0]
     row = fatigue.damages(loading).set_index("channel").loc["output.moment"]
     assert row["median"] == pytest.approx(np.quantile(sums[valid], 0.5, method="inverted_cdf"))
 
@@ -143,8 +143,8 @@ def test_a_duty_cycle_of_two_campaigns(campaign):
     files = [campaign("cycles", alpha) for alpha in (15.0, 5.0)]
     both = load_cycles(files, [0.25, 0.75])
     single = [cycles(file) for file in files]
-    power = sum(s * damage.equivalent_load(c, 4.0)[1:] ** 4 for s, (c, _) in zip((0.25, 0.75), single, strict=True))
-    np.testing.assert_allclose(damage.equivalent_load(both.cycles, 4.0), power**0.25)
+    power = sum(s * equivalent_load(c, 4.0)[1:] ** 4 for s, (c, _) in zip((0.25, 0.75), single, strict=True))
+    np.testing.assert_allclose(equivalent_load(both.cycles, 4.0), power**0.25)
     assert both.status.tolist() == np.maximum(*(status[1:] for _, status in single)).tolist()
     assert both.cycles.ranges.shape[0] == 12
     assert both.nominal.ranges.shape[0] == 1
@@ -262,7 +262,7 @@ def test_pylifes_own_damage(campaign):
 
     with ResultFile.open(campaign()) as store:
         series = tolstat.pylife_series(store.view(), ["cross1.F_t"], bins=2000, revolutions=1e7, nominal=True)
-        sums = damage.damage(cycles_of(store, np.arange(store.n), ["cross1.F_t"]), LINE, 1e7)[:, 0]
+        sums = damage(cycles_of(store, np.arange(store.n), ["cross1.F_t"]), LINE, 1e7)[:, 0]
     curve = pd.Series({"k_1": LINE.m, "ND": LINE.N0, "SD": LINE.S0 / 2})  # amplitudes
     theirs = curve.fatigue.miner_elementary().damage(series.load_collective).groupby("joint").sum()
     valid = np.flatnonzero(np.isfinite(sums))
@@ -284,7 +284,7 @@ def test_command_prints_loads_and_damage(campaign, tmp_path):
     assert len(frame) == 64 * 3
     loading = load_cycles([campaign(), campaign("cycles", 5.0)], [0.5, 0.5])
     median = frame[(frame["channel"] == "fork1.F_z") & (frame["share"] == 0.5)].iloc[0]
-    values = damage.equivalent_load(loading.cycles.of("fork1.F_z"), 4.0, 1e7, 1e6)[:, 0]
+    values = equivalent_load(loading.cycles.of("fork1.F_z"), 4.0, 1e7, 1e6)[:, 0]
     ordered = np.sort(values[loading.status == tolstat.Status.OK])
     assert median["estimate"] == pytest.approx(ordered[(len(ordered) + 1) // 2 - 1])
     only = call("fatigue", campaign(), "--by", "fork*.F_z")
@@ -352,5 +352,5 @@ def test_a_slice_of_a_campaign_has_the_rows_of_the_campaign(campaign, tmp_path):
 def test_only_the_first_samples_are_read(campaign):
     whole, part = load_cycles([campaign()]), load_cycles([campaign()], samples=5)
     assert part.status.tolist() == whole.status[:5].tolist()
-    assert np.array_equal(damage.moment(part.cycles, 3.0), damage.moment(whole.cycles, 3.0)[:5], equal_nan=True)
-    assert np.array_equal(damage.moment(part.nominal, 3.0), damage.moment(whole.nominal, 3.0))
+    assert np.array_equal(moment(part.cycles, 3.0), moment(whole.cycles, 3.0)[:5], equal_nan=True)
+    assert np.array_equal(moment(part.nominal, 3.0), moment(whole.nominal, 3.0))

@@ -16,9 +16,8 @@ from tests.campaign.test_campaign import datasets
 from tests.support import fakes, synthetic
 from tolstat import sampling, study
 from tolstat.analysis import subset
-from tolstat.analysis.subset import Settings, Walk
+from tolstat.analysis.subset import Walk
 from tolstat.campaign import run as campaign
-from tolstat.campaign.blocks import Execution
 from tolstat.cli import app
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.tables import PARAM, RESULT, Simulation, Status
@@ -44,7 +43,7 @@ def walk_of(load, n, limit, seed, dimensions=6):
         stream = streams.setdefault(level, np.random.default_rng([seed, level]))
         return stream.standard_normal((count, dimensions))
 
-    walk = Walk(Settings(n, 0.1, limit), noise)
+    walk = Walk(n, 0.1, limit, noise)
     while not walk.done:
         walk.take(load(walk.next.scores))
     return walk
@@ -211,8 +210,8 @@ def test_stopped_and_gone_on_with_it_is_the_same_in_any_blocks(tmp_path, whole, 
             raise KeyboardInterrupt
         return simulate(params, options)
 
-    def in_small_blocks(*args, execution, **kwargs):
-        return RUN(*args, execution=Execution(workers=1, block=30), **kwargs)
+    def in_small_blocks(study, out, workers, block, **kwargs):
+        return RUN(study, out, 1, 30, **kwargs)
 
     monkeypatch.setattr(campaign, "run", in_small_blocks)
     fakes.replace_functions(monkeypatch, simulate_rows=stop_at_times)

@@ -9,12 +9,14 @@ from typer.testing import CliRunner
 
 from tests.sampling.test_importance import load
 from tests.support import synthetic
-from tolstat.analysis import binomial, sorting
+from tolstat.analysis import binomial
 from tolstat.cli import app
 from tolstat.common.errors import InputError, StoreError
+from tolstat.joint import nominal_errors
 from tolstat.questions.sorting import query, section
 from tolstat.report import page
 from tolstat.store import ResultFile
+from tolstat.study.sorting import Gauge
 
 ENTRY = '"pin*.offset_t" = { plus_minus = "0.1 mm", distribution = "normal", cpk = 0.4, gauge = "GAUGE" }'
 PLAN = (
@@ -30,14 +32,20 @@ def stored(tmp_path_factory):
     return synthetic.store(tmp_path_factory.mktemp("sorting"), PLAN.replace("GAUGE", "0 mm"))
 
 
+def accepted(values, lower, upper, deviation):
+    errors = nominal_errors(len(values))
+    errors["pin1.offset_t"] = values
+    return Gauge("pin1.offset_t", lower, upper, deviation).accepted(errors, None)
+
+
 def test_a_gauge_accepts_what_it_measures_inside():
     rng = np.random.default_rng(1)
     x = np.array([-0.9, 0.0, 0.7, 1.2])
     measured = x[:, None] + 0.3 * rng.standard_normal((4, 100_000))
-    found = sorting.accepted(x, -1.0, 1.0, 0.3)
+    found = accepted(x, -1.0, 1.0, 0.3)
     np.testing.assert_allclose(found, (abs(measured) < 1.0).mean(axis=1), atol=0.006)
-    np.testing.assert_array_equal(sorting.accepted(x, -1.0, 1.0, 0.0), [1.0, 1.0, 1.0, 0.0])
-    np.testing.assert_allclose(sorting.accepted(x, -np.inf, 1.0, 0.3), norm.cdf((1.0 - x) / 0.3))
+    np.testing.assert_array_equal(accepted(x, -1.0, 1.0, 0.0), [1.0, 1.0, 1.0, 0.0])
+    np.testing.assert_allclose(accepted(x, -np.inf, 1.0, 0.3), norm.cdf((1.0 - x) / 0.3))
 
 
 def test_an_exact_gauge_gives_what_counting_the_joints_that_are_kept_gives(stored):

@@ -105,7 +105,7 @@ def test_other_lines_keep_their_errors_to_the_last_bit(tmp_path):
     plan = loaded(tmp_path)
     base = sampling.draw(plan)
     for step in widths.STEPS:
-        change = sets.narrowed(plan, line(plan, "pin*.tilt_t"), step)
+        change = sets.narrowed(plan, line(plan, "pin*.tilt_t"), step, range(N))
         errors = change.draw(range(N))
         for name in errors.dtype.names:
             same = errors[name].tobytes() == base[name][plan.first_sample :].tobytes()
@@ -116,7 +116,7 @@ def test_other_lines_keep_their_errors_to_the_last_bit(tmp_path):
 def test_a_band_is_narrowed_about_its_middle(tmp_path, step, factor):
     plan = loaded(tmp_path)
     base = sampling.draw(plan)["hole2.diameter"][plan.first_sample :]
-    errors = sets.narrowed(plan, line(plan, "hole*.diameter"), step).draw(range(N))
+    errors = sets.narrowed(plan, line(plan, "hole*.diameter"), step, range(N)).draw(range(N))
     np.testing.assert_allclose(errors["hole2.diameter"], 15e-6 + factor * (base - 15e-6), rtol=0, atol=1e-18)
 
 
@@ -157,7 +157,7 @@ def test_density_of_a_rescaled_distribution(tmp_path):
 def test_exchanged_joints_have_the_line_of_their_partner(tmp_path):
     plan = loaded(tmp_path)
     base = sampling.draw(plan)[plan.first_sample :]
-    errors = sets.exchanged(plan, line(plan, "pin*.tilt_t")).draw(range(3, 9))
+    errors = sets.exchanged(plan, line(plan, "pin*.tilt_t"), range(3, 9)).draw(range(3, 9))
     np.testing.assert_allclose(errors["pin3.tilt_t"], base["pin3.tilt_t"][7:18:2], rtol=1e-12)
     np.testing.assert_allclose(errors["pin3.offset_z"], base["pin3.offset_z"][6:18:2], rtol=1e-12)
 
@@ -168,7 +168,8 @@ def test_an_unchanged_line_gives_the_joints_of_the_campaign(tmp_path):
     plan = loaded(tmp_path, TEXT.replace("n = 400", "n = 8"))
     options = plan.solver.options()
     base = simulate_rows(perturb(plan.joint, plan.operation, sampling.draw(plan)), options).results
-    again = simulate_rows(perturb(plan.joint, plan.operation, sets.as_drawn(plan).draw(range(8))), options).results
+    errors = sets.as_drawn(plan, range(8)).draw(range(8))
+    again = simulate_rows(perturb(plan.joint, plan.operation, errors), options).results
     assert base[plan.first_sample :].tobytes() == again.tobytes()
 
 
@@ -269,11 +270,11 @@ def killing(params, options, tilt, **given):
 @pytest.mark.usefixtures("quick", "in_workers")
 def test_a_joint_that_kills_its_process_has_no_results(tmp_path, monkeypatch):
     path, plan = made(tmp_path), loaded(tmp_path, TEXT)
-    params = perturb(plan.joint, plan.operation, sets.as_drawn(plan).draw(range(4)))
+    params = perturb(plan.joint, plan.operation, sets.as_drawn(plan, range(4)).draw(range(4)))
     monkeypatch.setattr(blocks, "simulate_rows", partial(killing, tilt=params["pin_axis"][2, 0, 2]))
     monkeypatch.setattr(blocks, "warm_up", fakes.warm_up)
     with Writer.open(path) as store, kept_workers():
-        options, wanted = sets.options_of(plan, store), [sets.Wanted(sets.as_drawn(plan), range(4))]
+        options, wanted = sets.options_of(plan, store), [sets.as_drawn(plan, range(4))]
         assert 0 < sets.seconds_per_joint(plan, options, 4, [""]) < 1
         asked = sets.Asked(["cross1.F"], [""])
         held = sets.simulate(plan, store, wanted, asked, 1, lambda: False, lambda counts: None)

@@ -238,7 +238,7 @@ def test_a_stationary_joint_counts_on_both_sides_of_a_limit_inside_its_interval(
     values, status = [5.0, 7.0, 9.0, 8.0], [Status.OK, Status.STATIONARY, Status.OK, Status.STATIONARY]
     ends = [5.0, 6.0, 9.0, 7.9], [5.0, 8.0, 9.0, 8.1]
     for level, least, count, most in ((5.5, 3, 3, 3), (6.5, 2, 3, 3), (7.5, 2, 2, 3), (8.0, 1, 1, 2), (8.5, 1, 1, 1)):
-        found = exceedance.exceedance(values, status, level, ends=ends)
+        found = Sample.of(values, status, ends=ends).above(level)
         assert (found.bound_lower, found.estimate, found.bound_upper) == (least / 4, count / 4, most / 4)
         row = Sample.of(values, status, Weighted(np.ones(4)), ends).above(level)
         assert (row.bound_lower, row.bound_upper) == pytest.approx((least / 4, most / 4))

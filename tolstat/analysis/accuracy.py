@@ -59,16 +59,11 @@ def loads(results: NDArray[np.void]) -> FloatArray:
 
 def sizes(results: NDArray[np.void]) -> FloatArray:
     """Reference value of each observable in each joint: the largest load of its measure, (m, loads), SI."""
-    return np.column_stack([_size(results, kind) for kind in LOAD_KINDS])[:, KIND_OF]
+    return np.column_stack([size(results, kind) for kind in LOAD_KINDS])[:, KIND_OF]
 
 
-def size(results: Results, observable: str) -> FloatArray:
-    """Reference value of one observable in each joint, (m,), SI: a column of `sizes`."""
-    return _size(results, LOADS[observable].kind)
-
-
-def _size(results: Results, kind: Kind) -> FloatArray:
-    """Reference value of the observables of a kind in each joint, (m,)."""
+def size(results: Results, kind: Kind) -> FloatArray:
+    """Reference value of the observables of a kind in each joint, (m,), SI."""
     found = _largest(of_kind(results, measure_of(kind)))
     return found if kind == measure_of(kind) or not np.isnan(found).all() else _largest(of_kind(results, kind))
 

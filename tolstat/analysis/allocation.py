@@ -20,7 +20,6 @@ FEWEST = 10
 """Minimum number of joints above each limit for a search that aims at the estimated shares."""
 REGION = 0.3
 """Minimum share of the joints that is effective, in expectation, within the search region."""
-_EDGE = 1e-9
 
 
 class Problem(NamedTuple):
@@ -154,7 +153,7 @@ def _minimise(
 
     low, high = np.log(problem.lower), np.log(problem.upper)
     settings: Any = {"method": "SLSQP", "options": {"maxiter": 60, "ftol": 1e-5, "eps": 1e-4}}
-    settings |= {"bounds": Bounds(low, np.maximum(high, low + _EDGE)), "constraints": {"type": "ineq", "fun": room}}
+    settings |= {"bounds": Bounds(low, np.maximum(high, low + 1e-9)), "constraints": {"type": "ineq", "fun": room}}
     found = minimize(what, np.clip(start, low, high), **settings)
     return np.asarray(np.clip(found.x, low, high), dtype=float)
 

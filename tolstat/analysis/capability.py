@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from tolstat.analysis import binomial, exceedance
 from tolstat.analysis.estimates import Exceedance
 from tolstat.analysis.listed import Listed
-from tolstat.analysis.sample import Ends, Sample
+from tolstat.analysis.sample import Sample
 from tolstat.common.loads import FloatArray
 from tolstat.common.shown import shown
 
@@ -69,23 +69,13 @@ class Capability:
     needed: int
 
     @property
-    def good(self) -> tuple[float, float, float]:
-        """Yield: estimate, lower and upper end, unresolved joints counted both ways (NaN for dependent samples)."""
-        return 1 - self.above.estimate, 1 - self.above.outer_upper, 1 - self.above.outer_lower
-
-    @property
     def ppm(self) -> tuple[float, float, float]:
-        """Joints above the limit in a million: estimate, lower and upper end as in `good`."""
+        """Joints above the limit in a million: estimate, lower and upper end, unresolved joints counted both ways."""
         return 1e6 * self.above.estimate, 1e6 * self.above.outer_lower, 1e6 * self.above.outer_upper
 
 
 def capability(
-    values: ArrayLike,
-    status: ArrayLike,
-    limit: float,
-    confidence: float = 0.95,
-    iid: bool = True,
-    ends: Ends | None = None,
+    values: ArrayLike, status: ArrayLike, limit: float, confidence: float = 0.95, iid: bool = True
 ) -> Capability:
     """Capability of one load.
 
@@ -99,8 +89,6 @@ def capability(
         Confidence level of the intervals.
     iid : bool
         Whether the joints are independent samples; the intervals are NaN when they are not.
-    ends : tuple of array_like, shape (n,), optional
-        Interval of each load, see `exceedance.exceedance`.
 
     Returns
     -------
@@ -120,7 +108,7 @@ def capability(
     >>> round(found.cpk_normal, 1), found.above.count, found.needed
     (1.3, 0, 3244)
     """
-    return of_sample(Sample.of(values, status, None if iid else Listed(), ends), limit, confidence)
+    return of_sample(Sample.of(values, status, None if iid else Listed()), limit, confidence)
 
 
 def of_sample(sample: Sample, limit: float, confidence: float = 0.95) -> Capability:

@@ -16,7 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 from tolstat.analysis import prediction
 from tolstat.analysis.binomial import clopper_pearson, half_width, log_beta_binomial
 from tolstat.analysis.column import Column
-from tolstat.analysis.design import Design, Shares, counts_by_group
+from tolstat.analysis.design import Design, counts_by_group, or_independent
+from tolstat.analysis.estimates import Estimate
 from tolstat.common.loads import FloatArray
 
 LEAST = 30
@@ -43,15 +44,12 @@ class LotShares(NamedTuple):
     correlation : ndarray, shape (...)
         Correlation of two joints of a lot, both above or not: 0 if lots do not differ, 1 if they are all good or all
         bad (intraclass correlation, from the analysis of variance). It may be slightly negative.
-    n : int
-        Lots.
     """
 
     estimate: FloatArray
     lower: FloatArray
     upper: FloatArray
     correlation: FloatArray
-    n: int
 
 
 def interval(above: ArrayLike, joints: ArrayLike, confidence: float = 0.95) -> LotShares:
@@ -100,7 +98,7 @@ def interval(above: ArrayLike, joints: ArrayLike, confidence: float = 0.95) -> L
         correlation = (outside - inside) / (outside + (size - 1.0) * inside)
     if lots < LEAST:
         lower, upper = np.full_like(p, np.nan), np.full_like(p, np.nan)
-    return LotShares(p, lower, upper, correlation, lots)
+    return LotShares(p, lower, upper, correlation)
 
 
 def _credible(k: FloatArray, n: FloatArray, confidence: float) -> tuple[FloatArray, FloatArray]:
@@ -161,13 +159,14 @@ class Clustered(Design):
     def __init__(self, lots: NDArray[np.intp]) -> None:
         self.numbers, self._lots = np.unique(lots, return_inverse=True)
 
-    def shares(self, x: Column, levels: FloatArray, confidence: float) -> Shares:
+    def shares(self, x: Column, levels: FloatArray, confidence: float) -> Estimate[FloatArray]:
         """See `Design.shares`: `interval` over the lots; none for fewer than `LEAST` lots."""
         above, joints = self.counts(x, levels)
         above, joints = above[joints > 0], joints[joints > 0]
         if not joints.size:
-            return Shares.counted(x, levels)
-        return Shares(*interval(above, joints, confidence)[:3]).with_independent(x, levels, confidence)
+            return super().shares(x, levels, confidence)
+        found = Estimate(*interval(above, joints, confidence)[:3])
+        return or_independent(found, x, levels, confidence)
 
     def counts(self, x: Column, levels: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Joints above each level, (lots, m), and joints that count, (lots,), of each lot of `numbers`."""

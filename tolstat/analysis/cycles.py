@@ -1,8 +1,11 @@
-"""Which cycles does a load go through in a revolution? Mixtures, spectra, and the time above a level.
+"""Which cycles does a load go through in a revolution? Mixtures, spectra, fatigue damage, and the time above a level.
 
 Cycles are those of one periodic revolution: all numbers are per revolution. `exceedance` and `quantile` evaluate the
 distribution of these values over the *joints*; `share_of_revolution_above` gives the share of a *revolution* during
 which a load is above a level.
+
+S is a range, twice an amplitude. S–N lines have no knee and no endurance limit (Miner's rule in its elementary form);
+there is no mean-load correction.
 """
 
 from __future__ import annotations
@@ -162,3 +165,65 @@ def share_of_revolution_above(loads: ArrayLike, level: float) -> FloatArray:
     share: FloatArray = np.clip(part, 0.0, 1.0).mean(axis=1)
     share[np.isnan(x).any(axis=1)] = np.nan
     return share
+
+
+class Line(NamedTuple):
+    """S–N line N = N0 (S / S0)^-m.
+
+    Attributes
+    ----------
+    m : float
+        Wöhler exponent.
+    S0 : float
+        Range with a life of `N0` cycles, N or N m.
+    N0 : float
+        Cycles to failure at `S0`.
+    """
+
+    m: float
+    S0: float
+    N0: float
+
+
+def moment(cycles: Cycles, m: float) -> FloatArray:
+    """Sum of S^m over the cycles of a revolution, shape (n, channels); NaN for joints without results."""
+    sums = np.empty(cycles.number.shape)
+    for c in range(len(cycles.channels)):
+        sums[:, c] = cycles.ranges[:, c].astype(float) ** m @ cycles.repeats
+    return sums
+
+
+def equivalent_load(cycles: Cycles, m: float, revolutions: float = 1.0, reference_cycles: float = 1.0) -> FloatArray:
+    """Damage-equivalent load: the range that causes the damage of `revolutions` in `reference_cycles` cycles.
+
+    Parameters
+    ----------
+    cycles : Cycles
+        Cycles of one revolution.
+    m : float
+        Wöhler exponent, positive.
+    revolutions, reference_cycles : float
+        Service life, and number of cycles of the equivalent range.
+
+    Returns
+    -------
+    ndarray, shape (n, channels)
+        Range, N or N m; NaN for joints without results.
+    """
+    return np.asarray((revolutions / reference_cycles * moment(cycles, m)) ** (1.0 / m))
+
+
+def damage(cycles: Cycles, line: Line, revolutions: float) -> FloatArray:
+    """Damage sum of `revolutions` (Palmgren 1924, Miner 1945), shape (n, channels); failure is expected at 1."""
+    return np.asarray(revolutions / line.N0 * moment(cycles, line.m) / line.S0**line.m)
+
+
+def truncation_bound(cycles: Cycles, m: float) -> FloatArray:
+    """Upper bound of the relative increase of `moment` by cycles that were not stored, shape (n, channels).
+
+    None of them is larger than the smallest stored cycle of its operating point.
+    """
+    some = cycles.omitted > 1e-9  # NaN for joints without results
+    with np.errstate(invalid="ignore"):
+        most = np.sum(cycles.omitted * cycles.ceiling**m, axis=2, where=some)
+        return np.asarray(np.where(some.any(axis=2), most / moment(cycles, m), 0.0))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import ClassVar, Literal, NamedTuple
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from tolstat.analysis import prediction
 from tolstat.analysis.binomial import clopper_pearson
 from tolstat.analysis.column import Column
+from tolstat.analysis.estimates import Estimate
 from tolstat.common.loads import FloatArray
 
 Claim = Literal["share", "quantile", "mean", "difference", "index", "tail", "band", "delivery", "reweighting"]
@@ -19,41 +20,6 @@ holds for a whole curve; reweighting counts the joints by other weights."""
 FEW = 20
 """Number of joints on a side of a level below which an interval over units contains that of independent joints, too."""
 SAMPLE = 'give the file of a study with sampling.method "random", "sobol" or "lhs"'
-
-
-class Shares(NamedTuple):
-    """Shares of the joints above some levels.
-
-    Attributes
-    ----------
-    estimate, lower, upper : ndarray, shape (m,)
-        Share and its pointwise interval; NaN ends where the design gives none.
-    """
-
-    estimate: FloatArray
-    lower: FloatArray
-    upper: FloatArray
-
-    @classmethod
-    def counted(cls, x: Column, levels: FloatArray) -> Shares:
-        """Make shares of joints that count equally, without an interval."""
-        none = np.full(levels.shape, np.nan)
-        return cls(_counted(x, levels), none, none)
-
-    def with_independent(self, x: Column, levels: FloatArray, confidence: float) -> Shares:
-        """Contain Clopper and Pearson's interval, too, where fewer than `FEW` joints are on a side of a level."""
-        count = x.above(levels)
-        low, high = clopper_pearson(count, x.n, confidence)
-        few = np.minimum(count, x.n - count) < FEW
-        lower = np.where(few, np.minimum(self.lower, low), self.lower)
-        return Shares(self.estimate, lower, np.where(few, np.maximum(self.upper, high), self.upper))
-
-
-class Refusal(NamedTuple):
-    """Why joints give no estimate: what is found in the file, and the remedy; ``{path}`` stands for the file."""
-
-    found: str
-    remedy: str
 
 
 class Design(ABC):
@@ -92,9 +58,8 @@ class Design(ABC):
     ranks_at_once: ClassVar[int] = 16
     innermost: ClassVar[bool] = False
 
-    @abstractmethod
-    def shares(self, x: Column, levels: FloatArray, confidence: float) -> Shares:
-        """Share of the joints above each level, (m,).
+    def shares(self, x: Column, levels: FloatArray, confidence: float) -> Estimate[FloatArray]:
+        """Share of the joints above each level and its pointwise interval, (m,) each; by default without an interval.
 
         Parameters
         ----------
@@ -105,17 +70,20 @@ class Design(ABC):
         confidence : float
             Confidence level of the intervals.
         """
+        none = np.full(levels.shape, np.nan)
+        return Estimate(self.estimate(x, levels), none, none)
 
     def estimate(self, x: Column, levels: FloatArray) -> FloatArray:
         """Share of the joints above each level, (m,), as in `shares`."""
-        return _counted(x, levels)
+        with np.errstate(invalid="ignore"):  # NaN without joints
+            return np.asarray(x.above(levels) / np.float64(x.n))
 
     @abstractmethod
     def only(self, joints: NDArray[np.intp] | NDArray[np.bool_]) -> Design:
         """Return the design of some of the joints."""
 
-    def refuses(self, claim: Claim) -> Refusal | None:
-        """Return why the joints give no estimate of a claim; None if they do."""
+    def refuses(self, claim: Claim) -> tuple[str, str] | None:
+        """Return why the joints give no estimate of a claim, and the remedy, of file ``{path}``; None if they do."""
         return None
 
     def without_interval(self, claim: Claim) -> str:
@@ -172,10 +140,15 @@ class Design(ABC):
         return prediction.of_share(float(low), float(high), number, confidence)
 
 
-def _counted(x: Column, levels: FloatArray) -> FloatArray:
-    """Joints above each level over all joints, (m,); NaN where there are none."""
-    with np.errstate(invalid="ignore"):
-        return np.asarray(x.above(levels) / np.float64(x.n))
+def or_independent(
+    found: Estimate[FloatArray], x: Column, levels: FloatArray, confidence: float
+) -> Estimate[FloatArray]:
+    """Let intervals contain Clopper and Pearson's, too, where fewer than `FEW` joints are on a side of a level."""
+    count = x.above(levels)
+    low, high = clopper_pearson(count, x.n, confidence)
+    few = np.minimum(count, x.n - count) < FEW
+    lower = np.where(few, np.minimum(found.lower, low), found.lower)
+    return Estimate(found.estimate, lower, np.where(few, np.maximum(found.upper, high), found.upper))
 
 
 def counts_by_group(x: Column, groups: NDArray[np.intp], levels: ArrayLike) -> tuple[FloatArray, FloatArray]:

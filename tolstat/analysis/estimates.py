@@ -1,13 +1,24 @@
-"""Estimates of one load: the share of the joints above a level, and the load that a share stays at or below."""
+"""Estimates: a number with its interval; of one load the share above a level, and the load that a share stays below."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import NamedTuple
+from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 
 from tolstat.common.shown import shown
+
+T = TypeVar("T")
+
+
+@shown
+class Estimate(NamedTuple, Generic[T]):
+    """A number, or an array of them, and its interval; NaN ends for dependent samples."""
+
+    estimate: T
+    lower: T
+    upper: T
 
 
 @shown

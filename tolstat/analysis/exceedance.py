@@ -2,8 +2,7 @@
 
 Two uncertainties are reported separately. *Sampling*: other joints could have been drawn; an interval covers it.
 *Unresolved joints*: a joint that failed or did not settle has no valid load; counting all of them below the level, then
-all of them above it, bounds their effect. They are never dropped silently. The largest load of a stationary joint has
-an interval; at a level inside it, that joint too counts below, then above.
+all of them above it, bounds their effect. They are never dropped silently.
 """
 
 from __future__ import annotations
@@ -13,17 +12,12 @@ from numpy.typing import ArrayLike
 
 from tolstat.analysis.estimates import Exceedance, Quantile
 from tolstat.analysis.listed import Listed
-from tolstat.analysis.sample import Ends, Sample
+from tolstat.analysis.sample import Sample
 from tolstat.analysis.weighted import Weighted
 
 
 def exceedance(
-    values: ArrayLike,
-    status: ArrayLike,
-    level: float,
-    confidence: float = 0.95,
-    iid: bool = True,
-    ends: Ends | None = None,
+    values: ArrayLike, status: ArrayLike, level: float, confidence: float = 0.95, iid: bool = True
 ) -> Exceedance:
     """Share of the joints whose load is above one level.
 
@@ -38,8 +32,6 @@ def exceedance(
     iid : bool
         Whether the joints are independent samples; the intervals are NaN when they are not (Sobol', Latin
         hypercube, sweep), since Clopper–Pearson holds for independent samples only.
-    ends : tuple of array_like, shape (n,), optional
-        Interval of each load; without it, and where an end is not finite, the load is exact.
 
     Returns
     -------
@@ -60,7 +52,7 @@ def exceedance(
     >>> found.bound_lower, found.bound_upper
     (0.25, 0.5)
     """
-    return Sample.of(values, status, None if iid else Listed(), ends).above(level, confidence)
+    return Sample.of(values, status, None if iid else Listed()).above(level, confidence)
 
 
 def quantile(

@@ -1,8 +1,8 @@
 """Extrapolation to loads rarer than any joint simulated: generalised Pareto tail above a threshold.
 
 Excesses over a high threshold are approximately generalised Pareto for nearly every distribution (Pickands 1975). The
-approximation can fail: the goodness of fit is tested, and `stability` shows whether the shape is the same at other
-thresholds. A tail with too few joints is refused, with the number of joints needed. Intervals are of profile
+approximation can fail: the goodness of fit is tested, and fits of other shares show whether the shape is the same at
+other thresholds. A tail with too few joints is refused, with the number of joints needed. Intervals are of profile
 likelihood, the share above the threshold included (Coles 2001, 4.3.3): extrapolate with them, not with the estimate. A
 tail whose shape may be -1/2 or less, such as that of a uniform load, is refused: likelihood has no interval there.
 """
@@ -11,13 +11,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from tolstat.analysis import pareto
-from tolstat.analysis.listed import Listed
+from tolstat.analysis.estimates import Estimate
 from tolstat.analysis.sample import Sample
 from tolstat.common.loads import FloatArray
 from tolstat.common.shown import shown
@@ -40,15 +38,6 @@ class TooThinError(ValueError):
         super().__init__(
             f"{found} joints above the threshold, {MIN_EXCESSES} are needed: simulate some {needed} joints"
         )
-
-
-@shown
-class Estimate(NamedTuple):
-    """A number and its interval; NaN ends for dependent samples."""
-
-    estimate: float
-    lower: float
-    upper: float
 
 
 @shown
@@ -77,8 +66,8 @@ class Tail:
     n: int
     n_unresolved: int
     n_above: int
-    shape: Estimate
-    scale: Estimate
+    shape: Estimate[float]
+    scale: Estimate[float]
     excesses: FloatArray
     region: FloatArray
     iid: bool
@@ -109,7 +98,7 @@ class Tail:
         """Share of the valid joints above the threshold."""
         return self.n_above / (self.n - self.n_unresolved)
 
-    def probability(self, level: float) -> Estimate:
+    def probability(self, level: float) -> Estimate[float]:
         """Share of the joints above a level beyond the threshold.
 
         Raises
@@ -125,7 +114,7 @@ class Tail:
         best = self.share * float(pareto.upper_share(excess, self.shape.estimate, self.scale.estimate))
         return self._between(best, values)
 
-    def level(self, share: float) -> Estimate:
+    def level(self, share: float) -> Estimate[float]:
         """Load that a share of the joints exceed: the return load of "1 in N joints" is ``level(1 / N)``.
 
         Raises
@@ -148,7 +137,7 @@ class Tail:
         low = self.level(min(ends[0], self.share)).estimate
         return low, self.level(ends[1]).estimate if ends[1] > 0 else np.inf
 
-    def largest(self, fleet: int, probability: float = 0.5) -> Estimate:
+    def largest(self, fleet: int, probability: float = 0.5) -> Estimate[float]:
         """Quantile of the largest load in a fleet of independent joints; its median by default.
 
         Raises
@@ -158,28 +147,24 @@ class Tail:
         """
         return self.level(-np.expm1(np.log(probability) / fleet))
 
-    def _between(self, best: float, values: FloatArray) -> Estimate:
+    def _between(self, best: float, values: FloatArray) -> Estimate[float]:
         if not self.iid:
             return Estimate(best, np.nan, np.nan)
         return Estimate(best, min(best, float(values.min())), max(best, float(values.max())))
 
 
-def fit(
-    values: ArrayLike, status: ArrayLike, share: float | None = None, confidence: float = 0.95, iid: bool = True
-) -> Tail:
-    """Fit a generalised Pareto tail to the loads above a threshold.
+def fit(sample: Sample, share: float | None = None, confidence: float = 0.95) -> Tail:
+    """Fit a generalised Pareto tail to the loads above a threshold, of joints that count equally.
 
     Parameters
     ----------
-    values, status : array_like, shape (n,)
-        Load and `tables.Status` of each joint; leave the nominal joint out.
+    sample : Sample
+        The loads.
     share : float, optional
         Share of the valid joints in the tail; by default the smaller of 0.1 and 3 / sqrt(n): with more joints the
         intervals shrink, so the error of the approximation must shrink too.
     confidence : float
         Confidence level of all intervals.
-    iid : bool
-        Whether the joints are independent samples; there are no intervals when they are not.
 
     Returns
     -------
@@ -191,11 +176,6 @@ def fit(
     TooThinError
         When fewer than `MIN_EXCESSES` joints are above the threshold.
     """
-    return of_sample(Sample.of(values, status, None if iid else Listed()), share, confidence)
-
-
-def of_sample(sample: Sample, share: float | None = None, confidence: float = 0.95) -> Tail:
-    """Fit a tail to the load of joints that count equally; other parameters and errors raised as in `fit`."""
     from scipy.special import gammaincinv, xlog1py, xlogy
 
     valid, lost, iid = sample.valid, sum(sample.unresolved), sample.design.has_interval("tail")
@@ -220,30 +200,6 @@ def of_sample(sample: Sample, share: float | None = None, confidence: float = 0.
     ends = [(float(v.min()), float(v.max())) if iid else (np.nan, np.nan) for v in region.T[1:]]
     shape, scale = (Estimate(value, *own) for value, own in zip(best, ends, strict=True))
     return Tail(threshold, joints, lost, m, shape, scale, excesses, region, iid)
-
-
-def stability(
-    values: ArrayLike, status: ArrayLike, shares: ArrayLike | None = None, confidence: float = 0.95, iid: bool = True
-) -> list[Tail]:
-    """Fit tails above several thresholds, ascending: k and sigma - k threshold should stay within their intervals.
-
-    Parameters
-    ----------
-    values, status, confidence, iid
-        As in `fit`.
-    shares : array_like, optional
-        Shares of the joints in the tail; by default eight from 0.3 to the least that has `MIN_EXCESSES` joints.
-
-    Raises
-    ------
-    TooThinError
-        When a share has fewer than `MIN_EXCESSES` joints.
-    """
-    sample = Sample.of(values, status, None if iid else Listed())
-    n = sample.valid.size
-    least = min(0.3, (MIN_EXCESSES + 1) / max(n, 1))
-    asked = np.geomspace(0.3, least, 8) if shares is None else np.sort(np.atleast_1d(shares))[::-1]
-    return [of_sample(sample, float(share), confidence) for share in asked]
 
 
 def _likelihood(excesses: FloatArray, reach: float) -> tuple[FloatArray, FloatArray, FloatArray]:

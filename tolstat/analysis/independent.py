@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from tolstat.analysis import prediction
 from tolstat.analysis.binomial import clopper_pearson
 from tolstat.analysis.column import Column
-from tolstat.analysis.design import Design, Shares
+from tolstat.analysis.design import Design
+from tolstat.analysis.estimates import Estimate
 from tolstat.common.loads import FloatArray
 
 
@@ -19,10 +20,9 @@ class Independent(Design):
     interval = "Clopper–Pearson's"
     covers = "bands: pointwise 95 % Clopper–Pearson intervals of the settled joints"
 
-    def shares(self, x: Column, levels: FloatArray, confidence: float) -> Shares:
+    def shares(self, x: Column, levels: FloatArray, confidence: float) -> Estimate[FloatArray]:
         """See `Design.shares`; the interval is exact (Clopper and Pearson 1934)."""
-        lower, upper = clopper_pearson(x.above(levels), x.n, confidence)
-        return Shares.counted(x, levels)._replace(lower=lower, upper=upper)
+        return Estimate(self.estimate(x, levels), *clopper_pearson(x.above(levels), x.n, confidence))
 
     def only(self, joints: NDArray[np.intp] | NDArray[np.bool_]) -> Independent:
         """See `Design.only`."""

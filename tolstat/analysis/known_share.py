@@ -29,13 +29,6 @@ STEPS = 34
 """Number of halvings of the share in which an end is searched."""
 
 
-class Event(NamedTuple):
-    """Joints that count, and those of them that are above a level; (n,) each."""
-
-    above: Mask
-    counted: Mask
-
-
 class Mixture(NamedTuple):
     """A part of the distribution that joints were drawn from.
 
@@ -99,11 +92,7 @@ def supported(n: int, drawn: Draws, known: tuple[Known, ...], mixture: Sequence[
 
 
 def tallies(
-    sums: Sequence[Sums],
-    known: Sequence[Known],
-    drawn: Draws,
-    weights: FloatArray,
-    events: Sequence[Event],
+    sums: Sequence[Sums], known: Sequence[Known], drawn: Draws, weights: FloatArray, events: Sequence[tuple[Mask, Mask]]
 ) -> list[Split]:
     """Weights above and below, of each event, for each process.
 
@@ -115,8 +104,8 @@ def tallies(
         The entries and the processes.
     weights : ndarray, (n,)
         Density of each joint under the tolerances over that which it was drawn from.
-    events : sequence of Event
-        What is counted.
+    events : sequence of pairs of ndarray of bool, (n,)
+        Joints that are above a level, and joints that count.
 
     Returns
     -------
@@ -124,7 +113,7 @@ def tallies(
         One of each event, with arrays (K,).
     """
     base = np.log(weights)
-    sides = [mask for event in events for mask in (event.above & event.counted, ~event.above & event.counted)]
+    sides = [side & counted for above, counted in events for side in (above, ~above)]
     members = np.stack(sides).astype(float)
     tables: list[list[FloatArray]] = []
     step = max(1, BLOCK // len(base))

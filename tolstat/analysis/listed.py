@@ -5,9 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.analysis.column import Column
-from tolstat.analysis.design import SAMPLE, Claim, Design, Refusal, Shares
-from tolstat.common.loads import FloatArray
+from tolstat.analysis.design import SAMPLE, Claim, Design
 
 WITHOUT_INTERVAL = {"sobol": "Sobol' points", "lhs": "a Latin hypercube"}
 """Sampling methods of a production whose joints are not independent."""
@@ -34,21 +32,17 @@ class Listed(Design):
         self._method = method
         self.is_sample = method in (*WITHOUT_INTERVAL, "random")
 
-    def shares(self, x: Column, levels: FloatArray, confidence: float) -> Shares:
-        """See `Design.shares`."""
-        return Shares.counted(x, levels)
-
     def only(self, joints: NDArray[np.intp] | NDArray[np.bool_]) -> Listed:
         """See `Design.only`."""
         return self
 
-    def refuses(self, claim: Claim) -> Refusal | None:
+    def refuses(self, claim: Claim) -> tuple[str, str] | None:
         """See `Design.refuses`."""
         if self._method == "subset":
             remedy = "print its probability: tolstat rare {path}"
-            return Refusal("holds the levels of a subset simulation, no random sample", remedy)
+            return "holds the levels of a subset simulation, no random sample", remedy
         if self._method in ("cases", "sweep"):
-            return Refusal("holds joints that are no sample of a production", SAMPLE)
+            return "holds joints that are no sample of a production", SAMPLE
         return None
 
     def without_interval(self, claim: Claim) -> str:

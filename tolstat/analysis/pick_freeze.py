@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tolstat.analysis.binomial import clopper_pearson, half_width
+from tolstat.analysis.estimates import Estimate
 from tolstat.common.loads import FloatArray
 from tolstat.common.shown import shown
 
@@ -22,21 +23,12 @@ WIDER = 1.2
 
 
 @shown
-class Index(NamedTuple):
-    """An index of each group, shape (d,), with its interval."""
-
-    estimate: FloatArray
-    lower: FloatArray
-    upper: FloatArray
-
-
-@shown
 class Indices(NamedTuple):
     """Sobol' indices.
 
     Attributes
     ----------
-    first, total : Index
+    first, total : Estimate of ndarray, shape (d,)
         Share of the load's variance that a group explains alone, and in which it takes part, interactions included.
     variance : float
         Variance of the load, in its unit squared.
@@ -44,8 +36,8 @@ class Indices(NamedTuple):
         Points with valid loads of A and B.
     """
 
-    first: Index
-    total: Index
+    first: Estimate[FloatArray]
+    total: Estimate[FloatArray]
     variance: float
     points: int
 
@@ -153,7 +145,7 @@ def _recovered(
     counts: NDArray[np.intp],
     variance: tuple[float, float, float],
     confidence: float,
-) -> Index:
+) -> Estimate[FloatArray]:
     """Weighted sum of counts, (k, d), as shares of the points, over the variance, of which both ends are given."""
     shares = cells / counts
     low, high = clopper_pearson(cells, counts, confidence)
@@ -164,10 +156,10 @@ def _recovered(
     for away, back in ((np.where(signs > 0, down, up), most), (np.where(signs > 0, up, down), least)):
         of_variance = found * (estimate / back - 1.0)
         lengths.append(np.sqrt((away**2).sum(axis=0) / estimate**2 + of_variance**2))
-    return Index(found, found - lengths[0], found + lengths[1])
+    return Estimate(found, found - lengths[0], found + lengths[1])
 
 
-def _index(terms: FloatArray, square: FloatArray, half: float) -> Index:
+def _index(terms: FloatArray, square: FloatArray, half: float) -> Estimate[FloatArray]:
     """Ratio of the mean of `terms`, (n, d), NaN where missing, to the mean of `square`, (n,), with its interval.
 
     The interval contains each ratio r for which the mean of terms - r square is within `half` standard errors of zero.
@@ -184,4 +176,4 @@ def _index(terms: FloatArray, square: FloatArray, half: float) -> Index:
     if (c <= 0).any():
         raise ValueError("few points make up the variance of the load: decompose its logarithm")
     root = np.sqrt(np.maximum(b**2 - a * c, 0.0))
-    return Index(mean / variance, (b - root) / c, (b + root) / c)
+    return Estimate(mean / variance, (b - root) / c, (b + root) / c)

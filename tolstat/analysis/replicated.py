@@ -7,36 +7,20 @@ are consecutive blocks of its joints.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tolstat.analysis.binomial import half_width
 from tolstat.analysis.column import Column
-from tolstat.analysis.design import Design, Shares, counts_by_group
+from tolstat.analysis.design import Design, counts_by_group, or_independent
+from tolstat.analysis.estimates import Estimate
 from tolstat.analysis.listed import Listed
 from tolstat.common.loads import FloatArray
 
 
-class Mean(NamedTuple):
-    """Mean of the replicates' estimates.
-
-    Attributes
-    ----------
-    estimate, lower, upper : ndarray, shape (...)
-        Mean of the replicates and its interval, in the unit of the estimates.
-    n : int
-        Replicates.
-    """
-
-    estimate: FloatArray
-    lower: FloatArray
-    upper: FloatArray
-    n: int
-
-
-def interval(estimates: ArrayLike, confidence: float = 0.95, least: float = -np.inf, most: float = np.inf) -> Mean:
+def interval(
+    estimates: ArrayLike, confidence: float = 0.95, least: float = -np.inf, most: float = np.inf
+) -> Estimate[FloatArray]:
     """Student's t interval of the expectation of an estimator, from independent replicates (Owen 2013, 17.4).
 
     The expectation is the true value for shares and means, which are unbiased. A quantile of few joints is biased, and
@@ -53,8 +37,8 @@ def interval(estimates: ArrayLike, confidence: float = 0.95, least: float = -np.
 
     Returns
     -------
-    Mean
-        Estimates and intervals.
+    Estimate of ndarray, shape (...)
+        Mean of the replicates and its interval.
 
     Raises
     ------
@@ -70,10 +54,10 @@ def interval(estimates: ArrayLike, confidence: float = 0.95, least: float = -np.
     return _students_t(values, confidence, least, most)
 
 
-def _students_t(values: FloatArray, confidence: float, least: float, most: float) -> Mean:
+def _students_t(values: FloatArray, confidence: float, least: float, most: float) -> Estimate[FloatArray]:
     n, mean = len(values), values.mean(axis=0)
     half = half_width(confidence, n - 1) * values.std(axis=0, ddof=1) / np.sqrt(n)
-    return Mean(mean, np.maximum(mean - half, least), np.minimum(mean + half, most), n)
+    return Estimate(mean, np.maximum(mean - half, least), np.minimum(mean + half, most))
 
 
 class Replicated(Design):
@@ -100,7 +84,7 @@ class Replicated(Design):
         self.interval = f"Student's t over {number} replicates"
         self.covers = f"bands: pointwise 95 % intervals of the settled joints, {self.interval}"
 
-    def shares(self, x: Column, levels: FloatArray, confidence: float) -> Shares:
+    def shares(self, x: Column, levels: FloatArray, confidence: float) -> Estimate[FloatArray]:
         """See `Design.shares`: Student's t over the shares of the replicates.
 
         It contains the share of all joints, and where few are on a side of a level (`design.FEW`) the interval of as
@@ -112,7 +96,7 @@ class Replicated(Design):
             each = _students_t(above / joints[:, None], confidence, 0.0, 1.0)
         lower = np.fmin(each.lower, np.nan_to_num(estimate, nan=0.0))
         upper = np.fmax(each.upper, np.nan_to_num(estimate, nan=1.0))
-        return Shares(estimate, lower, upper).with_independent(x, levels, confidence)
+        return or_independent(Estimate(estimate, lower, upper), x, levels, confidence)
 
     def only(self, joints: NDArray[np.intp] | NDArray[np.bool_]) -> Design:
         """See `Design.only`: parts of replicates are no replicates."""

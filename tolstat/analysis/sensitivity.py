@@ -261,13 +261,18 @@ def _checked(x: ArrayLike, y: ArrayLike) -> tuple[FloatArray, FloatArray]:
 
 
 def _fit(column: FloatArray, centred: FloatArray) -> Fit:
-    """Fit the mean of loads, (n, m), given one error.
+    """Fit the mean of loads, (n, m), given one error: continuous, linear in pieces of equally many joints.
 
     With mean m(x), deviation e and share S = Var m / Var e, the influence function of S is
     (m² + 2 m (e - m) - S e²) / Var e.
     """
     n = len(column)
-    hats = _hats(column)
+    knots = np.unique(np.quantile(column, np.linspace(0, 1, min(max(8, round(np.cbrt(n))), 32) + 1)))
+    piece = np.clip(np.searchsorted(knots, column, side="right") - 1, 0, len(knots) - 2)
+    part, rows = (column - knots[piece]) / np.diff(knots)[piece], np.arange(n)
+    hats = np.zeros((n, len(knots)))
+    hats[rows, piece], hats[rows, piece + 1] = 1.0 - part, part
+    hats = hats[:, 1:] - hats[:, 1:].mean(axis=0)
     size, axes = np.linalg.eigh(hats.T @ hats)  # well conditioned: hats overlap with neighbours only
     held = size > 1e-12 * n
     basis, degrees = axes[:, held] / np.sqrt(size[held]), int(held.sum())
@@ -278,18 +283,6 @@ def _fit(column: FloatArray, centred: FloatArray) -> Fit:
         share = 1.0 - inside / (variance * n / (n - 1))
         influence = (mean * (2.0 * centred - mean) - share * centred**2) / variance
     return Fit(mean, influence, share, _chance(share, degrees, n), degrees)
-
-
-def _hats(column: FloatArray) -> FloatArray:
-    """Basis, (n, knots - 1), of continuous piecewise linear functions, centred; as many joints a piece."""
-    n = len(column)
-    knots = np.unique(np.quantile(column, np.linspace(0, 1, min(max(8, round(np.cbrt(n))), 32) + 1)))
-    piece = np.clip(np.searchsorted(knots, column, side="right") - 1, 0, len(knots) - 2)
-    part = (column - knots[piece]) / np.diff(knots)[piece]
-    hats, rows = np.zeros((n, len(knots))), np.arange(n)
-    hats[rows, piece], hats[rows, piece + 1] = 1.0 - part, part
-    found: FloatArray = hats[:, 1:] - hats[:, 1:].mean(axis=0)
-    return found
 
 
 def _interactions(errors: FloatArray, left: FloatArray, variance: float) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -319,8 +312,7 @@ def _interactions(errors: FloatArray, left: FloatArray, variance: float) -> tupl
 
 def _chance(share: FloatArray, degrees: int, n: int) -> FloatArray:
     """Variance of an estimated share in the absence of any effect, where the influence function vanishes."""
-    found: FloatArray = 2.0 * degrees * ((1.0 - share) / n) ** 2
-    return found
+    return np.asarray(2.0 * degrees * ((1.0 - share) / n) ** 2)
 
 
 def _error(influence: FloatArray, chance: FloatArray) -> NDArray[np.float64]:

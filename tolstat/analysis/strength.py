@@ -13,8 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tolstat.analysis.binomial import clopper_pearson
-from tolstat.analysis.bounded_mean import interval
+from tolstat.analysis.binomial import clopper_pearson, mean_interval
 from tolstat.analysis.column import Mask
 from tolstat.common.loads import FloatArray
 
@@ -156,8 +155,7 @@ def damage_at(collective: Collective, line: Line, factor: float = 1.0) -> FloatA
     """Damage sum of each joint in a part whose strength is `factor` times the median, (n,); NaN without results."""
     i = (collective.knots >= factor).sum(axis=1)[:, None]
     above, below = (np.take_along_axis(sums, i, axis=1)[:, 0] for sums in (collective.above, collective.below))
-    total: FloatArray = above * factor**-line.k + below * factor**-line.k_2
-    return total
+    return np.asarray(above * factor**-line.k + below * factor**-line.k_2)
 
 
 def critical_factor(collective: Collective, line: Line, lives: float = 1.0) -> FloatArray:
@@ -216,7 +214,7 @@ def failures(
         Numbers of these.
     confidence : float
         Confidence level of the intervals: Clopper and Pearson (1934) where no strength scatters, so that the
-        probabilities are 0 or 1, else `bounded_mean.interval`.
+        probabilities are 0 or 1, else `binomial.mean_interval`.
     iid : bool
         Whether the joints are independent samples.
 
@@ -241,4 +239,4 @@ def _ends(chances: FloatArray, confidence: float) -> tuple[float, float]:
     if counts.all():
         lower, upper = clopper_pearson(chances.sum(), chances.size, confidence)
         return float(lower), float(upper)
-    return interval(chances, confidence)
+    return mean_interval(chances, confidence)

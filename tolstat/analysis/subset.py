@@ -27,7 +27,6 @@ from tolstat.analysis.binomial import clopper_pearson, half_width
 from tolstat.common.loads import FloatArray
 from tolstat.common.shown import shown
 
-Noise = Callable[[int, int, int], FloatArray]
 FIRST_STEP = 0.6
 """Step of level 1 (Papaioannou et al. 2015)."""
 ACCEPTANCE = 0.44
@@ -38,25 +37,6 @@ FAMILIES = 5
 """Seeds per degree of freedom of the variance: from its scatter, measured over seeds (docs/notes/coverage.md)."""
 LEAST = 1e-12
 """Probability below which no further level starts: normal scores reach the end of double precision not far from it."""
-
-
-@shown
-class Settings(NamedTuple):
-    """Limit, and number of joints, of a subset simulation.
-
-    Attributes
-    ----------
-    n : int
-        Joints a level.
-    p0 : float
-        Share of them that seeds the next level; ``n * p0`` is a whole number.
-    limit : float
-        Load whose exceedance is estimated, in the unit of the loads.
-    """
-
-    n: int
-    p0: float
-    limit: float
 
 
 class Candidates(NamedTuple):
@@ -144,13 +124,17 @@ class _States(NamedTuple):
 class Walk:
     """State of a subset simulation: it provides the joints to simulate next, and takes their loads.
 
-    The joints depend on the settings, the noise and the loads taken so far only. To resume a simulation, take its
+    The joints depend on these numbers, the noise and the loads taken so far only. To resume a simulation, take its
     stored loads again.
 
     Parameters
     ----------
-    settings : Settings
-        Limit, and number of joints.
+    n : int
+        Joints a level.
+    p0 : float
+        Share of them that seeds the next level; ``n * p0`` is a whole number.
+    limit : float
+        Load whose exceedance is estimated, in the unit of the loads.
     noise : callable
         (level, first, m) -> independent standard normal numbers, (m, d): rows `first` and following of the level.
 
@@ -173,7 +157,7 @@ class Walk:
     How often is the sum of four standard normal numbers above 8, four standard deviations?
 
     >>> streams = [np.random.default_rng([1, level]) for level in range(9)]
-    >>> walk = Walk(Settings(1000, 0.1, 8.0), lambda level, first, m: streams[level].standard_normal((m, 4)))
+    >>> walk = Walk(1000, 0.1, 8.0, lambda level, first, m: streams[level].standard_normal((m, 4)))
     >>> while not walk.done:
     ...     walk.take(walk.next.scores.sum(axis=1))
     >>> found = walk.estimate()
@@ -181,8 +165,8 @@ class Walk:
     (True, 5)
     """
 
-    def __init__(self, settings: Settings, noise: Noise) -> None:
-        self.settings, self._noise = settings, noise
+    def __init__(self, n: int, p0: float, limit: float, noise: Callable[[int, int, int], FloatArray]) -> None:
+        self.n, self.seeds, self.limit, self._noise = n, round(n * p0), limit, noise
         self.levels: list[Level] = []
         self.done = self.reached = False
         self._taken = self._simulated = self._accepted = 0
@@ -192,7 +176,7 @@ class Walk:
         self._sums: list[list[FloatArray]] = []
         self._variance = 0.0
         self.last, self.ancestors = np.empty(0, np.intp), 0
-        self.next = Candidates(0, noise(0, 0, settings.n), np.full(settings.n, -1))
+        self.next = Candidates(0, noise(0, 0, n), np.full(n, -1))
 
     def take(self, loads: FloatArray) -> None:
         """Take the loads of the joints `next`, (m,), in the unit of the limit, and update `next` unless `done`.
@@ -217,24 +201,22 @@ class Walk:
             loads, numbers = np.where(moved, loads, before.loads), np.where(moved, numbers, before.number)
             self._start = here = before._replace(scores=scores, loads=loads, number=numbers)
         self._parts.append(here)
-        if sum(part.loads.size for part in self._parts) == self.settings.n:
+        if sum(part.loads.size for part in self._parts) == self.n:
             self._finish_level()
         if not self.done:
             assert self._start is not None
             first = sum(part.loads.size for part in self._parts)
-            start = self._start.part(slice(self.settings.n - first))
+            start = self._start.part(slice(self.n - first))
             noise = self._noise(len(self.levels), self._simulated, start.loads.size)
             scores = math.sqrt(1.0 - self._step**2) * start.scores + self._step * noise
             self.next = Candidates(len(self.levels), scores, start.number)
 
     def _finish_level(self) -> None:
         states = _States(*map(np.concatenate, zip(*self._parts, strict=True)))
-        n, limit = self.settings.n, self.settings.limit
-        seeds = round(n * self.settings.p0)
         ordered = np.sort(states.loads)[::-1]
-        middle = 0.5 * (ordered[seeds - 1] + ordered[seeds])
+        middle = 0.5 * (ordered[self.seeds - 1] + ordered[self.seeds])
         # infinite loads (joints without a valid one) have no midpoint
-        threshold = min(limit, middle if math.isfinite(middle) else ordered[seeds])
+        threshold = min(self.limit, middle if math.isfinite(middle) else ordered[self.seeds])
         beyond = states.loads > threshold
         self.last, self.ancestors = states.number, int(np.unique(states.first[beyond]).size)
         tried = self._simulated if self.levels else 0
@@ -243,7 +225,7 @@ class Walk:
         self._add_variance(beyond, share, states.families)
         own = math.sqrt(float((self._sums[-1][0] ** 2).sum()))
         self.levels.append(Level(self._threshold, share, own, self._simulated, acceptance, self._step))
-        self.reached = threshold >= limit
+        self.reached = threshold >= self.limit
         self.done = self.reached or self.probability < LEAST or threshold <= self._threshold
         if self.done:
             return
@@ -283,12 +265,12 @@ class Walk:
         logarithm plus half its variance: the product is unbiased, so its logarithm is biased low by that much.
         """
         share = math.prod(level.share for level in self.levels if level.share)
-        freedom = max(1.0, self.settings.n * self.settings.p0 / FAMILIES)
+        freedom = max(1.0, self.seeds / FAMILIES)
         half = float(half_width(confidence, freedom)) * math.sqrt(self._variance)
         lower, upper = (min(1.0, share * math.exp(0.5 * self._variance + sign * half)) for sign in (-1, 1))
         if not self.reached:
             return Estimate(math.nan, 0.0, upper, math.nan)
         if len(self.levels) == 1:  # independent joints
-            n = self.settings.n
-            lower, upper = (float(end) for end in clopper_pearson(round(share * n), n, confidence))
+            ends = clopper_pearson(round(share * self.n), self.n, confidence)
+            lower, upper = (float(end) for end in ends)
         return Estimate(share, lower, upper, math.sqrt(self._variance))

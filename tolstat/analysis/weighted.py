@@ -18,7 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from tolstat.analysis import pareto
 from tolstat.analysis.column import Column
-from tolstat.analysis.design import Claim, Design, Refusal, Shares
+from tolstat.analysis.design import Claim, Design
+from tolstat.analysis.estimates import Estimate
 from tolstat.analysis.independent import Independent
 from tolstat.common.bisection import first
 from tolstat.common.loads import FloatArray
@@ -168,10 +169,10 @@ class Weighted(Design):
                 "tolerances alone, whatever they miss"
             )
 
-    def shares(self, x: Column, levels: FloatArray, confidence: float) -> Shares:
+    def shares(self, x: Column, levels: FloatArray, confidence: float) -> Estimate[FloatArray]:
         """See `Design.shares` and the head of this file."""
         split = self._split(x, levels)
-        return Shares(split.share, *split.interval(confidence, self._withheld))
+        return Estimate(split.share, *split.interval(confidence, self._withheld))
 
     def estimate(self, x: Column, levels: FloatArray) -> FloatArray:
         """See `Design.estimate`."""
@@ -194,12 +195,12 @@ class Weighted(Design):
         mean = float(np.average(factors, weights=self.weights))
         return Weighted(self.weights * factors / mean, self.heaviest * largest / mean)
 
-    def refuses(self, claim: Claim) -> Refusal | None:
+    def refuses(self, claim: Claim) -> tuple[str, str] | None:
         """See `Design.refuses`: only shares and quantiles take the weights into account."""
         if claim in self.claims:
             return None
         remedy = 'use tolstat report {path}, or write sampling.method = "random" in the study'
-        return Refusal("holds weighted joints (importance sampling), which this statistic does not support", remedy)
+        return "holds weighted joints (importance sampling), which this statistic does not support", remedy
 
     def counts_as(self, n: int) -> FloatArray:
         """See `Design.counts_as`."""

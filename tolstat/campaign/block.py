@@ -66,7 +66,8 @@ def simulate_block(
 ) -> Timed:
     """Simulate the joints of a block and measure the time; those whose parameters are not finite get INVALID_INPUT."""
     begin = time.perf_counter()
-    good = _finite(block.params)
+    fields = [block.params[name].reshape(len(block.params), -1) for name in PARAM.names or ()]
+    good = np.isfinite(np.concatenate(fields, axis=1)).all(axis=1)
     whole = without_simulation(len(good), Status.INVALID_INPUT, specs)
     if good.any():
         part = simulate(block.params[good], block.options, histories=histories, n_harmonics=n_harmonics)
@@ -86,10 +87,3 @@ def results_of(block: Block, result: Timed | Lost) -> NDArray[np.void]:
     if isinstance(result, Lost):
         return without_results(len(block.slots), Status.CRASHED)
     return result.simulation.results
-
-
-def _finite(params: NDArray[np.void]) -> NDArray[np.bool_]:
-    good = np.ones(len(params), bool)
-    for name in PARAM.names or ():
-        good &= np.isfinite(params[name]).reshape(len(params), -1).all(axis=1)
-    return good

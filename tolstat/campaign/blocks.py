@@ -5,22 +5,14 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Generator, Iterator
 from contextlib import closing
-from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.campaign import pool
-from tolstat.campaign.block import (
-    Block,
-    BlockWork,
-    load_kernels,
-    results_of,
-    simulate_block,
-    without_simulation,
-)
+from tolstat.campaign.block import Block, BlockWork, load_kernels, results_of, simulate_block, without_simulation
 from tolstat.campaign.pool import Lost, Work
 from tolstat.common.cores import available_cores
 from tolstat.common.solver_options import from_names
@@ -29,10 +21,10 @@ from tolstat.solver.compilation import is_compiled, warm_up
 from tolstat.solver.simulation import simulate_rows
 from tolstat.store import Reader
 from tolstat.store.recorded import perturbed, settings, variants
+from tolstat.study import Study
 
-if TYPE_CHECKING:
-    from tolstat.study import Study
-
+Executor = Literal["processes", "dask"]
+"""Worker processes on this machine, or a cluster."""
 MAX_FIRST_BLOCK, MAX_BLOCK = 256, 2048
 """Largest default number of joints in a block, before and after the time per joint is known: enough to keep the lanes
 busy, and at most 90 MB of histories."""
@@ -48,28 +40,6 @@ SOME, READ = 64, 4096
 """Number of joints that tell which kernels a campaign needs, and of the first rows that they are from."""
 
 
-@dataclass(frozen=True)
-class Execution:
-    """Where and how the joints are simulated; does not affect results.
-
-    Attributes
-    ----------
-    kind : {"processes", "dask"}
-        Worker processes on this machine, or a cluster.
-    workers : int, optional
-        Number of processes; without it the number of cores.
-    block : int, optional
-        Joints per block; without it as many as take some seconds, see `Pace`.
-    scheduler : str, optional
-        Address of a Dask scheduler, such as ``tcp://host:8786``; without it a cluster is started on this machine.
-    """
-
-    kind: Literal["processes", "dask"] = "processes"
-    workers: int | None = None
-    block: int | None = None
-    scheduler: str | None = None
-
-
 class Pace:
     """Number of joints per block: small at first, then adapted to the time that finished blocks took.
 
@@ -81,18 +51,23 @@ class Pace:
         Number of processes.
     fixed : int, optional
         Constant number of joints per block, if one was asked for.
+
+    Attributes
+    ----------
+    size : int
+        Joints of the next block, unless fewer are left.
     """
 
     def __init__(self, n_pending: int, workers: int, fixed: int | None) -> None:
         self._left = n_pending
         self._workers = workers
         self._fixed = fixed
-        self._size = fixed or default_block(n_pending, workers)
+        self.size = fixed or default_block(n_pending, workers)
 
     def take(self, available: int) -> int:
         """Return the size of the next block, and count its joints as handed out."""
-        last = max(self._left // (MIN_BLOCKS_PER_WORKER * self._workers), -(-self._size // 4))  # shorter at the end
-        size = min(available, self._fixed or min(self._size, last))
+        last = max(self._left // (MIN_BLOCKS_PER_WORKER * self._workers), -(-self.size // 4))  # shorter at the end
+        size = min(available, self._fixed or min(self.size, last))
         self._left -= size
         return size
 
@@ -100,8 +75,8 @@ class Pace:
         """Adapt the size of blocks to the time a worker took for a block and the parent took to write it."""
         target_s = writing_s * max(1 / MAX_WRITE_SHARE, self._workers / MAX_PARENT_SHARE)
         wanted = min(max(target_s, MIN_BLOCK_S), MAX_BLOCK_S) * joints / max(simulating_s, 1e-9)
-        step = min(max(wanted, 0.5 * self._size), 2.0 * self._size)  # limits the effect of one untypical block
-        self._size = max(1, min(MAX_BLOCK, round(step)))
+        step = min(max(wanted, 0.5 * self.size), 2.0 * self.size)  # limits the effect of one untypical block
+        self.size = max(1, min(MAX_BLOCK, round(step)))
 
 
 def _work(options: list[Options], *kept: Any) -> BlockWork:
@@ -110,9 +85,16 @@ def _work(options: list[Options], *kept: Any) -> BlockWork:
 
 
 def simulate_pending(
-    study: Study, store: Reader, stop_slot: int, execution: Execution, stop: Callable[[], bool]
+    study: Study,
+    store: Reader,
+    stop_slot: int,
+    workers: int | None,
+    block: int | None,
+    executor: Executor,
+    scheduler: str | None,
+    stop: Callable[[], bool],
 ) -> Generator[tuple[Block, Simulation, str], None, None]:
-    """Simulate the joints in the pending file slots below `stop_slot`, until `stop` returns true.
+    """Simulate the joints in the pending file slots below `stop_slot`, until `stop` returns true; see `run.run`.
 
     Yields each block, its simulation, and why its joint was given up, which is empty if it was not. Close the generator
     (`contextlib.closing`) when leaving it early.
@@ -123,34 +105,33 @@ def simulate_pending(
         When worker processes die whichever block they work on.
     """
     todo = sum(len(slots) for _, slots in store.pending_blocks(stop_slot))
-    workers = execution.workers or available_cores()
-    size = execution.block or default_block(todo, workers)
+    workers = workers or available_cores()
     if not todo:
         return
-    pace = Pace(todo, workers, execution.block)
+    pace = Pace(todo, workers, block)
     kept = study.output.histories, study.output.harmonics, store.history_specs
     work, blocks = _work(settings_in_use(study, store), *kept), _blocks(study, store, stop_slot, pace)
-    if execution.kind == "dask":
+    if executor == "dask":
         from tolstat.campaign.cluster import map_on_cluster
 
-        results = map_on_cluster(work, blocks, execution.scheduler, workers, stop)
+        results = map_on_cluster(work, blocks, scheduler, workers, stop)
     else:
-        results = pool.map_blocks(work, blocks, max(1, min(workers, -(-todo // size))), stop)
+        results = pool.map_blocks(work, blocks, max(1, min(workers, -(-todo // pace.size))), stop)
     with closing(results):
-        for block, result in results:
+        for done, result in results:
             if isinstance(result, Lost):
-                blank = without_simulation(len(block.slots), Status.CRASHED, store.history_specs)
-                yield block, blank, result.reason
+                blank = without_simulation(len(done.slots), Status.CRASHED, store.history_specs)
+                yield done, blank, result.reason
             else:
                 begin = time.perf_counter()
                 # the caller writes the block to the file before it asks for the next one
-                yield block, result.simulation, ""
-                pace.note(len(block.slots), result.seconds, time.perf_counter() - begin)
+                yield done, result.simulation, ""
+                pace.note(len(done.slots), result.seconds, time.perf_counter() - begin)
 
 
 def simulate_beside(params: NDArray[np.void], options: Options) -> Simulation:
     """Simulate joints, (m,) table PARAM, in one worker and without histories; those that crash get no results."""
-    compile_missing(options)
+    _compile_missing(options)
     results = without_results(len(params), Status.PENDING)
     whole = Block("", np.arange(len(params)), params, options)
     with closing(pool.map_blocks(work_beside(options), [whole], 1)) as done:
@@ -175,19 +156,20 @@ def settings_in_use(study: Study, store: Reader) -> list[Options]:
     return list(dict.fromkeys([*(settings(solver, store.fidelity) for solver in study.solvers), *retried]))
 
 
-def compile_missing(options: Options, params: NDArray[np.void] | None = None) -> None:
+def _compile_missing(options: Options, params: NDArray[np.void] | None = None) -> None:
     """Compile what joints with these options need, such as `params`, unless it lies in the cache."""
     if not is_compiled(options, params):
         warm_up(options, params)
 
 
-def some_joints(study: Study, store: Reader) -> NDArray[np.void]:
-    """Return the parameters of some joints at each point: kernels that none of them needs are not compiled ahead."""
+def compile_for(study: Study, store: Reader) -> None:
+    """Compile what some joints at each point need: kernels that none of them needs are not compiled ahead."""
     first = min(store.n, READ)
     slots = np.unique(np.linspace(0, first - 1, min(first, SOME)).astype(np.intp))
     errors = store.errors(slice(0, first))[slots]
     each = [perturbed(study.at(one.point or ""), one.row(slots), errors) for one in store.each()]
-    return np.concatenate(each)
+    for options in settings_in_use(study, store):
+        _compile_missing(options, np.concatenate(each))
 
 
 def _blocks(study: Study, store: Reader, stop_slot: int, pace: Pace) -> Iterator[Block]:

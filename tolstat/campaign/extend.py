@@ -3,30 +3,30 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from functools import partial
 from itertools import accumulate, chain
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import Any, NamedTuple
 
+import h5py
 import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.common.counts import Counts
 from tolstat.common.draw_records import columns
 from tolstat.common.errors import Fault, InputError
+from tolstat.common.tables import Status
 from tolstat.sampling import draw_blocks, origin_blocks
-from tolstat.store import Reader, Writer, what_if
-from tolstat.store.assembly import copy_results
+from tolstat.store import Reader, Writer, layout, what_if
 from tolstat.store.hdf5 import BLOCK
 from tolstat.store.provenance import differing, differing_code
 from tolstat.store.recorded import differing_keys, recall
 from tolstat.store.what_if import Altered
 from tolstat.store.writer import check_free, write_new
-
-if TYPE_CHECKING:
-    from tolstat.study import Study
+from tolstat.study import Study
 
 NOT_EXTENDABLE = {
     "lhs": "a Latin hypercube has as many strata as joints, so that more joints would change the existing ones",
@@ -35,6 +35,8 @@ NOT_EXTENDABLE = {
     "subset": "the levels of a subset simulation determine its number of joints",
 }
 """Sampling methods whose campaigns cannot be extended, and the reason."""
+COPY_BYTES = 1 << 25
+"""Approximate number of bytes of a column that are copied at a time."""
 OTHER_FILE = "give another file: --out OTHER.h5"
 """Remedy where a file exists already."""
 OTHER_CODE = "was begun by another version of the code"
@@ -104,10 +106,7 @@ def _keep(path: Path, altered: Mapping[str, Altered]) -> None:
 
 
 def grow(
-    store: Writer,
-    study: Study,
-    errors: Iterable[NDArray[np.void]],
-    origin: Iterable[NDArray[np.void]] | None = None,
+    store: Writer, study: Study, errors: Iterable[NDArray[np.void]], origin: Iterable[NDArray[np.void]] | None = None
 ) -> None:
     """Replace a result file by one with further pending rows; existing rows do not change.
 
@@ -132,9 +131,10 @@ def grow(
         campaign_rows=study.rows,
         n=study.rows,
     )
-    drawn = None if origin is None else chain(_blocks(store, store.origin), origin)
-    every, fill = chain(_blocks(store, store.errors), errors), partial(copy_results, sources=[store])
-    write_new(store.path, held, OTHER_FILE, every, origin=drawn, fill=fill, overwrite=True)
+    tables = {"errors": chain(_blocks(store, store.errors), errors)}
+    if origin is not None:
+        tables["origin"] = chain(_blocks(store, store.origin), origin)
+    write_new(store.path, held, OTHER_FILE, tables, partial(_copy_results, sources=[store]), overwrite=True)
 
 
 def merge(paths: Sequence[Path], out: Path) -> Merged:
@@ -170,11 +170,12 @@ def merge(paths: Sequence[Path], out: Path) -> Merged:
         held = stores[0].metadata.changed(stop={}, first_row=0, n=rows)
         # each file that adds rows to those of the files before it, and the first file slot that does
         shares = [(s, s.slot(end)) for s, end in zip(stores, _ends(stores), strict=False) if s.rows.stop > end]
-        design = np.concatenate([s.design()[begin:] for s, begin in shares]) if stores[0].variants else None
-        errors = (block for store, begin in shares for block in _blocks(store, store.errors, begin))
-        origin = (block for store, begin in shares for block in _blocks(store, store.origin, begin))
-        drawn = origin if columns(stores[0].sampling) else None
-        write_new(out, held, OTHER_FILE, errors, design, drawn, partial(copy_results, sources=stores))
+        tables = {"errors": (block for store, begin in shares for block in _blocks(store, store.errors, begin))}
+        if stores[0].variants:
+            tables["design"] = (s.design()[begin:] for s, begin in shares)
+        if columns(stores[0].sampling):
+            tables["origin"] = (block for store, begin in shares for block in _blocks(store, store.origin, begin))
+        write_new(out, held, OTHER_FILE, tables, partial(_copy_results, sources=stores))
         twice = sum(len(store.rows) for store in stores) - rows
         altered, dropped = what_if.common(what_if.read(store) for store in stores)
     _keep(out, altered)
@@ -239,3 +240,56 @@ def _ends(stores: Sequence[Reader]) -> list[int]:
 def _blocks(store: Reader, read: Callable[[slice], NDArray[np.void]], begin: int = 0) -> Iterator[NDArray[np.void]]:
     for first in range(begin, store.n, BLOCK):
         yield read(slice(first, first + BLOCK))
+
+
+def _copy_results(file: h5py.File, sources: Sequence[Reader]) -> None:
+    """Copy finished joints from files with rows of a campaign to the new file of the whole campaign.
+
+    For a row in several of them, a finished result takes precedence over pending.
+
+    Raises
+    ------
+    InputError
+        When two of them hold different results of one row.
+    """
+    for source in sources:
+        for one in source.each():
+            for row, column in _copy(file, one):
+                holding = [str(store.path) for store in sources if row in store.rows]
+                found = f"hold different results of row {row}: {column} differs"
+                remedy = f"find the file that is wrong, and leave it out: tolstat replay {holding[0]} --row {row}"
+                raise InputError([Fault(" and ".join(holding), found, remedy)])
+
+
+def _copy(file: h5py.File, source: Reader) -> Iterator[tuple[int, str]]:
+    """Copy finished joints; yield row and column of those that the file has already with another result."""
+    place = layout.place_of(source.point or "") or "/"
+    columns = [("ledger", "attempt"), *(("histories", name) for name in source.history_specs)]
+    columns += [("results", c.name) for c in source.columns]  # the status last: it says what a file holds
+    for first in range(0, source.n, BLOCK):
+        own = slice(first, min(first + BLOCK, source.n))
+        there = slice(source.row(own.start), source.row(own.stop))
+        done = source.status(own) != Status.PENDING
+        held = file[place]["results/status"][there] != Status.PENDING
+        for group, name in columns:
+            dataset = file[place][group][name]
+            size = max(1, COPY_BYTES // max(1, dataset.dtype.itemsize * math.prod(dataset.shape[1:])))
+            for begin in range(own.start, own.stop, size):
+                part = slice(begin, min(begin + size, own.stop))
+                here = slice(part.start - own.start, part.stop - own.start)
+                target = slice(source.row(part.start), source.row(part.stop))
+                values, before = source.column(group, name, part), dataset[target]
+                both, new = (done & held)[here], (done & ~held)[here]
+                if group == "ledger":  # also pending joints have an attempt, the one to come
+                    new = ~held[here]
+                same = (_bytes(values[both]) == _bytes(before[both])).all(axis=1)
+                if group != "ledger" and not same.all():
+                    yield int(target.start + np.flatnonzero(both)[np.argmin(same)]), name
+                before[new] = values[new]
+                dataset[target] = before
+
+
+def _bytes(values: NDArray[Any]) -> NDArray[np.uint8]:
+    """Bytes of each row, (m, size), so that a NaN compares equal to the same NaN."""
+    size = values.dtype.itemsize * math.prod(values.shape[1:])
+    return np.ascontiguousarray(values).view(np.uint8).reshape(len(values), size)

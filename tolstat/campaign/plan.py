@@ -6,7 +6,7 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,12 +28,9 @@ from tolstat.solver.compilation import stage_name, warm_up
 from tolstat.solver.simulation import history_specs, simulate_rows
 from tolstat.store import layout, metadata, worst
 from tolstat.store.recorded import perturbed, settings, variants
-from tolstat.study import swept
+from tolstat.study import Study, swept
 from tolstat.study.points import names_of
 from tolstat.study.tolerances import meaning
-
-if TYPE_CHECKING:
-    from tolstat.study import Study
 
 PILOT = 128
 """Default number of joints in the pilot: fewer would not fill the lanes as a campaign does."""
@@ -235,7 +232,9 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT, stage: Te
     stages["report"] = slower * (REPORT_S + REPORT_S_PER_JOINT * study.rows)
     iid = study.sampling.method == "random" and study.sampling.joints_per_lot == 1
     valid = slice(study.first_sample, None)
-    status = worst.together(list(results.values()))["status"]
+    status, solver = worst.together(list(results.values()))["status"], settings(study.solver, choice)
+    specs = history_specs(solver, study.output.histories, study.output.harmonics)
+    held = metadata.of_study(study, range(study.rows), specs, dimensions(), solver, choice)
     return Plan(
         rows=study.rows,
         points=list(at),
@@ -248,7 +247,7 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT, stage: Te
         workers=workers,
         stages=stages,
         process_bytes=_process_bytes(),
-        file_bytes=_file_bytes(study, settings(study.solver, choice), choice),
+        file_bytes=layout.size_of(held) + len(held.model_dump_json()),
         widths={share: _width(share, study.samples) for share in SHARES} if iid else {},
         limits=_limits(study, {name: own[valid] for name, own in results.items()}) if iid else [],
         wilks={share: binomial.wilks(share, CONFIDENCE) for share in QUANTILES},
@@ -337,12 +336,6 @@ def _limits(study: Study, results: Mapping[str, NDArray[np.void]]) -> list[Limit
         nearest_half = min(max(0.5, found.lower), found.upper)  # the interval is widest at a share of one half
         plans.append(LimitPlan(name, level, found.count, valid, _width(nearest_half, study.samples)))
     return plans
-
-
-def _file_bytes(study: Study, options: Options, choice: Mapping[str, Any]) -> int:
-    specs = history_specs(options, study.output.histories, study.output.harmonics)
-    held = metadata.of_study(study, range(study.rows), specs, dimensions(), options, choice)
-    return layout.size_of(held) + len(held.model_dump_json())
 
 
 def _process_bytes() -> int:

@@ -7,7 +7,7 @@ import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from itertools import product
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,10 +30,8 @@ from tolstat.joint.ideal import NO_CLOSED_FORM
 from tolstat.solver import fidelity
 from tolstat.solver.refinement import MIN_MAX_REVS
 from tolstat.store import Reader, Writer
+from tolstat.study import Study
 from tolstat.study.rewriting import given
-
-if TYPE_CHECKING:
-    from tolstat.study import Study
 
 MAX_REVS, MAX_STEPS = 1000, 20_000
 """Largest solver.max_revs and solver.steps_per_rev that a study may have."""
@@ -244,8 +242,11 @@ def parse_retry(statuses: str, settings: Sequence[str], study: Study) -> Retry:
     changed: dict[str, Any] = {}
     for text in settings:
         with gather(faults):
-            key, value = _setting(text)
-            changed[key] = value
+            key, equals, value = text.partition("=")
+            if not (equals and key.startswith("solver.")):
+                remedy = "write --set solver.steps_per_rev=360"
+                raise InputError([Fault("--set", f"{text!r} is not a solver setting", remedy)])
+            changed[key.strip()] = given(value)
     solver = study.solver
     with gather(faults):
         new = {key.removeprefix("solver."): value for key, value in changed.items()}
@@ -256,13 +257,6 @@ def parse_retry(statuses: str, settings: Sequence[str], study: Study) -> Retry:
         raise InputError(faults)
     chosen = tuple(labels[name] for name in dict.fromkeys(names))
     return Retry(chosen, changed, solver.options(), auto=solver.fidelity == "auto")
-
-
-def _setting(text: str) -> tuple[str, Any]:
-    key, equals, value = text.partition("=")
-    if not (equals and key.startswith("solver.")):
-        raise InputError([Fault("--set", f"{text!r} is not a solver setting", "write --set solver.steps_per_rev=360")])
-    return key.strip(), given(value)
 
 
 def begin_retry(store: Writer, retry: Retry, specs: Mapping[str, HistorySpec], tell: Callable[[str], None]) -> None:

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from tolstat.campaign.remedy import remedy
 from tolstat.common import loads
 from tolstat.common.channels import BUSHING_LOADS, SHAFT_LOADS, LoadHistory
-from tolstat.common.columns import Column
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.load_kinds import CONTACTS, PINS
 from tolstat.common.shown import shown
@@ -245,22 +244,15 @@ def replay(store: Reader, row: int) -> Replay:
     begin = time.perf_counter()
     simulation = simulate_rows(params, options, "full")
     result = CaseResult(simulation, float(params["alpha"][0]), time.perf_counter() - begin, options)
-    differences = _different_results(store.columns, stored, simulation.results)
+    differences = []
+    for c in store.columns:
+        before, now = (np.ascontiguousarray(c.of(table)) for table in (stored, simulation.results))
+        if before.tobytes() != now.tobytes():
+            differences.append(Difference(c.name, float(before[0]), float(now[0])))
     if store.history_specs:
         differences += _different_histories(store, here.start, params, options)
     changed = differing(store.versions, versions(), "in the file", "now")
     return Replay(row, result, Status(stored["status"][0]), differences, changed)
-
-
-def _different_results(
-    columns: tuple[Column, ...], stored: NDArray[np.void], now: NDArray[np.void]
-) -> list[Difference]:
-    found = []
-    for c in columns:
-        before, after = (np.ascontiguousarray(c.of(table)) for table in (stored, now))
-        if before.tobytes() != after.tobytes():
-            found.append(Difference(c.name, float(before[0]), float(after[0])))
-    return found
 
 
 def _different_histories(store: Reader, row: int, params: NDArray[np.void], options: Options) -> list[Difference]:

@@ -9,20 +9,13 @@ from collections.abc import Iterable, Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from tolstat.campaign import verify
 from tolstat.campaign.block import Block
-from tolstat.campaign.blocks import (
-    Execution,
-    compile_missing,
-    settings_in_use,
-    simulate_beside,
-    simulate_pending,
-    some_joints,
-)
+from tolstat.campaign.blocks import Executor, compile_for, simulate_beside, simulate_pending
 from tolstat.campaign.extend import NOT_EXTENDABLE, OTHER_CODE, code_of
 from tolstat.campaign.pool import WorkerDied, kept_workers
 from tolstat.campaign.remedy import Retry, begin_retry
@@ -35,12 +28,10 @@ from tolstat.solver import fidelity, rainflow
 from tolstat.solver.compilation import stage_name
 from tolstat.solver.simulation import Histories, history_specs
 from tolstat.store import Reader, Writer
+from tolstat.store.hdf5 import store_error
 from tolstat.store.provenance import differing_code
 from tolstat.store.recorded import differing_keys, perturbed, settings
-
-if TYPE_CHECKING:
-    from tolstat.study import Study
-
+from tolstat.study import Study
 
 CAUGHT = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 
@@ -133,7 +124,8 @@ def run(
     progress: Reporter | None = None,
     rows: range | None = None,
     until_row: int | None = None,
-    execution: Execution | None = None,
+    executor: Executor = "processes",
+    scheduler: str | None = None,
     retry: Retry | None = None,
     tell: Tell = note,
     check: bool = True,
@@ -150,16 +142,20 @@ def run(
     out : str or Path
         Result file; created if it does not exist. Otherwise its pending rows are simulated, and its limits, study
         text and study name are updated from `study`.
-    workers, block : int, optional
-        Shorthand for an `Execution` with these; ignored if `execution` is given.
+    workers : int, optional
+        Number of processes; without it the number of cores.
+    block : int, optional
+        Joints per block; without it as many as take some seconds, see `blocks.Pace`.
     progress : Reporter, optional
         Called with the counts at the start and after every block.
     rows : range, optional
         Rows of the campaign that the file holds, if a slice; all without it.
     until_row : int, optional
         Rows of the campaign from this one on are left pending.
-    execution : Execution, optional
-        Where and how to simulate.
+    executor : {"processes", "dask"}
+        Worker processes on this machine, or a cluster.
+    scheduler : str, optional
+        Address of a Dask scheduler, such as ``tcp://host:8786``; without it a cluster is started on this machine.
     retry : Retry, optional
         Joints that are simulated again, and how.
     tell : callable, optional
@@ -185,15 +181,10 @@ def run(
     WorkerDied
         When worker processes die whichever block they work on; the file holds all finished blocks.
     """
-    execution = execution or Execution(workers=workers, block=block)
-    _check_positive(workers=execution.workers, block=execution.block)
+    _check_positive(workers=workers, block=block)
     path = Path(out)
     stage("drawing the errors" if not path.exists() else "opening the file")
-    with (
-        signals_caught() as stop,
-        _create_or_resume(study, path, rows, tell) as store,
-        kept_workers(),
-    ):
+    with signals_caught() as stop, _create_or_resume(study, path, rows, tell) as store, kept_workers():
         if retry:
             retry = retry.chosen(store.fidelity)
             begin_retry(store, retry, history_specs(retry.options, *_history_options(study)), tell)
@@ -202,12 +193,10 @@ def run(
         try:
             if next(store.pending_blocks(last), None) is not None:
                 stage(stage_name())
-                examples = some_joints(study, store)
-                for options in settings_in_use(study, store):
-                    compile_missing(options, examples)
+                compile_for(study, store)
                 store.begin_session(counts.done)
             stage(JOINTS)
-            finished = simulate_pending(study, store, last, execution, stop)
+            finished = simulate_pending(study, store, last, workers, block, executor, scheduler, stop)
             with stop.deferred(), closing(finished):
                 counts = _write_blocks(store, finished, counts, progress, tell)
             if check:
@@ -248,7 +237,9 @@ def _write_blocks(
 
 def _create_or_resume(study: Study, path: Path, rows: range | None, tell: Tell) -> Writer:
     rows = range(study.rows) if rows is None else rows
-    _check_part(rows, study.rows)
+    if not (0 <= rows.start < rows.stop <= study.rows and rows.step == 1):
+        found = f"{rows.start}:{rows.stop} is no part of the rows 0:{study.rows} of the study"
+        raise InputError([Fault("rows", found, f"write --rows A:B with 0 <= A < B <= {study.rows}")])
     if not path.exists():
         choice = choose_fidelity(study) if study.solver.fidelity == "auto" else {}
         if choice:
@@ -268,13 +259,6 @@ def _create_or_resume(study: Study, path: Path, rows: range | None, tell: Tell) 
     return store
 
 
-def _check_part(part: range, n: int) -> None:
-    """Refuse what is not a part, without gaps, of the n rows of a study."""
-    if not (0 <= part.start < part.stop <= n and part.step == 1):
-        found = f"{part.start}:{part.stop} is no part of the rows 0:{n} of the study"
-        raise InputError([Fault("rows", found, f"write --rows A:B with 0 <= A < B <= {n}")])
-
-
 def choose_fidelity(study: Study) -> dict[str, Any]:
     """Choose the fidelity of a new campaign from a pilot of its joints, simulated as in the campaign.
 
@@ -288,16 +272,12 @@ def choose_fidelity(study: Study) -> dict[str, Any]:
     errors = np.concatenate([part for row in rows.tolist() for part in draw_blocks(study, range(row, row + 1))])
     each = [perturbed(study.at(point.name), rows, errors) for point in study.points]
     params = np.concatenate(each)  # one choice for all points
-    budget, min_steps = study.solver.error_budget, _min_steps(*_history_options(study))
+    histories, n_harmonics = _history_options(study)
+    least = [2 * n_harmonics + 1] * ("harmonics" in histories) + [rainflow.MIN_SAMPLES] * ("cycles" in histories)
+    budget, min_steps = study.solver.error_budget, max(least, default=0)  # steps from which histories can be computed
     with kept_workers():
         closed_form = not study.has_axial_force
         return fidelity.choose(params, options, budget, study.asked, simulate_beside, min_steps, closed_form).record
-
-
-def _min_steps(histories: str, n_harmonics: int) -> int:
-    """Minimum steps per revolution from which the kept histories can be computed."""
-    harmonics = 2 * n_harmonics + 1 if "harmonics" in histories else 0
-    return max(harmonics, rainflow.MIN_SAMPLES if "cycles" in histories else 0)
 
 
 def _check_same(store: Reader, study: Study, rows: range) -> None:
@@ -307,25 +287,23 @@ def _check_same(store: Reader, study: Study, rows: range) -> None:
         found, remedy = OTHER_CODE, f"run the study into another file (--out OTHER.h5), or resume with {code_of(store)}"
     differing += differing_code(store.versions)
     if len(differing) == 1 and differing[0].startswith("sampling.n:") and store.whole:
-        raise StoreError(str(_of_number(store, study.samples)))
+        raise _of_number(store, study.samples)
     if not differing and store.rows != rows:
         held, asked = (f"{r.start}:{r.stop}" for r in (store.rows, rows))
-        raise StoreError(str(Fault(str(store.path), f"holds rows {held}, not {asked}", f"give --rows {held}")))
+        raise store_error(store.path, f"holds rows {held}, not {asked}", f"give --rows {held}")
     if differing:
-        lines = "\n    ".join([found, *differing])
-        raise StoreError(str(Fault(str(store.path), lines, remedy)))
+        raise store_error(store.path, "\n    ".join([found, *differing]), remedy)
 
 
-def _of_number(store: Reader, asked: int) -> Fault:
-    """Fault of a file of this study with another number of joints."""
-    path, held = store.path, int(store.sampling["n"])
-    found = f"is the result file of this study with {held} joints, not {asked}"
-    method = store.sampling["method"]
+def _of_number(store: Reader, asked: int) -> StoreError:
+    """Error of a file of this study with another number of joints."""
+    path, held, method = store.path, int(store.sampling["n"]), store.sampling["method"]
+    remedy = f"simulate more of its joints: tolstat extend {path} --n {asked}"
     if asked < held:
-        return Fault(str(path), found, f"read it as it is: tolstat report {path}, or give another file: --out OTHER.h5")
-    if method in NOT_EXTENDABLE:
-        return Fault(str(path), found, f"give another file: --out OTHER.h5; {NOT_EXTENDABLE[method]}")
-    return Fault(str(path), found, f"simulate more of its joints: tolstat extend {path} --n {asked}")
+        remedy = f"read it as it is: tolstat report {path}, or give another file: --out OTHER.h5"
+    elif method in NOT_EXTENDABLE:
+        remedy = f"give another file: --out OTHER.h5; {NOT_EXTENDABLE[method]}"
+    return store_error(path, f"is the result file of this study with {held} joints, not {asked}", remedy)
 
 
 def _check_positive(**numbers: int | None) -> None:

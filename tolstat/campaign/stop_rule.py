@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from tolstat.analysis import exceedance, sequential
 from tolstat.campaign.pool import kept_workers
@@ -18,10 +18,8 @@ from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import Limit, load_of
 from tolstat.store import Reader, Writer, worst
 from tolstat.store.hdf5 import BLOCK
+from tolstat.study import Study
 from tolstat.study import rule as rules
-
-if TYPE_CHECKING:
-    from tolstat.study import Study
 
 CONFIDENCE = 0.95
 BIASED = f"biased high if few joints are above ({100 * sequential.BIAS:.0f} % of itself with {sequential.LEAST_BESIDE})"
@@ -124,40 +122,26 @@ def run_until(study: Study, out: Path, rule: rules.Statement, run: Callable[[int
         if not selected_results.holds(study.output.columns, load.name):
             remedy = f"add {', '.join(load.columns)}"
             raise InputError([study.fault("output.results", f"leaves out {load.name}, which --until needs", remedy)])
-    planned = sequential.looks(study.samples, _taken(out))
-    with kept_workers():
-        reached, look = _looked(study.first_sample, out, rule, planned, run)
-    outcome = Outcome(reached, look, planned)
-    with Writer.open(out) as store:
-        store.record_stop(outcome.record(rule))
-    return outcome
-
-
-def _looked(
-    first: int, out: Path, rule: rules.Statement, planned: list[int], run: Callable[[int], object]
-) -> tuple[bool, Look]:
-    """Simulate and look until the rule holds or the joints end; return whether it holds, and the last look.
-
-    `first` is the row of sample 0. Looks at which no stop is possible are not taken.
-    """
-    joints = sequential.next_look(rule.bound, planned)
-    while True:
-        run(first + joints)
+    taken: list[int] = []  # looks at the joints of the file so far
+    if out.exists():
         with Reader.open(out) as store:
-            look = _look(store, rule.limit, range(first, first + joints))
-        counts = look.above, look.n_unresolved, joints
-        reached = bool(sequential.narrow(rule.bound, *counts))
-        if reached or joints == planned[-1]:
-            return reached, look
-        joints = sequential.next_look(rule.bound, planned, *counts)
-
-
-def _taken(out: Path) -> list[int]:
-    """Looks that were taken at the joints of the file so far."""
-    if not out.exists():
-        return []
-    with Reader.open(out) as store:
-        return list(store.stop.get("looks", ()))
+            taken = store.stop.get("looks", [])
+    planned, first = sequential.looks(study.samples, taken), study.first_sample
+    joints = sequential.next_look(rule.bound, planned)  # looks without a possible stop are not taken
+    with kept_workers():
+        while True:
+            run(first + joints)
+            with Reader.open(out) as store:
+                look = _look(store, rule.limit, range(first, first + joints))
+            counts = look.above, look.n_unresolved, joints
+            reached = bool(sequential.narrow(rule.bound, *counts))
+            if reached or joints == planned[-1]:
+                break
+            joints = sequential.next_look(rule.bound, planned, *counts)
+    outcome = Outcome(reached, look, planned)
+    with Writer.open(out) as file:
+        file.record_stop(outcome.record(rule))
+    return outcome
 
 
 def _look(store: Reader, limit: Limit, rows: range) -> Look:

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,12 +22,9 @@ from tolstat.joint import perturb
 from tolstat.store import Writer, what_if
 from tolstat.store.recorded import settings
 from tolstat.store.what_if import Altered
-from tolstat.study import axes, widths
+from tolstat.study import Study, axes, widths
 from tolstat.study.points import at
 from tolstat.study.widths import Line
-
-if TYPE_CHECKING:
-    from tolstat.study import Study
 
 WIDTH, EXCHANGE, AS_DRAWN = "width", "exchange", "as drawn"
 """Kinds of sets: a line with another width; a line's errors from another joint; no change."""
@@ -40,28 +37,24 @@ SAVE_S = 60.0
 
 
 class Change(NamedTuple):
-    """A change of the tolerances, and how its joints are drawn.
+    """A change of the tolerances, and which joints are wanted of it.
 
     Attributes
     ----------
     about : dict
         See `Altered.about`.
     draw : callable
-        Range of consecutive joints -> their errors, table ERROR; numbers are those of `Altered.first`.
+        Range of consecutive joints -> their errors, table ERROR.
+    numbers : range
+        The joints; numbers are those of `Altered.first`.
     """
 
     about: Mapping[str, Any]
     draw: Callable[[range], NDArray[np.void]]
-
-
-class Wanted(NamedTuple):
-    """A change, and the joints that are wanted of it."""
-
-    change: Change
     numbers: range
 
 
-def narrowed(study: Study, line: Line, step: str) -> Change:
+def narrowed(study: Study, line: Line, step: str, numbers: range) -> Change:
     """A line with the width of a step (`widths.STEPS`); joint i is sample i of the campaign but for this line."""
     other = widths.changed(study, line, step)
     about = {
@@ -72,19 +65,19 @@ def narrowed(study: Study, line: Line, step: str) -> Change:
         "seed": study.sampling.seed,
         "tolerances": {name: own.describe() for name, own in other.items()},
     }
-    return Change(about, partial(_draw, widths.applied(study, other)))
+    return Change(about, partial(_draw, widths.applied(study, other)), numbers)
 
 
-def exchanged(study: Study, line: Line) -> Change:
+def exchanged(study: Study, line: Line, numbers: range) -> Change:
     """Joint i is sample 2i of the campaign with the line's errors of sample 2i + 1."""
     about = {"kind": EXCHANGE, "label": line.label, "seed": study.sampling.seed, "names": list(line.names)}
-    return Change(about, partial(_exchange, widths.applied(study, {}), line))
+    return Change(about, partial(_exchange, widths.applied(study, {}), line), numbers)
 
 
-def as_drawn(study: Study) -> Change:
+def as_drawn(study: Study, numbers: range) -> Change:
     """Further samples of the campaign, or samples at random of one that is not: nothing is changed."""
     about = {"kind": AS_DRAWN, "label": "no line", "seed": study.sampling.seed}
-    return Change(about, partial(_draw, widths.applied(study, {})))
+    return Change(about, partial(_draw, widths.applied(study, {})), numbers)
 
 
 class Asked(NamedTuple):
@@ -107,9 +100,9 @@ class Asked(NamedTuple):
         return tuple(at(load, [point], every) for point in self.points for load in self.loads)
 
 
-def missing(held: Mapping[str, Altered], wanted: Wanted, names: Sequence[str]) -> range:
+def missing(held: Mapping[str, Altered], wanted: Change, names: Sequence[str]) -> range:
     """Joints of a change that the file lacks; all of them if those held begin later, or lack one of the loads."""
-    own = held.get(what_if.key(wanted.change.about))
+    own = held.get(what_if.key(wanted.about))
     if own is None or own.first > wanted.numbers.start or not own.holds(names):
         return wanted.numbers
     return range(max(own.end, wanted.numbers.start), max(own.end, wanted.numbers.stop))
@@ -122,7 +115,7 @@ def options_of(study: Study, store: Writer) -> Options:
 
 def seconds_per_joint(study: Study, options: Options, joints: int, points: Sequence[str]) -> float:
     """Time of a joint at all these points in one process, s, from the first samples; kernels must be ready."""
-    pilot = list(_blocks(study, options, [(as_drawn(study), range(joints))], points))
+    pilot = list(_blocks(study, options, [as_drawn(study, range(joints))], points))
     with closing(pool.map_blocks(work_beside(Options()), pilot, 1)) as done:
         spent = sum(result.seconds for _, result in done if isinstance(result, Timed))
     return (spent or SLOW_S * joints) / joints
@@ -131,7 +124,7 @@ def seconds_per_joint(study: Study, options: Options, joints: int, points: Seque
 def simulate(
     study: Study,
     store: Writer,
-    wanted: Sequence[Wanted],
+    wanted: Sequence[Change],
     asked: Asked,
     workers: int,
     stop: Callable[[], bool],
@@ -145,8 +138,8 @@ def simulate(
         The study of the campaign.
     store : Writer
         Its file.
-    wanted : sequence of Wanted
-        Changes and joints, in the order in which they are simulated.
+    wanted : sequence of Change
+        Changes with their joints, in the order in which they are simulated.
     asked : Asked
         Loads that are kept, and operating points.
     workers : int
@@ -163,7 +156,7 @@ def simulate(
     """
     held = what_if.read(store)
     names = asked.names(study)
-    todo = [(one.change, numbers) for one in wanted if (numbers := missing(held, one, names))]
+    todo = [one._replace(numbers=own) for one in wanted if (own := missing(held, one, names))]
     table = _Table(todo, asked, names)
     every = _blocks(study, options_of(study, store), todo, asked.points)
     done = pool.map_blocks(work_beside(Options()), every, workers, stop)
@@ -187,9 +180,9 @@ def simulate(
 class _Table:
     """Loads, (n, points, k), and status, (n, points), of all joints to do, one set after the other."""
 
-    def __init__(self, todo: Sequence[tuple[Change, range]], asked: Asked, names: tuple[str, ...]) -> None:
+    def __init__(self, todo: Sequence[Change], asked: Asked, names: tuple[str, ...]) -> None:
         self.todo, self.asked, self.names = todo, asked, names
-        n = sum(len(numbers) for _, numbers in todo)
+        n = sum(len(change.numbers) for change in todo)
         self.loads = np.full((n, len(asked.points), len(asked.loads)), np.nan)
         self.status = np.full((n, len(asked.points)), Status.PENDING, np.uint8)
 
@@ -203,34 +196,28 @@ class _Table:
     def sets(self, held: Mapping[str, Altered]) -> dict[str, Altered]:
         """Sets that have grown: of each, the joints before the first that is not done, behind those held."""
         found, begin = {}, 0
-        for change, numbers in self.todo:
+        for about, _, numbers in self.todo:
             here = slice(begin, begin + len(numbers))
             begin = here.stop
             waiting = np.flatnonzero((self.status[here] == Status.PENDING).any(axis=1))
             own = slice(here.start, here.start + int(waiting[0]) if waiting.size else here.stop)
             if own.stop > own.start:
-                name, states = what_if.key(change.about), list(self.status[own].T)
+                name, states = what_if.key(about), list(self.status[own].T)
                 status = worst_status(states)
-                loads = self.loads[own].reshape(-1, len(self.names))
-                found[name] = _joined(held.get(name), Altered(change.about, numbers.start, self.names, loads, status))
+                loads, old = self.loads[own].reshape(-1, len(self.names)), held.get(name)
+                found[name] = Altered(about, numbers.start, self.names, loads, status)
+                if old is not None and (old.end, old.names) == (numbers.start, self.names):
+                    joined = np.concatenate([old.loads, loads]), np.concatenate([old.status, status])
+                    found[name] = old._replace(loads=joined[0], status=joined[1])
         return found
 
 
-def _joined(old: Altered | None, new: Altered) -> Altered:
-    if old is None or old.end != new.first or old.names != new.names:
-        return new
-    loads, status = np.concatenate([old.loads, new.loads]), np.concatenate([old.status, new.status])
-    return old._replace(loads=loads, status=status)
-
-
-def _blocks(
-    study: Study, options: Options, todo: Sequence[tuple[Change, range]], points: Sequence[str]
-) -> Iterator[Block]:
+def _blocks(study: Study, options: Options, todo: Sequence[Change], points: Sequence[str]) -> Iterator[Block]:
     operations, begin = {point: study.at(point).operation for point in points}, 0
-    for change, numbers in todo:
+    for _, draw, numbers in todo:
         for first in range(0, len(numbers), BLOCK):
             own = numbers[first : first + BLOCK]
-            slots, errors = np.arange(begin + first, begin + first + len(own)), change.draw(own)
+            slots, errors = np.arange(begin + first, begin + first + len(own)), draw(own)
             for point, operation in operations.items():
                 yield Block(point, slots, perturb(study.joint, operation, errors), options)
         begin += len(numbers)

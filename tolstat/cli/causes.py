@@ -185,14 +185,13 @@ def _run_lines(path: Path, by: str | None, each: Each, groups: list[str], budget
 def _run_design(path: Path, points: int, groups: Groups, out: Path | None, workers: int | None) -> Path:
     """Simulate a pick-freeze design of a study; returns the result file."""
     from tolstat import study
-    from tolstat.campaign.blocks import Execution
     from tolstat.cli import run
     from tolstat.study.rewriting import with_keys
 
     keys = {"method": "pick_freeze", "n": points, "groups": groups.value}
     plan = study.load(path, text=with_keys(study.load(path).text, {("sampling",): keys}, str(path)))
     target = out if out is not None else Path(f"{path.stem}_causes.h5")
-    run.simulate(plan, target, execution=Execution("processes", workers))
+    run.simulate(plan, target, workers=workers)
     return target
 
 

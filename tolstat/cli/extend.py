@@ -32,10 +32,9 @@ def extend(
     """
     check_memory()
     from tolstat.campaign import extend as combine
-    from tolstat.campaign.blocks import Execution
 
     with progress("drawing the errors"):
         plan = combine.extend(file, n, study_file)
     say(f"{file}: extended to {n} joints")
-    run.simulate(plan, file, execution=Execution("processes", workers))
+    run.simulate(plan, file, workers=workers)
     run.conclude(file, report, wide)

@@ -54,7 +54,6 @@ def lots(
 
     Example: tolstat lots studies/lots.toml
     """
-    from tolstat.campaign.blocks import Execution
     from tolstat.cli import run
     from tolstat.display import text
     from tolstat.questions.lots import query, rendering
@@ -65,7 +64,7 @@ def lots(
     accepted = float("nan") if accept is None else parse_share(accept)
     if source.suffix == ".toml":
         path = out or Path(f"{source.stem}_lots.h5")
-        run.simulate(query.study_of(source, number, joints), path, execution=Execution(workers=workers))
+        run.simulate(query.study_of(source, number, joints), path, workers=workers)
     elif number or joints or out:
         remedy = "give a study, or remove --lots, --joints and --out"
         raise InputError([Fault(str(source), "holds its lots already", remedy)])

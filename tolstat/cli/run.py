@@ -24,7 +24,7 @@ SECONDS_PER_UNIT = {"s": 1.0, "min": 60.0, "h": 3600.0}
 
 
 class Executor(StrEnum):
-    """Where joints are simulated, see `campaign.blocks.Execution`."""
+    """Where joints are simulated, see `campaign.run`."""
 
     PROCESSES = "processes"
     DASK = "dask"
@@ -115,7 +115,6 @@ def run(
     with gather(faults):
         check_target(path)  # now, not when the pictures of the report are written
     from tolstat import study
-    from tolstat.campaign.blocks import Execution
     from tolstat.campaign.remedy import parse_retry
     from tolstat.common import strict
     from tolstat.study import rewriting
@@ -127,11 +126,8 @@ def run(
     if faults:
         raise InputError(faults)
     print_study_notes(study_file, plan)
-    execution = Execution(executor.value, workers, scheduler=scheduler)
-    if until is None:
-        simulate(plan, path, execution=execution, check=verify, rows=part, retry=again)
-    else:
-        simulate(plan, path, until, execution=execution, check=verify)
+    where = {"workers": workers, "executor": executor.value, "scheduler": scheduler}
+    simulate(plan, path, until=until, check=verify, rows=part, retry=again, **where)
     conclude(path, report, wide, " ".join([str(study_file), *(f"--set {quote(own)}" for own in changes)]))
 
 

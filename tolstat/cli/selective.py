@@ -41,7 +41,6 @@ def selective(
     """
     from matplotlib.figure import Figure
 
-    from tolstat.campaign.blocks import Execution
     from tolstat.cli import run
     from tolstat.display import style, text
     from tolstat.questions.selective import query, rendering
@@ -53,7 +52,7 @@ def selective(
     for plan in plans:
         assert plan.sampling.selective is not None
         paths.append(out / f"{study_file.stem}_k{plan.sampling.selective.classes}.h5")
-        run.simulate(plan, paths[-1], execution=Execution(workers=workers))
+        run.simulate(plan, paths[-1], workers=workers)
     with progress("selective assembly"), ExitStack() as opened:
         found = query.assembled([opened.enter_context(ResultFile.open(path)).view() for path in paths])
     with output_folder(out), style.settings():

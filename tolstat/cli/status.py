@@ -180,17 +180,16 @@ def _pace(store: Reader, points: int, pending: int) -> dict[str, Any]:
 
 def _exceedance(store: Reader, states: NDArray[np.uint8], name: str, values: NDArray[np.float64]) -> dict[str, Any]:
     """Share of the joints above a limit so far, from loads and their ends, (3, n); None without an estimate."""
-    from tolstat.analysis.designs import design_of
     from tolstat.analysis.sample import Sample
     from tolstat.common.loads import load_of
     from tolstat.common.tables import Status
-    from tolstat.store.view import drawn
+    from tolstat.store.view import design_of
 
     samples = slice(store.first_sample, None)
     weights = store.origin()["weight"][samples] if store.sampling["method"] == "importance" else None
     limit, unit = store.limits[name], load_of(name).unit
     own, *ends = values[:, samples]
-    design = design_of(drawn(store, weights, Status.PENDING in states[samples]))
+    design = design_of(store, weights, Status.PENDING in states[samples])
     load = Sample.of(own, states[samples], design, (ends[0], ends[1]))
     share = load.above(limit)
     numbers = {key: getattr(share, key) for key in ("estimate", "lower", "upper")}

@@ -210,7 +210,7 @@ def return_rows(view: View, name: str, one_in: Sequence[float], confidence: floa
         When the tail has too few joints (`TooThinError`), or N is too small to lie in it.
     """
     load = view.load(name)
-    tail = extreme.of_sample(load, None, confidence)
+    tail = extreme.fit(load, None, confidence)
     rows = []
     for number in one_in:
         row: dict[str, Any] = {"load": name, "unit": load.unit, "one_in": number}

@@ -8,7 +8,6 @@ that was killed leaves it odd, and the results unchecked.
 
 from __future__ import annotations
 
-import hashlib
 import zlib
 from collections.abc import Sequence
 from pathlib import Path
@@ -124,12 +123,6 @@ class CheckedFile:
         paths = [path for path in self.stored if self.number % 2 == 0 or not layout.is_at_point(path)]
         found = {path: self.damaged((path,), 0, n) for path in paths}
         return {path: blocks for path, blocks in found.items() if blocks.size}
-
-    def digest(self, paths: Sequence[str]) -> str:
-        """SHA-256 of the checksums of some datasets."""
-        with told_as_damage(self.path):
-            known = self.file[GROUP]["crc"][:][[self._index[path] for path in paths]]
-            return hashlib.sha256(known.tobytes()).hexdigest()
 
 
 def blocks_of(n: int) -> int:

@@ -12,6 +12,7 @@ from tolstat.analysis import prediction
 from tolstat.analysis.accuracy import LEAST_NEAR, OBSERVABLES, corrected, corrections, size
 from tolstat.analysis.column import frozen
 from tolstat.analysis.sample import Sample, largest_of
+from tolstat.common.load_kinds import Kind
 from tolstat.common.loads import ANY_LIMIT, LOADS, FloatArray
 from tolstat.common.once import once
 from tolstat.store.view import View
@@ -37,14 +38,14 @@ def _shifted(view: View, load: Sample) -> tuple[Sample, Sample] | None:
     if np.isnan(error):
         return None
     narrowed, name = view.narrowed(load.name)
-    by = error * _largest(narrowed, LOADS[name].kind.key) / load.scale
+    by = error * _largest(narrowed, LOADS[name].kind) / load.scale
     return load.shifted(-by), load.shifted(by)
 
 
 @once
-def _largest(view: View, kind: str) -> FloatArray:
+def _largest(view: View, kind: Kind) -> FloatArray:
     """Largest load that errors of a kind are relative to in each joint, (n,), see `accuracy.size`."""
-    return frozen(size(view.results, next(name for name in OBSERVABLES if LOADS[name].kind.key == kind)))
+    return frozen(size(view.results, kind))
 
 
 def near(view: View, load: Sample) -> tuple[Sample, Sample] | None:
@@ -72,7 +73,7 @@ def near(view: View, load: Sample) -> tuple[Sample, Sample] | None:
     found = found[np.isfinite(found)]
     if found.size < LEAST_NEAR:
         return None
-    sizes = np.nan_to_num(_largest(view, LOADS[name].kind.key) / load.scale)
+    sizes = np.nan_to_num(_largest(view, LOADS[name].kind) / load.scale)
     low, high = corrected(np.zeros(load.values.size), sizes, found)
     return load.shifted(low), load.shifted(high)
 

@@ -62,10 +62,18 @@ def open_hdf5(path: Path, mode: str) -> h5py.File:
         # h5py would turn an empty file that it opens for writing into an HDF5 file
         raise store_error(path, "is not an HDF5 file", "give a result file made by tolstat run")
     try:
-        file = _for_reading(path) if mode == "r" else h5py.File(path, mode, locking="best-effort")
+        if mode == "r":
+            # no lock: a writer only changes numbers in place; with a sieve buffer, HDF5 would read a dataset that stays
+            # open from its memory, as it was before
+            access = h5p.create(h5p.FILE_ACCESS)
+            access.set_fclose_degree(h5f.CLOSE_STRONG)
+            access.set_file_locking(False, False)
+            access.set_sieve_buf_size(0)
+            return h5py.File(h5f.open(os.fsencode(path), h5f.ACC_RDONLY, access))
+        file = h5py.File(path, mode, locking="best-effort")
     except OSError as error:
         raise _not_opened(path, mode, error) from error
-    if mode != "r" and not is_at(file, path):
+    if not is_at(file, path):
         # another process replaced the file between opening and locking: the open file is not at `path`
         file.close()
         raise store_error(path, "is being written by another process", "wait until that process ends, or stop it")
@@ -84,19 +92,6 @@ def _not_opened(path: Path, mode: str, error: OSError) -> StoreError:
     if not h5py.is_hdf5(path):
         return store_error(path, "is not an HDF5 file", "give a result file made by tolstat run")
     return store_error(path, f"is damaged or no tolstat result file: {error}", RUN_AGAIN)
-
-
-def _for_reading(path: Path) -> h5py.File:
-    """Open a file, also while a campaign writes it.
-
-    It takes no lock, since a writer only changes numbers in place, and has no sieve buffer: with one, HDF5 would read
-    a dataset that stays open from its memory, as it was before.
-    """
-    access = h5p.create(h5p.FILE_ACCESS)
-    access.set_fclose_degree(h5f.CLOSE_STRONG)
-    access.set_file_locking(False, False)
-    access.set_sieve_buf_size(0)
-    return h5py.File(h5f.open(os.fsencode(path), h5f.ACC_RDONLY, access))
 
 
 def is_at(file: h5py.File, path: Path) -> bool:

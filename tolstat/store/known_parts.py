@@ -9,7 +9,7 @@ import numpy as np
 
 from tolstat.analysis import known_share, process
 from tolstat.analysis.column import Mask
-from tolstat.analysis.known_share import Event, KnownShare, Mixture
+from tolstat.analysis.known_share import KnownShare, Mixture
 from tolstat.analysis.process import Known, Sums
 from tolstat.analysis.weighted import Split
 from tolstat.common.loads import ANY_LIMIT
@@ -21,7 +21,6 @@ from tolstat.store.view import View
 from tolstat.study import known
 from tolstat.study.axes import streams_of
 from tolstat.study.known import KnownEntry
-from tolstat.study.proposal import Proposal
 from tolstat.study.tolerances.distributions import score
 
 KEYS = ("known_from", "law")
@@ -35,10 +34,6 @@ def of(view: View) -> KnownParts | None:
         return None
     entries = known.of(view.study.entries)
     return KnownParts(view, entries) if entries else None
-
-
-def _refused(unsupported: float) -> KnownShare:
-    return KnownShare(np.nan, np.nan, np.nan, np.nan, np.nan, unsupported)
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,11 +56,12 @@ class KnownParts:
 
         Numbers are NaN where so many likely processes are not supported that the upper end would be 1.
         """
+        none = KnownShare(np.nan, np.nan, np.nan, np.nan, np.nan, 1.0)
         if not self._done.any():
-            return _refused(1.0)
+            return none
         found = known_share.intervals(*self._tallies[name], self.supported, confidence)
         refused = found.unsupported >= 0.5 * (1.0 - confidence)
-        return _refused(found.unsupported) if refused else found
+        return none._replace(unsupported=found.unsupported) if refused else found
 
     @cached_property
     def supported(self) -> Mask:
@@ -96,7 +92,8 @@ class KnownParts:
         tolerances = 1.0 - sum(proposal.share for proposal in proposals)
         found = [Mixture(tolerances, (None,) * len(self.entries))]
         for proposal in proposals:
-            parts = [_parts_of(entry, proposal) for entry in self.entries]
+            of = {frozenset(own.streams): own.parts for own in reversed(proposal.processes)}
+            parts = [of.get(frozenset(streams_of(name)[0] for name in entry.names)) for entry in self.entries]
             others = len(proposal.scores) + len(proposal.processes) - sum(own is not None for own in parts)
             if not others:
                 found.append(Mixture(proposal.share, tuple(parts)))
@@ -111,16 +108,16 @@ class KnownParts:
         """Weights above each limit: of joints with a valid load; for the lower end; and for the upper end."""
         view, done = self.view, self._done
         names = [*view.limits, ANY_LIMIT]
-        events: list[Event] = []
+        events: list[tuple[Mask, Mask]] = []
         places = []
         for load in view.loads(names):
             ends, limit = error_budget.with_error(view, load), float(load.limit or np.nan)
-            own = [Event(load.values > limit, load.is_valid)]
-            own += [Event(end.lower.values > limit, done) for end in ends]
-            own += [Event(end.upper.values > limit, done) for end in ends]
+            own = [(load.values > limit, load.is_valid)]
+            own += [(end.lower.values > limit, done) for end in ends]
+            own += [(end.upper.values > limit, done) for end in ends]
             places.append((len(events), len(ends)))
             events += own
-        events = [Event(event.above[done], event.counted[done]) for event in events]
+        events = [(above[done], counted[done]) for above, counted in events]
         weights = view.design.counts_as(view.n)[done]
         found = known_share.tallies(self._sums(), self._known, self._drawn, weights, events)
         return {
@@ -139,9 +136,3 @@ class KnownParts:
             parts.append([(own.sum(axis=0), np.square(own).sum(axis=0)) for own in stacked])
         each = zip(*parts, strict=True)
         return [Sums(*(np.concatenate(one)[self._done] for one in zip(*entry, strict=True))) for entry in each]
-
-
-def _parts_of(entry: KnownEntry, proposal: Proposal) -> int | None:
-    """Number of parts of a proposal's process of exactly the errors of an entry; None if it has none."""
-    streams = {streams_of(name)[0] for name in entry.names}
-    return next((one.parts for one in proposal.processes if set(one.streams) == streams), None)

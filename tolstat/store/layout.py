@@ -52,6 +52,8 @@ SESSION = {
 LINKED = ("row", "nominal")
 """Datasets of the file that every group with joints has as links: number of each row, mark of the nominal joint."""
 
+Tables = Mapping[str, Iterable[NDArray[np.void]]]
+"""Tables of a new file that are complete from the beginning, each in consecutive blocks of rows, by group."""
 NAMES = {*GROUPS, *LINKED, "metadata", "checksums", "verify", "near"}
 """All names that a file may have at its top and at each operating point."""
 
@@ -131,13 +133,7 @@ def size_of(metadata: Metadata) -> int:
     return sum(one.shape[0] * one.row_bytes for one in stored) + COLUMN_OVERHEAD * len(stored)
 
 
-def create(
-    file: h5py.File,
-    metadata: Metadata,
-    errors: Iterable[NDArray[np.void]],
-    design: NDArray[np.void] | None = None,
-    origin: Iterable[NDArray[np.void]] | None = None,
-) -> None:
+def create(file: h5py.File, metadata: Metadata, tables: Tables) -> None:
     """Fill an empty file, all rows pending; the checksums are not in it yet.
 
     Parameters
@@ -146,12 +142,8 @@ def create(
         The file.
     metadata : Metadata
         What it says of itself.
-    errors : iterable of table ERROR
-        Errors of its rows, in consecutive blocks.
-    design : (n,) table DESIGN, optional
-        Variant, case and group of each row, for a study that lists its joints.
-    origin : iterable of tables, optional
-        How each row was drawn, in consecutive blocks, for methods that have `draw_records.columns`.
+    tables : Tables
+        ``errors``; ``design`` of a study that lists its joints; ``origin`` for methods with `draw_records.columns`.
     """
     n, first, codes, held = metadata.n, metadata.first_row, meanings_of(metadata), columns(metadata)
     put_attributes(file, {"filetype": FILETYPE, "schema_version": SCHEMA_VERSION, "description": ABOUT})
@@ -166,12 +158,10 @@ def create(
     nominal.dims[0].attach_scale(row)
     put_attributes(nominal, {"units": "1", "description": "1 for the nominal joint, which is no sample"})
     put_meanings(nominal, MEANINGS["nominal"])
-    given = {"errors": errors, "design": None if design is None else [design], "origin": origin}
-    for group, blocks in given.items():
-        if (group in held) != (blocks is not None):
-            raise ValueError(f"{group} must be given for the campaigns that have it, only")
-        if blocks is not None:
-            create_table(file, group, held[group], n, blocks, codes)
+    if tables.keys() != held.keys() - set(AT_POINTS):
+        raise ValueError(f"the tables {', '.join(tables)} are not those of this campaign")
+    for group, blocks in tables.items():
+        create_table(file, group, held[group], n, blocks, codes)
     for point in metadata.points:
         place = file.require_group(place_of(point) or "/")
         for group in ("results", "ledger"):
@@ -216,14 +206,11 @@ def create_table(
     scale : h5py.Dataset, optional
         Dimension scale of the rows; ``row`` of the file without it, which the group then has with ``nominal``.
     """
-    group, row = holder.create_group(name), scale or holder.file["row"]
-    for link in LINKED if scale is None else ():
-        group[link] = holder.file[link]
-    if scale is not None:
-        group[scale.name.rpartition("/")[2]] = scale
-    codes = MEANINGS if codes is None else codes
+    group = holder.create_group(name)
+    for link in LINKED if scale is None else (scale.name,):
+        group[link.rpartition("/")[2]] = holder.file[link]
     for c in columns:
-        _create(group, c.name, (n,), c, row, codes, blocks is None)
+        _create(group, c.name, (n,), c, scale or holder.file["row"], codes or MEANINGS, blocks is None)
     first = 0
     for block in blocks or ():
         put(group, np.arange(first, first + len(block)), {c.name: c.of(block) for c in columns})

@@ -6,7 +6,7 @@ import hashlib
 import json
 from collections.abc import Mapping
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import h5py
 import numpy as np
@@ -16,9 +16,7 @@ from tolstat.common.solver_options import to_names
 from tolstat.common.tables import HistorySpec, Options, Variant
 from tolstat.store.hdf5 import put_attributes, text
 from tolstat.store.provenance import git_commit, versions
-
-if TYPE_CHECKING:
-    from tolstat.study import Study
+from tolstat.study import Study
 
 DATASET, CHECKSUM = "metadata", "sha256"
 """Dataset that holds the document as UTF-8, and its attribute with the checksum."""

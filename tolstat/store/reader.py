@@ -5,8 +5,8 @@ Damaged errors refuse the file. Damaged results make the joints of their block (
 
 from __future__ import annotations
 
+import hashlib
 import logging
-import math
 import time
 from collections.abc import Iterator, Sequence
 from copy import copy
@@ -25,7 +25,7 @@ from tolstat.common.errors import Fault, StoreError
 from tolstat.common.tables import Motion, Status
 from tolstat.joint import Operation
 from tolstat.store import layout, metadata
-from tolstat.store.checksums import ROWS, CheckedFile, Integrity
+from tolstat.store.checksums import GROUP, ROWS, CheckedFile, Integrity
 from tolstat.store.hdf5 import RUN_AGAIN, TOGETHER, is_locked, open_hdf5, pick, store_error, told_as_damage
 from tolstat.study.points import Point, only_one
 
@@ -185,11 +185,6 @@ class Reader:
     def whole(self) -> bool:
         """Whether the file holds all rows of its campaign, not a slice."""
         return self.rows == range(self.campaign_rows)
-
-    @property
-    def heaviest(self) -> float:
-        """Largest weight that a joint of importance sampling can have: one over the share of the tolerances, else 1."""
-        return 1.0 / (1.0 - math.fsum(share for share, _ in self.identity.get("proposal", ())))
 
     @property
     def complete(self) -> bool:
@@ -360,7 +355,9 @@ class Reader:
         """Number that is equal for files with the same joints and results; empty while they have no checksums."""
         if self._checked.number % 2:
             return ""
-        return self._checked.digest([path for path in self._checked.stored if path.split("/")[-2] == "results"])
+        with told_as_damage(self.path):
+            own = [k for k, path in enumerate(self._checked.stored) if path.split("/")[-2] == "results"]
+            return hashlib.sha256(self._checked.file[GROUP]["crc"][:][own].tobytes()).hexdigest()
 
     def _table(
         self, group: str, columns: tuple[Column, ...], dtype: np.dtype[np.void], slots: slice, fields: Sequence[str]

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.errors import Fault, InputError, StoreError
+from tolstat.common.errors import Fault, InputError
 from tolstat.common.solver_options import from_names
 from tolstat.common.strict import read_section, validate
 from tolstat.common.tables import PARAM, Options
@@ -18,6 +18,7 @@ from tolstat.joint import Joint, Operation, operating, perturb, varied
 from tolstat.joint.derived import get
 from tolstat.joint.sections import RIGID
 from tolstat.solver import fidelity
+from tolstat.store.hdf5 import store_error
 from tolstat.store.reader import Reader
 from tolstat.study import Study, load, mounting, subset_of
 from tolstat.study.design import nested
@@ -191,9 +192,8 @@ def recall(store: Reader, n: int | None = None, path: Path | None = None) -> Stu
     study = _at_point(store, study)
     differing = differing_keys(store.identity, json.loads(json.dumps(study.identity())))
     if differing:
-        lines = ["does not match the study that was read for it", *differing]
-        found = "\n    ".join(lines)
-        raise StoreError(str(Fault(str(store.path), found, "give the study file of the campaign: --study STUDY")))
+        found = "\n    ".join(["does not match the study that was read for it", *differing])
+        raise store_error(store.path, found, "give the study file of the campaign: --study STUDY")
     if n is None:
         return study
     return _at_point(store, load(source, n=n, text=text, joint=joint))

@@ -16,8 +16,9 @@ from tolstat.common.columns import ERROR_COLUMNS, Column
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import LOADS, limits_in_words
 from tolstat.common.shown import table
-from tolstat.common.tables import Motion, Status
+from tolstat.common.tables import Status
 from tolstat.store import recorded
+from tolstat.store.layout import MEANINGS
 from tolstat.store.reader import Reader
 from tolstat.store.view import View
 
@@ -27,11 +28,6 @@ if TYPE_CHECKING:
 
 AT_ONCE = 8192
 """Maximum number of rows of a block of `in_blocks`."""
-LABELS = {
-    "status": {status.value: status.label for status in Status},
-    "motion": {motion.value: motion.name.lower() for motion in Motion},
-}
-"""Columns that an export holds as text: label of each code."""
 OPERATING = {
     "operation.alpha": "misalignment of the shafts",
     "operation.speed": "angular velocity of the input shaft",
@@ -91,7 +87,13 @@ class ResultFile(Reader):
     @property
     def nominal(self) -> pd.Series[float]:
         """Largest loads of the nominal joint by name, SI; NaN where the file has none or its results are not valid."""
-        return self.loads.nominal()
+        import pandas as pd
+
+        names, held = list(self.loads), self.loads.view.nominal
+        values = [float(LOADS[name].of(held)[0]) if len(held) else np.nan for name in names]
+        series = pd.Series(values, pd.Index(names, name="load"), dtype=float, name="nominal")
+        series.attrs["units"] = {name: LOADS[name].unit for name in names}
+        return series
 
     def to_pandas(self, nominal: bool = False) -> pd.DataFrame:
         """Export errors and results as one DataFrame, one row per joint, pending and failed joints included.
@@ -144,7 +146,7 @@ class NamedLoads:
     """
 
     def __init__(self, view: View) -> None:
-        self._view = view
+        self.view = view
 
     def __getitem__(self, name: str) -> pd.Series[float]:
         """Largest load over the revolution of each joint, SI.
@@ -167,25 +169,15 @@ class NamedLoads:
         """
         import pandas as pd
 
-        load, store = self._view.load(name), self._view.store
+        load, store = self.view.load(name), self.view.store
         index = pd.RangeIndex(store.rows[store.first_sample :], name="row")
         series = pd.Series(load.values, index, name=name)
         series.attrs["units"] = load.unit
         return series
 
-    def nominal(self) -> pd.Series[float]:
-        """Loads of the nominal joint by name, SI; see `Reader.nominal`."""
-        import pandas as pd
-
-        held = self._view.nominal
-        values = [float(LOADS[name].of(held)[0]) if len(held) else np.nan for name in self.keys()]
-        series = pd.Series(values, pd.Index(self.keys(), name="load"), dtype=float, name="nominal")
-        series.attrs["units"] = {name: LOADS[name].unit for name in self.keys()}
-        return series
-
     def keys(self) -> tuple[str, ...]:
         """Names of the loads that the study keeps."""
-        return self._view.kept_loads
+        return self.view.kept_loads
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.keys())
@@ -202,7 +194,7 @@ class NamedLoads:
     def __repr__(self) -> str:
         names = self.keys()
         named = ", ".join(names) if len(names) <= 3 else f"{names[0]}, {names[1]}, ..., {names[-1]}"
-        return f"<{len(names)} loads of {self._view.n} joints: {named}>"
+        return f"<{len(names)} loads of {self.view.n} joints: {named}>"
 
     def _repr_html_(self) -> str:
         return table(repr(self)[1:-1], [("load", ", ".join(self.keys()))])
@@ -244,8 +236,8 @@ def _frame(store: Reader, rows: slice, nominal: bool, listed: Mapping[str, NDArr
     data |= {c.name: c.of(results) for c in store.columns}
     if store.retries:
         data["attempt"] = store.attempt(rows)
-    for name, labels in LABELS.items():
-        data[name] = np.array([labels[code] for code in data[name].tolist()], dtype=object)
+    for name in ("status", "motion"):
+        data[name] = np.array([MEANINGS[name][code] for code in data[name].tolist()], dtype=object)
     frame = pd.DataFrame(data, index=pd.RangeIndex(store.rows[rows], name="row"))
     columns = described(store)
     frame.attrs["units"] = {name: columns[name].unit if name in columns else "1" for name in data}

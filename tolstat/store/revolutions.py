@@ -11,13 +11,12 @@ from numpy.typing import NDArray
 
 from tolstat.common.aside import Aside
 from tolstat.common.channels import BUSHING_LOADS, CHANNELS, LOAD_HISTORIES, MEASURING, LoadHistory, histories_of
-from tolstat.common.errors import Fault, StoreError
 from tolstat.common.shown import shown
 from tolstat.joint import perturb
 from tolstat.solver.compilation import is_compiled, warm_up
 from tolstat.solver.harmonics import restore
 from tolstat.solver.simulation import simulate_rows
-from tolstat.store.hdf5 import RUN_AGAIN, pick
+from tolstat.store.hdf5 import RUN_AGAIN, pick, store_error
 from tolstat.store.reader import Reader
 from tolstat.store.recorded import joint_of, operation_of, options_of
 
@@ -159,7 +158,7 @@ def _loads(store: Reader, slots: NDArray[np.intp], history: LoadHistory) -> NDAr
         else:
             found = "holds no load histories"
             remedy = f'write histories = "harmonics" or "full" in [output] of the study, and {RUN_AGAIN}'
-        raise StoreError(str(Fault(str(store.path), found, remedy)))
+        raise store_error(store.path, found, remedy)
     real, imag = (store.histories(f"{history.prefix}coefficients_{part}", slots) for part in ("real", "imag"))
     return np.moveaxis(restore(real, imag, int(store.options["steps_per_rev"])), 0, 1)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -12,20 +13,24 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tolstat.analysis import accuracy
+from tolstat.analysis.clustered import Clustered
 from tolstat.analysis.column import frozen
 from tolstat.analysis.design import SAMPLE, Claim, Design
-from tolstat.analysis.designs import Drawn, design_of
+from tolstat.analysis.independent import Independent
+from tolstat.analysis.listed import Listed
+from tolstat.analysis.replicated import Replicated
 from tolstat.analysis.sample import Sample, largest_of
+from tolstat.analysis.weighted import Weighted
 from tolstat.common import selected_results
 from tolstat.common.counts import Counts
 from tolstat.common.draw_records import METHODS
-from tolstat.common.errors import Fault, InputError, StoreError
+from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import ANY_LIMIT, LOADS, SHOWN_LOADS, FloatArray, Limit, limits_in_words, split
 from tolstat.common.shown import table
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import ERROR, Status
 from tolstat.store import verification, what_if, worst
-from tolstat.store.hdf5 import BLOCK
+from tolstat.store.hdf5 import BLOCK, store_error
 from tolstat.store.reader import Reader
 from tolstat.store.recorded import recall
 from tolstat.store.verification import Verification
@@ -276,7 +281,7 @@ class View:
     @cached_property
     def design(self) -> Design:
         """How the joints were drawn, and what they allow to conclude."""
-        return design_of(drawn(self.store, self._weights, bool(self.count(Status.PENDING))))
+        return design_of(self.store, self._weights, bool(self.count(Status.PENDING)))
 
     @property
     def sampled(self) -> bool:
@@ -287,13 +292,13 @@ class View:
         """Raise a `StoreError` if the joints give no estimate of a claim."""
         refusal = self.design.refuses(claim)
         if refusal is not None:
-            remedy = refusal.remedy.format(path=self.path)
-            raise StoreError(str(Fault(str(self.path), refusal.found, remedy)))
+            found, remedy = refusal
+            raise store_error(self.path, found, remedy.format(path=self.path))
 
     def check_drawn(self) -> None:
         """Raise a StoreError for joints that were not drawn from tolerances."""
         if not self.study.tolerances:
-            raise StoreError(str(Fault(str(self.path), "holds joints that are not drawn from tolerances", SAMPLE)))
+            raise store_error(self.path, "holds joints that are not drawn from tolerances", SAMPLE)
 
     def rows(self, samples: ArrayLike) -> NDArray[np.intp]:
         """Rows of the campaign of samples."""
@@ -365,8 +370,8 @@ class View:
         return f"{text}, {self.counts.shortfall}" + (f", {pending} still pending" if pending else "")
 
 
-def drawn(store: Reader, weights: FloatArray | None, unfinished: bool) -> Drawn:
-    """How the joints of a file were drawn.
+def design_of(store: Reader, weights: FloatArray | None, unfinished: bool) -> Design:
+    """Sampling design of a file: the first that recognises how its joints were drawn.
 
     Parameters
     ----------
@@ -378,17 +383,15 @@ def drawn(store: Reader, weights: FloatArray | None, unfinished: bool) -> Drawn:
         Whether joints are pending; replicates are then unequal, and do not count as such.
     """
     sampling, skip = store.sampling, store.first_sample
-    whole = store.n - skip == sampling.get("n") and not unfinished
-    own = None
-    # proposals of processes alone leave out no way to a limit
-    if weights is not None and any(set(changed) != {"parts"} for _, changed in store.identity["proposal"]):
-        own = frozen(store.origin()["component"][skip:] == 0)
-    return Drawn(
-        str(sampling["method"]),
-        store.samples,
-        int(sampling.get("joints_per_lot", 1)),
-        int(sampling.get("replicates", 1)) if whole else 1,
-        weights,
-        store.heaviest,
-        own,
-    )
+    method, n = str(sampling["method"]), store.n - skip
+    if weights is not None:
+        shares, changes = zip(*store.identity["proposal"], strict=True)
+        # proposals of processes alone leave out no way to a limit
+        others = any(set(changed) != {"parts"} for changed in changes)
+        own = frozen(store.origin()["component"][skip:] == 0) if others else None
+        return Weighted(weights, 1.0 / (1.0 - math.fsum(shares)), own)  # one over the share of the tolerances
+    if sampling.get("joints_per_lot", 1) > 1:
+        return Clustered(np.asarray(store.samples) // int(sampling["joints_per_lot"]))
+    if sampling.get("replicates", 1) > 1 and n == sampling["n"] and not unfinished:
+        return Replicated(n, int(sampling["replicates"]), method)
+    return Independent() if method == "random" else Listed(method)

@@ -139,17 +139,10 @@ def common(files: Iterable[Mapping[str, Altered]]) -> tuple[dict[str, Altered], 
     for sets in files:
         for name, one in sets.items():
             short, long = sorted((one, found.get(name, one)), key=lambda own: own.end)
-            found[name] = long
-            if not _begins(long, short):
+            found[name], n = long, len(short.status)
+            if _check(long._replace(loads=long.loads[:n], status=long.status[:n])) != _check(short):
                 differing.add(name)
     return {name: one for name, one in found.items() if name not in differing}, len(differing)
-
-
-def _begins(long: Altered, short: Altered) -> bool:
-    """Whether a set begins with another one, to the last bit."""
-    n = len(short.status)
-    begin = long._replace(loads=long.loads[:n], status=long.status[:n])
-    return _check(begin) == _check(short)
 
 
 def _write(file: h5py.File, sets: Mapping[str, Altered]) -> None:

@@ -104,16 +104,6 @@ def limit_of(parts: Mapping[str, NDArray[np.void]], limit: Limit) -> tuple[Float
     return np.maximum.reduce(found), worst_status(states)
 
 
-def nominal(parts: Sequence[NDArray[np.void]]) -> NDArray[np.void]:
-    """Largest loads of the nominal joint, RESULT (1,), from its rows; (0,) unless it is valid at all points."""
-    if not all(len(part) for part in parts):
-        return np.empty(0, RESULT)
-    found, loads = without_results(1, Status.OK), together(parts)
-    for name in LOAD_FIELDS:
-        found[name] = loads[name]
-    return found
-
-
 def rank(load: Sample, limit: float | None) -> tuple[float, float]:
     """Share of the joints above a limit, and the load that 99 % do not exceed, relative to the limit if any."""
     if not load.valid.size:
@@ -175,8 +165,12 @@ def of_points(parts: Sequence[FirstPass], stores: Sequence[Reader]) -> FirstPass
     for sample, number in zip(samples.tolist(), points.tolist(), strict=True):
         slot = sample + stores[number].first_sample
         without.append(stores[number].results(slice(slot, slot + 1)))
-    none, at_all = np.full((4, 4), np.nan), nominal([part.nominal for part in parts])
-    return FirstPass(_frozen(results), frozen(at_all), frozen(np.concatenate(without)), frozen(none))
+    at_each = [part.nominal for part in parts]
+    nominal = without_results(int(all(map(len, at_each))), Status.OK)
+    for name, values in together(at_each).items() if nominal.size else ():
+        nominal[name] = values
+    none = np.full((4, 4), np.nan)
+    return FirstPass(_frozen(results), frozen(nominal), frozen(np.concatenate(without)), frozen(none))
 
 
 def _frozen(columns: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:

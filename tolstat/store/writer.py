@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 import h5py
 import numpy as np
@@ -24,11 +24,10 @@ from tolstat.common.tables import HistorySpec, Options, Simulation, Status
 from tolstat.store import checksums, layout, metadata
 from tolstat.store.checksums import ROWS, blocks_of
 from tolstat.store.hdf5 import copy_open, is_at, put, replace, store_error
+from tolstat.store.layout import Tables
 from tolstat.store.metadata import Metadata
 from tolstat.store.reader import Reader
-
-if TYPE_CHECKING:
-    from tolstat.study import Study
+from tolstat.study import Study
 
 KEPT = "and run the same command again; finished joints are kept"
 
@@ -80,9 +79,13 @@ class Writer(Reader):
         """
         rows = range(study.rows) if rows is None else rows
         held = metadata.of_study(study, rows, histories or {}, dimensions or {}, options, fidelity)
-        design = study.design[rows.start : rows.stop] if study.variants else None
+        tables = {"errors": errors}
+        if study.variants:
+            tables["design"] = [study.design[rows.start : rows.stop]]
+        if origin is not None:
+            tables["origin"] = origin
         exists = "resume it with its own study, or give another file: --out OTHER.h5"
-        write_new(Path(path), held, exists, errors, design, origin)
+        write_new(Path(path), held, exists, tables)
         return cls.open(path)
 
     @classmethod
@@ -123,7 +126,12 @@ class Writer(Reader):
             if damaged.size:
                 one._left_out.update(damaged.tolist())
                 ledger = found.get(layout.path_of(one.point or "", "ledger", "attempt"), damaged[:0])
-                one._make_pending(*(np.flatnonzero(np.isin(block, own)) for own in (damaged, ledger)))
+                rows, again = (np.flatnonzero(np.isin(block, own)) for own in (damaged, ledger))
+                one._begin_writing(rows)
+                put(one._place("results"), rows, {"status": np.full(rows.size, Status.PENDING, np.uint8)})
+                # attempts that are damaged: again with the study's settings
+                put(one._place("ledger"), again, {"attempt": np.zeros(again.size, np.int32)})
+                one._sync()
         self._tell("pending again", "run its study to simulate these joints: tolstat run STUDY")
 
     def close(self) -> None:
@@ -273,13 +281,6 @@ class Writer(Reader):
     def _place(self, group: str) -> h5py.Group:
         return self._checked.file[layout.path_of(self._point(), group, "")]
 
-    def _make_pending(self, rows: NDArray[np.intp], again: NDArray[np.intp]) -> None:
-        """Mark rows as pending; `again`, whose attempts are damaged, with the study's settings."""
-        self._begin_writing(rows)
-        put(self._place("results"), rows, {"status": np.full(rows.size, Status.PENDING, np.uint8)})
-        put(self._place("ledger"), again, {"attempt": np.zeros(again.size, np.int32)})
-        self._sync()
-
     def _sync(self) -> None:
         self._checked.file.flush()
         os.fsync(self._checked.file.id.get_vfd_handle())
@@ -315,9 +316,7 @@ def write_new(
     path: Path,
     held: Metadata,
     exists: str,
-    errors: Iterable[NDArray[np.void]],
-    design: NDArray[np.void] | None = None,
-    origin: Iterable[NDArray[np.void]] | None = None,
+    tables: Tables,
     fill: Callable[[h5py.File], None] | None = None,
     overwrite: bool = False,
 ) -> None:
@@ -331,7 +330,7 @@ def write_new(
         Its metadata.
     exists : str
         Remedy if the file exists.
-    errors, design, origin
+    tables : Tables
         See `layout.create`.
     fill : callable, optional
         Called with the file, to write results to it; their checksums are written then.
@@ -349,7 +348,7 @@ def write_new(
         make_parent(path)
         check_disk_space(path, layout.size_of(held))
         with atomic_write(path, overwrite=overwrite) as temporary, h5py.File(temporary, "w") as file:
-            layout.create(file, held, errors, design, origin)
+            layout.create(file, held, tables)
             checksums.create(file, held)
             if fill is not None:
                 fill(file)

@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from tolstat.analysis import sorting
 from tolstat.common import strict
 from tolstat.common.errors import Fault, gather
 from tolstat.common.load_kinds import PINS
@@ -84,13 +83,22 @@ class Gauge(NamedTuple):
         return (self.name, f"{pin}.diameter", f"{HOLE_OF_PIN[pin]}.diameter") if key == "clearance" else (self.name,)
 
     def accepted(self, errors: NDArray[np.void], joint: Joint) -> NDArray[np.float64]:
-        """Probability that each joint is accepted, (n,), from its errors."""
+        """Probability that each joint is accepted, (n,), from its errors.
+
+        The error of the gauge is normal with mean zero; without deviation the gauge is exact.
+        """
+        from scipy.special import ndtr
+
         values = np.asarray(errors[self.name])
         if self.name.endswith(".clearance"):
             _, pin, hole = self.columns
             nominal = joint.contact.D_H - joint.contact.D_P
             values = values + 0.5 * (nominal + np.asarray(errors[hole]) - np.asarray(errors[pin]))
-        return sorting.accepted(values, self.lower, self.upper, self.deviation)
+        if self.deviation == 0.0:
+            return ((values >= self.lower) & (values <= self.upper)).astype(float)
+        low, high = (self.lower - values) / self.deviation, (self.upper - values) / self.deviation
+        # from the tail that is nearer, where a difference keeps its digits
+        return np.where(low > 0.0, ndtr(-low) - ndtr(-high), ndtr(high) - ndtr(low))
 
 
 def part_of(name: str) -> str:

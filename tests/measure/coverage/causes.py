@@ -10,7 +10,7 @@ import numpy as np
 from scipy.stats import norm
 
 from tests.measure.coverage.trial import Asked, Experiment, Found, Rng, found
-from tolstat.analysis import overrepresentation, pick_freeze, regression, sensitivity
+from tolstat.analysis import pick_freeze, ranks, sensitivity
 from tolstat.common.loads import FloatArray
 
 WEIGHTS = np.array([1.0, 0.5, 0.0])
@@ -143,7 +143,7 @@ def _ranks(weights: FloatArray, n: int) -> Experiment:
 
     def once(rng: Rng) -> list[Found]:
         x = rng.standard_normal((n, 3))
-        return found(regression.ranks(x, np.exp(x @ weights)), truth)
+        return found(ranks.regression(x, np.exp(x @ weights)), truth)
 
     return Experiment(tuple(Asked("rank regression", f"{name}, error {k + 1}", n) for k in range(3)), once)
 
@@ -161,7 +161,7 @@ def _tail(share: float, n: int) -> Experiment:
 
     def once(rng: Rng) -> list[Found]:
         errors = rng.standard_normal((n, 3))
-        own = overrepresentation.tail(errors, errors @ WEIGHTS > z * size)
+        own = ranks.tail(errors, errors @ WEIGHTS > z * size)
         return found(own.direction, direction) + found(own.size, far)
 
     asked = [

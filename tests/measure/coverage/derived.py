@@ -19,7 +19,7 @@ from tests.measure.coverage.trial import (
     quantiles_at,
     sample_of,
 )
-from tolstat.analysis import capability, cycles, damage, sequential, strength
+from tolstat.analysis import capability, cycles, sequential, strength
 from tolstat.analysis.binomial import clopper_pearson
 from tolstat.common.loads import FloatArray
 
@@ -69,7 +69,7 @@ def _equivalent(exponent: float, n: int) -> Experiment:
     def once(rng: Rng) -> list[Found]:
         ranges = known.draw(rng, n)[:, None, None] * np.array([1.0, 0.5])
         counted = cycles.Cycles.of_revolution(("cross1.F",), ranges, ranges, np.full((n, 1), 2.0))
-        sample = sample_of(damage.equivalent_load(counted, exponent)[:, 0])
+        sample = sample_of(cycles.equivalent_load(counted, exponent)[:, 0])
         return quantiles_at(sample, {share: factor * float(known.ppf(share)) for share in (0.5, 0.9)})
 
     cases = (f"lognormal ranges, exponent {exponent:g}, {share}" for share in ("50 %", "90 %"))

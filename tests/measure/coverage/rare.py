@@ -9,7 +9,7 @@ from scipy.stats import chi2, norm
 
 from tests.measure.coverage.trial import Asked, Experiment, Found, Rng, found, fresh_share, laws, sample_of
 from tolstat.analysis import extreme
-from tolstat.analysis.subset import Settings, Walk
+from tolstat.analysis.subset import Walk
 from tolstat.common.loads import FloatArray
 from tolstat.solver import stationary
 
@@ -42,7 +42,7 @@ def _tail(name: str, n: int) -> Experiment:
     asked.append(Asked("share above, from the tail", f"{name}, {shares[0]:.2e}", n, of_share, SLOW.get(name, "")))
 
     def once(rng: Rng) -> list[Found]:
-        tail = extreme.of_sample(sample_of(law.draw(rng, n)))
+        tail = extreme.fit(sample_of(law.draw(rng, n)))
         own = [*(tail.level(share) for share in shares), tail.probability(max(loads[0], tail.threshold))]
         truths = (*loads, shares[0])
         return [Found(e.lower, e.upper, truth, not tail.refusal) for e, truth in zip(own, truths, strict=True)]
@@ -69,7 +69,7 @@ def _subset(name: str, share: float, n: int) -> Experiment:
     limit = limit_of(share)
 
     def once(rng: Rng) -> list[Found]:
-        walk = Walk(Settings(n, 0.1, limit), lambda level, first, m: rng.standard_normal((m, d)))
+        walk = Walk(n, 0.1, limit, lambda level, first, m: rng.standard_normal((m, d)))
         while not walk.done:
             walk.take(load(walk.next.scores))
         own = walk.estimate()

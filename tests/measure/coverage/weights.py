@@ -12,7 +12,7 @@ from scipy.stats import chi2, norm
 
 from tests.measure.coverage.trial import Asked, Experiment, Found, Law, Rng, found, fresh_share, sample_of
 from tolstat.analysis import allocation, known_share, process, reweight
-from tolstat.analysis.known_share import Event, Mixture
+from tolstat.analysis.known_share import Mixture
 from tolstat.analysis.process import Known, Sums
 from tolstat.analysis.reweight import Ratios
 from tolstat.analysis.weighted import Weighted
@@ -181,7 +181,7 @@ def _known(load: Load, parts: int, n: int, share: float) -> Experiment:
         weights = 1.0 / (TOLERANCES + (1.0 - TOLERANCES) * ratio)
         errors = center[:, None, None] + spread[:, None, None] * z
         above = load.of(np.concatenate(list(errors), axis=1)) > level
-        (split,) = known_share.tallies(sums, known, drawn, weights, [Event(above, np.ones(n, dtype=bool))])
+        (split,) = known_share.tallies(sums, known, drawn, weights, [(above, np.ones(n, dtype=bool))])
         own = known_share.intervals(split, [split], [split], usable)
         stated = sample_of(above, Weighted(weights, 1.0 / TOLERANCES)).above(0.5)
         return found(own, [share]) + found(stated, [share])

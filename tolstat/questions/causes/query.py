@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from tolstat import sampling
-from tolstat.analysis import overrepresentation, pick_freeze, regression, sensitivity
+from tolstat.analysis import pick_freeze, ranks, sensitivity
 from tolstat.analysis.sample import Sample
 from tolstat.common.errors import Fault, InputError, StoreError
 from tolstat.common.loads import ANY_LIMIT
@@ -128,7 +128,7 @@ def _of_samples(view: View, load: Sample, confidence: float, log: bool) -> Cause
     study = view.study
     samples = np.flatnonzero(load.is_valid)
     values = load.values[samples]
-    needed = max(MIN_JOINTS, len(sampling.streams(study)) + 2 * regression.GROUPS)
+    needed = max(MIN_JOINTS, len(sampling.streams(study)) + 2 * ranks.GROUPS)
     if samples.size < needed:
         what = "load on all limits" if load.name == ANY_LIMIT else load.name
         found = f"has {samples.size} joints with a valid {what}"
@@ -144,8 +144,8 @@ def _of_samples(view: View, load: Sample, confidence: float, log: bool) -> Cause
     names, x = list(own), np.column_stack(list(own.values()))
     y = values[:MAX_JOINTS]
     response = np.log(y) if log else y
-    ranks = regression.ranks(x, y, confidence, view.design.has_interval("index"))
-    parts: dict[str, NamedTuple] = {"srrc": ranks}
+    srrc = ranks.regression(x, y, confidence, view.design.has_interval("index"))
+    parts: dict[str, NamedTuple] = {"srrc": srrc}
     if study.copula.names or study.sampling.is_matched:
         first = parts["first"] = sensitivity.first_order(x, response, confidence, view.design.has_interval("index"))
     else:
@@ -153,7 +153,7 @@ def _of_samples(view: View, load: Sample, confidence: float, log: bool) -> Cause
         parts["first"] = first
     level = _tail_level(load)
     above = values > level
-    if overrepresentation.FEWEST <= above.sum() <= above.size - overrepresentation.FEWEST:
+    if ranks.FEWEST <= above.sum() <= above.size - ranks.FEWEST:
         parts |= _over_represented(view, names, samples, above, confidence)
     return Causes(
         load=load.name,
@@ -165,7 +165,7 @@ def _of_samples(view: View, load: Sample, confidence: float, log: bool) -> Cause
         unit=load.unit,
         std=float(np.sqrt(first.variance)),
         additive=float(first.estimate.sum()),
-        r2=ranks.r2,
+        r2=srrc.r2,
         table=_table(names, parts),
     )
 
@@ -179,7 +179,7 @@ def _over_represented(
     errors = view.errors(samples[chosen], sampling.columns(study))
     scores = sampling.normal_scores(study, errors)
     z = np.column_stack([scores[name] for name in names])
-    return overrepresentation.tail(z, above[chosen], confidence, view.design.has_interval("index"))._asdict()
+    return ranks.tail(z, above[chosen], confidence, view.design.has_interval("index"))._asdict()
 
 
 def _of_design(view: View, load: Sample, confidence: float, log: bool) -> Causes:

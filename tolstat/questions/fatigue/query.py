@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from tolstat.analysis import cycles, damage, prediction
+from tolstat.analysis import cycles, prediction
 from tolstat.analysis.cycles import Cycles, FloatArray
 from tolstat.analysis.design import Design
 from tolstat.analysis.prediction import DELIVERY
@@ -149,9 +149,9 @@ def equivalent_loads(loading: Loading, shares: Sequence[float] = SHARES, confide
     """
     settings, rows = loading.settings, []
     for m in settings.exponents:
-        values = damage.equivalent_load(loading.cycles, m, settings.revolutions, settings.reference_cycles)
-        nominal = damage.equivalent_load(loading.nominal, m, settings.revolutions, settings.reference_cycles)
-        lacking = damage.truncation_bound(loading.cycles, m)
+        values = cycles.equivalent_load(loading.cycles, m, settings.revolutions, settings.reference_cycles)
+        nominal = cycles.equivalent_load(loading.nominal, m, settings.revolutions, settings.reference_cycles)
+        lacking = cycles.truncation_bound(loading.cycles, m)
         for c, channel in enumerate(loading.cycles.channels):
             head = {"channel": channel, "unit": CHANNELS[channel].unit, "m": m, "nominal": _only(nominal[:, c])}
             head["lacking"] = float(lacking[:, c].max(initial=0.0))
@@ -177,9 +177,9 @@ def damages(loading: Loading, confidence: float = 0.95, delivery: int = DELIVERY
     for channel, values in loading.settings.lines.items():
         if channel not in loading.cycles.channels:
             continue
-        line = damage.Line(*values)
+        line = cycles.Line(*values)
         sums, nominal = (
-            damage.damage(part.of(channel), line, loading.settings.revolutions)[:, 0]
+            cycles.damage(part.of(channel), line, loading.settings.revolutions)[:, 0]
             for part in (loading.cycles, loading.nominal)
         )
         worst.append((sums, nominal))
@@ -187,7 +187,7 @@ def damages(loading: Loading, confidence: float = 0.95, delivery: int = DELIVERY
         rows.append(head | _above_one(loading, sums, confidence, delivery))
     if len(worst) > 1:
         sums, nominal = (np.maximum.reduce(parts) for parts in zip(*worst, strict=True))
-        head = {"channel": ANY, **dict.fromkeys(damage.Line._fields, np.nan), "nominal": _only(nominal)}
+        head = {"channel": ANY, **dict.fromkeys(cycles.Line._fields, np.nan), "nominal": _only(nominal)}
         rows.append(head | _above_one(loading, sums, confidence, delivery))
     return pd.DataFrame(rows)
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from tolstat import sampling
-from tolstat.analysis import overrepresentation
+from tolstat.analysis import ranks
 from tolstat.campaign.remedy import remedy
 from tolstat.common.tables import FAILED, UNSETTLED, Status
 from tolstat.store.view import View
@@ -42,7 +42,7 @@ def their_errors(view: View) -> pd.DataFrame | None:
     Returns
     -------
     DataFrame, optional
-        ``error``, then ``direction`` and ``size`` with ``_lower``, ``_upper`` and ``_p``, `overrepresentation.Part`;
+        ``error``, then ``direction`` and ``size`` with ``_lower``, ``_upper`` and ``_p``, `ranks.Part`;
         the error that differs most first. None if there are too few joints of either kind, or if the joints are not
         drawn from tolerances with equal weights.
 
@@ -57,12 +57,12 @@ def their_errors(view: View) -> pd.DataFrame | None:
         return None
     samples = np.flatnonzero(view.status[:MAX_JOINTS] != Status.PENDING)
     bad = np.isin(view.status[samples], (*FAILED, *UNSETTLED))
-    if min(int(bad.sum()), int((~bad).sum())) < overrepresentation.FEWEST:
+    if min(int(bad.sum()), int((~bad).sum())) < ranks.FEWEST:
         return None
     errors = view.errors(samples)
     scores = {name: own for name, own in sampling.normal_scores(view.study, errors).items() if np.ptp(own) > 0}
     z = np.column_stack(list(scores.values()))
-    found = overrepresentation.tail(z, bad, iid=view.design.has_interval("difference"))
+    found = ranks.tail(z, bad, iid=view.design.has_interval("difference"))
     columns: dict[str, Any] = {"error": list(scores)}
     for key, part in found._asdict().items():
         columns |= {key: part.estimate, f"{key}_lower": part.lower, f"{key}_upper": part.upper, f"{key}_p": part.p}

@@ -49,7 +49,7 @@ def factors(path: Path, limit: Limit, last: NDArray[np.intp]) -> tuple[float, fl
         if found.size < accuracy.LEAST_NEAR:
             return None
         values = np.where(np.isin(own["status"], VALID), load.of(own), -np.inf)
-        low, high = accuracy.corrected(values, np.nan_to_num(accuracy.size(own, name)), found)
+        low, high = accuracy.corrected(values, np.nan_to_num(accuracy.size(own, load.kind)), found)
         for end, loads in zip(ends, (values, low, high), strict=True):
             end.append(loads / level)
     plain, *moved = (float((np.maximum.reduce(end) > 1.0).mean()) for end in ends)

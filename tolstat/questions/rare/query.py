@@ -20,9 +20,8 @@ import numpy as np
 from tolstat import sampling
 from tolstat.analysis import prediction
 from tolstat.analysis.sample import is_valid
-from tolstat.analysis.subset import Candidates, Estimate, Level, Settings, Walk
+from tolstat.analysis.subset import Candidates, Estimate, Level, Walk
 from tolstat.campaign import run as campaign
-from tolstat.campaign.blocks import Execution
 from tolstat.campaign.extend import grow
 from tolstat.campaign.pool import kept_workers
 from tolstat.common.draw_records import SUBSET
@@ -241,7 +240,7 @@ def _run(
 ) -> RareEvent:
     settings = plan.sampling
     assert isinstance(settings, Subset)
-    walk = Walk(Settings(settings.per_level, settings.p0, settings.limit.level), lambda *which: _noise(plan, *which))
+    walk = Walk(settings.per_level, settings.p0, settings.limit.level, lambda *which: _noise(plan, *which))
     unresolved: list[int] = []
     first, told = plan.first_sample, 0
     rows = _rows(out) or first + settings.per_level
@@ -334,10 +333,9 @@ def _simulate(
     progress: Reporter | None,
 ) -> None:
     """Simulate the pending rows of the file, about `count` of them."""
-    execution = Execution(workers=workers)
-    if workers is None and count < MIN_PARALLEL:
-        execution = Execution(workers=1, block=count)
-    campaign.run(_sized(plan, rows), out, execution=execution, tell=tell, check=False, progress=progress)
+    alone = workers is None and count < MIN_PARALLEL
+    workers, block = (1, count) if alone else (workers, None)
+    campaign.run(_sized(plan, rows), out, workers, block, tell=tell, check=False, progress=progress)
 
 
 def _append(plan: Study, out: Path, stage: range, joints: Candidates) -> None:

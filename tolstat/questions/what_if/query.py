@@ -206,7 +206,7 @@ def as_drawn(view: View, load: str, held: Mapping[str, Altered]) -> FloatArray:
     """Load of the joints as drawn, from sample 0 on, NaN without a valid one, (n,): the campaign's, then fresh ones."""
     own = own_joints(view)
     values = view.load(load).values[:own]
-    more, how = held.get(kept.key(sets.as_drawn(view.study).about)), measure(view, load)
+    more, how = held.get(kept.key(sets.as_drawn(view.study, range(0)).about)), measure(view, load)
     if more is None or not how.held(more) or not more.first <= own < more.end:
         return values
     return np.concatenate([values, how.of(more)[own - more.first :]])

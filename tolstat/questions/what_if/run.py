@@ -10,7 +10,7 @@ from typing import NamedTuple
 from tolstat.campaign import what_if as sets
 from tolstat.campaign.checks import no_progress
 from tolstat.campaign.pool import kept_workers
-from tolstat.campaign.what_if import Asked, Wanted
+from tolstat.campaign.what_if import Asked, Change
 from tolstat.common.cores import available_cores
 from tolstat.common.counts import Counts
 from tolstat.common.errors import Fault, StoreError
@@ -208,19 +208,19 @@ class _Run:
             self.simulated += done
         self.each, self.settled = n, self._is_settled()
 
-    def _lacking(self, wanted: Sequence[Wanted]) -> int:
+    def _lacking(self, wanted: Sequence[Change]) -> int:
         return sum(len(sets.missing(self._held, one, self._names)) for one in wanted)
 
-    def _wanted(self, n: int, steps: Sequence[str]) -> list[Wanted]:
+    def _wanted(self, n: int, steps: Sequence[str]) -> list[Change]:
         """Sets of a look, what the order needs first."""
         study, own = self._view.study, query.own_joints(self._view)
-        found = [Wanted(sets.as_drawn(study), range(own, n))] if n > own else []
+        found = [sets.as_drawn(study, range(own, n))] if n > own else []
         for step in steps:
-            found += [Wanted(sets.narrowed(study, line, step), range(n)) for line in self._lines]
+            found += [sets.narrowed(study, line, step, range(n)) for line in self._lines]
         if len(steps) == 1:
             return found
         apart = [line for line in self._lines if query.independent(self._view, line)]
-        return found + [Wanted(sets.exchanged(study, line), range(n // 2)) for line in apart]
+        return found + [sets.exchanged(study, line, range(n // 2)) for line in apart]
 
     def _is_settled(self) -> bool:
         values = query.halves(self._held, list(self._lines), query.measure(self._view, self._load))

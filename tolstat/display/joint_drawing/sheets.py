@@ -39,7 +39,7 @@ MARKED, MOVED, SOFT, HATCH = "#C04A00", COLOURS[0], "#666666", "////"
 TINY, SMALL, PLAIN = 6.8, 8.5, 9.0
 """Sizes of letters, points."""
 HEADS = ("e\nµm", "t\nµm", "z\nµm", "tilt t\ndeg", "tilt z\ndeg", "⌀\nµm")
-COLUMNS = (0.42, 0.86, 1.26, 1.68, 2.08, 2.4)
+COLUMNS = (0.4, 0.79, 1.17, 1.6, 2.02, 2.4)
 """Heads of the numbers of one joint, and their places: inches from the middle of the panel."""
 X, Y = np.eye(2)
 
@@ -111,11 +111,11 @@ def _front(ax: Axes, d: Dimensions, marked: Collection[str]) -> None:
         _label(ax, (1.0 + away) * marker, f"cross{k + 1}", marked, CROSS, rotation=90 * (k > 1), fontsize=SMALL)
     radius = min(0.3 * inch, 0.8 * d.r_b)
     _turning(ax, 0.0 * X, -radius * Y, radius * X, "ω", "front.omega")
-    for name, x, y, level in (("r_b", d.r_b, 0.1 * inch, 0.7), ("R", d.R, d.eye + 0.04 * inch, 0.98)):
-        a, b, line = np.array([-x, -y]), -(d.end + 0.5 * inch) * Y, -(d.end + level * inch)
-        _dimension(ax, a, b, (line + y) * Y, f"{name} = {_millimetres(x)}", va="top")
+    for name, x, y, level in (("r_b", d.r_b, 0.1 * inch, 0.76), ("R", d.R, d.eye + 0.04 * inch, 0.98)):
+        a, b, line = np.array([-x, -y]), -(d.end + 0.62 * inch) * Y, -(d.end + level * inch)
+        _dimension(ax, a, b, (line + y) * Y, f" {name} = {_millimetres(x)}", "left")
     corner = np.array([-d.eye - 0.04 * inch, d.end])
-    _dimension(ax, corner, corner - d.z * Y, -0.25 * inch * X, f"z = {_millimetres(d.z)} ", ha="right")
+    _dimension(ax, corner, corner - d.z * Y, -0.25 * inch * X, f"z = {_millimetres(d.z)} ", "right")
     foot, gap = np.array([0.7 * inch, d.end + 0.12 * inch]), 0.5 * (d.hole - d.pin)
     _line(ax, np.array([0.5 * d.pin + 0.5 * gap, d.R + 0.3 * d.z]), foot)
     said = f"pin ⌀ {_millimetres(d.pin)}\nhole ⌀ {_millimetres(d.hole)}\nradial clearance {_millimetres(gap)}"
@@ -146,7 +146,7 @@ def _side(ax: Axes, d: Dimensions, marked: Collection[str]) -> None:
     shaft, beam, thick = 0.26 * d.R, min(0.5 * d.arm[0], d.eye), 0.5 * d.arm[1]
     yoke = max(d.l_f, d.eye) + 0.1 * d.R
     bridge, end = yoke + 0.2 * d.R, yoke + 0.95 * d.R
-    inch = max(end / 2.25, d.end / 1.65)
+    inch = max(end / 2.15, d.end / 1.65)
     _frame(ax, inch, -2.3, 2.3)
     _pins(ax, d, (2, 3), geometry.SIDE, marked, inch)
     along, wide = geometry.SIDE @ d.triads[7, 2], max(beam, 1.2 * shaft)
@@ -161,9 +161,9 @@ def _side(ax: Axes, d: Dimensions, marked: Collection[str]) -> None:
         for begin, stop, low, high in (*strips, (bridge, end, -shaft, shaft)):
             _part(ax, strip(begin * way, stop * way, low, high), colour, marked=name in marked)
         _turning(ax, end * way, -0.45 * shaft * way, 1.3 * shaft * left, text, f"side.{name}")
-        _axis(ax, -0.5 * end * way, (end + 0.1 * inch) * way)
+        _axis(ax, -0.5 * end * way, (end + 0.22 * inch) * way)
         below = -0.5 * shaft * np.sign(left[1]) * left
-        _label(ax, (yoke + 0.52 * d.R) * way + below, f"{name} shaft", marked, rotation=angle, fontsize=SMALL)
+        _label(ax, (yoke + 0.52 * d.R) * way + below, f"{name} shaft", marked, colour, rotation=angle, fontsize=SMALL)
     for radius, colour, name in (
         (d.eye, OUTPUT, "arm4"),
         (0.5 * d.hole, "white", "hole4"),
@@ -171,12 +171,12 @@ def _side(ax: Axes, d: Dimensions, marked: Collection[str]) -> None:
     ):
         _part(ax, circle(0.0 * X, radius), colour, f"side.{name}", name in marked)
     _label(ax, -0.24 * d.pin * Y, "pin 1", marked, CROSS)
-    _axis(ax, 0.0 * X, (end + 0.1 * inch) * X)
+    _axis(ax, 0.0 * X, (end + 0.22 * inch) * X)
     low = 1.25 * shaft + 0.12 * inch
     near = max(0.12 * inch, low - (end - 0.5 * inch) * np.tan(abs(d.alpha)))
     said = f"α = {np.degrees(d.alpha):.4g}°".replace("-", "−")
     _label(ax, np.array([2.4 * inch, free * near]), said, ha="right")
-    size, theta = 2.0 * end + 0.16 * inch, sorted((0.0, turned))
+    size, theta = 2.0 * end + 0.4 * inch, sorted((0.0, turned))
     ax.add_patch(Arc((0.0, 0.0), size, size, theta1=theta[0], theta2=theta[1], lw=0.8, color=INK))
     fork1, fork2, _, fork4 = d.markers[4:] @ geometry.SIDE.T
     rise, beside = (d.end + 0.2 * inch) * Y, max(d.eye + 0.12 * inch, d.root + 0.05 * inch) * X
@@ -211,16 +211,15 @@ def _kinds(ax: Axes, pairs: Mapping[str, Pair], d: Dimensions) -> None:
 def _moved(ax: Axes, feature: Feature, nominal: Feature, z: float, view: Array, middle: Array, name: str) -> None:
     """Draw a pin or hole with its error; without, dashed; and arrows from one to the other."""
     tint, hatch = (CROSS, None) if "pin" in name else (OUTPUT, HATCH)
-    moved: dict[str, Any] = {"edgecolor": MOVED, "facecolor": tint, "hatch": hatch}
-    dashed: dict[str, Any] = {"edgecolor": SOFT, "facecolor": "none", "linestyle": (0.0, (4.0, 2.0)), "linewidth": 0.9}
+    moved: dict[str, Any] = {"edgecolor": MOVED, "hatch": hatch}
+    dashed: dict[str, Any] = {"edgecolor": SOFT, "linestyle": (0.0, (4.0, 2.0)), "linewidth": 0.9}
     tops, sides = [], []
-    for own, look in ((feature, moved), (nominal, dashed)):
+    for state, own, look in (("moved", feature, moved), ("ideal", nominal, dashed)):
         centre, e = middle + view @ own.point, view @ own.axis
-        for outline in _outlines(
-            own, centre + 0.5 * z * np.array([-e, e]), own.diameter, geometry.WALL * nominal.diameter
-        ):
-            _part(ax, outline, **look)
-        tops.append(centre + (0.5 * z + 0.07 * (z + nominal.diameter)) * e)
+        ends, wall = centre + 0.5 * z * np.array([-e, e]), geometry.WALL * nominal.diameter
+        for i, outline in enumerate(_outlines(own, ends, own.diameter, wall), 1):
+            _part(ax, outline, tint if own is feature else "none", f"{name}.{state}.{i}", **look)
+        tops.append(centre + (0.5 * z + 0.2 * (z + nominal.diameter)) * e)
         sides.append(middle + 0.5 * own.diameter * np.array([-X, X]))
         _axis(ax, 2.0 * centre - tops[-1], tops[-1], color=look["edgecolor"])
     tips, tails = sides if "diameter" in name else np.array(tops)[:, None]
@@ -246,15 +245,16 @@ def _row(ax: Axes, pairs: Sequence[Pair], d: Dimensions, factor: float) -> None:
                     _part(ax, outline, colour, f"{own.name}.{way}.{k}", **look)
             _axis(ax, at - 0.36 * inch * Y, at + 0.36 * inch * Y)
     for i, (pin, hole) in enumerate(pairs):
-        at = inch * np.array([-0.2, 1.0 - 0.8 * i])
+        at = inch * np.array([-0.25, 1.0 - 0.8 * i])
         said = f"{pin.name} in {hole.name}: clearance {1e6 * clearance((pin, hole)):.4g} µm".replace("-", "−")
         _label(ax, at + 0.27 * inch * Y, said, ha="left", fontsize=TINY, fontweight="bold")
         _label(ax, at, f"{pin.name}\n{hole.name}", ha="left", fontsize=TINY)
-        for kind, head, column in zip(geometry.MEANINGS, HEADS, COLUMNS, strict=True):
-            unit = np.degrees(1.0) if "tilt" in kind else 1e6
-            text = "\n".join(f"{round(unit * own.errors[kind], 4):.4g}" for own in (pin, hole)).replace("-", "−")
+        for kind, column in zip(geometry.MEANINGS, COLUMNS, strict=True):
+            unit, digits = (np.degrees(1.0), 4) if "tilt" in kind else (1e6, 1)
+            text = "\n".join(f"{round(unit * own.errors[kind], digits):.4g}" for own in (pin, hole)).replace("-", "−")
             _label(ax, inch * np.array([column, 1.0 - 0.8 * i]), text, ha="right", fontsize=TINY)
-            _label(ax, inch * np.array([column, 1.72]), head, ha="right", fontsize=TINY)
+    for head, column in zip(HEADS, COLUMNS, strict=True):
+        _label(ax, inch * np.array([column, 1.72]), head, ha="right", fontsize=TINY)
     foot = (
         f"To scale: pin ⌀ {_millimetres(d.pin)}, contact {_millimetres(d.z)} long. Errors, clearance: × {factor:g}.\n"
     )
@@ -266,8 +266,8 @@ def _outlines(own: Feature, ends: Array, diameter: float, wall: float, across: A
     """Outline of a pin; of a hole those of its wall on either side, of the axis that has these ends on the drawing."""
     half = 0.5 * diameter
     if own.name.startswith("pin"):
-        return [strip(*ends, -half, half, across)]
-    return [strip(*ends, sign * half, sign * (half + wall), across) for sign in (-1.0, 1.0)]
+        return [strip(ends[0], ends[1], -half, half, across)]
+    return [strip(ends[0], ends[1], sign * half, sign * (half + wall), across) for sign in (-1.0, 1.0)]
 
 
 def _frame(ax: Axes, inch: float, low: float, high: float) -> None:
@@ -301,7 +301,7 @@ def _label(ax: Axes, at: Array, text: str, marked: Collection[str] = (), on: str
         {"color": MARKED, "fontweight": "bold"} if any(name in text.replace("pin ", "pin") for name in marked) else {}
     )
     look |= {"bbox": {"facecolor": on, "edgecolor": "none", "pad": 1.0}} if on else {}
-    ax.text(*at, text, **(look | given))
+    ax.text(at[0], at[1], text, **(look | given))
 
 
 def _arrow(ax: Axes, tail: Array, tip: Array, name: str = "", **given: Any) -> None:
@@ -320,13 +320,13 @@ def _turning(ax: Axes, middle: Array, back: Array, up: Array, text: str, name: s
     _label(ax, arc[-1] + 0.65 * (arc[-1] - arc[-9]), text, style="italic")
 
 
-def _dimension(ax: Axes, a: Array, b: Array, away: Array, text: str, **given: Any) -> None:
-    """Draw a dimension of what lies between two places, its line shifted from `a` by `away`, with its text."""
+def _dimension(ax: Axes, a: Array, b: Array, away: Array, text: str, ha: str) -> None:
+    """Draw a dimension of what lies between two places, its line shifted from `a` by `away`, with its text at `b`."""
     foot, tip = a + away, b + (a - b + away) @ away / (away @ away) * away
     _line(ax, a, foot, lw=0.5, color=SOFT)
     _line(ax, b, tip, lw=0.5, color=SOFT)
     _arrow(ax, foot, tip, arrowstyle="<|-|>,head_width=0.12,head_length=0.35", lw=0.7)
-    _label(ax, 0.5 * (foot + tip), text, fontsize=SMALL, **given)
+    _label(ax, tip, text, ha=ha, fontsize=SMALL)
 
 
 def _bushing(ax: Axes, at: Array, name: str, marked: Collection[str]) -> None:

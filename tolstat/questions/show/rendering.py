@@ -63,7 +63,13 @@ def read(source: str | Path, row: int | None = None, alpha: str | None = None) -
         first = case.points[0].name if isinstance(case, study.Study) else ""
         shown = Shown(case.joint, case.operation.alpha, f"{path.stem}, at {first}" if first else path.stem)
     else:
-        joint = joints.load(source, {}, str(source))
+        try:
+            joint = joints.load(source, {}, str(source))
+        except InputError as error:
+            if path.suffix == ".toml":
+                raise
+            remedy = error.faults[0].remedy
+            raise InputError([Fault(str(source), "is neither a file nor the name of a joint", remedy)]) from error
         shown = Shown(joint, given, joint.description or path.stem)
     return shown._replace(alpha=given) if alpha else shown
 

@@ -144,7 +144,7 @@ def _of_sweep(view: View) -> Section:
         Panel(
             f"sweep-{group}-{kind.symbol}",
             f"{group.capitalize()} bushings, {QUANTITY[kind.unit]}",
-            f"Largest {QUANTITY[kind.unit]}s of the {group} bushings against the swept value",
+            f"Largest {QUANTITY[kind.unit]} of the {group} bushings against the swept value",
             partial(_sweep, view=view, group=group, kind=kind),
             (4.9, 3.3 + room),
             top=room,

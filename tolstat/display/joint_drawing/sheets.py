@@ -334,7 +334,7 @@ def _bushing(ax: Axes, at: Array, name: str, marked: Collection[str]) -> None:
     stands_out = name in marked or (name == "fork4" and "fork3" in marked)
     size, face, edge, cross = (13.0, MARKED, MARKED, "white") if stands_out else (9.5, "white", INK, INK)
     ax.plot(*at, "o", ms=size, mfc=face, mec=edge, mew=1.2, zorder=4, gid=name)
-    ax.plot(*at, "+", ms=size, mec=cross, mew=0.8, zorder=4.1)
+    ax.plot(*at, "+", ms=size, color=cross, mew=0.8, zorder=4.1)
 
 
 def _triad(ax: Axes, at: Array, axes: Array, view: Array, inch: float, name: str) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon
 from matplotlib.text import Annotation
 from typer.testing import CliRunner
@@ -22,12 +23,12 @@ from tolstat.common.loads import LOADS
 from tolstat.common.tables import HOLES
 from tolstat.display import drawing
 from tolstat.display.asked import Asked
-from tolstat.display.joint_drawing import error_kinds, front, one_joint, side
-from tolstat.display.joint_drawing.geometry import FRONT, KINDS, SIDE
+from tolstat.display.joint_drawing import sheets
+from tolstat.display.joint_drawing.geometry import FRONT, MEANINGS, SIDE
 from tolstat.joint import nominal_errors, perturb
 from tolstat.kernel.mechanics import bushing
 from tolstat.kernel.mechanics.topology import ARM, ARM_OF_PIN, BUSHING_BASE, FRAME, PIN, TRIAD
-from tolstat.questions.show import query, rendering, section, source
+from tolstat.questions.show import rendering, section
 from tolstat.store import ResultFile
 
 ALPHA = 0.3
@@ -43,16 +44,20 @@ SHORT = {"pin": {"l": "15 mm"}}
 """A joint whose hub reaches nearly to the holes."""
 
 
-def drawn(draw, *args, size=(4.9, 4.9), **kwargs):
-    """Names of what is drawn, with its points: corners of parts, tail and tip of arrows."""
-    figure = Figure(figsize=size)
+def drawn(panel):
+    """Names of what is drawn, with its points: corners of parts, tail and tip of arrows, middles of bushings."""
+    figure = Figure(figsize=panel.size)
     with drawing.settings():
-        draw(figure.add_axes((0, 0, 1, 1)), *args, **kwargs)
+        panel.draw(figure.add_axes((0, 0, 1, 1)))
         FigureCanvasAgg(figure).draw()
     found = {}
-    for artist in figure.findobj(lambda one: one.get_gid() is not None and isinstance(one, (Annotation, Polygon))):
-        ends = isinstance(artist, Annotation)
-        found[artist.get_gid()] = np.array([artist.xyann, artist.xy]) if ends else artist.get_xy()[:-1]
+    for artist in figure.findobj(lambda one: one.get_gid() is not None):
+        if isinstance(artist, Annotation):
+            found[artist.get_gid()] = np.array([artist.xyann, artist.xy])
+        elif isinstance(artist, Polygon):
+            found[artist.get_gid()] = artist.get_xy()[:-1]
+        elif isinstance(artist, Line2D):
+            found[artist.get_gid()] = artist.get_xydata()
     return found, figure
 
 
@@ -69,7 +74,7 @@ def axes_of_parts():
 
 
 def test_front_view_has_pins_in_the_holes_of_the_kernels_arms(cirelli):
-    found, _ = drawn(front.draw, query.dimensions(cirelli, ALPHA))
+    found, _ = drawn(sheets.joint(rendering.dimensions(cirelli, ALPHA))[0])
     for k, arm in enumerate(ARM_OF_PIN):
         e, t, _ = TRIAD[PIN + k]
         middle = found[f"front.pin{k + 1}"].mean(axis=0)
@@ -79,29 +84,30 @@ def test_front_view_has_pins_in_the_holes_of_the_kernels_arms(cirelli):
         for letter, axis in (("e", e), ("t", t)):
             assert along(found[f"front.pin{k + 1}.{letter}"]) == pytest.approx(axis[:2])
         assert found[f"cross{k + 1}"].mean(axis=0) == pytest.approx(cirelli.cross.r_b * e[:2])
-    assert FRONT.towards == pytest.approx(TRIAD[PIN, 2])
+    assert np.cross(*FRONT) == pytest.approx(TRIAD[PIN, 2])
 
 
 def test_side_view_has_the_output_fork_at_the_misalignment(cirelli):
-    found, _ = drawn(side.draw, query.dimensions(cirelli, ALPHA))
+    found, _ = drawn(sheets.joint(rendering.dimensions(cirelli, ALPHA))[1])
     axes = axes_of_parts()
     for k in (0, 1):
         e, _, z = axes[4 + k]
-        assert along(found[f"side.arm{k + 1}.e"]) == pytest.approx(SIDE.of(e))
+        assert along(found[f"side.pin{k + 3}.e"]) == pytest.approx(SIDE @ e)
         marker = cirelli.cross.R * e - cirelli.arm.l_f * z
-        assert found[f"fork{k + 1}"].mean(axis=0) == pytest.approx(SIDE.of(marker))
+        assert found[f"fork{k + 1}"].mean(axis=0) == pytest.approx(SIDE @ marker)
     output = np.array([np.sin(ALPHA), 0.0, np.cos(ALPHA)])  # docs/model.md, Frames
-    assert found["fork4"].mean(axis=0) == pytest.approx(SIDE.of(cirelli.arm.l_f * output))
-    assert SIDE.towards == pytest.approx(axes[0, 0])  # pin 1 is in front
+    assert found["fork4"].mean(axis=0) == pytest.approx(SIDE @ (cirelli.arm.l_f * output))
+    towards = np.cross(*SIDE)
+    assert towards == pytest.approx(axes[0, 0])  # pin 1 is in front
     # on the near side a shaft that turns forward moves the way of its axis times the direction towards the reader
-    for name, sense in (("side.omega", 1.0), ("side.torque", -1.0)):
-        shaft = np.array([0.0, 0.0, 1.0]) if name == "side.omega" else output
-        assert along(found[name]) @ SIDE.of(np.cross(shaft, SIDE.towards)) * sense > 0.8
+    for name, sense in (("side.input", 1.0), ("side.output", -1.0)):
+        shaft = np.array([0.0, 0.0, 1.0]) if name == "side.input" else output
+        assert along(found[name]) @ SIDE @ np.cross(shaft, towards) * sense > 0.8
 
 
 def test_markers_are_those_of_the_kernels_bushings(cirelli, params):
     """`bushing.markers` gives places in axes of the base: hub, input shaft, output shaft."""
-    d, frames = query.dimensions(cirelli, ALPHA), naive.frames(0.0, ALPHA)
+    d, frames = rendering.dimensions(cirelli, ALPHA), naive.frames(0.0, ALPHA)
     assert d.triads == pytest.approx(axes_of_parts())
     for i, base in enumerate(BUSHING_BASE):
         _, on_base = bushing.markers(i, params(ALPHA)[0])
@@ -110,10 +116,10 @@ def test_markers_are_those_of_the_kernels_bushings(cirelli, params):
 
 @pytest.fixture(scope="module")
 def arrows(cirelli):
-    return drawn(error_kinds.draw, query.positive(cirelli), (0.076, 0.0762), 0.022)[0]
+    return drawn(sheets.errors(rendering.positive(cirelli), rendering.dimensions(cirelli, 0.0)))[0]
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", MEANINGS)
 @pytest.mark.parametrize("name", ["pin", "hole"])
 def test_arrow_of_an_error_has_the_sense_that_perturb_gives_it(cirelli, arrows, kind, name):
     """A small positive error of pin 1 or hole 4, in axes of its frame, against the arrow on the drawing."""
@@ -132,7 +138,7 @@ def test_arrow_of_an_error_has_the_sense_that_perturb_gives_it(cirelli, arrows, 
     e, t, z = TRIAD[PIN if name == "pin" else ARM + 3]
     right, up = (z, e) if kind in ("offset_z", "tilt_t") else (-t, e)
     expected = np.array([change @ right, change @ up])
-    assert along(arrows[f"{kind}.{name}.arrow"]) @ expected / np.hypot(*expected) == pytest.approx(1.0, abs=0.02)
+    assert along(arrows[f"{kind}.{name}.arrow.1"]) @ expected / np.hypot(*expected) == pytest.approx(1.0, abs=0.02)
     assert np.cross(right, up) == pytest.approx(z if right is not z else t)
 
 
@@ -140,14 +146,14 @@ def test_gaps_of_a_joint_are_its_clearances_and_errors_enlarged(cirelli, random_
     errors = nominal_errors(1)
     for name, value in random_errors(5).items():
         errors[name.replace("__", ".")] = value
-    par, (pin, z) = perturb(cirelli, OPERATION, errors)[0], (cirelli.contact.D_P, cirelli.contact.z)
-    pairs = query.pairs(cirelli, errors)
-    factor = one_joint.enlargement(pairs, pin, z)
-    found, _ = drawn(one_joint.draw, pairs, pin, z)
+    par, z = perturb(cirelli, OPERATION, errors)[0], cirelli.contact.z
+    panel = sheets.one(rendering.pairs(cirelli, errors), rendering.dimensions(cirelli, 0.0), "", "row")
+    (factor,) = map(float, re.findall(r"enlarged (\S+) times", panel.description))
+    found, _ = drawn(panel)
     for i, arm in enumerate(ARM_OF_PIN):
         e, t, own_z = TRIAD[PIN + i]
         for way, right in (("along_z", -t), ("along_t", own_z)):
-            inner_left, outer_left, outer_right, inner_right = found[f"{PINS[i]}.{way}"]
+            inner_left, outer_left, outer_right, inner_right = found[f"{PINS[i]}.{way}.1"]
             left, other = (found[f"{HOLES[arm]}.{way}.{k}"] for k in (1, 2))
             for end, s in ((0, -0.5 * z), (1, 0.5 * z)):
                 apart = (
@@ -157,24 +163,32 @@ def test_gaps_of_a_joint_are_its_clearances_and_errors_enlarged(cirelli, random_
                 drawn_right = other[end][0] - (inner_right, outer_right)[end][0]
                 assert drawn_left == pytest.approx(factor * (par["clearance"][i] + apart @ right), abs=2e-8 * factor)
                 assert drawn_right == pytest.approx(factor * (par["clearance"][i] - apart @ right), abs=2e-8 * factor)
-            shift = 0.25 * (inner_left + outer_left + outer_right + inner_right)[1]
-            assert shift == pytest.approx(factor * par["pin_point"][i] @ e, abs=1e-9)
+            shift = found[f"{PINS[i]}.{way}.1"].mean(axis=0) - 0.5 * (left + other).mean(axis=0)
+            assert shift[1] == pytest.approx(factor * (par["pin_point"][i] - par["hole_point"][arm]) @ e, abs=1e-9)
 
 
 def test_a_joint_without_errors_and_clearance_is_drawn_as_it_is(cirelli):
     contact = {"D_H": "76 mm", "k1u": "7.5e7 N/mm^2", "k2u": "1.2e6 N/mm"}
     fitting = joints.load("cirelli2021", {"contact": contact}, "test")
-    pairs = query.pairs(fitting, nominal_errors(1))
-    assert one_joint.enlargement(pairs, 0.076, 0.022) == 1.0
-    assert drawn(one_joint.draw, pairs, 0.076, 0.022)
+    panel = sheets.one(rendering.pairs(fitting, nominal_errors(1)), rendering.dimensions(fitting, 0.0), "", "row")
+    assert "enlarged 1 times" in panel.description
+    assert drawn(panel)
+
+
+def test_sizes_are_written_beside_the_drawing(cirelli):
+    front, side = sheets.joint(rendering.dimensions(cirelli, ALPHA))
+    words = [{text.get_text().strip() for text in drawn(panel)[1].findobj(mpl.text.Text)} for panel in (front, side)]
+    sizes = "pin ⌀ 76 mm\nhole ⌀ 76.2 mm\nradial clearance 0.1 mm"
+    assert {"R = 72.82 mm", "r_b = 36.41 mm", "z = 22 mm", sizes} <= words[0]
+    assert f"α = {np.degrees(ALPHA):.4g}°" in words[1]
 
 
 @pytest.mark.parametrize("alpha", [-20.0, 0.0, 15.0, 32.0])
 @pytest.mark.parametrize("over", [{}, SLIM, SHORT], ids=["paper", "slim", "short"])
 def test_labels_are_inside_and_apart(over, alpha):
-    d = query.dimensions(joints.load("cirelli2021", over, "test"), np.radians(alpha))
-    for view in (front, side):
-        _, figure = drawn(view.draw, d, marked=("cross1", "cross3", "fork4", "pin1"))
+    d = rendering.dimensions(joints.load("cirelli2021", over, "test"), np.radians(alpha))
+    for panel in sheets.joint(d, ("cross1", "cross3", "fork4", "pin1")):
+        _, figure = drawn(panel)
         renderer = figure.canvas.get_renderer()
         texts = [text for text in figure.findobj(mpl.text.Text) if text.get_text() and text.get_visible()]
         boxes = {text.get_text() + str(i): text.get_window_extent(renderer) for i, text in enumerate(texts)}
@@ -184,11 +198,24 @@ def test_labels_are_inside_and_apart(over, alpha):
             assert figure.bbox.y0 <= box.y0 < box.y1 <= figure.bbox.y1, name
         over_each_other = [(a, b) for a, b in combinations(boxes, 2) if boxes[a].overlaps(boxes[b])]
         assert over_each_other == []
-        if view is front:
-            corners = np.array([(-d.root, -d.root), (d.root, d.root)])
-            hub = mpl.transforms.Bbox(figure.axes[0].transData.transform(corners))
-            for name, box in boxes.items():
-                assert not name.startswith("cross") or not box.overlaps(hub), name
+
+
+@pytest.mark.parametrize("over", [{}, SLIM], ids=["paper", "slim"])
+def test_labels_of_errors_are_inside_and_apart(over, random_errors):
+    joint = joints.load("cirelli2021", over, "test")
+    errors, d = nominal_errors(1), rendering.dimensions(joint, 0.0)
+    for name, value in random_errors(6).items():
+        errors[name.replace("__", ".")] = value
+    for panel in (
+        sheets.errors(rendering.positive(joint), d),
+        sheets.one(rendering.pairs(joint, errors), d, "", "row"),
+    ):
+        _, figure = drawn(panel)
+        renderer = figure.canvas.get_renderer()
+        texts = [text for text in figure.findobj(mpl.text.Text) if text.get_text() and text.get_visible()]
+        boxes = [text.get_window_extent(renderer) for text in texts]
+        assert all(figure.bbox.x0 <= box.x0 < box.x1 <= figure.bbox.x1 for box in boxes)
+        assert not any(a.overlaps(b) for a, b in combinations(boxes, 2))
 
 
 @pytest.fixture
@@ -247,7 +274,7 @@ def test_row_prints_the_errors_of_the_file(here):
     lines = {line.split()[0]: line.split()[1:] for line in done.stdout.splitlines()[1:]}
     with ResultFile.open(path) as store:
         errors = store.errors(slice(17, 18))
-        shown = source.read(path, 17)
+        shown = rendering.read(path, 17)
     assert shown.errors == errors
     for name in (*PINS, *HOLES):
         assert float(lines[name][1]) == pytest.approx(1e3 * errors[f"{name}.offset_t"][0], abs=5e-5)
@@ -263,9 +290,8 @@ def test_row_prints_the_errors_of_the_file(here):
         (("none.toml",), "none.toml: cannot be read"),
         (("none.h5",), "none.h5: is neither a file nor"),
         (("small.h5", "--row", 1000), "has rows 0 to 60, not 1000"),
-        (("small.h5", "--alpha", "3 deg"), "--alpha: is used with a joint file only"),
-        (("cirelli2021", "--alpha", "3"), "--alpha: '3' has no unit"),
-        (("cirelli2021", "--alpha", "95 deg"), "--alpha: a Cardan joint cannot turn"),
+        (("cirelli2021", "--alpha", "3"), "--alpha: alpha: '3' has no unit"),
+        (("cirelli2021", "--alpha", "95 deg"), "--alpha: alpha: a Cardan joint cannot turn"),
         (("cirelli2021", "--out", "joint.txt"), "--out joint.txt: is not a picture"),
         (("small.h5", "--errors", "--row", 2), "--errors: cannot be used together with --row"),
     ],
@@ -289,7 +315,7 @@ def test_page_marks_the_leading_loads_and_draws_the_worst_joints(tmp_path):
     assert (marked.key, marked.title) == ("joint-worst", "fork2: nearest to its limit")
     assert "Marked: fork2." in marked.description
     panels = joint.blocks[0].panels
-    assert [panel.key for panel in panels] == ["joint-front", "joint-side", "joint-pin", "error-kinds"]
+    assert [panel.key for panel in panels] == ["joint-front", "joint-side", "error-kinds"]
     assert f"Marked: {', '.join(sorted(places))}." in panels[0].description
     assert {panel.key for panel in part.blocks[0].panels} == {f"drawn-{row}" for row in worst}
     assert asked.notes == []

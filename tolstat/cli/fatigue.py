@@ -58,7 +58,7 @@ def fatigue(
     parts that fail in the service life, with 95 % intervals. Without load histories in the file, the joints are
     simulated again. From cycles in the file: quantiles of the damage-equivalent load over the joints, and for each S-N
     line of a load the share of joints whose damage sum exceeds 1. Without --by, prints the most loaded component of
-    each bushing force and torque. All settings are those of [fatigue] in the study of the first FILE.
+    each bushing force and bending moment. All settings are those of [fatigue] in the study of the first FILE.
 
     The operating points of FILE form a duty cycle, by the share of the time that [[operation]] gives each; so do
     several files, with the same joints at one operating point each.

@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from tolstat.cli._app import make_folder, output_folder
 from tolstat.cli._talk import say
 from tolstat.common.errors import Fault, InputError
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from tolstat.questions.show.source import Shown
 
 FORMATS = (".svg", ".png", ".pdf")
 
@@ -37,7 +31,7 @@ def show(
     ] = None,
     alpha: Annotated[
         str | None,
-        typer.Option("--alpha", metavar="ANGLE", help='Misalignment for a joint file, which has none; "15 deg".'),
+        typer.Option("--alpha", metavar="ANGLE", help='Misalignment in place of the source\'s; "15 deg".'),
     ] = None,
     columns: Annotated[
         int, typer.Option("--columns", metavar="N", min=1, max=2, help="Drawings of the joint side by side: 1 or 2.")
@@ -55,20 +49,10 @@ def show(
     Example: tolstat show studies/iso2768_f.toml --out joint.svg
     """
     from tolstat.display import style
-    from tolstat.questions.show import source as sources
+    from tolstat.display.table import as_text, plain
+    from tolstat.questions.show import rendering
 
     target = out or Path("errors.svg" if errors else "joint.svg" if row is None else f"row{row}.svg")
-    _check(errors, row, target)
-    shown = sources.read(source, row, None if alpha is None else _angle(alpha))
-    figure, table = _drawn(shown, errors, columns)
-    make_folder(target.parent)
-    with output_folder(target.parent):
-        (path,) = style.save(figure, target.with_suffix(""), (target.suffix.lower(),))
-    typer.echo(table)
-    say(f"wrote {path}")
-
-
-def _check(errors: bool, row: int | None, target: Path) -> None:
     faults = []
     if errors and row is not None:
         faults.append(Fault("--errors", "cannot be used together with --row", "give one of them"))
@@ -76,34 +60,15 @@ def _check(errors: bool, row: int | None, target: Path) -> None:
         faults.append(Fault(f"--out {target}", "is not a picture", f"end its name in {', '.join(FORMATS)}"))
     if faults:
         raise InputError(faults)
-
-
-def _angle(text: str) -> float:
-    from pydantic_core import PydanticCustomError
-
-    from tolstat.common.units import to_si
-
-    try:
-        angle, found = to_si(text, "rad"), "a Cardan joint cannot turn at 90 deg or more"
-    except PydanticCustomError as error:
-        angle, found = math.inf, error.message()
-    if not abs(angle) < 0.5 * math.pi:
-        raise InputError([Fault("--alpha", found, 'write --alpha "15 deg"')])
-    return angle
-
-
-def _drawn(shown: Shown, errors: bool, columns: int) -> tuple[Figure, str]:
-    """Return the figure, and the table of its numbers as text."""
-    from tolstat.display.table import as_text, cells
-    from tolstat.display.text import align
-    from tolstat.questions.show import query, rendering
-
+    joint, own_alpha, title, own_errors = rendering.read(source, row, alpha)
     if errors:
-        rows = cells(rendering.MEANING, rendering.meanings())
-        return rendering.draw_errors(shown.joint), align(rows, words=(True, True, True))
-    if shown.errors is not None:
-        figure = rendering.draw_row(shown.joint, shown.errors, shown.title)
-        return figure, as_text(rendering.NUMBERS, rendering.numbers(query.pairs(shown.joint, shown.errors)))
-    figure = rendering.draw_joint(shown.joint, shown.alpha, shown.title, columns)
-    rows = cells(rendering.LENGTHS, rendering.lengths(shown.joint, shown.alpha))
-    return figure, align(rows, words=(True, True, True))
+        figure, table = rendering.draw_errors(joint), rendering.meanings()
+    elif own_errors is not None:
+        figure, table = rendering.draw_row(joint, own_errors, title), rendering.numbers(joint, own_errors)
+    else:
+        figure, table = rendering.draw_joint(joint, own_alpha, title, columns), rendering.lengths(joint, own_alpha)
+    make_folder(target.parent)
+    with output_folder(target.parent):
+        (path,) = style.save(figure, target.with_suffix(""), (target.suffix.lower(),))
+    typer.echo(as_text(plain(table), table))
+    say(f"wrote {path}")

@@ -25,7 +25,8 @@ def simulate(
     """Simulate one joint, with and without its errors.
 
     Prints status and course of the simulation, and the largest value of each load in the last revolution beside that of
-    the joint without errors: forces and torques of the bushings, contact forces of the pins, and psi.
+    the joint without errors: forces of the bushings, bending moments at the roots of pins and arms, contact forces of
+    the pins, and psi.
 
     Example: tolstat simulate studies/tilted_pin.toml --out loads.csv
     """

@@ -176,9 +176,9 @@ LOAD_KINDS = (
     Kind(
         "T",
         "T",
-        "bushing torque",
+        "bending moment at the root of pin or arm",
         "N*m",
-        f"modulus of the bushing torque {OVER}",
+        f"modulus of the bending moment at the root of pin or arm (torque of the bushing) {OVER}",
         BUSHINGS,
         decides=True,
         shown=True,

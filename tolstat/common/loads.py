@@ -171,11 +171,11 @@ LOADS = {load.name: load for load in _entries()}
 UNIT_OF_LOAD = {load.name: load.unit for load in LOADS.values()}
 """SI unit of each load."""
 SHOWN_LOADS = tuple(load.name for load in LOADS.values() if load.kind.shown)
-"""Loads that every report shows if the study keeps them: force and torque of each bushing."""
+"""Loads that every report shows if the study keeps them: force and bending moment of each bushing."""
 PANELS = tuple((group, kind) for group in ("cross", "fork") for kind in LOAD_KINDS if kind.shown)
 """Groups of bushings and kinds of loads; figures of a whole campaign have a panel for each."""
-QUANTITY = {"N": "force", "N*m": "torque"}
-"""What loads of a unit are called."""
+QUANTITY = {"N": "force", "N*m": "bending moment at the root"}
+"""What the loads of a bushing are called, by unit; the root is that of the pin or arm."""
 ANY_LIMIT = "any limit"
 """Name of all limits of a study together: a joint is above it if it is above at least one of them."""
 LOAD_FIELDS = ("status", *(f"{key}_{of}" for key in SPAN for of in ("max", "lower", "upper")))

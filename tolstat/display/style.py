@@ -95,7 +95,7 @@ def settings() -> Iterator[None]:
 
 
 def panels(title: str, subtitle: str) -> tuple[Figure, list[tuple[str, Kind, Axes]]]:
-    """Make a page of four panels: force and torque of the cross bushings above those of the fork bushings.
+    """Make a page of four panels: force and bending moment of the cross bushings above those of the fork bushings.
 
     Parameters
     ----------

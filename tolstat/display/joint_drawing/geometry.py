@@ -10,10 +10,25 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-KINDS = ("offset_e", "offset_t", "offset_z", "tilt_t", "tilt_z", "diameter")
-"""Kinds of errors of a pin or hole."""
+MEANINGS = {
+    "offset_e": "axis moved along e, outwards",
+    "offset_t": "axis moved along t",
+    "offset_z": "axis moved along z",
+    "tilt_t": "axis turned about t",
+    "tilt_z": "axis turned about z",
+    "diameter": "pin thicker, hole wider",
+}
+"""Kinds of errors of a pin or hole, and what a positive value does."""
 WALL = 0.12
 """Wall around a hole, relative to its diameter: the model has no such dimension, and drawings need one."""
+FRONT = np.array([(1.0, 0.0, 0.0), (0.0, 1.0, 0.0)])
+"""Directions of view are the axes that point to the right and upwards. Ground x and y: from the output side."""
+SIDE = np.array([(0.0, 0.0, 1.0), (1.0, 0.0, 0.0)])
+"""Ground z, the input shaft, to the right, x upwards: both shafts lie in this plane."""
+ALONG_Z = np.array([(0.0, -1.0, 0.0), (1.0, 0.0, 0.0)])
+"""For points in a triad (e, t, z): e upwards, t to the left, z towards the reader."""
+ALONG_T = np.array([(0.0, 0.0, 1.0), (1.0, 0.0, 0.0)])
+"""For points in a triad (e, t, z): e upwards, z to the right, t towards the reader."""
 
 
 class Dimensions(NamedTuple):
@@ -34,9 +49,8 @@ class Dimensions(NamedTuple):
         Misalignment of the shafts.
     triads : ndarray, shape (8, 3, 3)
         Rows e, t, z of pins 1 to 4 and arms 1 to 4, in ground axes.
-    centres, markers : ndarray, shape (8, 3)
-        Middles of pins 1 to 4 and holes 1 to 4; markers of the bushings cross1 to cross4 and fork1 to fork4. Ground
-        axes, m.
+    markers : ndarray, shape (8, 3)
+        Markers of the bushings cross1 to cross4 and fork1 to fork4, in ground axes, m.
     arm_of_pin : tuple of int
         Arm, 0 to 3, in whose hole each pin turns.
     """
@@ -52,14 +66,8 @@ class Dimensions(NamedTuple):
     arm: tuple[float, float]
     alpha: float
     triads: Array
-    centres: Array
     markers: Array
     arm_of_pin: tuple[int, ...]
-
-    @property
-    def clearance(self) -> float:
-        """Radial clearance, m."""
-        return 0.5 * (self.hole - self.pin)
 
     @property
     def end(self) -> float:
@@ -73,103 +81,55 @@ class Dimensions(NamedTuple):
 
 
 class Feature(NamedTuple):
-    """Axis of a pin or hole in its triad: coordinates along e, t, z.
+    """A pin or hole, with its errors.
 
     Attributes
     ----------
-    point : ndarray, shape (3,)
-        Shift of the axis' point from the ideal middle, m.
-    axis : ndarray, shape (3,)
-        Direction of the axis; (1, 0, 0) without tilt.
+    name : str
+        ``"pin1"``, ``"hole4"``.
     diameter : float
         m.
+    point : ndarray, shape (3,)
+        Shift of the axis' point from the ideal middle, along e, t, z, m.
+    axis : ndarray, shape (3,)
+        Direction of the axis, along e, t, z; (1, 0, 0) without tilt.
+    errors : mapping
+        Its errors by kind, SI.
     """
 
-    point: Array
-    axis: Array
+    name: str
     diameter: float
+    point: Array = np.zeros(3)
+    axis: Array = np.eye(3)[0]
+    errors: Mapping[str, float] = {}
+
+    def ends(self, length: float, factor: float = 1.0) -> Array:
+        """Ends of the axis, (2, 3), at -length/2 and length/2 along e, the deviation from the ideal axis enlarged."""
+        middle, e = np.outer((-0.5 * length, 0.5 * length), self.axis / self.axis[0]), np.eye(3)[0]
+        ideal = np.outer((-0.5 * length, 0.5 * length), e)
+        return np.asarray(ideal + factor * (middle - ideal + self.point))
 
 
-class Pair(NamedTuple):
-    """A pin and the hole that it turns in, with their errors.
+Pair = tuple[Feature, Feature]
+"""A pin and the hole that it turns in."""
 
-    Attributes
-    ----------
-    names : tuple of str
-        ``("pin1", "hole4")``.
-    pin, hole : Feature
-        Their axes, in the triad that pin and arm have in common.
-    clearance : float
-        Radial clearance, m.
-    errors : tuple of mapping
-        Errors of pin and hole by kind, SI.
+
+def clearance(pair: Pair) -> float:
+    """Radial clearance of a pin in its hole, m."""
+    return 0.5 * (pair[1].diameter - pair[0].diameter)
+
+
+def strip(a: Array, b: Array, low: float, high: float, across: Array | None = None) -> Array:
+    """Corners (4, 2) of a strip along the line from `a` to `b`, at distances from `low` to `high` to its left.
+
+    With `across`, a vector on the drawing, distances are along it.
     """
-
-    names: tuple[str, str]
-    pin: Feature
-    hole: Feature
-    clearance: float
-    errors: tuple[Mapping[str, float], Mapping[str, float]]
-
-
-class View(NamedTuple):
-    """Direction of view: the axes that point to the right and upwards on the drawing; the third is towards the reader.
-
-    Attributes
-    ----------
-    right, up : tuple of float
-        Unit vectors.
-    """
-
-    right: tuple[float, float, float]
-    up: tuple[float, float, float]
-
-    def of(self, points: Array) -> Array:
-        """Coordinates on the drawing, (..., 2), of points (..., 3)."""
-        return np.asarray(np.asarray(points, float) @ np.array([self.right, self.up]).T)
-
-    @property
-    def towards(self) -> Array:
-        """Unit vector towards the reader."""
-        return np.cross(self.right, self.up)
-
-
-FRONT = View((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
-"""Ground x to the right, y upwards: along the input shaft, from the output side."""
-SIDE = View((0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
-"""Ground z, the input shaft, to the right, x upwards: both shafts lie in this plane."""
-ALONG_Z = View((0.0, -1.0, 0.0), (1.0, 0.0, 0.0))
-"""For points in a triad (e, t, z): e upwards, t to the left, z towards the reader."""
-ALONG_T = View((0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
-"""For points in a triad (e, t, z): e upwards, z to the right, t towards the reader."""
-
-
-def bar(a: Array, b: Array, width: float) -> Array:
-    """Corners (4, 2) of a bar of some width whose axis runs from `a` to `b` on the drawing."""
-    along = np.asarray(b, float) - a
-    across = 0.5 * width * np.array([-along[1], along[0]]) / np.hypot(*along)
-    return np.array([a + across, b + across, b - across, a - across])
-
-
-def around(centre: Array, e: Array, length: float, diameter: float) -> Array:
-    """Corners (4, 2) of a cylinder on the drawing: its middle, its axis as a unit vector, length and diameter."""
-    return bar(centre - 0.5 * length * e, centre + 0.5 * length * e, diameter)
-
-
-def walls(centre: Array, e: Array, length: float, diameter: float, wall: float) -> tuple[Array, Array]:
-    """Section through a hole: corners (4, 2) of the wall on either side of its axis, which is a unit vector."""
-    across = 0.5 * (diameter + wall) * np.array([-e[1], e[0]])
-    left, right = (around(centre + side * across, e, length, wall) for side in (1.0, -1.0))
-    return left, right
+    way = np.asarray(b) - a
+    across = np.array([-way[1], way[0]]) / np.hypot(*way) if across is None else across
+    return np.array([a + low * across, b + low * across, b + high * across, a + high * across])
 
 
 def circle(centre: Array, radius: float) -> Array:
     """Points (n, 2) of a circle."""
     angle = np.linspace(0.0, 2.0 * np.pi, 97)[:-1]
     return np.asarray(centre) + radius * np.column_stack([np.cos(angle), np.sin(angle)])
-
-
-def round_number(x: float) -> float:
-    """Largest of 1, 2, 5, 10, 20, ... and of 0.5, 0.2, ... that is not above x."""
-    power = 10.0 ** np.floor(np.log10(x))
-    return float(max(step * power for step in (1.0, 2.0, 5.0) if step * power <= x * (1.0 + 1e-9)))

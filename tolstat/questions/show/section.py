@@ -14,7 +14,7 @@ from tolstat.display import text
 from tolstat.display.asked import Asked
 from tolstat.display.blocks import Panel, Panels, Section, Text
 from tolstat.display.joint_drawing import sheets
-from tolstat.questions.show import query
+from tolstat.questions.show import rendering
 from tolstat.store.points import point_of
 from tolstat.store.recorded import joint_of
 from tolstat.store.view import View
@@ -42,25 +42,24 @@ def worst(view: View, load: str, asked: Asked) -> Panel | None:
     """
     with asked.noting("the joint is not drawn"):
         place = load_of(load).place if load else PLACES[""]
-        front, side, _ = _joint(view, [place.name], load)
+        front, side = _joint(view, [place.name], load)
         title = "The joint"
         if load:
-            own = view.load(load)
-            exceeded = own.limit is not None and own.above(own.limit).count
-            title = f"{place.name or load}: {'most often above its limit' if exceeded else 'nearest to its limit'}"
-            title = title if own.limit is not None else f"{place.name or load}: the largest loads"
+            own, title = view.load(load), f"{place.name or load}: the largest loads"
+            if own.limit is not None:
+                often = "most often above" if own.above(own.limit).count else "nearest to"
+                title = f"{place.name or load}: {often} its limit"
             title += f", at {point_of(view, load)}" if len(view.points) > 1 else ""
         return replace(side if place.view == "side" else front, key="joint-worst", title=title)
     return None
 
 
-def _joint(view: View, marked: Collection[str], load: str) -> tuple[Panel, Panel, Panel]:
+def _joint(view: View, marked: Collection[str], load: str) -> tuple[Panel, Panel]:
     """Drawings of the joint at the operating point at which a load matters most; at the first one without a load."""
     point = point_of(view, load) if load else view.points[0]
-    front, side, pin = sheets.joint(
-        query.dimensions(joint_of(view.store, 0), view.at(point).store.operation.alpha), marked
-    )
-    return front, replace(side, title=f"{side.title}, at {point}") if point else side, pin
+    d = rendering.dimensions(joint_of(view.store, 0), view.at(point).store.operation.alpha)
+    front, side = sheets.joint(d, marked)
+    return front, replace(side, title=f"{side.title}, at {point}") if point else side
 
 
 def sections(view: View, asked: Asked) -> list[Section]:
@@ -68,20 +67,14 @@ def sections(view: View, asked: Asked) -> list[Section]:
     found = []
     if view.method != "sweep":
         with asked.noting("the worst joints are not drawn"):
-            panels = _worst(view)
-            if panels:
+            if panels := _worst(view):
                 found.append(Section("drawn", "The worst joints, drawn", [Panels(panels), Text(WORST, small=True)]))
     with asked.noting("the joint and its errors are not drawn"):
         marked = sorted({load_of(name).place.name for name in view.leading} - {""})
         joint = joint_of(view.store, 0)
-        kinds = sheets.errors(query.positive(joint), query.dimensions(joint, 0.0))
-        found.append(
-            Section(
-                "joint",
-                "The joint",
-                [Panels([*_joint(view, marked, next(iter(view.leading), "")), kinds]), Text(LEGEND, small=True)],
-            )
-        )
+        kinds = sheets.errors(rendering.positive(joint), rendering.dimensions(joint, 0.0))
+        panels = [*_joint(view, marked, next(iter(view.leading), "")), kinds]
+        found.append(Section("joint", "The joint", [Panels(panels), Text(LEGEND, small=True)]))
     return found
 
 
@@ -96,7 +89,6 @@ def _worst(view: View) -> list[Panel]:
     panels = []
     for sample, said in loads.items():
         joint, row = joint_of(view.store, int(view.slots(sample))), int(view.rows(sample))
-        errors = view.errors(np.array([sample]))
-        d = query.dimensions(joint, 0.0)
-        panels.append(sheets.one(query.pairs(joint, errors), d, f"Row {row}: {', '.join(said)}", f"drawn-{row}"))
+        pairs, d = rendering.pairs(joint, view.errors(np.array([sample]))), rendering.dimensions(joint, 0.0)
+        panels.append(sheets.one(pairs, d, f"Row {row}: {', '.join(said)}", f"drawn-{row}"))
     return panels

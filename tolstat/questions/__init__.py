@@ -40,7 +40,6 @@ if TYPE_CHECKING:
     from tolstat.questions.show.rendering import draw_errors as draw_errors
     from tolstat.questions.show.rendering import draw_joint as draw_joint
     from tolstat.questions.show.rendering import draw_row as draw_row
-    from tolstat.questions.sorting.query import sorted_joints as sorted_joints
     from tolstat.questions.time_above.query import time_above as time_above
     from tolstat.questions.what_if.query import what_if as what_if
     from tolstat.store.view import View
@@ -125,7 +124,7 @@ QUESTIONS = (
     Folder("what_if", ("query.what_if",), has_section=True),
     Folder("exceedance", has_section=True, has_summary=True),
     Folder("known_parts", has_section=True),
-    Folder("sorting", ("query.sorted_joints",), "Decide", ("sorting",), has_section=True),
+    Question("sorting", "Decide", "Compute yield and cost before and after parts are sorted.", "open"),
     Folder("histograms", has_section=True),
     Question("capability", "Read", "Compute yield and Cpk against each limit of the study.", "folded", counted=True),
     Folder("lots", ("query.lots_of",), "Read", ("lots",), has_section=True, has_summary=True),

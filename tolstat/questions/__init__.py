@@ -36,7 +36,6 @@ if TYPE_CHECKING:
     from tolstat.questions.orders.query import orders_of as orders_of
     from tolstat.questions.rare.query import rare_event as rare_event
     from tolstat.questions.reweight.query import reweighted as reweighted
-    from tolstat.questions.selective.query import assembled as assembled
     from tolstat.questions.show.rendering import draw_errors as draw_errors
     from tolstat.questions.show.rendering import draw_joint as draw_joint
     from tolstat.questions.show.rendering import draw_row as draw_row
@@ -161,7 +160,7 @@ QUESTIONS = (
     Folder("allocate", ("query.allocated",), "Decide", ("allocate",)),
     Folder("compare", ("query.compared",), "Decide", ("compare",)),
     Folder("rare", ("query.rare_event",), "Decide", ("rare",)),
-    Folder("selective", ("query.assembled",), "Decide", ("selective",), has_section=True),
+    Question("selective", "Decide", "Compute yield and unmatched parts of selective assembly.", "folded"),
 )
 
 PUBLIC = {

@@ -27,7 +27,6 @@ from tolstat.questions.bearing_life.rendering import curve
 from tolstat.questions.fatigue import parts_rendering
 from tolstat.questions.known_parts import rendering as known_rendering
 from tolstat.questions.known_parts.query import intervals
-from tolstat.questions.lots import rendering as lots_rendering
 
 mpl.use("Agg")
 from matplotlib import pyplot as plt
@@ -166,11 +165,8 @@ def duty_cycle(folder: Path) -> None:
 def lots(folder: Path) -> None:
     """Draw the shares of the lots, as the page does."""
     with tolstat.open(folder / "lots.h5") as store:
-        found = tolstat.lots_of(store.view())
-    figure, ax = plt.subplots(figsize=(7, 3.6), layout="constrained")
-    lots_rendering.draw(ax, found)
-    ax.grid(alpha=0.3)
-    save(figure, folder / "lots.png")
+        answer = tolstat.lots(store.view())
+    as_on_page(answer, (7, 3.6), folder / "lots.png")
 
 
 def kind(status: np.ndarray) -> np.ndarray:

@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from tolstat.questions.fatigue.query import equivalent_loads as equivalent_loads
     from tolstat.questions.fatigue.query import load_cycles as load_cycles
     from tolstat.questions.fatigue.stress import load_stresses as load_stresses
-    from tolstat.questions.lots.query import lots_of as lots_of
     from tolstat.questions.orders.query import orders_of as orders_of
     from tolstat.questions.rare.query import rare_event as rare_event
     from tolstat.questions.reweight.query import reweighted as reweighted
@@ -126,7 +125,7 @@ QUESTIONS = (
     Question("sorting", "Decide", "Compute yield and cost before and after parts are sorted.", "open"),
     Folder("histograms", has_section=True),
     Question("capability", "Read", "Compute yield and Cpk against each limit of the study.", "folded", counted=True),
-    Folder("lots", ("query.lots_of",), "Read", ("lots",), has_section=True, has_summary=True),
+    Question("lots", "Read", "Compute which share of a lot or of a delivery exceeds limits.", "folded", counted=True),
     Folder(
         "causes",
         ("query.causes_of", "angles.against_angle", "pairs.pairs_of", "tail.worst_joints"),

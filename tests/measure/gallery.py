@@ -25,8 +25,6 @@ from tolstat.display.blocks import Panels
 from tolstat.joint import operating
 from tolstat.questions.bearing_life.rendering import curve
 from tolstat.questions.fatigue import parts_rendering
-from tolstat.questions.known_parts import rendering as known_rendering
-from tolstat.questions.known_parts.query import intervals
 
 mpl.use("Agg")
 from matplotlib import pyplot as plt
@@ -81,11 +79,8 @@ def welded_fork(folder: Path) -> None:
 def known_parts(folder: Path) -> None:
     """Draw the three intervals of the shares exceeded most, as the page does."""
     with tolstat.open(folder / "known_parts.h5") as store:
-        table = intervals(store.view()).head(6)
-    with style.settings():
-        figure, ax = plt.subplots(figsize=(6.5, 3.6), layout="constrained")
-        known_rendering.forest(ax, table)
-        save(figure, folder / "known_parts.png")
+        answer = tolstat.known_parts(store.view())
+    as_on_page(answer, (6.5, 3.6), folder / "known_parts.png")
 
 
 def sorting(folder: Path) -> None:

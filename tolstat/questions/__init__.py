@@ -121,7 +121,7 @@ class Folder(NamedTuple):
 QUESTIONS = (
     Folder("what_if", ("query.what_if",), has_section=True),
     Folder("exceedance", has_section=True, has_summary=True),
-    Folder("known_parts", has_section=True),
+    Question("known_parts", "", "Estimate what measured parts leave open of each share.", "open"),
     Question("sorting", "Decide", "Compute yield and cost before and after parts are sorted.", "open"),
     Folder("histograms", has_section=True),
     Question("capability", "Read", "Compute yield and Cpk against each limit of the study.", "folded", counted=True),
@@ -193,7 +193,7 @@ def sections(view: View, asked: Asked) -> list[Section]:
             asked.stage(f"page: {question.name}")
             with asked.noting(f"{question.name} is left out"), suppress(NotApplicable):
                 answer = question.on_page(view, asked)
-                found.append(Section(question.name, answer.title, answer.blocks()))
+                found.append(Section(question.name.replace("_", "-"), answer.title, answer.blocks()))
     return found
 
 

@@ -14,9 +14,7 @@ from tests.conftest import CHEAP
 from tests.support.environment import ROOT
 from tolstat import cli
 from tolstat.cli import LISTED
-from tolstat.questions import PUBLIC
-from tolstat.questions.lots import query as lots
-from tolstat.questions.selective import query as selective
+from tolstat.questions import PUBLIC, lots, selective
 
 DOCS = ROOT / "docs"
 PAGES = [
@@ -176,10 +174,10 @@ def folder(example_files: Path, tmp_path_factory: pytest.TempPathFactory) -> Pat
     tolstat.run(
         tolstat.load(made / "studies" / "known_parts.toml", n=60), made / "known_parts.h5", workers=1, check=False
     )
-    few = lots.study_of(made / "studies" / "lots.toml", 30, 2)
+    few = lots.study_of(tolstat.load(made / "studies" / "lots.toml"), 30, 2)
     tolstat.run(few, made / "lots_lots.h5", workers=1, check=False)
     for classes in (1, 3):
-        few = selective.study_of(made / "studies" / "selective.toml", classes, 20)
+        few = selective.study_of(tolstat.load(made / "studies" / "selective.toml"), classes, 20)
         tolstat.run(few, made / f"selective_k{classes}.h5", workers=1, check=False)
     return made
 

@@ -12,7 +12,6 @@ from tests.support import synthetic
 from tolstat import study
 from tolstat.common.tables import Status
 from tolstat.questions.compare import query as compare
-from tolstat.questions.lots import query as lots
 
 LIMITED = synthetic.REAL.partition("[limits]")[0] + '[limits]\n"cross1.F" = "700 N"\n'
 OF_LOTS = (
@@ -75,8 +74,8 @@ def test_lots_of_a_slice_are_those_of_the_campaign(tmp_path: Path) -> None:
     plan, path = load(tmp_path, OF_LOTS), tmp_path / "part.h5"
     tolstat.run(plan, path, workers=1, rows=range(18, 185), check=False)
     with tolstat.open(path) as store:
-        found = lots.lots_of(store.view())
-        shares, above = found.shares, store.results()["F_max"][:, 0] > 650.0
+        answer = tolstat.lots(store.view())
+        shares, above = answer.frame("lots"), store.results()["F_max"][:, 0] > 650.0
     samples = np.arange(17, 184)  # the nominal joint is row 0
     lot, n = np.unique(samples // 5, return_counts=True)
     assert shares["lot"].tolist() == lot.tolist()

@@ -20,13 +20,11 @@ from tolstat.analysis.binomial import clopper_pearson
 from tolstat.common.loads import split
 from tolstat.common.tables import Status
 from tolstat.display import style
+from tolstat.display.answer import Answer
+from tolstat.display.blocks import Panels
 from tolstat.joint import operating
 from tolstat.questions.bearing_life.rendering import curve
 from tolstat.questions.fatigue import parts_rendering
-from tolstat.questions.known_parts import rendering as known_rendering
-from tolstat.questions.known_parts.query import intervals
-from tolstat.questions.lots import rendering as lots_rendering
-from tolstat.questions.sorting import rendering as sorting_rendering
 
 mpl.use("Agg")
 from matplotlib import pyplot as plt
@@ -40,6 +38,15 @@ def save(figure: plt.Figure, target: Path) -> None:
     figure.savefig(target, dpi=130)
     plt.close(figure)
     print(target)
+
+
+def as_on_page(answer: Answer, size: tuple[float, float], target: Path) -> None:
+    """Write the first picture of an answer in another size, without its title."""
+    pictures = next(part for part in answer.parts if isinstance(part, Panels))
+    with style.settings():
+        figure, ax = plt.subplots(figsize=size, layout="constrained")
+        pictures.panels[0].draw(ax)
+        save(figure, target)
 
 
 def tilted_pin(folder: Path) -> None:
@@ -72,21 +79,15 @@ def welded_fork(folder: Path) -> None:
 def known_parts(folder: Path) -> None:
     """Draw the three intervals of the shares exceeded most, as the page does."""
     with tolstat.open(folder / "known_parts.h5") as store:
-        table = intervals(store.view()).head(6)
-    with style.settings():
-        figure, ax = plt.subplots(figsize=(6.5, 3.6), layout="constrained")
-        known_rendering.forest(ax, table)
-        save(figure, folder / "known_parts.png")
+        answer = tolstat.known_parts(store.view())
+    as_on_page(answer, (6.5, 3.6), folder / "known_parts.png")
 
 
 def sorting(folder: Path) -> None:
     """Draw yield and cost before and after sorting, as the page does."""
     with tolstat.open(folder / "sorting.h5") as store:
-        table = tolstat.sorted_joints(store.view()).stages.head(3)
-    with style.settings():
-        figure, ax = plt.subplots(figsize=(6.5, 2.6), layout="constrained")
-        sorting_rendering.yields(ax, table)
-        save(figure, folder / "sorting.png")
+        answer = tolstat.sorting(store.view())
+    as_on_page(answer, (6.5, 2.6), folder / "sorting.png")
 
 
 def overnight(folder: Path) -> None:
@@ -159,11 +160,8 @@ def duty_cycle(folder: Path) -> None:
 def lots(folder: Path) -> None:
     """Draw the shares of the lots, as the page does."""
     with tolstat.open(folder / "lots.h5") as store:
-        found = tolstat.lots_of(store.view())
-    figure, ax = plt.subplots(figsize=(7, 3.6), layout="constrained")
-    lots_rendering.draw(ax, found)
-    ax.grid(alpha=0.3)
-    save(figure, folder / "lots.png")
+        answer = tolstat.lots(store.view())
+    as_on_page(answer, (7, 3.6), folder / "lots.png")
 
 
 def kind(status: np.ndarray) -> np.ndarray:

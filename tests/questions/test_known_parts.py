@@ -8,7 +8,8 @@ from tests.support import synthetic
 from tolstat import sampling
 from tolstat.analysis.process import Known
 from tolstat.campaign import extend, run
-from tolstat.questions.known_parts import query
+from tolstat.common.errors import NotApplicable
+from tolstat.questions.known_parts import known_parts
 from tolstat.report import headline, page
 from tolstat.store import ResultFile
 
@@ -48,7 +49,7 @@ def test_more_parts_later_narrow_the_verdict_and_too_few_are_refused(stored, tmp
             text = PLAN.replace("known_from = 30", f"known_from = {parts}")
             view = store.view(own)
             own.write_text(text, encoding="utf-8")
-            row = query.intervals(view).iloc[0]
+            row = known_parts(view).tables["intervals"].rows[0]
             spans.append(row["both_upper"] - row["both_lower"])
             answers.append(headline.headline(view, 0.9).answer)
             assert row["lower"] <= row["estimate"] <= row["upper"]
@@ -59,9 +60,19 @@ def test_more_parts_later_narrow_the_verdict_and_too_few_are_refused(stored, tmp
 
 def test_random_joints_do_not_support_what_few_parts_leave_open_and_the_remedy_is_told(tmp_path):
     with ResultFile.open(synthetic.store(tmp_path, RANDOM.replace("known_from = 30", "known_from = 8"))) as store:
-        found = headline.headline(store.view(), 0.5)
+        found, answer = headline.headline(store.view(), 0.5), known_parts(store.view())
     assert found.answer == "none"
+    table, words = answer.parts
+    assert np.isnan(table.rows[0]["both_upper"])
+    assert words.text.startswith("The joints do not support ")
+    assert 'parts = { "pin*.offset_t" = 8 }' in words.text
     assert 'parts = { "pin*.offset_t" = 8 }' in found.words
+
+
+def test_tolerances_that_are_exact_leave_nothing_open(tmp_path):
+    exact = synthetic.store(tmp_path, RANDOM.replace(", known_from = 30", ""))
+    with ResultFile.open(exact) as store, pytest.raises(NotApplicable, match="no share that measured parts leave open"):
+        known_parts(store.view())
 
 
 @pytest.mark.slow

@@ -15,14 +15,14 @@ from tolstat.analysis import allocation, clustered, exceedance
 from tolstat.campaign import stop_rule
 from tolstat.campaign.extend import merge
 from tolstat.cli import app
-from tolstat.common.errors import InputError, StoreError
+from tolstat.common.errors import InputError, NotApplicable, StoreError
 from tolstat.common.loads import ANY_LIMIT
 from tolstat.common.tables import Status
 from tolstat.display import drawing
 from tolstat.display.asked import Asked
 from tolstat.display.table import as_text
+from tolstat.questions import lots as question
 from tolstat.questions.capability import capability
-from tolstat.questions.lots import query, rendering, section
 
 LIMIT = {"cross1.F": 700.0, "fork1.T": 40.0}
 STUDY = (
@@ -50,11 +50,12 @@ def of_lots(n=801, size=20, **kwargs):
 
 def test_table_counts_lots_and_predicts_the_next_delivery():
     made = of_lots()
-    found = query.lots_of(made, delivery=100, accepted=0.1)
+    answer = question.lots(made, delivery=100, accepted=0.1)
     above = made.load(ANY_LIMIT).values > 1.0
     by_lot = above.reshape(-1, 20).sum(axis=1)
-    row = found.table.iloc[-1]
-    assert (found.shares[ANY_LIMIT] == by_lot).all()
+    row = answer.tables["limits"].rows[-1]
+    assert (answer.frame("lots")[ANY_LIMIT] == by_lot).all()
+    assert answer.facts == {"joints_per_lot": 20}
     assert (row["lots"], row["n"], row["count"]) == (40, 800, above.sum())
     assert row["without"] == np.mean(by_lot == 0)
     assert row["worst"] == by_lot.max() / 20
@@ -62,9 +63,10 @@ def test_table_counts_lots_and_predicts_the_next_delivery():
     law = clustered.law_of(by_lot, np.full(40, 20)).delivery(100)
     assert (row["next_lower"], row["next_upper"]) == law.ends()
     assert row["bad"] == law.more_than(0.1)
-    assert "more than 10 %" in rendering.note(found, 0.1)
-    assert "bad deliveries" in as_text(rendering.COLUMNS, found.table)
-    assert "bad deliveries" not in as_text(rendering.COLUMNS, query.lots_of(made).table)
+    assert "bad deliveries: more than 10 % of the joints above" in [getattr(part, "text", "") for part in answer.parts]
+    table, plain = answer.tables["limits"], question.lots(made).tables["limits"]
+    assert "bad deliveries" in as_text(table.columns, table.rows)
+    assert "bad deliveries" not in as_text(plain.columns, plain.rows)
 
 
 def test_joints_without_a_load_count_both_ways():
@@ -74,7 +76,7 @@ def test_joints_without_a_load_count_both_ways():
             if table.dtype[name].base.kind == "f":
                 table[name][:60] = np.nan
 
-    whole, lossy = (query.lots_of(of_lots(change=change)).table.iloc[-1] for change in (None, lose))
+    whole, lossy = (question.lots(of_lots(change=change)).tables["limits"].rows[-1] for change in (None, lose))
     assert lossy["n_failed"] == 60
     assert lossy["next_upper"] > whole["next_upper"]
     assert lossy["upper"] > whole["upper"]
@@ -94,11 +96,11 @@ def test_joints_that_share_lots_are_not_independent_anywhere():
 
 
 def test_what_needs_independent_joints_is_refused(tmp_path):
-    plan = query.study_of(_study(tmp_path), 30, 2)
+    plan = question.study_of(tolstat.load(_study(tmp_path)), 30, 2)
     rule = stop_rule.parse("P(cross1.F > 700 N) width < 0.1", {})
     with pytest.raises(InputError, match="share lots"):
         stop_rule.run_until(plan, tmp_path / "a.h5", rule, print)
-    assert query.study_of(plan.path).sampling.joints_per_lot == query.JOINTS
+    assert question.study_of(tolstat.load(plan.path)).sampling.joints_per_lot == question.JOINTS
 
 
 def test_halves_are_of_whole_lots():
@@ -110,11 +112,16 @@ def test_halves_are_of_whole_lots():
 
 def test_fewer_than_thirty_lots_and_joints_on_their_own_are_refused():
     with pytest.raises(StoreError, match="joints of 29 lots"):
-        query.lots_of(of_lots(n=29 * 20 + 1))
+        question.lots(of_lots(n=29 * 20 + 1))
     assert np.isnan(of_lots(n=29 * 20 + 1).load("cross1.F").above(700.0).lower)
-    with pytest.raises(StoreError, match="its own lot"):
-        query.lots_of(view(limits=LIMIT))
-    assert section.sections(view(limits=LIMIT), None) == []
+    with pytest.raises(NotApplicable, match="its own lot"):
+        question.lots(view(limits=LIMIT))
+    with pytest.raises(NotApplicable):
+        question.lots_on_page(view(limits=LIMIT), Asked("a.h5"))
+    (few,) = question.lots_on_page(of_lots(n=29 * 20 + 1), Asked("a.h5")).parts
+    assert few.text == "No lots: has joints of 29 lots simulated, and fewer than 30 have no interval."
+    with pytest.raises(InputError, match="600 lots of 500 joints"):
+        question.lots(of_lots(), from_lots=600)
 
 
 def _study(folder):
@@ -137,7 +144,7 @@ def _perturb(joint, operation, errors):
 
 @pytest.mark.slow
 def test_from_toml_to_page_with_the_same_bytes_however_it_is_run(tmp_path):
-    plan = query.study_of(_study(tmp_path), 30, 4)
+    plan = question.study_of(tolstat.load(_study(tmp_path)), 30, 4)
     whole, merged, stopped = (tmp_path / f"{name}.h5" for name in ("whole", "merged", "stopped"))
     run = partial(fakes.run, plan, block=None, draw_blocks=sampling.draw_blocks, perturb=_perturb)
     run(whole)
@@ -147,14 +154,30 @@ def test_from_toml_to_page_with_the_same_bytes_however_it_is_run(tmp_path):
     merge(parts, merged)
     run(stopped, until_row=17)
     with pytest.raises(StoreError, match="joints of 4 lots"), tolstat.open(stopped) as store:
-        tolstat.lots_of(store.view())
+        tolstat.lots(store.view())
     run(stopped, block=50)
     assert [_bytes(path) == _bytes(whole) for path in (merged, stopped)] == [True, True]
     done = CliRunner().invoke(app, ["lots", str(whole), "--json"])
-    assert len(json.loads(done.stdout)["lots"]) == 30
+    assert len(json.loads(done.stdout)["tables"]["lots"]["rows"]) == 30
     with tolstat.open(whole) as store:
         assert store.view().study.sampling.joints_per_lot == 4
-        shown = section.sections(store.view(), Asked(whole))
-    panel = shown[0].blocks[0].panels[0]
+        answer = question.lots_on_page(store.view(), Asked(whole))
+    panel = answer.parts[0].panels[0]
     assert panel.title == "30 lots: which share of their joints is bad"
     assert "path" in drawing.svg(panel)[0]
+
+
+@pytest.mark.slow
+def test_command_simulates_a_study_into_a_folder_and_options_of_a_simulation_need_a_study(tmp_path, monkeypatch):
+    fakes.replace_functions(monkeypatch, **fakes.FUNCTIONS | {"draw_blocks": sampling.draw_blocks, "perturb": _perturb})
+    words = ["lots", str(_study(tmp_path)), "--lots", "30", "--joints", "3", "--workers", "1"]
+    out = tmp_path / "out"
+    done = CliRunner().invoke(app, [*words, "--out", str(out)])
+    assert done.exit_code == 0, done.stderr
+    names = ["small_lots.h5", *(f"small_lots_{name}" for name in ("limits.csv", "lots.csv", "lots.png", "lots.svg"))]
+    assert sorted(path.name for path in out.iterdir()) == names
+    again = CliRunner().invoke(app, ["lots", str(out / "small_lots.h5"), "--delivery", "60"])
+    assert "of 60" in again.stdout
+    refused = CliRunner().invoke(app, ["lots", str(out / "small_lots.h5"), "--lots", "40"])
+    assert refused.exit_code == 2
+    assert "hint: give a study (TOML)" in refused.stderr

@@ -5,15 +5,17 @@ from functools import partial
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from typer.testing import CliRunner
 
 import tolstat
 from tests.support import fakes, synthetic
 from tolstat import sampling
 from tolstat.campaign.extend import merge
-from tolstat.common.errors import InputError, StoreError
+from tolstat.cli import app
+from tolstat.common.errors import InputError, NotApplicable
 from tolstat.display.asked import Asked
 from tolstat.display.table import as_text
-from tolstat.questions.selective import query, rendering, section
+from tolstat.questions import selective as question
 
 STUDY = (
     synthetic.HEAD
@@ -45,41 +47,41 @@ def folder(tmp_path_factory):
     made = tmp_path_factory.mktemp("selective")
     (made / "small.toml").write_text(STUDY, encoding="utf-8")
     for classes in (1, 3):
-        RUN(query.study_of(made / "small.toml", classes), made / f"k{classes}.h5")
+        RUN(question.study_of(tolstat.load(made / "small.toml"), classes), made / f"k{classes}.h5")
     return made
 
 
 def test_table_has_yield_and_unmatched_parts_by_number_of_classes(folder):
     with tolstat.open(folder / "k1.h5") as plain, tolstat.open(folder / "k3.h5") as of_three:
         views = [of_three.view(), plain.view()]
-        found = tolstat.assembled(views)
-        classes, load = query.classes_of(views[0]), views[0].load("any limit")
-    one, three = found.table.to_dict("records")
+        answer = tolstat.selective(*views)
+        classes, load = question.classes_of(views[0]), views[0].load("any limit")
+    pictures, table = answer.parts[:2]
+    one, three = table.rows
     assert (one["classes"], one["unmatched"], three["classes"]) == (1, 0.0, 3)
     assert three["unmatched"] == classes.unmatched == 1.0 - classes.shares.min(axis=0).sum() > 0.3
     assert three["good"] == 1.0 - np.mean(load.values > 1.0)
     assert three["good_lower"] < three["good"] < three["good_upper"]
     assert three["of_all"] == (1.0 - three["unmatched"]) * three["good"]
     assert three["clearance"] < one["clearance"]
-    assert "of all crosses" in as_text(rendering.COLUMNS, found.table)
+    assert "of all crosses" in as_text(table.columns, table.rows)
     ax = Figure().add_subplot()
-    rendering.draw(ax, found)
+    pictures.panels[0].draw(ax)
     assert [line.get_ydata()[1] for line in ax.lines] == [100.0 * three[key] for key in ("good", "unmatched", "of_all")]
 
 
 def test_page_has_the_classes_and_other_campaigns_have_no_section(folder):
     with tolstat.open(folder / "k3.h5") as store:
-        (found,) = section.sections(store.view(), Asked(folder / "k3.h5"))
-    said, table = found.blocks[0].text, found.blocks[1]
-    assert "of the crosses and forks have no partner" in said
+        words, table = question.selective_on_page(store.view(), Asked(store.path)).blocks()[:2]
+    assert "of the crosses and forks have no partner" in words.text
     assert [row[0] for row in table.rows] == ["1", "2", "3"]
-    with tolstat.open(folder / "k1.h5") as store:
-        assert section.sections(store.view(), Asked(folder / "k1.h5")) == []
+    with tolstat.open(folder / "k1.h5") as store, pytest.raises(NotApplicable):
+        question.selective_on_page(store.view(), Asked(store.path))
 
 
 @pytest.mark.slow
 def test_same_bytes_in_slices_in_blocks_and_stopped(folder, tmp_path):
-    plan = query.study_of(folder / "small.toml", 3)
+    plan = question.study_of(tolstat.load(folder / "small.toml"), 3)
     parts = [tmp_path / "a.h5", tmp_path / "b.h5"]
     for part, rows in zip(parts, (range(64), range(64, 151)), strict=True):
         RUN(plan, part, block=50, rows=rows)
@@ -99,9 +101,23 @@ def test_diameters_that_are_matched_are_neither_reweighted_nor_drawn_from_scores
     plain = tmp_path / "plain.toml"
     plain.write_text(STUDY.replace("selective", "# selective"), encoding="utf-8")
     with pytest.raises(InputError, match="missing key selective"):
-        query.study_of(plain, 2)
+        question.study_of(tolstat.load(plain), 2)
     bare = tmp_path / "bare.toml"
     bare.write_text(STUDY.partition("[limits]")[0], encoding="utf-8")
     RUN(tolstat.load(bare), tmp_path / "bare.h5")
-    with tolstat.open(tmp_path / "bare.h5") as store, pytest.raises(StoreError, match="without"):
-        tolstat.assembled([store.view()])
+    with tolstat.open(tmp_path / "bare.h5") as store, pytest.raises(NotApplicable, match="without"):
+        tolstat.selective(store.view())
+
+
+@pytest.mark.slow
+def test_command_simulates_each_number_of_classes_and_writes_into_the_folder(folder, tmp_path, monkeypatch):
+    fakes.replace_functions(monkeypatch, **fakes.FUNCTIONS | {"draw_blocks": sampling.draw_blocks, "perturb": _perturb})
+    study = str(folder / "small.toml")
+    words = ["selective", study, "--classes", "3", "--classes", "1", "--n", "40", "--workers", "1"]
+    done = CliRunner().invoke(app, [*words, "--out", str(tmp_path / "out")])
+    assert done.exit_code == 0, done.stderr
+    assert [line.split()[0] for line in done.stdout.splitlines()] == ["classes", "1", "3"]
+    files = ["small_k1.h5", "small_k3.h5", *(f"small_selective_classes.{end}" for end in ("csv", "png", "svg"))]
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == files
+    with tolstat.open(tmp_path / "out" / "small_k3.h5") as store:
+        assert store.view().n == 40

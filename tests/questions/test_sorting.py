@@ -11,9 +11,10 @@ from tests.sampling.test_importance import load
 from tests.support import synthetic
 from tolstat.analysis import binomial
 from tolstat.cli import app
-from tolstat.common.errors import InputError, StoreError
+from tolstat.common.errors import InputError, NotApplicable
+from tolstat.display.asked import Asked
 from tolstat.joint import nominal_errors
-from tolstat.questions.sorting import query, section
+from tolstat.questions import sorting as question
 from tolstat.report import page
 from tolstat.store import ResultFile
 from tolstat.study.sorting import Gauge
@@ -51,37 +52,36 @@ def test_a_gauge_accepts_what_it_measures_inside():
 def test_an_exact_gauge_gives_what_counting_the_joints_that_are_kept_gives(stored):
     with ResultFile.open(stored) as store:
         view = store.view()
-        found = query.sorted_joints(view)
+        answer = question.sorting(view)
         errors, force = view.errors(np.arange(view.n)), view.load("cross1.F").values
-    stages = found.stages.set_index("stage")
+    stages, parts = answer.frame("stages").set_index("stage"), answer.frame("parts").set_index("part")
     kept = np.all([abs(errors[f"pin{i}.offset_t"]) <= 1e-4 for i in (1, 2, 3, 4)], axis=0)
     count = ((force > 700.0) & kept).sum()
-    row = stages.loc[query.SCRAPPED]
+    row = stages.loc[question.SCRAPPED]
     assert row["estimate"] == pytest.approx(count / kept.sum())
     ends = binomial.clopper_pearson(count, kept.sum())
     assert (row["lower"], row["upper"]) == (pytest.approx(ends[0], abs=2e-3), pytest.approx(ends[1], abs=2e-3))
     # all clearances are 0.1 mm, and the gauge of each pin rejects the same share
     passed = norm.cdf(1.0) ** 4 * (errors["pin1.offset_t"] <= 5e-5)[kept].mean()
-    assert stages.loc[query.INSPECTED, "rejected"] == pytest.approx(1.0 - passed)
-    assert stages.loc[query.MADE, "rejected"] == 0.0
-    scrapped = found.parts.set_index("part")["scrapped"]
-    assert scrapped["cross"] == pytest.approx(1.0 - kept.mean())
-    assert scrapped["input fork"] == 0.0
+    assert stages.loc[question.INSPECTED, "rejected"] == pytest.approx(1.0 - passed)
+    assert stages.loc[question.MADE, "rejected"] == 0.0
+    assert parts.loc["cross", "scrapped"] == pytest.approx(1.0 - kept.mean())
+    assert parts.loc["input fork", "scrapped"] == 0.0
 
 
 def test_a_cost_table_prices_parts_and_joints(stored, tmp_path):
     table = tmp_path / "costs.toml"
     table.write_text('"pin*.offset_t" = { cost = 5.0, fixed = 1.0, at = "0.2 mm" }\n', encoding="utf-8")
     with ResultFile.open(stored) as store:
-        found = query.sorted_joints(store.view(), table)
-    cross = found.parts.iloc[0]
+        answer = question.sorting(store.view(), table)
+    cross = answer.tables["parts"].rows[0]
     assert cross["cost"] == pytest.approx(4 * (1.0 + 4.0 * 2.0))
     assert cross["cost_used"] == pytest.approx(cross["cost"] / (1.0 - cross["scrapped"]))
-    last = found.stages.iloc[-1]
+    last = answer.tables["stages"].rows[-1]
     assert last["cost"] == pytest.approx(cross["cost_used"] / (1.0 - last["rejected"]))
     assert last["cost_good"] == pytest.approx(last["cost"] / (1.0 - last["estimate"]))
     done = CliRunner().invoke(app, ["sorting", str(stored), "--costs", str(table), "--json"])
-    assert json.loads(done.stdout)["parts"][0]["cost"] == pytest.approx(cross["cost"])
+    assert json.loads(done.stdout)["tables"]["parts"]["rows"][0]["cost"] == pytest.approx(cross["cost"])
 
 
 def test_a_wide_gauge_sorts_less_and_neither_is_part_of_the_identity(tmp_path):
@@ -109,9 +109,10 @@ def test_every_fault_is_told(tmp_path, changed, found):
 def test_a_study_that_sorts_nothing_has_no_section_and_no_answer(tmp_path):
     with ResultFile.open(synthetic.store(tmp_path)) as store:
         view = store.view()
-        assert section.sections(view, None) == []
-        with pytest.raises(StoreError, match="sorts nothing"):
-            query.sorted_joints(view)
+        with pytest.raises(NotApplicable):
+            question.sorting_on_page(view, Asked(view.path))
+        with pytest.raises(NotApplicable, match="sorts nothing"):
+            question.sorting(view)
 
 
 @pytest.mark.slow

@@ -40,6 +40,15 @@ OutFolder = Annotated[
     Path | None,
     typer.Option("--out", metavar="DIR", help="Write tables as CSV and pictures to this folder, created if missing."),
 ]
+OutResults = Annotated[
+    Path | None,
+    typer.Option(
+        "--out",
+        metavar="DIR",
+        help="Folder of result files, created if missing; tables as CSV and pictures are written to it, too; "
+        "default: result files only, to the current one.",
+    ),
+]
 Run = Annotated[bool, typer.Option("--run", help="Simulate what the answer needs, and keep it in FILE.")]
 READS = {
     "view": [("file", "FILE", "Result file (HDF5) of a campaign.")],
@@ -104,13 +113,14 @@ def command_of(question: Question) -> Callable[..., None]:
     def run(**given: Any) -> None:
         options = {p.name: _value(p, given[p.name]) for p in asked.options}
         sources = [path for name, _, _ in arguments for path in _listed(given[name])]
+        stem = "_".join(path.stem for path in sources[:2])
         if asked.simulate is not None:
             sources = _simulated(asked, sources[0], given)
         with ExitStack() as stack:
             views = [_view(stack, path, given) for path in sources]
             with progress(question.name):
                 answer = asked.answer(*views, **options)
-            _deliver(answer, "_".join([*(path.stem for path in sources[:2]), question.name]), given)
+            _deliver(answer, f"{stem}_{question.name}", given)
 
     made: Any = run
     made.__name__, made.__doc__ = question.name, prose(asked.docstring)
@@ -191,7 +201,9 @@ def _simulated(asked: _Asked, source: Path, given: dict[str, Any]) -> list[Path]
     folder = given["out"] or Path()
     if is_study:
         make_folder(folder)
-    what = study.load(source).at(given.get("point") or "") if is_study else source
+    what: Any = study.load(source) if is_study else source
+    if is_study and given.get("point"):
+        what = what.at(given["point"])
     with work(given["workers"], folder) as running:
         return asked.simulate(what, running, **options)  # type: ignore[misc]
 
@@ -225,7 +237,8 @@ def _shared(asked: _Asked) -> list[inspect.Parameter]:
         found.append(("run", Run, False))
     if asked.simulate is not None:
         found.append(("workers", Workers, None))
-    found += [("out", OutFolder, None), ("wide", Wide, False), ("as_json", AsJson, False)]
+    out = OutResults if asked.reads in ("study", "either") else OutFolder
+    found += [("out", out, None), ("wide", Wide, False), ("as_json", AsJson, False)]
     return [_parameter(*entry) for entry in found]
 
 

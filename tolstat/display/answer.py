@@ -49,7 +49,7 @@ class Table:
     title : str
         What it shows.
     columns : sequence of Column
-        Columns that people see.
+        Columns that people see; none for a table that only JSON, CSV files and frames have.
     rows : sequence of mapping
         Values by key in SI units, the same keys in each row; a row with values of one unit may have a key ``unit``.
     units : mapping

@@ -32,15 +32,12 @@ if TYPE_CHECKING:
     from tolstat.questions.fatigue.query import equivalent_loads as equivalent_loads
     from tolstat.questions.fatigue.query import load_cycles as load_cycles
     from tolstat.questions.fatigue.stress import load_stresses as load_stresses
-    from tolstat.questions.lots.query import lots_of as lots_of
     from tolstat.questions.orders.query import orders_of as orders_of
     from tolstat.questions.rare.query import rare_event as rare_event
     from tolstat.questions.reweight.query import reweighted as reweighted
-    from tolstat.questions.selective.query import assembled as assembled
     from tolstat.questions.show.rendering import draw_errors as draw_errors
     from tolstat.questions.show.rendering import draw_joint as draw_joint
     from tolstat.questions.show.rendering import draw_row as draw_row
-    from tolstat.questions.sorting.query import sorted_joints as sorted_joints
     from tolstat.questions.time_above.query import time_above as time_above
     from tolstat.questions.what_if.query import what_if as what_if
     from tolstat.store.view import View
@@ -129,11 +126,11 @@ QUESTIONS = (
     ),
     Question("sweep", "", "Compare the largest loads of the joints of a sweep.", "open"),
     Question("quantiles", "", "Estimate quantiles and tolerance limits of each load.", "folded", "exceedance.answer"),
-    Folder("known_parts", has_section=True),
-    Folder("sorting", ("query.sorted_joints",), "Decide", ("sorting",), has_section=True),
+    Question("known_parts", "", "Estimate what measured parts leave open of each share.", "open"),
+    Question("sorting", "Decide", "Compute yield and cost before and after parts are sorted.", "open"),
     Folder("histograms", has_section=True),
     Question("capability", "Read", "Compute yield and Cpk against each limit of the study.", "folded", counted=True),
-    Folder("lots", ("query.lots_of",), "Read", ("lots",), has_section=True, has_summary=True),
+    Question("lots", "Read", "Compute which share of a lot or of a delivery exceeds limits.", "folded", counted=True),
     Folder(
         "causes",
         ("query.causes_of", "angles.against_angle", "pairs.pairs_of", "tail.worst_joints"),
@@ -167,7 +164,7 @@ QUESTIONS = (
     Folder("allocate", ("query.allocated",), "Decide", ("allocate",)),
     Folder("compare", ("query.compared",), "Decide", ("compare",)),
     Folder("rare", ("query.rare_event",), "Decide", ("rare",)),
-    Folder("selective", ("query.assembled",), "Decide", ("selective",), has_section=True),
+    Question("selective", "Decide", "Compute yield and unmatched parts of selective assembly.", "folded"),
 )
 
 PUBLIC = {
@@ -201,7 +198,8 @@ def sections(view: View, asked: Asked) -> list[Section]:
             asked.stage(f"page: {question.name}")
             with asked.noting(f"{question.name} is left out"), suppress(NotApplicable):
                 answer = question.on_page(view, asked)
-                found.append(Section(question.name, answer.title, answer.blocks(), question.page == "folded"))
+                key = question.name.replace("_", "-")
+                found.append(Section(key, answer.title, answer.blocks(), question.page == "folded"))
     return found
 
 

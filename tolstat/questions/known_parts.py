@@ -1,0 +1,128 @@
+"""Shares above the limits where tolerances are known from measured parts: three intervals."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from functools import partial
+from typing import TYPE_CHECKING
+
+from tolstat.analysis.sample import CONFIDENCE
+from tolstat.common.errors import Fault, NotApplicable
+from tolstat.common.loads import ANY_LIMIT
+from tolstat.display import drawing, style, text
+from tolstat.display.answer import Answer, Part, Sentence, Table
+from tolstat.display.blocks import Panel, Panels, Text
+from tolstat.display.mpl import lines
+from tolstat.display.table import Column, Row, Rows
+from tolstat.store import known_parts as known
+from tolstat.store.view import View
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+DRAWN = 6
+"""Maximum number of shares in the picture."""
+LEAST = 1e-5
+"""Smallest share that the picture shows."""
+INTERVALS = {
+    "joints": ("lower", "upper", style.COLOURS[0]),
+    "parts": ("parts_lower", "parts_upper", style.COLOURS[1]),
+    "both": ("both_lower", "both_upper", style.INK),
+}
+"""Keys of the ends of each interval and its colour, from the top of a row of the picture."""
+COLUMNS = (
+    Column("load > limit", text.limit),
+    Column("share as stated", lambda row: text.percent(row["estimate"])),
+    Column("joints", lambda row: text.span(row["lower"], row["upper"])),
+    Column("parts", lambda row: text.span(row["parts_lower"], row["parts_upper"])),
+    Column("both", lambda row: text.span(row["both_lower"], row["both_upper"])),
+    Column("next joint", lambda row: text.percent(row["expected"]), rank=1),
+    Column("not supported", lambda row: text.percent(row["unsupported"]), rank=2),
+)
+
+
+def known_parts(view: View) -> Answer:
+    """Estimate what measured parts leave open of each share.
+
+    Parameters
+    ----------
+    view : View
+        A campaign of a study with limits, some of whose tolerances are known from measured parts.
+
+    Returns
+    -------
+    Answer
+        Table ``intervals``, one row for `ANY_LIMIT`, if there are several limits, and for each limit, those exceeded
+        most first: ``load``, ``unit``, ``level``; ``estimate``, ``lower``, ``upper``, share at the tolerances as stated
+        with the interval of the joints; the fields of `known_share.KnownShare`, the last two ends with ``both_`` before
+        them.
+
+    Raises
+    ------
+    NotApplicable
+        When the study takes its tolerances as exact or has no limits, or no joint is simulated.
+    """
+    own = known.of(view)
+    if own is None or not view.counts.done:
+        remedy = "give an entry of [tolerances] known_from, and the study [limits]"
+        raise NotApplicable(str(Fault(str(view.path), "has no share that measured parts leave open", remedy)))
+    names = [*view.limits, *([ANY_LIMIT] if len(view.limits) > 1 else [])]
+    rows = [_row(view, own, name) for name in names]
+    rows.sort(key=lambda row: (row["load"] != ANY_LIMIT, -row["estimate"]))
+    given = [row for row in rows if not math.isnan(row["both_upper"])][:DRAWN]
+    beside = [Text(line, small=True) for line in _how(own)]
+    parts: list[Part] = [Panels([_panel(given)], beside=beside)] if given else []
+    parts.append(Table("intervals", "Shares above the limits, with what leaves them open", COLUMNS, rows))
+    if len(given) < min(len(rows), DRAWN):
+        most = text.percent(max(row["unsupported"] for row in rows))
+        words = f"The joints do not support {most} of the likely processes. {own.remedy}."
+        parts.append(Sentence(words, "lead"))
+    return Answer("known_parts", "Tolerances known from measured parts", parts)
+
+
+def _row(view: View, own: known.KnownParts, name: str) -> Row:
+    load, found = view.load(name), own.share(name, CONFIDENCE)
+    assert load.limit is not None
+    above = load.above(load.limit)
+    row = {"load": load.name, "unit": load.unit, "level": load.limit}
+    row |= {"estimate": above.estimate, "lower": above.lower, "upper": above.upper, "expected": found.expected}
+    row |= {"parts_lower": found.parts_lower, "parts_upper": found.parts_upper}
+    return row | {"both_lower": found.lower, "both_upper": found.upper, "unsupported": found.unsupported}
+
+
+def _how(own: known.KnownParts) -> Iterator[str]:
+    entries = ", ".join(f"{entry.pattern} from {entry.parts}" for entry in own.entries)
+    yield f"Mean and deviation are estimated from measured parts: {entries}."
+    yield (
+        "Joints: the tolerances are as stated, and the joints are a sample. Parts: the process may be any that the "
+        "parts make likely. Both: the verdict's, with joints without a valid load and the numerical error. Grey line: "
+        "the share at the tolerances as stated."
+    )
+
+
+def _panel(rows: Rows) -> Panel:
+    """Picture of the three intervals of some shares."""
+    left = drawing.rows_left([text.limit(row) for row in rows])
+    top = drawing.legend_room(list(INTERVALS), left)
+    size = (drawing.WIDTH, 0.47 * len(rows) + drawing.BOTTOM + top + 0.1)
+    spans = "; ".join(f"{row['load']}: {text.span(row['both_lower'], row['both_upper'])}" for row in rows)
+    title, description = "What joints and parts leave open", f"Intervals of both: {spans}"
+    return Panel("intervals", title, description, partial(_draw, rows=rows), size, left, top)
+
+
+def _draw(ax: Axes, rows: Rows) -> None:
+    """Draw the three intervals of each share, below each other; shares on a logarithmic axis."""
+    drawing.rows(ax, [text.limit(row) for row in rows])
+    ends = [row[end] for row in rows for low, high, _ in INTERVALS.values() for end in (low, high)]
+    low = max(0.7 * min(end for end in ends if end > LEAST), LEAST)
+    style.share_axis(ax, low, "x", min(1.3 * max(ends), 1.0))
+    for i, row in enumerate(rows):
+        for k, (lower, upper, colour) in enumerate(INTERVALS.values()):
+            y = i + 0.24 * (k - 1)
+            ax.plot([max(row[lower], 0.1 * low), row[upper]], [y, y], color=colour, lw=3.0, solid_capstyle="butt")
+        if row["estimate"] > low:
+            ax.plot([row["estimate"]] * 2, [i - 0.36, i + 0.36], color=style.FAINT, lw=1.2)
+    handles = [lines.Line2D([], [], color=colour, lw=3.0) for *_, colour in INTERVALS.values()]
+    drawing.legend_above(ax, handles, list(INTERVALS))
+    ax.set_xlabel("share of the joints above the limit, 95 % intervals")

@@ -1,1 +1,0 @@
-"""Tolerances known from measured parts: what the joints, the parts, and both leave open of each share."""

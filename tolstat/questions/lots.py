@@ -1,0 +1,282 @@
+"""Shares of the lots above the limits, and what the next delivery may hold."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import bdtr
+
+from tolstat.analysis import clustered, prediction
+from tolstat.analysis.clustered import Clustered, Delivery
+from tolstat.analysis.column import Column as Values
+from tolstat.analysis.design import Design
+from tolstat.analysis.sample import CONFIDENCE, Sample, total_interval
+from tolstat.campaign.work import Work
+from tolstat.common.errors import Fault, InputError, NotApplicable, StoreError
+from tolstat.common.loads import ANY_LIMIT
+from tolstat.common.tables import VALID
+from tolstat.display import drawing, style, text
+from tolstat.display.answer import Answer, Sentence, Table
+from tolstat.display.asked import Asked
+from tolstat.display.blocks import Panel, Panels
+from tolstat.display.options import Accepted, Opt
+from tolstat.display.table import Column, Row, Rows, has
+from tolstat.store import error_budget
+from tolstat.store.view import View
+from tolstat.study import Study, load
+from tolstat.study.rewriting import with_keys
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+Counts = tuple[NDArray[np.intp], NDArray[np.intp]]
+"""Joints above a limit, and joints, of each lot with a joint done, (lots,) each."""
+LOTS, JOINTS = 50, 20
+"""Number of lots, and of joints of each, that are simulated unless told otherwise."""
+LINES = ("lots simulated", "expected of a new lot", "if joints did not depend on their lot")
+
+COLUMNS = (
+    Column("load", lambda row: str(row["load"])),
+    Column("limit", lambda row: "-" if row["load"] == ANY_LIMIT else text.value(row["limit"], row["unit"])),
+    Column("above", lambda row: text.percent(row["estimate"])),
+    Column("total interval", lambda row: text.span(row["lower"], row["upper"])),
+    Column("lots without", lambda row: text.percent(row["without"]), rank=2),
+    Column("median lot", lambda row: text.percent(row["median"]), rank=4),
+    Column("one lot in ten", lambda row: f"> {text.percent(row['high'])}", rank=3),
+    Column("worst lot", lambda row: text.percent(row["worst"]), rank=1),
+    Column("correlation", lambda row: text.formed(row["correlation"], ".2f"), rank=5),
+    Column("above in delivery", text.delivery),
+    Column("bad deliveries", lambda row: text.percent(row["bad"]), shown=has("bad")),
+)
+"""Columns of the table ``limits``; bad deliveries with an accepted share."""
+
+
+def simulate(
+    study: Study,
+    work: Work,
+    number: Annotated[int | None, Opt("L", least=clustered.LEAST, name="lots")] = None,
+    joints: Annotated[int | None, Opt("M", least=2)] = None,
+) -> list[Path]:
+    """Simulate lots of a study into ``STUDY_lots.h5``.
+
+    Parameters
+    ----------
+    study : Study
+        A study with ``lot`` in an entry of ``[tolerances]``.
+    work : Work
+        Worker processes and folder.
+    number : int, optional
+        Number of lots; default: that of STUDY, or 50.
+    joints : int, optional
+        Joints of each lot; default: those of STUDY, or 20.
+    """
+    return [work.run(study_of(study, number, joints), f"{study.path.stem}_lots.h5")]
+
+
+def study_of(study: Study, number: int | None = None, joints: int | None = None) -> Study:
+    """Let the joints of a study share lots: `number` of them with `joints` each, see `simulate`.
+
+    Raises
+    ------
+    InputError
+        With every fault of the study.
+    """
+    own = study.sampling.joints_per_lot
+    size = joints or (own if own > 1 else JOINTS)
+    lots_of_study = study.samples // own if own > 1 else LOTS
+    keys = {"method": "random", "n": size * (number or lots_of_study), "joints_per_lot": size, "replicates": None}
+    changed = with_keys(study.text, {("sampling",): keys | {"groups": None}}, str(study.path))
+    return load(study.path, text=changed)
+
+
+def lots(
+    view: View,
+    delivery: Annotated[int, Opt("N", 1, 10**5)] = 500,
+    from_lots: Annotated[int, Opt("K", least=1)] = 1,
+    accepted: Accepted = math.nan,
+) -> Answer:
+    """Compute which share of a lot or of a delivery exceeds limits.
+
+    Parts of one lot deviate together, as the key lot of an entry of [tolerances] says. Simulates 50 lots of 20 joints
+    of STUDY into STUDY_lots.h5. To resume after an interruption, run the same command again.
+
+    Prints for each limit, and for all limits together, the share of the joints above it, with a 95 % interval over the
+    lots, the worst lot, and a prediction interval for the next delivery; with --wide or --json also the median lot and
+    how much joints of one lot are alike. With --accept, prints the share of the deliveries with more bad joints.
+
+    Example: tolstat lots studies/lots.toml
+
+    Parameters
+    ----------
+    view : View
+        A campaign with limits whose joints share lots.
+    delivery : int
+        Number of joints of the next delivery.
+    from_lots : int
+        Number of new lots that the next delivery is of.
+    accepted : float
+        Accepted share of a delivery, all limits together: "0.1 %", "1000 ppm" or 0.001.
+
+    Returns
+    -------
+    Answer
+        Fact ``joints_per_lot``; a slice, or joints that are pending, may leave fewer. Table ``limits``, one row per
+        limit, the last for all limits together: ``load``, ``unit``, ``limit``, ``lots``, ``n`` (joints), ``n_failed``,
+        ``n_unsettled``, ``count`` (above); ``estimate``, share of the joints above, with its total interval ``lower``,
+        ``upper`` over lots; ``correlation`` of two joints of a lot; ``without``, share of the lots with no joint above;
+        ``median``, ``high`` (90 %) and ``worst`` of the lots' shares; ``delivery``, ``from_lots``, ``next_lower``,
+        ``next_upper``: joints above the limit in the next delivery; ``bad``: probability that more than the accepted
+        share of the next delivery is above, NaN without one. Table ``lots``, one row per lot: ``lot``, its number;
+        ``n``, joints; and by load the number of joints above the limit.
+
+    Raises
+    ------
+    InputError
+        When a delivery has fewer joints than lots.
+    NotApplicable
+        When the study has no limits, or each joint is its own lot.
+    StoreError
+        When fewer than `clustered.LEAST` lots have joints done.
+    """
+    if delivery < from_lots:
+        raise InputError([Fault("--from-lots", f"{from_lots} lots of {delivery} joints", "give fewer lots")])
+    _check(view)
+    loads = [*view.loads(list(view.limits)), view.load(ANY_LIMIT)]
+    known: dict[bytes, Delivery] = {}
+
+    def predicted(counts: Counts) -> Delivery:
+        key = b"".join(own.tobytes() for own in counts)  # equal counts have one prediction
+        if key not in known:
+            known[key] = clustered.law_of(*counts).delivery(delivery, from_lots)
+        return known[key]
+
+    rows = []
+    for own in loads:
+        samples = error_budget.with_error(view, own)
+        least = predicted(_counted(own, samples[1 % len(samples)].lower))
+        most = predicted(_counted(own, samples[-1].upper))
+        bad = math.nan if math.isnan(accepted) else most.more_than(accepted)
+        ends = prediction.columns((least.ends()[0], most.ends()[1]), delivery)
+        rows.append({**_shares(own, samples), **ends, "from_lots": from_lots, "bad": bad})
+    counts = {own.name: _counted(own, own.value) for own in loads}
+    above, n = counts[ANY_LIMIT]
+    columns = {"lot": _numbers(loads[-1]), "n": n} | {name: own[0] for name, own in counts.items()}
+    of_lots = [dict(zip(columns, values, strict=True)) for values in zip(*columns.values(), strict=True)]
+    size = int(view.store.sampling["joints_per_lot"])
+    return Answer(
+        "lots",
+        "Lots, and the next delivery",
+        [
+            Panels([_panel(rows[-1], above, n, size)]),
+            Table("limits", "Lots against each limit, and all of them together", COLUMNS, rows),
+            Table("lots", "Joints above the limits, by lot", (), of_lots, seen=()),
+            *map(Sentence, _notes(rows, size, accepted)),
+            *([Sentence(unknown)] if (unknown := error_budget.unknown(view)) else []),
+        ],
+        {"joints_per_lot": size},
+    )
+
+
+def lots_on_page(view: View, asked: Asked) -> Answer:
+    """Shares of the lots and the next delivery, or why there are none; for campaigns whose joints share lots."""
+    if not isinstance(view.design, Clustered) or not view.limits or not view.count(*VALID):
+        raise NotApplicable
+    try:
+        answer = lots(view, accepted=asked.accepted)
+    except StoreError as error:
+        reason = str(error).splitlines()[0].partition(": ")[2]
+        return Answer("lots", "Lots", [Sentence(f"No lots: {reason}.", "lead")])
+    unknown = Sentence(error_budget.unknown(view))  # which the page says of all limits
+    return replace(answer, parts=[part for part in answer.parts if part != unknown])
+
+
+def _check(view: View) -> None:
+    """Raise a StoreError for a file whose lots tell nothing; the hint names what can be used."""
+    own = view.load(ANY_LIMIT) if view.limits and isinstance(view.design, Clustered) else None
+    if own is None:
+        alone = not isinstance(view.design, Clustered)
+        found = "holds joints that are each its own lot" if alone else "is of a study without [limits]"
+        remedy = "give the file of a study with [limits], or simulate its lots: tolstat lots STUDY"
+        raise NotApplicable(str(Fault(str(view.path), found, remedy)))
+    done = len(_counted(own, own.value)[1])
+    if done < clustered.LEAST:
+        found = f"has joints of {done} lots simulated, and fewer than {clustered.LEAST} have no interval"
+        remedy = "simulate the others: run the same command again, or tolstat run STUDY"
+        raise StoreError(str(Fault(str(view.path), found, remedy)))
+
+
+def _lots_of(design: Design) -> Clustered:
+    assert isinstance(design, Clustered)
+    return design
+
+
+def _counted(own: Sample, x: Values) -> Counts:
+    """Joints above the limit of a load, by its values or their lower or upper ends `x`, and joints of each lot."""
+    lots, levels = _lots_of(own.design), [own.limit or 0.0]
+    n = lots.counts(own.upper, levels)[1]
+    return lots.counts(x, levels)[0][n > 0, 0].astype(np.intp), n[n > 0].astype(np.intp)
+
+
+def _numbers(own: Sample) -> NDArray[np.intp]:
+    """Number of each lot with a joint done."""
+    lots = _lots_of(own.design)
+    return lots.numbers[lots.counts(own.upper, [1.0])[1] > 0]
+
+
+def _shares(own: Sample, samples: tuple[Sample, ...]) -> Row:
+    """Shares of the joints and of the lots above the limit of a load."""
+    assert own.limit is not None
+    above = own.above(own.limit)
+    low, high = total_interval(samples, own.limit, CONFIDENCE)
+    count, n = _counted(own, own.value)
+    share = count / n
+    row = {"load": own.name, "unit": own.unit, "limit": own.limit, "lots": len(n)}
+    row |= {key: getattr(above, key) for key in ("n", "n_failed", "n_unsettled", "count", "estimate")}
+    row |= {"lower": low, "upper": high, "correlation": float(clustered.interval(count, n).correlation)}
+    row |= {"without": float(np.mean(count == 0)), "median": float(np.median(share))}
+    return row | {"high": float(np.quantile(share, 0.9, method="inverted_cdf")), "worst": float(share.max())}
+
+
+def _notes(rows: Rows, size: int, accepted: float) -> Iterator[str]:
+    lots, delivery, of = (int(rows[-1][key]) for key in ("lots", "delivery", "from_lots"))
+    yield f"{lots} lots, {size} joints a lot; intervals: Student's t over lots, on the logit"
+    origin = "one new lot" if of == 1 else f"{of} new lots"
+    yield f"delivery: {delivery} joints of {origin}, 95 % prediction interval"
+    if not math.isnan(accepted):
+        yield f"bad deliveries: more than {text.percent(accepted)} of the joints above"
+    if any(row["n_failed"] + row["n_unsettled"] for row in rows):
+        yield "joints without a valid load: below a limit at lower ends, above it at upper ends"
+
+
+def _panel(row: Row, above: NDArray[np.intp], n: NDArray[np.intp], size: int) -> Panel:
+    """Picture of the shares of the lots that exceed at least one limit; `row` is that of all limits together."""
+    title = f"{row['lots']} lots: which share of their joints is bad"
+    half, worst = text.percent(row["median"]), text.percent(row["worst"])
+    description = f"Half of the lots have at most {half}, the worst has {worst}"
+    draw = partial(_draw, above=above, n=n, size=size)
+    return Panel("lots", title, description, draw, (4.9, 3.2), top=drawing.legend_room(LINES))
+
+
+def _draw(ax: Axes, above: NDArray[np.intp], n: NDArray[np.intp], size: int) -> None:
+    """Draw the share of the lots with at most a share of bad joints: simulated, expected, and without lots."""
+    share = np.sort(above / n)
+    top = max(2, int(np.ceil(size * min(1.0, share[-1] * 1.15 + 1.0 / size))))
+    at = np.arange(top + 1)
+    expected = np.cumsum(clustered.law_of(above, n).delivery(size).probability)[at]
+    alone = bdtr(at, size, above.sum() / n.sum())
+    x = np.append(at / size, (top + 1) / size)
+    for cdf, colour, dash in ((alone, style.FAINT, style.DASHES[2]), (expected, style.COLOURS[1], style.DASHES[1])):
+        ax.step(x, 100.0 * np.append(cdf, cdf[-1]), where="post", color=colour, ls=dash)
+    steps = 100.0 * np.arange(1, share.size + 1) / share.size
+    ax.step(np.append(share, x[-1]), np.append(steps, 100.0), where="post", color=style.COLOURS[0])
+    drawing.legend_above(ax, [ax.lines[2], ax.lines[1], ax.lines[0]], LINES)
+    ax.set(xlim=(0.0, x[-1]), ylim=(0.0, 104.0), ylabel="lots with at most this share [%]")
+    ax.xaxis.set_major_formatter(lambda value, _: f"{100.0 * value:g} %")
+    ax.set_xlabel("share of the joints of a lot that exceed at least one limit")

@@ -1,1 +1,0 @@
-"""Which share of the joints of a lot, and of the next delivery, is above a limit."""

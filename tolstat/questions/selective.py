@@ -1,0 +1,208 @@
+"""Selective assembly: yield and unmatched parts by number of classes, and the classes of one campaign."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+
+from tolstat.analysis.sample import CONFIDENCE, total_interval
+from tolstat.campaign.work import Work
+from tolstat.common import units
+from tolstat.common.errors import Fault, InputError, NotApplicable
+from tolstat.common.loads import ANY_LIMIT
+from tolstat.common.tables import VALID
+from tolstat.display import drawing, style, text
+from tolstat.display.answer import Answer, Sentence, Table
+from tolstat.display.asked import Asked
+from tolstat.display.blocks import Panel, Panels
+from tolstat.display.options import Opt
+from tolstat.display.table import Column, Row, Rows
+from tolstat.joint.perturbation import HOLE_OF_PIN
+from tolstat.store import error_budget
+from tolstat.store.hdf5 import BLOCK
+from tolstat.store.view import View
+from tolstat.study import Study, load
+from tolstat.study.rewriting import with_keys
+from tolstat.study.selective import KINDS, MAX_CLASSES, Matching, matching
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+TITLE = "Selective assembly"
+NUMBERS = (1, 2, 3, 5)
+"""Numbers of classes that are simulated unless told otherwise; 1: not sorted."""
+NOTES = (
+    Sentence("yield: of the assembled joints; of all crosses: yield times the matched share"),
+    Sentence("a cross is in the class of its largest measured pin, a fork in that of its smallest measured hole"),
+)
+LINES = {
+    "good": "yield of the assembled joints",
+    "unmatched": "parts without a partner",
+    "of_all": "crosses in a good joint",
+}
+"""Lines of the picture by key of the rows, and their labels."""
+
+
+def _length(value: float, digits: int) -> str:
+    return "-" if np.isinf(value) else units.shown(float(f"{value:.{digits}g}"), "m")
+
+
+COLUMNS = (
+    Column("classes", lambda row: f"{row['classes']:.0f}"),
+    Column("unmatched", lambda row: text.percent(row["unmatched"])),
+    Column("clearance, sigma", lambda row: _length(row["clearance"], 3)),
+    Column("yield", lambda row: text.percent(row["good"])),
+    Column("total interval", lambda row: text.span(row["good_lower"], row["good_upper"])),
+    Column("of all crosses", lambda row: text.percent(row["of_all"])),
+)
+OF_ONE = (
+    Column("class", lambda row: f"{row['class']:.0f}"),
+    Column("pin up to", lambda row: _length(row["pins"], 4)),
+    Column("hole up to", lambda row: _length(row["holes"], 4)),
+    *(Column(kind.name, lambda row, name=kind.name: text.percent(row[name])) for kind in KINDS),  # type: ignore[misc]
+    Column("matched", lambda row: text.percent(row["matched"])),
+)
+"""Columns of the classes of one campaign."""
+
+
+def simulate(
+    study: Study,
+    work: Work,
+    classes: Annotated[list[int] | None, Opt("K", 1, MAX_CLASSES)] = None,
+    n: Annotated[int | None, Opt("N", least=1)] = None,
+) -> list[Path]:
+    """Simulate one campaign for each number of classes, with the same seed, into ``STUDY_kK.h5``.
+
+    Parameters
+    ----------
+    study : Study
+        A study with ``sampling.selective``.
+    work : Work
+        Worker processes and folder.
+    classes : list of int, optional
+        Number of classes; repeatable; default: 1, 2, 3 and 5.
+    n : int, optional
+        Number of joints of each.
+    """
+    studies = {number: study_of(study, number, n) for number in sorted(set(classes or NUMBERS))}
+    return [work.run(own, f"{study.path.stem}_k{number}.h5") for number, own in studies.items()]
+
+
+def study_of(study: Study, classes: int, n: int | None = None) -> Study:
+    """Set the number of classes of a study with ``sampling.selective`` and, if given, of joints.
+
+    Raises
+    ------
+    InputError
+        With every fault of the study.
+    """
+    if study.sampling.selective is None:
+        remedy = 'add selective = { classes = 3, gauge = "2 um" } to [sampling]'
+        raise InputError([study.fault("sampling", "missing key selective", remedy)])
+    changed = with_keys(study.text, {("sampling", "selective"): {"classes": classes}}, str(study.path))
+    return load(study.path, n, changed)
+
+
+def selective(*views: View) -> Answer:
+    """Compute yield and unmatched parts of selective assembly.
+
+    Pins and holes are measured and sorted in classes; crosses and forks of equal class are assembled. Simulates one
+    campaign for each number of classes, with the same seed, into STUDY_kK.h5; 1 is without sorting. To resume after an
+    interruption, run the same command again.
+
+    Prints for each the share of the parts without a partner, the scatter of the clearance, and the yield of the
+    assembled joints with its 95 % interval.
+
+    Example: tolstat selective studies/selective.toml --classes 1 --classes 3
+
+    Parameters
+    ----------
+    *views : View
+        Campaigns of one study with limits and different numbers of classes; one without classes counts as one class.
+
+    Returns
+    -------
+    Answer
+        Table ``classes``, one row per campaign, by number of classes: ``classes``; ``unmatched``, share of the crosses
+        and forks without a partner of their class; ``clearance``, standard deviation of the radial clearance, m; ``n``,
+        ``count`` (above at least one limit), ``n_failed``, ``n_unsettled``; ``good``, yield of the assembled joints,
+        with its total interval ``good_lower``, ``good_upper``; ``of_all``, share of all crosses that are in a good
+        joint, with its ends.
+
+    Raises
+    ------
+    NotApplicable
+        When a study has no limits.
+    StoreError
+        When its joints are no sample of a production.
+    """
+    rows = sorted(map(_row, views), key=lambda row: row["classes"])
+    top = drawing.legend_room(list(LINES.values()))
+    description = "; ".join(f"{row['classes']} classes: yield {text.percent(row['good'])}" for row in rows)
+    panel = Panel("classes", TITLE, description, partial(_draw, rows=rows), (drawing.WIDTH, 3.4), top=top)
+    table = Table("classes", "Yield and unmatched parts, by number of classes", COLUMNS, rows, {"clearance": "m"})
+    return Answer("selective", TITLE, [Panels([panel]), table, *NOTES])
+
+
+def selective_on_page(view: View, asked: Asked) -> Answer:
+    """Classes of a campaign whose pins and holes are sorted."""
+    found = classes_of(view) if view.store.sampling.get("selective") and view.count(*VALID) else None
+    if found is None:
+        raise NotApplicable
+    words = f"{text.percent(found.unmatched)} of the crosses and forks have no partner of their class."
+    if view.limits:
+        row = _row(view)
+        ends = text.span(row["good_lower"], row["good_upper"])
+        words += f" {text.percent(row['good'])} of the assembled joints keep all limits (total interval {ends})."
+    columns = {"class": range(1, found.matched.size + 1), "pins": found.edges[0, 1:], "holes": found.edges[1, 1:]}
+    columns |= {kind.name: found.shares[k] for k, kind in enumerate(KINDS)} | {"matched": found.matched}
+    rows = [dict(zip(columns, values, strict=True)) for values in zip(*columns.values(), strict=True)]
+    title = "Classes by measured diameter, deviation from nominal"
+    table = Table("edges", title, OF_ONE, rows, {"pins": "m", "holes": "m"})
+    return Answer("selective", TITLE, [Sentence(words, "lead"), table, *NOTES])
+
+
+def classes_of(view: View) -> Matching | None:
+    """Classes of a campaign; None if its parts are not sorted."""
+    study = view.study
+    if not study.sampling.is_matched or study.sampling.selective is None:
+        return None
+    return matching(study.sampling.selective, study.entries, study.tolerances)
+
+
+def _row(view: View) -> Row:
+    view.check("mean")
+    if not view.limits:
+        remedy = "add [limits] to the study, and run the same command again"
+        raise NotApplicable(str(Fault(str(view.path), "is of a study without [limits]", remedy)))
+    classes, own = classes_of(view), view.load(ANY_LIMIT)
+    above = own.above(1.0)
+    low, high = total_interval(error_budget.with_error(view, own), 1.0, CONFIDENCE)
+    unmatched = 0.0 if classes is None else classes.unmatched
+    row: dict[str, Any] = {"classes": 1 if classes is None else classes.matched.size, "unmatched": unmatched}
+    row |= {"clearance": _clearance(view)}
+    row |= {key: getattr(above, key) for key in ("n", "count", "n_failed", "n_unsettled")}
+    good = {"good": 1.0 - above.estimate, "good_lower": 1.0 - high, "good_upper": 1.0 - low}
+    return row | good | {key.replace("good", "of_all"): (1.0 - unmatched) * share for key, share in good.items()}
+
+
+def _clearance(view: View) -> float:
+    """Standard deviation of the radial clearance of the pairs, m; from the first joints of a large campaign."""
+    errors = view.errors(np.arange(min(view.n, BLOCK)))
+    each = [0.5 * (errors[f"{hole}.diameter"] - errors[f"{pin}.diameter"]) for pin, hole in HOLE_OF_PIN.items()]
+    return float(np.sqrt(np.mean([own.var() for own in each])))
+
+
+def _draw(ax: Axes, rows: Rows) -> None:
+    """Draw yield with its interval, unmatched share, and share of all crosses in a good joint, over the classes."""
+    x, lines = [row["classes"] for row in rows], []
+    for (name, label), colour, dash in zip(LINES.items(), style.COLOURS, style.DASHES, strict=False):
+        y = [100.0 * row[name] for row in rows]
+        lines += ax.plot(x, y, marker="o", ms=4.5, color=colour, ls=dash, label=label)
+    low, high = ([100.0 * row[end] for row in rows] for end in ("good_lower", "good_upper"))
+    ax.vlines(x, low, high, color=style.COLOURS[0], lw=1.2)
+    drawing.legend_above(ax, lines, list(LINES.values()))
+    ax.set(xlabel="classes", ylabel="share [%]", ylim=(-2.0, 102.0), xticks=x)

@@ -14,6 +14,7 @@ import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 from matplotlib.markers import CARETLEFT
+from scipy.stats import norm
 from typer.testing import CliRunner
 
 import tolstat
@@ -59,6 +60,7 @@ seed = 3
 """
 )
 N = 400
+SEEDS = 100
 
 
 def loaded(folder, text=TEXT):
@@ -288,7 +290,7 @@ def test_of_fewer_joints_an_exact_line_is_compared_with_half_of_it(path):
     assert row["share"] == pytest.approx(max(half["share"] + exact.mean() - halves.mean(), 0.0), abs=1e-12)
     assert row["share"] <= half["share"]
     assert row["change"] <= half["change"]
-    assert "exact, finer: the share half as wide, plus the difference on the joints that both have" in notes(answer)
+    assert "exact: the share half as wide, plus the difference on the joints that both have" in notes(answer)
 
 
 @pytest.mark.usefixtures("quick")
@@ -669,3 +671,21 @@ def test_files_that_are_no_sample_are_refused(tmp_path):
         runner.simulate(file, Work())
     with ResultFile.open(file) as store, pytest.raises(StoreError, match="not drawn from tolerances"):
         tolstat.lines(store.view(), "cross1.F")
+
+
+def test_interval_of_a_line_on_fewer_joints_than_half_of_it_covers():
+    """Against the share that a second error alone has; a share that is off by what half of the line gains is missed."""
+    found, truth = [], 2.0 * norm.sf(2.2)  # exact: the second error alone is above
+    joints = object.__new__(shares.Joints)
+    joints.level = 2.2
+    for seed in range(SEEDS):
+        own, other = np.random.default_rng(seed).standard_normal((2, 2000))
+        joints.base, half, exact = (np.hypot(factor * own, other) for factor in (1.0, 0.5, 0.0))
+        (share, low, high), (change, *_) = joints.estimates(exact[:300], half)
+        assert share <= joints.share(half)[0]
+        assert share == pytest.approx(max(joints.share(joints.base)[0] + change, 0.0), abs=1e-12)
+        drop = joints.share(joints.base)[0] - joints.share(half)[0]
+        found.append((low <= truth <= high, low <= truth + drop <= high))
+    covered, wrong = np.mean(found, axis=0)
+    assert covered > 0.95 - 3.0 * np.sqrt(0.95 * 0.05 / SEEDS)
+    assert wrong < 0.5

@@ -191,8 +191,8 @@ def _notes(found: Lines) -> Iterator[str]:
     yield f"share of the joints above {found.limit}, {said}"
     if len({row["n"] for row in found.rows}) > 1:
         yield f"joints compared: {', '.join(f'{step} {least[step]}' for step in STEPS if step in least)}"
-    if any(least.get(step, np.inf) < least.get(HALF, 0) for step in (EXACT, FINER)):
-        yield "exact, finer: the share half as wide, plus the difference on the joints that both have"
+    if fewer := [step for step in (EXACT, FINER) if least.get(step, np.inf) < least.get(HALF, 0)]:
+        yield f"{', '.join(fewer)}: the share half as wide, plus the difference on the joints that both have"
     if not found.facts["settled"]:
         yield "the order of neighbouring lines is not settled: --run with a longer --budget or a larger --most goes on"
     if any(step not in line for line in found.by_line for step in least):

@@ -38,6 +38,8 @@ BUDGET_S = 300.0
 
 Each = Literal["entry", "feature", "error"]
 """What a line is."""
+LINES = {"entry": widths.lines, "feature": widths.features, "error": widths.errors}
+"""Lines of a study by what they are."""
 
 
 def simulate(
@@ -87,7 +89,7 @@ def simulate(
     with Writer.open(path) as store, kept_workers():
         view = View(store)
         load = _checked(view, by)
-        lines = find_lines(view.study, each, group or [])
+        lines = [*LINES[each](view.study), *widths.named(view.study, group or [])]
         if not lines:
             remedy = 'name what a study can change: --group "tilts = pin*.tilt_*, hole*.tilt_*"'
             raise StoreError(str(Fault(str(path), "has no line whose width can be changed", remedy)))
@@ -96,18 +98,6 @@ def simulate(
         looks.run()
         work.tell(f"simulated {looks.simulated} joints in {looks.spent:.0f} s, {looks.outcome}")
     return [path]
-
-
-def find_lines(study: Study, each: Each, groups: list[str]) -> list[Line]:
-    """Lines to change: the entries of the study, or its features or single errors; and the groups that a user names.
-
-    Raises
-    ------
-    InputError
-        With every fault of the groups.
-    """
-    kinds = {"entry": widths.lines, "feature": widths.features, "error": widths.errors}
-    return [*kinds[each](study), *widths.named(study, groups)]
 
 
 def points_of(view: View, by: str) -> tuple[str, ...]:

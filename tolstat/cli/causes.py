@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -20,7 +21,7 @@ from tolstat.cli._app import (
     print_table,
 )
 from tolstat.cli._talk import progress, say
-from tolstat.common.errors import Fault, InputError
+from tolstat.common.errors import Fault, InputError, NotApplicable
 
 
 class Each(StrEnum):
@@ -88,6 +89,9 @@ def causes(
             "--each", help="With --run: a line is an entry of [tolerances], a pin with its hole, or an error."
         ),
     ] = Each.ENTRY,
+    most: Annotated[
+        int, typer.Option("--most", metavar="N", min=128, help="With --run: largest number of joints of each change.")
+    ] = 16_384,
     group: Annotated[
         list[str] | None,
         typer.Option(
@@ -110,8 +114,8 @@ def causes(
 
     Prints for each line of the drawing, an entry of [tolerances], the share of the joints above the limit if it were
     half as wide, exact, finer or coarser by one class (else by the factors 0.63 and 1.6). With --run, simulates these
-    joints, which have the seeds of FILE and keep their loads in it: until the order of the lines is settled or the
-    time is up. To go on, run the same command again.
+    joints, which have the seeds of FILE and keep their loads in it: until the order of the lines is settled, the time
+    is up, or each change has --most joints. To go on, run the same command again.
 
     Prints for each error: the share of the load's variance that it explains alone and in interactions (first-order and
     total Sobol' indices), the direction of its effect (rank regression), and the probability that a joint above the
@@ -134,13 +138,13 @@ def causes(
     if run:
         if points is not None or out is not None:
             raise InputError([Fault("--run", "cannot be combined with --pick-freeze or --out", "remove one of them")])
-        _run_lines(file, by, each, group or [], budget, workers)
+        _run_lines(file, by, each, group, budget, most, workers)
     elif group or each != Each.ENTRY:
         raise InputError([Fault("--each, --group", "say what --run simulates", "add --run")])
+    from tolstat.cli._questions import show
     from tolstat.questions.causes import rendering
+    from tolstat.questions.causes.lines import lines
     from tolstat.questions.causes.query import causes_of
-    from tolstat.questions.what_if import rendering as whatifs
-    from tolstat.questions.what_if.query import what_if
     from tolstat.store import ResultFile
 
     if points is not None:
@@ -151,35 +155,33 @@ def causes(
     with progress("causes"), ResultFile.open(file) as store:
         view = store.view(study_file).at(point or "")
         load = by or view.decisive
-        lines = what_if(view, load) if view.altered else None
+        changed = None
+        with suppress(NotApplicable):
+            changed = lines(view, load) if view.altered else None
         found = causes_of(view, load, log=logarithm)
     if as_json:
-        typer.echo(as_text(rendering.values(found) | ({"what_if": whatifs.values(lines)} if lines else {})))
+        typer.echo(as_text(rendering.values(found) | ({"lines": changed.values()} if changed else {})))
         return
-    if lines is not None:
-        typer.echo(whatifs.heading(lines))
-        print_table(whatifs.columns(lines), whatifs.rows(lines), wide)
-        say(whatifs.note(lines))
+    if changed is not None:
+        show(changed, wide)
         typer.echo(f"\n{rendering.heading(found)}")
     elif not found.from_design:
         say(f"which line of the drawing to change: tolstat causes {file} --run")
     print_table(rendering.columns(found), rendering.largest(found, top), wide)
-    say(rendering.note(found, logarithm, lines is not None))
+    say(rendering.note(found, logarithm, changed is not None))
 
 
-def _run_lines(path: Path, by: str | None, each: Each, groups: list[str], budget: str, workers: int | None) -> None:
+def _run_lines(
+    path: Path, by: str | None, each: Each, group: list[str] | None, budget: str, most: int, workers: int | None
+) -> None:
     """Simulate joints with other widths of each line into the result file."""
+    from tolstat.cli._work import work
     from tolstat.cli.run import parse_time
-    from tolstat.questions.what_if.run import simulate
+    from tolstat.questions.causes.lines_run import simulate
 
     seconds = parse_time(budget, "--budget")
-    announce_compilation()
-    with progress() as shown:
-        done = simulate(path, by, each.value, groups, seconds, workers, say, shown)
-    order = "settled" if done.settled else "not settled: a longer --budget goes on"
-    say(
-        f"simulated {done.simulated} joints in {done.seconds:.0f} s, {done.each} of each change; order of lines {order}"
-    )
+    with work(workers, path.parent) as running:
+        simulate(path, running, by, each.value, group, seconds, most)
 
 
 def _run_design(path: Path, points: int, groups: Groups, out: Path | None, workers: int | None) -> Path:

@@ -39,7 +39,6 @@ if TYPE_CHECKING:
     from tolstat.questions.show.rendering import draw_joint as draw_joint
     from tolstat.questions.show.rendering import draw_row as draw_row
     from tolstat.questions.time_above.query import time_above as time_above
-    from tolstat.questions.what_if.query import what_if as what_if
     from tolstat.store.view import View
 
 
@@ -119,7 +118,7 @@ class Folder(NamedTuple):
 
 
 QUESTIONS = (
-    Folder("what_if", ("query.what_if",), has_section=True),
+    Question("lines", "", "List what each line of the drawing would change.", "open", file="causes.lines"),
     Question("limits", "", "Estimate the share of the joints above each limit.", "open", "exceedance.answer"),
     Question(
         "exceedance", "", "Estimate which share of the joints exceeds each load.", "open", "exceedance.answer", True

@@ -17,7 +17,7 @@ from tolstat.display.blocks import Facts, Listing, Page, Panels, Section, Text
 from tolstat.display.text import sentence
 from tolstat.joint.mounting import in_words
 from tolstat.questions.causes import ahead
-from tolstat.questions.what_if import section as what_if
+from tolstat.questions.causes.lines import lines_on_page
 from tolstat.report import joint_values
 from tolstat.solver import fidelity
 from tolstat.store import recorded, viewed
@@ -120,9 +120,9 @@ def compose_brief(view: View, asked: Asked) -> Page:
     asked.notes.extend(_notes(view))
     sections = [verdict.section(view, asked)]
     with asked.noting("nothing on the lines of the drawing"), suppress(NotApplicable):
-        found = what_if.sections(view, asked)
-        blocks = [block for own in found for block in own.blocks if isinstance(block, Text | Panels)]
-        sections += [Section("lines", found[0].title, blocks[:2])] if found else []
+        answer = lines_on_page(view, asked)
+        blocks = [block for block in answer.blocks() if isinstance(block, Text | Panels)]
+        sections.append(Section("lines", answer.title, blocks[:2]))
     return _page(view, sections)
 
 

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from tolstat.display.answer import Answer
     from tolstat.display.asked import Asked
     from tolstat.questions.allocate.query import allocated as allocated
-    from tolstat.questions.bearing_life.lives import lives_of as lives_of
     from tolstat.questions.causes.angles import against_angle as against_angle
     from tolstat.questions.causes.pairs import pairs_of as pairs_of
     from tolstat.questions.causes.query import causes_of as causes_of
@@ -126,7 +125,7 @@ QUESTIONS = (
     Folder("exceedance", has_section=True, has_summary=True),
     Folder("known_parts", has_section=True),
     Folder("sorting", ("query.sorted_joints",), "Decide", ("sorting",), has_section=True),
-    Folder("histograms", has_section=True),
+    Question("histograms", "", "Draw histograms of the loads, and of the errors drawn.", "folded"),
     Question("capability", "Read", "Compute yield and Cpk against each limit of the study.", "folded", counted=True),
     Folder("lots", ("query.lots_of",), "Read", ("lots",), has_section=True, has_summary=True),
     Folder(
@@ -153,10 +152,19 @@ QUESTIONS = (
         ("fatigue",),
         has_section=True,
     ),
-    Folder("bearing_life", ("lives.lives_of",), "Read", ("bearing_life",), has_section=True, has_summary=True),
+    Question(
+        "bearing_life",
+        "Read",
+        "Compute the rating life of the pins' bearings.",
+        "open",
+        file="bearing_life.answer",
+        counted=True,
+    ),
     Folder("orders", ("query.orders_of",), "Read", ("orders",), has_section=True),
-    Folder("accuracy", has_section=True, has_summary=True),
-    Folder("joints", has_section=True),
+    Question("accuracy", "", "Give the numerical error of the loads, from checks of joints.", "folded", counted=True),
+    Question("modes", "", "Compute the shares of the revolution in which pins touch.", "folded", "joints"),
+    Question("failed", "", "List joints without a valid load, and compare their errors.", "open", "joints"),
+    Question("tolerances", "", "Explain the entries of the tolerances and correlations.", "open", "joints"),
     Folder("time_above", ("query.time_above",), "Read", ("time_above",)),
     Folder("reweight", ("query.reweighted",), "Decide", ("reweight",)),
     Folder("allocate", ("query.allocated",), "Decide", ("allocate",)),

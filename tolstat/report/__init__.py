@@ -184,9 +184,9 @@ def _sweep(view: View, stem: Path, width: int | None) -> Report:
 
 
 def _accuracy(view: View) -> str:
-    from tolstat.questions.accuracy import rendering
+    from tolstat.questions.accuracy import note
 
-    return rendering.note(view.verification, view.limits) if view.verification else ""
+    return note(view.verification, view.limits) if view.verification else ""
 
 
 def _cases(store: Reader, stem: Path, width: int | None) -> Report:

@@ -11,9 +11,8 @@ from tolstat.analysis import binomial
 from tolstat.common.loads import ANY_LIMIT
 from tolstat.common.tables import FAILED, STATUS_TEXT, UNSETTLED, VALID
 from tolstat.display import text
-from tolstat.questions import capability
+from tolstat.questions import capability, joints
 from tolstat.questions.exceedance import query as exceedance
-from tolstat.questions.joints import query as joints
 from tolstat.store import known_parts
 from tolstat.store.points import point_of
 from tolstat.store.view import View

@@ -15,8 +15,7 @@ from tolstat.display import drawing, style, text
 from tolstat.display.asked import Asked
 from tolstat.display.blocks import Card, Decision, Panel, Panels, Section, Table, Text
 from tolstat.display.table import Column, Rows, as_block, has
-from tolstat.questions import capability
-from tolstat.questions.accuracy import rendering as accuracy
+from tolstat.questions import accuracy, capability
 from tolstat.questions.exceedance import query as exceedance
 from tolstat.questions.exceedance.curves_figure import LIMIT_DASH
 from tolstat.questions.exceedance.rendering import AT_POINTS, LIMITS, above, at_points

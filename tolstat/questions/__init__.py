@@ -26,11 +26,6 @@ if TYPE_CHECKING:
     from tolstat.questions.causes.query import causes_of as causes_of
     from tolstat.questions.causes.tail import worst_joints as worst_joints
     from tolstat.questions.compare.query import compared as compared
-    from tolstat.questions.fatigue.parts import part_failures as part_failures
-    from tolstat.questions.fatigue.pylife import pylife_series as pylife_series
-    from tolstat.questions.fatigue.query import equivalent_loads as equivalent_loads
-    from tolstat.questions.fatigue.query import load_cycles as load_cycles
-    from tolstat.questions.fatigue.stress import load_stresses as load_stresses
     from tolstat.questions.lots.query import lots_of as lots_of
     from tolstat.questions.orders.query import orders_of as orders_of
     from tolstat.questions.rare.query import rare_event as rare_event
@@ -142,16 +137,7 @@ QUESTIONS = (
         ("show",),
         has_section=True,
     ),
-    Folder(
-        "fatigue",
-        (
-            *("query.load_cycles", "query.equivalent_loads", "pylife.pylife_series"),
-            *("stress.load_stresses", "parts.part_failures"),
-        ),
-        "Read",
-        ("fatigue",),
-        has_section=True,
-    ),
+    Question("fatigue", "Read", "Compute failures of parts, equivalent loads and damage.", "open", "fatigue.answer"),
     Question(
         "bearing_life",
         "Read",

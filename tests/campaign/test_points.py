@@ -17,7 +17,7 @@ from tolstat.campaign.remedy import Retry
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.tables import Options, Status
 from tolstat.joint import Operation
-from tolstat.questions.fatigue.query import load_cycles
+from tolstat.questions.fatigue.loads import load_cycles
 from tolstat.store import ResultFile, Writer
 from tolstat.study.points import Point
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 from functools import partial
-from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -17,12 +16,11 @@ from tolstat import cli, joint, sampling, study
 from tolstat.analysis import accuracy
 from tolstat.campaign import checks, verify
 from tolstat.campaign import run as campaign
-from tolstat.common.errors import InputError, StoreError
+from tolstat.common.errors import InputError, NotApplicable, StoreError
 from tolstat.common.load_kinds import LOAD_KINDS
 from tolstat.common.solver_options import from_names
 from tolstat.common.tables import Method, Options, Simulation, Start, Status
-from tolstat.questions.accuracy import query as tables
-from tolstat.questions.accuracy import rendering
+from tolstat.questions import accuracy as question
 from tolstat.questions.exceedance.answer import exceedance
 from tolstat.store import ResultFile, Writer, provenance, recorded, verification
 from tolstat.store.verification import Check, Verification
@@ -248,10 +246,18 @@ def accuracy_end(count, n):
     return binomtest(count, n).proportion_ci(0.95, "exact")
 
 
-def test_an_error_that_is_not_known_is_null_in_json():
+def test_an_error_that_is_not_known_is_null_in_json(tmp_path):
     """As when the rows of all checked joints are damaged."""
-    found = tables.summary(SimpleNamespace(numerical_error={"F": math.nan, "T": 0.01}), 0.95)
-    assert json.loads(json.dumps(found, allow_nan=False)) == {"numerical_error": {"F": None, "T": 0.01}}
+    path = synthetic.store(tmp_path)
+    with ResultFile.open(path) as store, pytest.raises(NotApplicable, match="holds no checks of the numerical error"):
+        question.accuracy(store.view())
+    off_by(path, 1.25)
+    with ResultFile.open(path) as store:
+        view = store.view()
+        assert question.accuracy(view).frame("errors").equals(pd.DataFrame(question.error_rows(view.verification)))
+        view.numerical_error = {"F": math.nan, "T": 0.01}
+        found = question.accuracy(view).values()
+    assert json.loads(json.dumps(found, allow_nan=False))["facts"] == {"numerical_error": {"F": None, "T": 0.01}}
 
 
 def test_checks_that_fail_are_counted_and_not_measured(tmp_path):
@@ -261,9 +267,9 @@ def test_checks_that_fail_are_counted_and_not_measured(tmp_path):
         found = verification.read(store)
     assert found is not None
     found.checks["reference"].results["status"][0] = Status.NOT_SETTLED
-    assert "1 not settled in reference" in rendering.note(found)
+    assert "1 not settled in reference" in question.note(found)
     # the estimate stands in: invented checks that change nothing
-    assert accuracy.by_kind(tables.errors(found)[tables.TOTAL])[:, 0] == pytest.approx([0.0, 0.2])
+    assert accuracy.by_kind(question.errors(found)[question.TOTAL])[:, 0] == pytest.approx([0.0, 0.2])
 
 
 @pytest.mark.slow
@@ -322,7 +328,7 @@ def test_lower_fidelity_is_measured_against_the_dynamic_joint(tmp_path):
     assert true.min() > 5e-4  # the inertia of bodies that deviate from the ideal motion
     np.testing.assert_allclose(seen, true, rtol=0.3)
     assert force_and_torque(found.base, found.checks["half_step"].results).max() < 0.1 * true.min()
-    assert "error of numerics and fidelity, measured" in rendering.note(found)
+    assert "error of numerics and fidelity, measured" in question.note(found)
     auto = study.load(written(tmp_path, REAL.replace("steps_per_rev = 12", 'fidelity = "auto"')))
     with pytest.raises(InputError, match="auto"):
         verify.check_study(auto)

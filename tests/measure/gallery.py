@@ -23,7 +23,6 @@ from tolstat.display import style
 from tolstat.display.answer import Answer
 from tolstat.display.blocks import Panels
 from tolstat.joint import operating
-from tolstat.questions.bearing_life.rendering import curve
 from tolstat.questions.fatigue import parts_rendering
 
 mpl.use("Agg")
@@ -125,10 +124,10 @@ def overnight(folder: Path) -> None:
 def needle_bearings(folder: Path) -> None:
     """Draw the share of joints whose bearings have a shorter life."""
     with tolstat.open(folder / "needle_bearings.h5") as store:
-        draw = curve(tolstat.lives_of(store.view()))
-    assert draw is not None
+        answer = tolstat.bearing_life(store.view())
+    (panel,) = (panel for part in answer.parts if isinstance(part, Panels) for panel in part.panels)
     figure, ax = plt.subplots(figsize=(7, 3.6), layout="constrained")
-    draw(ax)
+    panel.draw(ax)
     ax.grid(alpha=0.3)
     save(figure, folder / "needle_bearings.png")
 

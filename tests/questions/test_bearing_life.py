@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import tolstat
@@ -13,15 +14,15 @@ from tests.support import synthetic, views
 from tolstat import joint
 from tolstat.analysis.binomial import clopper_pearson
 from tolstat.common.columns import RESULT_COLUMNS
-from tolstat.common.errors import InputError, StoreError
+from tolstat.common.errors import InputError, NotApplicable, StoreError
 from tolstat.common.load_kinds import PINS
 from tolstat.common.tables import Mode, Status
+from tolstat.display.answer import Sentence, Table
 from tolstat.display.asked import Asked
-from tolstat.display.blocks import Panels, Table, Text
+from tolstat.display.blocks import Panels, Text
 from tolstat.joint import Operation
-from tolstat.questions.bearing_life import query, rendering
+from tolstat.questions.bearing_life import answer as question
 from tolstat.questions.bearing_life.lives import PLACES, lives_of
-from tolstat.questions.bearing_life.section import sections
 from tolstat.store.recorded import operating_points
 from tolstat.study.points import Point
 
@@ -37,9 +38,19 @@ def view(n=201, alpha=None, **kwargs):
     return views.view(n, joint=kwargs.pop("joint", None) or held(), alpha=alpha, **kwargs)
 
 
-def answer(made):
-    lives = lives_of(made)
-    return rendering.verdict(lives, query.below(lives), query.quantiles(lives))
+def said(made, place=None):
+    """Sentences of the answer, the first is the verdict; those of one place."""
+    parts = tolstat.bearing_life(made).parts
+    return [part.text for part in parts if isinstance(part, Sentence) and part.place == (place or part.place)]
+
+
+def below(lives):
+    """Rows on the required life, as a frame."""
+    return pd.DataFrame(question.below_rows(lives))
+
+
+def contacts(made):
+    return tolstat.bearing_life(made).frame("contacts")
 
 
 def test_lives_in_hours():
@@ -84,7 +95,7 @@ def test_a_duty_cycle_is_a_miner_sum_over_its_points():
     np.testing.assert_allclose(lives.loads, (0.9 * 1000 ** (10 / 3) + 0.1 * 2000 ** (10 / 3)) ** 0.3, rtol=1e-12)
     np.testing.assert_allclose(lives.nominal_hours[0], expected)
     assert lives.duty == {"cruise": 0.75, "climb": 0.25}
-    assert any(n.startswith("over a duty cycle: 75 % at cruise, 25 % at climb") for n in rendering.notes(lives, []))
+    assert any(n.startswith("over a duty cycle: 75 % at cruise, 25 % at climb") for n in said(duty()))
 
 
 def test_one_point_of_a_duty_cycle_alone():
@@ -106,7 +117,7 @@ def test_joints_that_hardly_swing_at_one_point_of_their_duty_cycle_have_no_ratin
     ]
     made = views.at_points({point.name: synthetic.results(4) for point in points}, joint=held(), points=points)
     assert lives_of(made).unrated == 3
-    assert answer(made)[0].startswith("no rating: every joint swings by less than 12.4 deg")
+    assert said(made)[0].startswith("No rating: every joint swings by less than 12.4 deg")
     assert lives_of(duty()).unrated == 0
 
 
@@ -122,30 +133,30 @@ def test_a_joint_that_fails_at_one_point_has_no_life():
 
     made = duty(change=failing)
     assert np.isnan(lives_of(made).hours).all(axis=1).tolist() == [False, True, False]
-    assert query.below(lives_of(made)).iloc[-1]["n_failed"] == 1
+    assert below(lives_of(made)).iloc[-1]["n_failed"] == 1
 
 
 def test_contact_modes_count_by_the_revolutions_of_a_point():
     """Revolutions are 0.75*600 to 0.25*100, so climb has a nineteenth of them."""
 
     def at_one_end(tables):
-        for table, mode in zip(tables.values(), (Mode.UNIFORM, query.LOADED["one_end"]), strict=True):
+        for table, mode in zip(tables.values(), (Mode.UNIFORM, question.LOADED["one_end"]), strict=True):
             table["mode_share"] = 0.0
             table["mode_share"][:, :, mode] = 1.0
 
-    assert query.contacts(duty(change=at_one_end))["one_end"].tolist() == [0.0] * 5
-    assert query.contacts(duty((0.1, 0.9), at_one_end))["one_end"].tolist() == [1.0] * 5  # 90 to 60 of 150
+    assert contacts(duty(change=at_one_end))["one_end"].tolist() == [0.0] * 5
+    assert contacts(duty((0.1, 0.9), at_one_end))["one_end"].tolist() == [1.0] * 5  # 90 to 60 of 150
 
 
 def test_shares_and_quantiles_are_those_of_the_lives():
     lives = lives_of(view())
-    table, hours = query.below(lives).set_index("place"), lives.hours[:, 4]
+    table, hours = below(lives).set_index("place"), lives.hours[:, 4]
     count = int((hours < 8e6).sum())
     assert 20 < count < 180
     assert (table.loc["joint", "count"], table.loc["joint", "n"]) == (count, 200)
     assert (table.loc["joint", "lower"], table.loc["joint", "upper"]) == clopper_pearson(count, 200)
     assert list(table.index) == list(PLACES)
-    row = query.quantiles(lives).set_index(["place", "share"]).loc[("joint", 0.9)]
+    row = tolstat.bearing_life(view()).frame("lives").set_index(["place", "share"]).loc[("joint", 0.9)]
     assert (hours >= row["estimate"]).mean() == pytest.approx(0.9)
     assert row["lower"] < row["estimate"] < row["upper"]
     # with the load rating given, this share reaches the required life
@@ -155,7 +166,7 @@ def test_shares_and_quantiles_are_those_of_the_lives():
 
 def test_joints_without_a_life_are_counted_both_ways():
     lives = lives_of(view(failed=6, unsettled=4))
-    row = query.below(lives).iloc[-1]
+    row = below(lives).iloc[-1]
     count = int((lives.hours[:190, 4] < 8e6).sum())
     assert (row["n_failed"], row["n_unsettled"], row["count"]) == (6, 4, count)
     assert (row["bound_lower"], row["bound_upper"]) == (count / 200, (count + 10) / 200)
@@ -165,22 +176,21 @@ def test_joints_without_a_life_are_counted_both_ways():
 
 def test_the_numerical_error_widens_the_total_interval():
     lives = lives_of(view())
-    wide = query.below(replace(lives, load_error=0.05)).iloc[-1]
-    plain = query.below(lives).iloc[-1]
+    wide = below(replace(lives, load_error=0.05)).iloc[-1]
+    plain = below(lives).iloc[-1]
     assert wide["total_lower"] < plain["total_lower"] < plain["total_upper"] < wide["total_upper"]
     assert (wide["estimate"], wide["lower"]) == (plain["estimate"], plain["lower"])
 
 
 def test_half_of_the_joints_failed_gives_no_verdict():
     made = view(failed=100)
-    first, *others = answer(made)
-    assert first.startswith("no verdict: 100 of 200 joints have no life")
-    assert not others
-    assert rendering.BELOW[2].cell(query.below(lives_of(made)).iloc[-1].to_dict()) == "-"
+    assert said(made, "lead")[0].startswith("No verdict: 100 of 200 joints have no life")
+    assert not any("reach it with C" in words for words in said(made))
+    assert question.BELOW[2].cell(tolstat.bearing_life(made).tables["below_required"].rows[-1]) == "-"
 
 
 def test_all_joints_failed_gives_no_verdict():
-    assert answer(view(failed=200))[0].startswith("no verdict: 200 of 200 joints have no life")
+    assert said(view(failed=200))[0].startswith("No verdict: 200 of 200 joints have no life")
 
 
 @pytest.mark.parametrize("alpha", [0.0, np.radians(12.4), -np.radians(3)])
@@ -188,9 +198,8 @@ def test_below_the_critical_amplitude_there_is_no_rating(alpha):
     made = view(alpha=alpha)
     lives = lives_of(made)
     assert (np.isnan(lives.hours).all(), lives.unrated) == (True, 200)
-    assert answer(made)[0].startswith("no rating: every joint swings by less than 12.4 deg")
-    (section,) = sections(made, Asked(made.path))
-    titles = [block.title for block in section.blocks if isinstance(block, Table)]
+    assert said(made)[0].startswith("No rating: every joint swings by less than 12.4 deg")
+    titles = [part.title for part in tolstat.bearing_life(made).parts if isinstance(part, Table)]
     assert not any("L10" in title or "reach" in title for title in titles)
     assert any("equivalent load" in title for title in titles)
 
@@ -198,11 +207,9 @@ def test_below_the_critical_amplitude_there_is_no_rating(alpha):
 def test_some_joints_without_a_rating():
     alpha = np.full(201, np.radians(15))
     alpha[1:5] = np.radians(12)
-    lives = lives_of(view(alpha=alpha))
-    assert (lives.unrated, int(query.below(lives)["n_failed"].iloc[-1])) == (4, 4)
-    assert any(
-        note.startswith("4 of 200 joints have no rating") for note in rendering.notes(lives, query.contacts(view()))
-    )
+    found = tolstat.bearing_life(view(alpha=alpha))
+    assert (found.facts["unrated"], int(found.frame("below_required")["n_failed"].iloc[-1])) == (4, 4)
+    assert any(note.startswith("4 of 200 joints have no rating") for note in said(view(alpha=alpha)))
 
 
 def test_reliability_and_lubrication_shorten_the_life():
@@ -213,8 +220,8 @@ def test_reliability_and_lubrication_shorten_the_life():
 def test_no_required_life():
     bearing = {key: value for key, value in BEARING.items() if key != "required_life"}
     made = view(joint=joint.load("cirelli2021", {"bearing": bearing}, "x.toml").given("json"))
-    assert answer(made) == ["no required life is given: bearing.required_life"]
-    assert query.below(lives_of(made)).empty
+    assert said(made)[0] == "No required life is given: bearing.required_life."
+    assert "below_required" not in tolstat.bearing_life(made).tables
 
 
 def test_joints_loaded_at_one_end():
@@ -224,30 +231,51 @@ def test_joints_loaded_at_one_end():
         results["mode_share"][:30, 2] = [0.0, 0.6, 0.4, 0.0]
         results["mode_share"][20:50, 3] = [0.0, 0.4, 0.6, 0.0]
 
-    table = query.contacts(view(change=change)).set_index("place")
+    table = contacts(view(change=change)).set_index("place")
     assert table["one_end"].tolist() == [0.0, 0.0, 0.15, 0.0, 0.15]
     assert table["opposite_ends"].tolist() == [0.0, 0.0, 0.0, 0.15, 0.15]
     assert table.loc["any", "along"] == 1.0
-    notes = rendering.notes(lives_of(view(change=change)), query.contacts(view(change=change)))
+    notes = said(view(change=change), "note")
     assert any("In 15 % of the joints at least one bearing is loaded at one end only" in note for note in notes)
 
 
 def test_without_independent_joints_there_are_no_intervals():
-    table = query.below(lives_of(view(method="sobol")))
+    table = below(lives_of(view(method="sobol")))
     assert table[["lower", "upper", "total_lower", "total_upper"]].isna().all(axis=None)
-    assert "interval" not in answer(view(method="sobol"))[0]
+    assert "interval" not in said(view(method="sobol"))[0]
 
 
 def test_the_page_and_the_json():
     made = view()
-    (section,) = sections(made, Asked(made.path))
-    assert isinstance(section.blocks[0], Text)
-    assert section.blocks[0].text.endswith("do not reach the required 8000000 h.")
-    assert sum(isinstance(block, Panels) for block in section.blocks) == 1
-    found = query.summary(made, 0.95)["bearing_life"]
-    assert (found["symbol"], len(found["lives"]), len(found["below_required"])) == ("L10", 15, 5)
+    blocks = question.bearing_life_on_page(made, Asked(made.path)).blocks()
+    assert isinstance(blocks[0], Text)
+    assert blocks[0].text.endswith("do not reach the required 8000000 h.")
+    assert sum(isinstance(block, Panels) for block in blocks) == 1
+    found = tolstat.bearing_life(made).values()
+    assert found["facts"]["symbol"] == "L10"
+    assert {name: len(table["rows"]) for name, table in found["tables"].items()} == {
+        "lives": 15, "below_required": 5, "loads": 12, "contacts": 5
+    }  # fmt: skip
+    assert found["tables"]["lives"]["units"]["estimate"] == "h"
     without = views.view(joint=joint.load("cirelli2021", {}, "x.toml").given("json"))
-    assert (sections(without, Asked(without.path)), query.summary(without, 0.95)) == ([], {})
+    with pytest.raises(NotApplicable, match="joint without bearings"):
+        question.bearing_life_on_page(without, Asked(without.path))
+
+
+def test_the_command_writes_all_tables_and_the_picture(tmp_path):
+    from tests.cli.test_cli import call
+
+    text = STUDY.replace("[sampling]", '[limits]\n"cross1.F" = "700 N"\n[sampling]')
+    path = synthetic.store(tmp_path, text)
+    done = call("bearing-life", path, "--out", tmp_path / "out")
+    assert done.exit_code == 0, done.stderr
+    assert done.stdout.count("\n\n") == 4
+    assert "do not reach the required 20000 h." in " ".join(done.stdout.split())
+    stem = f"{path.stem}_bearing_life"
+    names = [f"{stem}_{table}.csv" for table in ("lives", "below_required", "loads", "contacts")]
+    names += [f"{stem}_bearing-life.{ending}" for ending in ("png", "svg")]
+    assert {file.name for file in (tmp_path / "out").iterdir()} == set(names)
+    assert len(pd.read_csv(tmp_path / "out" / names[0])) == 15
 
 
 def test_refused_files():
@@ -266,10 +294,8 @@ def test_a_bearing_for_the_contact_alone_has_no_life():
     with pytest.raises(StoreError, match="bearings without C, needle_diameter, which a rating life needs") as caught:
         lives_of(made)
     assert "no joint is simulated again" in str(caught.value)
-    assert query.summary(made, 0.95) == {}
-    asked = Asked(Path(made.path))
-    assert sections(made, asked) == []
-    assert any("bearing life is left out" in note and "C, needle_diameter" in note for note in asked.notes)
+    with pytest.raises(StoreError, match="C, needle_diameter"):
+        question.bearing_life_on_page(made, Asked(Path(made.path)))
 
 
 STUDY = (
@@ -315,7 +341,7 @@ def test_bearings_may_be_edited_after_the_run(tmp_path):
     file.write_text(STUDY, encoding="utf-8")
     tolstat.run(tolstat.load(file), target, workers=1)
     with tolstat.open(target) as store:
-        first, created = tolstat.lives_of(store.view()), store.created
+        first, created = lives_of(store.view()), store.created
         torque = operating_points(store)["torque"][1:]
     assert (first.status == Status.OK).all()
     # without inertia to speak of, forces and equivalent loads are in proportion to the torque
@@ -325,7 +351,7 @@ def test_bearings_may_be_edited_after_the_run(tmp_path):
     file.write_text(STUDY.replace("10 kN", "20 kN"), encoding="utf-8")
     tolstat.run(tolstat.load(file), target, workers=1)
     with tolstat.open(target) as store:
-        second = tolstat.lives_of(store.view())
+        second = lives_of(store.view())
         assert store.created == created
     np.testing.assert_allclose(second.hours, 2 ** (10 / 3) * first.hours)
     assert np.isfinite(second.hours[:, : len(PINS)]).all()

@@ -17,13 +17,14 @@ from tests.support import synthetic
 from tests.support.environment import ROOT
 from tolstat.analysis.cycles import Line, damage, equivalent_load, moment
 from tolstat.common.channels import CHANNELS
-from tolstat.common.errors import InputError, StoreError
+from tolstat.common.errors import InputError, NotApplicable, StoreError
 from tolstat.display.asked import Asked
 from tolstat.display.blocks import Panels, Table, Text
-from tolstat.questions.fatigue import pylife, rendering
-from tolstat.questions.fatigue import query as fatigue
+from tolstat.questions.fatigue import loads as fatigue
+from tolstat.questions.fatigue import pylife
+from tolstat.questions.fatigue.answer import fatigue_on_page
 from tolstat.questions.fatigue.counting import channels, cycles_of
-from tolstat.questions.fatigue.section import sections
+from tolstat.questions.fatigue.pylife import pylife_series
 from tolstat.solver import rainflow
 from tolstat.store import ResultFile
 from tolstat.study.fatigue import Fatigue, read
@@ -126,7 +127,7 @@ def test_cycles_of_shafts_are_evaluated_where_they_are_asked_for(campaign, tmp_p
     loading = load_cycles([out])
     line = Line(5.0, 20.0, 2e6)
     sums = damage(found["cycles"].cycles.of("output.moment"), line, 1e7)[:, 0]
-    row = fatigue.damages(loading).set_index("channel").loc["output.moment"]
+    row = pd.DataFrame(fatigue.damages(loading)).set_index("channel").loc["output.moment"]
     assert row["median"] == pytest.approx(np.quantile(sums[valid], 0.5, method="inverted_cdf"))
 
 
@@ -187,8 +188,12 @@ def test_a_campaign_without_a_valid_joint(tmp_path):
     done = call("fatigue", out)
     assert done.exit_code == 0, done.output
     assert len(done.stdout.splitlines()) == 1 + 64 + 3 + 9
-    page = rendering.figure(load_cycles([out]))
-    assert all("no joint" in ax.texts[0].get_text() for ax in page.axes)
+    with ResultFile.open(out) as store:
+        answer = tolstat.fatigue(store.view())
+        with pytest.raises(NotApplicable):
+            fatigue_on_page(store.view(), Asked(out))
+    assert not any(isinstance(part, Panels) for part in answer.parts)
+    assert answer.frame("loads")["estimate"].isna().all()
 
 
 def test_channels_are_selected_by_patterns():
@@ -222,8 +227,8 @@ def test_every_fault_of_the_section_is_told():
 
 def test_pylife_series_holds_every_cycle_and_survives_a_file(campaign, tmp_path):
     with ResultFile.open(campaign()) as store:
-        series = tolstat.pylife_series(store.view(), revolutions=10.0, nominal=True)
-        samples = tolstat.pylife_series(store.view())
+        series = pylife_series(store.view(), revolutions=10.0, nominal=True)
+        samples = pylife_series(store.view())
         counted = cycles_of(store, np.arange(store.n))
     assert series.index.names == ["range", "mean", "joint", "channel"]
     assert isinstance(series.index.levels[0], pd.IntervalIndex)
@@ -252,7 +257,7 @@ def test_the_lines_of_the_document_read_the_export(campaign, tmp_path, monkeypat
     names: dict[str, object] = {}
     exec(code, names)
     with ResultFile.open(campaign()) as store:
-        pd.testing.assert_series_equal(names["series"], tolstat.pylife_series(store.view()))
+        pd.testing.assert_series_equal(names["series"], pylife_series(store.view()))
 
 
 @needs("pylife")
@@ -261,7 +266,7 @@ def test_pylifes_own_damage(campaign):
     import pylife.stress.collective  # noqa: F401
 
     with ResultFile.open(campaign()) as store:
-        series = tolstat.pylife_series(store.view(), ["cross1.F_t"], bins=2000, revolutions=1e7, nominal=True)
+        series = pylife_series(store.view(), ["cross1.F_t"], bins=2000, revolutions=1e7, nominal=True)
         sums = damage(cycles_of(store, np.arange(store.n), ["cross1.F_t"]), LINE, 1e7)[:, 0]
     curve = pd.Series({"k_1": LINE.m, "ND": LINE.N0, "SD": LINE.S0 / 2})  # amplitudes
     theirs = curve.fatigue.miner_elementary().damage(series.load_collective).groupby("joint").sum()
@@ -275,12 +280,14 @@ def test_pylifes_own_damage(campaign):
 def test_command_prints_loads_and_damage(campaign, tmp_path):
     from tests.cli.test_cli import call
 
-    out = tmp_path / "loads.csv"
+    out = tmp_path / "out"
     done = call("fatigue", campaign(), campaign("cycles", 5.0), "--share", 0.5, "--share", 0.5, "--out", out)
     assert done.exit_code == 0, done.stderr
     assert len(done.stdout.splitlines()) == 1 + 16 + 3 + 9
-    assert "share of joints whose damage sum exceeds 1" in done.stdout
-    frame = pd.read_csv(out)
+    assert "share of the joints where it exceeds 1" in done.stdout
+    stem = f"{campaign().stem}_{campaign('cycles', 5.0).stem}_fatigue"
+    assert len(list(out.glob(f"{stem}_spectrum-*.png"))) == 4
+    frame = pd.read_csv(out / f"{stem}_loads.csv")
     assert len(frame) == 64 * 3
     loading = load_cycles([campaign(), campaign("cycles", 5.0)], [0.5, 0.5])
     median = frame[(frame["channel"] == "fork1.F_z") & (frame["share"] == 0.5)].iloc[0]
@@ -293,47 +300,48 @@ def test_command_prints_loads_and_damage(campaign, tmp_path):
     assert (failed.exit_code, failed.stdout) == (2, "")
 
 
-def test_spectra_fall_and_the_figure_shows_four_panels(campaign):
+def test_spectra_fall_and_four_are_drawn(campaign):
     loading = load_cycles([campaign()])
-    table = fatigue.spectra(loading, ["fork1.F_z"])
+    table = pd.DataFrame(fatigue.spectrum(loading, "fork1.F_z"))
     for _, part in table.groupby("share"):
         assert (np.diff(part["cycles"]) > 0).all()
         assert (np.diff(part["estimate"]) <= 0).all()
         assert (part["lower"] <= part["estimate"]).all()
         assert (part["estimate"] <= part["upper"]).all()
     thirds = load_cycles([campaign()] * 3, [1 / 3, 1 / 3, 1 / 3])
-    assert set(table["cycles"]) <= set(fatigue.spectra(thirds, ["fork1.F_z"])["cycles"].round())
-    page = rendering.figure(loading)
-    assert [ax.get_ylabel().split(" of ")[1][:4] for ax in page.axes] == ["cros", "cros", "fork", "fork"]
+    assert set(table["cycles"]) <= {round(row["cycles"]) for row in fatigue.spectrum(thirds, "fork1.F_z")}
+    assert [name[:4] for name in fatigue.leading(fatigue.equivalent_loads(loading))] == ["cros", "cros", "fork", "fork"]
     assert fatigue.most_loaded(fatigue.equivalent_loads(loading))[-1].startswith("fork4.T_")
 
 
 def test_the_section_shows_what_is_loaded_most(campaign, tmp_path):
     asked = Asked(tmp_path / "c.h5")
     with ResultFile.open(campaign()) as store:
-        found = sections(store.view(), asked)
+        answer = fatigue_on_page(store.view(), asked)
+        spectra, loads, damages, note = answer.blocks()
+        leading = spectra.panels[2].title.split(":")[0]
+        ax = Figure().add_subplot()
+        spectra.panels[2].draw(ax)
         store.study_text = store.study_text.replace("exponents = [4]", "exponents = [0]")
-        assert sections(store.view(), asked) == []
-    assert [section.key for section in found] == ["fatigue"]
-    spectra, loads, damages, note = found[0].blocks
+        with pytest.raises(NotApplicable):
+            fatigue_on_page(store.view(), asked)
     assert isinstance(spectra, Panels)
     assert [panel.key.split("-")[1][:-1] for panel in spectra.panels] == ["cross", "cross", "fork", "fork"]
-    ax = Figure().add_subplot()
-    spectra.panels[2].draw(ax)
-    leading = spectra.panels[2].title.split(":")[0]
     assert (ax.get_ylabel(), len(ax.get_legend().get_texts())) == (f"range of {leading} [N]", 4)
     loading = load_cycles([campaign()])
-    table = fatigue.equivalent_loads(loading)
+    table = answer.frame("loads")
+    assert table.equals(pd.DataFrame(fatigue.equivalent_loads(loading)))
     own = table[table["channel"] == leading].set_index("share")
     assert isinstance(loads, Table)
     row = next(row for row in loads.rows if row[0] == f"{leading}, m = 4")
     assert row[1:5] == [f"{x:.4g} N" for x in (own["nominal"][0.5], *own["estimate"])]
     assert (len(loads.rows), len(damages.rows), damages.rows[0][4]) == (4, 9, f"0 of {loading.settled}")
-    assert note == Text(f"{rendering.notes(loading, table)}.", small=True)
+    assert isinstance(note, Text)
+    assert note.text.startswith(f"{loading.settled} of 12 joints settled; loads are ranges: 1e+06 cycles of them")
     assert [text.split(":")[0] for text in asked.notes] == ["load cycles are left out"]
     for path in (campaign("none"), synthetic.store(tmp_path, synthetic.SWEEP, "sweep")):
-        with ResultFile.open(path) as store:
-            assert sections(store.view(), asked) == []
+        with ResultFile.open(path) as store, pytest.raises(NotApplicable):
+            fatigue_on_page(store.view(), asked)
     assert len(asked.notes) == 1
 
 
@@ -344,7 +352,7 @@ def test_a_slice_of_a_campaign_has_the_rows_of_the_campaign(campaign, tmp_path):
     joints = []
     for path in (campaign(), part):
         with ResultFile.open(path) as store:
-            joints.append(set(tolstat.pylife_series(store.view()).index.get_level_values("joint")))
+            joints.append(set(pylife_series(store.view()).index.get_level_values("joint")))
     assert joints[1] == joints[0] & set(range(4, 9))
     assert joints[1]
 

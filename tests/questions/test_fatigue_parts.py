@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 
@@ -15,13 +16,13 @@ import tolstat
 from tolstat.analysis import strength
 from tolstat.analysis.cycles import Cycles
 from tolstat.analysis.independent import Independent
-from tolstat.common.errors import InputError
+from tolstat.common.errors import InputError, NotApplicable
 from tolstat.common.load_kinds import BUSHINGS
 from tolstat.common.tables import Status
 from tolstat.display.asked import Asked
 from tolstat.display.blocks import Panels, Table
-from tolstat.questions.fatigue import parts, parts_rendering
-from tolstat.questions.fatigue.section import sections
+from tolstat.questions.fatigue import parts
+from tolstat.questions.fatigue.answer import _notes_on_parts, fatigue_on_page
 from tolstat.questions.fatigue.stress import Stresses, load_stresses
 from tolstat.solver import rainflow
 from tolstat.store import ResultFile
@@ -185,12 +186,12 @@ def synthetic(n=400, seed=3, scatter=1.3, status=None):
     )
     own = Stresses(cycles, -0.5 * size, 0.5 * size)
     settings = Fatigue(revolutions=1e6, points=(point(line), point(line, "b")))
-    return Stressed("made", own, state, own.rows(slice(0)), Independent(), settings, n, 0.0, (("", 1.0),)), size, line
+    return Stressed(own, state, own.rows(slice(0)), Independent(), settings, n, 0.0, (("", 1.0),)), size, line
 
 
 def test_failures_and_lives_of_one_cycle_in_closed_form():
     stressed, size, line = synthetic()
-    table = parts.part_failures(stressed).set_index("point")
+    table = pd.DataFrame(parts.part_failures(stressed)).set_index("point")
     factor = size / line.S_D  # N_D cycles: the critical strength is the range itself
     chances = strength.probability(factor, line.T_S)
     np.testing.assert_allclose(table["estimate"][["a", "b"]], chances.mean(axis=0))
@@ -214,24 +215,24 @@ def test_failures_and_lives_of_one_cycle_in_closed_form():
 def test_notes_of_a_duty_cycle_give_its_shares():
     stressed, _, _ = synthetic(n=40)
     table = parts.part_failures(stressed)
-    assert "duty cycle" not in parts_rendering.notes(stressed, table)
+    assert not any("duty cycle" in note for note in _notes_on_parts(stressed, table))
     cycle = replace(stressed, duty=(("cruise", 0.95), ("start", 0.05)))
     said = "over a duty cycle: 95 % at cruise, 5 % at start, shares of the revolutions"
-    assert said in parts_rendering.notes(cycle, table)
+    assert said in list(_notes_on_parts(cycle, table))
 
 
 def test_joints_without_stresses_count_both_ways_and_pending_ones_not_at_all():
     status = np.full(400, Status.OK)
     status[:10], status[10:30], status[30:40] = Status.NEWTON_FAILED, Status.STATIONARY, Status.PENDING
     stressed, size, line = synthetic(status=status)
-    row = parts.part_failures(stressed).iloc[0]
+    row = parts.part_failures(stressed)[0]
     assert (row["n"], row["n_failed"], row["n_unsettled"]) == (390, 10, 20)
     chances = strength.probability(size[40:, 0] / line.S_D, line.T_S)
     assert row["estimate"] == pytest.approx(chances.mean())
     assert row["outer_upper"] > (chances.sum() + 30) / 390 > row["upper"]
     assert row["outer_lower"] < row["lower"]
     nothing, *_ = synthetic(status=np.full(400, Status.NEWTON_FAILED))
-    row = parts.part_failures(nothing).iloc[0]
+    row = parts.part_failures(nothing)[0]
     assert np.isnan([row["estimate"], row["life"], row["median"], row["life_lower"]]).all()
     assert (row["outer_lower"], row["outer_upper"]) == (0.0, 1.0)
 
@@ -271,11 +272,12 @@ def test_the_command_prints_a_row_a_point(campaign):
     assert [line.split("  ")[0] for line in lines] == ["point", *NAMES, parts.ANY]
     assert max(map(len, lines)) <= 80
     assert "with 10000 starts" in done.stderr
-    assert "damage-equivalent" not in done.stdout
-    table = parts.part_failures(stresses([campaign("none")]))
+    assert "amage-equivalent" not in done.stdout
+    rows = parts.part_failures(stresses([campaign("none")]))
     found = json.loads(call("fatigue", campaign("none"), "--json").stdout)
-    assert list(found) == ["points"]
-    assert [row["estimate"] for row in found["points"]] == pytest.approx(table["estimate"].tolist())
+    assert list(found["tables"]) == ["points"]
+    assert found["tables"]["points"]["units"]["S_D"] == "Pa"
+    assert [row["estimate"] for row in found["tables"]["points"]["rows"]] == [row["estimate"] for row in rows]
 
 
 @pytest.mark.slow
@@ -284,7 +286,7 @@ def test_the_command_prints_loads_below_the_parts(campaign):
 
     both = call("fatigue", campaign(), "--joints", 6)
     assert both.stdout.startswith("point")
-    assert "\ndamage-equivalent loads\nchannel and exponent" in both.stdout
+    assert "\nDamage-equivalent loads\nchannel and exponent" in both.stdout
     failed = call("fatigue", campaign("none"), "--by", "cross1.F_t")
     assert (failed.exit_code, failed.stdout) == (2, "")
     assert "holds neither cycles nor load histories" in failed.stderr
@@ -299,9 +301,10 @@ def test_a_study_without_points_says_so(campaign, tmp_path):
 
 def test_the_page_shows_parts_before_loads(campaign, tmp_path):
     with ResultFile.open(campaign("none")) as store:
-        assert sections(store.view(), Asked(tmp_path / "a.h5")) == []
-        found = sections(store.view(), Asked(tmp_path / "a.h5", replay=1000))
-    panels, table, *notes = found[0].blocks
+        with pytest.raises(NotApplicable):
+            fatigue_on_page(store.view(), Asked(tmp_path / "a.h5"))
+        found = fatigue_on_page(store.view(), Asked(tmp_path / "a.h5", replay=1000))
+    panels, table, *notes = found.blocks()
     assert isinstance(panels, Panels)
     assert isinstance(table, Table)
     assert [row[0] for row in table.rows] == [*NAMES, parts.ANY]

@@ -21,9 +21,8 @@ from tolstat.common.tables import Status
 from tolstat.display.asked import Asked
 from tolstat.display.blocks import Section
 from tolstat.display.html import bound, grouped
-from tolstat.questions.accuracy import rendering
+from tolstat.questions import accuracy, joints
 from tolstat.questions.exceedance import rows
-from tolstat.questions.joints import query as joints
 from tolstat.report import headline as verdict
 from tolstat.report import html as writer
 from tolstat.report import page
@@ -247,8 +246,8 @@ def test_a_number_stays_with_its_unit_and_an_interval_on_one_line():
 
 
 def test_a_small_numerical_error_is_not_given_in_digits():
-    assert rendering.in_percent(9.5e-7) == "< 0.001 %"
-    assert rendering.in_percent(1.08e-3) == "0.108 %"
+    assert accuracy.in_percent(9.5e-7) == "< 0.001 %"
+    assert accuracy.in_percent(1.08e-3) == "0.108 %"
 
 
 @pytest.mark.slow
@@ -320,9 +319,12 @@ def test_joints_without_a_load_are_named_with_what_to_do_and_compared_with_the_o
     assert len(found) == MAX_LISTED
     assert {joint.row for joint in found} <= set(range(401 - 27, 401))
     assert all(joint.remedy for joint in found)
-    table = joints.their_errors(view)
-    assert list(table.columns[:2]) == ["error", "direction"]
-    assert table["direction_p"].min() > 0.01  # they are the last rows: chance
+    rows = joints.their_errors(view)
+    assert list(rows[0])[:2] == ["error", "direction"]
+    assert min(row["direction_p"] for row in rows) > 0.01  # they are the last rows: chance
+    answer = joints.failed(view)
+    assert answer.frame("first")["row"].tolist() == [joint.row for joint in found]
+    assert answer.frame("states").set_index("status")["joints"][Status.NEWTON_FAILED.label] == 15
 
 
 def test_leading_load_is_the_one_whose_limit_most_joints_exceed(view):

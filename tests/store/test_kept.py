@@ -22,9 +22,8 @@ from tolstat.campaign import run as campaign
 from tolstat.common import selected_results as kept
 from tolstat.common.columns import RESULT_COLUMNS
 from tolstat.common.errors import InputError, StoreError
+from tolstat.questions import accuracy as question
 from tolstat.questions import sweep
-from tolstat.questions.accuracy import query as accuracy_tables
-from tolstat.questions.accuracy import rendering
 from tolstat.questions.causes.tail import worst_joints
 from tolstat.questions.exceedance import curves, rows
 from tolstat.store import ResultFile, layout, metadata, verification
@@ -192,13 +191,13 @@ def test_replay_and_verify_compare_what_is_stored(tmp_path: Path) -> None:
     with ResultFile.open(path) as store:
         held = verification.read(store)
     assert held is not None
-    table = accuracy_tables.distribution(held)  # from the file as from the run
-    pd.testing.assert_frame_equal(table, accuracy_tables.distribution(found))
+    table = pd.DataFrame(question.error_rows(held))  # from the file as from the run
+    pd.testing.assert_frame_equal(table, pd.DataFrame(question.error_rows(found)))
     assert set(table["load"]) == {"F"}
     assert table["worst"].max() > 0
-    assert set(accuracy_tables.joints(held)["load"]) == {f"cross{i}.F" for i in (1, 2, 3, 4)}
-    assert rendering.note(held).count("F ") == 1
-    assert "T " not in rendering.note(held)
+    assert {row["load"] for row in question.joint_rows(held)} == {f"cross{i}.F" for i in (1, 2, 3, 4)}
+    assert question.note(held).count("F ") == 1
+    assert "T " not in question.note(held)
 
 
 def test_errors_are_relative_to_the_largest_load_kept() -> None:

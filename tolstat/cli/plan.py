@@ -83,11 +83,11 @@ def _lines(made: Plan) -> str:
 
 def _meanings(made: Plan) -> list[str]:
     """Tables of what each entry of [tolerances] and [[correlation]] means."""
-    import pandas as pd
+    from tolstat.display import table
+    from tolstat.questions.joints import CORRELATED, ENTRIES
 
-    from tolstat.questions.joints import tolerances
-
-    return tolerances.as_text(pd.DataFrame(made.tolerances), pd.DataFrame(made.correlations))
+    tables = ((ENTRIES, made.tolerances), (CORRELATED, made.correlations))
+    return [line for columns, rows in tables if rows for line in ("", table.as_text(columns, rows))]
 
 
 def _rattle_warning(made: Plan) -> list[str]:
@@ -96,7 +96,7 @@ def _rattle_warning(made: Plan) -> list[str]:
     if not found.joints:
         return []
     reason = f"warning: the torque reverses in {found.joints} of {made.pilot} joints: inertia torque up to"
-    return [f"{reason} {found.torque:.3g} N*m; these joints rattle and cost {found.cost:.2g} times as much as others"]
+    return [f"{reason} {found.torque:.3g} N m; these joints rattle and cost {found.cost:.2g} times as much as others"]
 
 
 def _misfit_warning(made: Plan) -> list[str]:

@@ -58,7 +58,7 @@ def verify(
     from tolstat.campaign.verify import check_near
     from tolstat.common.cores import available_cores
     from tolstat.common.files import check_target
-    from tolstat.questions.accuracy import query, rendering
+    from tolstat.questions import accuracy
 
     if out is not None:
         check_target(out, what)
@@ -71,23 +71,26 @@ def verify(
     if as_json:
         typer.echo(as_text(_summary(found)))
     else:
-        print_table(rendering.ERRORS, query.distribution(found), wide)
-    say(rendering.note(found))
+        print_table(accuracy.ERRORS, accuracy.error_rows(found), wide)
+    say(accuracy.note(found))
     if out is not None:
+        import pandas as pd
+
         with output_file(out) as temporary:
-            query.joints(found).to_csv(temporary, index=False, lineterminator="\n")
+            pd.DataFrame(accuracy.joint_rows(found)).to_csv(temporary, index=False, lineterminator="\n")
         say(f"wrote {out}")
 
 
 def _summary(found: Verification) -> dict[str, Any]:
     """Return the distributions of errors as plain values, by kind of load and by load; None for unknown values."""
-    from tolstat.questions.accuracy import query
+    from tolstat.display.answer import plain
+    from tolstat.questions import accuracy
 
     facts: dict[str, Any] = {"rows": found.rows.tolist(), "seed": found.seed}
     facts["checks"] = {name: check.description for name, check in found.checks.items()}
-    for key, table in (("kinds", query.distribution(found)), ("loads", query.by_observable(found))):
+    for key, by_kind in (("kinds", True), ("loads", False)):
         errors: dict[str, Any] = {}
-        for line in table.astype(object).where(table.notna(), None).to_dict("records"):
-            errors.setdefault(line.pop("error"), {})[line.pop("load")] = line
+        for row in plain(accuracy.error_rows(found, by_kind)):
+            errors.setdefault(row.pop("error"), {})[row.pop("load")] = row
         facts[key] = errors
     return facts

@@ -21,17 +21,11 @@ if TYPE_CHECKING:
     from tolstat.display.answer import Answer
     from tolstat.display.asked import Asked
     from tolstat.questions.allocate.query import allocated as allocated
-    from tolstat.questions.bearing_life.lives import lives_of as lives_of
     from tolstat.questions.causes.angles import against_angle as against_angle
     from tolstat.questions.causes.pairs import pairs_of as pairs_of
     from tolstat.questions.causes.query import causes_of as causes_of
     from tolstat.questions.causes.tail import worst_joints as worst_joints
     from tolstat.questions.compare.query import compared as compared
-    from tolstat.questions.fatigue.parts import part_failures as part_failures
-    from tolstat.questions.fatigue.pylife import pylife_series as pylife_series
-    from tolstat.questions.fatigue.query import equivalent_loads as equivalent_loads
-    from tolstat.questions.fatigue.query import load_cycles as load_cycles
-    from tolstat.questions.fatigue.stress import load_stresses as load_stresses
     from tolstat.questions.orders.query import orders_of as orders_of
     from tolstat.questions.rare.query import rare_event as rare_event
     from tolstat.questions.reweight.query import reweighted as reweighted
@@ -127,7 +121,7 @@ QUESTIONS = (
     Question("quantiles", "", "Estimate quantiles and tolerance limits of each load.", "folded", "exceedance.answer"),
     Question("known_parts", "", "Estimate what measured parts leave open of each share.", "open"),
     Question("sorting", "Decide", "Compute yield and cost before and after parts are sorted.", "open"),
-    Folder("histograms", has_section=True),
+    Question("histograms", "", "Draw histograms of the loads, and of the errors drawn.", "folded"),
     Question("capability", "Read", "Compute yield and Cpk against each limit of the study.", "folded", counted=True),
     Question("lots", "Read", "Compute which share of a lot or of a delivery exceeds limits.", "folded", counted=True),
     Folder(
@@ -144,20 +138,20 @@ QUESTIONS = (
         ("show",),
         has_section=True,
     ),
-    Folder(
-        "fatigue",
-        (
-            *("query.load_cycles", "query.equivalent_loads", "pylife.pylife_series"),
-            *("stress.load_stresses", "parts.part_failures"),
-        ),
+    Question("fatigue", "Read", "Compute failures of parts, equivalent loads and damage.", "open", "fatigue.answer"),
+    Question(
+        "bearing_life",
         "Read",
-        ("fatigue",),
-        has_section=True,
+        "Compute the rating life of the pins' bearings.",
+        "open",
+        file="bearing_life.answer",
+        counted=True,
     ),
-    Folder("bearing_life", ("lives.lives_of",), "Read", ("bearing_life",), has_section=True, has_summary=True),
     Folder("orders", ("query.orders_of",), "Read", ("orders",), has_section=True),
-    Folder("accuracy", has_section=True, has_summary=True),
-    Folder("joints", has_section=True),
+    Question("accuracy", "", "Give the numerical error of the loads, from checks of joints.", "folded", counted=True),
+    Question("modes", "", "Compute the shares of the revolution in which pins touch.", "folded", "joints"),
+    Question("failed", "", "List joints without a valid load, and compare their errors.", "open", "joints"),
+    Question("tolerances", "", "Explain the entries of the tolerances and correlations.", "open", "joints"),
     Folder("time_above", ("query.time_above",), "Read", ("time_above",)),
     Folder("reweight", ("query.reweighted",), "Decide", ("reweight",)),
     Folder("allocate", ("query.allocated",), "Decide", ("allocate",)),

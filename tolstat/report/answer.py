@@ -14,8 +14,7 @@ from tolstat.display import text
 from tolstat.display.answer import Answer, Part, Sentence, Sheet, Table
 from tolstat.display.asked import silent
 from tolstat.joint.mounting import in_words
-from tolstat.questions import capability
-from tolstat.questions.accuracy import rendering as accuracy
+from tolstat.questions import accuracy, capability
 from tolstat.questions.cases import cases
 from tolstat.questions.exceedance import answer as exceedance
 from tolstat.questions.exceedance import curves

@@ -12,10 +12,9 @@ from tolstat.common.loads import ANY_LIMIT
 from tolstat.common.tables import FAILED, STATUS_TEXT, UNSETTLED, VALID
 from tolstat.display import text
 from tolstat.display.table import Row
-from tolstat.questions import capability
+from tolstat.questions import capability, joints
 from tolstat.questions.exceedance import rows as exceedance
 from tolstat.questions.exceedance.verdicts import WORDS, ends, share_of, unresolved_matter, verdict
-from tolstat.questions.joints import query as joints
 from tolstat.store import known_parts
 from tolstat.store.points import point_of
 from tolstat.store.view import View

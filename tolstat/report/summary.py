@@ -34,7 +34,7 @@ def statistics(view: View, accepted: float = math.nan) -> dict[str, Any]:
         (null without an accepted share), ``sentence`` and ``notes``, null without limits; ``joints``, numbers by
         status;
         ``limits`` (share above each), ``quantiles`` of every load kept; ``capability``, the answer of this name (null
-        for weighted joints); ``numerical_error`` by kind of load;
+        for weighted joints); ``accuracy`` and ``bearing_life`` likewise;
         ``joint``, mounting of the shafts and contact law in words; ``fidelity``, a sentence on the fidelity of the
         results; ``provenance``.
 

@@ -13,8 +13,7 @@ from tolstat.display import text
 from tolstat.display.asked import Asked
 from tolstat.display.blocks import Card, Decision, Section, Table, Text
 from tolstat.display.table import Column, as_block, has
-from tolstat.questions import capability
-from tolstat.questions.accuracy import rendering as accuracy
+from tolstat.questions import accuracy, capability
 from tolstat.questions.exceedance import rows as exceedance
 from tolstat.questions.exceedance.answer import above
 from tolstat.questions.exceedance.verdicts import WORDS, ends, share_of

@@ -12,10 +12,9 @@ from tolstat.analysis import accuracy
 from tolstat.analysis.design import Design
 from tolstat.analysis.rating_life import basic_life, system_life, turns_per_revolution
 from tolstat.analysis.sample import Sample
-from tolstat.common.errors import Fault, StoreError
+from tolstat.common.errors import Fault, NotApplicable, StoreError
 from tolstat.common.load_kinds import PINS
 from tolstat.common.loads import FloatArray
-from tolstat.common.shown import shown
 from tolstat.common.tables import LIFE_EXPONENT, VALID
 from tolstat.joint import Bearing, operating
 from tolstat.joint.bearing import FOR_LIFE
@@ -27,18 +26,15 @@ JOINT = "joint"
 PLACES = (*PINS, JOINT)
 """Bearings, named by their pins, and the joint: it lasts until the first of its four bearings fails."""
 HOUR = 3600.0
-FIELDS = ("equivalent_load",)
+OPERATION = ("operation.alpha", "operation.speed", "operation.torque")
 
 
-@shown
 @dataclass(frozen=True, eq=False)
 class Lives:
     """Rating lives of n joints.
 
     Attributes
     ----------
-    name : str
-        Name of the study.
     bearing : Bearing
         Section ``[bearing]`` of the joint.
     duty : dict of str to float
@@ -55,13 +51,10 @@ class Lives:
         Relative numerical error of an equivalent load that 95 % of the checked joints stay below; NaN if unknown.
     status : ndarray, shape (n,)
         `tables.Status` of each joint.
-    weights : ndarray, shape (n,), optional
-        Weight of each joint; without it all joints count equally.
-    iid : bool
-        Whether the joints are independent samples.
+    design : Design
+        How the joints were drawn.
     """
 
-    name: str
     bearing: Bearing
     duty: Mapping[str, float]
     loads: FloatArray
@@ -87,25 +80,14 @@ class Lives:
         """Reciprocal of the life of a bearing or of the joint, 1/h: as with a load, higher is worse."""
         k = PLACES.index(place)
         with np.errstate(divide="ignore"):
-            return self._load(place, "1/h", 1.0 / self.nominal_hours[k], 1.0 / self.hours[:, k])
+            nominal, values = 1.0 / self.nominal_hours[k], 1.0 / self.hours[:, k]
+        return Sample.of(values, self.status, self.design, name=place, unit="1/h", nominal=nominal)
 
     def load(self, pin: str) -> Sample:
         """Dynamic equivalent load of a pin's bearing, N."""
         k = PINS.index(pin)
-        return self._load(pin, "N", float(self.nominal_loads[k]), self.loads[:, k])
-
-    def _load(self, name: str, unit: str, nominal: float, values: FloatArray) -> Sample:
-        return Sample.of(values, self.status, self.design, name=name, unit=unit, nominal=nominal)
-
-
-def bearing_of(view: View) -> Bearing | None:
-    """Section ``[bearing]`` of the joint of a file, if it has one."""
-    return joint_of(view.store, 0).bearing
-
-
-def keeps_loads(view: View) -> bool:
-    """Whether the study keeps the equivalent loads of all pins."""
-    return sum(column.field == "equivalent_load" for column in view.columns) == len(PINS)
+        nominal, values = float(self.nominal_loads[k]), self.loads[:, k]
+        return Sample.of(values, self.status, self.design, name=pin, unit="N", nominal=nominal)
 
 
 def lives_of(view: View) -> Lives:
@@ -119,59 +101,53 @@ def lives_of(view: View) -> Lives:
 
     Raises
     ------
+    NotApplicable
+        When the joint has no such section.
     StoreError
-        When the joint has no such section or it lacks a key, the equivalent loads are not kept, or the joints are no
-        sample.
+        When the section lacks a key, the equivalent loads are not kept, or the joints are no sample.
     InputError
         When the view has several operating points, and the study does not give their shares of the time.
     """
     view.check("quantile")
-    bearing = bearing_of(view)
-    if bearing is None:
-        remedy = (
-            "add the section [bearing] to the joint file or [joint.bearing] to the study, then repeat tolstat run: "
-            "no joint is simulated again"
-        )
-        raise StoreError(str(Fault(str(view.path), "holds a joint without bearings", remedy)))
-    if lacking := bearing.lacking(FOR_LIFE):
-        without = f"holds bearings without {', '.join(lacking)}, which a rating life needs"
-        remedy = "add to [bearing] of the joint, then repeat tolstat run: no joint is simulated again"
-        raise StoreError(str(Fault(str(view.path), without, remedy)))
-    if not keeps_loads(view):
-        remedy = 'add "pin*.equivalent_load" to [output] results of the study'
-        raise StoreError(str(Fault(str(view.path), "does not keep the equivalent loads of the bearings", remedy)))
+    bearing = _bearing(view)
     duty = points.shares_of_time(view).tolist()
     samples = np.arange(view.n)
-    operation = [
-        operating(
-            part.store.operation, part.errors(samples, ("operation.alpha", "operation.speed", "operation.torque"))
-        )
-        for part in view.parts
-    ]
-    loads, hours = _lives(duty, [_loads(part.read_results(FIELDS)) for part in view.parts], operation, bearing)
-    unrated = np.isin(view.status, VALID) & _unrated(operation, bearing)
+    operation = [operating(part.store.operation, part.errors(samples, OPERATION)) for part in view.parts]
+    results = [part.read_results(("equivalent_load",)) for part in view.parts]
+    loads, hours = _lives(duty, results, operation, bearing)
     nominal_loads, nominal_hours = np.full(len(PINS), np.nan), np.full(len(PLACES), np.nan)
     if len(view.nominal):
-        operation = [operating(part.store.operation, part.store.errors(slice(0, 1))) for part in view.parts]
-        found = _lives(duty, [_loads(part.nominal) for part in view.parts], operation, bearing)
+        ideal = [operating(part.store.operation, part.store.errors(slice(0, 1))) for part in view.parts]
+        found = _lives(duty, [part.nominal for part in view.parts], ideal, bearing)
         nominal_loads, nominal_hours = found[0][0], found[1][0]
     return Lives(
-        name=view.name,
         bearing=bearing,
         duty=dict(zip(view.points, duty, strict=True)),
         loads=loads,
         hours=hours,
         nominal_loads=nominal_loads,
         nominal_hours=nominal_hours,
-        unrated=int(unrated.sum()),
-        load_error=load_error(view),
+        unrated=int((np.isin(view.status, VALID) & _unrated(operation, bearing)).sum()),
+        load_error=_load_error(view),
         status=view.status,
         design=view.design,
     )
 
 
-def _loads(results: NDArray[np.void]) -> FloatArray:
-    return np.asarray(results["equivalent_load"])
+def _bearing(view: View) -> Bearing:
+    """Section ``[bearing]`` of the joint of a file, with all that a life needs."""
+    bearing, place = joint_of(view.store, 0).bearing, str(view.path)
+    again = "then repeat tolstat run: no joint is simulated again"
+    if bearing is None:
+        remedy = f"add the section [bearing] to the joint file or [joint.bearing] to the study, {again}"
+        raise NotApplicable(str(Fault(place, "holds a joint without bearings", remedy)))
+    if lacking := bearing.lacking(FOR_LIFE):
+        found = f"holds bearings without {', '.join(lacking)}, which a rating life needs"
+        raise StoreError(str(Fault(place, found, f"add to [bearing] of the joint, {again}")))
+    if sum(column.field == "equivalent_load" for column in view.columns) < len(PINS):
+        remedy = 'add "pin*.equivalent_load" to [output] results of the study'
+        raise StoreError(str(Fault(place, "does not keep the equivalent loads of the bearings", remedy)))
+    return bearing
 
 
 def _unrated(operation: Sequence[Mapping[str, FloatArray]], bearing: Bearing) -> NDArray[np.bool_]:
@@ -181,7 +157,10 @@ def _unrated(operation: Sequence[Mapping[str, FloatArray]], bearing: Bearing) ->
 
 
 def _lives(
-    duty: Sequence[float], loads: Sequence[FloatArray], operation: Sequence[Mapping[str, FloatArray]], bearing: Bearing
+    duty: Sequence[float],
+    results: Sequence[NDArray[np.void]],
+    operation: Sequence[Mapping[str, FloatArray]],
+    bearing: Bearing,
 ) -> tuple[FloatArray, FloatArray]:
     """Equivalent loads, (m, 4), N, and lives of bearings and joint, (m, 5), h, over a duty cycle.
 
@@ -191,13 +170,14 @@ def _lives(
     ----------
     duty : sequence of float
         Share of the time at each operating point; the sum is 1.
-    loads : sequence of ndarray, shape (m, 4)
-        Equivalent loads at each point, N.
+    results : sequence of ndarray, shape (m,)
+        Tables with ``equivalent_load``, (m, 4), N, at each point.
     operation : sequence of mapping
         ``alpha`` (rad) and ``speed`` (rad/s) of the joints at each point, (m,).
     bearing : Bearing
         The bearings.
     """
+    loads = np.stack([table["equivalent_load"] for table in results])
     hourly = np.stack(
         [
             share * np.abs(own["speed"]) / (2.0 * np.pi) * turns_per_revolution(own["alpha"]) * HOUR
@@ -207,8 +187,8 @@ def _lives(
     turns = hourly.sum(axis=0)
     with np.errstate(divide="ignore", invalid="ignore"):
         weights = np.where(turns > 0.0, hourly / turns, np.array(duty)[:, None])[:, :, None]
-        largest = np.maximum.reduce(loads)
-        relative = np.where(largest > 0.0, np.stack(loads) / largest, 0.0 * np.stack(loads))
+        largest = loads.max(axis=0)
+        relative = np.where(largest > 0.0, loads / largest, 0.0 * loads)
         load = largest * (weights * relative**LIFE_EXPONENT).sum(axis=0) ** (1.0 / LIFE_EXPONENT)
         pins = bearing.factor * basic_life(load, bearing.C) / turns[:, None]
     hours = np.column_stack([pins, system_life(pins)])
@@ -216,7 +196,7 @@ def _lives(
     return load, hours
 
 
-def load_error(view: View) -> float:
+def _load_error(view: View) -> float:
     """Relative numerical error of an equivalent load, `analysis.accuracy.USUAL` of the checked joints; NaN if unknown.
 
     It is estimated as that of largest loads (`analysis.accuracy.estimate`); the largest of the four bearings counts.
@@ -224,12 +204,9 @@ def load_error(view: View) -> float:
     if view.verification is None:
         return np.nan
     base = view.verification.base
+    valid = np.isin(base["status"], VALID)[:, None]
     changes = {
-        name: np.where(
-            np.isin(base["status"], VALID)[:, None],
-            base["equivalent_load"] / check.results["equivalent_load"] - 1.0,
-            np.nan,
-        )
+        name: np.where(valid, base["equivalent_load"] / check.results["equivalent_load"] - 1.0, np.nan)
         for name, check in view.verification.checks.items()
     }
     return accuracy.spread(accuracy.estimate(changes).max(axis=1)).usual

@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from tolstat.analysis import prediction, strength
@@ -16,6 +15,7 @@ from tolstat.analysis.sample import Sample
 from tolstat.analysis.strength import Collective, Failures, Line
 from tolstat.common.bisection import first
 from tolstat.common.tables import FAILED, Status
+from tolstat.display.table import Rows
 from tolstat.questions.fatigue.stress import Stressed, Stresses
 from tolstat.study.fatigue import Fatigue
 
@@ -23,6 +23,7 @@ SHARE = 0.1
 """Share of the parts that have failed at the end of the life given, B10."""
 ANY = "any of them"
 """Name of the row for all points together."""
+CONFIDENCE = 0.95
 LONGEST = 1e12
 """Lives beyond so many service lives are given as infinite."""
 
@@ -64,26 +65,24 @@ class Course(NamedTuple):
                 survive += np.log1p(-strength.probability(factor, line.T_S))
         return -np.expm1(survive)
 
-    def failures(self, lives: float = 1.0, confidence: float = 0.95) -> Failures:
+    def failures(self, lives: float = 1.0, confidence: float = CONFIDENCE) -> Failures:
         """Share of the parts that have failed after so many service lives."""
         return strength.failures(self.chances(lives), self.n_failed, self.n_unsettled, confidence, self.has_interval)
 
 
-def part_failures(stressed: Stressed, confidence: float = 0.95, delivery: int = DELIVERY) -> pd.DataFrame:
+def part_failures(stressed: Stressed, delivery: int = DELIVERY) -> Rows:
     """Damage, life and probability of failure at each point of the parts.
 
     Parameters
     ----------
     stressed : Stressed
         Stress cycles of the joints, from `load_stresses`.
-    confidence : float
-        Confidence level of the intervals.
     delivery : int
         Number of joints of the next delivery.
 
     Returns
     -------
-    DataFrame
+    sequence of mapping
         One row per point, and one for all of them if there are several (the strengths of two points are independent):
         ``point``, ``bushing``, fields of `analysis.strength.Line` (S_D in Pa); ``nominal``, ``median``, ``upper_99``
         (damage sum at the median strength: of the nominal joint, and not exceeded by half and by 99 % of the joints);
@@ -93,34 +92,27 @@ def part_failures(stressed: Stressed, confidence: float = 0.95, delivery: int = 
         ``next_upper`` (prediction interval for the failures in the next delivery).
     """
     own, nominal = (evaluated(stresses, stressed.settings) for stresses in (stressed.own, stressed.nominal))
-    each = [(_damage(stressed, p, own[p], nominal[p]), [p]) for p in range(len(own))]
-    together = [({"point": ANY, "bushing": ""}, list(range(len(own))))] if len(own) > 1 else []
+    heads = [_damage(stressed, p, own[p], nominal[p]) for p in range(len(own))]
+    groups = [[p] for p in range(len(own))]
+    if len(own) > 1:
+        heads.append({"point": ANY, "bushing": ""} | dict.fromkeys(list(heads[0])[2:], np.nan))
+        groups.append(list(range(len(own))))
     rows = []
-    for head, group in each + together:
+    for head, group in zip(heads, groups, strict=True):
         course = course_of(stressed, [own[p] for p in group])
         ideal = Course([nominal[p] for p in group], np.ones(len(stressed.nominal.low), bool), 0, 0, False)
-        life = _life(course, stressed.settings.revolutions, confidence)
-        found = course.failures(1.0, confidence)._asdict()
-        wide = course.failures(1.0, prediction.half(confidence))
-        following = prediction.of_share(wide.outer_lower, wide.outer_upper, delivery, confidence)
-        head |= prediction.columns(following, delivery)
-        head |= life | {"nominal_failures": ideal.failures().estimate} | found | {"confidence": confidence}
-        rows.append(head)
-    return pd.DataFrame(rows)
+        wide = course.failures(1.0, prediction.half(CONFIDENCE))
+        following = prediction.of_share(wide.outer_lower, wide.outer_upper, delivery, CONFIDENCE)
+        head |= prediction.columns(following, delivery) | _life(course, stressed.settings.revolutions)
+        head |= {"nominal_failures": ideal.failures().estimate} | course.failures()._asdict()
+        rows.append(head | {"confidence": CONFIDENCE})
+    return rows
 
 
-def failures_over_life(stressed: Stressed, revolutions: Sequence[float], confidence: float = 0.95) -> pd.DataFrame:
-    """Share of the joints with a failed part at any point after numbers of revolutions.
-
-    Returns
-    -------
-    DataFrame
-        One row per number: ``revolutions``, the fields of `analysis.strength.Failures`.
-    """
+def failures_over_life(stressed: Stressed, revolutions: Sequence[float]) -> list[Failures]:
+    """Share of the joints with a failed part at any point after numbers of revolutions."""
     course = course_of(stressed, evaluated(stressed.own, stressed.settings))
-    lives = [number / stressed.settings.revolutions for number in revolutions]
-    rows = [course.failures(life, confidence)._asdict() for life in lives]
-    return pd.DataFrame([{"revolutions": n, **row} for n, row in zip(revolutions, rows, strict=True)])
+    return [course.failures(number / stressed.settings.revolutions) for number in revolutions]
 
 
 def evaluated(stresses: Stresses, settings: Fatigue) -> list[Evaluated]:
@@ -168,25 +160,16 @@ def _damage(stressed: Stressed, p: int, own: Evaluated, nominal: Evaluated) -> d
     }
 
 
-def _life(course: Course, revolutions: float, confidence: float) -> dict[str, float]:
+def _life(course: Course, revolutions: float) -> dict[str, float]:
     """Revolutions after which a share `SHARE` of the parts has failed, with the ends of an interval."""
-
-    def estimate(lives: float) -> float:
-        return float(np.nanmean(course.chances(lives)))
-
-    def least(lives: float) -> float:
-        return course.failures(lives, confidence).outer_lower
-
-    def most(lives: float) -> float:
-        return course.failures(lives, confidence).outer_upper
-
-    found = {"life": np.nan, "life_lower": np.nan, "life_upper": np.nan}
+    shares: dict[str, Callable[[float], float]] = {
+        "life": lambda lives: float(np.nanmean(course.chances(lives))),
+        "life_lower": lambda lives: course.failures(lives).outer_upper,
+        "life_upper": lambda lives: course.failures(lives).outer_lower,
+    }
     some = course.done.sum() > course.n_failed + course.n_unsettled
-    if some:
-        found["life"] = revolutions * _reaches(estimate)
-    if some and course.has_interval:
-        found["life_lower"], found["life_upper"] = (revolutions * _reaches(end) for end in (most, least))
-    return found
+    known = {"life": some, "life_lower": some and course.has_interval, "life_upper": some and course.has_interval}
+    return {name: revolutions * _reaches(share) if known[name] else np.nan for name, share in shares.items()}
 
 
 def _reaches(share: Callable[[float], float]) -> float:

@@ -13,7 +13,6 @@ from tolstat.analysis.cycles import Cycles, FloatArray, duty_cycle
 from tolstat.analysis.design import Design
 from tolstat.common.channels import BUSHING_LOADS
 from tolstat.common.errors import Fault, InputError
-from tolstat.common.shown import shown
 from tolstat.common.tables import Status
 from tolstat.questions.fatigue import duty
 from tolstat.solver import rainflow
@@ -46,15 +45,12 @@ class Stresses(NamedTuple):
         return Stresses(self.cycles.rows(joints), self.low[joints], self.high[joints])
 
 
-@shown
 @dataclass(frozen=True)
 class Stressed:
     """Stresses of the joints of one campaign or of a duty cycle, and the settings of their evaluation.
 
     Attributes
     ----------
-    name : str
-        Name of the study, or of the studies.
     own : Stresses
         Stresses of the n samples.
     status : ndarray, shape (n,)
@@ -73,7 +69,6 @@ class Stressed:
         Operating points, or files, and their shares of the revolutions; one entry with share 1 for a single point.
     """
 
-    name: str
     own: Stresses
     status: NDArray[np.uint8]
     nominal: Stresses
@@ -112,7 +107,6 @@ def load_stresses(views: Sequence[View], shares: Sequence[float] | None = None, 
     StoreError
         When a file holds joints that are no sample of a production.
     """
-    name = " + ".join(view.name for view in views)
     views, shares = duty.members(views, shares)
     first = views[0]
     settings = of_text(first.store.study_text, str(first.path))
@@ -132,7 +126,7 @@ def load_stresses(views: Sequence[View], shares: Sequence[float] | None = None, 
     own = [_spread(part.rows(slice(skip, None)), settled, status.size) for part, skip in zip(parts, skips, strict=True)]
     cycle = duty.described(views, shares)
     design = duty.design(first, samples)
-    return Stressed(name, _mixed(own, shares), status, _mixed(nominal, shares), design, settings, first.n, apart, cycle)
+    return Stressed(_mixed(own, shares), status, _mixed(nominal, shares), design, settings, first.n, apart, cycle)
 
 
 def stresses_of(store: Reader, slots: NDArray[np.intp], points: Sequence[StressPoint]) -> tuple[Stresses, float]:

@@ -5,16 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import combinations
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 
 from tolstat.common.load_kinds import PINS
 from tolstat.common.tables import HOLES
 from tolstat.study.tolerances.correlation import Copula
 from tolstat.study.tolerances.distributions import Array, Distribution, Normal
 from tolstat.study.tolerances.entry import Toleranced
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 NODES = 64
 """Number of Gauss–Hermite nodes of each of two normal scores."""
@@ -35,6 +37,8 @@ def table(entries: Sequence[Toleranced]) -> pd.DataFrame:
         and ``sigma``, standard deviation of each of these errors, SI (where several entries set an error, the part of
         this one); ``outside``, share of the parts outside the band or zone, NaN without either.
     """
+    import pandas as pd
+
     rows: dict[tuple[Any, ...], dict[str, None]] = {}
     for entry in entries:
         for site, model in entry.models:
@@ -105,6 +109,8 @@ def correlations(copula: Copula, tolerances: Mapping[str, Distribution]) -> pd.D
         ``errors``, the first pair; ``pairs``, number of pairs; ``rho`` of their normal scores, as the study gives it;
         ``pearson``, linear correlation of the errors themselves; ``spearman``, rank correlation.
     """
+    import pandas as pd
+
     rows: dict[tuple[float, float], list[str]] = {}
     for (i, one), (j, other) in combinations(enumerate(copula.names), 2):
         if rho := float(copula.matrix[i, j]):

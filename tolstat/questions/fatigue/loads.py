@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from tolstat.analysis import cycles, prediction
@@ -14,11 +14,11 @@ from tolstat.analysis.cycles import Cycles, FloatArray
 from tolstat.analysis.design import Design
 from tolstat.analysis.prediction import DELIVERY
 from tolstat.analysis.sample import Sample
-from tolstat.common.channels import CHANNELS, Channel
-from tolstat.common.load_kinds import PLACES, Kind
+from tolstat.common.channels import CHANNELS
+from tolstat.common.load_kinds import PLACES
 from tolstat.common.loads import PANELS
-from tolstat.common.shown import shown
 from tolstat.common.tables import Status
+from tolstat.display.table import Row, Rows
 from tolstat.questions.fatigue import duty
 from tolstat.questions.fatigue.counting import SHOWN, cycles_of
 from tolstat.store.view import View
@@ -28,19 +28,17 @@ ANY = "any of them"
 """Name of the row for all channels together."""
 SHARES = (0.5, 0.9, 0.99)
 """Shares of the joints at which quantiles are given."""
+CONFIDENCE = 0.95
 MAX_NUMBERS = 40
 """Maximum number of points of a spectrum."""
 
 
-@shown
 @dataclass(frozen=True)
 class Loading:
     """Load cycles of the joints of one campaign or of a duty cycle, and the settings of their evaluation.
 
     Attributes
     ----------
-    name : str
-        Name of the study, or of the studies.
     cycles : Cycles
         Cycles of the n samples.
     status : ndarray, shape (n,)
@@ -55,7 +53,6 @@ class Loading:
         Operating points, or files, and their shares of the revolutions; one entry with share 1 for a single point.
     """
 
-    name: str
     cycles: Cycles
     status: NDArray[np.uint8]
     nominal: Cycles
@@ -98,7 +95,6 @@ def load_cycles(
     StoreError
         When a file holds no histories, or joints that are no sample of a production.
     """
-    name = " + ".join(view.name for view in views)
     views, shares = duty.members(views, shares)
     first = views[0]
     # the section alone, like limits: it is at hand even where the study refers to files that are not
@@ -109,7 +105,6 @@ def load_cycles(
     # the nominal joint of a duty cycle has settled at all operating points, or it has no row
     rows = slice(min(len(nominal.number) for _, nominal in parts))
     return Loading(
-        name=name,
         cycles=cycles.duty_cycle([own for own, _ in parts], shares),
         status=duty.status(views, samples),
         nominal=cycles.duty_cycle([nominal.rows(rows) for _, nominal in parts], shares),
@@ -128,158 +123,133 @@ def _cycles_of(view: View, names: Sequence[str], samples: int | None) -> tuple[C
     return whole.rows(slice(first, None)), whole.rows(slice(settled))
 
 
-def equivalent_loads(loading: Loading, shares: Sequence[float] = SHARES, confidence: float = 0.95) -> pd.DataFrame:
+def equivalent_loads(loading: Loading) -> Rows:
     """Quantiles over the joints of the damage-equivalent loads.
 
     Parameters
     ----------
     loading : Loading
         Cycles of the joints.
-    shares : sequence of float
-        Shares of the joints at or below the quantile.
-    confidence : float
-        Confidence level of the intervals.
 
     Returns
     -------
-    DataFrame
-        One row per channel, exponent and share: ``channel``, ``unit``, ``m``, ``nominal``, ``lacking`` (upper bound of
-        the relative increase of the sum of S^m by cycles that the file does not hold, maximum over the joints), the
-        fields of `analysis.estimates.Quantile`, ``confidence``. Loads are ranges in SI units.
+    sequence of mapping
+        One row per exponent, channel and share of `SHARES`: ``channel``, ``unit``, ``m``, ``nominal``, ``lacking``
+        (upper bound of the relative increase of the sum of S^m by cycles that the file does not hold, maximum over the
+        joints), the fields of `analysis.estimates.Quantile`, ``confidence``. Loads are ranges in SI units.
     """
     settings, rows = loading.settings, []
     for m in settings.exponents:
-        values = cycles.equivalent_load(loading.cycles, m, settings.revolutions, settings.reference_cycles)
-        nominal = cycles.equivalent_load(loading.nominal, m, settings.revolutions, settings.reference_cycles)
+        values, nominal = (
+            cycles.equivalent_load(own, m, settings.revolutions, settings.reference_cycles)
+            for own in (loading.cycles, loading.nominal)
+        )
         lacking = cycles.truncation_bound(loading.cycles, m)
         for c, channel in enumerate(loading.cycles.channels):
             head = {"channel": channel, "unit": CHANNELS[channel].unit, "m": m, "nominal": _only(nominal[:, c])}
             head["lacking"] = float(lacking[:, c].max(initial=0.0))
             sample = Sample.of(values[:, c], loading.status, loading.design)
-            for share in shares:
-                found = sample.quantile(share, confidence)
-                rows.append({**head, **found._asdict(), "confidence": confidence})
-    return pd.DataFrame(rows)
+            for share in SHARES:
+                found = sample.quantile(share, CONFIDENCE)
+                rows.append({**head, **found._asdict(), "confidence": CONFIDENCE})
+    return rows
 
 
-def damages(loading: Loading, confidence: float = 0.95, delivery: int = DELIVERY) -> pd.DataFrame:
+def damages(loading: Loading, delivery: int = DELIVERY) -> Rows:
     """Share of the joints whose damage sum in the service life exceeds 1, for each channel that has an S–N line.
 
     Returns
     -------
-    DataFrame
+    sequence of mapping
         One row per channel and, of several, `ANY` for joints with any of these damage sums above 1 (it has no line):
         ``channel``, ``m``, ``S0`` (N or N m), ``N0``, ``nominal`` (damage of the nominal joint), ``median`` (of the
         joints), the fields of `analysis.estimates.Exceedance` for the level 1, ``next_lower`` and ``next_upper``
         (prediction interval for the joints above 1 in the next delivery), ``confidence``.
     """
-    rows, worst = [], []
+    rows, every = [], []
     for channel, values in loading.settings.lines.items():
-        if channel not in loading.cycles.channels:
-            continue
-        line = cycles.Line(*values)
-        sums, nominal = (
-            cycles.damage(part.of(channel), line, loading.settings.revolutions)[:, 0]
-            for part in (loading.cycles, loading.nominal)
-        )
-        worst.append((sums, nominal))
-        head = {"channel": channel, **line._asdict(), "nominal": _only(nominal)}
-        rows.append(head | _above_one(loading, sums, confidence, delivery))
-    if len(worst) > 1:
-        sums, nominal = (np.maximum.reduce(parts) for parts in zip(*worst, strict=True))
-        head = {"channel": ANY, **dict.fromkeys(cycles.Line._fields, np.nan), "nominal": _only(nominal)}
-        rows.append(head | _above_one(loading, sums, confidence, delivery))
-    return pd.DataFrame(rows)
+        if channel in loading.cycles.channels:
+            line = cycles.Line(*values)
+            sums, nominal = (
+                cycles.damage(part.of(channel), line, loading.settings.revolutions)[:, 0]
+                for part in (loading.cycles, loading.nominal)
+            )
+            every.append((sums, nominal))
+            rows.append(_above_one(loading, {"channel": channel, **line._asdict()}, sums, nominal, delivery))
+    if len(every) > 1:
+        sums, nominal = (np.maximum.reduce(parts) for parts in zip(*every, strict=True))
+        head = {"channel": ANY, **dict.fromkeys(cycles.Line._fields, np.nan)}
+        rows.append(_above_one(loading, head, sums, nominal, delivery))
+    return rows
 
 
-def _above_one(loading: Loading, sums: FloatArray, confidence: float, delivery: int) -> dict[str, object]:
-    """Columns of `damages` that follow from the damage sums of the joints."""
+def _above_one(
+    loading: Loading, head: dict[str, Any], sums: FloatArray, nominal: FloatArray, delivery: int
+) -> dict[str, Any]:
+    """Row of `damages` from the damage sums of the joints."""
     sample = Sample.of(sums, loading.status, loading.design)
-    ends = prediction.columns(sample.delivery(1.0, delivery, confidence), delivery)
-    above = asdict(sample.above(1.0, confidence))
-    return {"median": sample.quantile(0.5).estimate} | above | ends | {"confidence": confidence}
+    head |= {"nominal": _only(nominal), "median": sample.quantile(0.5).estimate} | asdict(sample.above(1.0, CONFIDENCE))
+    following = prediction.columns(sample.delivery(1.0, delivery, CONFIDENCE), delivery)
+    return head | following | {"confidence": CONFIDENCE}
 
 
-def spectra(
-    loading: Loading,
-    channels: Sequence[str] | None = None,
-    shares: Sequence[float] = SHARES,
-    confidence: float = 0.95,
-) -> pd.DataFrame:
-    """Cumulative load spectra: quantiles over the joints of the range that a number of cycles reaches or exceeds.
-
-    Parameters
-    ----------
-    loading : Loading
-        Cycles of the joints.
-    channels : sequence of str, optional
-        Channels of ``loading.cycles``; by default all.
-    shares, confidence
-        As in `equivalent_loads`; the intervals are pointwise.
+def spectrum(loading: Loading, channel: str) -> Rows:
+    """Cumulative load spectrum: quantiles over the joints of the range that a number of cycles reaches or exceeds.
 
     Returns
     -------
-    DataFrame
-        One row per channel, share and number: ``channel``, ``unit``, ``cycles`` (in the service life), ``nominal``, the
-        fields of `analysis.estimates.Quantile`, ``confidence``. Ranges in SI units, ascending numbers.
+    sequence of mapping
+        One row per share of `SHARES` and number: ``channel``, ``unit``, ``cycles`` (in the service life), ``nominal``,
+        the fields of `analysis.estimates.Quantile` (intervals are pointwise), ``confidence``. Ranges in SI units,
+        ascending numbers.
     """
-    rows = []
-    for channel in loading.cycles.channels if channels is None else channels:
-        part = loading.cycles.of(channel)
-        numbers = _numbers(part)
-        values = cycles.spectrum(part, numbers)[:, 0]
-        nominal = cycles.spectrum(loading.nominal.of(channel), numbers)[:, 0]
-        samples = [Sample.of(own, loading.status, loading.design) for own in values.T]
-        for share in shares:
-            for number, sample, own in zip(numbers, samples, nominal.T, strict=True):
-                head = {
-                    "channel": channel,
-                    "unit": CHANNELS[channel].unit,
-                    "cycles": number * loading.settings.revolutions,
-                }
-                found = sample.quantile(share, confidence)
-                rows.append({**head, "nominal": _only(own), **found._asdict(), "confidence": confidence})
-    return pd.DataFrame(rows)
+    numbers = _numbers(loading.cycles.of(channel))
+    values, nominal = (cycles.spectrum(own.of(channel), numbers)[:, 0] for own in (loading.cycles, loading.nominal))
+    samples = [Sample.of(own, loading.status, loading.design) for own in values.T]
+    rows: list[Row] = []
+    for share in SHARES:
+        for number, sample, own in zip(numbers, samples, nominal.T, strict=True):
+            head = {"channel": channel, "unit": CHANNELS[channel].unit, "nominal": _only(own)}
+            head["cycles"] = number * loading.settings.revolutions
+            rows.append({**head, **sample.quantile(share, CONFIDENCE)._asdict(), "confidence": CONFIDENCE})
+    return rows
 
 
-def most_loaded(table: pd.DataFrame) -> list[str]:
+def most_loaded(rows: Rows) -> list[str]:
     """Channel with the largest equivalent load for each kind of loads at each place, from `equivalent_loads`.
 
     Evaluated at the middle exponent and the highest share. Moduli, whose cycles are not those of a component, are used
     only if the table has nothing else. Empty if no joint has a valid result.
     """
-    exponents = sorted(table["m"].unique())
-    part = _highest(table)
-    part = part[part["m"] == exponents[len(exponents) // 2]].dropna(subset="estimate")
-    components = part[[not CHANNELS[name].is_modulus for name in part["channel"]]]
-    part = components if len(components) else part
-    loads = pd.Series([(CHANNELS[name].place, CHANNELS[name].kind.key) for name in part["channel"]], part.index)
-    return [str(name) for name in part.loc[part.groupby(loads, sort=False)["estimate"].idxmax(), "channel"]]
+    exponents = sorted({row["m"] for row in rows})
+    middle = [row for row in _highest(rows) if row["m"] == exponents[len(exponents) // 2]]
+    valid = [row for row in middle if not np.isnan(row["estimate"])]
+    found: dict[tuple[str, str], Row] = {}
+    for row in [row for row in valid if not CHANNELS[row["channel"]].is_modulus] or valid:
+        channel = CHANNELS[row["channel"]]
+        best = found.setdefault((channel.place, channel.kind.key), row)
+        if row["estimate"] > best["estimate"]:
+            found[channel.place, channel.kind.key] = row
+    return [row["channel"] for row in found.values()]
 
 
-def leading(table: pd.DataFrame) -> list[str]:
+def leading(rows: Rows) -> list[str]:
     """Channel with the largest equivalent load for force and torque of the cross bushings and of the fork bushings.
 
     Candidates are the channels `most_loaded` of the table; all exponents count.
     """
-    part = _highest(table)
-    candidates = part[part["channel"].isin(most_loaded(table))].sort_values("estimate")
+    names = most_loaded(rows)
+    candidates = [(row["estimate"], CHANNELS[row["channel"]]) for row in _highest(rows) if row["channel"] in names]
     found = []
     for group, kind in PANELS:
-        here = candidates[[is_in(CHANNELS[name], group, kind) for name in candidates["channel"]]]
-        found += [str(here["channel"].iloc[-1])] if len(here) else []
+        here = [own for own in candidates if PLACES[own[1].place].group == group and own[1].kind == kind]
+        found += [max(here, key=lambda own: own[0])[1].name] if here else []
     return found
 
 
-def is_in(channel: Channel, group: str, kind: Kind) -> bool:
-    """Whether a channel is of a kind of loads, at a place of a group, ``"cross"``."""
-    return PLACES[channel.place].group == group and channel.kind == kind
-
-
-def _highest(table: pd.DataFrame) -> pd.DataFrame:
+def _highest(rows: Rows) -> Rows:
     """Rows of the highest share of the joints."""
-    part: pd.DataFrame = table[table["share"] == table["share"].max()]
-    return part
+    return [row for row in rows if row["share"] == SHARES[-1]]
 
 
 def _numbers(part: Cycles) -> FloatArray:

@@ -1,0 +1,169 @@
+"""Numerical error of the loads: of each check of some joints, and as they give it together."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tolstat.analysis import accuracy as comparison
+from tolstat.analysis.accuracy import FIDELITY, KIND_OF, OBSERVABLES, REFERENCE
+from tolstat.common.errors import Fault, NotApplicable
+from tolstat.common.load_kinds import KIND, LOAD_KINDS
+from tolstat.common.loads import UNIT_OF_LOAD, FloatArray, load_of
+from tolstat.common.tables import Status
+from tolstat.display import text
+from tolstat.display.answer import Answer, Sentence, Table
+from tolstat.display.table import Column, Rows
+from tolstat.store.verification import Verification
+from tolstat.store.view import View
+
+TOTAL = "numerical error"
+LEAST = 1e-5
+"""Smallest error that is given as a number in per cent."""
+
+
+def _small(x: float) -> str:
+    return text.formed(x, ".1e")
+
+
+ERRORS = (
+    Column("load", lambda row: str(row["load"])),
+    Column("error", lambda row: str(row["error"]), words=True),
+    Column("joints", lambda row: str(row["joints"])),
+    Column("median", lambda row: _small(row["median"])),
+    Column("95 % below", lambda row: _small(row["usual"])),
+    Column("worst", lambda row: _small(row["worst"])),
+)
+"""Columns of the table ``errors``."""
+
+
+def accuracy(view: View) -> Answer:
+    """Give the numerical error of the loads, from checks of joints.
+
+    Parameters
+    ----------
+    view : View
+        A campaign of which some joints were checked, as ``tolstat run`` and ``tolstat verify`` do.
+
+    Returns
+    -------
+    Answer
+        Table ``errors``, see `error_rows`. Fact ``numerical_error``: by kind of load, the error that 95 % of the
+        checked joints stay below; None if it is not known.
+
+    Raises
+    ------
+    NotApplicable
+        When the file holds no checks.
+    """
+    checks = view.verification
+    if checks is None:
+        remedy = f"check some joints: tolstat verify {view.path}"
+        raise NotApplicable(str(Fault(str(view.path), "holds no checks of the numerical error", remedy)))
+    title = "Relative to the largest load of its kind in the joint"
+    table = Table("errors", title, ERRORS, error_rows(checks), dict.fromkeys(("median", "usual", "worst"), "1"))
+    said = Sentence(text.sentence(note(checks, view.limits)), "lead")
+    return Answer("accuracy", "Numerical error", [said, table], {"numerical_error": view.numerical_error})
+
+
+def error_rows(verification: Verification, by_kind: bool = True) -> Rows:
+    """Distribution of the errors over the joints, for each check and each kind of load, or load, that is kept.
+
+    Returns
+    -------
+    sequence of mapping
+        ``load`` (``F``: the worst of its bushings in each joint; ``cross1.F`` if not `by_kind`), ``error`` (name of the
+        check or `TOTAL`), ``joints``, ``median``, ``usual`` (95 % of the joints are below) and ``worst``.
+    """
+    found, kept = errors(verification), _kept(verification)
+    if by_kind:
+        columns = {LOAD_KINDS[k].key: k for k in np.unique(KIND_OF[kept])}
+        found = {name: comparison.by_kind(values) for name, values in found.items()}
+    else:
+        columns = {OBSERVABLES[k]: k for k in np.flatnonzero(kept)}
+    rows = []
+    for load, k in columns.items():
+        for name, values in found.items():
+            n, median, usual, worst = comparison.spread(values[:, k])
+            row = {"load": load, "error": name, "joints": n, "median": median, "usual": usual, "worst": worst}
+            rows.append(row)
+    return rows
+
+
+def errors(verification: Verification) -> dict[str, FloatArray]:
+    """Errors, (m, loads), by check, as of `accuracy.differences`; last `TOTAL`, from `accuracy.numerical`."""
+    results = {name: check.results for name, check in verification.checks.items()}
+    found = {name: comparison.differences(verification.base, other) for name, other in results.items()}
+    return found | {TOTAL: comparison.numerical(verification.base, results)}
+
+
+def joint_rows(verification: Verification) -> Rows:
+    """Errors of every joint, by check and load kept.
+
+    Returns
+    -------
+    sequence of mapping
+        ``row``, ``check``, ``status`` (of the check), ``load``, ``unit``, ``campaign`` and ``value`` (SI), ``error``:
+        the campaign's value minus the check's, relative to the largest load of the measure.
+    """
+    base, kept = comparison.loads(verification.base), np.flatnonzero(_kept(verification))
+    rows = []
+    for name, check in verification.checks.items():
+        other, error = comparison.loads(check.results), comparison.differences(verification.base, check.results)
+        for k in kept:
+            values = zip(verification.rows, check.results["status"], base[:, k], other[:, k], error[:, k], strict=True)
+            for row, status, campaign, value, relative in values:
+                head = {"row": int(row), "check": name, "status": Status(status).label, "load": OBSERVABLES[k]}
+                head["unit"] = UNIT_OF_LOAD[OBSERVABLES[k]]
+                rows.append({**head, "campaign": float(campaign), "value": float(value), "error": float(relative)})
+    return rows
+
+
+def note(verification: Verification, limits: Iterable[str] = ()) -> str:
+    """Sentence on the numerical error of the largest loads: of kinds that every report shows, and those of `limits`."""
+    kinds = {load_of(name).kind.key for name in limits}
+    total = [row for row in error_rows(verification) if row["error"] == TOTAL]
+    shown = [row for row in total if row["load"] in kinds or KIND[row["load"]].shown] or total
+    known = [row for row in shown if not np.isnan(row["worst"])]
+    words = [f"{_called(row['load'])} {_small(row['median'])}, at worst {_small(row['worst'])}" for row in known]
+    noun = "error of numerics and fidelity" if FIDELITY in verification.checks else "numerical error"
+    return "; ".join([f"{noun}, {basis(verification)}: {'; '.join(words) or 'unknown'}", *_unknown(verification)])
+
+
+def basis(verification: Verification) -> str:
+    """Words on how the numerical error was determined."""
+    m = len(verification.rows)
+    if REFERENCE in verification.checks:
+        settled = int((verification.checks[REFERENCE].results["status"] == Status.OK).sum())
+        return f"measured on {settled} of {m} joints against a tight reference"
+    noun = "joint" if m == 1 else "joints"
+    return f"estimated on {m} {noun} from half the step, tighter Newton and longer settling"
+
+
+def in_percent(error: float) -> str:
+    """Format an error in per cent; below `LEAST` the number says no more than that it is small."""
+    return f"< {text.percent(LEAST)}" if error < LEAST else text.percent(error)
+
+
+def _kept(verification: Verification) -> NDArray[np.bool_]:
+    """Which of `OBSERVABLES` the campaign keeps, (loads,); all if no joint has a value."""
+    kept = ~np.isnan(comparison.loads(verification.base)).all(axis=0)
+    return np.asarray(kept | ~kept.any())
+
+
+def _called(key: str) -> str:
+    """Kind of loads in a sentence: its symbol, or what a load is called where several kinds share the symbol."""
+    kind = KIND[key]
+    return kind.symbol if kind.symbol == key else kind.noun
+
+
+def _unknown(verification: Verification) -> list[str]:
+    """Words on joints that failed or did not settle in the campaign or in a check; empty if there are none."""
+    base = verification.base["status"] == Status.OK
+    words = [] if base.all() else [f"{int((~base).sum())} not settled"]
+    for name, check in verification.checks.items():
+        bad = int((base & (check.results["status"] != Status.OK)).sum())
+        words += [f"{bad} not settled in {name}"] if bad else []
+    return [", ".join(words)] if words else []

@@ -1,1 +1,0 @@
-"""Numerical error of the loads."""

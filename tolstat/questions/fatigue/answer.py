@@ -1,0 +1,353 @@
+"""Fatigue of a campaign: failures of the parts, damage-equivalent loads and damage sums over a service life."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+
+from tolstat.analysis.prediction import DELIVERY
+from tolstat.analysis.strength import Line
+from tolstat.common.channels import CHANNELS
+from tolstat.common.errors import NotApplicable
+from tolstat.common.loads import unit_text
+from tolstat.common.tables import Status
+from tolstat.display import drawing, style, text
+from tolstat.display.answer import Answer, Part, Sentence, Table
+from tolstat.display.asked import Asked
+from tolstat.display.blocks import Panel, Panels
+from tolstat.display.mpl import lines as mpl_lines
+from tolstat.display.mpl import ticker
+from tolstat.display.options import Delivery, Loads, Opt
+from tolstat.display.table import Column, Row, Rows
+from tolstat.questions.fatigue import loads, parts
+from tolstat.questions.fatigue.counting import channels
+from tolstat.questions.fatigue.loads import SHARES, Loading, load_cycles
+from tolstat.questions.fatigue.stress import Stressed, load_stresses
+from tolstat.store.revolutions import held
+from tolstat.store.view import View
+from tolstat.study.fatigue import of_text
+from tolstat.study.stress_point import StressPoint
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+
+JOINTS = 5000
+"""Maximum number of samples, the first ones, whose cycles the page evaluates: more add little and take memory."""
+MAX_APART = 1e-6
+"""Relative difference of joints simulated again from their stored loads above which a note says so."""
+MAX_LACKING = 1e-3
+"""Relative increase of the sum of S^m by cycles that the file does not hold, above which a note says so."""
+MIN_RANGE = 1e-3
+"""Smallest range drawn, relative to the largest."""
+POINTS = 25
+"""Number of lives of the curve of failures."""
+DECADES = 2.0
+"""Decades drawn around the service life."""
+LABELS = [*(f"{100 * share:g} % of the joints stay below" for share in SHARES), "nominal joint"]
+"""Legend of a load spectrum."""
+
+
+def _life(x: float) -> str:
+    return "-" if math.isnan(x) else "never" if math.isinf(x) else f"{x:.2e}".replace("e+", "e")
+
+
+def _life_span(row: Row) -> str:
+    low, high = row["life_lower"], row["life_upper"]
+    return "-" if math.isnan(low) else f"{_life(low)} .. {_life(high)}"
+
+
+def _quantile(share: float) -> Column:
+    head, rank = f"{100 * share:g} % below", 0 if share == SHARES[-1] else 1
+    return Column(head, lambda row: text.value(row[share]["estimate"], row["unit"]), rank=rank)
+
+
+def _interval(row: Row) -> str:
+    return text.span_of(row[SHARES[-1]]["lower"], row[SHARES[-1]]["upper"], row["unit"])
+
+
+def _line_of_load(row: Row) -> str:
+    if row["channel"] == loads.ANY:
+        return "-"
+    return f"{text.value(row['S0'], CHANNELS[row['channel']].unit)} at {row['N0']:g} cycles, m = {row['m']:g}"
+
+
+PARTS = (
+    Column("point", lambda row: str(row["point"])),
+    Column("failures", lambda row: text.percent(row["estimate"])),
+    Column("95 % interval", lambda row: text.span(row["outer_lower"], row["outer_upper"])),
+    Column("ppm", lambda row: text.ppm(row["estimate"]), rank=6),
+    Column("failures in delivery", text.delivery, rank=7),
+    Column("B10 life", lambda row: _life(row["life"])),
+    Column("its 95 % interval", _life_span, rank=5),
+    Column("nominal damage", lambda row: text.formed(row["nominal"]), rank=3),
+    Column("median damage", lambda row: text.formed(row["median"]), rank=2),
+    Column("99 % damage", lambda row: text.formed(row["upper_99"]), rank=1),
+    Column("nominal joint fails", lambda row: text.percent(row["nominal_failures"]), rank=4),
+)
+"""Columns of the table ``points``."""
+LOADS = (
+    Column("channel and exponent", lambda row: f"{row['channel']}, m = {row['m']:g}"),
+    Column("nominal", lambda row: text.value(row["nominal"], row["unit"]), rank=2),
+    *map(_quantile, SHARES),
+    Column(f"95 % interval of {100 * SHARES[-1]:g} %", _interval),
+)
+"""Columns of the table ``loads``, arranged by `_by_channel`."""
+DAMAGES = (
+    Column("channel", lambda row: str(row["channel"])),
+    Column("S–N line", _line_of_load, words=True, rank=3),
+    Column("nominal damage", lambda row: text.formed(row["nominal"]), rank=2),
+    Column("median", lambda row: text.formed(row["median"]), rank=1),
+    Column("joints above 1", lambda row: f"{row['count']} of {row['n'] - row['n_failed'] - row['n_unsettled']}"),
+    Column("share", lambda row: text.percent(row["estimate"])),
+    Column("95 % interval", lambda row: text.span(row["lower"], row["upper"])),
+    Column("ppm", lambda row: text.ppm(row["estimate"]), rank=4),
+    Column("above in delivery", text.delivery, rank=5),
+)
+"""Columns of the table ``damages``. Joints above 1 are counted among the settled ones, as the share is."""
+
+
+def fatigue(
+    *views: View,
+    shares: Annotated[list[float] | None, Opt("S", name="share")] = None,
+    by: Loads = None,
+    joints: Annotated[int | None, Opt("N", least=1)] = None,
+    delivery: Delivery = DELIVERY,
+) -> Answer:
+    """Compute failures of parts, equivalent loads and damage.
+
+    For each [fatigue.point] of the study: the damage sum, the life that 90 % of the parts reach, and the share of the
+    parts that fail in the service life, with 95 % intervals. Without load histories in the file, the joints are
+    simulated again. From cycles in the file: quantiles of the damage-equivalent load over the joints, and for each S-N
+    line of a load the share of joints whose damage sum exceeds 1. Without --by, prints the most loaded component of
+    the force and of the moment of each bushing. All settings are those of [fatigue] in the study of the first FILE.
+
+    The operating points of FILE form a duty cycle, by the share of the time that [[operation]] gives each; so do
+    several files, with the same joints at one operating point each.
+
+    Example: tolstat fatigue iso2768_f.h5 --by "cross*.F_t"
+
+    Parameters
+    ----------
+    *views : View
+        One campaign, whose operating points are the duty cycle if it has several; or the same joints in a campaign for
+        each operating point.
+    shares : list of float, optional
+        Share of the revolutions, once for each FILE in the same order; sum 1; default: 1 for one file.
+    by : list of str, optional
+        Component or pattern, such as cross1.F_t or "cross*.F_t"; repeatable; default: all of bushings.
+    joints : int, optional
+        Evaluate the first N joints only; default: all.
+    delivery : int
+        Number of joints of the next delivery, for the prediction intervals of failures.
+
+    Returns
+    -------
+    Answer
+        Of a study with points table ``points``, see `parts.part_failures`; of files with cycles or histories tables
+        ``loads``, see `loads.equivalent_loads`, and of channels with an S–N line ``damages``, see `loads.damages`.
+        Fact ``duty``: shares of the revolutions by operating point, if there are several.
+
+    Raises
+    ------
+    InputError
+        When the shares are not shares or not known, the campaigns have different joints, or nothing is selected.
+    StoreError
+        When a file holds no histories and its study no points, or its joints are no sample of a production.
+    """
+    has_points = bool(of_text(views[0].store.study_text, str(views[0].path)).points)
+    has_cycles = all(part.store.history_specs for view in views for part in view.parts)
+    found: list[Part] = []
+    duty: Sequence[tuple[str, float]] = ()
+    if has_points:
+        stressed = load_stresses(views, shares or None, joints)
+        duty, found = stressed.duty, _of_parts(stressed, delivery)
+    if by or has_cycles or not has_points:
+        loading = load_cycles(views, shares or None, channels(by) if by else None, joints)
+        rows = loads.equivalent_loads(loading)
+        shown = [] if by else loads.most_loaded(rows)
+        seen = [row for row in rows if not shown or row["channel"] in shown]
+        duty, found = loading.duty, [*found, *_of_loads(loading, rows, seen, delivery)]
+    return Answer("fatigue", "Fatigue", found, {"duty": dict(duty)} if len(duty) > 1 else {})
+
+
+def fatigue_on_page(view: View, asked: Asked) -> Answer:
+    """Fatigue of the first joints, with the leading loads; without histories, of those that are simulated again."""
+    found: list[Part] = []
+    if view.method != "sweep" and view.count(Status.OK):
+        with asked.noting("load cycles are left out"):
+            joints = JOINTS if held(view.store) else min(asked.replay, JOINTS)
+            if of_text(view.store.study_text, str(view.path)).points and joints:
+                found += _of_parts(load_stresses([view], samples=joints), DELIVERY)
+            if view.store.history_specs:
+                loading = load_cycles([view], samples=JOINTS)
+                rows = loads.equivalent_loads(loading)
+                leading = loads.leading(rows)
+                seen = sorted((row for row in rows if row["channel"] in leading), key=lambda r: (r["channel"], r["m"]))
+                found += _of_loads(loading, rows, seen, DELIVERY)
+    if not found:
+        raise NotApplicable
+    return Answer("fatigue", "Fatigue", found)
+
+
+def _of_parts(stressed: Stressed, delivery: int) -> list[Part]:
+    rows = parts.part_failures(stressed, delivery)
+    panel = Panel(
+        "failures-over-life",
+        "Share of the joints with a failed part, with pointwise 95 % intervals",
+        "Share of the joints in which a part has failed, against revolutions of the input shaft",
+        partial(_draw_failures, stressed=stressed, life=rows[-1]["life"]),
+        (6.5, 3.6),
+    )
+    lives = dict.fromkeys(("life", "life_lower", "life_upper"), "revolutions")
+    table = Table("points", "Parts", PARTS, rows, {"S_D": "Pa"} | lives)
+    return [Panels([panel]), table, *map(Sentence, _notes_on_parts(stressed, rows))]
+
+
+def _of_loads(loading: Loading, rows: Rows, seen: Rows, delivery: int) -> list[Part]:
+    panels = [_spectrum_panel(loading, channel) for channel in loads.leading(rows)]
+    found: list[Part] = [Panels(panels)] if panels else []
+    found.append(Table("loads", "Damage-equivalent loads", LOADS, rows, seen=_by_channel(seen)))
+    if damages := loads.damages(loading, delivery):
+        title = "Damage sum of the service life, and share of the joints where it exceeds 1"
+        found.append(Table("damages", title, DAMAGES, damages, {"S0": "N or N*m"}))
+    return [*found, *map(Sentence, _notes_on_loads(loading, rows))]
+
+
+def _by_channel(rows: Rows) -> Rows:
+    """One row per channel and exponent: for each share its row."""
+    found: dict[Any, dict[Any, Any]] = {}
+    for row in rows:
+        head = {key: row[key] for key in ("channel", "m", "unit", "nominal")}
+        found.setdefault((row["channel"], row["m"]), head)[row["share"]] = row
+    return list(found.values())
+
+
+def _notes_on_parts(stressed: Stressed, rows: Rows) -> Iterator[str]:
+    """Number of joints, meaning of the columns, restrictions."""
+    settings, n = stressed.settings, stressed.status.size
+    starts = f" with {settings.starts:g} starts" if settings.starts else ""
+    first = f" (the first {n} of {stressed.total})" if stressed.total > n else ""
+    settled = f"{int(stressed.valid.sum())} of {n} joints settled{first}"
+    yield f"{settled}; service life {settings.revolutions:g} revolutions{starts}"
+    yield from _duty(stressed.duty)
+    life = "B10 life: revolutions after which 10 % have failed; damage: at the median strength"
+    yield f"{life}; intervals count joints without a valid load as failing and as surviving"
+    yield from _lines(settings.points)
+    if rows[-1]["point"] == parts.ANY:
+        yield f"{parts.ANY}: the joint fails with its first part; strengths of two points are independent"
+    if not stressed.design.has_interval("mean"):
+        yield "no intervals: they hold for independent samples only"
+    if stressed.apart > MAX_APART:
+        yield f"joints simulated again differ from the file by up to {stressed.apart:.1g} of a largest load"
+
+
+def _notes_on_loads(loading: Loading, rows: Rows) -> Iterator[str]:
+    """Number of joints, definition of the loads, restrictions."""
+    settings = loading.settings
+    cycles = f"loads are ranges: {settings.reference_cycles:g} cycles of them do the damage of "
+    settled = f"{loading.settled} of {loading.status.size} joints settled"
+    yield f"{settled}; {cycles}{settings.revolutions:g} revolutions"
+    yield from _duty(loading.duty)
+    if not loading.design.has_interval("quantile"):
+        yield "no intervals: order statistics hold for independent samples only"
+    lacking = max((row["lacking"] for row in rows), default=0.0)
+    if lacking > MAX_LACKING:
+        yield f"cycles that the file does not hold may add {lacking:.2g} of a sum of S^m"
+
+
+def _duty(cycle: Sequence[tuple[str, float]]) -> list[str]:
+    """Sentence on the shares of a duty cycle; none for a single operating point."""
+    shares = ", ".join(f"{text.percent(share)} at {name}" for name, share in cycle)
+    return [f"over a duty cycle: {shares}, shares of the revolutions"] if len(cycle) > 1 else []
+
+
+def _lines(points: Sequence[StressPoint]) -> list[str]:
+    """One sentence for each S–N line, with the names of its points."""
+    names: dict[Line, list[str]] = {}
+    for point in points:
+        names.setdefault(point.line, []).append(point.name)
+    if len(names) == 1:
+        return [f"S–N line: {_line(points[0].line)}"]
+    return [f"S–N line of {'; '.join(own)}: {_line(line)}" for line, own in names.items()]
+
+
+def _line(line: Line) -> str:
+    scatter = f", T_S = {line.T_S:.3g}" if line.T_S > 1 else ""
+    mean = f", M = {line.M:g} (R = {line.R:g})" if line.M > 0 else ""
+    knee = f"range of {line.S_D / 1e6:.4g} MPa at {line.N_D:g} cycles"
+    return f"{knee}, k = {line.k:g}, {line.k_2:g} below{scatter}{mean}, damage sum {line.D_c:g}"
+
+
+def _draw_failures(ax: Axes, stressed: Stressed, life: float) -> None:
+    """Draw the share of the joints with a failed part against revolutions, with its band and the service life."""
+    service = stressed.settings.revolutions
+    first, last = sorted([service, life if math.isfinite(life) and life > 0 else service])
+    numbers = np.geomspace(first / 10**DECADES, last * 10**DECADES, POINTS)
+    curve = parts.failures_over_life(stressed, numbers.tolist())
+    lower, share, upper = np.array([(own.outer_lower, own.estimate, own.outer_upper) for own in curve]).T
+    if stressed.design.has_interval("mean"):
+        ax.fill_between(numbers, lower, upper, color=style.COLOURS[0], alpha=0.2, lw=0)
+    ax.plot(numbers, share, color=style.COLOURS[0])
+    ax.axvline(service, color=style.INK, lw=1, ls="--")
+    place: Any = {"xycoords": ("data", "axes fraction"), "textcoords": "offset points", "va": "top"}
+    ax.annotate("service life", (service, 1.0), (4, -2), **place)
+    ax.set(xscale="log", xlim=(numbers[0], numbers[-1]))
+    ends = upper if stressed.design.has_interval("mean") else share
+    ax.set_ylim(0.0, min(1.0, 1.1 * float(np.nanmax(ends, initial=0.0))) or 1.0)
+    ax.xaxis.set_major_formatter(ticker.FuncFormatter(lambda x, _: f"{x:.0e}".replace("e+0", "e").replace("e+", "e")))
+    ax.yaxis.set_major_formatter(ticker.FuncFormatter(lambda value, _: f"{100 * value:g} %"))
+    ax.set_xlabel("revolutions of the input shaft")
+    ax.set_ylabel("joints with a failed part")
+
+
+def _spectrum_panel(loading: Loading, channel: str) -> Panel:
+    return Panel(
+        f"spectrum-{channel}",
+        f"{channel}: load spectrum",
+        f"Ranges of {channel} that so many cycles a revolution reach, for half, 90 and 99 % of the joints",
+        partial(_draw_spectrum, loading=loading, channel=channel),
+        (4.9, 3.5),
+        top=drawing.legend_room(LABELS),
+    )
+
+
+def _draw_spectrum(ax: Axes, loading: Loading, channel: str) -> None:
+    """Draw the spectra of one channel as step curves, with their bands."""
+    rows = loads.spectrum(loading, channel)
+    ceiling = max(row["estimate"] for row in rows)
+    floor = MIN_RANGE * ceiling if ceiling > 0 else 1.0
+    numbers = np.array([row["cycles"] for row in rows if row["share"] == SHARES[0]]) / loading.settings.revolutions
+    x = np.concatenate([[0.7 * numbers[0]], numbers])
+    handles: list[Artist] = []
+    for share, colour, dash in zip(SHARES, style.COLOURS, style.DASHES, strict=False):
+        own = [row for row in rows if row["share"] == share]
+        lower, estimate, upper, nominal = (_steps(own, key) for key in ("lower", "estimate", "upper", "nominal"))
+        if np.isfinite(lower).any():
+            top = np.where(np.isfinite(upper), upper, estimate)  # too few joints: the upper end is infinite
+            low, high = (np.maximum(y, 0.1 * floor) for y in (lower, top))
+            ax.fill_between(x, low, high, step="pre", color=colour, alpha=0.2, lw=0)
+        ax.step(x, estimate, where="pre", color=colour, ls=dash, zorder=3)
+        handles.append(mpl_lines.Line2D([], [], color=colour, ls=dash))
+    ax.step(x, nominal, where="pre", color=style.INK, lw=1, zorder=2)
+    handles.append(mpl_lines.Line2D([], [], color=style.INK, lw=1))
+    shown = max([row["cycles"] for row in rows if row["estimate"] > floor], default=0.0) / loading.settings.revolutions
+    ax.set(xscale="log", yscale="log", ylim=(floor, 2.0 * max(ceiling, floor)))
+    ax.set_xlim(x[0], 1.05 * max(shown if shown > x[0] else x[-1], 2.0 * x[0]))
+    for axis in (ax.xaxis, ax.yaxis):
+        axis.set_major_formatter(ticker.FuncFormatter(lambda value, _: f"{value:g}"))
+        axis.set_minor_formatter(ticker.NullFormatter())
+    ax.set_xticks([t for t in (0.01, 0.03, 0.1, 0.3, 1, 2, 3, 4, 6, 8, 12, 16) if x[0] <= t <= ax.get_xlim()[1]])
+    ax.set_xlabel("cycles a revolution with at least this range")
+    ax.set_ylabel(f"range of {channel} [{unit_text(CHANNELS[channel].unit)}]")
+    drawing.legend_above(ax, handles, LABELS)
+
+
+def _steps(rows: Rows, key: str) -> np.ndarray[Any, Any]:
+    """Values of a step curve, the first one twice, so that the curve begins at the left edge."""
+    values = np.array([row[key] for row in rows])
+    return np.concatenate([values[:1], values])

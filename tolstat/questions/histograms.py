@@ -1,0 +1,265 @@
+"""Histograms of the leading loads, and of the errors that each entry of the tolerances drew."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from tolstat.analysis.sample import Sample
+from tolstat.common.errors import Fault, NotApplicable
+from tolstat.common.loads import FloatArray
+from tolstat.common.tables import VALID
+from tolstat.common.units import DISPLAY_UNITS
+from tolstat.display import drawing, style, text
+from tolstat.display.answer import Answer, Part, Sentence
+from tolstat.display.asked import Asked
+from tolstat.display.blocks import Panel, Panels
+from tolstat.display.mpl import ticker
+from tolstat.store.view import View
+from tolstat.study import axes
+from tolstat.study.tolerances.entry import SingleEntry
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+JOINTS = 20_000
+"""Maximum number of joints (the first ones) whose errors are counted."""
+BINS = 30
+"""Number of bins."""
+
+
+class Drawn(NamedTuple):
+    """Errors that an entry of ``[tolerances]`` drew, all in one histogram.
+
+    Attributes
+    ----------
+    entry : str
+        Pattern of the entry.
+    number : str
+        What its number is, see `study.tolerances.entry.Meaning`.
+    errors : tuple of str
+        Errors that it sets, columns of the table ERROR.
+    unit : str
+        Their SI unit.
+    band : tuple of float, optional
+        Lower and upper limit of the drawing, SI; None for a zone, and where none is given.
+    outside : float
+        Share of the values outside the band; NaN without one.
+    others : tuple of str
+        Patterns of other entries that the same errors include, such as that of the tilt of a pair in its positions.
+    edges : ndarray, shape (m + 1,)
+        Edges of the bins, ascending, SI.
+    share : ndarray, shape (m,)
+        Share of the values, of all these errors in all joints, in each bin.
+    """
+
+    entry: str
+    number: str
+    errors: tuple[str, ...]
+    unit: str
+    band: tuple[float, float] | None
+    outside: float
+    others: tuple[str, ...]
+    edges: FloatArray
+    share: FloatArray
+
+
+def histograms(view: View) -> Answer:
+    """Draw histograms of the loads, and of the errors drawn.
+
+    Parameters
+    ----------
+    view : View
+        A campaign of a study whose joints are drawn from tolerances.
+
+    Returns
+    -------
+    Answer
+        Pictures of the leading loads, and of the errors of each entry of the tolerances, see `of_load` and `drawn`.
+
+    Raises
+    ------
+    NotApplicable
+        When the joints are no sample of a production, or there are none.
+    InputError, StoreError
+        When the study cannot be read.
+    """
+    return _answer(view, drawn(view) if view.sampled else [])
+
+
+def histograms_on_page(view: View, asked: Asked) -> Answer:
+    """As `histograms`; the loads alone if the study cannot be read."""
+    found: list[Drawn] = []
+    if view.sampled:
+        with asked.noting("no histograms of errors"):
+            found = drawn(view)
+    return _answer(view, found)
+
+
+def drawn(view: View) -> list[Drawn]:
+    """Histogram of the errors of each entry, in the study's order, over the first `JOINTS` joints.
+
+    Joints are counted by their weights. Entries that say more than one thing, such as zones of offset and tilt, have
+    several; empty for a study without tolerances.
+
+    Raises
+    ------
+    InputError, StoreError
+        When the study cannot be read.
+    """
+    found: dict[tuple[Any, ...], list[str]] = {}
+    entries_of: dict[str, list[str]] = {}
+    for entry in view.study.entries:
+        for site, model in entry.models:
+            band = model.band(site) if isinstance(model, SingleEntry) else None
+            for meaning in model.meaning(site):
+                found.setdefault((entry.pattern, meaning.number, meaning.unit, band), []).extend(meaning.errors)
+            for name in _moved(site.name, [name for meaning in model.meaning(site) for name in meaning.errors]):
+                entries_of.setdefault(name, []).append(entry.pattern)
+    if not (found and view.n):
+        return []
+    samples = np.arange(min(view.n, JOINTS))
+    table = view.errors(samples, sorted({name for names in found.values() for name in names}))
+    weights = view.design.counts_as(view.n)[: len(samples)]
+    histograms = []
+    for (pattern, number, unit, band), names in found.items():
+        errors = tuple(dict.fromkeys(names))
+        others = dict.fromkeys(own for name in errors for own in entries_of[name] if own != pattern)
+        counted = _counted_errors(np.concatenate([table[name] for name in errors]), np.tile(weights, len(errors)), band)
+        histograms.append(Drawn(pattern, number, errors, unit, band, counted[0], tuple(others), *counted[1:]))
+    return histograms
+
+
+def of_load(load: Sample) -> tuple[FloatArray, FloatArray]:
+    """Histogram of a load over its valid joints, counted by weight; bins of equal ratio where it has a long tail.
+
+    Returns
+    -------
+    edges : ndarray, shape (m + 1,)
+        Edges of the bins, ascending, SI.
+    share : ndarray, shape (m,)
+        Share of the joints in each bin.
+    """
+    values, weights = load.values[load.is_valid], load.counts_as
+    low, high = float(values.min()), float(values.max())
+    high = high if high > low else low + max(1e-3 * abs(low), 1e-12)
+    edges = np.geomspace(low, high, BINS + 1) if load.long_tailed else np.linspace(low, high, BINS + 1)
+    edges[0], edges[-1] = low, high  # rounding must not put the extreme values outside
+    return edges, _shares(values, edges, weights)
+
+
+def _moved(zone: str, errors: Sequence[str]) -> set[str]:
+    """Errors that a tolerance moves: beside those that it sets, the tilt of a pair's axis moves both its features."""
+    feature, _, key = zone.partition(".")
+    tilts_pair = feature in axes.PAIRS and key in axes.ORIENTATIONS
+    return {*errors, *(axes.columns_of(zone) if tilts_pair else ())}
+
+
+def _counted_errors(
+    values: FloatArray, weights: FloatArray, band: tuple[float, float] | None
+) -> tuple[float, FloatArray, FloatArray]:
+    """Share outside the band, edges, and shares in the bins; the bins cover values and band."""
+    outside = np.nan
+    if band is not None:
+        beyond = (values < band[0]) | (values > band[1])
+        outside = float(weights[beyond].sum() / weights.sum())
+    low, high = min([values.min(), *(band or ())]), max([values.max(), *(band or ())])
+    edges = np.linspace(low, high, BINS + 1) if high > low else np.array([low, low + max(abs(low), 1e-9) * 1e-3])
+    return outside, edges, _shares(values, edges, weights)
+
+
+def _shares(values: FloatArray, edges: FloatArray, weights: FloatArray) -> FloatArray:
+    return np.asarray(np.histogram(values, edges, weights=weights)[0] / weights.sum())
+
+
+def _answer(view: View, found: Sequence[Drawn]) -> Answer:
+    parts: list[Part] = []
+    if view.sampled and view.leading and view.count(*VALID):
+        parts.append(Panels([_load_panel(load) for load in view.loads(view.leading)]))
+    if found:
+        said = "Small pictures: all errors that an entry of the tolerances sets, in one histogram; between the dashed "
+        said += "lines its tolerance band."
+        said += f" The first {JOINTS} joints." if view.n > JOINTS else ""
+        pictures = Panels([_drawn_panel(own, k, found) for k, own in enumerate(found)], small=True)
+        parts += [pictures, Sentence(f"{said} {view.design.counting}".rstrip())]
+    if not parts:
+        remedy = "give the result file of a study with [tolerances] whose joints are drawn at random"
+        raise NotApplicable(str(Fault(str(view.path), "holds no errors or loads of a random sample", remedy)))
+    return Answer("histograms", "What was drawn, and the loads that came of it", parts)
+
+
+def _load_panel(load: Sample) -> Panel:
+    median, most = (text.value(load.quantile(share).estimate, load.unit) for share in (0.5, 0.95))
+    scale = "logarithmic" if load.long_tailed else "linear"
+    return Panel(
+        f"histogram-{load.name}",
+        f"{load.name}: distribution of the joints",
+        f"Half of the joints are below {median}, 95 % below {most}; scale of loads {scale}",
+        partial(_draw_load, load=load),
+        (4.9, 2.7),
+    )
+
+
+def _draw_load(ax: Axes, load: Sample) -> None:
+    edges, share = of_load(load)
+    _bars(ax, edges, 100.0 * share)
+    low, high = float(edges[0]), float(edges[-1])
+    if load.limit is not None and 0.5 * low <= load.limit <= 2.0 * high:
+        low, high = min(low, load.limit), max(high, load.limit)
+        ax.axvline(load.limit, color=style.INK, lw=1.4, ls=(0.0, (8.0, 3.0)))
+        words, place = f"limit {text.value(load.limit, load.unit)}", (load.limit, 1.015)
+        ax.annotate(words, place, xycoords=ax.get_xaxis_transform(), ha="center", va="bottom")
+    if load.long_tailed:
+        unit = drawing.log_loads(ax, 0.95 * low, 1.05 * high, load.limit or high, load.unit)
+    else:
+        margin = 0.03 * (high - low)
+        ax.set_xlim(low - margin, high + margin)
+        ax.xaxis.set_major_locator(ticker.MaxNLocator(6))
+        unit = drawing.loads_axis(ax.xaxis, load.limit or high, load.unit)
+    left, right = ax.get_xlim()
+    if left <= load.nominal <= right:
+        style.mark(ax, load.nominal, ax.get_ylim()[1], style.COLOURS[0])
+    ax.set(xlabel=f"{load.name} [{unit or '1'}], largest over the revolution", ylabel="share of the joints [%]")
+
+
+def _drawn_panel(found: Drawn, k: int, every: Sequence[Drawn]) -> Panel:
+    """One picture; of several with one entry each says whether it is of offsets or of tilts."""
+    kinds = dict.fromkeys(name.partition(".")[2].partition("_")[0] for name in found.errors)
+    kind = f", {' and '.join(kinds)}" if sum(own.entry == found.entry for own in every) > 1 else ""
+    outside = "" if found.band is None else f"; {text.percent(found.outside)} outside"
+    others = f"; includes {' and '.join(found.others)}" if found.others else ""
+    return Panel(
+        f"drawn-errors-{k}",
+        f"{found.entry}{kind}: {found.number}{outside}{others}",
+        f"Histogram of {', '.join(found.errors)}",
+        partial(_draw_errors, found=found),
+        (2.5, 1.4),
+        0.15,
+        0.06,
+    )
+
+
+def _draw_errors(ax: Axes, found: Drawn) -> None:
+    unit, factor = DISPLAY_UNITS.get(found.unit, (found.unit, 1.0))
+    _bars(ax, factor * found.edges, found.share)
+    ends = factor * np.array(found.band or ())
+    for end in ends:
+        ax.axvline(end, color=style.INK, lw=1.0, ls=(0.0, (4.0, 2.0)))
+    ax.set_yticks([])
+    ax.spines["left"].set_visible(False)
+    if found.band is None:
+        ax.xaxis.set_major_locator(ticker.MaxNLocator(3))
+    else:
+        marks = (ends[0], ends.mean(), ends[1])
+        ax.set_xticks(marks, [f"{x:.3g}" for x in marks])
+    ax.grid(visible=False)
+    ax.set_xlabel(f"[{unit or '1'}]")
+
+
+def _bars(ax: Axes, edges: FloatArray, share: FloatArray) -> None:
+    ax.stairs(share, edges, fill=True, color=style.COLOURS[0], alpha=0.55)
+    ax.stairs(share, edges, color=style.COLOURS[0], lw=1.0)
+    ax.set_ylim(0.0, 1.08 * max(float(share.max()), 1e-10))

@@ -1,1 +1,0 @@
-"""What was drawn, and which loads came of it: histograms."""

@@ -1,1 +1,0 @@
-"""Contact modes, and joints without a valid load."""

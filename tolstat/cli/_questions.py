@@ -128,7 +128,7 @@ def show(answer: Answer, wide: bool) -> None:
 
     first = True
     for part in answer.parts:
-        if isinstance(part, Table):
+        if isinstance(part, Table) and not part.hidden:
             if not first:
                 typer.echo(f"\n{part.title}")
             print_table(part.columns, part.for_people, wide)

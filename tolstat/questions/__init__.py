@@ -41,7 +41,6 @@ if TYPE_CHECKING:
     from tolstat.questions.show.rendering import draw_joint as draw_joint
     from tolstat.questions.show.rendering import draw_row as draw_row
     from tolstat.questions.sorting.query import sorted_joints as sorted_joints
-    from tolstat.questions.time_above.query import time_above as time_above
     from tolstat.questions.what_if.query import what_if as what_if
     from tolstat.store.view import View
 
@@ -157,7 +156,7 @@ QUESTIONS = (
     Folder("orders", ("query.orders_of",), "Read", ("orders",), has_section=True),
     Folder("accuracy", has_section=True, has_summary=True),
     Folder("joints", has_section=True),
-    Folder("time_above", ("query.time_above",), "Read", ("time_above",)),
+    Question("time_above", "Read", "Estimate how much of a revolution loads are above levels."),
     Folder("reweight", ("query.reweighted",), "Decide", ("reweight",)),
     Folder("allocate", ("query.allocated",), "Decide", ("allocate",)),
     Folder("compare", ("query.compared",), "Decide", ("compare",)),

@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from tolstat.questions.fatigue.query import load_cycles as load_cycles
     from tolstat.questions.fatigue.stress import load_stresses as load_stresses
     from tolstat.questions.lots.query import lots_of as lots_of
-    from tolstat.questions.orders.query import orders_of as orders_of
     from tolstat.questions.rare.query import rare_event as rare_event
     from tolstat.questions.reweight.query import reweighted as reweighted
     from tolstat.questions.selective.query import assembled as assembled
@@ -153,7 +152,7 @@ QUESTIONS = (
         has_section=True,
     ),
     Folder("bearing_life", ("lives.lives_of",), "Read", ("bearing_life",), has_section=True, has_summary=True),
-    Folder("orders", ("query.orders_of",), "Read", ("orders",), has_section=True),
+    Question("orders", "Read", "Estimate the orders of the loads that the shafts carry.", "folded"),
     Folder("accuracy", has_section=True, has_summary=True),
     Folder("joints", has_section=True),
     Question("time_above", "Read", "Estimate how much of a revolution loads are above levels."),

@@ -41,7 +41,7 @@ MAX_LOADS = 4
 LINES = {
     "time": "mean joint",
     "time_50": "median joint",
-    "time_90": "90 % of the joints below",
+    "time_90": "90 % below",
     "time_99": "99 % below",
 }
 """Labels of the curves of time above, by key."""

@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     from tolstat.questions.fatigue.stress import load_stresses as load_stresses
     from tolstat.questions.lots.query import lots_of as lots_of
     from tolstat.questions.rare.query import rare_event as rare_event
-    from tolstat.questions.reweight.query import reweighted as reweighted
     from tolstat.questions.selective.query import assembled as assembled
     from tolstat.questions.show.rendering import draw_errors as draw_errors
     from tolstat.questions.show.rendering import draw_joint as draw_joint
@@ -156,7 +155,7 @@ QUESTIONS = (
     Folder("accuracy", has_section=True, has_summary=True),
     Folder("joints", has_section=True),
     Question("time_above", "Read", "Estimate how much of a revolution loads are above levels."),
-    Folder("reweight", ("query.reweighted",), "Decide", ("reweight",)),
+    Question("reweight", "Decide", "Estimate exceedances for changed tolerances."),
     Folder("allocate", ("query.allocated",), "Decide", ("allocate",)),
     Folder("compare", ("query.compared",), "Decide", ("compare",)),
     Folder("rare", ("query.rare_event",), "Decide", ("rare",)),

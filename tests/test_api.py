@@ -59,7 +59,7 @@ def examples(tmp_path_factory):
     fewer = campaign(folder, TWO.replace("n = 12000", "n = 500"), "fewer")
     known = made(folder, TEXT.replace("3000", "600"))
     return {
-        **{name: {"path": two} for name in ("questions.allocate.query", "questions.reweight", "report.summary")},
+        **{name: {"path": two} for name in ("questions.allocate.answer", "questions.reweight", "report.summary")},
         "questions.compare.query": {"path": two, "other": fewer},
         "questions.causes.query": {"path": known},
     }
@@ -68,7 +68,7 @@ def examples(tmp_path_factory):
 @pytest.mark.parametrize(
     "module",
     [
-        "questions.allocate.query",
+        "questions.allocate.answer",
         "questions.reweight",
         "questions.compare.query",
         "questions.causes.query",

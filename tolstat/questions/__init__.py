@@ -20,7 +20,6 @@ from tolstat.display.blocks import Section
 if TYPE_CHECKING:
     from tolstat.display.answer import Answer
     from tolstat.display.asked import Asked
-    from tolstat.questions.allocate.query import allocated as allocated
     from tolstat.questions.bearing_life.lives import lives_of as lives_of
     from tolstat.questions.causes.angles import against_angle as against_angle
     from tolstat.questions.causes.pairs import pairs_of as pairs_of
@@ -156,7 +155,7 @@ QUESTIONS = (
     Folder("joints", has_section=True),
     Question("time_above", "Read", "Estimate how much of a revolution loads are above levels."),
     Question("reweight", "Decide", "Estimate exceedances for changed tolerances."),
-    Folder("allocate", ("query.allocated",), "Decide", ("allocate",)),
+    Question("allocate", "Decide", "Propose the cheapest tolerances that meet the targets.", file="allocate.answer"),
     Folder("compare", ("query.compared",), "Decide", ("compare",)),
     Folder("rare", ("query.rare_event",), "Decide", ("rare",)),
     Folder("selective", ("query.assembled",), "Decide", ("selective",), has_section=True),

@@ -60,14 +60,21 @@ def examples(tmp_path_factory):
     fewer = campaign(folder, TWO.replace("n = 12000", "n = 500"), "fewer")
     known = made(folder, TEXT.replace("3000", "600"))
     return {
-        **{name: {"path": two} for name in ("questions.allocate.query", "questions.reweight.query", "report.summary")},
+        **{name: {"path": two} for name in ("questions.allocate.answer", "questions.reweight", "report.summary")},
         "questions.compare.query": {"path": two, "other": fewer},
         "questions.causes.query": {"path": known},
     }
 
 
 @pytest.mark.parametrize(
-    "module", [f"questions.{name}.query" for name in ("allocate", "reweight", "compare", "causes")] + ["report.summary"]
+    "module",
+    [
+        "questions.allocate.answer",
+        "questions.reweight",
+        "questions.compare.query",
+        "questions.causes.query",
+        "report.summary",
+    ],
 )
 def test_examples_on_files(module, examples):
     # import_module, as a name of the package may be a function

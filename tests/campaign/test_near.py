@@ -13,7 +13,7 @@ from tolstat.common.errors import InputError
 from tolstat.common.tables import Status
 from tolstat.questions.capability import capability
 from tolstat.questions.exceedance import answer as exceeded
-from tolstat.questions.reweight import query as reweight
+from tolstat.questions.reweight import reweight
 from tolstat.store import ResultFile, error_budget
 from tolstat.store.verification import Check, Verification
 
@@ -99,7 +99,7 @@ def test_ppm_and_reweighting_carry_it(path):
     def tables():
         with ResultFile.open(path) as store:
             view = store.view()
-            other = reweight.reweighted(view, ["pin1.offset_t.cpk=1.05"]).table
+            other = reweight(view, ["pin1.offset_t.cpk=1.05"]).frame("loads")
             return capability(view).frame("limits").set_index("load"), other.set_index("load")
 
     before, reweighted = tables()

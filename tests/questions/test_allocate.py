@@ -13,7 +13,8 @@ from tolstat import sampling, study
 from tolstat.analysis import allocation
 from tolstat.cli import app
 from tolstat.common.errors import InputError
-from tolstat.questions.allocate import query as allocate
+from tolstat.display.answer import Document
+from tolstat.questions.allocate.answer import allocate
 from tolstat.questions.allocate.ratios import DensityRatios
 from tolstat.store import ResultFile
 from tolstat.study import costs, scaling
@@ -30,6 +31,11 @@ def path(tmp_path_factory):
     return campaign(tmp_path_factory.mktemp("allocate"), TWO, "two")
 
 
+def study_of(answer):
+    """Text of the study proposed."""
+    return next(part.text for part in answer.parts if isinstance(part, Document))
+
+
 def share_of(factor):
     """Share of the joints above 700 N, where |offset_1 + offset_2| > 100 / 1.5e6 m."""
     sigma = factor * np.sqrt(2) * 1e-4 / 3
@@ -38,9 +44,9 @@ def share_of(factor):
 
 def test_a_proposal_keeps_its_limit_in_a_fresh_campaign(path, tmp_path):
     with ResultFile.open(path) as store:
-        found = allocate.allocated(store.view(), [LIMIT])
-    assert found.aim == "interval"
-    row, table = found.limits.iloc[0], found.tolerances.set_index("tolerance")
+        found = allocate(store.view(), [LIMIT])
+    assert found.facts["aim"] == "interval"
+    row, table = found.tables["limits"].rows[0], found.frame("tolerances").set_index("tolerance")
     factor = table.loc["pin[12].offset_t", "factor"]
     # between the exact factor for the limit and what the joints' interval asks for
     exact = 100 / 1.5e6 / norm.isf(0.01) / (np.sqrt(2) * 1e-4 / 3)
@@ -50,9 +56,10 @@ def test_a_proposal_keeps_its_limit_in_a_fresh_campaign(path, tmp_path):
     # a uniform band cannot be widened by its joints, and nothing is won by a narrower one
     assert table.loc["pin4.tilt_t", "factor"] == 1.0
     source = tmp_path / "new.toml"
-    source.write_text(found.text, encoding="utf-8")
+    source.write_text(study_of(found), encoding="utf-8")
     fresh = study.load(source, n=20000)
-    assert fresh.sampling.seed == found.study.sampling.seed + 1
+    with ResultFile.open(path) as store:
+        assert fresh.sampling.seed == store.view().study.sampling.seed + 1
     errors = sampling.draw(fresh)[1:]
     loads = 600.0 + 1.5e6 * np.abs(errors["pin1.offset_t"] + errors["pin2.offset_t"])
     assert np.mean(loads > 700.0) == pytest.approx(share_of(factor), abs=4e-3)
@@ -60,21 +67,21 @@ def test_a_proposal_keeps_its_limit_in_a_fresh_campaign(path, tmp_path):
 
 def test_where_a_limit_leaves_room_tolerances_become_wider(path):
     with ResultFile.open(path) as store:
-        found = allocate.allocated(store.view(), ["P(cross1.F > 700 N) < 0.25"])
-    table = found.tolerances.set_index("tolerance")
+        found = allocate(store.view(), ["P(cross1.F > 700 N) < 0.25"])
+    table = found.frame("tolerances").set_index("tolerance")
     assert table.loc["pin[12].offset_t", "factor"] > 1.1
-    assert found.tolerances["cost"].sum() < found.tolerances["cost_before"].sum()
-    assert found.holds
+    assert table["cost"].sum() < table["cost_before"].sum()
+    assert found.facts["holds"]
 
 
 def test_what_the_joints_cannot_show_needs_new_runs(path):
     with ResultFile.open(path) as store:
-        found = allocate.allocated(store.view(), ["P(cross1.F > 700 N) < 1e-6"])
-    assert not found.holds
-    assert found.verdict.startswith("needs new runs")
-    assert found.aim == "step"
-    assert found.limits["usable"].all()
-    assert found.tolerances.set_index("tolerance").loc["pin[12].offset_t", "factor"] < 1.0
+        found = allocate(store.view(), ["P(cross1.F > 700 N) < 1e-6"])
+    assert not found.facts["holds"]
+    assert found.facts["verdict"].startswith("needs new runs")
+    assert found.facts["aim"] == "step"
+    assert found.frame("limits")["usable"].all()
+    assert found.frame("tolerances").set_index("tolerance").loc["pin[12].offset_t", "factor"] < 1.0
 
 
 def test_costs_decide_between_two_tolerances_with_the_same_effect(path, tmp_path):
@@ -85,8 +92,8 @@ def test_costs_decide_between_two_tolerances_with_the_same_effect(path, tmp_path
     table = tmp_path / "costs.csv"
     table.write_text("tolerance,cost,fixed,power,most\npin1.offset_t,10,2,1,\npin2.offset_t,1,,2,0.1 mm\n")
     with ResultFile.open(file) as store:
-        found = allocate.allocated(store.view(), [LIMIT], table)
-    rows = found.tolerances.set_index("tolerance")
+        found = allocate(store.view(), [LIMIT], table)
+    rows = found.frame("tolerances").set_index("tolerance")
     assert list(rows.index) == ["pin1.offset_t", "pin2.offset_t"]  # the tilt has no cost, and is kept
     assert rows.loc["pin2.offset_t", "factor"] < rows.loc["pin1.offset_t", "factor"]
     new = rows.loc["pin1.offset_t", "factor"]
@@ -101,8 +108,8 @@ def test_a_tolerance_that_its_own_bounds_exclude_may_stay_as_it_is(path, tmp_pat
     table = tmp_path / "costs.toml"
     table.write_text(f'"pin[12].offset_t" = {{ cost = 4.0, {bound} }}\n', encoding="utf-8")
     with ResultFile.open(path) as store:
-        found = allocate.allocated(store.view(), [limit], table)
-    assert found.tolerances.set_index("tolerance").loc["pin[12].offset_t", "factor"] == pytest.approx(1.0)
+        found = allocate(store.view(), [limit], table)
+    assert found.frame("tolerances").set_index("tolerance").loc["pin[12].offset_t", "factor"] == pytest.approx(1.0)
 
 
 def test_search_finds_the_optimum_of_a_problem_with_a_known_one():
@@ -136,10 +143,10 @@ def test_a_mean_off_centre_moves_with_its_band(tmp_path):
         found = tolerance.distribution(tolerance.scaled(factor))
         assert (found.mean, found.sigma) == pytest.approx((factor * 4.5e-5, factor * 5.5e-5 / 2.4))
     with ResultFile.open(campaign(tmp_path, text, "off")) as store:
-        found = allocate.allocated(store.view(), ["P(cross1.F > 700 N) < 0.5"])
-    row = found.tolerances.set_index("tolerance").loc["pin*.offset_t"]
+        found = allocate(store.view(), ["P(cross1.F > 700 N) < 0.5"])
+    row = found.frame("tolerances").set_index("tolerance").loc["pin*.offset_t"]
     assert 0.5 < row["factor"] < 1.0
-    new = load(tmp_path, found.text, "new").tolerances["pin1.offset_t"]
+    new = load(tmp_path, study_of(found), "new").tolerances["pin1.offset_t"]
     assert new.mean / new.sigma == pytest.approx(4.5e-5 / (5.5e-5 / 2.4), rel=0.01)
 
 
@@ -193,7 +200,7 @@ def test_faults_of_limits_costs_and_names_are_told_together(path, tmp_path):
     table.write_text('"pin[12].offset_t" = { cost = 1, fixed = 2 }\n"pin4.tilt_t" = { least = "1 mm" }\npin9.x = {}\n')
     bad = ["P(cros1.F > 7 N) < 0.1", "P(cross1.F > 700 mm) < 2", "often"]
     with ResultFile.open(path) as store, pytest.raises(InputError) as found:
-        allocate.allocated(store.view(), bad, table, ["pin7.*"])
+        allocate(store.view(), bad, table, ["pin7.*"])
     for words in (
         "did you mean 'cross1.F'",
         "'700 mm' cannot be",
@@ -206,7 +213,7 @@ def test_faults_of_limits_costs_and_names_are_told_together(path, tmp_path):
         assert words in str(found.value)
     assert "selects no error" in str(found.value)
     with ResultFile.open(path) as store, pytest.raises(InputError, match="no tolerance that may change"):
-        allocate.allocated(store.view(), [LIMIT], keep=["pin*.offset_t", "pin*.tilt_t"])
+        allocate(store.view(), [LIMIT], keep=["pin*.offset_t", "pin*.tilt_t"])
 
 
 def test_cost_model_is_a_reciprocal_power(tmp_path):
@@ -220,14 +227,17 @@ def test_cost_model_is_a_reciprocal_power(tmp_path):
 
 
 def test_command_writes_a_study(path, tmp_path):
-    out = tmp_path / "next.toml"
+    out = tmp_path / "next"
     done = CliRunner().invoke(app, ["allocate", str(path), "--target", LIMIT, "--out", str(out)])
     assert done.exit_code == 0
     assert '"pin[12].offset_t" = { plus_minus' in done.stdout
     assert "joints in the check" in done.stderr
-    assert study.load(out).tolerances["pin1.offset_t"].sigma < 1e-4 / 3
+    assert "next, with --out DIR: tolstat run DIR/two_allocate.toml" in done.stderr
+    assert study.load(out / "two_allocate.toml").tolerances["pin1.offset_t"].sigma < 1e-4 / 3
     found = json.loads(CliRunner().invoke(app, ["allocate", str(path), "--target", LIMIT, "--json"]).stdout)
-    assert found["tolerances"][1]["cost"] > found["tolerances"][1]["cost_before"]
+    row = found["tables"]["tolerances"]["rows"][1]
+    assert row["cost"] > row["cost_before"]
+    assert list(found["facts"]["entries"]) == ["pin[12].offset_t"]
     refused = CliRunner().invoke(app, ["allocate", str(path), "--target", "P(cross1.F > 700 N) = 1"])
     assert refused.exit_code == 2
     assert "write --target" in refused.stderr

@@ -1,6 +1,7 @@
 """Orders of the shafts' loads: quantiles by NumPy and SciPy, closed form of the ideal joint, known orbits, the page."""
 
 import json
+import warnings
 
 import numpy as np
 import pandas as pd
@@ -15,9 +16,12 @@ from tolstat.common.errors import StoreError
 from tolstat.common.load_kinds import ORDERS, SHAFTS
 from tolstat.common.loads import LOADS
 from tolstat.common.tables import Options, Simulation
+from tolstat.display import drawing
 from tolstat.display.asked import Asked
-from tolstat.questions.orders import query, rendering, section
-from tolstat.questions.orders.query import orders_of
+from tolstat.display.blocks import Panels
+from tolstat.questions import orders as module
+from tolstat.questions import sections
+from tolstat.questions.orders import orders
 from tolstat.solver.simulation import history_specs
 from tolstat.store import ResultFile, Writer
 
@@ -48,6 +52,13 @@ def run(*arguments):
     return CliRunner().invoke(cli.app, ["orders", *map(str, arguments)])
 
 
+def orbits_of(answer):
+    """Orbits of an answer: shaft, near, row, point, and force at each angle, (k, 2)."""
+    frame = answer.frame("orbits")
+    groups = frame.groupby(["shaft", "near", "row", "point"], sort=False)
+    return [module.Orbit(*names, part[["f_x", "f_y"]].to_numpy()) for names, part in groups]
+
+
 def semi_major(force, n):
     """Amplitude of order n of points of an orbit, (k, 2), by NumPy's FFT."""
     spectrum = np.fft.fft(force[:, 0] + 1j * force[:, 1]) / len(force)
@@ -73,12 +84,13 @@ def slow(tmp_path_factory):
 
 def test_quantiles_of_each_amplitude_with_their_order_statistics(invented):
     with ResultFile.open(invented) as store:
-        found = orders_of(store.view(), orbits=False)
+        found = orders(store.view())
         own = store.results(slice(1, 58))  # row 0 is the nominal joint, the last three have failed
         nominal = store.results(slice(0, 1))
-    assert (found.joints, found.left_out, found.orbits) == (57, 3, [])
-    assert len(found.table) == 6 * len(ORDERS)
-    for row in found.table.to_dict("records"):
+    assert found.facts == {"joints": 57, "left_out": 3}
+    assert list(found.tables) == ["amplitudes"]
+    assert len(found.tables["amplitudes"].rows) == 6 * len(ORDERS)
+    for row in found.tables["amplitudes"].rows:
         values = np.sort(LOADS[row["load"]].of(own))
         assert row["nominal"] == LOADS[row["load"]].of(nominal)[0]
         assert row["load"] == f"{row['quantity']}_{row['order']}x"
@@ -96,7 +108,7 @@ def test_ideal_joint_has_the_even_orders_of_its_closed_forms(tmp_path):
     path.write_text(SLOW.replace("quasistatic", "ideal").replace("n = 24", "n = 2"), encoding="utf-8")
     tolstat.run(tolstat.load(path), tmp_path / "ideal.h5", workers=1)
     with ResultFile.open(tmp_path / "ideal.h5") as store:
-        table = orders_of(store.view(), orbits=False).table.set_index("load")
+        table = orders(store.view()).frame("amplitudes").set_index("load")
     alpha = np.radians(25.0)
     below = 1.0 - (np.sin(alpha) * np.cos(THETA)) ** 2
     moment = 100.0 * np.sin(np.arctan(np.tan(alpha) * np.sin(THETA))) / np.sqrt(below)
@@ -116,20 +128,21 @@ def test_orbits_simulated_again_are_those_of_the_histories_and_have_the_stored_o
     found = []
     for path in slow:
         with ResultFile.open(path) as store:
-            found.append(orders_of(store.view()))
+            found.append(orders(store.view(), orbits=True))
             load = {shaft: store.view().load(f"{shaft}.lateral") for shaft in SHAFTS}
             stored = {name: LOADS[name].of(store.results(slice(0, None))) for name in LOADS if "lateral_" in name}
-    assert [one.origin for one in found] == ["simulated again", "stored"]
-    assert [one.apart for one in found] == [0.0, 0.0]
-    assert [orbit.near for orbit in found[0].orbits] == ["nominal", "median", "95 %"] * 2
-    for again, kept in zip(found[0].orbits, found[1].orbits, strict=True):
+    assert [one.facts["origin"] for one in found] == ["simulated again", "stored"]
+    assert [one.facts["apart"] for one in found] == [0.0, 0.0]
+    orbits = [orbits_of(one) for one in found]
+    assert [orbit.near for orbit in orbits[0]] == ["nominal", "median", "95 %"] * 2
+    for again, kept in zip(*orbits, strict=True):
         assert again[:4] == kept[:4]
         np.testing.assert_array_equal(again.force, kept.force)
         for n in ORDERS:
             own = stored[f"{again.shaft}.lateral_{n}x"][again.row]
             assert semi_major(again.force, n) == pytest.approx(own, rel=1e-4, abs=1e-4)
         if again.near != "nominal":
-            share = query.NEAR[again.near]
+            share = module.NEAR[again.near]
             expected = np.quantile(load[again.shaft].valid, share, method="inverted_cdf")
             assert load[again.shaft].values[again.row - 1] == expected
 
@@ -153,7 +166,7 @@ def test_a_force_that_turns_and_one_that_swings_have_orbits_with_the_same_semi_a
         store.write(np.arange(plan.rows), Simulation(results, {"shafts": known(plan.rows)}))
         store.finish()
     with ResultFile.open(tmp_path / "known.h5") as store:
-        orbits = orders_of(store.view()).orbits
+        orbits = orbits_of(orders(store.view(), orbits=True))
     for orbit in orbits:
         axes = np.linalg.svd(orbit.force - orbit.force.mean(axis=0))[1] * np.sqrt(2 / SAMPLES)
         if orbit.shaft == "input":
@@ -177,22 +190,26 @@ def test_of_several_points_an_amplitude_is_the_largest_and_an_orbit_that_of_the_
     tolstat.run(tolstat.load(tmp_path / "two.toml"), tmp_path / "two.h5", workers=1)
     with ResultFile.open(tmp_path / "two.h5") as store:
         view = store.view()
-        found, bent, flat = (orders_of(part) for part in (view, view.at("bent"), view.at("flat")))
-    tables = {name: one.table.set_index("load") for name, one in (("all", found), ("bent", bent), ("flat", flat))}
+        found, bent, flat = (orders(part, orbits=True) for part in (view, view.at("bent"), view.at("flat")))
+    tables = {
+        name: one.frame("amplitudes").set_index("load")
+        for name, one in (("all", found), ("bent", bent), ("flat", flat))
+    }
     name = "input.moment_2x"
     assert tables["all"].loc[name, "qmedian"] == tables["bent"].loc[name, "qmedian"]
     assert tables["bent"].loc[name, "qmedian"] > 3 * tables["flat"].loc[name, "qmedian"]
+    of_all, of_bent, of_flat = (orbits_of(one) for one in (found, bent, flat))
     for shaft in SHAFTS:
         largest = {
-            one.orbits[0].point: max(np.abs(own.force).max() for own in one.orbits if own.shaft == shaft)
-            for one in (bent, flat)
+            one[0].point: max(np.abs(own.force).max() for own in one if own.shaft == shaft)
+            for one in (of_bent, of_flat)
         }
-        shown = [own for own in found.orbits if own.shaft == shaft]
+        shown = [own for own in of_all if own.shaft == shaft]
         assert {own.point for own in shown} == {max(largest, key=lambda point: largest[point])}
-        of_point = (bent if shown[0].point == "bent" else flat).orbits
+        of_point = of_bent if shown[0].point == "bent" else of_flat
         for own, alone in zip(shown, [own for own in of_point if own.shaft == shaft], strict=True):
             np.testing.assert_array_equal(own.force, alone.force)
-    assert found.apart == 0.0
+    assert found.facts["apart"] == 0.0
 
 
 def test_joints_of_a_sweep_are_simulated_again_each_at_its_own_operating_point(tmp_path):
@@ -201,11 +218,11 @@ def test_joints_of_a_sweep_are_simulated_again_each_at_its_own_operating_point(t
     (tmp_path / "sweep.toml").write_text(text.replace("points = 11", "points = 3"), encoding="utf-8")
     tolstat.run(tolstat.load(tmp_path / "sweep.toml"), tmp_path / "sweep.h5", workers=1)
     with ResultFile.open(tmp_path / "sweep.h5") as store:
-        found = orders_of(store.view())
+        found = orders(store.view(), orbits=True)
         own = store.results()["lateral_max"]
-    assert (found.origin, found.apart) == ("simulated again", 0.0)
-    assert found.table["q95_upper"].isna().all()
-    for orbit in found.orbits:
+    assert (found.facts["origin"], found.facts["apart"]) == ("simulated again", 0.0)
+    assert found.frame("amplitudes")["q95_upper"].isna().all()
+    for orbit in orbits_of(found):
         size = np.linalg.norm(orbit.force, axis=1).max()
         assert size == pytest.approx(own[orbit.row, SHAFTS.index(orbit.shaft)], rel=1e-2, abs=1e-3)
 
@@ -223,41 +240,53 @@ def test_joints_of_a_sweep_are_simulated_again_each_at_its_own_operating_point(t
 def test_the_page_shows_orders_where_the_study_asks_for_loads_of_the_shafts(tmp_path, change, asked):
     path = synthetic.store(tmp_path, synthetic.STUDY.replace(*change))
     with ResultFile.open(path) as store:
-        assert query.are_asked(store.view()) == asked
+        assert module.are_asked(store.view()) == asked
         remarks = Asked(path)
-        found = section.sections(store.view(), remarks)
+        found = [own.key for own in sections(store.view(), remarks) if own.key == "orders"]
     kept = "results" not in change[1]
-    assert [own.key for own in found] == (["orders"] if asked and kept else [])
-    assert bool(remarks.notes) == (asked and not kept)  # the study keeps no amplitudes
+    assert found == (["orders"] if asked and kept else [])
+    left_out = [note for note in remarks.notes if note.startswith("orders is left out")]
+    assert bool(left_out) == (asked and not kept)  # the study keeps no amplitudes
 
 
 def test_panels_are_of_each_quantity_and_shaft(slow):
     with ResultFile.open(slow[1]) as store:
-        panels = rendering.panels(orders_of(store.view()))
+        parts = orders(store.view(), orbits=True).parts
+    panels = next(part for part in parts if isinstance(part, Panels)).panels
     quantities = ["input-lateral", "output-lateral", "input-moment", "output-moment", "input-drive", "psi"]
     assert [panel.key for panel in panels] == [
-        *(f"orders-{name}" for name in quantities),
+        *(f"amplitude-{name}" for name in quantities),
         "orbit-input",
         "orbit-output",
     ]
 
 
+def test_a_slice_without_the_nominal_joint_is_drawn_without_warnings(invented):
+    with ResultFile.open(invented) as store:
+        rows = orders(store.view()).tables["amplitudes"].rows
+    without = [{**row, "nominal": np.nan} for row in rows]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for panel in module._amplitude_panels(without):
+            assert "<svg" in drawing.svg(panel)[0]
+
+
 def test_command_prints_a_table_writes_files_and_refuses_files_without_amplitudes(slow, tmp_path):
-    done = run(slow[1], "--out", tmp_path / "out")
+    done = run(slow[1], "--orbits", "--out", tmp_path / "out")
     assert done.exit_code == 0, done.stderr
     assert max(map(len, done.stdout.splitlines())) <= 80
     assert [line.split()[0] for line in done.stdout.splitlines()[1:]][:5] == [
         *(f"input.lateral_{n}x" for n in ORDERS),
         "output.lateral_1x",
     ]
-    orbits = pd.read_csv(tmp_path / "out" / "full_orbits.csv")
+    orbits = pd.read_csv(tmp_path / "out" / "full_orders_orbits.csv")
     assert orbits.groupby(["shaft", "near"]).size().eq(SAMPLES).all()
-    assert sorted(file.name for file in (tmp_path / "out").iterdir()) == [
-        f"full_{name}" for name in ("orbits.csv", "orders.csv", "orders.png", "orders.svg")
-    ]
+    files = {file.name.removeprefix("full_orders_") for file in (tmp_path / "out").iterdir()}
+    assert {name for name in files if name.endswith(".csv")} == {"amplitudes.csv", "orbits.csv"}
+    assert {"amplitude-input-lateral.svg", "amplitude-psi.png", "orbit-output.svg"} < files
     found = json.loads(run(slow[1], "--json").stdout)
-    table = pd.read_csv(tmp_path / "out" / "full_orders.csv")
-    assert [row["q95"] for row in found["orders"]] == table["q95"].tolist()
+    table = pd.read_csv(tmp_path / "out" / "full_orders_amplitudes.csv")
+    assert [row["q95"] for row in found["tables"]["amplitudes"]["rows"]] == table["q95"].tolist()
     few = synthetic.store(tmp_path, synthetic.STUDY.replace("[limits]", f"[output]\nresults = [{OTHERS}]\n[limits]"))
     with ResultFile.open(few) as store, pytest.raises(StoreError, match="no amplitudes of orders"):
-        orders_of(store.view())
+        orders(store.view())

@@ -17,7 +17,8 @@ from tolstat.analysis.sample import Sample
 from tolstat.cli import app
 from tolstat.common.errors import InputError
 from tolstat.common.tables import Simulation, Status
-from tolstat.questions.reweight import query as campaigns
+from tolstat.display.answer import Document, Sentence
+from tolstat.questions import reweight as question
 from tolstat.store import ResultFile, Writer
 from tolstat.study.change import changed, rewritten
 from tolstat.study.tolerances import density_ratio
@@ -182,12 +183,12 @@ def test_reweighted_campaign_agrees_with_a_fresh_one(tmp_path):
     path = campaign(tmp_path)
     settings = ["pin[12].offset_t.plus_minus=0.08 mm"]
     with ResultFile.open(path) as store:
-        found = campaigns.reweighted(store.view(), settings)
+        found = question.reweight(store.view(), settings)
     plan = load(tmp_path, CORRELATED.replace("n = 4000", "n = 40000").replace("seed = 2021", "seed = 5"))
     fresh = load_of(sampling.draw(replace(plan, tolerances=changed(plan, settings)))[1:])
-    row = found.table.set_index("load").loc["cross1.F"]
+    row = found.frame("loads").set_index("load").loc["cross1.F"]
     assert row["usable"]
-    assert found.changed == ["pin1.offset_t", "pin2.offset_t"]
+    assert found.facts["changed"] == ["pin1.offset_t", "pin2.offset_t"]
     assert row["lower"] <= np.mean(fresh > 700.0) <= row["upper"]
     assert not row["lower"] <= row["before"] <= row["upper"]
     assert row["bound_lower"] == pytest.approx(row["estimate"])
@@ -197,9 +198,9 @@ def test_errors_where_no_joint_was_drawn_need_new_runs(tmp_path):
     path = campaign(tmp_path, synthetic.STUDY.replace('"normal", cpk = 1.0', '"uniform"'), "band")
     with ResultFile.open(path) as store:
         with pytest.raises(InputError, match=r"0\.17 of the new errors lie where the study draws none") as found:
-            campaigns.reweighted(store.view(), ["pin*.offset_t.plus_minus=0.12 mm"])
+            question.reweight(store.view(), ["pin*.offset_t.plus_minus=0.12 mm"])
         assert len(found.value.faults) == 4
-        campaigns.reweighted(store.view(), ["pin*.offset_t.plus_minus=0.08 mm"])
+        question.reweight(store.view(), ["pin*.offset_t.plus_minus=0.08 mm"])
 
 
 def test_command_prints_a_table_and_json(tmp_path):
@@ -210,8 +211,8 @@ def test_command_prints_a_table_and_json(tmp_path):
     assert done.stdout.splitlines()[1].startswith("cross1.F")
     assert "1 errors changed; 4000 joints count as" in done.stderr
     found = json.loads(CliRunner().invoke(app, [*command, "--json"]).stdout)
-    assert found["loads"][0]["usable"] is True
-    assert found["loads"][0]["estimate"] < found["loads"][0]["before"]
+    assert found["tables"]["loads"]["rows"][0]["usable"] is True
+    assert found["tables"]["loads"]["rows"][0]["estimate"] < found["tables"]["loads"]["rows"][0]["before"]
     refused = CliRunner().invoke(app, ["reweight", str(path), "--set", "pin9.offset_t.cpk=1"])
     assert refused.exit_code == 2
     assert "selects no error" in refused.stderr
@@ -233,8 +234,8 @@ def test_a_campaign_without_a_valid_load_is_refused(tmp_path):
 def test_a_study_without_limits_has_quantiles(tmp_path):
     path = campaign(tmp_path, CORRELATED.replace("[limits]", "[errors]").replace(LIMITS, ""), "free")
     with ResultFile.open(path) as store:
-        found = campaigns.reweighted(store.view(), ["pin1.offset_t.plus_minus=0.08 mm"])
-    row = found.table.query("load == 'cross1.F' and share == 0.9").iloc[0]
+        found = question.reweight(store.view(), ["pin1.offset_t.plus_minus=0.08 mm"])
+    row = found.frame("loads").query("load == 'cross1.F' and share == 0.9").iloc[0]
     assert row["lower"] <= row["estimate"] <= row["upper"] < row["before"] + 20.0
     assert row["estimate"] < row["before"]
 
@@ -243,14 +244,27 @@ def test_a_table_that_needs_new_runs_has_no_estimates(tmp_path):
     text = synthetic.STUDY.replace("n = 60", "n = 400")
     path = campaign(tmp_path, text, "few")
     with ResultFile.open(path) as store:
-        found = campaigns.reweighted(store.view(), ["pin*.offset_t.plus_minus=0.01 mm"])
-    assert not found.usable
-    assert found.table[["estimate", "lower", "upper", "bound_lower", "bound_upper"]].isna().all(axis=None)
-    assert found.table["before"].notna().all()
-    assert found.verdict.startswith("needs new runs, no estimates: ")
-    assert found.remedy.startswith(
-        f'tolstat reweight {path} --set "pin*.offset_t.plus_minus=0.01 mm" --out changed.toml'
-    )
+        found = question.reweight(store.view(), ["pin*.offset_t.plus_minus=0.01 mm"])
+    table = found.frame("loads")
+    assert not found.facts["usable"]
+    assert table[["estimate", "lower", "upper", "bound_lower", "bound_upper"]].isna().all(axis=None)
+    assert table["before"].notna().all()
+    assert found.facts["verdict"].startswith("needs new runs, no estimates: ")
+    remedy = f'tolstat reweight {path} --set "pin*.offset_t.plus_minus=0.01 mm" --out changed'
+    last = [part.text for part in found.parts if isinstance(part, Sentence)][-1]
+    assert last == f"fresh joints, same seeds: {remedy} && tolstat run changed/few_reweight.toml"
+    assert [part for part in found.parts if isinstance(part, Document)]
+
+
+def test_the_study_with_the_changes_is_written_where_the_remedy_says(tmp_path):
+    path, setting = campaign(tmp_path), "pin1.offset_t.plus_minus=0.09 mm"
+    done = CliRunner().invoke(app, ["reweight", str(path), "--set", setting, "--out", str(tmp_path / "changed")])
+    assert done.exit_code == 0
+    names = [f"many_reweight{end}" for end in (".toml", "_loads.csv")]
+    assert sorted(file.name for file in (tmp_path / "changed").iterdir()) == names
+    assert f"wrote {tmp_path / 'changed' / names[0]}" in done.stderr
+    new = study.load(tmp_path / "changed" / names[0])
+    assert new.tolerances == changed(study.load(tmp_path / "many.toml"), [setting])
 
 
 @pytest.mark.parametrize(

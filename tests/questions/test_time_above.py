@@ -17,8 +17,7 @@ from tolstat.common.errors import InputError, StoreError
 from tolstat.common.load_kinds import BUSHINGS, SHAFTS
 from tolstat.common.loads import LOADS
 from tolstat.common.tables import Options, Simulation, Status
-from tolstat.questions.time_above import rendering
-from tolstat.questions.time_above.query import time_above
+from tolstat.questions.time_above import LEVELS, time_above
 from tolstat.solver.simulation import history_specs
 from tolstat.store import ResultFile, Writer
 
@@ -78,8 +77,8 @@ def test_times_of_known_waves_and_joints_told_apart_from_them(path):
         found = time_above(store.view(), ["cross1.F", "cross1.F_t", "output.lateral", "output.axial"], ["0.75 kN"])
     own = tops(201)[1:-2]  # row 0 is the nominal joint, the last two have failed
     expected = time_of(750.0, own)
-    assert (found.joints, found.left_out) == (198, 2)
-    for row in found.table.to_dict("records"):
+    assert found.facts == {"joints": 198, "left_out": 2}
+    for row in found.tables["levels"].rows:
         assert row["time"] == pytest.approx(expected.mean(), abs=1e-3), row["load"]
         assert row["time_90"] == pytest.approx(np.quantile(expected, 0.9, method="inverted_cdf"), abs=1e-3)
         assert row["joints_above"] == pytest.approx(np.mean(own > 750.0))
@@ -96,7 +95,7 @@ def test_joints_that_are_pending_are_not_left_out(path, tmp_path):
     with ResultFile.open(tmp_path / "part.h5") as store:
         settled = int((store.status()[1:21] == Status.OK).sum())
     found = json.loads(run(tmp_path / "part.h5", "--json").stdout)
-    assert (found["joints"], found["left_out"]) == (settled, 20 - settled)
+    assert found["facts"] == {"joints": settled, "left_out": 20 - settled}
     assert settled > 0
 
 
@@ -141,15 +140,19 @@ def test_every_load_at_an_instant_of_a_bushing_or_shaft_is_a_channel():
 
 @pytest.mark.slow
 def test_command_prints_limits_and_writes_curves(path, tmp_path):
-    done = run(path, "--by", "cross1.F", "--out", tmp_path / "out")
+    done = run(path, "--by", "cross1.F", "--curves", "--out", tmp_path / "out")
     assert done.exit_code == 0
     assert "cross1.F > 700 N" in done.stdout
+    assert len(done.stdout.splitlines()) == 2
     assert "198 joints, 2 without" in done.stderr
-    assert sorted(p.suffix for p in (tmp_path / "out").iterdir()) == [".csv", ".png", ".svg"]
-    curve = pd.read_csv(tmp_path / "out" / "waves_time_above.csv")
+    pictures = [f"{name}-cross1-F.{kind}" for name in ("joints", "time") for kind in ("png", "svg")]
+    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == [
+        f"waves_time_above_{name}" for name in ("curves.csv", *pictures[:2], "levels.csv", *pictures[2:])
+    ]
+    curve = pd.read_csv(tmp_path / "out" / "waves_time_above_curves.csv")
     assert (np.diff(curve["time"]) <= 0).all()
     assert (curve["time"] <= curve["joints_above"]).all()
-    found = json.loads(run(path, "--by", "cross1.F", "--json").stdout)["loads"][0]
+    found = json.loads(run(path, "--by", "cross1.F", "--json").stdout)["tables"]["levels"]["rows"][0]
     assert found["level"] == 700.0
     # without options: the limits of bushings
     assert {line.split()[0] for line in run(path).stdout.splitlines()[1:]} == {
@@ -160,11 +163,11 @@ def test_command_prints_limits_and_writes_curves(path, tmp_path):
 
 def test_shares_have_their_unit_with_intervals_and_without(path):
     with ResultFile.open(path) as store:
-        table = time_above(store.view(), ["cross1.F"], ["700 N"]).table
+        table = time_above(store.view(), ["cross1.F"], ["700 N"]).frame("levels")
     without = table.assign(**{name: np.nan for name in table if name.endswith(("_lower", "_upper"))})
     cells = []
     for shown in (table, without):
-        cells = [cell(row) for row in shown.to_dict("records") for _, cell, *_ in rendering.LEVELS[1:]]
+        cells = [cell(row) for row in shown.to_dict("records") for _, cell, *_ in LEVELS[1:]]
         assert all(cell.endswith(" %") for cell in cells), cells
     assert "(" not in "".join(cells)
 
@@ -177,7 +180,7 @@ def test_faults_are_told_together_and_files_without_histories_refused(path, tmp_
             assert words in str(found.value)
         with pytest.raises(InputError, match="neither a level nor a limit"):
             time_above(store.view(), ["fork1.F"])
-        both = time_above(store.view(), ["cross1.F", "cross1.T"], ["1 N*m", "2 N", "1 N"]).table
+        both = time_above(store.view(), ["cross1.F", "cross1.T"], ["1 N*m", "2 N", "1 N"]).frame("levels")
         assert list(zip(both["load"], both["level"], strict=True)) == [
             ("cross1.F", 2.0),
             ("cross1.F", 1.0),

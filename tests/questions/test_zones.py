@@ -11,7 +11,7 @@ from tolstat import sampling, study
 from tolstat.common.errors import InputError
 from tolstat.common.tables import Simulation
 from tolstat.questions.causes.query import causes_of
-from tolstat.questions.reweight.query import _block_log_ratios
+from tolstat.questions.reweight import _block_log_ratios
 from tolstat.store import View, Writer
 from tolstat.study import scaling
 from tolstat.study.change import changed

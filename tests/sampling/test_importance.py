@@ -20,7 +20,7 @@ from tolstat.cli import app
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.tables import Simulation, Status
 from tolstat.questions.exceedance import answer as exceeded
-from tolstat.questions.reweight import query as reweighting
+from tolstat.questions.reweight import reweight
 from tolstat.report import headline
 from tolstat.store import ResultFile, Writer
 from tolstat.study.proposal import Proposal, component, weights
@@ -167,7 +167,7 @@ def test_the_file_keeps_weights_and_reports_go_by_them(stored):
         view = store.view()
         found = view.load("cross1.F").above(700.0)
         frame = store.to_pandas()
-        shares = reweighting.reweighted(view, ["pin4.offset_t.plus_minus=0.09 mm"]).table.iloc[0]
+        shares = reweight(view, ["pin4.offset_t.plus_minus=0.09 mm"]).tables["loads"].rows[0]
     assert found.lower < norm.sf(3.0) < found.upper
     assert found.upper < 2.0 * norm.sf(3.0)
     assert frame["weight"].iloc[1:].mean() == pytest.approx(1.0, abs=0.05)

@@ -20,19 +20,15 @@ from tolstat.display.blocks import Section
 if TYPE_CHECKING:
     from tolstat.display.answer import Answer
     from tolstat.display.asked import Asked
-    from tolstat.questions.allocate.query import allocated as allocated
     from tolstat.questions.causes.angles import against_angle as against_angle
     from tolstat.questions.causes.pairs import pairs_of as pairs_of
     from tolstat.questions.causes.query import causes_of as causes_of
     from tolstat.questions.causes.tail import worst_joints as worst_joints
     from tolstat.questions.compare.query import compared as compared
-    from tolstat.questions.orders.query import orders_of as orders_of
     from tolstat.questions.rare.query import rare_event as rare_event
-    from tolstat.questions.reweight.query import reweighted as reweighted
     from tolstat.questions.show.rendering import draw_errors as draw_errors
     from tolstat.questions.show.rendering import draw_joint as draw_joint
     from tolstat.questions.show.rendering import draw_row as draw_row
-    from tolstat.questions.time_above.query import time_above as time_above
     from tolstat.store.view import View
 
 
@@ -147,14 +143,14 @@ QUESTIONS = (
         file="bearing_life.answer",
         counted=True,
     ),
-    Folder("orders", ("query.orders_of",), "Read", ("orders",), has_section=True),
+    Question("orders", "Read", "Estimate the orders of the loads that the shafts carry.", "open"),
     Question("accuracy", "", "Give the numerical error of the loads, from checks of joints.", "folded", counted=True),
     Question("modes", "", "Compute the shares of the revolution in which pins touch.", "folded", "joints"),
     Question("failed", "", "List joints without a valid load, and compare their errors.", "open", "joints"),
     Question("tolerances", "", "Explain the entries of the tolerances and correlations.", "open", "joints"),
-    Folder("time_above", ("query.time_above",), "Read", ("time_above",)),
-    Folder("reweight", ("query.reweighted",), "Decide", ("reweight",)),
-    Folder("allocate", ("query.allocated",), "Decide", ("allocate",)),
+    Question("time_above", "Read", "Estimate how much of a revolution loads are above levels."),
+    Question("reweight", "Decide", "Estimate exceedances for changed tolerances."),
+    Question("allocate", "Decide", "Propose the cheapest tolerances that meet the targets.", file="allocate.answer"),
     Folder("compare", ("query.compared",), "Decide", ("compare",)),
     Folder("rare", ("query.rare_event",), "Decide", ("rare",)),
     Question("selective", "Decide", "Compute yield and unmatched parts of selective assembly.", "folded"),

@@ -4,25 +4,28 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
-from typing import Any, NamedTuple
+from shlex import quote
+from typing import Annotated, Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from tolstat import sampling
-from tolstat.analysis import prediction, reweight
+from tolstat.analysis import prediction
+from tolstat.analysis import reweight as weighting
 from tolstat.analysis.prediction import DELIVERY
 from tolstat.analysis.reweight import Ratios
-from tolstat.analysis.sample import Sample
+from tolstat.analysis.sample import CONFIDENCE, Sample
 from tolstat.analysis.weighted import Weighted
 from tolstat.common.errors import Fault, InputError, StoreError
 from tolstat.common.loads import FloatArray
-from tolstat.common.shown import shown
 from tolstat.common.tables import Status
+from tolstat.display import text
+from tolstat.display.answer import Answer, Document, Part, Sentence, Table
+from tolstat.display.options import Delivery, Opt
+from tolstat.display.table import Column, Row, Rows, has
 from tolstat.store import error_budget
 from tolstat.store.view import View
 from tolstat.study import Study
@@ -37,91 +40,86 @@ MAX_OUTSIDE = 1e-4
 """Maximum probability of the new distribution outside the range of the old one; no estimate covers that part."""
 GIVEN = ("estimate", "lower", "upper", "bound_lower", "bound_upper")
 WITHHELD = (*GIVEN, "total_lower", "total_upper", "next_lower", "next_upper")
-"""Columns that are NaN where the joints do not support them."""
+"""Keys that are NaN where the joints do not support them."""
 DRAWS = 1 << 15
 """Number of sets of errors drawn for the mean square of the ratio of correlated errors, which has no closed form."""
 _ENDS = np.array([1e-12, 1 - 1e-12])
 
 
-@shown
-class Reweighted(NamedTuple):
-    """Statistics of a campaign reweighted to other tolerances.
-
-    Attributes
-    ----------
-    path : Path
-        The result file.
-    settings : tuple of str
-        The changes, as given.
-    ratios : Ratios
-        Density ratios of the joints that have been simulated.
-    changed : list of str
-        Errors whose distribution changes.
-    table : DataFrame
-        One row per limit, and `ANY_LIMIT` for all of them together: ``load``, ``unit``, ``level``, ``before`` (share
-        of the joints as drawn), ``estimate``, ``lower``, ``upper``, ``bound_lower`` and ``bound_upper`` (joints without
-        a valid load counted below and above), ``total_lower`` and ``total_upper`` (also with the numerical error; NaN
-        where that is not known, see `store.error_budget.near`), ``next_lower`` and ``next_upper`` (prediction interval
-        for the joints above the limit in the next delivery), ``ess``, ``above`` and ``below`` (effective joints on each
-        side of the limit), ``k``, ``usable``. For a study without limits, quantiles: ``share`` instead of ``level``,
-        loads as estimates, no bounds and no sides. Estimates, intervals and bounds are NaN where ``usable`` is false.
-    text : str
-        The study with the changed tolerances and the same seed, TOML: run it where the table is not usable.
-    """
-
-    path: Path
-    settings: tuple[str, ...]
-    ratios: Ratios
-    changed: list[str]
-    table: pd.DataFrame
-    text: str
-
-    @property
-    def verdict(self) -> str:
-        """Sentence on whether the table is reliable."""
-        n, ratios = len(self.ratios.values), self.ratios
-        figures = f"{n} joints count as {ratios.effective:.0f}"
-        if ratios.effective < ratios.needed:
-            return f"needs new runs, no estimates: {figures}, {ratios.needed:.0f} needed"
-        if not ratios.usable:
-            found, allowed = math.exp(ratios.log_unbounded), reweight.LARGEST_SPREAD
-            wide = f"mean square {found:.3g} of the density ratio of wider or shifted tolerances, {allowed:g} allowed"
-            return f"needs new runs, no estimates: {wide}"
-        missing = int((~self.table["usable"]).sum())
-        least = f"fewer than {reweight.LEAST_BESIDE:g} effective joints on one side, or the tail of their weights"
-        some = f"; {missing} of {len(self.table)} rows need new runs: {least}"
-        return figures + (some if missing else "")
-
-    @property
-    def usable(self) -> bool:
-        """Whether every row of the table is usable."""
-        return bool(self.table["usable"].all())
-
-    @property
-    def remedy(self) -> str:
-        """Commands that simulate what is not usable: fresh joints of the changed tolerances, from the same seed."""
-        changes = " ".join(f"--set {json.dumps(setting, ensure_ascii=False)}" for setting in self.settings)
-        return f"tolstat reweight {self.path} {changes} --out changed.toml && tolstat run changed.toml"
+def _value(key: str) -> Callable[[Row], str]:
+    return lambda row: text.value(row[key], row["unit"])
 
 
-def reweighted(view: View, settings: Sequence[str], confidence: float = 0.95, delivery: int = DELIVERY) -> Reweighted:
-    """Estimate a campaign's statistics for other tolerances.
+def _share(key: str) -> Callable[[Row], str]:
+    return lambda row: text.percent(row[key])
+
+
+def _interval(key: str) -> Callable[[Row], str]:
+    return lambda row: text.span(row[f"{key}lower"], row[f"{key}upper"])
+
+
+def _any_unresolved(rows: Rows) -> bool:
+    return any(row["bound_upper"] > row["bound_lower"] for row in rows)
+
+
+COUNTS = Column("counts as joints", lambda row: text.formed(row["ess"], ".0f"), rank=1)
+LIMITS = (
+    Column("load > limit", text.limit),
+    Column("before", _share("before")),
+    Column("after", _share("estimate")),
+    Column("95 % interval", _interval("")),
+    COUNTS,
+    Column("with numerical error", _interval("total_"), shown=has("total_lower"), rank=1),
+    Column("with unresolved joints", _interval("bound_"), shown=_any_unresolved, rank=2),
+    Column("ppm", lambda row: text.ppm(row["estimate"]), rank=2),
+    Column("above in delivery", text.delivery, rank=3),
+)
+"""Columns of the table ``loads`` of a study with limits: shares above them."""
+QUANTILES = (
+    Column("quantile", lambda row: f"{row['load']}, {100 * row['share']:g} % stay below"),
+    Column("before", _value("before")),
+    Column("after", _value("estimate")),
+    Column("95 % interval", lambda row: text.span_of(row["lower"], row["upper"], row["unit"])),
+    COUNTS,
+)
+"""Columns of the table ``loads`` of a study without limits."""
+
+
+def reweight(
+    view: View, settings: Annotated[list[str], Opt("KEY=VALUE", name="set")], delivery: Delivery = DELIVERY
+) -> Answer:
+    """Estimate exceedances for changed tolerances.
+
+    Simulates nothing: each joint in FILE gets a weight, the density of its errors under the changed tolerances over
+    that under the tolerances of the campaign (likelihood ratio).
+
+    Gives the share of joints above each limit, and above any limit, with its 95 % interval, and a verdict. Where the
+    joints do not support a share, none is given; the verdict is then "needs new runs" and names the commands. With
+    --out DIR, writes also the study with the changed tolerances and the same seed, STEM_reweight.toml.
+
+    Example: tolstat reweight iso2768_f.h5 --set "pin*.offset_t.plus_minus=0.1 mm"
 
     Parameters
     ----------
     view : View
         A campaign of joints drawn from tolerances.
-    settings : sequence of str
-        See `study.change.changed`.
-    confidence : float
-        Confidence level of the intervals.
+    settings : list of str
+        Tolerance to change: "pin*.offset_t.plus_minus=0.05 mm"; repeatable.
     delivery : int
-        Number of joints of the next delivery.
+        Number of joints of the next delivery, for the prediction interval of those above a limit.
 
     Returns
     -------
-    Reweighted
-        Table and verdict.
+    Answer
+        Table ``loads``, one row per limit, and `ANY_LIMIT` for all of them together: ``load``, ``unit``, ``level``,
+        ``before`` (share of the joints as drawn), ``estimate``, ``lower``, ``upper``, ``bound_lower`` and
+        ``bound_upper`` (joints without a valid load counted below and above), ``total_lower`` and ``total_upper`` (also
+        with the numerical error; NaN where that is not known, see `store.error_budget.near`), ``next_lower`` and
+        ``next_upper`` (prediction interval for the joints above the limit in the next delivery), ``ess``, ``above`` and
+        ``below`` (effective joints on each side of the limit), ``k``, ``usable``. For a study without limits,
+        quantiles: ``share`` instead of ``level``, loads as estimates, no bounds and no sides. Estimates, intervals and
+        bounds are NaN where ``usable`` is false. Facts: ``usable`` (every row), ``effective`` and ``needed`` joints,
+        ``verdict``, ``changed`` (errors whose distribution changes).
 
     Raises
     ------
@@ -134,9 +132,9 @@ def reweighted(view: View, settings: Sequence[str], confidence: float = 0.95, de
     Examples
     --------
     >>> with tolstat.open(path) as store:
-    ...     found = tolstat.reweighted(store.view(), ["pin1.offset_t.plus_minus=0.09 mm"])
-    >>> row = found.table.iloc[0]
-    >>> found.usable, row["load"], bool(row["estimate"] < row["before"])
+    ...     answer = tolstat.reweight(store.view(), ["pin1.offset_t.plus_minus=0.09 mm"])
+    >>> row = answer.tables["loads"].rows[0]
+    >>> answer.facts["usable"], row["load"], bool(row["estimate"] < row["before"])
     (True, 'cross1.F', True)
     """
     view.check_drawn()
@@ -149,6 +147,22 @@ def reweighted(view: View, settings: Sequence[str], confidence: float = 0.95, de
         raise InputError(faults)
     done = np.flatnonzero(view.status != Status.PENDING)
     ratios = _ratios(view, new, names, done)
+    rows = _rows(view, done, ratios, delivery)
+    verdict, usable = _verdict(ratios, rows), all(row["usable"] for row in rows)
+    facts = {"usable": usable, "effective": ratios.effective, "needed": ratios.needed, "verdict": verdict}
+    title = "Shares above the limits" if view.limits else "Quantiles"
+    parts: list[Part] = [Table("loads", f"{title}, reweighted", LIMITS if view.limits else QUANTILES, rows)]
+    parts.append(Sentence(f"{len(names)} errors changed; {verdict}"))
+    if unknown := error_budget.unknown(view):
+        parts.append(Sentence(unknown))
+    if not usable:
+        parts.append(Sentence(f"fresh joints, same seeds: {_remedy(view, settings)}"))
+    parts.append(Document(".toml", rewritten(view.study, settings)))
+    return Answer("reweight", "Other tolerances", parts, facts | {"changed": names})
+
+
+def _rows(view: View, done: NDArray[np.intp], ratios: Ratios, delivery: int) -> list[Row]:
+    """Rows of the table ``loads``; `ratios` are those of the joints `done`."""
     if not ratios.values.any():
         found = "the new tolerances make none of the joints"
         raise StoreError(str(Fault(str(view.path), found, "run a study with these tolerances")))
@@ -157,11 +171,31 @@ def reweighted(view: View, settings: Sequence[str], confidence: float = 0.95, de
         found = f"holds no joint with a valid load: {', '.join(lacking)}"
         raise StoreError(str(Fault(str(view.path), found, f"see why: tolstat status {view.path}")))
     if view.limits:
-        rows = [_share_above(view, load, done, ratios, confidence, delivery) for load in (*loads, view.together)]
+        rows = [_share_above(view, load, done, ratios, delivery) for load in (*loads, view.together)]
     else:
-        rows = [_quantile(load.only(done), ratios, share, confidence) for load in loads for share in SHARES]
-    table = pd.DataFrame([row if row["usable"] else row | dict.fromkeys(WITHHELD & row.keys(), np.nan) for row in rows])
-    return Reweighted(view.path, tuple(settings), ratios, names, table, rewritten(view.study, settings))
+        rows = [_quantile(load.only(done), ratios, share) for load in loads for share in SHARES]
+    return [row if row["usable"] else row | dict.fromkeys(WITHHELD & row.keys(), np.nan) for row in rows]
+
+
+def _verdict(ratios: Ratios, rows: Rows) -> str:
+    """Sentence on whether the table is reliable."""
+    figures = f"{ratios.values.size} joints count as {ratios.effective:.0f}"
+    if ratios.effective < ratios.needed:
+        return f"needs new runs, no estimates: {figures}, {ratios.needed:.0f} needed"
+    if not ratios.usable:
+        found, allowed = math.exp(ratios.log_unbounded), weighting.LARGEST_SPREAD
+        wide = f"mean square {found:.3g} of the density ratio of wider or shifted tolerances, {allowed:g} allowed"
+        return f"needs new runs, no estimates: {wide}"
+    missing = sum(not row["usable"] for row in rows)
+    least = f"fewer than {weighting.LEAST_BESIDE:g} effective joints on one side, or the tail of their weights"
+    return figures + (f"; {missing} of {len(rows)} rows need new runs: {least}" if missing else "")
+
+
+def _remedy(view: View, settings: Sequence[str]) -> str:
+    """Commands that simulate what is not usable: fresh joints of the changed tolerances, from the same seed."""
+    changes = " ".join(f"--set {json.dumps(setting, ensure_ascii=False)}" for setting in settings)
+    study = quote(f"changed/{view.path.stem}_reweight.toml")
+    return f"tolstat reweight {quote(str(view.path))} {changes} --out changed && tolstat run {study}"
 
 
 def _ratios(view: View, new: Mapping[str, Distribution], names: Sequence[str], done: NDArray[np.intp]) -> Ratios:
@@ -233,34 +267,30 @@ def _block_log_ratios(
     return logs
 
 
-def _share_above(
-    view: View, load: Sample, done: NDArray[np.intp], ratios: Ratios, confidence: float, delivery: int
-) -> dict[str, Any]:
+def _share_above(view: View, load: Sample, done: NDArray[np.intp], ratios: Ratios, delivery: int) -> dict[str, Any]:
     """Row of the table for a limit; `ratios` are those of the joints `done`."""
     assert load.limit is not None
     level, known = load.limit, error_budget.near(view, load)
 
-    def share(load: Sample, confidence: float) -> reweight.Share:
-        return reweight.share_above(load.only(done), ratios, level, confidence)
+    def share(load: Sample, confidence: float) -> weighting.Share:
+        return weighting.share_above(load.only(done), ratios, level, confidence)
 
     def widest(confidence: float) -> tuple[float, float]:
         """Ends of the interval; with the numerical error where that is known."""
         ends = [share(one, confidence) for one in (load, *(known or ()))]
         return min(one.lower for one in ends), max(one.upper for one in ends)
 
-    found = share(load, confidence)
-    before = load.only(done).above(level, confidence).estimate
-    numbers = found._asdict()
+    found = share(load, CONFIDENCE)
+    before = load.only(done).above(level, CONFIDENCE).estimate
     row = {"load": load.name, "unit": load.unit, "level": level, "before": before}
-    row |= {key: numbers[key] for key in GIVEN}
-    row |= dict(zip(("total_lower", "total_upper"), widest(confidence) if known else (np.nan, np.nan), strict=True))
-    following = prediction.of_share(*widest(prediction.half(confidence)), delivery, confidence)
-    row |= prediction.columns(following, delivery)
-    return row | {"ess": found.ess} | found.support._asdict()
+    row |= {key: getattr(found, key) for key in GIVEN}
+    row["total_lower"], row["total_upper"] = widest(CONFIDENCE) if known else (np.nan, np.nan)
+    following = prediction.of_share(*widest(prediction.half(CONFIDENCE)), delivery, CONFIDENCE)
+    return row | prediction.columns(following, delivery) | {"ess": found.ess} | found.support._asdict()
 
 
-def _quantile(load: Sample, ratios: Ratios, share: float, confidence: float) -> dict[str, Any]:
+def _quantile(load: Sample, ratios: Ratios, share: float) -> dict[str, Any]:
     """Row of the table for a quantile; `ratios` are those of the joints of `load`."""
-    found = reweight.quantile(load, ratios, share, confidence)
-    before = load.quantile(share, confidence).estimate
+    found = weighting.quantile(load, ratios, share, CONFIDENCE)
+    before = load.quantile(share, CONFIDENCE).estimate
     return {"load": load.name, "unit": load.unit, "share": share, "before": before, **found._asdict()}

@@ -1,0 +1,334 @@
+"""Amplitudes of the shafts' loads at multiples of the input speed, and orbits of their lateral forces."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tolstat.analysis.sample import CONFIDENCE
+from tolstat.common.columns import RESULT_COLUMNS
+from tolstat.common.errors import Fault, NotApplicable, StoreError
+from tolstat.common.load_kinds import LOAD_KINDS, ORDERS, SHAFTS
+from tolstat.common.loads import LOADS, load_of
+from tolstat.common.tables import VALID
+from tolstat.display import drawing, style, text
+from tolstat.display.answer import Answer, Part, Sentence, Table
+from tolstat.display.asked import Asked
+from tolstat.display.blocks import Panel, Panels
+from tolstat.display.mpl import lines, patches, ticker
+from tolstat.display.table import Column, Row, Rows, has
+from tolstat.store import revolutions
+from tolstat.store.points import point_of
+from tolstat.store.view import View
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+SHARES = {"5": 0.05, "median": 0.5, "95": 0.95}
+"""Shares of the joints at which quantiles of an amplitude are given, by key."""
+NEAR = {"median": 0.5, "95 %": 0.95}
+"""Quantiles of the largest lateral force; the orbit of the joint nearest to each is shown."""
+INTRODUCTION = (
+    "Amplitudes of the loads on the shafts and of Ψ at multiples of the input speed. Forces and moments across a shaft "
+    "are taken in axes that do not turn; there the vector of one order moves on an ellipse, whose semi-major axis is "
+    "the amplitude. An orbit also holds the mean force; its dot is the input angle 0, its arrow points on."
+)
+AMPLITUDES = ("nominal joint", "median", "5 to 95 %")
+"""Labels of the picture of amplitudes."""
+SMALL = 0.05
+"""Orbits below this part of the largest one are too small for an arrow."""
+LOOKS: dict[str, tuple[str, str, style.Dash]] = {
+    "nominal": ("nominal joint", style.INK, style.DASHES[2]),
+    "median": ("near median", style.COLOURS[0], style.DASHES[0]),
+    "95 %": ("near 95 %", style.COLOURS[1], style.DASHES[0]),
+}
+"""Label, colour and dash of the orbits, by `Orbit.near`."""
+ORIGIN = {
+    "stored": "from the histories in the file",
+    "harmonics": "restored from the harmonics in the file",
+    revolutions.AGAIN: "simulated again, since the file holds no histories of them",
+}
+
+
+class Orbit(NamedTuple):
+    """Lateral force on a shaft over the last revolution, in axes that do not turn.
+
+    Attributes
+    ----------
+    shaft : str
+        ``"input"`` or ``"output"``.
+    near : str
+        Which joint: ``"nominal"``, or the name in `NEAR` of the quantile that its largest lateral force is nearest to.
+    row : int
+        Row of the joint in the campaign.
+    point : str
+        Operating point: of several the one at which the lateral force matters most.
+    force : ndarray, shape (k, 2)
+        Components f_x (in the plane of both shafts) and f_y (normal to it), N, at equally spaced input angles from 0.
+    """
+
+    shaft: str
+    near: str
+    row: int
+    point: str
+    force: NDArray[np.float64]
+
+    @property
+    def label(self) -> str:
+        """Which joint, in words."""
+        return LOOKS[self.near][0]
+
+    @property
+    def place(self) -> str:
+        """The shaft, and the operating point if it has a name."""
+        return f"{self.shaft} shaft{f' at {self.point}' if self.point else ''}"
+
+    @property
+    def largest(self) -> float:
+        """Largest force, N."""
+        return float(np.linalg.norm(self.force, axis=1).max())
+
+
+def _value(key: str) -> Callable[[Row], str]:
+    return lambda row: text.value(row[key], row["unit"])
+
+
+def _interval(key: str) -> Callable[[Row], str]:
+    return lambda row: text.span_of(row[f"{key}_lower"], row[f"{key}_upper"], row["unit"])
+
+
+COLUMNS = (
+    Column("amplitude", lambda row: str(row["load"])),
+    Column("nominal joint", _value("nominal")),
+    Column("5 %", _value("q5")),
+    Column("interval of 5 %", _interval("q5"), shown=has("q5_lower"), rank=3),
+    Column("median", _value("qmedian")),
+    Column("interval of median", _interval("qmedian"), shown=has("qmedian_lower"), rank=2),
+    Column("95 %", _value("q95")),
+    Column("interval of 95 %", _interval("q95"), shown=has("q95_lower"), rank=1),
+)
+"""Columns of the table ``amplitudes``: quantiles over the joints with their intervals."""
+
+
+def orders(view: View, orbits: bool = False) -> Answer:
+    """Estimate the orders of the loads that the shafts carry.
+
+    Gives the amplitudes of lateral force, bending moment, driving torque and speed error at one to four times the
+    input speed: of the nominal joint, and their 5, 50 and 95 % quantiles over the joints with 95 % intervals. With
+    --orbits also the orbits of the lateral forces in axes that do not turn. --out writes pictures of them.
+
+    Example: tolstat orders iso2768_f.h5 --orbits --out orders
+
+    Parameters
+    ----------
+    view : View
+        A campaign.
+    orbits : bool
+        Read the orbits of the lateral forces, too; joints without histories of them are simulated again.
+
+    Returns
+    -------
+    Answer
+        Table ``amplitudes``, one row per quantity and order that the study keeps, SI: ``quantity``
+        (``input.lateral``), ``noun``, ``order``, ``load`` (``input.lateral_2x``), ``unit``; ``nominal`` (NaN without a
+        nominal joint); ``q5``, ``qmedian``, ``q95`` (amplitude that this share of the joints does not exceed), each
+        with ``_lower`` and ``_upper``, which are NaN for dependent samples; too few joints give 0 and infinity. With
+        `orbits` table ``orbits``, one row per point: ``shaft``, ``near``, ``row``, ``point`` as in `Orbit`, ``theta``
+        (input angle), ``f_x``, ``f_y``. Facts ``joints`` and ``left_out``: joints with and without a valid result,
+        those pending not counted; ``origin`` and ``apart`` of the orbits, see `store.revolutions.Revolutions`.
+
+    Raises
+    ------
+    StoreError
+        When the study keeps no amplitude, no joint has a valid result, or the file holds levels of a subset simulation.
+    InputError
+        When a joint has to be simulated again and this version cannot read the file's joint or options.
+    """
+    names = [name for name in view.kept_loads if LOADS[name].kind.orders]
+    if not names:
+        remedy = 'let [output] results of the study select them, such as "*_1x_max", and run it again'
+        raise StoreError(str(Fault(str(view.path), "holds no amplitudes of orders", remedy)))
+    joints = view.count(*VALID)
+    if not joints:
+        raise StoreError(str(Fault(str(view.path), "has no joint with a valid result", "resume the campaign")))
+    names.sort(key=lambda name: LOAD_KINDS.index(LOADS[name].kind))
+    rows = [_amplitude(view, name) for name in names]
+    facts: dict[str, Any] = {"joints": joints, "left_out": view.counts.done - joints}
+    parts: list[Part] = [Table("amplitudes", "Amplitudes over the joints", COLUMNS, rows)]
+    counts = f"{joints} joints, {facts['left_out']} without a valid load left out"
+    if has("q95_lower")(rows):
+        notes = [f"{counts}; 95 % intervals"]
+    else:
+        notes = [counts, "no intervals: the joints are not independent"]
+    found, origin, apart = _orbits(view) if orbits else ([], "", 0.0)
+    if found:
+        facts |= {"origin": origin, "apart": apart}
+        points, units = [row for orbit in found for row in _points(orbit)], {"theta": "rad", "f_x": "N", "f_y": "N"}
+        parts.append(Table("orbits", "Lateral force over one revolution", (), points, units, seen=()))
+        notes.append(f"{_which(found)}; {ORIGIN[origin]}")
+    if apart:
+        notes.append(
+            f"largest loads of these joints differ by up to {apart:.1e} (relative) from the stored ones, which "
+            "another machine or version computed"
+        )
+    drawn = Panels([*_amplitude_panels(rows), *_orbit_panels(found)])
+    return Answer("orders", "Orders of what the shafts carry", [drawn, *parts, *map(Sentence, notes)], facts)
+
+
+def orders_on_page(view: View, asked: Asked) -> Answer:
+    """Orders where the study asks for loads of the shafts; orbits where the page shows histories at all."""
+    if not (view.sampled and view.count(*VALID) and are_asked(view)):
+        raise NotApplicable
+    found = orders(view, orbits=asked.replay > 0)
+    return Answer(found.name, found.title, [Sentence(INTRODUCTION, "lead"), *found.parts], found.facts)
+
+
+def are_asked(view: View) -> bool:
+    """Whether the study asks for loads of the shafts or orders: by a limit, or by selecting them among its results."""
+    selected = view.kept_loads if len(view.columns) < len(RESULT_COLUMNS) else ()
+    asked = [load_of(name) for name in (*view.limits, *selected)]
+    return any(load.kind.orders or load.place.group == "shaft" for load in asked)
+
+
+def _amplitude(view: View, name: str) -> Row:
+    """One row of the table ``amplitudes``."""
+    load, kind = view.load(name), LOADS[name].kind
+    order = kind.orders[LOADS[name].element % len(kind.orders)]
+    quantity = ".".join(filter(None, (LOADS[name].place.name, kind.symbol)))
+    row = {"quantity": quantity, "noun": kind.noun, "order": order, "load": name, "unit": load.unit}
+    row["nominal"] = load.nominal
+    for key, share in SHARES.items():
+        found = load.quantile(share, CONFIDENCE)
+        ends = {"lower": float(np.maximum(found.lower, 0.0)), "upper": found.upper}
+        row |= {f"q{key}": found.estimate} | {f"q{key}_{end}": value for end, value in ends.items()}
+    return row
+
+
+def _orbits(view: View) -> tuple[list[Orbit], str, float]:
+    """Orbits of each shaft whose lateral force is kept, their source, and how far from the stored values."""
+    found, origin, apart = [], "", 0.0
+    for shaft in SHAFTS:
+        name = f"{shaft}.lateral"
+        if name not in view.kept_loads or not view.load(name).valid.size:
+            continue
+        at = view.at(point_of(view, name))
+        names, samples = [f"{shaft}.f_x", f"{shaft}.f_y"], int(at.store.options["steps_per_rev"])
+        for near, slot in _near(at, name).items():
+            read = revolutions.read(at.store, np.array([slot]), names, samples)
+            force = np.column_stack([read.loads[own][0] for own in names])
+            origin, apart = read.origin, max(apart, read.apart)
+            found.append(Orbit(shaft, near, int(at.store.row(slot)), at.points[0], force))
+    return found, origin, apart
+
+
+def _near(view: View, name: str) -> dict[str, int]:
+    """File slots of the joints whose orbits are shown for a lateral force, by `Orbit.near`."""
+    load = view.load(name)
+    found = {"nominal": int(view.nominal_slots[0])} if view.nominal_slots.size else {}
+    for near, share in NEAR.items():
+        apart = np.abs(load.values - load.quantile(share).estimate)
+        if np.isfinite(apart).any():
+            found[near] = int(view.slots(np.nanargmin(apart)))
+    return found
+
+
+def _points(orbit: Orbit) -> Rows:
+    """Rows of the table ``orbits`` for one orbit."""
+    head = {"shaft": orbit.shaft, "near": orbit.near, "row": orbit.row, "point": orbit.point}
+    theta = 2 * np.pi * np.arange(len(orbit.force)) / len(orbit.force)
+    return [head | {"theta": angle, "f_x": x, "f_y": y} for angle, (x, y) in zip(theta, orbit.force, strict=True)]
+
+
+def _which(orbits: Sequence[Orbit]) -> str:
+    """Words on which joints the orbits are of."""
+    of_shaft: dict[str, list[str]] = {}
+    for orbit in orbits:
+        of_shaft.setdefault(orbit.place, []).append(f"{orbit.label} row {orbit.row}")
+    parts = [f"{place} {', '.join(joints)}" for place, joints in of_shaft.items()]
+    return f"orbits: {'; '.join(parts)}; nearest in the largest lateral force"
+
+
+def _amplitude_panels(rows: Rows) -> list[Panel]:
+    """Pictures of the amplitude over the order, one of each quantity."""
+    panels = []
+    for name in dict.fromkeys(row["quantity"] for row in rows):
+        own = [row for row in rows if row["quantity"] == name]
+        most, noun, (place, _, _) = max(own, key=_median), own[0]["noun"], name.rpartition(".")
+        where = f", {place} shaft" if place else ""
+        title = f"{noun[0].upper()}{noun[1:]}{where}".replace("Psi", "Ψ")
+        largest = f"order {most['order']}, {text.value(most['qmedian'], most['unit'])}"
+        words = f"The median of the joints is largest at {largest}."
+        draw, room = partial(_bars, rows=own), drawing.legend_room(AMPLITUDES)
+        panels.append(Panel(f"amplitude-{name}", title, words, draw, (drawing.WIDTH, 2.7), top=room))
+    return panels
+
+
+def _median(row: Row) -> float:
+    return float(row["qmedian"])
+
+
+def _orbit_panels(orbits: Sequence[Orbit]) -> list[Panel]:
+    """Pictures of the lateral force on each shaft."""
+    panels = []
+    for shaft in dict.fromkeys(orbit.shaft for orbit in orbits):
+        own = [orbit for orbit in orbits if orbit.shaft == shaft]
+        at = f", at {own[0].point}" if own[0].point else ""
+        title = f"Lateral force on the {shaft} shaft over one revolution{at}"
+        words = "Orbit of the force in axes that do not turn, of the nominal joint and of two others. "
+        words += " ".join(f"{orbit.label}: up to {text.value(orbit.largest, 'N')}." for orbit in own)
+        draw, room = partial(_draw_orbits, orbits=own), drawing.legend_room([orbit.label for orbit in own])
+        panels.append(Panel(f"orbit-{shaft}", title, words, draw, (drawing.WIDTH, 4.6), top=room))
+    return panels
+
+
+def _bars(ax: Axes, rows: Rows) -> None:
+    """Draw the nominal joint beside the median, with the range from 5 to 95 % of the joints."""
+    order, nominal, low, middle, high = (
+        np.array([row[key] for row in rows]) for key in ("order", "nominal", "q5", "qmedian", "q95")
+    )
+    nominal = np.nan_to_num(nominal)
+    ends = np.clip([middle - low, high - middle], 0.0, None)
+    ax.bar(order - 0.18, nominal, 0.32, color=drawing.GREY)
+    ax.bar(order + 0.18, middle, 0.32, color=style.COLOURS[0])
+    ax.errorbar(order + 0.18, middle, ends, fmt="none", ecolor=style.INK, elinewidth=1.3, capsize=4.0)
+    top = float(max(high.max(), nominal.max()))
+    ax.set(xticks=list(ORDERS), xticklabels=[f"{n}×" for n in ORDERS], xlabel="order, multiple of the input speed")
+    ax.set(xlim=(ORDERS[0] - 0.6, ORDERS[-1] + 0.6), ylim=(0.0, 1.08 * top or 1.0))
+    ax.grid(axis="x", visible=False)
+    unit = drawing.loads_axis(ax.yaxis, top, rows[0]["unit"])
+    if not unit:
+        ax.yaxis.set_major_formatter(ticker.FuncFormatter(lambda x, _: f"{x:.3g}"))
+    ax.set_ylabel(f"amplitude [{unit or '1'}]")
+    handles = [
+        patches.Patch(color=drawing.GREY),
+        patches.Patch(color=style.COLOURS[0]),
+        lines.Line2D([], [], color=style.INK, lw=1.3, marker="|", ms=8.0),
+    ]
+    drawing.legend_above(ax, handles, AMPLITUDES)
+
+
+def _draw_orbits(ax: Axes, orbits: Sequence[Orbit]) -> None:
+    """Draw the orbits about zero force; a dot is the input angle 0, an arrow head points on."""
+    handles, largest = [], max(orbit.largest for orbit in orbits)
+    for line in (ax.axhline, ax.axvline):
+        line(0.0, color=style.FAINT, lw=0.8)
+    for orbit in orbits:
+        _, colour, dash = LOOKS[orbit.near]
+        x, y = np.vstack([orbit.force, orbit.force[:1]]).T
+        small = orbit.near == "nominal"  # mostly a point at the centre, where other orbits pass
+        size, order = (4.0, 4) if small else (6.0, 3)
+        handles += ax.plot(x, y, "o", markevery=[0], ms=size, zorder=order, color=colour, ls=dash)
+        k = max(1, len(orbit.force) // 12)
+        if orbit.largest > SMALL * largest:
+            head = {"arrowstyle": "-|>", "color": colour, "mutation_scale": 16.0}
+            ax.annotate("", (x[k], y[k]), (x[k - 1], y[k - 1]), arrowprops=head)
+    ax.set_aspect("equal", adjustable="datalim")
+    ax.margins(0.08)
+    unit = drawing.loads_axis(ax.xaxis, largest, "N")
+    drawing.loads_axis(ax.yaxis, largest, "N")
+    ax.set(xlabel=f"f_x, in the plane of both shafts [{unit}]", ylabel=f"f_y, normal to that plane [{unit}]")
+    drawing.legend_above(ax, handles, [orbit.label for orbit in orbits])

@@ -1,1 +1,0 @@
-"""Likelihood-ratio reweighting to other tolerances."""

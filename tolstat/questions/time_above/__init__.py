@@ -1,1 +1,0 @@
-"""Share of a revolution above a level."""

@@ -61,13 +61,15 @@ def examples(tmp_path_factory):
     known = made(folder, TEXT.replace("3000", "600"))
     return {
         **{name: {"path": two} for name in ("questions.allocate.query", "questions.reweight.query", "report.summary")},
-        "questions.compare.query": {"path": two, "other": fewer},
+        "questions.compare": {"path": two, "other": fewer},
         "questions.causes.query": {"path": known},
     }
 
 
 @pytest.mark.parametrize(
-    "module", [f"questions.{name}.query" for name in ("allocate", "reweight", "compare", "causes")] + ["report.summary"]
+    "module",
+    [f"questions.{name}.query" for name in ("allocate", "reweight", "causes")]
+    + ["questions.compare", "report.summary"],
 )
 def test_examples_on_files(module, examples):
     # import_module, as a name of the package may be a function

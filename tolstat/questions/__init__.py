@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from tolstat.questions.causes.pairs import pairs_of as pairs_of
     from tolstat.questions.causes.query import causes_of as causes_of
     from tolstat.questions.causes.tail import worst_joints as worst_joints
-    from tolstat.questions.compare.query import compared as compared
     from tolstat.questions.fatigue.parts import part_failures as part_failures
     from tolstat.questions.fatigue.pylife import pylife_series as pylife_series
     from tolstat.questions.fatigue.query import equivalent_loads as equivalent_loads
@@ -157,7 +156,7 @@ QUESTIONS = (
     Folder("time_above", ("query.time_above",), "Read", ("time_above",)),
     Folder("reweight", ("query.reweighted",), "Decide", ("reweight",)),
     Folder("allocate", ("query.allocated",), "Decide", ("allocate",)),
-    Folder("compare", ("query.compared",), "Decide", ("compare",)),
+    Question("compare", "Decide", "Compare the exceedances and loads of two campaigns."),
     Folder("rare", ("query.rare_event",), "Decide", ("rare",)),
     Question("selective", "Decide", "Compute yield and unmatched parts of selective assembly.", "folded"),
 )

@@ -61,7 +61,7 @@ def examples(tmp_path_factory):
     known = made(folder, TEXT.replace("3000", "600"))
     return {
         **{name: {"path": two} for name in ("questions.allocate.answer", "questions.reweight", "report.summary")},
-        "questions.compare.query": {"path": two, "other": fewer},
+        "questions.compare": {"path": two, "other": fewer},
         "questions.causes.query": {"path": known},
     }
 
@@ -71,7 +71,7 @@ def examples(tmp_path_factory):
     [
         "questions.allocate.answer",
         "questions.reweight",
-        "questions.compare.query",
+        "questions.compare",
         "questions.causes.query",
         "report.summary",
     ],

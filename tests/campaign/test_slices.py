@@ -11,7 +11,7 @@ import tolstat
 from tests.support import synthetic
 from tolstat import study
 from tolstat.common.tables import Status
-from tolstat.questions.compare import query as compare
+from tolstat.questions import compare
 
 LIMITED = synthetic.REAL.partition("[limits]")[0] + '[limits]\n"cross1.F" = "700 N"\n'
 OF_LOTS = (
@@ -59,14 +59,14 @@ def test_joints_of_slices_are_paired_by_their_number(tmp_path: Path) -> None:
     common = {("whole", "last"): range(20, 61), ("first", "last"): range(20, 40), ("last", "bare"): range(20, 51)}
     for (one, other), rows in common.items():
         with tolstat.open(tmp_path / f"{one}.h5") as a, tolstat.open(tmp_path / f"{other}.h5") as b:
-            found = compare.compared(a.view(), b.view(), ["cross1.F"])
-            assert found.sides.rows.tolist() == list(rows), (one, other)
-            of_a, of_b = (side.values for side in found.sides.load("cross1.F"))
-        assert found.sides.paired
+            sides, answer = compare.sides(a.view(), b.view()), tolstat.compare(a.view(), b.view(), ["cross1.F"])
+            assert sides.rows.tolist() == list(rows), (one, other)
+            of_a, of_b = (side.values for side in sides.load("cross1.F"))
+        assert sides.paired
         np.testing.assert_array_equal(of_a, of_b)
         assert np.unique(of_a).size == len(rows)
-        assert (found.loads["estimate"] == 0.0).all()
-        assert found.switched.empty
+        assert (answer.frame("loads")["estimate"] == 0.0).all()
+        assert answer.frame("switched").empty
 
 
 def test_lots_of_a_slice_are_those_of_the_campaign(tmp_path: Path) -> None:

@@ -1,8 +1,9 @@
 """``python -m tests.measure.gallery FOLDER``: pictures of docs/gallery that no command draws by itself.
 
 FOLDER holds the result files ``welded_fork.h5``, ``overnight.h5``, ``fuzz.h5``, ``hard_cases.h5``,
-``needle_bearings.h5``, ``duty_cycle.h5``, ``known_parts.h5``, ``sorting.h5`` and ``lots.h5``, of some joints or
-all, and gets a picture of each, and ``tilted_pin.png``.
+``needle_bearings.h5``, ``duty_cycle.h5``, ``known_parts.h5``, ``sorting.h5``, ``lots.h5``, and, compared with
+``iso2768_f.h5``, ``rigid_shafts.h5`` and ``line_bored.h5``, of some joints or all, and gets a picture of each, and
+``tilted_pin.png``.
 """
 
 from __future__ import annotations
@@ -163,6 +164,30 @@ def lots(folder: Path) -> None:
     as_on_page(answer, (7, 3.6), folder / "lots.png")
 
 
+def compared(folder: Path, name: str) -> None:
+    """Draw the curves of a study and of iso2768_f, and their difference, for one force and one torque."""
+    with tolstat.open(folder / "iso2768_f.h5") as a, tolstat.open(folder / f"{name}.h5") as b:
+        answer = tolstat.compare(a.view(), b.view(), ["cross1.F", "cross1.T"])
+    pictures = next(part for part in answer.parts if isinstance(part, Panels))
+    with style.settings():
+        figure, axes = plt.subplots(2, 2, figsize=(9.8, 7.0))
+        figure.subplots_adjust(left=0.085, right=0.985, top=0.91, bottom=0.07, hspace=0.45, wspace=0.18)
+        for ax, panel in zip(axes.flat, pictures.panels, strict=True):
+            panel.draw(ax)
+            ax.set_title(panel.title, pad=24.0)
+        save(figure, folder / f"{name}.png")
+
+
+def rigid_shafts(folder: Path) -> None:
+    """Draw what rigid shafts change."""
+    compared(folder, "rigid_shafts")
+
+
+def line_bored(folder: Path) -> None:
+    """Draw what line-bored holes change."""
+    compared(folder, "line_bored")
+
+
 def kind(status: np.ndarray) -> np.ndarray:
     """Name of the colour of each joint."""
     names = np.full(len(status), "other", dtype="U10")
@@ -222,7 +247,7 @@ def main(folder: Path) -> None:
     """Draw what the folder has the results of."""
     tilted_pin(folder)
     drawn = (welded_fork, overnight, fuzz, hard_cases, needle_bearings, duty_cycle, known_parts, sorting, lots)
-    for draw in drawn:
+    for draw in (*drawn, rigid_shafts, line_bored):
         if (folder / f"{draw.__name__}.h5").exists():
             draw(folder)
 

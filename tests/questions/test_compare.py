@@ -14,9 +14,10 @@ from tolstat.analysis.binomial import clopper_pearson
 from tolstat.analysis.listed import Listed
 from tolstat.analysis.sample import Sample
 from tolstat.cli import app
-from tolstat.common.errors import InputError
+from tolstat.common.errors import InputError, NotApplicable
 from tolstat.common.tables import Simulation, Status
-from tolstat.questions.compare import query as compare
+from tolstat.display.answer import Sentence
+from tolstat.questions import compare as question
 from tolstat.store import ResultFile, Writer
 
 SEEDS = 500
@@ -139,21 +140,28 @@ def test_joints_of_one_seed_are_paired_by_sample_and_changes_are_put_together(tm
     wide = synthetic.STUDY.replace("0.1 mm", "0.12 mm").replace("n = 60", "n = 60\nnominal_first = false")
     a, b = campaign(tmp_path, "a"), campaign(tmp_path, "b", wide, n=300)
     with ResultFile.open(a) as one, ResultFile.open(b) as other:
-        found = compare.compared(one.view(), other.view(), ["cross1.F"])
+        answer = question.compare(one.view(), other.view(), ["cross1.F"])
+        pairs, differing = question.sides(one.view(), other.view()), question.changes(one.view(), other.view())
         loads = [source_of(store)[k : k + 299] for store, k in ((one, 1), (other, 0))]
-    assert found.sides.paired
-    assert found.sides.rows[[0, -1]].tolist() == [1, 300]
-    row = found.shares.set_index("load").loc["cross1.F"]
+    assert answer.facts == {"paired": True}
+    assert pairs.rows[[0, -1]].tolist() == [1, 300]
+    row = answer.frame("shares").set_index("load").loc["cross1.F"]
     above = [load > 700.0 for load in loads]
     assert (row["only_a"], row["only_b"]) == (0, np.sum(above[1] & ~above[0]))
     assert row["lower"] > 0
     assert (
-        found.switched.query("load == 'cross1.F'")["row"].tolist()
+        answer.frame("switched").query("load == 'cross1.F'")["row"].tolist()
         == (1 + np.flatnonzero(above[0] != above[1])).tolist()
     )
     sigmas = [f"tolerances.pin{i}.offset_t.sigma" for i in (1, 2, 3, 4)]
-    assert [change.keys for change in found.changes if "tolerances" in change.keys[0]] == [sigmas]
-    assert found.loads["statistic"].tolist() == ["mean", "50 %", "90 %", "99 %"]
+    assert [keys for keys, *_ in differing if "tolerances" in keys[0]] == [sigmas]
+    assert set(sigmas) < set(answer.frame("changes")["key"])
+    assert any(note.startswith(f"  {sigmas[0]} and 3 more: ") for note in notes_of(answer))
+    assert answer.frame("loads")["statistic"].tolist() == ["mean", "50 %", "90 %", "99 %"]
+
+
+def notes_of(answer):
+    return [part.text for part in answer.parts if isinstance(part, Sentence)]
 
 
 def source_of(store):
@@ -166,10 +174,10 @@ def test_other_seeds_are_not_paired(tmp_path):
         campaign(tmp_path, "b", synthetic.STUDY.replace("seed = 2021", "seed = 5"), factor=1.2),
     )
     with ResultFile.open(a) as one, ResultFile.open(b) as other:
-        found = compare.compared(one.view(), other.view())
-    assert not found.sides.paired
-    assert found.switched.empty
-    row = found.shares.set_index("load").loc["cross1.F"]
+        answer = question.compare(one.view(), other.view())
+    assert not answer.facts["paired"]
+    assert answer.frame("switched").empty
+    row = answer.frame("shares").set_index("load").loc["cross1.F"]
     assert row["lower"] < row["estimate"] < row["upper"]
     assert np.isnan(row["p"])
 
@@ -183,12 +191,14 @@ def test_command_prints_tables_and_writes_files(tmp_path):
     assert "400 pairs of joints" in done.stderr
     assert "the studies are the same" in done.stderr
     assert "2 joints without a valid load" in done.stderr
-    names = [f"a_b_{what}" for what in ("compare.png", "compare.svg", "loads.csv", "shares.csv", "switched.csv")]
-    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == names
-    switched = pd.read_csv(tmp_path / "out" / "a_b_switched.csv").query("load == 'cross1.F'")
-    found = json.loads(run("compare", a, b, "--json").stdout)
-    assert found["shares"][0]["only_b"] == len(switched) > 0
-    assert found["loads"][0]["estimate"] == pytest.approx(found["loads"][0]["b"] - found["loads"][0]["a"])
+    pictures = [f"cross1-F{what}.{end}" for what in ("", "-difference") for end in ("png", "svg")]
+    names = [f"a_b_compare_{what}" for what in (*pictures, "loads.csv", "shares.csv", "switched.csv")]
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == sorted(names)
+    switched = pd.read_csv(tmp_path / "out" / "a_b_compare_switched.csv").query("load == 'cross1.F'")
+    tables = json.loads(run("compare", a, b, "--json").stdout)["tables"]
+    (shares, *_), (loads, *_) = tables["shares"]["rows"], tables["loads"]["rows"]
+    assert shares["only_b"] == len(switched) > 0
+    assert loads["estimate"] == pytest.approx(loads["b"] - loads["a"])
 
 
 @pytest.mark.slow
@@ -197,19 +207,30 @@ def test_what_cannot_be_compared_is_refused(tmp_path):
     done = run("compare", a, sweep)
     assert done.exit_code == 2
     assert "not drawn from tolerances" in done.stderr
-    blocked = tmp_path / "a_a_compare.png"
+    blocked = tmp_path / "a_a_compare_shares.csv"
     blocked.mkdir()
-    done = run("compare", a, a)
+    done = run("compare", a, a, "--out", tmp_path)
     assert done.exit_code == 2
     assert "hint: give another folder" in done.stderr
     with ResultFile.open(a) as one, pytest.raises(InputError, match=r"did you mean 'cross1\.F'") as refused:
-        compare.compared(one.view(), one.view(), ["cros1.F", "nothing"])
+        question.compare(one.view(), one.view(), ["cros1.F", "nothing"])
     assert len(refused.value.faults) == 2
+    with ResultFile.open(sweep) as one, pytest.raises(NotApplicable):
+        question.compare(one.view(), one.view())
 
 
 def test_pending_joints_are_not_compared(tmp_path):
     a, b = campaign(tmp_path, "a", n=60), synthetic.store(tmp_path, simulated=31, name="b")
     with ResultFile.open(a) as one, ResultFile.open(b) as other:
-        found = compare.compared(one.view(), other.view())
-    assert len(found.sides.rows) == 30
-    assert (found.sides.b.load("cross1.F").status == Status.OK).all()
+        found = question.sides(one.view(), other.view())
+        assert "30 pairs of joints with the same random numbers" in notes_of(question.compare(*found.views))
+        assert len(found.rows) == 30
+        assert (found.load("cross1.F")[1].status == Status.OK).all()
+
+
+def test_units_of_a_study_are_written_for_people(tmp_path):
+    stiff = synthetic.STUDY.replace('base = "cirelli2021"', 'base = "cirelli2021"\nbushing.cross.k_bx = "6e5 N*m/rad"')
+    with ResultFile.open(campaign(tmp_path, "a")) as one, ResultFile.open(campaign(tmp_path, "b", stiff)) as other:
+        answer = question.compare(one.view(), other.view())
+    assert "  joint.bushing.cross.k_bx: 590000.0 N m/rad -> 600000.0 N m/rad" in notes_of(answer)
+    assert answer.frame("changes").set_index("key").loc["joint.bushing.cross.k_bx", "b"] == "600000.0 N*m/rad"

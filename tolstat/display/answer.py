@@ -148,7 +148,7 @@ class Answer:
         return [block for part in self.parts if (block := _block(part)) is not None]
 
     def write(self, stem: Path) -> list[Path]:
-        """Write each table as ``STEM_TABLE.csv``, pictures as PNG and SVG beside them, and documents.
+        """Write each table with rows as ``STEM_TABLE.csv``, pictures as PNG and SVG beside them, and documents.
 
         Returns
         -------
@@ -163,7 +163,7 @@ class Answer:
         files: list[Path] = []
         sheets = [part for part in self.parts if isinstance(part, Sheet)]
         for part in self.parts:
-            if isinstance(part, Table):
+            if isinstance(part, Table) and part.rows:
                 files.append(text.csv(text.columns_of(part.rows), stem, part.name))
             elif isinstance(part, Panels) and not sheets:
                 for panel in part.panels:

@@ -1,0 +1,367 @@
+"""Comparison of two campaigns: differences between their studies and between their loads."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tolstat.analysis import difference
+from tolstat.analysis.design import Claim
+from tolstat.analysis.sample import Sample
+from tolstat.common.counts import Counts
+from tolstat.common.draw_records import DRAWN
+from tolstat.common.errors import Fault, InputError, NotApplicable, StoreError
+from tolstat.common.loads import ANY_LIMIT, FloatArray, unit_text
+from tolstat.common.strict import did_you_mean
+from tolstat.common.tables import Status
+from tolstat.display import drawing, style, text
+from tolstat.display.answer import Answer, Sentence, Table
+from tolstat.display.blocks import Panel, Panels
+from tolstat.display.mpl import patches
+from tolstat.display.options import Loads
+from tolstat.display.table import Column, Row, Rows
+from tolstat.store.view import View
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+SHARES = (0.5, 0.9, 0.99)
+"""Quantiles that are compared."""
+LEVELS = 200
+"""Approximate number of levels of a curve."""
+MAX_LOADS = 4
+"""Maximum number of loads with pictures."""
+SIZE = (drawing.WIDTH, 3.4)
+"""Width and height of a picture, inches."""
+
+
+class Sides(NamedTuple):
+    """The joints of two campaigns A and B that are compared.
+
+    Attributes
+    ----------
+    views : tuple of View
+        The campaigns.
+    samples : tuple of ndarray of int
+        Samples of each, ascending; if paired, as many.
+    paired : bool
+        Whether joint i of both was drawn with the same random numbers.
+    """
+
+    views: tuple[View, View]
+    samples: tuple[NDArray[np.intp], NDArray[np.intp]]
+    paired: bool
+
+    @property
+    def has_intervals(self) -> bool:
+        """Whether differences of shares have intervals."""
+        claim: Claim = "difference" if self.paired else "share"
+        return all(view.design.has_interval(claim) for view in self.views)
+
+    @property
+    def rows(self) -> NDArray[np.intp]:
+        """Row of each joint of A in its campaign, (n,)."""
+        return self.views[0].rows(self.samples[0])
+
+    @property
+    def unresolved(self) -> int:
+        """Number of joints that failed or did not settle."""
+        counts = [Counts.of(view.status[own]) for view, own in zip(self.views, self.samples, strict=True)]
+        return sum(own.failed + own.unsettled for own in counts)
+
+    def load(self, name: str) -> tuple[Sample, Sample]:
+        """Load of the joints of A and of B."""
+        both = zip(self.views, self.samples, strict=True)
+        a, b = (_only(view.load(name), own) for view, own in both)
+        return a, b
+
+
+def _only(load: Sample, samples: NDArray[np.intp]) -> Sample:
+    return load if len(samples) == load.values.size else load.only(samples)  # a million joints are not copied
+
+
+def _unit(row: Row) -> str:
+    return f" {unit_text(row['unit'])}".rstrip()
+
+
+def _interval(row: Row, factor: float, unit: str) -> str:
+    low, high = factor * row["lower"], factor * row["upper"]
+    return "-" if math.isnan(low) else f"{low:+.3g} .. {high:+.3g}{unit}"
+
+
+def _share_columns(paired: bool) -> tuple[Column, ...]:
+    """Columns of the table ``shares``; joints above on one side only are counted for pairs."""
+
+    def only(side: str) -> Callable[[Row], str]:
+        return lambda row: str(row[f"only_{side}"]) if paired else "-"
+
+    return (
+        Column("load > limit", text.limit),
+        Column("A", lambda row: text.percent(row["a"])),
+        Column("B", lambda row: text.percent(row["b"])),
+        Column("B - A", lambda row: f"{100 * row['estimate']:+.3g} %"),
+        Column("ppm", lambda row: f"{1e6 * row['estimate']:+.4g}", rank=2),
+        Column("95 % interval", lambda row: _interval(row, 100.0, " %")),
+        Column("only A", only("a"), rank=1),
+        Column("only B", only("b"), rank=1),
+        Column("p", lambda row: text.formed(row["p"], ".2g")),
+    )
+
+
+LOADS = (
+    Column("load", lambda row: str(row["load"])),
+    Column("statistic", lambda row: str(row["statistic"])),
+    Column("A", lambda row: f"{row['a']:.4g}{_unit(row)}"),
+    Column("B", lambda row: f"{row['b']:.4g}{_unit(row)}"),
+    Column("B - A", lambda row: f"{row['estimate']:+.3g}{_unit(row)}"),
+    Column("95 % interval", lambda row: _interval(row, 1.0, _unit(row))),
+)
+
+
+def compare(a: View, b: View, by: Loads = None) -> Answer:
+    """Compare the exceedances and loads of two campaigns.
+
+    Prints the differences between the studies and, as B - A with its 95 % interval, the difference of the share above
+    each limit; with --by, or without limits, also of quantiles and means. Joints drawn from the same seed are compared
+    in pairs, which makes the intervals narrow.
+
+    With --out, writes the curves and their difference as PNG and SVG, and as CSV the differences and the joints that
+    are above a limit in one campaign only.
+
+    Example: tolstat compare iso2768_f.h5 narrow.h5 --by cross1.F
+
+    Parameters
+    ----------
+    a, b : View
+        Campaigns. Joints are paired if both studies draw them by the same method from the same seed: an error then
+        has the same random number in both, whatever its tolerance. Joints without a partner are then left out.
+    by : list of str, optional
+        Load whose quantiles and mean are compared, such as cross1.F; repeatable; default: loads with limits.
+
+    Returns
+    -------
+    Answer
+        Differences are B minus A. Fact ``paired``: whether joints are compared in pairs. Table ``shares``, one row per
+        limit of either study, and `ANY_LIMIT` if both have some (each side against its own): ``load``, ``unit``,
+        ``level``, fields of `difference.ShareDifference`. Table ``loads``, one row per load and ``statistic``
+        (``mean``, ``50 %`` ...): ``load``, ``unit``, fields of `difference.Difference`. Table ``switched``, one row per
+        pair and limit if only one joint of the pair is above the limit: ``row`` (of A), ``load``, ``unit``, ``level``,
+        ``a``, ``b``. Table ``changes``, one row per ``key`` that differs between the studies, with its values ``a`` and
+        ``b``.
+
+    Raises
+    ------
+    InputError
+        When a name is not a load, or a load is not kept by both files.
+    NotApplicable
+        When a file holds joints that are not drawn from tolerances.
+    StoreError
+        When a file has no joint with a valid load.
+
+    Examples
+    --------
+    >>> with tolstat.open(path) as a, tolstat.open(other) as b:
+    ...     answer = tolstat.compare(a.view(), b.view(), ["cross1.F"])
+    >>> answer.facts["paired"], answer.frame("changes")["key"].tolist()[0]
+    (True, 'sampling.n')
+    >>> answer.frame("shares")[["only_a", "only_b"]].iloc[0].tolist()
+    [0, 0]
+    """
+    for view in (a, b):
+        if view.method not in DRAWN:
+            remedy = 'compare files of studies with sampling.method "random", "sobol" or "lhs"'
+            raise NotApplicable(str(Fault(str(view.path), "holds joints that are not drawn from tolerances", remedy)))
+    limits = [*a.limits.items(), *(limit for limit in b.limits.items() if limit not in a.limits.items())]
+    names = _names(a, b, by or (), [name for name, _ in limits])
+    both = sides(a, b)
+    try:
+        shares = [_share(both, name, level) for name, level in limits]
+        shares += [_share(both, ANY_LIMIT, 1.0)] if a.limits and b.limits else []
+        loads = [row for name in names for row in _statistics(both, name)]
+    except ValueError as error:
+        raise StoreError(str(Fault(f"{a.path}, {b.path}", str(error), "resume both campaigns"))) from error
+    switched = [row for name, level in limits for row in _switched(both, name, level)] if both.paired else []
+    differing = changes(a, b)
+    every = [{"key": key, "a": one, "b": other} for keys, one, other in differing for key in keys]
+    return Answer(
+        "compare",
+        "Two campaigns side by side",
+        [
+            Panels([panel for name in names[:MAX_LOADS] for panel in _panels(both, name, shares, loads)]),
+            Table("shares", "Shares above the limits", _share_columns(both.paired) if shares else (), shares),
+            Table("loads", "Quantiles and means", LOADS if by or not shares else (), loads),
+            Table("switched", "Pairs with one joint above a limit", (), switched),
+            Table("changes", "Differences between the studies", (), every),
+            *map(Sentence, _notes(both, differing, len(switched))),
+        ],
+        {"paired": both.paired},
+    )
+
+
+def changes(a: View, b: View) -> list[tuple[list[str], Any, Any]]:
+    """Keys that differ between the studies of two files, limits and code included, with their values in A and in B.
+
+    Keys with equal values are together; a value is None where a study has no such key.
+    """
+    one, other = (_identity(view) for view in (a, b))
+    found: dict[str, tuple[list[str], Any, Any]] = {}
+    for key in sorted(one.keys() | other.keys()):
+        pair = (one.get(key), other.get(key))
+        if pair[0] != pair[1]:
+            found.setdefault(json.dumps(pair), ([], *pair))[0].append(key)
+    return list(found.values())
+
+
+def _identity(view: View) -> dict[str, Any]:
+    limits = {f"limits.{name}": level for name, level in view.limits.items()}
+    return view.store.identity | limits | {key: view.store.versions.get(key) for key in ("tolstat", "sources")}
+
+
+def sides(a: View, b: View) -> Sides:
+    """Simulated joints of both campaigns; those with the same random numbers if there are any."""
+    done_a, done_b = (view.status != Status.PENDING for view in (a, b))
+    first = max(a.campaign_samples.start, b.campaign_samples.start)
+    common = range(first, min(a.campaign_samples.stop, b.campaign_samples.stop))
+    keys = ("method", "seed", *{"sobol": ("dimensions",), "lhs": ("n",)}.get(a.method, ()))
+    same_random_numbers = all(a.store.sampling[key] == b.store.sampling[key] for key in keys)
+    if not (common and same_random_numbers):
+        return Sides((a, b), (np.flatnonzero(done_a), np.flatnonzero(done_b)), paired=False)
+    samples_a, samples_b = (np.arange(len(common)) + view.campaign_samples.index(first) for view in (a, b))
+    done = done_a[samples_a] & done_b[samples_b]
+    return Sides((a, b), (samples_a[done], samples_b[done]), paired=True)
+
+
+def _names(a: View, b: View, by: Sequence[str], limited: Sequence[str]) -> list[str]:
+    """Loads whose quantiles and means are compared; checks that both files keep them and the loads with limits."""
+    kept = [name for name in a.kept_loads if name in b.kept_loads]
+    places = {**dict.fromkeys(by, "--by"), **{name: f"limits.{name}" for name in limited}}
+    faults = [
+        Fault(place, f"{name!r} is not a load that both files keep", did_you_mean(name, kept))
+        for name, place in places.items()
+        if name not in kept
+    ]
+    if faults:
+        raise InputError(faults)
+    return list(by) or list(dict.fromkeys(limited)) or [name for name in a.shown_loads if name in kept]
+
+
+def _share(both: Sides, name: str, level: float) -> Row:
+    a, b = both.load(name)
+    found = difference.shares(a, b, [level], both.paired)._asdict()
+    values = {key: value if key == "n" else value[0].item() for key, value in found.items()}
+    return {"load": name, "unit": a.unit, "level": level, **values}
+
+
+def _statistics(both: Sides, name: str) -> Rows:
+    a, b = both.load(name)
+    found = {"mean": difference.means(a, b, both.paired)}
+    found |= {f"{100 * share:g} %": difference.quantiles(a, b, share, both.paired) for share in SHARES}
+    return [{"load": name, "unit": a.unit, "statistic": key, **value._asdict()} for key, value in found.items()]
+
+
+def _switched(both: Sides, name: str, level: float) -> Iterator[Row]:
+    of_a, of_b = both.load(name)
+    a, b = of_a.values, of_b.values
+    here = np.isfinite(a) & np.isfinite(b) & ((a > level) != (b > level))
+    for row, one, other in zip(both.rows[here].tolist(), a[here].tolist(), b[here].tolist(), strict=True):
+        yield {"row": row, "load": name, "unit": of_a.unit, "level": level, "a": one, "b": other}
+
+
+def _notes(both: Sides, differing: Sequence[tuple[list[str], Any, Any]], switched: int) -> Iterator[str]:
+    """Differences between the studies, numbers of joints, and what the intervals leave out."""
+    for side, view in zip("AB", both.views, strict=True):
+        yield f"{side}: {view.path}"
+    for keys, one, other in differing:
+        more = f" and {len(keys) - 1} more" if len(keys) > 1 else ""
+        yield f"  {keys[0]}{more}: {_in_words(one)} -> {_in_words(other)}"
+    if not differing:
+        yield "  the studies are the same"
+    a, b = map(len, both.samples)
+    if both.paired:
+        yield f"{a} pairs of joints with the same random numbers"
+        yield f"{switched} times only one joint of a pair is above a limit"
+    else:
+        yield f"{a} and {b} joints with different random numbers"
+    if unresolved := both.unresolved:
+        bounds = "the bounds in JSON and CSV count them below, then above"
+        yield f"{unresolved} joints without a valid load: left out; {bounds}"
+    if not both.has_intervals:
+        yield "no intervals: they hold for independent samples only"
+
+
+def _in_words(value: object) -> str:
+    """Value of a key of a study for people: products of units without a sign, ``N m/rad``."""
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    return "nothing" if value is None else re.sub(r"(?<=[A-Za-z])\*(?=[A-Za-z])", " ", str(value))
+
+
+def _panels(both: Sides, name: str, shares: Rows, loads: Rows) -> Iterator[Panel]:
+    """Pictures of a load: exceedance of both campaigns, and their difference, with pointwise 95 % intervals."""
+    a, b = both.load(name)
+    limits = [row["level"] for row in shares if row["load"] == name]
+    labels = [f"{side}: {view.path.stem}" for side, view in zip("AB", both.views, strict=True)]
+    band = ["95 % band"] if both.has_intervals else []
+    curves = partial(_draw_curves, a=a, b=b, labels=[*labels, *band], limits=limits)
+    top = drawing.legend_room([*labels, *band])
+    median = next(row for row in loads if row["load"] == name and row["statistic"] == "50 %")
+    medians = " and ".join(text.value(median[side], a.unit) for side in "ab")
+    yield Panel(name, f"{name}: joints above a load", f"Medians of A and B: {medians}", curves, SIZE, top=top)
+    title, key = f"{name}: B less A{', pairs' if both.paired else ''}", f"{name}-difference"
+    change = partial(_draw_difference, a=a, b=b, paired=both.paired, labels=band, limits=limits)
+    description = "Difference of the shares of the joints above a load"
+    yield Panel(key, title, description, change, SIZE, top=drawing.legend_room(band) if band else Panel.top)
+
+
+def _draw_curves(ax: Axes, a: Sample, b: Sample, labels: Sequence[str], limits: Sequence[float]) -> None:
+    """Draw the exceedance of both campaigns; of `labels` the third is that of the bands, if they have any."""
+    levels, floor = _levels(a.values, b.values), 0.5 / max(a.values.size, b.values.size)
+    handles: list[Any] = []
+    for load, colour, dash in zip((a, b), style.COLOURS, style.DASHES, strict=False):
+        table = load.curve(levels)
+        handles += ax.step(levels, table["estimate"].clip(0.1 * floor), where="post", color=colour, ls=dash)
+        if len(labels) > 2:
+            ends = table["lower"].clip(0.1 * floor), table["upper"]
+            ax.fill_between(levels, *ends, step="post", color=colour, alpha=0.2, lw=0)
+    _frame(ax, a, labels, handles, limits)
+    style.share_axis(ax, floor)
+    ax.set_ylabel("share of the joints above x")
+
+
+def _draw_difference(
+    ax: Axes, a: Sample, b: Sample, paired: bool, labels: Sequence[str], limits: Sequence[float]
+) -> None:
+    """Draw the share of B less that of A; `labels` has that of the band, if there is one."""
+    levels = _levels(a.values, b.values)
+    found = difference.shares(a, b, levels, paired)
+    ax.axhline(0.0, color=style.FAINT, lw=1.0)
+    ax.step(levels, 100.0 * found.estimate, where="post", color=style.INK)
+    if labels:
+        ax.fill_between(levels, 100.0 * found.lower, 100.0 * found.upper, step="post", color=style.INK, alpha=0.2, lw=0)
+    _frame(ax, a, labels, [], limits)
+    ax.set_ylabel("B less A, % of the joints")
+
+
+def _frame(ax: Axes, load: Sample, labels: Sequence[str], handles: Sequence[Any], limits: Sequence[float]) -> None:
+    """Draw limits, legend, and label of the x axis."""
+    for level in limits:
+        ax.axvline(level, color=style.FAINT, lw=1.0, ls=style.DASHES[2])
+    if labels:
+        band = [patches.Patch(color=style.FAINT, alpha=0.3, lw=0)] * (len(labels) - len(handles))
+        drawing.legend_above(ax, [*handles, *band], labels)
+    ax.set_xlabel(f"x [{unit_text(load.unit)}]" if load.unit != "1" else "x")
+
+
+def _levels(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Levels of the curves: quantiles of both campaigns pooled, denser in the tail."""
+    both = np.concatenate([a[np.isfinite(a)], b[np.isfinite(b)]])
+    tail = np.geomspace(1.0, 1.0 / both.size, LEVELS // 2)
+    shares = np.union1d(np.linspace(0.0, 1.0, LEVELS // 2), 1.0 - tail)
+    return np.unique(np.quantile(both, shares, method="inverted_cdf"))

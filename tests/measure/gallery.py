@@ -20,9 +20,9 @@ from tolstat.analysis.binomial import clopper_pearson
 from tolstat.common.loads import split
 from tolstat.common.tables import Status
 from tolstat.display import style
-from tolstat.display.blocks import Panels
+from tolstat.display.answer import Answer
+from tolstat.display.blocks import Panel, Panels
 from tolstat.joint import operating
-from tolstat.questions.fatigue import parts_rendering
 from tolstat.questions.known_parts import rendering as known_rendering
 from tolstat.questions.known_parts.query import intervals
 from tolstat.questions.lots import rendering as lots_rendering
@@ -40,6 +40,11 @@ def save(figure: plt.Figure, target: Path) -> None:
     figure.savefig(target, dpi=130)
     plt.close(figure)
     print(target)
+
+
+def panel_of(answer: Answer) -> Panel:
+    """First picture of an answer."""
+    return next(panel for part in answer.parts if isinstance(part, Panels) for panel in part.panels)
 
 
 def tilted_pin(folder: Path) -> None:
@@ -62,10 +67,10 @@ def tilted_pin(folder: Path) -> None:
 def welded_fork(folder: Path) -> None:
     """Draw the share of the joints with a failed part against revolutions, as the page does."""
     with tolstat.open(folder / "welded_fork.h5") as store:
-        stressed = tolstat.load_stresses([store.view()])
+        panel = panel_of(tolstat.fatigue(store.view()))
     with style.settings():
         figure, ax = plt.subplots(figsize=(6.5, 3.6), layout="constrained")
-        parts_rendering.panel(ax, stressed, tolstat.part_failures(stressed))
+        panel.draw(ax)
         save(figure, folder / "welded_fork.png")
 
 
@@ -124,8 +129,7 @@ def overnight(folder: Path) -> None:
 def needle_bearings(folder: Path) -> None:
     """Draw the share of joints whose bearings have a shorter life."""
     with tolstat.open(folder / "needle_bearings.h5") as store:
-        answer = tolstat.bearing_life(store.view())
-    (panel,) = (panel for part in answer.parts if isinstance(part, Panels) for panel in part.panels)
+        panel = panel_of(tolstat.bearing_life(store.view()))
     figure, ax = plt.subplots(figsize=(7, 3.6), layout="constrained")
     panel.draw(ax)
     ax.grid(alpha=0.3)

@@ -22,9 +22,8 @@ from tolstat.common.loads import split
 from tolstat.common.tables import Status
 from tolstat.display import style
 from tolstat.display.answer import Answer
-from tolstat.display.blocks import Panels
+from tolstat.display.blocks import Panel, Panels
 from tolstat.joint import operating
-from tolstat.questions.fatigue import parts_rendering
 
 mpl.use("Agg")
 from matplotlib import pyplot as plt
@@ -40,12 +39,16 @@ def save(figure: plt.Figure, target: Path) -> None:
     print(target)
 
 
+def panel_of(answer: Answer) -> Panel:
+    """First picture of an answer."""
+    return next(panel for part in answer.parts if isinstance(part, Panels) for panel in part.panels)
+
+
 def as_on_page(answer: Answer, size: tuple[float, float], target: Path) -> None:
     """Write the first picture of an answer in another size, without its title."""
-    pictures = next(part for part in answer.parts if isinstance(part, Panels))
     with style.settings():
         figure, ax = plt.subplots(figsize=size, layout="constrained")
-        pictures.panels[0].draw(ax)
+        panel_of(answer).draw(ax)
         save(figure, target)
 
 
@@ -69,10 +72,10 @@ def tilted_pin(folder: Path) -> None:
 def welded_fork(folder: Path) -> None:
     """Draw the share of the joints with a failed part against revolutions, as the page does."""
     with tolstat.open(folder / "welded_fork.h5") as store:
-        stressed = tolstat.load_stresses([store.view()])
+        panel = panel_of(tolstat.fatigue(store.view()))
     with style.settings():
         figure, ax = plt.subplots(figsize=(6.5, 3.6), layout="constrained")
-        parts_rendering.panel(ax, stressed, tolstat.part_failures(stressed))
+        panel.draw(ax)
         save(figure, folder / "welded_fork.png")
 
 
@@ -125,8 +128,7 @@ def overnight(folder: Path) -> None:
 def needle_bearings(folder: Path) -> None:
     """Draw the share of joints whose bearings have a shorter life."""
     with tolstat.open(folder / "needle_bearings.h5") as store:
-        answer = tolstat.bearing_life(store.view())
-    (panel,) = (panel for part in answer.parts if isinstance(part, Panels) for panel in part.panels)
+        panel = panel_of(tolstat.bearing_life(store.view()))
     figure, ax = plt.subplots(figsize=(7, 3.6), layout="constrained")
     panel.draw(ax)
     ax.grid(alpha=0.3)

@@ -273,7 +273,7 @@ def test_the_command_writes_all_tables_and_the_picture(tmp_path):
     assert "do not reach the required 20000 h." in " ".join(done.stdout.split())
     stem = f"{path.stem}_bearing_life"
     names = [f"{stem}_{table}.csv" for table in ("lives", "below_required", "loads", "contacts")]
-    names += [f"{stem}_bearing-life.{ending}" for ending in ("png", "svg")]
+    names += [f"{stem}_lives.{ending}" for ending in ("png", "svg")]
     assert {file.name for file in (tmp_path / "out").iterdir()} == set(names)
     assert len(pd.read_csv(tmp_path / "out" / names[0])) == 15
 

@@ -23,7 +23,8 @@ from tolstat.display.asked import Asked
 from tolstat.display.blocks import Panels, Table
 from tolstat.questions.fatigue import parts
 from tolstat.questions.fatigue.answer import _notes_on_parts, fatigue_on_page
-from tolstat.questions.fatigue.stress import Stresses, load_stresses
+from tolstat.questions.fatigue.duty import Joints
+from tolstat.questions.fatigue.stress import Stressed, Stresses, load_stresses
 from tolstat.solver import rainflow
 from tolstat.store import ResultFile
 from tolstat.study.fatigue import Fatigue, of_text
@@ -174,8 +175,6 @@ def test_starts_are_the_cycles_of_the_whole_course(offset):
 
 def synthetic(n=400, seed=3, scatter=1.3, status=None):
     """Joints whose stress is one cycle of lognormal range at two points."""
-    from tolstat.questions.fatigue.stress import Stressed
-
     rng = np.random.default_rng(seed)
     line = strength.Line(k=5.0, k_2=9.0, N_D=1e6, S_D=200.0, T_S=scatter)
     size = 120.0 * np.exp(rng.normal(0.0, 0.3, (n, 2)))
@@ -186,7 +185,8 @@ def synthetic(n=400, seed=3, scatter=1.3, status=None):
     )
     own = Stresses(cycles, -0.5 * size, 0.5 * size)
     settings = Fatigue(revolutions=1e6, points=(point(line), point(line, "b")))
-    return Stressed(own, state, own.rows(slice(0)), Independent(), settings, n, 0.0, (("", 1.0),)), size, line
+    joints = Joints(state, Independent(), settings, n, (("", 1.0),))
+    return Stressed(**vars(joints), own=own, nominal=own.rows(slice(0)), apart=0.0), size, line
 
 
 def test_failures_and_lives_of_one_cycle_in_closed_form():

@@ -149,7 +149,7 @@ def _write(out: str, write: Callable[[TextIO], object], what: str) -> None:
 def _collectives(view: View, nominal: bool) -> tuple[Callable[[TextIO], None], str]:
     from tolstat.questions.fatigue import pylife
 
-    table = pylife.table(pylife.pylife_series(view, nominal=nominal))
+    table = pylife.table(view, nominal=nominal)
     what = f"cycles of {table['joint'].nunique()} joints"
     return lambda stream: table.to_csv(stream, index=False, lineterminator="\n"), what
 

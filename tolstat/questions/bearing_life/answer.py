@@ -147,9 +147,7 @@ def bearing_life(view: View) -> Answer:
     rate = lives.rate(JOINT)
     if rate.valid.size and rate.valid[0] > 0.0:
         said = f"Share of the joints whose bearings fail before a time, against that time. {text.sentence(first)}"
-        parts.append(
-            Panels([Panel("bearing-life", "Life of the joints", said, partial(_draw, lives=lives), (6.4, 3.5))])
-        )
+        parts.append(Panels([Panel("lives", "Life of the joints", said, partial(_draw, lives=lives), (6.4, 3.5))]))
     if lives.unrated < lives.valid:
         title = f"Life {lives.bearing.symbol} that a share of the joints reaches"
         parts.append(Table("lives", title, LIVES, found, LIFE_UNITS, _by_place(found)))

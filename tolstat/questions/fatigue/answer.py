@@ -232,8 +232,7 @@ def _notes_on_parts(stressed: Stressed, rows: Rows) -> Iterator[str]:
     settings, n = stressed.settings, stressed.status.size
     starts = f" with {settings.starts:g} starts" if settings.starts else ""
     first = f" (the first {n} of {stressed.total})" if stressed.total > n else ""
-    settled = f"{int(stressed.valid.sum())} of {n} joints settled{first}"
-    yield f"{settled}; service life {settings.revolutions:g} revolutions{starts}"
+    yield f"{stressed.settled}{first}; service life {settings.revolutions:g} revolutions{starts}"
     yield from _duty(stressed.duty)
     life = "B10 life: revolutions after which 10 % have failed; damage: at the median strength"
     yield f"{life}; intervals count joints without a valid load as failing and as surviving"
@@ -250,8 +249,7 @@ def _notes_on_loads(loading: Loading, rows: Rows) -> Iterator[str]:
     """Number of joints, definition of the loads, restrictions."""
     settings = loading.settings
     cycles = f"loads are ranges: {settings.reference_cycles:g} cycles of them do the damage of "
-    settled = f"{loading.settled} of {loading.status.size} joints settled"
-    yield f"{settled}; {cycles}{settings.revolutions:g} revolutions"
+    yield f"{loading.settled}; {cycles}{settings.revolutions:g} revolutions"
     yield from _duty(loading.duty)
     if not loading.design.has_interval("quantile"):
         yield "no intervals: order statistics hold for independent samples only"

@@ -3,15 +3,53 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.analysis.design import Design
 from tolstat.common.errors import Fault, InputError
-from tolstat.common.tables import ERROR_FIELDS, worst_status
+from tolstat.common.tables import ERROR_FIELDS, Status, worst_status
 from tolstat.store import points
 from tolstat.store.view import View
+from tolstat.study.fatigue import Fatigue, of_text
+
+
+@dataclass(frozen=True)
+class Joints:
+    """Joints of one campaign or of a duty cycle, and the settings of their evaluation.
+
+    Attributes
+    ----------
+    status : ndarray, shape (n,)
+        `tables.Status`; with several operating points the worst, see `tables.worst_status`.
+    design : Design
+        How the joints were drawn.
+    settings : Fatigue
+        Section ``[fatigue]`` of the study; of the first study if there are several.
+    total : int
+        Number of samples of the campaign, those not evaluated included.
+    duty : tuple of (str, float)
+        Operating points, or files of one point without a name, and their shares of the revolutions; one entry with
+        share 1 for a single point.
+    """
+
+    status: NDArray[np.uint8]
+    design: Design
+    settings: Fatigue
+    total: int
+    duty: tuple[tuple[str, float], ...]
+
+    @property
+    def valid(self) -> NDArray[np.bool_]:
+        """Which joints settled to a motion that repeats at all operating points, (n,)."""
+        return np.asarray(self.status == Status.OK)
+
+    @property
+    def settled(self) -> str:
+        """Words on the number of these joints."""
+        return f"{int(self.valid.sum())} of {self.status.size} joints settled"
 
 
 def members(views: Sequence[View], shares: Sequence[float] | None) -> tuple[Sequence[View], list[float]]:
@@ -46,20 +84,17 @@ def members(views: Sequence[View], shares: Sequence[float] | None) -> tuple[Sequ
     return views, [share / total for share in shares]
 
 
-def described(views: Sequence[View], shares: Sequence[float]) -> tuple[tuple[str, float], ...]:
-    """Name and share of the revolutions of each of the `members`: its operating point or, without a name, its file."""
-    return tuple((view.points[0] or view.path.name, share) for view, share in zip(views, shares, strict=True))
-
-
-def status(views: Sequence[View], samples: int | None) -> NDArray[np.uint8]:
-    """Status of the first samples, of several operating points that of the point that decides, (n,)."""
-    own = [view.status[:samples] for view in views]
-    return worst_status(own)
-
-
-def design(view: View, samples: int | None) -> Design:
-    """Design of the first samples."""
-    return view.design if samples is None else view.design.only(np.arange(min(samples, view.n)))
+def joints_of(views: Sequence[View], shares: Sequence[float], samples: int | None) -> Joints:
+    """First samples of the `members`; all without a number."""
+    first = views[0]
+    return Joints(
+        status=worst_status([view.status[:samples] for view in views]),
+        design=first.design if samples is None else first.design.only(np.arange(min(samples, first.n))),
+        # the section alone, like limits: it is at hand even where the study refers to files that are not
+        settings=of_text(first.store.study_text, str(first.path)),
+        total=first.n,
+        duty=tuple((view.points[0] or view.path.name, share) for view, share in zip(views, shares, strict=True)),
+    )
 
 
 def _of_points(views: Sequence[View], shares: Sequence[float] | None) -> tuple[list[View], list[float]]:

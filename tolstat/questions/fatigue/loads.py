@@ -7,11 +7,9 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tolstat.analysis import cycles, prediction
 from tolstat.analysis.cycles import Cycles, FloatArray
-from tolstat.analysis.design import Design
 from tolstat.analysis.prediction import DELIVERY
 from tolstat.analysis.sample import Sample
 from tolstat.common.channels import CHANNELS
@@ -21,8 +19,8 @@ from tolstat.common.tables import Status
 from tolstat.display.table import Row, Rows
 from tolstat.questions.fatigue import duty
 from tolstat.questions.fatigue.counting import SHOWN, cycles_of
+from tolstat.questions.fatigue.duty import Joints
 from tolstat.store.view import View
-from tolstat.study.fatigue import Fatigue, of_text
 
 ANY = "any of them"
 """Name of the row for all channels together."""
@@ -34,36 +32,19 @@ MAX_NUMBERS = 40
 
 
 @dataclass(frozen=True)
-class Loading:
-    """Load cycles of the joints of one campaign or of a duty cycle, and the settings of their evaluation.
+class Loading(Joints):
+    """Load cycles of joints.
 
     Attributes
     ----------
     cycles : Cycles
         Cycles of the n samples.
-    status : ndarray, shape (n,)
-        `tables.Status`; with several operating points the worst, see `tables.worst_status`.
     nominal : Cycles
         Cycles of the nominal joint; no rows if there is none that settled.
-    design : Design
-        How the joints were drawn.
-    settings : Fatigue
-        Section ``[fatigue]`` of the study; of the first study if there are several.
-    duty : tuple of (str, float)
-        Operating points, or files, and their shares of the revolutions; one entry with share 1 for a single point.
     """
 
     cycles: Cycles
-    status: NDArray[np.uint8]
     nominal: Cycles
-    design: Design
-    settings: Fatigue
-    duty: tuple[tuple[str, float], ...]
-
-    @property
-    def settled(self) -> int:
-        """Number of joints that settled at all operating points."""
-        return int((self.status == Status.OK).sum())
 
 
 def load_cycles(
@@ -96,27 +77,20 @@ def load_cycles(
         When a file holds no histories, or joints that are no sample of a production.
     """
     views, shares = duty.members(views, shares)
-    first = views[0]
-    # the section alone, like limits: it is at hand even where the study refers to files that are not
-    settings = of_text(first.store.study_text, str(first.path))
+    joints = duty.joints_of(views, shares, samples)
     if names is None:
-        names = tuple(name for name in CHANNELS if name in SHOWN or name in settings.lines)
-    parts = [_cycles_of(view, names, samples) for view in views]
+        names = tuple(name for name in CHANNELS if name in SHOWN or name in joints.settings.lines)
+    parts = [_cycles_of(view, names, joints.status.size) for view in views]
     # the nominal joint of a duty cycle has settled at all operating points, or it has no row
     rows = slice(min(len(nominal.number) for _, nominal in parts))
+    own = cycles.duty_cycle([own for own, _ in parts], shares)
     return Loading(
-        cycles=cycles.duty_cycle([own for own, _ in parts], shares),
-        status=duty.status(views, samples),
-        nominal=cycles.duty_cycle([nominal.rows(rows) for _, nominal in parts], shares),
-        design=duty.design(first, samples),
-        settings=settings,
-        duty=duty.described(views, shares),
+        **vars(joints), cycles=own, nominal=cycles.duty_cycle([nominal.rows(rows) for _, nominal in parts], shares)
     )
 
 
-def _cycles_of(view: View, names: Sequence[str], samples: int | None) -> tuple[Cycles, Cycles]:
-    """Cycles of the first samples, and of the nominal joint (no rows if there is none that settled)."""
-    n = view.n if samples is None else min(samples, view.n)
+def _cycles_of(view: View, names: Sequence[str], n: int) -> tuple[Cycles, Cycles]:
+    """Cycles of the first n samples, and of the nominal joint (no rows if there is none that settled)."""
     first, end = map(int, view.slots([0, n]))
     whole = cycles_of(view.store, np.arange(end), names)  # the nominal joint, if the file has it, is before the samples
     settled = int((view.nominal["status"] == Status.OK).sum())

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -55,6 +55,17 @@ def pylife_series(
     ValueError
         When `bins` is less than 1.
     """
+    return from_table(table(view, channels, bins, revolutions, nominal))
+
+
+def table(
+    view: View,
+    channels: Sequence[str] | None = None,
+    bins: int = 100,
+    revolutions: float = 1.0,
+    nominal: bool = False,
+) -> pd.DataFrame:
+    """Flat table of `pylife_series`: ``joint``, ``channel``, ``unit``, ends of range and mean, ``cycles``."""
     import pandas as pd
 
     if bins < 1:
@@ -62,34 +73,21 @@ def pylife_series(
     first = 0 if nominal else view.store.first_sample
     cycles = cycles_of(view.store, np.arange(first, view.store.n), channels)
     joint, channel, place = np.nonzero(cycles.ranges > 0)  # leaves out NaN
-    values = {"range": cycles.ranges[joint, channel, place], "mean": cycles.means[joint, channel, place]}
-    torque = np.array([CHANNELS[name].unit != "N" for name in cycles.channels], bool)[channel]
-    rows = np.array(view.store.rows[first:])[joint]
-    frame = pd.DataFrame({"joint": rows, "channel": channel, "cycles": cycles.repeats[place] * revolutions})
-    for name in INTERVALS:
-        frame[f"{name}_left"], frame[f"{name}_right"] = np.zeros((2, len(frame)))
-        for kind in (torque, ~torque):
-            edges = _edges(values[name][kind].astype(float), bins, from_zero=name == "range")
-            here = np.searchsorted(edges, values[name][kind], side="right") - 1
-            frame.loc[kind, f"{name}_left"], frame.loc[kind, f"{name}_right"] = edges[here], edges[here + 1]
+    units = np.array([CHANNELS[name].unit for name in cycles.channels], dtype=object)[channel]
+    columns: dict[str, Any] = {"joint": np.array(view.store.rows[first:])[joint], "channel": channel, "unit": units}
+    for name, values in (("range", cycles.ranges), ("mean", cycles.means)):
+        ends = np.zeros((2, len(joint)))
+        for kind in (units != "N", units == "N"):
+            own = values[joint, channel, place][kind].astype(float)
+            edges = _edges(own, bins, from_zero=name == "range")
+            here = np.searchsorted(edges, own, side="right") - 1
+            ends[:, kind] = edges[here], edges[here + 1]
+        columns |= dict(zip((f"{name}_left", f"{name}_right"), ends, strict=True))
     keys = ["joint", "channel", *(f"{name}_{side}" for name in INTERVALS for side in ("left", "right"))]
-    classes = frame.groupby(keys)[["cycles"]].sum().reset_index()
+    frame = pd.DataFrame(columns | {"cycles": cycles.repeats[place] * revolutions})
+    classes = frame.groupby([*keys[:2], "unit", *keys[2:]])[["cycles"]].sum().reset_index()
     classes["channel"] = np.array(cycles.channels, dtype=object)[classes["channel"]]
-    return from_table(classes)
-
-
-def table(collectives: pd.Series[float]) -> pd.DataFrame:
-    """Flat table of `pylife_series`: ``joint``, ``channel``, ``unit``, ends of range and mean, ``cycles``."""
-    import pandas as pd
-
-    index = collectives.index
-    flat = {name: index.get_level_values(name) for name in ("joint", "channel")}
-    frame = pd.DataFrame(flat | {"unit": [CHANNELS[name].unit for name in flat["channel"]]})
-    for name in INTERVALS:
-        level = index.get_level_values(name).array
-        frame[f"{name}_left"], frame[f"{name}_right"] = level.left, level.right
-    frame["cycles"] = collectives.to_numpy()
-    return frame
+    return classes
 
 
 def from_table(table: pd.DataFrame) -> pd.Series[float]:

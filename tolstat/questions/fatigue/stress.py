@@ -10,15 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.analysis.cycles import Cycles, FloatArray, duty_cycle
-from tolstat.analysis.design import Design
 from tolstat.common.channels import BUSHING_LOADS
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.tables import Status
 from tolstat.questions.fatigue import duty
+from tolstat.questions.fatigue.duty import Joints
 from tolstat.solver import rainflow
 from tolstat.store import revolutions
 from tolstat.store.view import View
-from tolstat.study.fatigue import Fatigue, of_text
 from tolstat.study.stress_point import StressPoint
 
 if TYPE_CHECKING:
@@ -46,42 +45,22 @@ class Stresses(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Stressed:
-    """Stresses of the joints of one campaign or of a duty cycle, and the settings of their evaluation.
+class Stressed(Joints):
+    """Stresses of joints.
 
     Attributes
     ----------
     own : Stresses
         Stresses of the n samples.
-    status : ndarray, shape (n,)
-        `tables.Status`; with several operating points the first that is not ``OK``.
     nominal : Stresses
         Stresses of the nominal joint; no rows if there is none that settled.
-    design : Design
-        How the joints were drawn.
-    settings : Fatigue
-        Section ``[fatigue]`` of the study; of the first study if there are several.
-    total : int
-        Number of samples of the campaign, those not evaluated included.
     apart : float
         As in `revolutions.Revolutions`.
-    duty : tuple of (str, float)
-        Operating points, or files, and their shares of the revolutions; one entry with share 1 for a single point.
     """
 
     own: Stresses
-    status: NDArray[np.uint8]
     nominal: Stresses
-    design: Design
-    settings: Fatigue
-    total: int
     apart: float
-    duty: tuple[tuple[str, float], ...]
-
-    @property
-    def valid(self) -> NDArray[np.bool_]:
-        """Which joints settled to a motion that repeats at all operating points, (n,)."""
-        return np.asarray(self.status == Status.OK)
 
 
 def load_stresses(views: Sequence[View], shares: Sequence[float] | None = None, samples: int | None = None) -> Stressed:
@@ -108,25 +87,22 @@ def load_stresses(views: Sequence[View], shares: Sequence[float] | None = None, 
         When a file holds joints that are no sample of a production.
     """
     views, shares = duty.members(views, shares)
-    first = views[0]
-    settings = of_text(first.store.study_text, str(first.path))
-    if not settings.points:
+    joints = duty.joints_of(views, shares, samples)
+    points = joints.settings.points
+    if not points:
         remedy = 'add [fatigue.point."NAME"] to the study, and run it again; no joint is simulated anew'
-        raise InputError([Fault(str(first.path), "its study names no point of a part", remedy)])
-    status = duty.status(views, samples)
-    settled = np.flatnonzero(status == Status.OK)
-    parts, apart = [], 0.0
+        raise InputError([Fault(str(views[0].path), "its study names no point of a part", remedy)])
+    settled = np.flatnonzero(joints.valid)
+    # the nominal joint of a duty cycle has settled at all operating points, or it has no row
+    both = all(_nominal(view).size for view in views)
+    nominal, own, apart = [], [], 0.0
     for view in views:
-        slots = np.concatenate([_nominal(view), view.slots(settled)])
-        found, difference = stresses_of(view.store, slots, settings.points)
-        parts.append(found)
+        first = _nominal(view)
+        found, difference = stresses_of(view.store, np.concatenate([first, view.slots(settled)]), points)
+        nominal.append(found.rows(slice(first.size if both else 0)))
+        own.append(_spread(found.rows(slice(first.size, None)), settled, joints.status.size))
         apart = max(apart, difference)
-    skips = [_nominal(view).size for view in views]
-    nominal = [part.rows(slice(min(skips))) for part in parts]  # settled at all operating points, or no row
-    own = [_spread(part.rows(slice(skip, None)), settled, status.size) for part, skip in zip(parts, skips, strict=True)]
-    cycle = duty.described(views, shares)
-    design = duty.design(first, samples)
-    return Stressed(_mixed(own, shares), status, _mixed(nominal, shares), design, settings, first.n, apart, cycle)
+    return Stressed(**vars(joints), own=_mixed(own, shares), nominal=_mixed(nominal, shares), apart=apart)
 
 
 def stresses_of(store: Reader, slots: NDArray[np.intp], points: Sequence[StressPoint]) -> tuple[Stresses, float]:

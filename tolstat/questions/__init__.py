@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from tolstat.questions.fatigue.query import load_cycles as load_cycles
     from tolstat.questions.fatigue.stress import load_stresses as load_stresses
     from tolstat.questions.lots.query import lots_of as lots_of
-    from tolstat.questions.rare.query import rare_event as rare_event
     from tolstat.questions.selective.query import assembled as assembled
     from tolstat.questions.show.rendering import draw_errors as draw_errors
     from tolstat.questions.show.rendering import draw_joint as draw_joint
@@ -157,7 +156,7 @@ QUESTIONS = (
     Question("reweight", "Decide", "Estimate exceedances for changed tolerances."),
     Question("allocate", "Decide", "Propose the cheapest tolerances that meet the targets.", file="allocate.answer"),
     Folder("compare", ("query.compared",), "Decide", ("compare",)),
-    Folder("rare", ("query.rare_event",), "Decide", ("rare",)),
+    Question("rare", "Decide", "Estimate a rare exceedance by subset simulation.", file="rare.answer"),
     Folder("selective", ("query.assembled",), "Decide", ("selective",), has_section=True),
 )
 

@@ -58,7 +58,7 @@ MAIN = Campaign(
     ["process: run iso2768_f.toml --n 64 --workers 2", "run rigid_shafts.toml --n 64"],
     usual("iso2768_f.h5")
     | {
-        "pictures": ["orders iso2768_f.h5 --out orders", "report iso2768_f.h5 --out report --accept '50 %'"],
+        "pictures": ["orders iso2768_f.h5 --orbits --out orders", "report iso2768_f.h5 --out report --accept '50 %'"],
         "again": ["run iso2768_f.toml --n 64 --out iso2768_f.h5", "process: run iso2768_f.toml --n 64"],
         "capability_rare": forms("capability iso2768_f.h5 --one-in 100 --delivery 50"),
         "compare": [*forms("compare iso2768_f.h5 rigid_shafts.h5"), "compare iso2768_f.h5 rigid_shafts.h5 --by psi"],

@@ -96,14 +96,14 @@ SORTING = Campaign(
             "export sorting.h5 --statistics - --by cross1.T",
         ],
         "reweight": forms("reweight sorting.h5 --set 'pin*.tilt_[tz].cpk=0.6' --set 'hole*.diameter.cpk=1.2'"),
-        "reweight_out": ["reweight sorting.h5 --set 'pin*.tilt_[tz].cpk=0.6' --out changed.toml"],
+        "reweight_out": ["reweight sorting.h5 --set 'pin*.tilt_[tz].cpk=0.6' --out changed"],
         "allocate": [
             *forms("shape: allocate sorting.h5 --target 'P(any limit) < 0.2'"),
-            "shape: allocate sorting.h5 --target 'P(cross*.T > 60 N*m) < 0.05' --keep 'pin*.diameter' --out new.toml",
+            "shape: allocate sorting.h5 --target 'P(cross*.T > 60 N*m) < 0.05' --keep 'pin*.diameter' --out new",
         ],
         "time_above": [
             *forms("time-above sorting.h5"),
-            "time-above sorting.h5 --by cross1.T --level '30 N*m' --out above",
+            "time-above sorting.h5 --by cross1.T --level '30 N*m' --curves --out above",
         ],
         "fatigue": forms("fatigue sorting.h5"),
     },
@@ -122,7 +122,7 @@ RARE = Campaign(
     {
         "rare": forms("rare rigid_shafts.toml --limit 'cross1.F > 4 kN' --n 60 --p0 0.2 --repeats 2"),
         "file": ["rare rigid_shafts_rare.h5", "status rigid_shafts_rare.h5", "report rigid_shafts_rare.h5"],
-        "any": ["rare rigid_shafts.toml --limit 'any limit' --n 40 --p0 0.25 --repeats 1 --out any.h5 --json"],
+        "any": ["rare rigid_shafts.toml --limit 'any limit' --n 40 --p0 0.25 --repeats 1 --out any --json"],
     },
 )
 LISTED = Campaign(

@@ -107,7 +107,7 @@ WELDED = Campaign(
             "fatigue welded_fork.h5 --joints 20 --out equivalent.csv --delivery 50",
             "fatigue welded_fork.h5 welded_fork.h5 --share 0.5 --share 0.5",
         ],
-        "time_above": forms("time-above welded_fork.h5 --by cross1.F --level '1400 N' --out above"),
+        "time_above": forms("time-above welded_fork.h5 --by cross1.F --level '1400 N' --curves --out above"),
         "cycles": ["export welded_fork.h5 --pylife cycles.csv", "export welded_fork.h5 --csv joints.csv"],
     },
 )

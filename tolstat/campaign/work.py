@@ -28,12 +28,15 @@ class Work:
         Shows progress.
     tell : callable
         Receives messages.
+    study_file : Path, optional
+        Study to read instead of the text stored in a result file that is simulated further.
     """
 
     workers: int | None = None
     folder: Path = Path()
     display: Display = field(default_factory=Display)
     tell: Callable[[str], None] = silent
+    study_file: Path | None = None
 
     def run(self, study: Study, name: str) -> Path:
         """Simulate the pending joints of a campaign into the file `name` of the folder; returns its path.

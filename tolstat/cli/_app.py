@@ -57,18 +57,30 @@ LISTED: dict[str, Listed] = {}
 class _Commands(TyperGroup):
     """Commands under their headings; each is imported when it is used."""
 
+    _completes = False
+
     def list_commands(self, ctx: Any) -> list[str]:
         """Names of all commands."""
         return list(LISTED)
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """A command by its name; None if there is none."""
+        if self._completes and cmd_name in LISTED and LISTED[cmd_name].summary:
+            return TyperCommand(cmd_name, help=LISTED[cmd_name].summary)
         if cmd_name in LISTED and cmd_name not in self.commands:
             one = typer.Typer(rich_markup_mode=None, pretty_exceptions_enable=False, add_completion=False)
             function = command(LISTED[cmd_name].make())
             one.command(cmd_name, cls=OneCommand, context_settings=CONTEXT)(function)
             self.commands[cmd_name] = typer.main.get_command(one)
         return self.commands.get(cmd_name)
+
+    def shell_complete(self, ctx: Any, incomplete: str) -> list[Any]:
+        """Names that begin so, with their summaries: none of the commands is imported."""
+        self._completes = True
+        try:
+            return super().shell_complete(ctx, incomplete)
+        finally:
+            self._completes = False
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """Write the commands, one heading after the other."""

@@ -2,7 +2,8 @@
 
 The first parameters of a question say what its command reads: a `View` is FILE, two are A and B, ``*views`` are several
 files. Where the question's file has a function ``simulate(source, work, ...)``, its first parameter says what is
-simulated: a `Study` is STUDY, whose campaigns the answer is about, and a path is FILE, behind ``--run``.
+simulated: a `Study` is STUDY, whose campaigns the answer is about, a path is FILE, behind ``--run``, and either is
+STUDY or a FILE of an earlier run, which is resumed.
 """
 
 from __future__ import annotations
@@ -34,7 +35,6 @@ from tolstat.questions import Question
 
 if TYPE_CHECKING:
     from tolstat.display.answer import Answer
-    from tolstat.store.view import View
 
 OutFolder = Annotated[
     Path | None,
@@ -72,8 +72,8 @@ class _Asked:
         A key of `READS`.
     options, simulated : list of inspect.Parameter
         Options of the question, and of its simulation.
-    into_file : bool
-        Whether it simulates into the result file that it reads.
+    into_file, resumes : bool
+        Whether it simulates into the result file that it reads, and whether it resumes one.
     """
 
     def __init__(self, question: Question) -> None:
@@ -87,12 +87,12 @@ class _Asked:
         several = views[0].kind is inspect.Parameter.VAR_POSITIONAL
         self.options = [p for p in found if p.annotation is not View]
         self.reads = "pair" if len(views) == 2 else "views" if several else "view"
-        self.simulated, self.into_file = [], False
+        self.simulated, self.into_file, self.resumes = [], False, False
         if self.simulate is not None:
             source, _, *self.simulated = inspect.signature(self.simulate, eval_str=True).parameters.values()
-            self.into_file = source.annotation is not Study
-            if source.annotation is not Path:
-                self.reads = "study" if several else "either"
+            self.into_file, self.resumes = source.annotation is Path, source.annotation == Study | Path
+            if not self.into_file:
+                self.reads = "study" if several and not self.resumes else "either"
 
     @property
     def docstring(self) -> str:
@@ -111,13 +111,17 @@ def command_of(question: Question) -> Callable[..., None]:
     arguments, shared = READS[asked.reads], _shared(asked)
 
     def run(**given: Any) -> None:
+        from tolstat.store import ResultFile
+
         options = {p.name: _value(p, given[p.name]) for p in asked.options}
         sources = [path for name, _, _ in arguments for path in _listed(given[name])]
-        stem = "_".join(path.stem for path in sources[:2])
+        stem, point = "_".join(path.stem for path in sources[:2]), given.get("point") or ""
         if asked.simulate is not None:
+            point = "" if sources[0].suffix == ".toml" else point  # the study is simulated at the point
             sources = _simulated(asked, sources[0], given)
         with ExitStack() as stack:
-            views = [_view(stack, path, given) for path in sources]
+            opened = [stack.enter_context(ResultFile.open(path)) for path in sources]
+            views = [store.view(given.get("study_file")).at(point) for store in opened]
             with progress(question.name):
                 answer = asked.answer(*views, **options)
             _deliver(answer, f"{stem}_{question.name}", given)
@@ -181,19 +185,13 @@ def _deliver(answer: Answer, stem: str, given: dict[str, Any]) -> None:
         say(f"wrote {path}")
 
 
-def _view(stack: ExitStack, path: Path, given: dict[str, Any]) -> View:
-    from tolstat.store import ResultFile
-
-    view = stack.enter_context(ResultFile.open(path)).view(given.get("study_file"))
-    return view.at(given.get("point") or "")
-
-
 def _simulated(asked: _Asked, source: Path, given: dict[str, Any]) -> list[Path]:
     """Simulate what a question needs; returns the result files that it is about."""
     is_study = source.suffix == ".toml"
     if not (is_study or given.get("run")):
         _refuse_unused(asked, source, given)
-        return [source]
+        if not asked.resumes:
+            return [source]
     from tolstat import study
     from tolstat.cli._work import work
 
@@ -204,7 +202,7 @@ def _simulated(asked: _Asked, source: Path, given: dict[str, Any]) -> list[Path]
     what: Any = study.load(source) if is_study else source
     if is_study and given.get("point"):
         what = what.at(given["point"])
-    with work(given["workers"], folder) as running:
+    with work(given["workers"], folder, given.get("study_file")) as running:
         return asked.simulate(what, running, **options)  # type: ignore[misc]
 
 

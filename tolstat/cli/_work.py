@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 @contextmanager
-def work(workers: int | None, folder: Path) -> Iterator[Work]:
+def work(workers: int | None, folder: Path, study_file: Path | None = None) -> Iterator[Work]:
     """Work of one command: worker processes, the folder of its result files, progress on standard error."""
     from tolstat.campaign import run as campaign
     from tolstat.campaign.pool import WorkerDied
@@ -26,7 +26,7 @@ def work(workers: int | None, folder: Path) -> Iterator[Work]:
     announce_compilation()
     try:
         with progress() as shown:
-            yield Work(workers, folder, shown, say)
+            yield Work(workers, folder, shown, say, study_file)
     except campaign.Interrupted as stop:
         fail(str(stop))
         raise typer.Exit(stop.exit_code) from stop

@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from tolstat.questions.causes.pairs import pairs_of as pairs_of
     from tolstat.questions.causes.query import causes_of as causes_of
     from tolstat.questions.causes.tail import worst_joints as worst_joints
-    from tolstat.questions.rare.query import rare_event as rare_event
     from tolstat.questions.show.rendering import draw_errors as draw_errors
     from tolstat.questions.show.rendering import draw_joint as draw_joint
     from tolstat.questions.show.rendering import draw_row as draw_row
@@ -151,7 +150,7 @@ QUESTIONS = (
     Question("reweight", "Decide", "Estimate exceedances for changed tolerances."),
     Question("allocate", "Decide", "Propose the cheapest tolerances that meet the targets.", file="allocate.answer"),
     Question("compare", "Decide", "Compare the exceedances and loads of two campaigns."),
-    Folder("rare", ("query.rare_event",), "Decide", ("rare",)),
+    Question("rare", "Decide", "Estimate a rare exceedance by subset simulation.", file="rare.answer"),
     Question("selective", "Decide", "Compute yield and unmatched parts of selective assembly.", "folded"),
 )
 

@@ -100,7 +100,7 @@ def capability(
     InputError
         When N is too small, or the tail has too few joints.
     """
-    if not view.limits or not view.sampled:
+    if not view.limits or view.method in ("sweep", "cases"):
         remedy = 'give the result file of a study with [limits] and sampling.method "random", "sobol" or "lhs"'
         raise NotApplicable(str(Fault(str(view.path), "has no limits, or its joints are no random sample", remedy)))
     view.check("index")

@@ -61,12 +61,14 @@ def examples(tmp_path_factory):
     return {
         **{name: {"path": two} for name in ("questions.allocate.query", "questions.reweight.query", "report.summary")},
         "questions.compare.query": {"path": two, "other": fewer},
-        "questions.causes.query": {"path": known},
+        "questions.causes.errors": {"path": known},
     }
 
 
 @pytest.mark.parametrize(
-    "module", [f"questions.{name}.query" for name in ("allocate", "reweight", "compare", "causes")] + ["report.summary"]
+    "module",
+    [f"questions.{name}" for name in ("allocate.query", "reweight.query", "compare.query", "causes.errors")]
+    + ["report.summary"],
 )
 def test_examples_on_files(module, examples):
     # import_module, as a name of the package may be a function

@@ -5,7 +5,7 @@
     with tolstat.open("iso2768_f.h5") as store:
         force = store.loads["cross1.F"]
         frame = store.to_pandas()
-        found = tolstat.causes_of(store.view(), "cross1.F")
+        found = tolstat.causes(store.view(), "cross1.F")
 
 Functions on arrays (`exceedance`, `quantile`, `capability`) take the loads of joints and their status; those on a view
 of an open result file answer what the command line does. Names are imported when first used, so that the command line

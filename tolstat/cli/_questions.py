@@ -128,6 +128,8 @@ def show(answer: Answer, wide: bool) -> None:
 
     first = True
     for part in answer.parts:
+        if isinstance(part, Table) and not part.columns:
+            continue
         if isinstance(part, Table):
             if not first:
                 typer.echo(f"\n{part.title}")

@@ -16,7 +16,6 @@ from tolstat.cli._app import (
     Workers,
     announce_compilation,
     as_text,
-    output_file,
     print_table,
 )
 from tolstat.cli._talk import progress, say
@@ -70,8 +69,7 @@ def causes(
         typer.Option(
             "--out",
             metavar="OUT",
-            help="With --pick-freeze: result file, default STUDY_causes.h5. With --against-angle: CSV file of the "
-            "indices, and a figure beside it.",
+            help="With --pick-freeze: result file, default STUDY_causes.h5.",
         ),
     ] = None,
     run: Annotated[
@@ -95,12 +93,6 @@ def causes(
         ),
     ] = None,
     workers: Workers = None,
-    against_angle: Annotated[
-        bool, typer.Option("--against-angle", help="Print the indices over the input angle instead.")
-    ] = False,
-    joints: Annotated[
-        int, typer.Option("--joints", metavar="N", min=100, help="With --against-angle: number of joints used.")
-    ] = 1000,
     point: AtPoints = None,
     study_file: StudyOption = None,
     wide: Wide = False,
@@ -121,24 +113,16 @@ def causes(
     one more for each group of errors; it gives total indices with intervals instead of bounds. To resume after an
     interruption, run the same command again. OUT can be given as FILE afterwards.
 
-    With --against-angle, prints the first-order indices of a force or torque over the revolution, and with --out writes
-    them at each input angle. Joints are simulated again if FILE has no load histories.
-
     Example: tolstat causes iso2768_f.h5 --by cross1.F
     """
-    if against_angle:
-        if points is not None:
-            raise InputError([Fault("--against-angle", "cannot be combined with --pick-freeze", "remove one of them")])
-        _against_angle(file, by, top, logarithm, out, joints, point, study_file, wide)
-        return
     if run:
         if points is not None or out is not None:
             raise InputError([Fault("--run", "cannot be combined with --pick-freeze or --out", "remove one of them")])
         _run_lines(file, by, each, group or [], budget, workers)
     elif group or each != Each.ENTRY:
         raise InputError([Fault("--each, --group", "say what --run simulates", "add --run")])
-    from tolstat.questions.causes import rendering
-    from tolstat.questions.causes.query import causes_of
+    from tolstat.cli._questions import show
+    from tolstat.questions.causes import errors
     from tolstat.questions.what_if import rendering as whatifs
     from tolstat.questions.what_if.query import what_if
     from tolstat.store import ResultFile
@@ -146,25 +130,21 @@ def causes(
     if points is not None:
         file = _run_design(file, points, groups, out, workers)
     elif out is not None:
-        remedy = "add --pick-freeze 1024, or --against-angle"
-        raise InputError([Fault("--out", "is used with --pick-freeze or --against-angle only", remedy)])
+        raise InputError([Fault("--out", "is used with --pick-freeze only", "add --pick-freeze 1024")])
     with progress("causes"), ResultFile.open(file) as store:
         view = store.view(study_file).at(point or "")
         load = by or view.decisive
         lines = what_if(view, load) if view.altered else None
-        found = causes_of(view, load, log=logarithm)
+        answer = errors.causes(view, load, top, logarithm)
     if as_json:
-        typer.echo(as_text(rendering.values(found) | ({"what_if": whatifs.values(lines)} if lines else {})))
+        typer.echo(as_text(answer.values() | ({"what_if": whatifs.values(lines)} if lines else {})))
         return
     if lines is not None:
         typer.echo(whatifs.heading(lines))
         print_table(whatifs.columns(lines), whatifs.rows(lines), wide)
         say(whatifs.note(lines))
-        typer.echo(f"\n{rendering.heading(found)}")
-    elif not found.from_design:
-        say(f"which line of the drawing to change: tolstat causes {file} --run")
-    print_table(rendering.columns(found), rendering.largest(found, top), wide)
-    say(rendering.note(found, logarithm, lines is not None))
+        typer.echo(f"\n{answer.tables['errors'].title}")
+    show(answer, wide)
 
 
 def _run_lines(path: Path, by: str | None, each: Each, groups: list[str], budget: str, workers: int | None) -> None:
@@ -194,38 +174,3 @@ def _run_design(path: Path, points: int, groups: Groups, out: Path | None, worke
     target = out if out is not None else Path(f"{path.stem}_causes.h5")
     run.simulate(plan, target, execution=Execution("processes", workers))
     return target
-
-
-def _against_angle(
-    file: Path,
-    by: str | None,
-    top: int,
-    logarithm: bool,
-    out: Path | None,
-    joints: int,
-    point: str | None,
-    study_file: Path | None,
-    wide: bool,
-) -> None:
-    from tolstat.common.files import check_target
-    from tolstat.questions.causes import angles_figure
-    from tolstat.questions.causes.angles import against_angle
-    from tolstat.store import ResultFile, revolutions
-
-    if out is not None:
-        for path in (out, out.with_suffix(".png")):
-            check_target(path, file)
-    with progress("causes over the input angle"), ResultFile.open(file) as store:
-        view = store.view(study_file).at(point or "")
-        view, load = view.narrowed(by or view.most_exceeded)
-        if not revolutions.held(store):
-            announce_compilation()
-        found = against_angle(view, [load], joints, (load,) if logarithm else ())[0]
-    print_table(angles_figure.COLUMNS, angles_figure.rows(found, top), wide)
-    say(angles_figure.note(found, logarithm))
-    if out is None:
-        return
-    with output_file(out) as temporary:
-        found.table().to_csv(temporary, index=False, encoding="utf-8", lineterminator="\n")
-    for path in (out, *angles_figure.save(found, logarithm, out.with_suffix(".png"))):
-        say(f"wrote {path}")

@@ -48,7 +48,7 @@ class Table:
     title : str
         What it shows.
     columns : sequence of Column
-        Columns that people see.
+        Columns that people see; none for a table that only JSON, CSV files and frames have.
     rows : sequence of mapping
         Values by key in SI units, the same keys in each row; a row with values of one unit may have a key ``unit``.
     units : mapping
@@ -185,9 +185,9 @@ def _block(part: Part) -> Block | None:
     if isinstance(part, Sentence):
         lead = part.place == "lead"
         return Text(part.text if lead else text.sentence(part.text), small=not lead)
-    if isinstance(part, Table):
+    if isinstance(part, Table) and part.columns:
         return as_block(part.title, part.columns, part.for_people, part.verdicts)
-    return None if isinstance(part, Document) else part
+    return None if isinstance(part, (Document, Table)) else part
 
 
 def _short(value: Any) -> str:

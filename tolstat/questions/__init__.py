@@ -22,10 +22,6 @@ if TYPE_CHECKING:
     from tolstat.display.asked import Asked
     from tolstat.questions.allocate.query import allocated as allocated
     from tolstat.questions.bearing_life.lives import lives_of as lives_of
-    from tolstat.questions.causes.angles import against_angle as against_angle
-    from tolstat.questions.causes.pairs import pairs_of as pairs_of
-    from tolstat.questions.causes.query import causes_of as causes_of
-    from tolstat.questions.causes.tail import worst_joints as worst_joints
     from tolstat.questions.compare.query import compared as compared
     from tolstat.questions.fatigue.parts import part_failures as part_failures
     from tolstat.questions.fatigue.pylife import pylife_series as pylife_series
@@ -129,13 +125,12 @@ QUESTIONS = (
     Folder("histograms", has_section=True),
     Question("capability", "Read", "Compute yield and Cpk against each limit of the study.", "folded", counted=True),
     Folder("lots", ("query.lots_of",), "Read", ("lots",), has_section=True, has_summary=True),
-    Folder(
-        "causes",
-        ("query.causes_of", "angles.against_angle", "pairs.pairs_of", "tail.worst_joints"),
-        "Read",
-        ("worst", "causes"),
-        has_section=True,
+    Question("pairs", "Read", "Find which errors of pin and hole together cause a load.", "folded", "causes.pairs"),
+    Question("causes", "", "Print which tolerances and errors cause the largest loads.", "folded", "causes.errors"),
+    Question(
+        "angles", "Read", "Compute which errors make a load scatter at each input angle.", "folded", "causes.angles"
     ),
+    Question("worst", "Read", "List the joints with the largest load and their errors.", "folded", "causes.worst"),
     Folder(
         "show",
         ("rendering.draw_joint", "rendering.draw_errors", "rendering.draw_row"),

@@ -25,7 +25,9 @@ PAGES = [
     *sorted(path for path in DOCS.rglob("*.md") if path.parent.name != "api"),
 ]
 NOTEBOOKS = sorted((DOCS / "notebooks").glob("*.ipynb"))
-QUESTIONS = sorted(path.stem for path in (ROOT / "tolstat" / "questions").iterdir() if not path.stem.startswith("__"))
+FOLDERS = [path.stem for path in (ROOT / "tolstat" / "questions").iterdir() if not path.stem.startswith("__")]
+QUESTIONS = sorted([*FOLDERS, "lines"])
+"""Pages of questions; that of the lines of the drawing, which the command ``causes`` answers, is in its folder."""
 PARTS = ["Intervals", "From Python", "On the page", "Limits of validity"]
 """Headings that each page of a question has, after its commands."""
 README = (ROOT / "README.md").read_text(encoding="utf-8")

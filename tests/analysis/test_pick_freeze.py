@@ -160,7 +160,7 @@ def test_a_command_runs_the_design_of_a_study_and_tells_the_indices(tmp_path, mo
     monkeypatch.chdir(tmp_path)
     fakes.replace_functions(monkeypatch, **fakes.SOLVER | {"simulate_rows": simulate})
     load(tmp_path, TEXT.replace('\nmethod = "pick_freeze"', ""))
-    command = ["causes", "design.toml", "--pick-freeze", "150", "--workers", "1"]
+    command = ["causes", "design.toml", "--points", "150", "--workers", "1"]
     done = CliRunner().invoke(cli.app, command)
     assert done.exit_code == 0, done.stderr
     lines = [line.split() for line in done.stdout.splitlines()]
@@ -195,8 +195,9 @@ def test_too_few_points_and_options_that_go_with_a_design_are_refused(tmp_path):
     path = synthetic.store(tmp_path, TEXT.replace("n = 60", "n = 20"), "few")
     for arguments, text in (
         ((path,), "run 50 points or more"),
-        ((path, "--out", "x.h5"), "add --pick-freeze"),
-        ((path, "--pick-freeze", 100), "is not UTF-8"),
+        ((path, "--points", 100), "add --run, or give a study (TOML)"),
+        ((path, "--run", "--points", 100), "are about the design of a study"),
+        ((path.with_suffix(".toml"), "--each", "error"), "say what --run simulates into FILE"),
     ):
         done = CliRunner().invoke(cli.app, ["causes", *map(str, arguments)])
         assert done.exit_code == 2, text

@@ -423,6 +423,7 @@ def test_progress_text_before_the_first_joint() -> None:
     assert text == "100 of 513 joints, 0 failed, 0 not settled"
     assert progress.text(Counts(513, 100, 4, 0, 3), 100, 0.0).endswith(", 0 failed, 1 not settled, 3 not resolved")
     assert "2:00:00 left" in progress.text(Counts(7201, 1, 0, 0), begun=0, seconds=1.0)
+    assert "0:42 left" in progress.text(Counts(7201, 1, 0, 0), begun=0, seconds=1.0, budget=42.0)
 
 
 def test_progress_bar_goes_to_stderr(capfd: pytest.CaptureFixture[str]) -> None:

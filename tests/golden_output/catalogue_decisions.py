@@ -110,7 +110,7 @@ SORTING = Campaign(
 )
 FROZEN = Campaign(
     "pick_freeze",
-    [cheap("iso2768_f"), "causes iso2768_f.toml --pick-freeze 50 --by cross1.F"],
+    [cheap("iso2768_f"), "causes iso2768_f.toml --points 50 --by cross1.F"],
     {
         "causes": forms("causes iso2768_f_causes.h5 --by cross1.F"),
         "status": ["status iso2768_f_causes.h5", "report iso2768_f_causes.h5", "capability iso2768_f_causes.h5"],

@@ -27,7 +27,7 @@ from tolstat.campaign import what_if as sets
 from tolstat.common.loads import ANY_LIMIT, LOADS
 from tolstat.common.tables import VALID
 from tolstat.joint import perturb
-from tolstat.questions.what_if.query import what_if
+from tolstat.questions.causes.lines_shares import evaluate
 from tolstat.solver.compilation import warm_up
 from tolstat.solver.simulation import simulate_rows
 from tolstat.study import widths
@@ -93,14 +93,14 @@ def compare(path: Path, found: dict[str, list[int]]) -> None:
     with tolstat.open(path) as store:
         view = store.view()
         names = [*view.limits, ANY_LIMIT]
-        tornados = {name: what_if(view, name) for name in names}
+        tornados = {name: evaluate(view, name) for name in names}
     misses = dict.fromkeys(names, 0)
     values = 0
     print("| line | step | joints of the file | from the file, % | fresh joints | of these, % | |\n" + "|---" * 7 + "|")
     for place, name in enumerate(names):
         tornado = tornados[name]
         assert tornado is not None, f"{path} holds no joints with a line changed"
-        for row in tornado.table.to_dict("records"):
+        for row in tornado.rows:
             above, failed, n = (found[f"{row['line']}|{row['step']}"][k] for k in (place, -2, -1))
             share = above / (n - failed)
             low, high = float(clopper_pearson(above, n)[0]), float(clopper_pearson(above + failed, n)[1])

@@ -28,10 +28,7 @@ PLAIN = {
         "verify": "Estimate the numerical error on some joints.",
         "replay": "Simulate one joint again and compare with the file.",
     },
-    "Read": {
-        "report": "Report the share of joints above each load.",
-        "causes": "Print which tolerances and errors cause the largest loads.",
-    },
+    "Read": {"report": "Report the share of joints above each load."},
     "Decide": {},
     "Share": {
         "export": "Export joints, load cycles or statistics to files.",

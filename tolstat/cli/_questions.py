@@ -2,7 +2,8 @@
 
 The first parameters of a question say what its command reads: a `View` is FILE, two are A and B, ``*views`` are several
 files. Where the question's file has a function ``simulate(source, work, ...)``, its first parameter says what is
-simulated: a `Study` is STUDY, whose campaigns the answer is about, and a path is FILE, behind ``--run``.
+simulated: a `Study` is STUDY, whose campaigns the answer is about, and a path is FILE, behind ``--run``; it may be
+either.
 """
 
 from __future__ import annotations
@@ -40,6 +41,15 @@ OutFolder = Annotated[
     Path | None,
     typer.Option("--out", metavar="DIR", help="Write tables as CSV and pictures to this folder, created if missing."),
 ]
+OutResults = Annotated[
+    Path | None,
+    typer.Option(
+        "--out",
+        metavar="DIR",
+        help="Folder of result files, created if missing; tables as CSV and pictures are written to it, too; "
+        "default: result files only, to the current one.",
+    ),
+]
 Run = Annotated[bool, typer.Option("--run", help="Simulate what the answer needs, and keep it in FILE.")]
 READS = {
     "view": [("file", "FILE", "Result file (HDF5) of a campaign.")],
@@ -62,7 +72,7 @@ class _Asked:
     reads : str
         A key of `READS`.
     options, simulated : list of inspect.Parameter
-        Options of the question, and of its simulation.
+        Options of the question, and of its simulation; both may have the same.
     into_file : bool
         Whether it simulates into the result file that it reads.
     """
@@ -86,6 +96,12 @@ class _Asked:
                 self.reads = "study" if several else "either"
 
     @property
+    def only_simulated(self) -> list[inspect.Parameter]:
+        """Options of the simulation that the question itself has not."""
+        names = {p.name for p in self.options}
+        return [p for p in self.simulated if p.name not in names]
+
+    @property
     def docstring(self) -> str:
         return inspect.getdoc(self.answer) or ""
 
@@ -104,19 +120,20 @@ def command_of(question: Question) -> Callable[..., None]:
     def run(**given: Any) -> None:
         options = {p.name: _value(p, given[p.name]) for p in asked.options}
         sources = [path for name, _, _ in arguments for path in _listed(given[name])]
+        stem = "_".join(path.stem for path in sources[:2])
         if asked.simulate is not None:
             sources = _simulated(asked, sources[0], given)
         with ExitStack() as stack:
             views = [_view(stack, path, given) for path in sources]
             with progress(question.name):
                 answer = asked.answer(*views, **options)
-            _deliver(answer, "_".join(path.stem for path in sources[:2]), given)
+            _deliver(answer, stem, given)
 
     made: Any = run
     made.__name__, made.__doc__ = question.name, prose(asked.docstring)
     listed = asked.reads == "views"
     parameters = [_argument(*entry, listed) for entry in arguments]
-    parameters += [_option(p, asked.help[p.name]) for p in (*asked.options, *asked.simulated)]
+    parameters += [_option(p, asked.help[p.name]) for p in (*asked.options, *asked.only_simulated)]
     made.__signature__ = inspect.Signature([*parameters, *shared])
     return run
 
@@ -193,7 +210,9 @@ def _simulated(asked: _Asked, source: Path, given: dict[str, Any]) -> list[Path]
     folder = given["out"] or Path()
     if is_study:
         make_folder(folder)
-    what = study.load(source).at(given.get("point") or "") if is_study else source
+    what: Any = study.load(source) if is_study else source
+    if is_study and given.get("point"):
+        what = what.at(given["point"])
     with work(given["workers"], folder) as running:
         return asked.simulate(what, running, **options)  # type: ignore[misc]
 
@@ -206,9 +225,10 @@ def _refuse_unused(asked: _Asked, source: Path, given: dict[str, Any]) -> None:
     InputError
         When there are any.
     """
-    used = [_flag(p) for p in asked.simulated if given[p.name] not in (None, p.default)]
+    used = [_flag(p) for p in asked.only_simulated if given[p.name] not in (None, p.default)]
     if used:
-        remedy = "add --run" if asked.into_file else "give a study (TOML)"
+        ways = {"add --run": asked.into_file, "give a study (TOML)": asked.reads != "view"}
+        remedy = ", or ".join(way for way, is_open in ways.items() if is_open)
         found = f"{'are' if len(used) > 1 else 'is'} about a simulation, and {source} holds its joints already"
         raise InputError([Fault(", ".join(used), found, remedy)])
 
@@ -227,7 +247,8 @@ def _shared(asked: _Asked) -> list[inspect.Parameter]:
         found.append(("run", Run, False))
     if asked.simulate is not None:
         found.append(("workers", Workers, None))
-    found += [("out", OutFolder, None), ("wide", Wide, False), ("as_json", AsJson, False)]
+    out = OutResults if asked.reads in ("study", "either") else OutFolder
+    found += [("out", out, None), ("wide", Wide, False), ("as_json", AsJson, False)]
     return [_parameter(*entry) for entry in found]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 import threading
 import time
@@ -31,7 +32,7 @@ class Reporter(Protocol):
         """Report the progress `counts`."""
 
 
-def text(counts: Counts, begun: int, seconds: float) -> str:
+def text(counts: Counts, begun: int, seconds: float, budget: float = math.inf) -> str:
     """Describe the progress of a campaign in one line.
 
     Parameters
@@ -42,6 +43,8 @@ def text(counts: Counts, begun: int, seconds: float) -> str:
         Joints that were done at the start.
     seconds : float
         Time since the start.
+    budget : float
+        Largest time that may be left: the work ends after it, finished or not.
 
     Returns
     -------
@@ -52,7 +55,8 @@ def text(counts: Counts, begun: int, seconds: float) -> str:
     words = [f"{counts.done} of {counts.total} joints"]
     if counts.done > begun and seconds > 0:
         rate = (counts.done - begun) / seconds
-        words += [f"{rate:.3g} joints/s", f"{clock((counts.total - counts.done) / rate)} left"]
+        left = min((counts.total - counts.done) / rate, max(budget, 0.0))
+        words += [f"{rate:.3g} joints/s", f"{clock(left)} left"]
     return ", ".join([*words, counts.shortfall])
 
 
@@ -91,6 +95,7 @@ class Display:
         self._now = now
         self._name = ""
         self._begun_at = 0.0
+        self._ends_at = math.inf
         self._counts: Counts | None = None
         self._start = 0
 
@@ -102,12 +107,13 @@ class Display:
     ) -> None:
         self._end()
 
-    def stage(self, name: str) -> None:
-        """Begin the stage `name`; that before it has ended."""
+    def stage(self, name: str, budget: float = math.inf) -> None:
+        """Begin the stage `name`, which ends after the time `budget`, s, at the latest; that before it has ended."""
         if name == self._name:
             return
         self._end()
         self._name, self._begun_at, self._counts = name, self._now(), None
+        self._ends_at = self._begun_at + budget
 
     def __call__(self, counts: Counts) -> None:
         """Report the counts of a campaign, or of the joints of the current stage."""
@@ -123,7 +129,7 @@ class Display:
         seconds = self._now() - self._begun_at
         if self._counts is None:
             return f"{self._name}, {clock(seconds)}"
-        own = text(self._counts, self._start, seconds)
+        own = text(self._counts, self._start, seconds, self._ends_at - self._now())
         return own if self._name == JOINTS else f"{self._name}: {own}"
 
     def _end(self) -> None:
@@ -189,11 +195,11 @@ class Bar(Display):
         if self._bar is not None:
             self._bar.stop()
 
-    def stage(self, name: str) -> None:
+    def stage(self, name: str, budget: float = math.inf) -> None:
         """Begin the stage `name` with a bar of its own."""
         if name == self._name:
             return
-        super().stage(name)
+        super().stage(name, budget)
         if self._bar is not None:
             self._task = self._bar.add_task(name, total=None)
 

@@ -38,7 +38,6 @@ if TYPE_CHECKING:
     from tolstat.questions.show.rendering import draw_row as draw_row
     from tolstat.questions.sorting.query import sorted_joints as sorted_joints
     from tolstat.questions.time_above.query import time_above as time_above
-    from tolstat.questions.what_if.query import what_if as what_if
     from tolstat.store.view import View
 
 
@@ -118,7 +117,7 @@ class Folder(NamedTuple):
 
 
 QUESTIONS = (
-    Folder("what_if", ("query.what_if",), has_section=True),
+    Question("lines", "", "List what each line of the drawing would change.", "open", file="causes.lines"),
     Folder("exceedance", has_section=True, has_summary=True),
     Folder("known_parts", has_section=True),
     Folder("sorting", ("query.sorted_joints",), "Decide", ("sorting",), has_section=True),
@@ -126,7 +125,7 @@ QUESTIONS = (
     Question("capability", "Read", "Compute yield and Cpk against each limit of the study.", "folded", counted=True),
     Folder("lots", ("query.lots_of",), "Read", ("lots",), has_section=True, has_summary=True),
     Question("pairs", "Read", "Find which errors of pin and hole together cause a load.", "folded", "causes.pairs"),
-    Question("causes", "", "Print which tolerances and errors cause the largest loads.", "folded", "causes.errors"),
+    Question("causes", "Read", "Print which tolerances and errors cause the largest loads.", "folded", "causes.errors"),
     Question(
         "angles", "Read", "Compute which errors make a load scatter at each input angle.", "folded", "causes.angles"
     ),

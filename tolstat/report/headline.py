@@ -194,9 +194,9 @@ def _judged(view: View, records: Sequence[Row], accepted: float) -> Headline:
     elif several and worst["count"] and not np.isnan(worst["estimate"]):
         said += _most_often(view, records, worst)
     if answer == "no":
-        from tolstat.questions.what_if import rendering as what_if  # draws, which other verdicts need not wait for
+        from tolstat.questions.causes import lines  # simulates, which other verdicts need not wait for
 
-        better = what_if.advice(view, row["load"], accepted)
+        better = lines.advice(view, row["load"], accepted)
         said += f". {better}" if better else ""
     return Headline(answer, WORDS[answer], said, notes, worst["load"])
 

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from functools import partial
+from pathlib import Path
 from shlex import quote
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 
+from tolstat import study
+from tolstat.campaign.work import Work
 from tolstat.common.aside import mapped
-from tolstat.common.errors import NotApplicable, TolstatError
+from tolstat.common.errors import Fault, InputError, NotApplicable, TolstatError
 from tolstat.common.loads import unit_text
 from tolstat.common.tables import VALID
 from tolstat.display import drawing, style
@@ -19,11 +23,14 @@ from tolstat.display.answer import Answer, Part, Sentence, Table
 from tolstat.display.asked import Asked
 from tolstat.display.blocks import Panel, Panels
 from tolstat.display.mpl import patches
-from tolstat.display.options import Load, Top
+from tolstat.display.options import Load, Opt, Top
 from tolstat.display.table import Column, Row, Rows, has
 from tolstat.display.text import ends
+from tolstat.questions.causes import lines, lines_run
 from tolstat.questions.causes.indices import indices
 from tolstat.store.view import View
+from tolstat.study import Study
+from tolstat.study.rewriting import with_keys
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -37,6 +44,10 @@ JOINTS = 20_000
 """Maximum number of joints (the first ones) of which the page takes causes: more add little and take memory."""
 Found = tuple[Mapping[str, Any], Rows]
 """What `indices` returns."""
+POINTS = 1024
+"""Default number of points of a pick-freeze design."""
+Groups = Literal["tolerance", "error"]
+"""Errors that a pick-freeze design exchanges together."""
 ALONE, IN_ALL = "alone (first order), 95 %", "in all (bounds of the total index)"
 BARS = (
     "Bars: share of a load's variance that vanishes when the error is removed (first-order index). "
@@ -49,9 +60,18 @@ LOGARITHMS = "Where a few joints with large loads dominate the variance, it is t
 def causes(view: View, by: Load = None, top: Top = 12, logarithm: bool = False) -> Answer:
     """Print which tolerances and errors cause the largest loads.
 
+    Prints for each line of the drawing, an entry of [tolerances], the share of the joints above the limit if it were
+    half as wide, exact, finer or coarser by one class (else by the factors 0.63 and 1.6). With --run, simulates these
+    joints, which have the seeds of FILE and keep their loads in it: until the order of the lines is settled, the time
+    is up, or each change has --most joints. To go on, run the same command again.
+
     Prints for each error: the share of the load's variance that it explains alone and in interactions (first-order and
     total Sobol' indices), the direction of its effect (rank regression), and the probability that a joint above the
     limit (without a limit: above the 90 % quantile) has a larger, or a more extreme, error than a joint below.
+
+    With STUDY, simulates a pick-freeze design into STUDY_causes.h5, each point with two joints and one more for each
+    group of errors; it gives total indices with intervals instead of bounds. To resume after an interruption, run the
+    same command again. STUDY_causes.h5 can be given as FILE afterwards.
 
     Example: tolstat causes iso2768_f.h5 --by cross1.F
 
@@ -69,7 +89,8 @@ def causes(view: View, by: Load = None, top: Top = 12, logarithm: bool = False) 
     Returns
     -------
     Answer
-        Table ``errors`` and facts, see `indices.indices`.
+        Table ``errors`` and facts, see `indices.indices`. Where the file has joints with other widths, first the tables
+        of `lines.lines`, and a fact ``lines`` with its facts.
 
     Raises
     ------
@@ -85,15 +106,74 @@ def causes(view: View, by: Load = None, top: Top = 12, logarithm: bool = False) 
     >>> found.frame("errors")["error"][:2].sort_values().tolist()
     ['pin1.offset_t', 'pin2.offset_z']
     """
-    # the parts of ``lines.parts(view, load)`` come first, once they are in this folder
+    load = by or view.decisive
+    facts, rows = indices(view, load, logarithm)
     parts: list[Part] = []
-    facts, rows = indices(view, by or view.decisive, logarithm)
     command = f"tolstat causes {quote(str(view.path))} --run"
-    if not (view.altered or _from_design(facts)):
+    if view.altered:
+        with suppress(NotApplicable):  # joints of other lines, or at other operating points
+            changed = lines.lines(view, load)
+            parts, facts = list(changed.parts), {**facts, "lines": changed.facts}
+    elif not _from_design(facts):
         parts.append(Sentence(f"which line of the drawing to change: {command}"))
     parts += [Panels([_tornado_panel(facts, rows)]), _table("errors", facts, rows, top)]
     parts += map(Sentence, _notes(facts, rows, "" if view.altered else command))
     return Answer("causes", "Causes by error", parts, facts)
+
+
+def simulate(
+    source: Study | Path,
+    work: Work,
+    by: Load = None,
+    points: Annotated[int, Opt("N", least=50)] = POINTS,
+    groups: Groups = "tolerance",
+    each: lines_run.Each = "entry",
+    group: Annotated[list[str] | None, Opt("NAME=PATTERN,...")] = None,
+    budget: Annotated[float, Opt("TIME", unit="s")] = lines_run.BUDGET_S,
+    most: Annotated[int, Opt("N", least=lines_run.LEAST)] = lines_run.MOST,
+) -> list[Path]:
+    """Simulate a pick-freeze design of a study, or into a result file joints with other widths of each line.
+
+    Parameters
+    ----------
+    source : Study or Path
+        The study, or the result file, see `lines_run.simulate`.
+    work : Work
+        Workers, folder and progress.
+    by : str, optional
+        Load whose limit orders the lines.
+    points : int
+        With STUDY: number of points of the pick-freeze design.
+    groups : {"tolerance", "error"}
+        With STUDY: exchange all errors of a tolerance together, or each error by itself.
+    each : {"entry", "feature", "error"}
+        With --run: a line is an entry of [tolerances], a pin with its hole, or an error.
+    group : list of str, optional
+        With --run: also change these errors together; repeatable.
+    budget : float
+        With --run: time limit, with unit s, min or h; 5 min unless given.
+    most : int
+        With --run: largest number of joints of each change.
+
+    Returns
+    -------
+    list of Path
+        The result file.
+
+    Raises
+    ------
+    InputError
+        When options of the one are given with the other.
+    """
+    if isinstance(source, Path):
+        if (points, groups) != (POINTS, "tolerance"):
+            raise InputError([Fault("--points, --groups", "are about the design of a study", "give a study (TOML)")])
+        return lines_run.simulate(source, work, by, each, group, budget, most)
+    if group or each != "entry":
+        raise InputError([Fault("--each, --group", "say what --run simulates into FILE", "give a result file")])
+    keys = {"method": "pick_freeze", "n": points, "groups": groups}
+    text = with_keys(source.text, {("sampling",): keys}, str(source.path))
+    return [work.run(study.load(source.path, text=text), f"{source.path.stem}_causes.h5")]
 
 
 def causes_on_page(view: View, asked: Asked) -> Answer:

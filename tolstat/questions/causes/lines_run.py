@@ -1,0 +1,230 @@
+"""Simulate the joints that the lines of the drawing are compared on, until the order of the lines is settled."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Literal
+
+from tolstat.campaign import what_if as sets
+from tolstat.campaign.pool import kept_workers
+from tolstat.campaign.what_if import Asked, Wanted
+from tolstat.campaign.work import Work
+from tolstat.common.cores import available_cores
+from tolstat.common.errors import Fault, StoreError
+from tolstat.common.loads import ANY_LIMIT, split
+from tolstat.display.options import Opt
+from tolstat.display.progress import clock
+from tolstat.questions.causes import lines_shares
+from tolstat.solver.compilation import warm_up
+from tolstat.store import Writer, what_if
+from tolstat.store.provenance import versions
+from tolstat.store.view import View
+from tolstat.study import widths
+from tolstat.study.points import names_of
+from tolstat.study.study import Study
+from tolstat.study.widths import HALF, STEPS, Line
+
+FIRST, LEAST, MOST = 1024, 128, 16_384
+"""Number of joints of each change at the first look, the smallest if time is short, and by default the largest."""
+PILOT = 64
+"""Number of joints whose time is measured."""
+RELIABLE = 2000
+"""Number of simulated joints whose time, with the start of the workers, says more than the pilot's."""
+BUDGET_S = 300.0
+"""Default time limit, s."""
+
+Each = Literal["entry", "feature", "error"]
+"""What a line is."""
+LINES = {"entry": widths.lines, "feature": widths.features, "error": widths.errors}
+"""Lines of a study by what they are."""
+
+
+def simulate(
+    path: Path,
+    work: Work,
+    by: Annotated[str | None, Opt("LOAD")] = None,
+    each: Each = "entry",
+    group: Annotated[list[str] | None, Opt("NAME=PATTERN,...")] = None,
+    budget: Annotated[float, Opt("TIME", unit="s")] = BUDGET_S,
+    most: Annotated[int, Opt("N", least=LEAST)] = MOST,
+) -> list[Path]:
+    """Simulate joints with other widths of each line, and keep their loads in the file.
+
+    Of several operating points those that `by` or a limit of the study is about. Ends when the order of the lines is
+    settled, the time is up, or each change has `most` joints. What is done by then stays in the file; the same call
+    goes on.
+
+    Parameters
+    ----------
+    path : Path
+        Result file of a campaign whose joints are drawn from tolerances.
+    work : Work
+        Workers, progress and messages.
+    by : str, optional
+        Load whose limit orders the lines; by default all limits together, or the only one.
+    each : {"entry", "feature", "error"}
+        With --run: a line is an entry of [tolerances], a pin with its hole, or an error.
+    group : list of str, optional
+        With --run: also change these errors together, "tilts = pin*.tilt_*, hole*.tilt_*"; repeatable.
+    budget : float
+        With --run: time limit, with unit s, min or h; 5 min unless given.
+    most : int
+        With --run: largest number of joints of each change.
+
+    Returns
+    -------
+    list of Path
+        The file.
+
+    Raises
+    ------
+    InputError
+        With every fault of `group`, or when there is no such load.
+    StoreError
+        When the file cannot be used, or was made by other code.
+    """
+    with Writer.open(path) as store, kept_workers():
+        view = View(store)
+        load = _checked(view, by)
+        lines = [*LINES[each](view.study), *widths.named(view.study, group or [])]
+        if not lines:
+            remedy = 'name what a study can change: --group "tilts = pin*.tilt_*, hole*.tilt_*"'
+            raise StoreError(str(Fault(str(path), "has no line whose width can be changed", remedy)))
+        warm_up()
+        looks = _Looks(store, view, lines, load, work, budget, most)
+        looks.run()
+        work.tell(f"simulated {looks.simulated} joints in {looks.spent:.0f} s, {looks.outcome}")
+    return [path]
+
+
+def points_of(view: View, by: str) -> tuple[str, ...]:
+    """Operating points that a load, a limit or joints in the file are about; all of them if there is no limit."""
+    every = tuple(view.store.points)
+    asked = () if by == ANY_LIMIT else (by,)
+    names = [*asked, *(view.limits or ("",)), *(name for one in view.altered.values() for name in one.names)]
+    chosen = {point for name in names for point in names_of(split(name)[1], every, name)}
+    return tuple(point for point in every if point in chosen)
+
+
+class _Looks:
+    """Looks at the order of the lines, each with more joints of the changes than the one before.
+
+    Attributes
+    ----------
+    each, simulated : int
+        Number of joints of each change at the last look; of all joints simulated.
+    settled : bool
+        Whether the order of the lines is settled.
+    """
+
+    def __init__(
+        self, store: Writer, view: View, lines: Sequence[Line], load: str, work: Work, budget: float, most: int
+    ) -> None:
+        self._begin, self._budget, self._most = time.monotonic(), budget, most
+        self._store, self._view, self._lines, self._load, self._work = store, view, lines, load, work
+        self._workers = work.workers or available_cores()
+        self._held, self._asked = what_if.read(store), Asked(view.kept_loads, points_of(view, load))
+        options = sets.options_of(view.study, store)
+        self._seconds = sets.seconds_per_joint(view.study, options, PILOT, self._asked.points) / self._workers
+        self.each, self.simulated, self.settled = 0, 0, False
+        self._looks, self._count, self._cut = 0, 1, False
+
+    @property
+    def spent(self) -> float:
+        """Time since the beginning, s."""
+        return time.monotonic() - self._begin
+
+    @property
+    def outcome(self) -> str:
+        """What the last look found, in words."""
+        more = "a larger --most" if self.each >= self._most else "a longer --budget"
+        order = "settled" if self.settled else f"not settled: {more} goes on"
+        return f"{'up to ' if self._cut else ''}{self.each} of each change; order of lines {order}"
+
+    def run(self) -> None:
+        """Look until the order is settled, then bring the other steps to as many joints."""
+        n = self._first()
+        self._count = 1 + math.ceil(math.log2(max(self._most / n, 1.0)))
+        self._look(n, STEPS)
+        while not self.settled and (more := self._next()) > self.each:
+            self._look(more, (HALF,))
+        if self.simulated and self._left > 0.0:
+            self._look(self.each, STEPS)
+
+    @property
+    def _left(self) -> float:
+        return self._budget - self.spent
+
+    def _first(self) -> int:
+        """Joints at the first look: those of the campaign, fewer if half of the budget does not suffice for them."""
+        own = lines_shares.own_joints(self._view)
+        affordable = int(0.5 * self._budget / (self._seconds * ((len(STEPS) + 0.5) * len(self._lines) + 1.0)))
+        return max(LEAST, min(own if LEAST < own < FIRST else FIRST, affordable, self._most))
+
+    def _next(self) -> int:
+        """Joints at the next look: twice as many, or what the time suffices for if that is a tenth more."""
+        affordable = self.each + int(0.9 * self._left / (self._seconds * (len(self._lines) + 1.0)))
+        more = min(2 * self.each, affordable, self._most)
+        return more if more > 1.1 * self.each else self.each
+
+    def _look(self, n: int, steps: Sequence[str]) -> None:
+        """Simulate what is missing of `n` joints of each line after these steps, and compare the lines half as wide."""
+        wanted, left = self._wanted(n, steps), self._left
+        self._looks += 1
+        if lacking := self._lacking(wanted):
+            self._announce(n, lacking, left)
+            self._work.display.stage(f"look {self._looks}", left)
+            stop, shown = (lambda: self._left <= 0.0), self._work.display
+            self._held = sets.simulate(self._view.study, self._store, wanted, self._asked, self._workers, stop, shown)
+            done = lacking - (still := self._lacking(wanted))
+            self._cut = still > 0
+            if done > RELIABLE:
+                self._seconds = (left - self._left) / done
+            self.simulated += done
+        joints = lines_shares.Joints(self._view, self._load, self._held)
+        self.each, self.settled = n, joints.settled(self._lines, 1.0 - 0.05 / self._count)
+
+    def _announce(self, n: int, lacking: int, left: float) -> None:
+        needed, points = self._seconds * lacking, self._asked.points
+        where = f" at {', '.join(points)}" if all(points) else ""
+        cost = f"about {clock(needed)} on {self._workers} processes"
+        cost += f", of which {clock(max(left, 0.0))} are left" if needed > left else ""
+        lines = f"{len(self._lines)} lines, {n} joints of each change"
+        self._work.tell(f"{lines}: {lacking} joints to simulate{where}, {cost}")
+
+    def _lacking(self, wanted: Sequence[Wanted]) -> int:
+        names = self._asked.names(self._view.study)
+        return sum(len(sets.missing(self._held, one, names)) for one in wanted)
+
+    def _wanted(self, n: int, steps: Sequence[str]) -> list[Wanted]:
+        """Sets of a look, what the order needs first."""
+        study, own = self._view.study, lines_shares.own_joints(self._view)
+        found = [Wanted(sets.as_drawn(study), range(own, n))] if n > own else []
+        for step in steps:
+            found += [Wanted(sets.narrowed(study, line, step), range(n)) for line in self._lines]
+        if len(steps) == 1:
+            return found
+        apart = [line for line in self._lines if _independent(study, line)]
+        return found + [Wanted(sets.exchanged(study, line), range(n // 2)) for line in apart]
+
+
+def _independent(study: Study, line: Line) -> bool:
+    """Whether no error of a line is correlated with one of another line, so that it can be exchanged."""
+    own = [name in line.names for name in study.copula.names]
+    others = [not within for within in own]
+    return not study.copula.matrix[own][:, others].any()
+
+
+def _checked(view: View, by: str | None) -> str:
+    """Load that orders the lines; refuse a file that the code cannot continue."""
+    lines_shares.check(view)
+    load = by or view.decisive
+    view.load(load)
+    store = view.store
+    if any(store.versions.get(name) != value for name, value in versions().items() if name in ("tolstat", "sources")):
+        remedy = "use that version, or run the campaign again: tolstat run STUDY --out OTHER.h5"
+        raise StoreError(str(Fault(str(view.path), "was made by another version of the code", remedy)))
+    return load

@@ -1,0 +1,327 @@
+"""Share of the joints above a limit if a line of the drawing had another width, from joints with the same seeds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from tolstat.analysis import difference, pick_freeze
+from tolstat.analysis.sample import Sample
+from tolstat.campaign import what_if as sets
+from tolstat.common.errors import Fault, StoreError
+from tolstat.common.loads import ANY_LIMIT, FloatArray
+from tolstat.common.tables import Status
+from tolstat.display import text
+from tolstat.display.table import Row, Rows
+from tolstat.store import what_if as kept
+from tolstat.store.view import View
+from tolstat.store.what_if import Altered
+from tolstat.study import widths
+from tolstat.study.points import at
+from tolstat.study.widths import COARSER, EXACT, FINER, HALF, STEPS, Line
+
+NEGLIGIBLE = 0.1
+"""Difference of two lines that does not matter for their order, relative to the share of the joints as drawn."""
+TAIL_STARTS_AT = 0.9
+"""Quantile of the load that takes the place of a limit where the study sets none."""
+ENDS = ("", "_lower", "_upper")
+"""Ends of the keys of an estimate and its interval."""
+INDICES = tuple(f"{name}{word}{end}" for name in ("", "above_") for word in ("alone", "in_all") for end in ENDS)
+"""Keys of the Sobol' indices of a line, with their intervals."""
+
+Estimate = tuple[float, float, float]
+"""An estimate, and the ends of its interval."""
+
+
+class Lines(NamedTuple):
+    """Share of the joints above a limit, or above at least one of all limits, with other widths.
+
+    Attributes
+    ----------
+    facts : mapping
+        ``load`` (``"any limit"`` for the largest ratio of load to limit), ``unit``; ``level``, the limit or without one
+        the 90 % quantile of the load; ``n``, number of joints as drawn; ``share`` of these above the level, ``lower``
+        and ``upper``, its interval with failed and unsettled joints; ``logarithmic``, whether the logarithm of the load
+        is decomposed; ``missing`` and ``left_out``, entries of ``[tolerances]`` without joints in the file, and those
+        whose width is not changed; ``settled``, whether the order of the lines is: neighbours differ, or by less than
+        `NEGLIGIBLE` of the share.
+    rows : sequence of mapping
+        One row per line and step, lines in the order of their share if half as wide: ``line``, ``names``, ``size``,
+        ``step``, ``words``, ``factor`` (NaN if it differs within the line), ``n``, ``share`` with ``_lower`` and
+        ``_upper``, and ``change`` from the joints as drawn, with ends; see `Joints.estimates`.
+    indices : sequence of mapping
+        One row per line that can be exchanged: ``line``, ``pairs``; ``alone`` and ``in_all`` with ends, the closed and
+        total Sobol' index of the load, or of its logarithm; ``above_alone`` and ``above_in_all``, those of the event
+        that it is above the level. NaN where they cannot be estimated.
+    """
+
+    facts: Mapping[str, Any]
+    rows: Rows
+    indices: Rows
+
+    @property
+    def by_line(self) -> Rows:
+        """One row per line, with the numbers of each step behind its name: ``half``, ``half_lower``, ``half_change``.
+
+        ``by`` has the words of the steps that follow classes; keys of steps that are not simulated are missing.
+        """
+        found: dict[str, dict[str, Any]] = {}
+        for row in self.rows:
+            step, line = (
+                row["step"],
+                found.setdefault(row["line"], {"line": row["line"], "size": row["size"], "by": []}),
+            )
+            line |= {f"{step}{end}": row[f"share{end}"] for end in ENDS}
+            line |= {f"{step}_change{end}": row[f"change{end}"] for end in ENDS}
+            line["by"] += [row["words"]] if step in (FINER, COARSER) else []
+        return list(found.values())
+
+    @property
+    def event(self) -> str:
+        """What the share is about: ``cross1.F > 1500 N``, or ``at least one limit exceeded``."""
+        return "at least one limit exceeded" if self.facts["load"] == ANY_LIMIT else text.limit(self.facts)
+
+    @property
+    def limit(self) -> str:
+        """What the joints of the share exceed: ``the limit``, or ``at least one limit``."""
+        return "at least one limit" if self.facts["load"] == ANY_LIMIT else "the limit"
+
+    @property
+    def best(self) -> Row | None:
+        """Row of the line that lowers the share most if half as wide; None if none surely lowers it."""
+        rows = [row for row in self.rows if row["step"] == HALF and row["change_upper"] < 0.0]
+        return min(rows, key=lambda row: float(row["share"]), default=None)
+
+
+def evaluate(view: View, by: str) -> Lines | None:
+    """Evaluate the joints with other widths that a file holds.
+
+    Parameters
+    ----------
+    view : View
+        A campaign whose joints are drawn from tolerances.
+    by : str
+        A load that can have a limit (``cross1.F``, ``pin2.contact``, ``psi``), or ``"any limit"`` of the study.
+
+    Returns
+    -------
+    Lines or None
+        None where the file holds no such joints (`lines_run.simulate` adds them). All intervals are 95 %.
+
+    Raises
+    ------
+    InputError
+        When there is no such load, or the study does not keep it.
+    StoreError
+        When the joints are not drawn from tolerances, or differ in weight.
+    """
+    check(view)
+    joints = Joints(view, by, view.altered)
+    rows = joints.rows() if np.isfinite(joints.base).any() else []
+    if not rows:
+        return None
+    lines, entries = list(dict.fromkeys(row["line"] for row in rows)), widths.lines(view.study)
+    facts = {"load": by, "unit": joints.load.unit, "level": joints.level, "n": len(joints.base)}
+    facts |= dict(zip(("share", "lower", "upper"), joints.share(joints.base), strict=True))
+    halves = {row["line"] for row in rows if row["step"] == HALF}
+    settled = joints.settled([line for line in entries if line.label in halves])
+    facts |= {"logarithmic": joints.load.long_tailed, "settled": settled}
+    missing = [line.label for line in entries if line.label not in lines]
+    facts |= {"missing": missing, "left_out": widths.left_out(view.study)}
+    return Lines(facts, rows, joints.indices(lines))
+
+
+def check(view: View) -> None:
+    """Refuse a file whose joints are not drawn from tolerances, differ in weight, or are a part of the campaign's.
+
+    Raises
+    ------
+    StoreError
+        The hint names what can be used.
+    """
+    view.check_drawn()
+    view.check("difference")
+    if view.study.groups:
+        remedy = 'give the file of a study with sampling.method "random", "sobol" or "lhs"'
+        raise StoreError(str(Fault(str(view.path), "holds a pick-freeze design", remedy)))
+    if not view.store.whole:
+        remedy = "merge all slices first: tolstat merge SLICE... --out FILE"
+        raise StoreError(str(Fault(str(view.path), "holds a part of the campaign only", remedy)))
+
+
+def own_joints(view: View) -> int:
+    """Number of samples of the campaign, from the first, that serve as joints as drawn: none of them pending."""
+    if not view.design.has_interval("difference"):
+        return 0
+    waiting = np.flatnonzero(view.status == Status.PENDING)
+    return int(waiting[0]) if waiting.size else view.n
+
+
+class Joints:
+    """Load of the joints that the lines are compared on, as drawn and with each change.
+
+    Parameters
+    ----------
+    view : View
+        A campaign whose joints are drawn from tolerances.
+    by : str
+        A load, or ``"any limit"``.
+    held : mapping
+        Changes by their digest, as `View.altered`.
+
+    Attributes
+    ----------
+    load : Sample
+        The load in the campaign.
+    level : float
+        Its limit; without one, its quantile `TAIL_STARTS_AT`.
+    base : ndarray, shape (n,)
+        Load of the joints as drawn, from sample 0 on, NaN without a valid one: the campaign's, then fresh ones.
+    """
+
+    def __init__(self, view: View, by: str, held: Mapping[str, Altered]) -> None:
+        self.load, self._study, self._held = view.load(by), view.study, held
+        limit = self.load.limit
+        self.level = self.load.quantile(TAIL_STARTS_AT).estimate if limit is None else limit
+        levels = view.limits if by == ANY_LIMIT else {by: 1.0}
+        self._parts = [(names_at_points(view, name), level) for name, level in levels.items()]
+        own = own_joints(view)
+        self.base, more = self.load.values[:own], held.get(kept.key(sets.as_drawn(view.study).about))
+        if more is not None and self.holds(more) and more.first <= own < more.end:
+            self.base = np.concatenate([self.base, self.of(more)[own - more.first :]])
+
+    def holds(self, one: Altered) -> bool:
+        """Whether a change has the load."""
+        return all(one.holds(names) for names, _ in self._parts)
+
+    def of(self, one: Altered) -> FloatArray:
+        """Load of each joint with a change, or its largest ratio to all limits; NaN without a valid one, (n,)."""
+        return np.asarray(np.maximum.reduce([one.valid(names) / level for names, level in self._parts]))
+
+    def settled(self, lines: Sequence[Line], confidence: float = 0.95) -> bool:
+        """Whether the file has all these lines half as wide, and their order is settled, see `is_settled`."""
+        halves = {about["label"]: self.of(one) for about, one in self._changes(sets.WIDTH) if about["step"] == HALF}
+        if any(line.label not in halves for line in lines):
+            return False
+        return is_settled([halves[line.label] for line in lines], self.base, self.level, confidence)
+
+    def share(self, values: FloatArray) -> Estimate:
+        """Share of joints above the level."""
+        found = _sample(values).above(self.level)
+        return found.estimate, found.outer_lower, found.outer_upper
+
+    def estimates(self, values: FloatArray, half: FloatArray | None) -> tuple[Estimate, Estimate]:
+        """Share of joints with one line changed above the level, and its change from the joints as drawn.
+
+        Of fewer joints than are known as drawn, it is the share of all as drawn plus the change. Of fewer joints than
+        are known with the line half as wide, `half`, it is the share of these plus the difference on the joints that
+        both have, so that a line exact does not seem worse than half as wide because its joints are fewer.
+        """
+        change = self._difference(self.base, values)
+        if len(values) == len(self.base):
+            return self.share(values), change
+        if half is None or len(half) <= len(values) or not np.isfinite(values + half[: len(values)]).any():
+            return _sum(self.share(self.base), change, 0.0), change
+        share, change = self.estimates(half, None)
+        further = self._difference(half, values)
+        return _sum(share, further, 0.0), _sum(change, further, -1.0)
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Rows of `Lines.rows`: lines by their share if half as wide, then if exact, those without these behind."""
+        held: dict[Line, dict[str, Any]] = {}
+        for about, one in self._changes(sets.WIDTH):
+            values = self.of(one)[: len(self.base)]
+            if np.isfinite(values + self.base[: len(values)]).any():
+                held.setdefault(Line(about["label"], tuple(about["tolerances"])), {})[about["step"]] = about, values
+        rows, places = [], dict[str, tuple[int, float]]()
+        for line, steps in held.items():
+            size = widths.size(self._study, line)
+            for step, (about, values) in steps.items():
+                half = steps[HALF][1] if step in (EXACT, FINER) and HALF in steps else None
+                share, change = self.estimates(values, half)
+                factors = {own["factor"] for own in about["tolerances"].values()}
+                row = {"line": line.label, "names": line.names, "size": size, "step": step, "words": about["words"]}
+                row |= {"factor": factors.pop() if len(factors) == 1 else np.nan, "n": len(values)}
+                rows.append(row | _named("share", share) | _named("change", change))
+                place = {HALF: 0, EXACT: 1}.get(step, 2), share[0]
+                places[line.label] = min(places.get(line.label, place), place)
+        return sorted(rows, key=lambda row: (*places[row["line"]], row["line"], STEPS.index(row["step"])))
+
+    def indices(self, lines: Sequence[str]) -> list[dict[str, Any]]:
+        """Rows of `Lines.indices`, in the order of these lines."""
+        rows = []
+        for about, one in self._changes(sets.EXCHANGE):
+            n = min(one.end, len(self.base) // 2)
+            if about["label"] not in lines or n < pick_freeze.FEWEST:
+                continue
+            row: dict[str, Any] = {"line": about["label"], "pairs": n} | dict.fromkeys(INDICES, np.nan)
+            joints = self.base[: 2 * n : 2], self.base[1 : 2 * n : 2], self.of(one)[:n]
+            loads = [np.log(values) if self.load.long_tailed else values for values in joints]
+            events = [np.where(np.isfinite(values), values > self.level, np.nan) for values in joints]
+            pairs = (("", loads, pick_freeze.indices), ("above_", events, pick_freeze.of_event))
+            for name, (a, b, ab), estimate in pairs:
+                with suppress(ValueError):  # too few joints with a load, or none, or all of them, above the level
+                    found = estimate(a, b, ab[:, None])
+                    row |= _named(f"{name}alone", [float(x[0]) for x in found.first])
+                    row |= _named(f"{name}in_all", [float(x[0]) for x in found.total])
+            rows.append(row)
+        return sorted(rows, key=lambda row: lines.index(row["line"]))
+
+    def _changes(self, kind: str) -> list[tuple[Mapping[str, Any], Altered]]:
+        """Changes of a kind that have the load from the first joint on."""
+        every = self._held.values()
+        return [(one.about, one) for one in every if one.about["kind"] == kind and not one.first and self.holds(one)]
+
+    def _difference(self, a: FloatArray, b: FloatArray) -> Estimate:
+        """Share of B above the level less that of A, joint by joint; A may have more joints."""
+        found = difference.shares(_sample(a[: len(b)]), _sample(b), [self.level], paired=True)
+        return float(found.estimate[0]), float(found.outer_lower[0]), float(found.outer_upper[0])
+
+
+def names_at_points(view: View, load: str) -> tuple[str, ...]:
+    """Names that the file keeps of a load, one for each operating point: that of the load unless it has several."""
+    own, plain = view.narrowed(load)
+    return tuple(at(plain, [point], list(view.store.points)) for point in own.points)
+
+
+def is_settled(values: Sequence[FloatArray], base: FloatArray, level: float, confidence: float = 0.95) -> bool:
+    """Whether the order of lines by their shares above a level is settled.
+
+    Neighbours in the order are compared joint by joint. Their difference has an interval, at a confidence level that
+    holds for all of them together (Bonferroni); it excludes zero, or lies within `NEGLIGIBLE` of the share as drawn.
+    """
+    if len(values) < 2:
+        return True
+    n = min(len(base), *map(len, values))
+    ranked = sorted(values, key=lambda own: float(np.mean(own[:n] > level)))
+    drawn = float(np.mean(base[:n] > level))
+    own = 1.0 - (1.0 - confidence) / (len(values) - 1)
+    for one, other in pairwise(ranked):
+        found = difference.shares(_sample(one[:n]), _sample(other[:n]), [level], paired=True, confidence=own)
+        low, high = float(found.lower[0]), float(found.upper[0])
+        if low <= 0.0 <= high and max(-low, high) > NEGLIGIBLE * drawn:
+            return False
+    return True
+
+
+def _named(key: str, estimate: Sequence[float]) -> dict[str, float]:
+    return {f"{key}{end}": value for end, value in zip(ENDS, estimate, strict=True)}
+
+
+def _sum(share: Estimate, change: Estimate, least: float) -> Estimate:
+    """Share plus a change that fewer joints tell, with the interval of both (Zou and Donner 2008); at least `least`.
+
+    The share and its change have a negative covariance, so the interval is wide rather than narrow.
+    """
+    total = share[0] + change[0]
+    low, high = (np.hypot(share[0] - share[k], change[0] - change[k]) for k in (1, 2))
+    return tuple(float(np.clip(x, least, 1.0)) for x in (total, total - low, total + high))  # type: ignore[return-value]
+
+
+def _sample(values: FloatArray) -> Sample:
+    """Sample of loads; joints without one have failed."""
+    return Sample.of(values, np.full(values.size, Status.OK))

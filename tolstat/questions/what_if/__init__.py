@@ -1,1 +1,0 @@
-"""Which line of the drawing to change."""

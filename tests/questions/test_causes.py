@@ -2,6 +2,7 @@
 
 import json
 from contextlib import suppress
+from shlex import quote
 
 import numpy as np
 import pandas as pd
@@ -19,8 +20,8 @@ from tolstat.display.asked import Asked
 from tolstat.display.text import value
 from tolstat.questions import QUESTIONS, Question
 from tolstat.questions.capability import capability
+from tolstat.questions.causes import errors, worst
 from tolstat.questions.causes import indices as of_errors
-from tolstat.questions.causes import worst
 from tolstat.questions.causes.errors import causes
 from tolstat.store import ResultFile, Writer, view
 
@@ -101,6 +102,25 @@ def test_command_prints_the_first_errors_and_json_has_all(path):
     assert found["facts"]["unit"] == "1"
 
 
+def test_shares_in_all_are_offered_until_they_are_simulated(path, monkeypatch):
+    with ResultFile.open(path) as store:
+        known = store.view()
+        before = [part.text for part in causes(known, "cross2.F").parts if isinstance(part, Sentence)]
+        known.altered = {"a change": None}
+        monkeypatch.setattr(errors.lines, "lines", refuses)
+        after = [part.text for part in causes(known, "cross2.F").parts if isinstance(part, Sentence)]
+    assert (
+        f"no shares in all: given joints bound them too widely; tolstat causes {quote(str(path))} --run gives them"
+        in before
+    )
+    assert "no shares in all: given joints bound them too widely" in after
+    assert not any("--run" in text for text in after)
+
+
+def refuses(view, load):
+    raise NotApplicable("no joints with other widths")
+
+
 def test_correlated_errors_have_no_total_and_dependent_samples_no_interval(tmp_path):
     text = TEXT.replace('"random"', '"lhs"').replace("[limits]", 'method = "lhs"\n\n[limits]').replace("3000", "400")
     text += '\n[[correlation]]\nbetween = ["pin1.offset_t", "pin3.offset_t"]\nrho = 0.5\n'
@@ -145,7 +165,7 @@ def shown(path):
         view = store.view()
         found = {}
         for question in QUESTIONS:
-            if isinstance(question, Question) and question.file.startswith("causes."):
+            if isinstance(question, Question) and question.name in ("pairs", "causes", "angles", "worst"):
                 with suppress(NotApplicable):
                     found[question.name] = question.on_page(view, asked).blocks()
         return found, asked.notes, view.loads(view.leading)

@@ -20,7 +20,7 @@ from tolstat.common.draw_records import SUBSET
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.files import data_dir
 from tolstat.common.tables import Simulation, Status
-from tolstat.questions.causes.worst import joint_rows, largest_errors, unit_of
+from tolstat.questions.causes.worst import joint_rows, largest_errors
 from tolstat.store import ResultFile, Writer, recorded
 from tolstat.study.tolerances import distributions
 from tolstat.study.tolerances.radial import Rayleigh
@@ -170,7 +170,7 @@ def test_the_tail_is_told_with_its_errors(tmp_path: Path) -> None:
         found = joint_rows(store.view(), "cross1.F", 4)
         errors, results = store.errors(), store.results()
         contact = joint_rows(store.view(), "pin1.contact", 100)
-        assert unit_of(store.view(), "steps") == "1"
+        assert joint_rows(store.view(), "steps", 1)[0]["unit"] == "1"
         with pytest.raises(InputError, match="did you mean 'cross1\\.F'"):
             joint_rows(store.view(), "cros1.F")
     largest = results["F_max"][1:, 0]

@@ -15,6 +15,7 @@ from tolstat.common.errors import InputError, StoreError
 from tolstat.common.load_kinds import BUSHINGS
 from tolstat.common.loads import LOADS, SHOWN_LOADS
 from tolstat.display.asked import Asked
+from tolstat.questions.causes import angles
 from tolstat.questions.causes.angles import angles_on_page
 from tolstat.questions.causes.errors import causes_on_page
 from tolstat.questions.causes.revolution import against_angle
@@ -146,6 +147,11 @@ def test_page_draws_loads_over_the_revolution(known):
     lines = ax.get_lines()[:3]
     assert [line.get_label() for line in lines] == [f"row {joint['row']}" for joint in worst]
     assert [line.get_ydata()[0] for line in lines] == pytest.approx(600.0 + 20.0 * errors / SIGMA)
+
+
+def test_shares_that_are_no_more_than_chance_have_no_minus_before_zero():
+    shares = [cell.cell for cell in angles.COLUMNS if cell.head == "revolution, %"]
+    assert [cell({"share": x}) for cell in shares for x in (-1e-4, -6e-4, 0.1234)] == ["0.0", "-0.1", "12.3"]
 
 
 def test_components_and_loads_of_shafts_have_shares_in_their_unit(known):

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Container, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
@@ -18,7 +18,8 @@ from tolstat.display.answer import Answer, Part, Sentence, Table
 from tolstat.display.asked import Asked
 from tolstat.display.blocks import Panel, Panels
 from tolstat.display.options import Load, Opt, Top
-from tolstat.display.table import Column, Row, Rows
+from tolstat.display.table import Column, Row
+from tolstat.display.text import ends
 from tolstat.questions.causes.revolution import JOINTS, MIN_JOINTS, AgainstAngle, against_angle
 from tolstat.store.view import View
 
@@ -37,10 +38,11 @@ ORIGIN = {
 OVER_REVOLUTION = "Share of the variance over the whole revolution, every angle weighted by its variance"
 
 COLUMNS = (
-    Column("error", lambda row: str(row["error"])),
-    Column("revolution, %", lambda row: _percent(row)),
-    Column("95 % interval", lambda row: _interval(row)),
-    Column("largest, %", lambda row: f"{100.0 * row['largest']:.1f}"),
+    Column("load", lambda row: str(row["load"]), shown=lambda rows: len({row["load"] for row in rows}) > 1),
+    Column("error", lambda row: str(row["error"]), words=True),
+    Column("revolution, %", lambda row: _percent(row["share"])),
+    Column("95 % interval", lambda row: ends(100.0 * row["share_lower"], 100.0 * row["share_upper"], ".1f")),
+    Column("largest, %", lambda row: _percent(row["largest"])),
     Column("at, deg", lambda row: f"{math.degrees(row['theta']):.0f}"),
 )
 """Columns of the table ``revolution``."""
@@ -90,13 +92,13 @@ def angles(
     """
     view, load = view.narrowed(by or view.most_exceeded)
     (found,) = against_angle(view, [load], joints, (load,) if logarithm else ())
-    rows = _overall_rows(found)
     facts = {key: getattr(found, key) for key in ("load", "unit", "logarithm", "joints", "origin", "apart")}
+    facts["additive"] = _additive(found)
     parts: list[Part] = [
         Panels(_panels(found)),
-        Table("revolution", OVER_REVOLUTION, COLUMNS, rows, {"theta": "rad"}, rows[:top]),
+        _table([found], found.names[:top]),
         Table("angles", "Shares at each input angle", (), _angle_rows(found), {"theta": "rad"}),
-        Sentence(_note(found)),
+        Sentence(_note([found])),
     ]
     return Answer("angles", "Causes over the input angle", parts, facts)
 
@@ -111,7 +113,8 @@ def angles_on_page(view: View, asked: Asked) -> Answer:
         logarithmic = {load.name for load in view.loads(view.leading) if load.long_tailed}
         found = against_angle(view, followed, asked.replay, logarithmic)
         panels = Panels([panel for angle in found for panel in _panels(angle)])
-        parts: list[Part] = [panels, _side_by_side(found), Sentence(_note(found[0]))]
+        drawn = {name for angle in found for name in angle.names[:LINES]}
+        parts: list[Part] = [panels, _table(found, drawn), Sentence(_note(found))]
         return Answer("angles", "Causes over the input angle", parts)
     raise NotApplicable
 
@@ -147,49 +150,34 @@ def _angle_rows(found: AgainstAngle) -> list[Row]:
     ]
 
 
-def _percent(row: Row) -> str:
-    return f"{100.0 * row['share']:.1f}"
+def _percent(share: float) -> str:
+    return f"{round(100.0 * share, 1) + 0.0:.1f}"  # no -0
 
 
-def _interval(row: Row) -> str:
-    low, high = 100.0 * row["share_lower"], 100.0 * row["share_upper"]
-    return "-" if math.isnan(low) else f"{low:.1f} .. {high:.1f}"
+def _table(found: Sequence[AgainstAngle], shown: Container[str]) -> Table:
+    """Shares over the revolution; people see those of the errors `shown`."""
+    rows = [row for angle in found for row in _overall_rows(angle)]
+    seen = [row for row in rows if row["error"] in shown]
+    return Table("revolution", OVER_REVOLUTION, COLUMNS, rows, {"theta": "rad"}, seen)
 
 
-def _side_by_side(found: Sequence[AgainstAngle]) -> Table:
-    """Shares over the revolution, loads side by side; of the errors that are drawn for any of them."""
-    rows = {angle.load: {row["error"]: row for row in _overall_rows(angle)} for angle in found}
-    columns = [Column("error", lambda row: str(row["error"]))]
-    for load in rows:
-        columns.append(Column(f"{load}, %", partial(_cell, load=load, cell=_percent)))
-        columns.append(Column("95 % interval", partial(_cell, load=load, cell=_interval)))
-    shown = dict.fromkeys(name for angle in found for name in angle.names[:LINES])
-    seen: list[Row] = [{"error": name} | {load: own[name] for load, own in rows.items()} for name in shown]
-    sums = {angle.load: f"{100 * float(np.nansum(angle.overall.estimate)):.0f}" for angle in found}
-    seen.append({"error": "all errors alone", **sums})
-    every: Rows = [row for own in rows.values() for row in own.values()]
-    return Table("revolution", OVER_REVOLUTION, columns, every, {"theta": "rad"}, seen)
+def _additive(angle: AgainstAngle) -> float:
+    """Share of the variance over the revolution that all errors explain alone."""
+    return float(np.nansum(angle.overall.estimate))
 
 
-def _cell(row: Row, load: str, cell: Callable[[Row], str]) -> str:
-    """Cell of one load; the last row has the sum of the shares, without an interval."""
-    own: Any = row[load]
-    if isinstance(own, str):
-        return own if cell is _percent else ""
-    return cell(own)
-
-
-def _note(found: AgainstAngle) -> str:
-    """Joints, source of the histories, bias correction."""
-    what = " of the variance of the logarithm" if found.logarithm else ""
+def _note(found: Sequence[AgainstAngle]) -> str:
+    """Sums of the shares, joints, source of the histories, bias correction."""
+    first = found[0]
+    alone = ", ".join(f"{100 * _additive(angle):.0f} % of the variance of {angle.quantity}" for angle in found)
     sentences = (
-        f"Over the input angle: the first {found.joints} settled joints, {ORIGIN[found.origin]}; bands are the 95 % "
-        f"intervals at each angle. Shares{what} are corrected for chance: an error without effect has the mean share "
-        "0, and its estimate may be negative."
+        f"All errors alone explain {alone}. Over the input angle: the first {first.joints} settled joints, "
+        f"{ORIGIN[first.origin]}; bands are the 95 % intervals at each angle. Shares are corrected for chance: an "
+        "error without effect has the mean share 0, and its estimate may be negative."
     )
-    if found.apart:
+    if first.apart:
         sentences += (
-            f" The largest loads differ by up to {found.apart:.1e} (relative) from the stored ones, which another "
+            f" The largest loads differ by up to {first.apart:.1e} (relative) from the stored ones, which another "
             "machine or version computed."
         )
     return sentences

@@ -243,8 +243,7 @@ def _draw(ax: Axes, facts: Mapping[str, Any], use: FloatArray, values: FloatArra
         ax.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
         ax.set_ylim(low, high)
     ax.set_xlim(0.0, None)
-    name, unit = facts["name"], unit_text(facts["unit"])
-    ax.set(xlabel=f"share of the clearance used by\n{name}", ylabel=f"{facts['load']} [{unit}]")
+    ax.set(xlabel=f"clearance used by {facts['name']}", ylabel=f"{facts['load']} [{unit_text(facts['unit'])}]")
     if not math.isnan(limit):
         ax.axhline(limit, color=style.INK, lw=1.2, ls=(0.0, (8.0, 3.0)), label="limit")
         ax.legend(loc="upper left", ncols=3, columnspacing=1.2, handlelength=1.8)

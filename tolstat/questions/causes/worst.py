@@ -77,7 +77,7 @@ def worst(view: View, by: Load = None, top: Top = 10) -> Answer:
     """
     load = by or view.most_exceeded
     rows = joint_rows(view, load, top)
-    unit = unit_of(view, load)
+    unit = rows[0]["unit"] if rows else "1"
     columns = [
         Column("row", lambda row: str(row["row"])),
         Column(f"{load} [{unit}]" if unit != "1" else load, lambda row: f"{row['value']:.6g}"),
@@ -144,18 +144,12 @@ def joint_rows(view: View, by: str, n: int = 10) -> Rows:
     StoreError
         When the study is not that of the file.
     """
-    samples, values = _largest(view, by, n)
-    head = {"load": by, "unit": unit_of(view, by)}
+    samples, values, unit = _largest(view, by, n)
+    status = [Status(one).label for one in view.status[samples]]
+    own = zip(view.rows(samples).tolist(), values.tolist(), _points(view, by, samples), status, strict=True)
     return [
-        head | {"row": row, "value": value, "point": point, "status": Status(status).label} | scores
-        for row, value, point, status, scores in zip(
-            view.rows(samples).tolist(),
-            values.tolist(),
-            _points(view, by, samples),
-            view.status[samples],
-            _scores(view, samples),
-            strict=True,
-        )
+        dict(zip(KEYS, (by, unit, *joint), strict=True)) | scores
+        for joint, scores in zip(own, _scores(view, samples), strict=True)
     ]
 
 
@@ -169,17 +163,17 @@ def largest_errors(row: Row) -> list[tuple[str, float]]:
     return sorted(((k, z) for k, z in row.items() if k not in KEYS), key=lambda item: -round(abs(item[1]), 9))
 
 
-def _largest(view: View, by: str, n: int) -> tuple[NDArray[np.intp], FloatArray]:
-    """Samples of the `n` joints with the largest values, the largest first; and these values."""
+def _largest(view: View, by: str, n: int) -> tuple[NDArray[np.intp], FloatArray, str]:
+    """Samples of the `n` joints with the largest values, the largest first; these values, and their unit."""
     view, name = view.narrowed(by)
     if name in view.kept_loads:
-        values = LOADS[name].of(view.results)
+        values, unit = LOADS[name].of(view.results), LOADS[name].unit
     else:
         column = _column(view, name)
-        values = column.of(view.read_results([column.field])).astype(np.float64)
+        values, unit = column.of(view.read_results([column.field])).astype(np.float64), str(column.unit)
     samples = np.flatnonzero(np.isin(view.status, SIMULATED) & np.isfinite(values))
     samples = samples[np.argsort(-values[samples], kind="stable")][:n]
-    return samples, values[samples]
+    return samples, values[samples], unit
 
 
 def _column(view: View, by: str) -> Any:
@@ -198,12 +192,6 @@ def _column(view: View, by: str) -> Any:
         raise InputError([Fault(by, found, f"give one of: {', '.join([*view.kept_loads, *columns])}")])
     remedy = did_you_mean(by, [*view.kept_loads, *columns])
     raise InputError([Fault(by, "is neither a load nor a column of the results", remedy)])
-
-
-def unit_of(view: View, by: str) -> str:
-    """SI unit of a load or a column of the results."""
-    view, name = view.narrowed(by)
-    return LOADS[name].unit if name in view.kept_loads else str(_column(view, name).unit)
 
 
 def _points(view: View, by: str, samples: NDArray[np.intp]) -> list[str]:

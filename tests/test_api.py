@@ -62,7 +62,7 @@ def examples(tmp_path_factory):
     return {
         **{name: {"path": two} for name in ("questions.allocate.answer", "questions.reweight", "report.summary")},
         "questions.compare": {"path": two, "other": fewer},
-        "questions.causes.query": {"path": known},
+        "questions.causes.errors": {"path": known},
     }
 
 
@@ -72,7 +72,7 @@ def examples(tmp_path_factory):
         "questions.allocate.answer",
         "questions.reweight",
         "questions.compare",
-        "questions.causes.query",
+        "questions.causes.errors",
         "report.summary",
     ],
 )

@@ -77,7 +77,8 @@ def write(runs: Sequence[Run], setup: Setup, stem: Path) -> str:
     with atomic_write(stem.with_suffix(".md")) as temporary:
         temporary.write_text(page(points, truth, subtitle, f"{stem.name}.png"), encoding="utf-8")
     ahead = _ahead(points, truth, "loads")
-    return table.as_text(table.plain(ahead), ahead)
+    rows = ahead.to_dict("records")
+    return table.as_text(table.plain(rows), rows)
 
 
 def short(runs: Sequence[Run]) -> str:

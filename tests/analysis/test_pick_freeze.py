@@ -14,7 +14,7 @@ from tolstat.analysis import pick_freeze
 from tolstat.campaign import extend
 from tolstat.common.errors import InputError
 from tolstat.common.tables import RESULT, Simulation, Status
-from tolstat.questions.causes.query import causes_of
+from tolstat.questions.causes.errors import causes
 from tolstat.store import ResultFile
 
 SEEDS = 500
@@ -160,7 +160,7 @@ def test_a_command_runs_the_design_of_a_study_and_tells_the_indices(tmp_path, mo
     monkeypatch.chdir(tmp_path)
     fakes.replace_functions(monkeypatch, **fakes.SOLVER | {"simulate_rows": simulate})
     load(tmp_path, TEXT.replace('\nmethod = "pick_freeze"', ""))
-    command = ["causes", "design.toml", "--pick-freeze", "150", "--workers", "1"]
+    command = ["causes", "design.toml", "--points", "150", "--workers", "1"]
     done = CliRunner().invoke(cli.app, command)
     assert done.exit_code == 0, done.stderr
     lines = [line.split() for line in done.stdout.splitlines()]
@@ -169,7 +169,7 @@ def test_a_command_runs_the_design_of_a_study_and_tells_the_indices(tmp_path, mo
     assert "in all" in done.stdout
     assert "rank" not in done.stdout
     with ResultFile.open("design_causes.h5") as store:
-        table = causes_of(store.view(), "cross1.F").table.set_index("error")
+        table = causes(store.view(), "cross1.F").frame("errors").set_index("error")
     assert {row[0] for row in lines[1:]} == set(table.index)
     # pin and hole are normal with these deviations: y = pin + 2 hole + 0.3 pin hole
     pin = np.sqrt(4) * 1e-4 / 3 * 1e5
@@ -185,8 +185,8 @@ def test_a_command_runs_the_design_of_a_study_and_tells_the_indices(tmp_path, mo
             assert abs(row[index] - truth) < row[f"{index}_upper"] - row[f"{index}_lower"]
         assert row["first_upper"] - row["first_lower"] < 0.6
     found = json.loads(CliRunner().invoke(cli.app, ["causes", "design_causes.h5", "--json"]).stdout)
-    assert found["r2"] is None
-    assert len(found["table"]) == 2
+    assert found["facts"]["r2"] is None
+    assert len(found["tables"]["errors"]["rows"]) == 2
     wider = extend.extend(tmp_path / "design_causes.h5", 160)
     assert wider.rows == 1 + 160 * 4
 
@@ -195,8 +195,9 @@ def test_too_few_points_and_options_that_go_with_a_design_are_refused(tmp_path):
     path = synthetic.store(tmp_path, TEXT.replace("n = 60", "n = 20"), "few")
     for arguments, text in (
         ((path,), "run 50 points or more"),
-        ((path, "--out", "x.h5"), "add --pick-freeze"),
-        ((path, "--pick-freeze", 100), "is not UTF-8"),
+        ((path, "--points", 100), "add --run, or give a study (TOML)"),
+        ((path, "--run", "--points", 100), "are about the design of a study"),
+        ((path.with_suffix(".toml"), "--each", "error"), "say what --run simulates into FILE"),
     ):
         done = CliRunner().invoke(cli.app, ["causes", *map(str, arguments)])
         assert done.exit_code == 2, text

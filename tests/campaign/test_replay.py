@@ -20,7 +20,7 @@ from tolstat.common.draw_records import SUBSET
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.files import data_dir
 from tolstat.common.tables import Simulation, Status
-from tolstat.questions.causes.tail import worst_joints
+from tolstat.questions.causes.worst import joint_rows, largest_errors
 from tolstat.store import ResultFile, Writer, recorded
 from tolstat.study.tolerances import distributions
 from tolstat.study.tolerances.radial import Rayleigh
@@ -167,25 +167,25 @@ def test_the_tail_is_told_with_its_errors(tmp_path: Path) -> None:
     )
     path = synthetic.store(tmp_path, text, failed=2, unsettled=3)
     with ResultFile.open(path) as store:
-        found = worst_joints(store.view(), "cross1.F", 4)
+        found = joint_rows(store.view(), "cross1.F", 4)
         errors, results = store.errors(), store.results()
-        contact = worst_joints(store.view(), "pin1.contact", 100)
-        assert worst_joints(store.view(), "steps", 1).unit == "1"
+        contact = joint_rows(store.view(), "pin1.contact", 100)
+        assert joint_rows(store.view(), "steps", 1)[0]["unit"] == "1"
         with pytest.raises(InputError, match="did you mean 'cross1\\.F'"):
-            worst_joints(store.view(), "cros1.F")
+            joint_rows(store.view(), "cros1.F")
     largest = results["F_max"][1:, 0]
     order = np.argsort(-np.nan_to_num(largest, nan=0.0))[:4] + 1
-    assert [joint.row for joint in found.joints] == order.tolist()
-    assert found.unit == "N"
-    assert len(contact.joints) == 58  # sixty joints less two failed; the nominal one is not counted
-    assert {joint.status for joint in contact.joints} == {Status.OK, Status.NOT_SETTLED}
-    for joint in found.joints:
-        z = errors["pin3.offset_t"][joint.row] / (1e-4 / 3)
-        assert joint.scores["pin3.offset_t"] == pytest.approx(z, abs=1e-9)
+    assert [joint["row"] for joint in found] == order.tolist()
+    assert {joint["unit"] for joint in found} == {"N"}
+    assert len(contact) == 58  # sixty joints less two failed; the nominal one is not counted
+    assert {joint["status"] for joint in contact} == {Status.OK.label, Status.NOT_SETTLED.label}
+    for joint in found:
+        z = errors["pin3.offset_t"][joint["row"]] / (1e-4 / 3)
+        assert joint["pin3.offset_t"] == pytest.approx(z, abs=1e-9)
         for part in "tz":
-            z = errors[f"hole2.offset_{part}"][joint.row] / 1e-4
-            assert joint.scores[f"hole2.offset_radial_{part}"] == pytest.approx(z, abs=1e-9)
-        sizes = [abs(score) for score in joint.scores.values()]
+            z = errors[f"hole2.offset_{part}"][joint["row"]] / 1e-4
+            assert joint[f"hole2.offset_radial_{part}"] == pytest.approx(z, abs=1e-9)
+        sizes = [abs(score) for _, score in largest_errors(joint)]
         assert sizes == sorted(sizes, reverse=True)
 
 
@@ -198,7 +198,7 @@ def test_the_tail_of_a_subset_simulation_is_told_too(tmp_path: Path) -> None:
         store.write(np.arange(61), Simulation(results, {}))
     with ResultFile.open(tmp_path / "subset.h5") as store:
         view = store.view()
-        assert [joint.row for joint in worst_joints(view, "cross1.F", 1).joints] == [np.argmax(results["F_max"][:, 0])]
+        assert [joint["row"] for joint in joint_rows(view, "cross1.F", 1)] == [np.argmax(results["F_max"][:, 0])]
         with pytest.raises(StoreError, match="no random sample"):
             view.load("cross1.F")
 
@@ -213,9 +213,10 @@ def test_worst_command(tmp_path: Path) -> None:
     assert len(lines) == 4
     done = CliRunner().invoke(cli.app, ["worst", str(path), "--by", "fork1.T", "--json"])
     found = json.loads(done.stdout)
-    assert len(found["joints"]) == 10
-    assert set(found["joints"][0]["scores"]) == {f"pin{i}.offset_t" for i in (1, 2, 3, 4)}
+    joints = found["tables"]["joints"]["rows"]
+    assert len(joints) == 10
+    assert {name for name, _ in largest_errors(joints[0])} == {f"pin{i}.offset_t" for i in (1, 2, 3, 4)}
     plan = study.load(tmp_path / "small.toml")
-    row = found["joints"][0]["row"]
+    row = joints[0]["row"]
     drawn = sampling.draw(plan, range(row, row + 1))["pin2.offset_t"][0]
-    assert found["joints"][0]["scores"]["pin2.offset_t"] == pytest.approx(drawn / (1e-4 / 3), abs=1e-9)
+    assert joints[0]["pin2.offset_t"] == pytest.approx(drawn / (1e-4 / 3), abs=1e-9)

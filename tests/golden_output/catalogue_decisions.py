@@ -92,7 +92,7 @@ SORTING = Campaign(
         "causes": [
             *forms("causes sorting.h5 --by cross1.T --top 5"),
             "causes sorting.h5 --logarithm",
-            "causes sorting.h5 --by cross1.F --against-angle --joints 200 --out angles.csv",
+            "angles sorting.h5 --by cross1.F --joints 200 --out angles",
             "export sorting.h5 --statistics - --by cross1.T",
         ],
         "reweight": forms("reweight sorting.h5 --set 'pin*.tilt_[tz].cpk=0.6' --set 'hole*.diameter.cpk=1.2'"),
@@ -110,7 +110,7 @@ SORTING = Campaign(
 )
 FROZEN = Campaign(
     "pick_freeze",
-    [cheap("iso2768_f"), "causes iso2768_f.toml --pick-freeze 50 --by cross1.F"],
+    [cheap("iso2768_f"), "causes iso2768_f.toml --points 50 --by cross1.F"],
     {
         "causes": forms("causes iso2768_f_causes.h5 --by cross1.F"),
         "status": ["status iso2768_f_causes.h5", "report iso2768_f_causes.h5", "capability iso2768_f_causes.h5"],

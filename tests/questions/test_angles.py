@@ -1,4 +1,4 @@
-"""Loads over the shaft angle: read or simulated again, and the errors that make them scatter at each angle."""
+"""Loads over the input angle: read or simulated again, and the errors that make them scatter at each angle."""
 
 import numpy as np
 import pandas as pd
@@ -15,9 +15,11 @@ from tolstat.common.errors import InputError, StoreError
 from tolstat.common.load_kinds import BUSHINGS
 from tolstat.common.loads import LOADS, SHOWN_LOADS
 from tolstat.display.asked import Asked
-from tolstat.questions.causes.angles import against_angle
-from tolstat.questions.causes.section import sections
-from tolstat.questions.causes.tail import worst_joints
+from tolstat.questions.causes import angles
+from tolstat.questions.causes.angles import angles_on_page
+from tolstat.questions.causes.errors import causes_on_page
+from tolstat.questions.causes.revolution import against_angle
+from tolstat.questions.causes.worst import drawn, joint_rows, worst_on_page
 from tolstat.store import ResultFile, revolutions
 from tolstat.store.revolutions import Revolutions
 
@@ -105,55 +107,51 @@ def test_each_error_has_its_share_where_it_acts(known):
 
 
 def test_command_writes_shares_and_picture(known, tmp_path):
-    arguments = [
-        "causes",
-        str(known),
-        "--by",
-        "cross2.F",
-        "--against-angle",
-        "--out",
-        str(tmp_path / "out.csv"),
-        "--top",
-        "2",
-    ]
-    done = CliRunner().invoke(app, arguments)
+    arguments = ["--by", "cross2.F", "--out", str(tmp_path / "out"), "--top", "2"]
+    done = CliRunner().invoke(app, ["angles", str(known), *arguments])
     assert done.exit_code == 0
     lines = done.stdout.splitlines()
     assert [line.split()[0] for line in lines] == ["error", "pin1.offset_t", "pin3.offset_z"]
     assert lines[2].split()[-1] in ("90", "270")
-    table = pd.read_csv(tmp_path / "out.csv")
+    table = pd.read_csv(tmp_path / "out" / "known_angles_angles.csv")
     assert len(table) == 12 * 8
     assert table.groupby("theta")["share"].sum().to_numpy() == pytest.approx(1.0, abs=0.15)
-    assert (tmp_path / "out.png").read_bytes().startswith(b"\x89PNG")
+    assert len(pd.read_csv(tmp_path / "out" / "known_angles_revolution.csv")) == 8
+    for key in ("angle-cross2-F", "angle-shares-cross2-F"):
+        assert (tmp_path / "out" / f"known_angles_{key}.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_page_draws_loads_over_the_revolution(known):
     asked = Asked(known, replay=800)
     with ResultFile.open(known) as store:
         view = store.view()
-        found = sections(view, asked)
+        found = [on_page(view, asked) for on_page in (causes_on_page, angles_on_page, worst_on_page)]
         bushings = [name for name in view.leading if name in SHOWN_LOADS]
-        worst = worst_joints(view, bushings[0], 3)
-        errors = view.errors(np.sort(worst.samples))["pin1.offset_t"][np.argsort(np.argsort(worst.samples))]
-    assert [section.key for section in found] == ["causes", "worst"]
+        worst, samples = joint_rows(view, bushings[0], 3), drawn(view, bushings[0])
+        errors = view.errors(np.sort(samples))["pin1.offset_t"][np.argsort(np.argsort(samples))]
     assert asked.notes == []
     panels = {
         panel.key: panel
-        for section in found
-        for block in section.blocks
+        for answer in found
+        for block in answer.blocks()
         if block.kind == "panels"
         for panel in block.panels
     }
     keys = [name.replace(".", "-") for name in bushings]
-    drawn = [key for key in panels if not key.startswith("tornado")]
-    assert drawn == [f"angle{part}-{key}" for key in keys for part in ("", "-shares")] + [
+    histories = [key for key in panels if not key.startswith("tornado")]
+    assert histories == [f"angle{part}-{key}" for key in keys for part in ("", "-shares")] + [
         f"worst-{key}" for key in keys
     ]
     ax = Figure().subplots()
     panels[f"worst-{keys[0]}"].draw(ax)
     lines = ax.get_lines()[:3]
-    assert [line.get_label() for line in lines] == [f"row {joint.row}" for joint in worst.joints]
+    assert [line.get_label() for line in lines] == [f"row {joint['row']}" for joint in worst]
     assert [line.get_ydata()[0] for line in lines] == pytest.approx(600.0 + 20.0 * errors / SIGMA)
+
+
+def test_shares_that_are_no_more_than_chance_have_no_minus_before_zero():
+    shares = [cell.cell for cell in angles.COLUMNS if cell.head == "revolution, %"]
+    assert [cell({"share": x}) for cell in shares for x in (-1e-4, -6e-4, 0.1234)] == ["0.0", "-0.1", "12.3"]
 
 
 def test_components_and_loads_of_shafts_have_shares_in_their_unit(known):
@@ -165,7 +163,7 @@ def test_components_and_loads_of_shafts_have_shares_in_their_unit(known):
 
 def test_what_has_no_shares_is_refused(known, tmp_path):
     few, sweep = synthetic.store(tmp_path), synthetic.store(tmp_path, synthetic.SWEEP, "sweep")
-    with ResultFile.open(known) as store, pytest.raises(InputError, match="is not a load over the shaft angle"):
+    with ResultFile.open(known) as store, pytest.raises(InputError, match="is not a load over the input angle"):
         against_angle(store.view(), ["pin1.contact"])
     for path, text in ((few, "100 are needed"), (sweep, "not drawn from tolerances")):
         with ResultFile.open(path) as store, pytest.raises(StoreError, match=text):

@@ -1,6 +1,8 @@
 """Commands `causes` and `capability` on a campaign whose causes are known."""
 
 import json
+from contextlib import suppress
+from shlex import quote
 
 import numpy as np
 import pandas as pd
@@ -10,14 +12,17 @@ from typer.testing import CliRunner
 from tests.support import synthetic
 from tolstat.analysis import exceedance, sensitivity
 from tolstat.cli import app
+from tolstat.common.errors import NotApplicable
 from tolstat.common.loads import ANY_LIMIT
 from tolstat.common.tables import SIMULATED, Simulation, Status
+from tolstat.display.answer import Sentence
 from tolstat.display.asked import Asked
 from tolstat.display.text import value
+from tolstat.questions import QUESTIONS, Question
 from tolstat.questions.capability import capability
-from tolstat.questions.causes import query, rendering, tail_section
-from tolstat.questions.causes.query import causes_of
-from tolstat.questions.causes.section import sections
+from tolstat.questions.causes import errors, worst
+from tolstat.questions.causes import indices as of_errors
+from tolstat.questions.causes.errors import causes
 from tolstat.store import ResultFile, Writer, view
 
 N = 3000
@@ -47,10 +52,10 @@ def run(*arguments):
 
 def test_known_causes_are_found_with_their_shares(path):
     with ResultFile.open(path) as store:
-        found = causes_of(store.view(), "cross1.F")
-    assert (found.joints, found.without_load, found.level) == (N - 5, 5, 700.0)
-    table = found.table.set_index("error")
-    assert set(found.table["error"][:2]) == {"pin1.offset_t", "pin2.offset_z"}
+        found = causes(store.view(), "cross1.F")
+    assert [found.facts[key] for key in ("joints", "without_load", "level")] == [N - 5, 5, 700.0]
+    table = found.frame("errors").set_index("error")
+    assert set(table.index[:2]) == {"pin1.offset_t", "pin2.offset_z"}
     # variances 20² and 2 · 10²
     assert table.loc["pin1.offset_t", "first"] == pytest.approx(2 / 3, abs=0.05)
     assert table.loc["pin2.offset_z", "first"] == pytest.approx(1 / 3, abs=0.05)
@@ -60,27 +65,28 @@ def test_known_causes_are_found_with_their_shares(path):
     assert table.loc["pin1.offset_t", "direction_p"] < 1e-6 < 0.05 < table.loc["pin2.offset_z", "direction_p"]
     assert table.loc["pin2.offset_z", "size_p"] < 1e-6
     with ResultFile.open(path) as store:
-        relative = causes_of(store.view(), "cross1.F", log=True)
-    assert relative.std == pytest.approx(found.std / 650, rel=0.05)
+        relative = causes(store.view(), "cross1.F", logarithm=True)
+    assert relative.facts["std"] == pytest.approx(found.facts["std"] / 650, rel=0.05)
     others = table.drop(["pin1.offset_t", "pin2.offset_z"])
     assert others[["direction_p", "size_p"]].min(axis=None) > 0.05
     assert others["first"].max() < 0.02
 
 
 def test_of_many_joints_the_first_are_taken_and_all_of_a_thin_tail(path, monkeypatch):
-    monkeypatch.setattr(query, "MAX_JOINTS", 1000)
+    monkeypatch.setattr(of_errors, "MAX_JOINTS", 1000)
     monkeypatch.setattr(view, "BLOCK", 700)
     with ResultFile.open(path) as store:
-        found = causes_of(store.view(), "cross1.F")
+        found = causes(store.view(), "cross1.F")
         errors, loads = store.errors()[1:1001], store.results()["F_max"][1:-5, 0]
-    assert (found.joints, found.used) == (N - 5, 1000)
-    row = found.table.set_index("error").loc["pin1.offset_t"]
-    x = np.column_stack([errors[name] for name in found.table["error"]])
-    here = list(found.table["error"]).index("pin1.offset_t")
+    assert (found.facts["joints"], found.facts["used"]) == (N - 5, 1000)
+    table = found.frame("errors").set_index("error")
+    row = table.loc["pin1.offset_t"]
+    x = np.column_stack([errors[name] for name in table.index])
+    here = list(table.index).index("pin1.offset_t")
     assert row["first"] == pytest.approx(sensitivity.first_order(x, loads[:1000]).estimate[here])
-    assert found.above == np.sum(found.level < loads)
+    assert found.facts["above"] == np.sum(found.facts["level"] < loads)
     assert row["direction_p"] < 1e-6
-    assert "first 1000 joints" in rendering.note(found)
+    assert any("first 1000 joints" in part.text for part in found.parts if isinstance(part, Sentence))
 
 
 def test_command_prints_the_first_errors_and_json_has_all(path):
@@ -92,8 +98,27 @@ def test_command_prints_the_first_errors_and_json_has_all(path):
     assert "2995 joints, 5 without a valid load" in done.stderr
     assert "of the logarithm" in run("causes", path, "--logarithm").stderr
     found = json.loads(run("causes", path, "--by", "psi", "--json").stdout)
-    assert len(found["table"]) == 8
-    assert found["unit"] == "1"
+    assert len(found["tables"]["errors"]["rows"]) == 8
+    assert found["facts"]["unit"] == "1"
+
+
+def test_shares_in_all_are_offered_until_they_are_simulated(path, monkeypatch):
+    with ResultFile.open(path) as store:
+        known = store.view()
+        before = [part.text for part in causes(known, "cross2.F").parts if isinstance(part, Sentence)]
+        known.altered = {"a change": None}
+        monkeypatch.setattr(errors.lines, "lines", refuses)
+        after = [part.text for part in causes(known, "cross2.F").parts if isinstance(part, Sentence)]
+    assert (
+        f"no shares in all: given joints bound them too widely; tolstat causes {quote(str(path))} --run gives them"
+        in before
+    )
+    assert "no shares in all: given joints bound them too widely" in after
+    assert not any("--run" in text for text in after)
+
+
+def refuses(view, load):
+    raise NotApplicable("no joints with other widths")
 
 
 def test_correlated_errors_have_no_total_and_dependent_samples_no_interval(tmp_path):
@@ -122,23 +147,27 @@ def test_what_has_no_causes_is_refused(tmp_path, path):
 
 def test_of_the_first_samples_only_these_count(path):
     with ResultFile.open(path) as store:
-        found = causes_of(store.view(), "cross1.F", joints=1000)
+        found, rows = of_errors.indices(store.view(), "cross1.F", joints=1000)
         errors, loads = store.errors()[1:1001], store.results()["F_max"][1:1001, 0]
-    assert (found.joints, found.used, found.without_load) == (1000, 1000, 0)
-    assert found.above == np.sum(loads > found.level)
-    x = np.column_stack([errors[name] for name in found.table["error"]])
-    np.testing.assert_allclose(found.table["first"], sensitivity.first_order(x, loads).estimate)
+    assert [found[key] for key in ("joints", "used", "without_load")] == [1000, 1000, 0]
+    assert found["above"] == np.sum(loads > found["level"])
+    x = np.column_stack([errors[row["error"]] for row in rows])
+    np.testing.assert_allclose([row["first"] for row in rows], sensitivity.first_order(x, loads).estimate)
 
 
 PAGE = synthetic.STUDY.replace("n = 60", "n = 400").replace("40 N*m", "18 N*m").replace("offset_t", "offset_[tz]")
 
 
 def shown(path):
-    """Sections of the page by key, the notes, and the leading loads of a result file."""
+    """Blocks of the page by question, the notes, and the leading loads of a result file."""
     asked = Asked(path)
     with ResultFile.open(path) as store:
         view = store.view()
-        found = {section.key: section.blocks for section in sections(view, asked)}
+        found = {}
+        for question in QUESTIONS:
+            if isinstance(question, Question) and question.name in ("pairs", "causes", "angles", "worst"):
+                with suppress(NotApplicable):
+                    found[question.name] = question.on_page(view, asked).blocks()
         return found, asked.notes, view.loads(view.leading)
 
 
@@ -150,17 +179,19 @@ def test_page_has_causes_and_worst_joints_of_the_leading_loads(tmp_path):
     found, notes, leading = shown(synthetic.store(tmp_path, PAGE, failed=15, unsettled=12))
     assert (list(found), notes) == (["causes", "worst"], [])
     assert leading[0].name == "cross1.F"
-    assert [table.title.partition(":")[0] for table in tables(found["causes"])] == [load.name for load in leading]
+    assert [table.title.split()[2] for table in tables(found["causes"])] == [load.name for load in leading]
     assert [len(table.rows) for table in tables(found["causes"])] == [8] * len(leading)
     said = [block.text for block in found["causes"] if block.kind == "text"]
     assert sum(": 373 joints, 27 without a valid load left out" in line for line in said) == len(leading)
     assert [panel.key for panel in found["causes"][1].panels] == [
         f"tornado-{load.name.replace('.', '-')}" for load in leading
     ]
-    assert [table.head[1] for table in tables(found["worst"])] == [load.name for load in leading]
-    for load, table in zip(leading, tables(found["worst"]), strict=True):
+    (table,) = tables(found["worst"])
+    assert list(dict.fromkeys(row[0] for row in table.rows)) == [load.name for load in leading]
+    for load in leading:
         values = np.sort(load.values[np.isin(load.status, SIMULATED) & np.isfinite(load.values)])[::-1]
-        assert [row[1] for row in table.rows] == [value(x, load.unit) for x in values[: tail_section.JOINTS]]
+        own = [row[2] for row in table.rows if row[0] == load.name]
+        assert own == [value(x, load.unit) for x in values[: worst.ON_PAGE]]
 
 
 @pytest.mark.slow

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import tolstat
 from tests.support import synthetic
 from tests.support.views import OPERATION
 from tolstat import sampling, study
-from tolstat.common.errors import StoreError
+from tolstat.cli import app
+from tolstat.common.errors import NotApplicable, StoreError
 from tolstat.common.load_kinds import PINS
 from tolstat.common.tables import ERROR, Simulation
 from tolstat.display.asked import Asked
 from tolstat.joint import HOLE_OF_PIN, load, perturb
-from tolstat.questions.causes import pairs_section
-from tolstat.questions.causes.pairs import MISSED, combinations
+from tolstat.questions.causes.pairs import MISSED, combinations, pairs_on_page
 from tolstat.store import ResultFile, Writer
 
 TEXT = (
@@ -52,11 +55,31 @@ def path(tmp_path):
 
 def test_the_cause_is_found_on_one_half_and_shown_on_the_other(path):
     with ResultFile.open(path) as store:
-        found = tolstat.pairs_of(store.view(), "cross1.F")
-    assert found.name == MISSED
-    assert found.correlation > 0.95 > 0.5 > found.single
-    assert len(found.use) == len(found.values) == 300
-    assert next(iter(found.others)) == MISSED
+        found = tolstat.pairs(store.view(), "cross1.F")
+    assert found.facts["name"] == MISSED
+    assert found.facts["correlation"] > 0.95 > 0.5 > found.facts["single"]
+    assert len(found.frame("joints")) == 300
+    assert found.frame("combinations")["name"][0] == MISSED
+    assert found.frame("combinations")["correlation"][0] == found.facts["correlation"]
+
+
+def test_command_prints_the_combinations_and_json_has_all_of_them(path):
+    done = CliRunner().invoke(app, ["pairs", str(path)])
+    assert done.exit_code == 0
+    assert f"What tells most is {MISSED}" in " ".join(done.stdout.split())
+    assert done.stdout.splitlines()[-5].endswith(MISSED)
+    found = json.loads(CliRunner().invoke(app, ["pairs", str(path), "--json"]).stdout)
+    assert len(found["tables"]["combinations"]["rows"]) == 14
+    assert {row["unit"] for row in found["tables"]["joints"]["rows"]} == {"N"}
+
+
+def test_where_a_single_error_tells_more_the_command_says_so_and_the_page_is_silent(tmp_path):
+    file = synthetic.store(tmp_path, synthetic.STUDY.replace("n = 60", "n = 300"))
+    with ResultFile.open(file) as store, pytest.raises(NotApplicable):
+        pairs_on_page(store.view(), Asked(file))
+    done = CliRunner().invoke(app, ["pairs", str(file), "--by", "cross2.F"])
+    assert done.stdout.startswith("A single error tells more of cross2.F than any combination")
+    assert "limit" not in done.stdout
 
 
 def test_motions_of_the_cross_use_no_clearance():
@@ -87,10 +110,10 @@ def test_equal_tilts_of_pin_and_hole_use_no_clearance():
 
 def test_the_page_shows_the_scatter_with_the_limit(path):
     with ResultFile.open(path) as store:
-        (section,) = pairs_section.sections(store.view(), Asked(path))
-    assert [block.kind for block in section.blocks] == ["text", "panels", "table", "text"]
-    assert MISSED in section.blocks[0].text
-    assert "of the others" in section.blocks[0].text
+        blocks = pairs_on_page(store.view(), Asked(path)).blocks()
+    assert [block.kind for block in blocks] == ["text", "panels", "table", "text"]
+    assert MISSED in blocks[0].text
+    assert "of the others" in blocks[0].text
 
 
 def test_of_several_points_the_load_is_that_of_the_worst_and_the_page_names_it(tmp_path):
@@ -107,16 +130,16 @@ def test_of_several_points_the_load_is_that_of_the_worst_and_the_page_names_it(t
         for name, table in tables.items():
             store.at(name).write(np.arange(plan.rows), Simulation(table, {}))
     with ResultFile.open(tmp_path / "points.h5") as store:
-        found = tolstat.pairs_of(store.view(), "cross1.F")
-        at_one = tolstat.pairs_of(store.view(), "cross1.F at high")
-        (section,) = pairs_section.sections(store.view(), Asked(tmp_path / "points.h5"))
-    assert (found.points, found.worst, found.name) == (("low", "high"), "high", MISSED)
-    assert (at_one.points, at_one.worst) == (("high",), "high")
-    np.testing.assert_array_equal(found.values, at_one.values)
-    assert "cross1.F is the largest over low, high; it is most severe at high" in section.blocks[0].text
+        found = tolstat.pairs(store.view(), "cross1.F")
+        at_one = tolstat.pairs(store.view(), "cross1.F at high")
+        blocks = pairs_on_page(store.view(), Asked(tmp_path / "points.h5")).blocks()
+    assert [found.facts[key] for key in ("points", "worst", "name")] == [["low", "high"], "high", MISSED]
+    assert [at_one.facts[key] for key in ("points", "worst")] == [["high"], "high"]
+    np.testing.assert_array_equal(found.frame("joints")["value"], at_one.frame("joints")["value"])
+    assert "cross1.F is the largest over low, high; it is most severe at high" in blocks[0].text
 
 
 def test_too_few_joints_are_refused(tmp_path):
     file = synthetic.store(tmp_path)
     with ResultFile.open(file) as store, pytest.raises(StoreError, match="60 joints"):
-        tolstat.pairs_of(store.view(), "cross1.F")
+        tolstat.pairs(store.view(), "cross1.F")

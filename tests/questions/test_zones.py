@@ -10,7 +10,7 @@ from tests.support.synthetic import HEAD
 from tolstat import sampling, study
 from tolstat.common.errors import InputError
 from tolstat.common.tables import Simulation
-from tolstat.questions.causes.query import causes_of
+from tolstat.questions.causes.errors import causes
 from tolstat.questions.reweight import _block_log_ratios
 from tolstat.store import View, Writer
 from tolstat.study import scaling
@@ -99,7 +99,7 @@ def test_causes_name_the_components_of_a_zone(tmp_path):
         results, errors = synthetic.results(store.n), store.errors()
         results["F_max"][:, 0] = 640.0 + 1e6 * (errors["pin1.offset_t"] - 0.018 * errors["pin1.tilt_z"])
         store.write(np.arange(store.n), Simulation(results, {}))
-        found = causes_of(View(store), "cross1.F").table.set_index("error")
+        found = causes(View(store), "cross1.F").frame("errors").set_index("error")
     assert len(found) == 25
     # the load follows the inner end along t, and nothing else
     assert found.index[0] == "pin1.position_inner_t"

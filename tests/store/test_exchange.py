@@ -39,7 +39,7 @@ def test_json_has_all_statistics_as_the_reports_have_them(tmp_path):
             told, table.replace([float("inf"), -float("inf")], float("nan")), check_exact=False
         )
     assert len(found["exceedance"]["tables"]["quantiles"]["rows"]) == 4 * len(SHOWN_LOADS)
-    assert found["causes"]["cross1.F"]["table"][0]["error"] == "pin1.offset_t"
+    assert found["causes"]["cross1.F"]["tables"]["errors"]["rows"][0]["error"] == "pin1.offset_t"
 
 
 def test_statistics_are_of_a_sample(tmp_path):

@@ -127,7 +127,6 @@ def test_texts_at_the_prompt_are_short(path, store):
     assert repr(load).startswith("<load 'cross1.F': 55 of 60 joints valid, 6")
     assert repr(load).endswith(" N, limit 700 N>")
     results = [store, store.loads, view, view.study, load, load.above(700.0), load.quantile(0.5), store.counts()]
-    results += [tolstat.worst_joints(view, "cross1.F", 3)]
     for result in results:
         assert len(repr(result)) <= MAX_REPR
         assert "\n" not in repr(result)

@@ -24,7 +24,7 @@ from tolstat.common.columns import RESULT_COLUMNS
 from tolstat.common.errors import InputError, StoreError
 from tolstat.questions import accuracy as question
 from tolstat.questions import sweep
-from tolstat.questions.causes.tail import worst_joints
+from tolstat.questions.causes.worst import joint_rows
 from tolstat.questions.exceedance import curves, rows
 from tolstat.store import ResultFile, layout, metadata, verification
 
@@ -269,11 +269,11 @@ def test_reports_of_cases(tmp_path: Path) -> None:
 def test_what_is_not_kept_cannot_be_asked_for(tmp_path: Path) -> None:
     path = synthetic.store(tmp_path, text("cross*.F_max", body=PLAIN))
     with ResultFile.open(path) as store:
-        assert len(worst_joints(store.view(), "cross1.F", 3).joints) == 3
-        assert len(worst_joints(store.view(), "closure", 3).joints) == 3
+        assert len(joint_rows(store.view(), "cross1.F", 3)) == 3
+        assert len(joint_rows(store.view(), "closure", 3)) == 3
         for by in ("fork1.T", "fork1.T_max", "psi"):
             with pytest.raises(InputError, match=r"is not kept in .*\n.*give one of: cross1\.F, "):
-                worst_joints(store.view(), by)
+                joint_rows(store.view(), by)
     until = stop_rule.parse("P(pin1.contact > 1 N) width < 0.1", {})
     with pytest.raises(InputError, match=r"leaves out pin1\.contact, .*--until.*\n.*add pin1\.contact_outer_max, pin1"):
         stop_rule.run_until(study.load(tmp_path / "small.toml"), tmp_path / "b.h5", until, lambda row: None)

@@ -6,7 +6,7 @@ import pytest
 from tests.support import synthetic, views
 from tolstat.common.tables import Status
 from tolstat.display.asked import Asked
-from tolstat.questions.causes.tail import worst_joints
+from tolstat.questions.causes.worst import _largest, joint_rows
 from tolstat.questions.exceedance.answer import exceedance, exceedance_on_page, limits_on_page
 from tolstat.report import verdict
 from tolstat.report.headline import headline
@@ -92,11 +92,12 @@ def test_shares_at_each_point(view, tables):
 
 
 def test_the_worst_joints_name_their_point(view, monkeypatch):
-    monkeypatch.setattr("tolstat.questions.causes.tail._with_errors", lambda *args: args[-1])
-    found = worst_joints(view, "cross1.F", 20)
-    parts = np.stack([view.load(f"cross1.F at {name}").values[found.samples] for name in ("one", "two")])
-    assert found.joints == [("one", "two")[k] for k in parts.argmax(axis=0)]
-    assert set(worst_joints(view, "cross1.F at one", 20).joints) == {"one"}
+    monkeypatch.setattr("tolstat.questions.causes.worst._scores", lambda view, samples: [{}] * len(samples))
+    samples = _largest(view, "cross1.F", 20)[0]
+    parts = np.stack([view.load(f"cross1.F at {name}").values[samples] for name in ("one", "two")])
+    found = [joint["point"] for joint in joint_rows(view, "cross1.F", 20)]
+    assert found == [("one", "two")[k] for k in parts.argmax(axis=0)]
+    assert {joint["point"] for joint in joint_rows(view, "cross1.F at one", 20)} == {"one"}
 
 
 def test_the_verdict_names_the_point(tables, view):

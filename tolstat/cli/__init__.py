@@ -55,11 +55,6 @@ for heading, commands in PLAIN.items():
     for name, summary in commands.items():
         LISTED[name.replace("_", "-")] = Listed(heading, summary, partial(_plain, name))
     for question in QUESTIONS:
-        if isinstance(question, Question):
-            if question.heading == heading:
-                made = partial(_of_question, question)
-                LISTED[question.name.replace("_", "-")] = Listed(heading, question.summary, made)
-        elif question.heading == heading:
-            for name in question.commands:
-                if name not in commands:
-                    LISTED[name.replace("_", "-")] = Listed(heading, "", partial(_plain, name))
+        if question.heading == heading:
+            made = partial(_of_question, question)
+            LISTED[question.name.replace("_", "-")] = Listed(heading, question.summary, made)

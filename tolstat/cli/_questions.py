@@ -2,8 +2,7 @@
 
 The first parameters of a question say what its command reads: a `View` is FILE, two are A and B, ``*views`` are several
 files. Where the question's file has a function ``simulate(source, work, ...)``, its first parameter says what is
-simulated: a `Study` is STUDY, whose campaigns the answer is about, a path is FILE, behind ``--run``, and either is
-STUDY or a FILE of an earlier run, which is resumed.
+simulated: a `Study` is STUDY, whose campaigns the answer is about, a path is FILE, behind ``--run``; it may be either.
 """
 
 from __future__ import annotations
@@ -71,9 +70,9 @@ class _Asked:
     reads : str
         A key of `READS`.
     options, simulated : list of inspect.Parameter
-        Options of the question, and of its simulation.
-    into_file, resumes : bool
-        Whether it simulates into the result file that it reads, and whether it resumes one.
+        Options of the question, and of its simulation; both may have the same.
+    into_file : bool
+        Whether it simulates into the result file that it reads.
     """
 
     def __init__(self, question: Question) -> None:
@@ -87,12 +86,20 @@ class _Asked:
         several = views[0].kind is inspect.Parameter.VAR_POSITIONAL
         self.options = [p for p in found if p.annotation is not View]
         self.reads = "pair" if len(views) == 2 else "views" if several else "view"
-        self.simulated, self.into_file, self.resumes = [], False, False
+        self.simulated, self.into_file = [], False
         if self.simulate is not None:
             source, _, *self.simulated = inspect.signature(self.simulate, eval_str=True).parameters.values()
-            self.into_file, self.resumes = source.annotation is Path, source.annotation == Study | Path
-            if not self.into_file:
-                self.reads = "study" if several and not self.resumes else "either"
+            self.into_file = source.annotation is not Study
+            if source.annotation is Study:
+                self.reads = "study" if several else "either"
+            elif source.annotation is not Path:
+                self.reads = "either"
+
+    @property
+    def only_simulated(self) -> list[inspect.Parameter]:
+        """Options of the simulation that the question itself has not."""
+        names = {p.name for p in self.options}
+        return [p for p in self.simulated if p.name not in names]
 
     @property
     def docstring(self) -> str:
@@ -130,7 +137,7 @@ def command_of(question: Question) -> Callable[..., None]:
     made.__name__, made.__doc__ = question.name, prose(asked.docstring)
     listed = asked.reads == "views"
     parameters = [_argument(*entry, listed) for entry in arguments]
-    parameters += [_option(p, asked.help[p.name]) for p in (*asked.options, *asked.simulated)]
+    parameters += [_option(p, asked.help[p.name]) for p in (*asked.options, *asked.only_simulated)]
     made.__signature__ = inspect.Signature([*parameters, *shared])
     return run
 
@@ -190,8 +197,7 @@ def _simulated(asked: _Asked, source: Path, given: dict[str, Any]) -> list[Path]
     is_study = source.suffix == ".toml"
     if not (is_study or given.get("run")):
         _refuse_unused(asked, source, given)
-        if not asked.resumes:
-            return [source]
+        return [source]
     from tolstat import study
     from tolstat.cli._work import work
 
@@ -214,9 +220,10 @@ def _refuse_unused(asked: _Asked, source: Path, given: dict[str, Any]) -> None:
     InputError
         When there are any.
     """
-    used = [_flag(p) for p in asked.simulated if given[p.name] not in (None, p.default)]
+    used = [_flag(p) for p in asked.only_simulated if given[p.name] not in (None, p.default)]
     if used:
-        remedy = "add --run" if asked.into_file else "give a study (TOML)"
+        ways = {"add --run": asked.into_file, "give a study (TOML)": asked.reads != "view"}
+        remedy = ", or ".join(way for way, is_open in ways.items() if is_open)
         found = f"{'are' if len(used) > 1 else 'is'} about a simulation, and {source} holds its joints already"
         raise InputError([Fault(", ".join(used), found, remedy)])
 

@@ -155,12 +155,11 @@ def _collectives(view: View, nominal: bool) -> tuple[Callable[[TextIO], None], s
 
 
 def _statistics(view: View, by: Sequence[str], accepted: float) -> tuple[Callable[[TextIO], object], str]:
-    from tolstat.questions.causes import rendering
-    from tolstat.questions.causes.query import causes_of
+    from tolstat.questions.causes.errors import causes
     from tolstat.report import summary
 
     found = summary.statistics(view, accepted=accepted)
-    found["causes"] = {load: rendering.values(causes_of(view, load)) for load in by}
+    found["causes"] = {load: causes(view, load).values() for load in by}
     return lambda stream: stream.write(as_text(found) + "\n"), "all statistics"
 
 

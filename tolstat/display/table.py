@@ -97,14 +97,15 @@ def _text(used: Sequence[Column], rows: Rows) -> str:
     return align(_cells(used, rows), [column.words for column in used])
 
 
-def plain(table: pd.DataFrame, ranked: Sequence[str] = ()) -> list[Column]:
-    """Columns that show any frame, numbers to five digits; those `ranked` may be left out, the last first."""
+def plain(rows: Rows, ranked: Sequence[str] = ()) -> list[Column]:
+    """Columns that show any rows, numbers to five digits; those `ranked` may be left out, the last first."""
 
-    def column(name: str, words: bool) -> Column:
+    def column(name: str) -> Column:
+        words = any(isinstance(row[name], str) for row in rows)
         rank = 1 + list(ranked).index(name) if name in ranked else 0
-        return Column(name, lambda row: _short(row[name]), words, rank=rank)
+        return Column(name.replace("N*m", "N m"), lambda row: _short(row[name]), words, rank=rank)
 
-    return [column(str(name), table[name].dtype.kind not in "iufb") for name in table.columns]
+    return [column(name) for name in (rows[0] if rows else ())]
 
 
 def _short(x: Any) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,9 +14,8 @@ from tolstat.common import selected_results
 from tolstat.common.errors import Fault, NotApplicable
 from tolstat.common.load_kinds import BUSHINGS
 from tolstat.common.tables import Motion, Status, Variant
-from tolstat.display import text
 from tolstat.display.answer import Answer, Document, Part, Sentence, Table
-from tolstat.display.table import Column, Row, Rows
+from tolstat.display.table import Row, Rows, plain
 from tolstat.solver import refinement
 from tolstat.store import Reader, recorded, verification
 from tolstat.store.view import View
@@ -58,7 +56,7 @@ def cases(view: View) -> Answer:
     rows = _rows(store)
     seen = [_worst(row) for row in rows]
     title, counts = "Change of the loads by the errors of each joint", store.counts()
-    parts: list[Part] = [Table("cases", title, _columns(seen), rows, seen=seen)]
+    parts: list[Part] = [Table("cases", title, plain(seen, RANKED), rows, seen=seen)]
     parts.append(Sentence(f"{counts.done} of {counts.total} joints, {counts.shortfall}"))
     parts += [Sentence(f"{row['variant']}, {row['case']}: {row['remedy']}") for row in rows if row["remedy"]]
     if any(row["note"] for row in rows):
@@ -129,18 +127,6 @@ def _worst(row: Row) -> dict[str, Any]:
 
 def _of_bushings(row: Row, what: str) -> list[float]:
     return [row[name] for bushing in BUSHINGS if (name := f"{bushing}.{what}") in row]
-
-
-def _columns(rows: Rows) -> list[Column]:
-    names = list(rows[0]) if rows else []
-    words = {name for row in rows for name in names if isinstance(row[name], str)}
-    ranks = {name: RANKED.index(name) + 1 for name in names if name in RANKED}
-    return [Column(name, partial(_cell, name), words=name in words, rank=ranks.get(name, 0)) for name in names]
-
-
-def _cell(name: str, row: Row) -> str:
-    value = row[name]
-    return text.formed(value, ".5g") if isinstance(value, float) else str(value)
 
 
 def _markdown(rows: Rows) -> str:

@@ -20,7 +20,7 @@ from tolstat.display import drawing, style, text
 from tolstat.display.answer import Answer, Part, Sheet, Table
 from tolstat.display.blocks import Panel, Panels
 from tolstat.display.mpl import lines, ticker
-from tolstat.display.table import Column, Row, Rows
+from tolstat.display.table import Row, Rows, plain
 from tolstat.store import recorded
 from tolstat.store.view import View
 from tolstat.study.selection import UNITS
@@ -61,7 +61,8 @@ def sweep(view: View) -> Answer:
         raise NotApplicable(str(Fault(str(view.path), "holds no sweep", remedy)))
     rows = _rows(view)
     seen = [_short(row) for row in rows]
-    table = Table("sweep", "Worst bushing", _columns(seen), rows, seen=seen)
+    names = [name for name in (seen[0] if seen else ()) if "." in name]
+    table = Table("sweep", "Worst bushing", plain(seen, names[1:]), rows, seen=seen)
     pictures: list[Part] = [Panels(_panels(view)), Sheet("sweep", partial(sheet, view))] if view.bushing_loads else []
     return Answer("sweep", "Loads against the swept value", [*pictures, table])
 
@@ -86,26 +87,6 @@ def _short(row: Row) -> Row:
         if held:
             short[head] = float(np.fmax.reduce(held))
     return short
-
-
-def _columns(rows: Rows) -> list[Column]:
-    """Columns of the short rows; those of loads after the first may be left out, the last first."""
-    names = list(rows[0]) if rows else []
-    loads = [name for name in names if "." in name][1:]
-    return [
-        Column(
-            name.replace("N*m", "N m"),
-            partial(_cell, name),
-            words=name == "status",
-            rank=1 + loads.index(name) if name in loads else 0,
-        )
-        for name in names
-    ]
-
-
-def _cell(name: str, row: Row) -> str:
-    value = row[name]
-    return text.formed(value, ".5g") if isinstance(value, float) else str(value)
 
 
 def _panels(view: View) -> list[Panel]:

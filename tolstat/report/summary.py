@@ -69,6 +69,6 @@ def statistics(view: View, accepted: float = math.nan) -> dict[str, Any]:
         "sampling": store.sampling,
         "stop": store.stop,
     }
-    found = questions.summary(view)
+    found = questions.statistics(view)
     stands_on = {"joint": in_words(*recorded.mountings(store)), "fidelity": sentence(store.options, store.fidelity)}
     return head | found | stands_on | {"provenance": provenance}

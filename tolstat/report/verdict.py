@@ -14,10 +14,10 @@ from tolstat.display.asked import Asked
 from tolstat.display.blocks import Card, Decision, Section, Table, Text
 from tolstat.display.table import Column, as_block, has
 from tolstat.questions import accuracy, capability
+from tolstat.questions.drawings.answer import place_of
 from tolstat.questions.exceedance import rows as exceedance
 from tolstat.questions.exceedance.answer import above
 from tolstat.questions.exceedance.verdicts import WORDS, ends, share_of
-from tolstat.questions.show import section as show
 from tolstat.report.headline import Headline, headline, tells_yield
 from tolstat.store.view import View
 
@@ -27,7 +27,7 @@ def section(view: View, asked: Asked) -> Section:
     found = headline(view, asked.accepted)
     load = found.load if found else next(iter(view.leading), "")
     head = Decision(
-        question_of(view.store.study_text), _answer(view, found), _cards(view, found), show.worst(view, load, asked)
+        question_of(view.store.study_text), _answer(view, found), _cards(view, found), place_of(view, load, asked)
     )
     notes = (Text(f"{note[0].upper()}{note[1:]}.", small=True) for note in asked.notes)
     return Section("verdict", "Verdict", [head, *_points(view), *notes])

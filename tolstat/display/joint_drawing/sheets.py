@@ -9,19 +9,22 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from functools import partial
 from textwrap import wrap
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.patches import Arc, Polygon
 
 from tolstat.display import drawing
 from tolstat.display.blocks import Panel
 from tolstat.display.drawing import WIDTH
 from tolstat.display.joint_drawing import geometry
 from tolstat.display.joint_drawing.geometry import Array, Dimensions, Feature, Pair, circle, clearance, strip
+from tolstat.display.mpl import figure as figures
+from tolstat.display.mpl import patches
 from tolstat.display.style import COLOURS, INK
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 NOTES = (
     "⊕ bushings: cross1–4 carry the pins, fork1–4 the arms. Their loads, the force F and the bending moment T at the "
@@ -87,7 +90,7 @@ def figure(panels: Sequence[Panel], title: str, notes: Sequence[str] = (), colum
     top, heights = 0.26 + 0.24 * len(head), [max(panel.size[1] for panel in row) + 0.34 for row in rows]
     width, height = columns * WIDTH, top + sum(heights) + (0.2 * len(foot) + 0.2 if foot else 0.0)
     with drawing.settings():
-        sheet = Figure(figsize=(width, height))
+        sheet = figures.Figure(figsize=(width, height))
         sheet.text(0.2 / width, 1.0 - 0.15 / height, "\n".join(head), fontsize=12.5, fontweight="bold", va="top")
         for row, room in zip(rows, heights, strict=True):
             for k, panel in enumerate(row):
@@ -177,7 +180,7 @@ def _side(ax: Axes, d: Dimensions, marked: Collection[str]) -> None:
     said = f"α = {np.degrees(d.alpha):.4g}°".replace("-", "−")
     _label(ax, np.array([2.4 * inch, free * near]), said, ha="right")
     size, theta = 2.0 * end + 0.4 * inch, sorted((0.0, turned))
-    ax.add_patch(Arc((0.0, 0.0), size, size, theta1=theta[0], theta2=theta[1], lw=0.8, color=INK))
+    ax.add_patch(patches.Arc((0.0, 0.0), size, size, theta1=theta[0], theta2=theta[1], lw=0.8, color=INK))
     fork1, fork2, _, fork4 = d.markers[4:] @ geometry.SIDE.T
     rise, beside = (d.end + 0.2 * inch) * Y, max(d.eye + 0.12 * inch, d.root + 0.05 * inch) * X
     for point, place, text, ha in (
@@ -280,7 +283,7 @@ def _part(ax: Axes, outline: Array, facecolor: str, name: str = "", marked: bool
     """Fill an outline (n, 2) and draw its edge."""
     edge = {"edgecolor": MARKED, "linewidth": 2.4} if marked else {"edgecolor": INK, "linewidth": 1.2}
     look: dict[str, Any] = {"joinstyle": "round", "zorder": 2} | edge | given
-    ax.add_patch(Polygon(outline, closed=True, gid=name or None, facecolor=facecolor, **look))
+    ax.add_patch(patches.Polygon(outline, closed=True, gid=name or None, facecolor=facecolor, **look))
 
 
 def _line(ax: Axes, a: Array, b: Array, **given: Any) -> None:

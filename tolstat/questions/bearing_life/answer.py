@@ -110,7 +110,7 @@ CONTACTS = (
 
 
 def bearing_life(view: View) -> Answer:
-    """Compute the rating life of the pins' bearings.
+    """Compute the life of the pins' bearings.
 
     Gives the life that 50, 90 and 99 % of the joints reach, for each bearing and for all four together, the share of
     the joints that do not reach the required life, each with its 95 % interval, the dynamic equivalent loads, and how

@@ -117,12 +117,6 @@ def lines_on_page(view: View, asked: Asked) -> Answer:
     return Answer("lines", TITLE, [Sentence(missing, "lead")])
 
 
-def parts(view: View, load: str, accepted: float = math.nan) -> list[Part]:
-    """Parts of the answer for a load; none where the file holds no joints with other widths."""
-    found = lines_shares.evaluate(view, load) if view.altered else None
-    return [] if found is None else _parts(found, accepted)
-
-
 def advice(view: View, load: str, accepted: float) -> str:
     """Return the `sentence` of a load for the verdict; empty where the file holds no joints with other widths."""
     found = lines_shares.evaluate(view, load) if view.altered else None

@@ -8,19 +8,30 @@ along z one combination is left that no motion takes up: that of pins 1 and 2 ag
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import math
+from collections.abc import Mapping
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.analysis.ranks import ranks
-from tolstat.common.errors import Fault, StoreError
+from tolstat.common.errors import Fault, NotApplicable, StoreError
 from tolstat.common.load_kinds import PINS
-from tolstat.common.loads import FloatArray
-from tolstat.common.shown import shown
+from tolstat.common.loads import FloatArray, unit_text
+from tolstat.display import style, text
+from tolstat.display.answer import Answer, Part, Sentence, Table
+from tolstat.display.asked import Asked
+from tolstat.display.blocks import Panel, Panels
+from tolstat.display.options import Load
+from tolstat.display.table import Column
 from tolstat.joint import HOLE_OF_PIN, perturb
 from tolstat.store import points
 from tolstat.store.view import View
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 MOST = 4000
 """Number of joints used, the first ones."""
@@ -28,61 +39,51 @@ FEWEST = 200
 """Minimum number of valid joints."""
 MISSED = "offsets along z"
 """Name of the combination of offsets that no motion of the cross takes up."""
+MATTERS = 0.3
+"""Rank correlation of the best combination below which it does not matter, and the page does not show it."""
+MOST_USED = 0.1
+"""Share of the joints, those that use most of the clearance, whose share above the limit is told."""
+CHOSEN, SHOWN = slice(None, None, 2), slice(1, None, 2)
+"""Joints on which the combination is chosen, and those that correlations and pictures are of."""
+LISTED = 5
+"""Number of combinations that people see."""
+COLUMNS = (
+    Column("rank correlation", lambda row: f"{row['correlation']:+.2f}", words=True),
+    Column("share of the clearance used by", lambda row: str(row["name"]), words=True),
+)
+HOW = (
+    "Chosen on the joints with an even number, so that it need not be the first of the table; picture and "
+    "correlations are of the others. Errors are those of a hole less those of its pin; a tilt counts by what it "
+    "takes at the ends of the pin. Offsets along z: what is left of the four after the cross has moved and turned, "
+    "the middle of pins 1 and 2 against that of pins 3 and 4."
+)
 
 
-@shown
-class Pairs(NamedTuple):
-    """Load against the combination of errors that orders the joints best.
+def pairs(view: View, by: Load = None) -> Answer:
+    """Find which errors of pin and hole together cause a load.
 
-    Attributes
-    ----------
-    load, unit : str
-        The load, and its SI unit.
-    limit : float
-        Its limit, SI; NaN without one.
-    points : tuple of str
-        Operating points over which the load is the largest; ``("",)`` for one without a name.
-    worst : str
-        The one of these at which most joints exceed the limit, or else at which the load is largest.
-    name : str
-        The combination, chosen on the joints with an even number.
-    use, values : ndarray, shape (n,)
-        Share of the clearance that the combination uses, and load, SI, of the joints with an odd number.
-    correlation : float
-        Spearman's rank correlation of `use` and `values`.
-    single : float
-        Largest magnitude of the correlation of the load and a single error, or its distance from the mean, chosen and
-        found in the same way.
-    others : dict of str to float
-        Correlation of each combination, in descending order of that of the joints with an even number.
-    """
+    A joint binds where errors of a pin against its hole use up the clearance. Prints the combinations of tilts and
+    offsets whose share of the clearance orders the joints best by the load, and how often joints that use most of it
+    exceed the limit.
 
-    load: str
-    unit: str
-    limit: float
-    points: tuple[str, ...]
-    worst: str
-    name: str
-    use: FloatArray
-    values: FloatArray
-    correlation: float
-    single: float
-    others: dict[str, float]
-
-
-def pairs_of(view: View, by: str) -> Pairs:
-    """Find the combination of a pin's errors and its hole's that orders the joints best by a load.
+    Example: tolstat pairs iso2768_f.h5 --by cross1.F
 
     Parameters
     ----------
     view : View
         A campaign whose joints are drawn from tolerances, all of the same weight.
-    by : str
-        A load that can have a limit (``cross1.F``, ``fork2.T``).
+    by : str, optional
+        Load, such as cross1.F or fork2.T; by default the one whose limit most joints exceed.
 
     Returns
     -------
-    Pairs
+    Answer
+        Table ``combinations``: ``name`` and rank ``correlation`` with the load over the joints with an odd number, in
+        descending order of that of the joints with an even number. Table ``joints``, those with an odd number:
+        ``use``, share of the clearance that the first combination uses, and ``value`` of the load. Facts: ``load``,
+        ``unit``, ``limit`` (NaN without one); ``points`` over which the load is the largest, and ``worst`` of them;
+        ``name`` and ``correlation`` of the first combination, ``single``: largest magnitude of the correlation of the
+        load and a single error, or its distance from the mean, chosen and found in the same way.
 
     Raises
     ------
@@ -90,42 +91,52 @@ def pairs_of(view: View, by: str) -> Pairs:
         When there is no such load, or the study does not keep it.
     StoreError
         When joints are not drawn from tolerances, differ in weight, or too few are valid.
-
-    Examples
-    --------
-    >>> with tolstat.open(path) as store:  # doctest: +SKIP
-    ...     tolstat.pairs_of(store.view(), "fork1.F").name
     """
     view.check_drawn()
     view.check("index")
-    load = view.load(by)
+    load = view.load(by or view.most_exceeded)
     samples = np.flatnonzero(load.is_valid)[:MOST]
     if samples.size < FEWEST or np.ptp(load.values[samples]) == 0.0:
-        found = f"has {samples.size} joints with a valid {by} that scatters"
+        found = f"has {samples.size} joints with a valid {load.name} that scatters"
         raise StoreError(str(Fault(str(view.path), found, f"run {FEWEST} joints or more")))
     errors, values = view.errors(samples), load.values[samples]
-    point = points.point_of(view, by)
-    chosen, seen = slice(None, None, 2), slice(1, None, 2)
+    point = points.point_of(view, load.name)
     # what is taken of the parameters, clearances and stations, is the same at every operating point
     used = combinations(errors, perturb(view.study.joint, view.at(point).store.operation, errors))
-    rank = sorted(used, key=lambda name: -_spearman(used[name][chosen], values[chosen]))
-    best = rank[0]
-    scattering = [errors[name] for name in _scattering(errors)]
-    single = [*scattering, *(np.abs(error - error.mean()) for error in scattering)]
-    one = max(single, key=lambda error: abs(_spearman(error[chosen], values[chosen])))
-    return Pairs(
-        load=by,
-        unit=load.unit,
-        limit=np.nan if load.limit is None else load.limit,
-        points=view.narrowed(by)[0].points,
-        worst=point,
-        name=best,
-        use=used[best][seen],
-        values=values[seen],
-        correlation=_spearman(used[best][seen], values[seen]),
-        single=abs(_spearman(one[seen], values[seen])),
-        others={name: _spearman(used[name][seen], values[seen]) for name in rank},
-    )
+    rank = sorted(used, key=lambda name: -_spearman(used[name][CHOSEN], values[CHOSEN]))
+    shown = values[SHOWN]
+    rows: list[dict[str, Any]] = [{"name": name, "correlation": _spearman(used[name][SHOWN], shown)} for name in rank]
+    facts = {
+        "load": load.name,
+        "unit": load.unit,
+        "limit": math.nan if load.limit is None else load.limit,
+        "points": list(view.narrowed(load.name)[0].points),
+        "worst": point,
+        **rows[0],
+        "single": _largest_single(errors, values),
+    }
+    use = used[rank[0]][SHOWN]
+    joints = [{"use": u, "value": v, "unit": load.unit} for u, v in zip(use.tolist(), shown.tolist(), strict=True)]
+    listed = sorted(rows[:LISTED], key=lambda row: -row["correlation"])
+    parts: list[Part] = [
+        Sentence(_finding(facts, use, shown), "lead"),
+        Panels([_panel(facts, use, shown)]),
+        Table("combinations", "The best combinations", COLUMNS, rows, seen=listed),
+        Table("joints", "Load and share of the clearance used", (), joints, {"use": "1"}),
+        Sentence(HOW),
+    ]
+    return Answer("pairs", "Errors of pin and hole together", parts, facts)
+
+
+def pairs_on_page(view: View, asked: Asked) -> Answer:
+    """Pairs that matter for the load with the limit exceeded most; none where a single error tells more than a pair."""
+    if not (view.sampled and view.limits and view.leading) or view.design.refuses("index") or view.study.groups:
+        raise NotApplicable
+    with asked.noting("no pairs of errors"):
+        found = pairs(view)
+        if found.facts["correlation"] >= max(MATTERS, found.facts["single"]):
+            return found
+    raise NotApplicable
 
 
 def combinations(errors: NDArray[np.void], params: NDArray[np.void]) -> dict[str, FloatArray]:
@@ -167,8 +178,12 @@ def combinations(errors: NDArray[np.void], params: NDArray[np.void]) -> dict[str
     return found
 
 
-def _scattering(errors: NDArray[np.void]) -> list[str]:
-    return [name for name in errors.dtype.names or () if np.ptp(errors[name]) > 0.0]
+def _largest_single(errors: NDArray[np.void], values: FloatArray) -> float:
+    """Magnitude of the correlation of the load and the single error, or its distance from the mean, that tells most."""
+    scattering = [errors[name] for name in errors.dtype.names or () if np.ptp(errors[name]) > 0.0]
+    single = [*scattering, *(np.abs(error - error.mean()) for error in scattering)]
+    one = max(single, key=lambda error: abs(_spearman(error[CHOSEN], values[CHOSEN])))
+    return abs(_spearman(one[SHOWN], values[SHOWN]))
 
 
 def _spearman(x: FloatArray, y: FloatArray) -> float:
@@ -177,3 +192,58 @@ def _spearman(x: FloatArray, y: FloatArray) -> float:
         return 0.0
     a, b = ranks(np.column_stack([x, y])).T
     return float(np.corrcoef(a, b)[0, 1])
+
+
+def _finding(facts: Mapping[str, Any], use: FloatArray, values: FloatArray) -> str:
+    """What the best combination is, and what it tells of joints above the limit."""
+    load, name = facts["load"], facts["name"]
+    if facts["correlation"] < facts["single"]:
+        most = f"A single error tells more of {load} than any combination; of these, {name} tells most"
+    else:
+        most = f"{load} comes of errors of pins against their holes: a joint binds where they use up its clearance. "
+        most += f"What tells most is {name}"
+    sentences = (
+        f"{most}, as a share of the clearance: rank correlation with the load {facts['correlation']:.2f}, where that "
+        f"of the best single error is {facts['single']:.2f}."
+    )
+    if not math.isnan(facts["limit"]):
+        order, first = np.argsort(-use), max(1, round(MOST_USED * use.size))
+        above = values[order] > facts["limit"]
+        sentences += (
+            f" Of the tenth of the joints that use most of the clearance {text.percent(above[:first].mean())} exceed "
+            f"the limit, of the others {text.percent(above[first:].mean())}."
+        )
+    if len(facts["points"]) > 1:
+        over = ", ".join(facts["points"])
+        sentences += f" {load} is the largest over {over}; it is most severe at {facts['worst']}."
+    return sentences
+
+
+def _panel(facts: Mapping[str, Any], use: FloatArray, values: FloatArray) -> Panel:
+    return Panel(
+        f"pairs-{facts['load']}",
+        f"{facts['load']} against the share of the clearance used",
+        f"{facts['name']}: rank correlation {facts['correlation']:.2f} over {use.size} joints",
+        partial(_draw, facts=facts, use=use, values=values),
+        (4.9, 3.6),
+    )
+
+
+def _draw(ax: Axes, facts: Mapping[str, Any], use: FloatArray, values: FloatArray) -> None:
+    limit = facts["limit"]
+    above = values > limit  # nowhere without a limit
+    for here, colour, label in ((~above, style.COLOURS[0], "within the limit"), (above, style.COLOURS[1], "above")):
+        ax.plot(use[here], values[here], "o", color=colour, ms=3.4, alpha=0.6, mew=0, label=label)
+    if values.min() > 0.0 and values.max() > 3.0 * np.median(values):
+        ax.set_yscale("log")
+        ticks = [level * 10.0**power for power in range(-6, 9) for level in (1, 2, 5)]
+        low, high = 0.9 * values.min(), 1.9 * values.max()
+        ax.set_yticks([tick for tick in ticks if low <= tick <= high], minor=False)
+        ax.set_yticks([], minor=True)
+        ax.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
+        ax.set_ylim(low, high)
+    ax.set_xlim(0.0, None)
+    ax.set(xlabel=f"clearance used by {facts['name']}", ylabel=f"{facts['load']} [{unit_text(facts['unit'])}]")
+    if not math.isnan(limit):
+        ax.axhline(limit, color=style.INK, lw=1.2, ls=(0.0, (8.0, 3.0)), label="limit")
+        ax.legend(loc="upper left", ncols=3, columnspacing=1.2, handlelength=1.8)

@@ -80,7 +80,7 @@ NOTABLE = 0.1
 
 
 def exceedance(view: View, accepted: Accepted = math.nan) -> Answer:
-    """Estimate which share of the joints exceeds each load.
+    """Estimate the share of joints above each load.
 
     Parameters
     ----------

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from itertools import accumulate
 from operator import mul
+from shlex import quote
 from typing import Any
 
 import numpy as np
@@ -126,7 +127,8 @@ def seed_row(view: View, delivery: int) -> tuple[dict[str, Any], Rows]:
     while not walk.done:
         stage = stage_of(walk, first)
         if store.n < stage.stop or not complete:
-            raise StoreError(str(Fault(str(view.path), "is not finished", f"resume it: tolstat rare {view.path}")))
+            remedy = f"resume it: tolstat rare {quote(str(view.path))} --run"
+            raise StoreError(str(Fault(str(view.path), "is not finished", remedy)))
         unresolved.append(take(walk, plan, store, stage))
         first = stage.stop
     found, wide = walk.estimate(), walk.estimate(prediction.half(CONFIDENCE))

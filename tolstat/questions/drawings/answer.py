@@ -11,10 +11,11 @@ from tolstat.common.load_kinds import PLACES
 from tolstat.common.loads import load_of
 from tolstat.common.tables import SIMULATED
 from tolstat.display import text
+from tolstat.display.answer import Answer, Part, Sentence
 from tolstat.display.asked import Asked
-from tolstat.display.blocks import Panel, Panels, Section, Text
+from tolstat.display.blocks import Panel, Panels
 from tolstat.display.joint_drawing import sheets
-from tolstat.questions.show import rendering
+from tolstat.questions.drawings import joints
 from tolstat.store.points import point_of
 from tolstat.store.recorded import joint_of
 from tolstat.store.view import View
@@ -28,7 +29,7 @@ WORST = "Pins and holes stand where their errors have them. To draw another join
 """Text below the drawings of the worst joints."""
 
 
-def worst(view: View, load: str, asked: Asked) -> Panel | None:
+def place_of(view: View, load: str, asked: Asked) -> Panel | None:
     """Drawing of the joint in the view that shows the place of a load, which is marked; None if it cannot be read.
 
     Parameters
@@ -57,25 +58,32 @@ def worst(view: View, load: str, asked: Asked) -> Panel | None:
 def _joint(view: View, marked: Collection[str], load: str) -> tuple[Panel, Panel]:
     """Drawings of the joint at the operating point at which a load matters most; at the first one without a load."""
     point = point_of(view, load) if load else view.points[0]
-    d = rendering.dimensions(joint_of(view.store, 0), view.at(point).store.operation.alpha)
+    d = joints.dimensions(joint_of(view.store, 0), view.at(point).store.operation.alpha)
     front, side = sheets.joint(d, marked)
     return front, replace(side, title=f"{side.title}, at {point}") if point else side
 
 
-def sections(view: View, asked: Asked) -> list[Section]:
-    """Errors of the joints with the largest leading loads, enlarged; the joint from all sides, and its errors."""
-    found = []
-    if view.method != "sweep":
-        with asked.noting("the worst joints are not drawn"):
-            if panels := _worst(view):
-                found.append(Section("drawn", "The worst joints, drawn", [Panels(panels), Text(WORST, small=True)]))
-    with asked.noting("the joint and its errors are not drawn"):
-        marked = sorted({load_of(name).place.name for name in view.leading} - {""})
-        joint = joint_of(view.store, 0)
-        kinds = sheets.errors(rendering.positive(joint), rendering.dimensions(joint, 0.0))
-        panels = [*_joint(view, marked, next(iter(view.leading), "")), kinds]
-        found.append(Section("joint", "The joint", [Panels(panels), Text(LEGEND, small=True)]))
-    return found
+def drawings(view: View) -> Answer:
+    """Draw the joint, its errors and its worst rows.
+
+    Parameters
+    ----------
+    view : View
+        A campaign.
+
+    Returns
+    -------
+    Answer
+        Pictures: the joint from all sides, with the places of the leading loads marked; the kinds of its errors; errors
+        of the joints with the largest leading loads, enlarged.
+    """
+    marked = sorted({load_of(name).place.name for name in view.leading} - {""})
+    joint = joint_of(view.store, 0)
+    kinds = sheets.errors(joints.positive(joint), joints.dimensions(joint, 0.0))
+    parts: list[Part] = [Panels([*_joint(view, marked, next(iter(view.leading), "")), kinds]), Sentence(LEGEND)]
+    if view.method != "sweep" and (worst := _worst(view)):
+        parts += [Panels(worst), Sentence(WORST)]
+    return Answer("drawings", "The joint and its errors, drawn", parts)
 
 
 def _worst(view: View) -> list[Panel]:
@@ -89,6 +97,6 @@ def _worst(view: View) -> list[Panel]:
     panels = []
     for sample, said in loads.items():
         joint, row = joint_of(view.store, int(view.slots(sample))), int(view.rows(sample))
-        pairs, d = rendering.pairs(joint, view.errors(np.array([sample]))), rendering.dimensions(joint, 0.0)
+        pairs, d = joints.pairs(joint, view.errors(np.array([sample]))), joints.dimensions(joint, 0.0)
         panels.append(sheets.one(pairs, d, f"Row {row}: {', '.join(said)}", f"drawn-{row}"))
     return panels

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import pandas as pd
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from tolstat import joint as joints
@@ -18,11 +16,15 @@ from tolstat.common.strict import read_toml, validate
 from tolstat.common.tables import HOLES
 from tolstat.display.joint_drawing import sheets
 from tolstat.display.joint_drawing.geometry import MEANINGS, Dimensions, Feature, Pair, clearance
+from tolstat.display.table import Rows
 from tolstat.joint import Joint, Operation, nominal_errors, perturb
 from tolstat.joint.perturbation import ARM_TRIADS, PIN_TRIADS
 from tolstat.kernel.mechanics.topology import ARM, ARM_OF_PIN, FRAME, FRAME_F, FRAME_I, PIN
 from tolstat.store import ResultFile
 from tolstat.store.recorded import joint_of, operation_of
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 class Shown(NamedTuple):
@@ -199,7 +201,7 @@ def draw_row(joint: Joint, errors: NDArray[np.void], title: str = "") -> Figure:
     return sheets.figure([panel], title or "Errors of one joint")
 
 
-def lengths(joint: Joint, alpha: float) -> pd.DataFrame:
+def lengths(joint: Joint, alpha: float) -> Rows:
     """Dimensions on the drawing: ``dimension``, ``value`` with its unit, ``meaning``."""
     d, arm = dimensions(joint, alpha), joint.arm
     rows = [
@@ -218,15 +220,15 @@ def lengths(joint: Joint, alpha: float) -> pd.DataFrame:
     ]
     found = [(name, f"{1e3 * x:.5g} mm", meaning) for name, x, meaning in rows if x is not None]
     found.append(("operation.alpha", f"{np.degrees(alpha):.5g} deg", "misalignment of the shafts"))
-    return pd.DataFrame(found, columns=["dimension", "value", "meaning"])
+    return [dict(zip(("dimension", "value", "meaning"), row, strict=True)) for row in found]
 
 
-def meanings() -> pd.DataFrame:
+def meanings() -> Rows:
     """Kinds of errors: ``error``, and what ``a positive value`` does."""
-    return pd.DataFrame(MEANINGS.items(), columns=["error", "a positive value"])
+    return [{"error": error, "a positive value": meaning} for error, meaning in MEANINGS.items()]
 
 
-def numbers(joint: Joint, errors: NDArray[np.void]) -> pd.DataFrame:
+def numbers(joint: Joint, errors: NDArray[np.void]) -> Rows:
     """Errors of a joint, one row for each pin and hole, with the radial clearance of the pair.
 
     e, t, z: offsets; ⌀: deviation of the diameter. Lengths in mm, tilts in degrees, to four decimals.
@@ -238,4 +240,4 @@ def numbers(joint: Joint, errors: NDArray[np.void]) -> pd.DataFrame:
             own = (np.degrees(x) if kind.startswith("tilt") else 1e3 * x for kind, x in part.errors.items())
             cells = [part.name, *(round(float(x), 4) for x in (*own, 1e3 * clearance(pair)))]
             rows.append(dict(zip(heads, cells, strict=True)))
-    return pd.DataFrame(rows)
+    return rows

@@ -1,0 +1,339 @@
+"""Causes of a load by error: which errors make it scatter over the joints, and which make its tail."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from functools import partial
+from pathlib import Path
+from shlex import quote
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import numpy as np
+
+from tolstat import study
+from tolstat.campaign.work import Work
+from tolstat.common.aside import mapped
+from tolstat.common.errors import Fault, InputError, NotApplicable, TolstatError
+from tolstat.common.loads import unit_text
+from tolstat.common.tables import VALID
+from tolstat.display import drawing, style
+from tolstat.display.answer import Answer, Part, Sentence, Table
+from tolstat.display.asked import Asked
+from tolstat.display.blocks import Panel, Panels
+from tolstat.display.mpl import patches
+from tolstat.display.options import Load, Opt, Top
+from tolstat.display.table import Column, Row, Rows, has
+from tolstat.display.text import ends
+from tolstat.questions.causes import lines, lines_run
+from tolstat.questions.causes.indices import indices
+from tolstat.store.view import View
+from tolstat.study import Study
+from tolstat.study.rewriting import with_keys
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+
+SIGNIFICANT = 0.05
+"""p-value below which a table marks an error of the tail."""
+SHOWN = 10
+"""Number of errors shown for each load on the page."""
+JOINTS = 20_000
+"""Maximum number of joints (the first ones) of which the page takes causes: more add little and take memory."""
+Found = tuple[Mapping[str, Any], Rows]
+"""What `indices` returns."""
+POINTS = 1024
+"""Default number of points of a pick-freeze design."""
+Groups = Literal["tolerance", "error"]
+"""Errors that a pick-freeze design exchanges together."""
+ALONE, IN_ALL = "alone (first order), 95 %", "in all (bounds of the total index)"
+BARS = (
+    "Bars: share of a load's variance that vanishes when the error is removed (first-order index). "
+    "The rest up to 100 % comes from errors that act together."
+)
+GREY = "Grey: share that the error takes part in, alone or with others (bounds of the total index)."
+LOGARITHMS = "Where a few joints with large loads dominate the variance, it is that of the logarithm."
+
+
+def causes(view: View, by: Load = None, top: Top = 12, logarithm: bool = False) -> Answer:
+    """Compute which tolerances and errors cause a load.
+
+    Prints for each line of the drawing, an entry of [tolerances], the share of the joints above the limit if it were
+    half as wide, exact, finer or coarser by one class (else by the factors 0.63 and 1.6). With --run, simulates these
+    joints, which have the seeds of FILE and keep their loads in it: until the order of the lines is settled, the time
+    is up, or each change has --most joints. To go on, run the same command again.
+
+    Prints for each error: the share of the load's variance that it explains alone and in interactions (first-order and
+    total Sobol' indices), the direction of its effect (rank regression), and the probability that a joint above the
+    limit (without a limit: above the 90 % quantile) has a larger, or a more extreme, error than a joint below.
+
+    With STUDY, simulates a pick-freeze design into STUDY_causes.h5, each point with two joints and one more for each
+    group of errors; it gives total indices with intervals instead of bounds. To resume after an interruption, run the
+    same command again. STUDY_causes.h5 can be given as FILE afterwards.
+
+    Example: tolstat causes iso2768_f.h5 --by cross1.F
+
+    Parameters
+    ----------
+    view : View
+        A campaign whose joints are drawn from tolerances, all of the same weight.
+    by : str, optional
+        Load, such as cross1.F or psi, or "any limit"; default: all limits, or the only one.
+    top : int
+        Number of errors in the printed table.
+    logarithm : bool
+        Explain the variance of the load's logarithm instead of the load's.
+
+    Returns
+    -------
+    Answer
+        Table ``errors`` and facts, see `indices.indices`. Where the file has joints with other widths, first the tables
+        of `lines.lines`, and a fact ``lines`` with its facts.
+
+    Raises
+    ------
+    InputError
+        When there is no such load, the study does not keep it, or `logarithm` is set and a value is not positive.
+    StoreError
+        When the file has too few valid joints, or joints that are not drawn from tolerances or differ in weight.
+
+    Examples
+    --------
+    >>> with tolstat.open(path) as store:
+    ...     found = tolstat.causes(store.view(), "cross1.F")
+    >>> found.frame("errors")["error"][:2].sort_values().tolist()
+    ['pin1.offset_t', 'pin2.offset_z']
+    """
+    load = by or view.decisive
+    facts, rows = indices(view, load, logarithm)
+    parts: list[Part] = []
+    command = f"tolstat causes {quote(str(view.path))} --run"
+    if view.altered:
+        with suppress(NotApplicable):  # joints of other lines, or at other operating points
+            changed = lines.lines(view, load)
+            parts, facts = list(changed.parts), {**facts, "lines": changed.facts}
+    elif not _from_design(facts):
+        parts.append(Sentence(f"which line of the drawing to change: {command}"))
+    parts += [Panels([_tornado_panel(facts, rows)]), _table("errors", facts, rows, top)]
+    parts += map(Sentence, _notes(facts, rows, "" if view.altered else command))
+    return Answer("causes", "Causes by error", parts, facts)
+
+
+def simulate(
+    source: Study | Path,
+    work: Work,
+    by: Load = None,
+    points: Annotated[int, Opt("N", least=50)] = POINTS,
+    groups: Groups = "tolerance",
+    each: lines_run.Each = "entry",
+    group: Annotated[list[str] | None, Opt("NAME=PATTERN,...")] = None,
+    budget: Annotated[float, Opt("TIME", unit="s")] = lines_run.BUDGET_S,
+    most: Annotated[int, Opt("N", least=lines_run.LEAST)] = lines_run.MOST,
+) -> list[Path]:
+    """Simulate a pick-freeze design of a study, or into a result file joints with other widths of each line.
+
+    Parameters
+    ----------
+    source : Study or Path
+        The study, or the result file, see `lines_run.simulate`.
+    work : Work
+        Workers, folder and progress.
+    by : str, optional
+        Load whose limit orders the lines.
+    points : int
+        With STUDY: number of points of the pick-freeze design.
+    groups : {"tolerance", "error"}
+        With STUDY: exchange all errors of a tolerance together, or each error by itself.
+    each : {"entry", "feature", "error"}
+        With --run: a line is an entry of [tolerances], a pin with its hole, or an error.
+    group : list of str, optional
+        With --run: also change these errors together; repeatable.
+    budget : float
+        With --run: time limit, with unit s, min or h; 5 min unless given.
+    most : int
+        With --run: largest number of joints of each change.
+
+    Returns
+    -------
+    list of Path
+        The result file.
+
+    Raises
+    ------
+    InputError
+        When options of the one are given with the other.
+    """
+    if isinstance(source, Path):
+        if (points, groups) != (POINTS, "tolerance"):
+            raise InputError([Fault("--points, --groups", "are about the design of a study", "give a study (TOML)")])
+        return lines_run.simulate(source, work, by, each, group, budget, most)
+    if group or each != "entry":
+        raise InputError([Fault("--each, --group", "say what --run simulates into FILE", "give a result file")])
+    keys = {"method": "pick_freeze", "n": points, "groups": groups}
+    text = with_keys(source.text, {("sampling",): keys}, str(source.path))
+    return [work.run(study.load(source.path, text=text), f"{source.path.stem}_causes.h5")]
+
+
+def causes_on_page(view: View, asked: Asked) -> Answer:
+    """Causes of the leading loads; of a load with a long tail, those of its logarithm."""
+    if view.method == "sweep" or not view.count(*VALID):
+        raise NotApplicable
+    found: list[Found] = []
+    with asked.noting("causes are left out"):
+        view.check("index")
+        loads = view.loads(view.leading)
+        jobs = [partial(indices, view, load.name, load.long_tailed, JOINTS) for load in loads]
+        tried = mapped([partial(_tried, job) for job in jobs], min(asked.processes, 2))
+        for load, job, own in zip(loads, jobs, tried, strict=True):
+            with asked.noting(f"no causes of {load.name}"):
+                found.append(own or job())  # which raises what it raised before
+    if not found:
+        raise NotApplicable
+    panels = Panels([_tornado_panel(facts, rows) for facts, rows in found])
+    parts: list[Part] = [Sentence(_introduction(found), "lead"), panels]
+    command = "" if view.altered else f"tolstat causes {quote(view.path.name)} --run"
+    for facts, rows in found:
+        parts.append(_table(f"errors_{facts['load']}", facts, rows, SHOWN))
+        parts += map(Sentence, _notes(facts, rows, command))
+    return Answer("causes", "Causes by error", parts)
+
+
+def _tried(job: Callable[[], Found]) -> Found | None:
+    """Result of a job; None where it cannot be had."""
+    try:
+        return job()
+    except TolstatError:
+        return None
+
+
+def _from_design(facts: Mapping[str, Any]) -> bool:
+    """Whether the joints are a pick-freeze design."""
+    return math.isnan(facts["r2"])
+
+
+def _quantity(facts: Mapping[str, Any]) -> str:
+    """Name of the decomposed quantity: the load, or its logarithm."""
+    return f"log {facts['load']}" if facts["logarithm"] else str(facts["load"])
+
+
+def _has_narrow_bounds(rows: Rows) -> bool:
+    """Whether the bounds of the total indices tell something: median width of the first `SHOWN` below 0.5."""
+    widths = [row["total_upper"] - row["total_lower"] for row in rows[:SHOWN]]
+    return bool(widths) and bool(np.median(widths) < 0.5)  # false without bounds (NaN)
+
+
+def _introduction(found: Sequence[Found]) -> str:
+    sentences = [BARS]
+    if any(_has_narrow_bounds(rows) for _, rows in found):
+        sentences.append(GREY)
+    if any(facts["logarithm"] for facts, _ in found):
+        sentences.append(LOGARITHMS)
+    if all(math.isnan(row["first_lower"]) for row in found[0][1]):
+        sentences.append("No intervals: the samples are not independent.")
+    return " ".join(sentences)
+
+
+def _table(name: str, facts: Mapping[str, Any], rows: Rows, shown: int) -> Table:
+    """Table of all errors; people see the `shown` with the largest shares, and those with an effect on the tail.
+
+    Shares of the variance in per cent and rank coefficients, with intervals; probability that a joint of the tail has
+    the larger error (``direction``) and the error farther from the middle (``size``), where ``*`` marks
+    p < `SIGNIFICANT`.
+    """
+    if _from_design(facts):
+        total = Column("in all, %", partial(_interval, name="total", factor=100), shown=has("total"))
+    else:  # given data yield bounds only
+        total = Column("in all, %", partial(_ends, name="total", factor=100), shown=_has_narrow_bounds, rank=3)
+    columns = [
+        Column("error", lambda row: str(row["error"])),
+        Column("alone, %", partial(_interval, name="first", factor=100), shown=has("first")),
+        total,
+        Column("rank coefficient", partial(_interval, name="srrc"), shown=has("srrc")),
+        Column("tail: larger", partial(_tail, name="direction"), shown=has("direction"), rank=2),
+        Column("tail: farther out", partial(_tail, name="size"), shown=has("size"), rank=1),
+    ]
+    marked = [min(row["direction_p"], row["size_p"]) < SIGNIFICANT for row in rows]
+    seen = [row for i, row in enumerate(rows) if i < shown or marked[i]]
+    title = f"Scatter of {_quantity(facts)} over all joints, not of exceeding a limit, by error"
+    return Table(name, title, columns, rows, seen=seen)
+
+
+def _interval(row: Row, name: str, factor: float = 1.0) -> str:
+    value = row[name]
+    if math.isnan(value):
+        return "-"
+    # estimates of shares may scatter beyond 0 and 1, where no share is
+    own = f"{factor * min(max(value, 0.0), 1.0):.1f}" if factor > 1 else f"{value:+.2f}"
+    return own if math.isnan(row[f"{name}_lower"]) else f"{own} ({_ends(row, name, factor)})"
+
+
+def _ends(row: Row, name: str, factor: float = 1.0) -> str:
+    return ends(factor * row[f"{name}_lower"], factor * row[f"{name}_upper"], ".1f" if factor > 1 else "+.2f")
+
+
+def _tail(row: Row, name: str) -> str:
+    star = "*" if row[f"{name}_p"] < SIGNIFICANT else " "
+    return "-" if math.isnan(row[name]) else f"{row[name]:.2f}{star}"
+
+
+def _notes(facts: Mapping[str, Any], rows: Rows, command: str) -> list[str]:
+    """Joints, explained variance, restrictions; `command` gives shares in all, empty if it has been run."""
+    unit, std = unit_text(facts["unit"]), f"{facts['std']:.4g}"
+    std = f"{std}, of the logarithm" if facts["logarithm"] else f"{std} {unit}".rstrip()
+    if _from_design(facts):
+        what, ranks, tail = "groups of errors", "", "from a pick-freeze design"
+    else:
+        what, ranks = "errors", f", ranks {100 * facts['r2']:.0f} %"
+        tail = f"tail: {facts['above']} joints above {facts['level']:.5g} {unit}".rstrip()
+    notes = [
+        f"{facts['load']}: {facts['joints']} joints, {facts['without_load']} without a valid load left out; "
+        f"standard deviation {std}",
+        f"{what} alone explain {100 * facts['additive']:.0f} % of the variance{ranks}; {tail}",
+    ]
+    if (used := facts["used"]) < facts["joints"]:
+        notes.append(f"shares and ranks are from the first {used} joints, the tail from at most as many on either side")
+    if all(math.isnan(row["total"]) for row in rows):
+        notes.append("errors are correlated: shares overlap, and shares in all are not given")
+    elif not (_from_design(facts) or _has_narrow_bounds(rows)):
+        remedy = f"; {command} gives them" if command else ""
+        notes.append(f"no shares in all: given joints bound them too widely{remedy}")
+    if all(math.isnan(row["first_lower"]) for row in rows):
+        notes.append("no intervals: they hold for independent samples only")
+    return notes
+
+
+def _tornado_panel(facts: Mapping[str, Any], rows: Rows) -> Panel:
+    quantity, part = _quantity(facts), rows[:SHOWN]
+    top = ", ".join(f"{row['error']} {100 * row['first']:.1f} %" for row in part[:5])
+    return Panel(
+        f"tornado-{facts['load']}",
+        f"{quantity}: share of the variance by error",
+        f"Largest first-order indices: {top}; all errors alone {100 * facts['additive']:.0f} %",
+        partial(_tornado, rows=part, quantity=quantity),
+        (4.9, drawing.rows_height(len(part)) + 0.25),
+        left := drawing.rows_left([row["error"] for row in part]),
+        drawing.legend_room([ALONE, *([IN_ALL] if _has_narrow_bounds(part) else [])], left),
+    )
+
+
+def _tornado(ax: Axes, rows: Rows, quantity: str) -> None:
+    place = np.arange(len(rows))
+    first, low, high, total_low, total_high = (
+        100.0 * np.array([row[key] for row in rows])
+        for key in ("first", "first_lower", "first_upper", "total_lower", "total_upper")
+    )
+    drawing.rows(ax, [row["error"] for row in rows])
+    ax.barh(place, first.clip(min=0.0), height=0.5, color=style.COLOURS[0], zorder=2)
+    handles: list[Artist] = [patches.Patch(color=style.COLOURS[0])]
+    labels = [ALONE]
+    if _has_narrow_bounds(rows):
+        ax.barh(place, total_high - total_low, left=total_low, height=0.74, color=drawing.GREY, alpha=0.45, zorder=1)
+        handles.append(patches.Patch(color=drawing.GREY, alpha=0.45))
+        labels.append(IN_ALL)
+    if np.isfinite(low).any():
+        ax.hlines(place, low, high, color=style.INK, lw=1.2, zorder=3)
+    ax.set_xlim(0.0, None)
+    drawing.legend_above(ax, handles, labels)
+    ax.set_xlabel(f"share of the variance of {quantity} [%]")

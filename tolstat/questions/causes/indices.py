@@ -1,0 +1,188 @@
+"""Indices of errors: shares of a load's variance, ranks, and what sets the joints of its tail apart."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tolstat import sampling
+from tolstat.analysis import pick_freeze, ranks, sensitivity
+from tolstat.analysis.sample import Sample
+from tolstat.common.errors import Fault, InputError, StoreError
+from tolstat.common.loads import ANY_LIMIT, FloatArray
+from tolstat.display.table import Row, Rows
+from tolstat.store.view import View
+
+TAIL_STARTS_AT = 0.9
+"""Share of the joints below the tail, for a load without a limit."""
+MIN_JOINTS = 200
+"""Minimum number of valid joints."""
+MAX_JOINTS = sensitivity.MOST
+"""Maximum number of joints (the first ones) for shares and ranks, and on either side of the tail: more add little, and
+a million joints with fifty errors do not fit into a gigabyte."""
+KINDS = ("first", "total", "srrc", "direction", "size")
+TAIL = KINDS[-2:]
+
+Parts = Mapping[str, NamedTuple]
+"""Estimates of all errors with their ends, by name of `KINDS`."""
+
+
+def indices(
+    view: View, by: str, logarithm: bool = False, joints: int | None = None, confidence: float = 0.95
+) -> tuple[Mapping[str, Any], Rows]:
+    """Estimate what each error contributes to a load.
+
+    Parameters
+    ----------
+    view : View
+        A campaign whose joints are drawn from tolerances, all of the same weight.
+    by : str
+        A load that can have a limit (``cross1.F``, ``pin2.contact``, ``psi``).
+    logarithm : bool
+        Decompose the variance of the load's logarithm: for a load whose variance a few joints dominate.
+    joints : int, optional
+        Number of samples to use, from the first; by default all. Of a pick-freeze design all are used.
+    confidence : float
+        Confidence level of all intervals.
+
+    Returns
+    -------
+    facts : mapping
+        ``load``, ``unit``, ``logarithm``; ``joints`` (valid), ``used`` (of them for shares and ranks),
+        ``without_load``; ``level`` at which the tail begins, SI: the study's limit or, without one, the 90 % quantile;
+        ``above``: number of joints above it; ``std`` of the load or its logarithm; ``additive``: sum of the
+        first-order indices; ``r2`` of the rank regression, NaN for a pick-freeze design.
+    rows : sequence of mapping
+        One row per error that scatters (two per vector of a zone), the largest first-order index first: ``error``; with
+        ``_lower`` and ``_upper``: ``first``, ``total`` (NaN for correlated errors), ``srrc``, ``direction`` and
+        ``size``; the last two also with ``_p``, and NaN if too few joints are on either side of the level. For a
+        pick-freeze design, one row per group of errors, with ``first`` and ``total`` only.
+
+    Raises
+    ------
+    InputError
+        When there is no such load, the study does not keep it, or `logarithm` is set and a value is not positive.
+    StoreError
+        When the file has too few valid joints, or joints that are not drawn from tolerances or differ in weight.
+    """
+    view.check_drawn()
+    view.check("index")
+    load = view.load(by)
+    if joints is not None and not view.study.groups:
+        load = load.only(np.arange(min(joints, view.n)))
+    estimate = _of_design if view.study.groups else _of_samples
+    names, parts, variance, level = estimate(view, load, logarithm, confidence)
+    valid, rows = load.valid, _rows(names, parts)
+    first: Any = parts["first"]
+    ranks: Any = parts.get("srrc")
+    facts = {
+        "load": load.name,
+        "unit": load.unit,
+        "logarithm": logarithm,
+        "joints": valid.size,
+        "used": min(valid.size, MAX_JOINTS) if ranks else valid.size,
+        "without_load": sum(load.unresolved),
+        "level": level,
+        "above": int((valid > level).sum()),
+        "std": math.sqrt(variance),
+        "additive": float(first.estimate.sum()),
+        "r2": ranks.r2 if ranks else math.nan,
+    }
+    return facts, rows
+
+
+def scattering(components: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+    """Those of the components (`sampling.components`) that vary over the joints."""
+    return {name: own for name, own in components.items() if np.ptp(own) > 0}
+
+
+def _of_samples(view: View, load: Sample, logarithm: bool, confidence: float) -> tuple[list[str], Parts, float, float]:
+    """Names, estimates, variance and tail level from joints that are all drawn from the same tolerances."""
+    study, independent = view.study, view.design.has_interval("index")
+    samples = np.flatnonzero(load.is_valid)
+    values = load.values[samples]
+    _check_samples(view, load, values)
+    if logarithm:
+        _check_positive(load.name, values)
+    errors = view.errors(samples[:MAX_JOINTS], sampling.columns(study))
+    own = scattering(sampling.components(study, errors))
+    names, x, y = list(own), np.column_stack(list(own.values())), values[:MAX_JOINTS]
+    response = np.log(y) if logarithm else y
+    parts: dict[str, NamedTuple] = {"srrc": ranks.regression(x, y, confidence, independent)}
+    if study.copula.names or study.sampling.is_matched:
+        first = sensitivity.first_order(x, response, confidence, independent)
+    else:
+        first, parts["total"] = sensitivity.first_and_total(x, response, confidence, independent)
+    level = _tail_level(load)
+    above = values > level
+    if ranks.FEWEST <= above.sum() <= above.size - ranks.FEWEST:
+        parts |= _over_represented(view, names, samples, above, confidence)
+    return names, parts | {"first": first}, float(first.variance), level
+
+
+def _check_samples(view: View, load: Sample, values: FloatArray) -> None:
+    """Refuse too few joints, and a load without scatter."""
+    needed = max(MIN_JOINTS, len(sampling.streams(view.study)) + 2 * ranks.GROUPS)
+    if values.size < needed:
+        what = "load on all limits" if load.name == ANY_LIMIT else load.name
+        found = f"has {values.size} joints with a valid {what}"
+        raise StoreError(str(Fault(str(view.path), found, f"run {needed} joints or more")))
+    if np.ptp(values) == 0:
+        found = f"has the same {load.name} in all joints: no error causes it"
+        raise StoreError(str(Fault(str(view.path), found, "name another load with --by")))
+
+
+def _over_represented(
+    view: View, names: list[str], samples: NDArray[np.intp], above: NDArray[np.bool_], confidence: float
+) -> dict[str, NamedTuple]:
+    """Compare the errors of the first `MAX_JOINTS` joints above the level with those of at most as many below it."""
+    chosen = np.sort(np.concatenate([np.flatnonzero(side)[:MAX_JOINTS] for side in (above, ~above)]))
+    errors = view.errors(samples[chosen], sampling.columns(view.study))
+    scores = sampling.normal_scores(view.study, errors)
+    z = np.column_stack([scores[name] for name in names])
+    return ranks.tail(z, above[chosen], confidence, view.design.has_interval("index"))._asdict()
+
+
+def _of_design(view: View, load: Sample, logarithm: bool, confidence: float) -> tuple[list[str], Parts, float, float]:
+    """Names of groups, their Sobol' indices, variance and tail level from a pick-freeze design."""
+    path, groups = str(view.path), view.study.groups
+    if not view.store.whole:
+        raise StoreError(str(Fault(path, "holds a slice of a design", "merge all slices first: tolstat merge")))
+    values = load.values
+    if logarithm:
+        _check_positive(load.name, values[load.is_valid])
+        values = np.log(values)
+    points = values.reshape(-1, len(groups) + 2)
+    try:
+        found = pick_freeze.indices(points[:, 0], points[:, 1], points[:, 2:], confidence)
+    except ValueError as error:
+        remedy = f"run {pick_freeze.FEWEST} points or more; decompose the logarithm of a load with a long tail"
+        raise StoreError(str(Fault(path, str(error), remedy))) from error
+    parts = {"first": found.first, "total": found.total}
+    return [group.label for group in groups], parts, float(found.variance), _tail_level(load)
+
+
+def _check_positive(name: str, values: FloatArray) -> None:
+    if values.min(initial=np.inf) <= 0:
+        remedy = "decompose the variance of the load itself, not of its logarithm"
+        raise InputError([Fault(name, "is not positive in all joints", remedy)])
+
+
+def _tail_level(load: Sample) -> float:
+    return load.quantile(TAIL_STARTS_AT).estimate if load.limit is None else load.limit
+
+
+def _rows(names: list[str], parts: Parts) -> list[Row]:
+    """Rows of `indices`, from the estimates by name of the key."""
+    columns: dict[str, Any] = {"error": names}
+    for kind in KINDS:
+        found = parts[kind]._asdict() if kind in parts else {}
+        keys = {"": "estimate", "_lower": "lower", "_upper": "upper"} | ({"_p": "p"} if kind in TAIL else {})
+        for end, key in keys.items():
+            columns[f"{kind}{end}"] = np.broadcast_to(found.get(key, np.nan), len(names)).tolist()
+    rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+    return sorted(rows, key=lambda row: -row["first"])

@@ -1,0 +1,277 @@
+"""The joints with the largest values of a load: their errors, and their loads over the revolution."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from functools import partial
+from shlex import quote
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tolstat import sampling
+from tolstat.common.channels import CHANNELS
+from tolstat.common.columns import RESULT_COLUMNS
+from tolstat.common.errors import Fault, InputError, NotApplicable, TolstatError
+from tolstat.common.loads import LOADS, FloatArray, unit_text
+from tolstat.common.strict import did_you_mean
+from tolstat.common.tables import SIMULATED, VALID, Status
+from tolstat.display import drawing, style, text
+from tolstat.display.answer import Answer, Part, Sentence, Table
+from tolstat.display.asked import Asked
+from tolstat.display.blocks import Panel, Panels
+from tolstat.display.options import Load, Top
+from tolstat.display.table import Column, Row, Rows
+from tolstat.questions.causes import angles, revolution
+from tolstat.store import revolutions
+from tolstat.store.view import View
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+ON_PAGE = 8
+"""Number of worst joints of each load on the page."""
+DRAWN = 3
+"""Number of the worst joints drawn for each load."""
+ANGLES = 180
+"""Number of input angles drawn, if the histories have as many samples."""
+SPREAD = "5 to 95 %"
+"""Label of the loads of all joints."""
+ERRORS = ("largest error in σ", "second", "third", "fourth", "fifth")
+"""Heads of the columns of the largest errors of a joint."""
+ERRORS_ON_PAGE = 4
+"""Number of errors of each joint on the page."""
+KEYS = ("load", "unit", "row", "value", "point", "status")
+"""Keys of a row that are no errors."""
+
+
+def worst(view: View, by: Load = None, top: Top = 10) -> Answer:
+    """List the joints with the largest load and their errors.
+
+    Prints row, load and status of each joint, and its largest errors in sigma: the standard normal score that has the
+    same probability as the error in its own distribution. --by takes columns of the results too, such as revolutions.
+
+    Example: tolstat worst iso2768_f.h5 --by cross1.F --top 20
+
+    Parameters
+    ----------
+    view : View
+        A campaign.
+    by : str, optional
+        Load, such as cross1.F or psi, or a column of the results; by default the one whose limit most joints exceed.
+    top : int
+        Number of joints to list.
+
+    Returns
+    -------
+    Answer
+        Table ``joints``, see `joint_rows`.
+
+    Raises
+    ------
+    InputError
+        When there is no such load, the study does not keep it, or the study cannot be read any more.
+    StoreError
+        When the study is not that of the file.
+    """
+    load = by or view.most_exceeded
+    rows = joint_rows(view, load, top)
+    unit = rows[0]["unit"] if rows else "1"
+    columns = [
+        Column("row", lambda row: str(row["row"])),
+        Column(f"{load} [{unit}]" if unit != "1" else load, lambda row: f"{row['value']:.6g}"),
+        Column("at", lambda row: str(row["point"]), words=True, shown=_has_points),
+        Column("status", lambda row: str(row["status"]), words=True),
+        *(Column(head, partial(_error, place=i), True, rank=i) for i, head in enumerate(ERRORS)),
+    ]
+    parts: list[Part] = [Table("joints", f"Joints with the largest {load}", columns, rows)]
+    if rows:
+        first = rows[0]
+        where = f" --point {quote(first['point'])}" if first["point"] else ""
+        command = f"tolstat replay {quote(str(view.path))} --row {first['row']}{where} --out trace.csv"
+        parts.append(Sentence(f"next: {command}"))
+    return Answer("worst", "The worst joints", parts, {"by": load, "unit": unit})
+
+
+def worst_on_page(view: View, asked: Asked) -> Answer:
+    """The worst joints of the leading loads, and their loads over the revolution."""
+    if view.method == "sweep" or not view.count(*VALID) or not view.leading:
+        raise NotApplicable
+    rows = [row for load in view.leading for row in joint_rows(view, load, ON_PAGE)]
+    panels = _panels(view, rows, asked.replay) if asked.replay and len(view.points) == 1 else []
+    columns = [
+        Column("load", lambda row: str(row["load"])),
+        Column("row", lambda row: str(row["row"])),
+        Column("largest", lambda row: text.value(row["value"], row["unit"])),
+        Column("at", lambda row: str(row["point"]), words=True, shown=_has_points),
+        Column("status", lambda row: str(row["status"]), words=True),
+        Column("largest errors, in standard deviations", _errors_on_page, words=True),
+    ]
+    at = " --point POINT" if len(view.points) > 1 else ""
+    command = f"tolstat replay {quote(view.path.name)} --row ROW{at} --out trace.csv"
+    parts: list[Part] = [Panels(panels)] if panels else []
+    parts.append(Table("joints", "Joints with the largest leading loads", columns, rows))
+    parts.append(Sentence(f"to simulate one of them again: {command}, with its number for ROW"))
+    return Answer("worst", "The worst joints", parts)
+
+
+def joint_rows(view: View, by: str, n: int = 10) -> Rows:
+    """Joints with the largest load.
+
+    Parameters
+    ----------
+    view : View
+        A campaign.
+    by : str
+        A load that can have a limit (``cross1.F``, ``pin2.contact``, ``psi``), or a column of the results; of some
+        operating points ``cross1.F at cruise``.
+    n : int
+        Maximum number of joints.
+
+    Returns
+    -------
+    sequence of mapping
+        At most `n` joints that have results; the nominal joint is not among them, and equal loads come in the order
+        of their rows. ``load``, ``unit``, ``row`` of the campaign, ``value`` (SI; of a joint that is not settled that
+        of the recorded revolution), ``point`` (with the largest value; empty where there is one only), ``status``, and
+        by name each error that scatters, in sigma (`sampling.normal_scores`).
+
+    Raises
+    ------
+    InputError
+        When there is no such load, the study does not keep it, or the study cannot be read any more.
+    StoreError
+        When the study is not that of the file.
+    """
+    samples, values, unit = _largest(view, by, n)
+    status = [Status(one).label for one in view.status[samples]]
+    own = zip(view.rows(samples).tolist(), values.tolist(), _points(view, by, samples), status, strict=True)
+    return [
+        dict(zip(KEYS, (by, unit, *joint), strict=True)) | scores
+        for joint, scores in zip(own, _scores(view, samples), strict=True)
+    ]
+
+
+def drawn(view: View, load: str) -> NDArray[np.intp]:
+    """Samples of the worst joints whose loads over the revolution are drawn, the largest load first."""
+    return _largest(view, load, DRAWN)[0]
+
+
+def largest_errors(row: Row) -> list[tuple[str, float]]:
+    """Errors of a row of `joint_rows` in descending order of the modulus; equal ones as they come."""
+    return sorted(((k, z) for k, z in row.items() if k not in KEYS), key=lambda item: -round(abs(item[1]), 9))
+
+
+def _largest(view: View, by: str, n: int) -> tuple[NDArray[np.intp], FloatArray, str]:
+    """Samples of the `n` joints with the largest values, the largest first; these values, and their unit."""
+    view, name = view.narrowed(by)
+    if name in view.kept_loads:
+        values, unit = LOADS[name].of(view.results), LOADS[name].unit
+    else:
+        column = _column(view, name)
+        values, unit = column.of(view.read_results([column.field])).astype(np.float64), str(column.unit)
+    samples = np.flatnonzero(np.isin(view.status, SIMULATED) & np.isfinite(values))
+    samples = samples[np.argsort(-values[samples], kind="stable")][:n]
+    return samples, values[samples], unit
+
+
+def _column(view: View, by: str) -> Any:
+    """Column of the results.
+
+    Raises
+    ------
+    InputError
+        When there is none of this name.
+    """
+    columns = {column.name: column for column in view.columns}
+    if by in columns:
+        return columns[by]
+    if by in LOADS or by in [column.name for column in RESULT_COLUMNS]:
+        found = f"is not kept in {view.path}, see [output] results of its study"
+        raise InputError([Fault(by, found, f"give one of: {', '.join([*view.kept_loads, *columns])}")])
+    remedy = did_you_mean(by, [*view.kept_loads, *columns])
+    raise InputError([Fault(by, "is neither a load nor a column of the results", remedy)])
+
+
+def _points(view: View, by: str, samples: NDArray[np.intp]) -> list[str]:
+    """Operating point with the largest value in each joint; a load, unless there is one point only."""
+    view, name = view.narrowed(by)
+    if len(view.parts) == 1:
+        return [view.points[0]] * len(samples)
+    each = np.stack([LOADS[name].of(part.results)[samples] for part in view.parts])
+    return [view.points[k] for k in np.argmax(each, axis=0)]
+
+
+def _scores(view: View, samples: NDArray[np.intp]) -> list[dict[str, float]]:
+    """Each error of joints that scatters, in sigma."""
+    ascending, place = np.unique(samples, return_inverse=True)
+    errors = view.errors(ascending, sampling.columns(view.study))[place]
+    scores = sampling.normal_scores(view.study, errors)
+    return [{name: float(z[i]) for name, z in scores.items()} for i in range(len(samples))]
+
+
+def _has_points(rows: Rows) -> bool:
+    return any(row["point"] for row in rows)
+
+
+def _error(row: Row, place: int) -> str:
+    errors = largest_errors(row)
+    return f"{errors[place][0]} {errors[place][1]:+.2f}" if place < len(errors) else "-"
+
+
+def _errors_on_page(row: Row) -> str:
+    return ",  ".join(f"{name} {z:+.1f} σ" for name, z in largest_errors(row)[:ERRORS_ON_PAGE])
+
+
+def _panels(view: View, rows: Rows, joints: int) -> list[Panel]:
+    """Loads of the worst joints over the revolution, with those of all joints where they are known."""
+    followed = [load for load in view.leading if load in CHANNELS]
+    spreads: dict[str, tuple[FloatArray, FloatArray]] = {}
+    with suppress(TolstatError):  # which `angles` notes
+        spreads = revolution.spreads(view, followed, joints)
+    return [_panel(view, [row for row in rows if row["load"] == load], spreads.get(load)) for load in followed]
+
+
+def _panel(view: View, rows: Rows, spread: tuple[FloatArray, FloatArray] | None) -> Panel:
+    load, rows = rows[0]["load"], rows[:DRAWN]
+    ascending, place = np.unique(drawn(view, load), return_inverse=True)
+    found = revolutions.read(view.store, view.slots(ascending), [load], ANGLES)
+    lines = {f"row {row['row']}": line for row, line in zip(rows, found.loads[load][place], strict=True)}
+    highest = ", ".join(f"row {row['row']} up to {text.value(row['value'], row['unit'])}" for row in rows)
+    return Panel(
+        f"worst-{load}",
+        f"{load} of the worst joints over the revolution",
+        f"Histories of the worst joints: {highest}",
+        partial(
+            _draw,
+            name=f"|{load}| [{unit_text(rows[0]['unit'])}]",
+            theta=found.angles,
+            lines=lines,
+            spread=spread,
+            limit=view.limits.get(load),
+        ),
+        (4.9, 3.3),
+        top=drawing.legend_room([*lines, SPREAD, "limit"]),
+    )
+
+
+def _draw(
+    ax: Axes,
+    name: str,
+    theta: FloatArray,
+    lines: dict[str, FloatArray],
+    spread: tuple[FloatArray, FloatArray] | None,
+    limit: float | None,
+) -> None:
+    degrees = angles.theta_axis(ax, theta)
+    for i, (label, load) in enumerate(lines.items()):
+        ax.plot(degrees, angles.closed(load), color=style.COLOURS[i], ls=style.DASHES[i], lw=1.3, label=label)
+    if spread is not None:
+        low, _, high = angles.closed(spread[1])
+        around = angles.theta_axis(ax, spread[0])
+        ax.fill_between(around, low, high, color=style.FAINT, alpha=0.25, lw=0, label=SPREAD)
+    if limit is not None:
+        ax.axhline(limit, color=style.INK, lw=1.2, ls=(0.0, (8.0, 3.0)), label="limit")
+    ax.set(ylabel=name, ylim=(0.0, 1.05 * np.nanmax([*(line.max() for line in lines.values()), limit or 0.0])))
+    drawing.legend_above(ax, *ax.get_legend_handles_labels())

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-import tolstat
-from tolstat.analysis import prediction
+from tolstat.analysis import exceedance, prediction
 from tolstat.analysis.binomial import clopper_pearson
 from tolstat.common.tables import Status
 
@@ -31,7 +30,7 @@ def test_exceedance_of_joints_of_which_some_have_no_load():
     load = np.random.default_rng(1).normal(size=300)
     status = np.full(300, Status.OK)
     status[:20], load[:20] = Status.NEWTON_FAILED, np.nan
-    found = tolstat.exceedance(load, status, 1.0)
+    found = exceedance.exceedance(load, status, 1.0)
     count = int((load > 1.0).sum())
     theirs = stats.binomtest(count, 280).proportion_ci(method="exact")
     np.testing.assert_allclose([found.lower, found.upper], theirs, rtol=0, atol=ROOT)
@@ -50,7 +49,7 @@ def test_interval_of_a_quantile(n, decimals):
     for share in (0.01, 0.05, 0.5, 0.9, 0.95, 0.99):
         for confidence in CONFIDENCES:
             theirs = stats.quantile_test(load, p=share).confidence_interval(confidence)
-            found = tolstat.quantile(load, np.full(n, Status.OK), share, confidence)
+            found = exceedance.quantile(load, np.full(n, Status.OK), share, confidence)
             assert found.lower == (-np.inf if np.isnan(theirs.low) else theirs.low)
             assert found.upper == (np.inf if np.isnan(theirs.high) else theirs.high)
 

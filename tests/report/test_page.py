@@ -361,7 +361,15 @@ def test_a_campaign_under_way_has_a_page_that_says_so(tmp_path, simulated):
 def test_a_campaign_without_a_valid_joint_has_a_page(tmp_path):
     page.write_page(synthetic.store(tmp_path, failed=40, unsettled=20), tmp_path / "page.html", accepted=0.1, replay=0)
     text = (tmp_path / "page.html").read_text(encoding="utf-8")
-    assert Reading(text).sections == ["verdict", "limits", "histograms", "joint", "failed", "tolerances", "provenance"]
+    assert Reading(text).sections == [
+        "verdict",
+        "limits",
+        "tolerances",
+        "failed",
+        "drawings",
+        "histograms",
+        "provenance",
+    ]
     assert text.count(">no verdict<") == 8
 
 

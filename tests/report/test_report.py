@@ -242,7 +242,7 @@ def test_report_of_a_campaign_under_way_counts_what_is_pending(tmp_path):
 def test_report_of_a_file_that_has_just_been_made(tmp_path):
     made = reports.build(synthetic.store(tmp_path, simulated=0))
     assert "0 joints" in made.notes
-    assert len(made.files) == 5
+    assert [file.name for file in made.files[:2]] == ["small_exceedance.png", "small_exceedance.svg"]
 
 
 @pytest.mark.slow

@@ -34,7 +34,15 @@ if TYPE_CHECKING:
     from tolstat.joint import Joint
     from tolstat.study import Study
 
-ABOUT = "Monte Carlo tolerance analysis of Cardan joints: which share of the joints exceeds a load."
+ABOUT = """Monte Carlo tolerance analysis of Cardan joints: which share of the joints exceeds a load.
+
+\b
+For the first time:
+  tolstat new shaft                         a study to edit
+  tolstat plan shaft.toml                   its time, memory and precision
+  tolstat run shaft.toml                    simulate it, and print the report
+  tolstat report shaft.h5 --out shaft.html  the page
+"""
 CONTEXT = {"help_option_names": ["-h", "--help"]}
 EPILOG = (
     "Exit codes: 0 success, 1 internal error (replay: results differ), 2 input that cannot be used, "

@@ -149,7 +149,7 @@ def show(answer: Answer, wide: bool) -> None:
 
     first = True
     for part in answer.parts:
-        if isinstance(part, Table) and not part.hidden:
+        if isinstance(part, Table) and part.columns:
             if not first:
                 typer.echo(f"\n{part.title}")
             print_table(part.columns, part.for_people, wide)

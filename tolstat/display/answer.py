@@ -56,7 +56,6 @@ class Table:
         Units by key, where rows have none of their own.
     seen : sequence of mapping, optional
         What `columns` take their cells from: some of the rows, or rows arranged for people; by default all rows.
-        Without any, the table is in JSON and CSV only.
     verdicts : sequence of str
         Verdict of each row, see `blocks.Table`.
     """
@@ -73,11 +72,6 @@ class Table:
     def for_people(self) -> Rows:
         """Rows that people see."""
         return self.rows if self.seen is None else self.seen
-
-    @property
-    def hidden(self) -> bool:
-        """Whether people see nothing of it."""
-        return self.seen is not None and not self.seen
 
 
 @dataclass(frozen=True)
@@ -201,7 +195,7 @@ def _block(part: Part) -> Block | None:
         lead = part.place == "lead"
         return Text(part.text if lead else text.sentence(part.text), small=not lead)
     if isinstance(part, Table):
-        return None if part.hidden else as_block(part.title, part.columns, part.for_people, part.verdicts)
+        return as_block(part.title, part.columns, part.for_people, part.verdicts) if part.columns else None
     return None if isinstance(part, Document | Sheet) else part
 
 

@@ -176,7 +176,7 @@ def lots(
         [
             Panels([_panel(rows[-1], above, n, size)]),
             Table("limits", "Lots against each limit, and all of them together", COLUMNS, rows),
-            Table("lots", "Joints above the limits, by lot", (), of_lots, seen=()),
+            Table("lots", "Joints above the limits, by lot", (), of_lots),
             *map(Sentence, _notes(rows, size, accepted)),
             *([Sentence(unknown)] if (unknown := error_budget.unknown(view)) else []),
         ],

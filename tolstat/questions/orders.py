@@ -168,7 +168,7 @@ def orders(view: View, orbits: bool = False) -> Answer:
     if found:
         facts |= {"origin": origin, "apart": apart}
         points, units = [row for orbit in found for row in _points(orbit)], {"theta": "rad", "f_x": "N", "f_y": "N"}
-        parts.append(Table("orbits", "Lateral force over one revolution", (), points, units, seen=()))
+        parts.append(Table("orbits", "Lateral force over one revolution", (), points, units))
         notes.append(f"{_which(found)}; {ORIGIN[origin]}")
     if apart:
         notes.append(

@@ -121,7 +121,7 @@ def time_above(
         spread = {name: np.linspace(*ends[name], POINTS) for name in asked}
         more = list(_rows(spread, _shares(view, settled, spread)[0], design))
         drawn = [panel for name in list(asked)[:MAX_LOADS] for panel in _panels(name, more, asked[name])]
-        parts += [Table("curves", "Time above many levels", LEVELS, more, seen=()), Panels(drawn)]
+        parts += [Table("curves", "Time above many levels", (), more), Panels(drawn)]
     left_out = view.counts.done - settled.size
     counts = f"{settled.size} joints, {left_out} without a settled revolution left out"
     parts.append(Sentence(f"{counts}; time: share of a revolution"))

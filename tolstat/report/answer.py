@@ -124,8 +124,8 @@ def _tables(view: View, accepted: float) -> Iterator[Part]:
     if not view.shown_loads:
         yield Sentence("no largest load is kept; the results that are: tolstat export", "lead")
     for table in exceedance.quantile_tables(view):
-        yield Table("exceedance", "Exceedance curves", (), curve_rows(view), seen=())
-        yield replace(table, seen=()) if view.limits else table
+        yield Table("exceedance", "Exceedance curves", (), curve_rows(view))
+        yield replace(table, columns=()) if view.limits else table
     yield from exceedance.limit_tables(view, accepted)
 
 

@@ -32,9 +32,8 @@ def statistics(view: View, accepted: float = math.nan) -> dict[str, Any]:
     dict
         JSON values in SI units, null if unknown: ``study``, ``method``, ``confidence``; ``verdict``, with ``answer``
         (null without an accepted share), ``sentence`` and ``notes``, null without limits; ``joints``, numbers by
-        status;
-        ``limits`` (share above each), ``quantiles`` of every load kept; ``capability``, the answer of this name (null
-        for weighted joints); ``accuracy`` and ``bearing_life`` likewise;
+        status; the answers ``exceedance``, ``lots``, ``bearing_life``, ``capability`` and ``accuracy``, each with
+        ``facts``, ``sentences`` and ``tables``, null where the file cannot give it;
         ``joint``, mounting of the shafts and contact law in words; ``fidelity``, a sentence on the fidelity of the
         results; ``provenance``.
 
@@ -47,7 +46,7 @@ def statistics(view: View, accepted: float = math.nan) -> dict[str, Any]:
     --------
     >>> with tolstat.open(path) as store:
     ...     found = tolstat.statistics(store.view())
-    >>> found["joints"], round(found["limits"][0]["estimate"], 2)
+    >>> found["joints"], round(found["exceedance"]["tables"]["limits"]["rows"][0]["estimate"], 2)
     ({'ok': 12000}, 0.15)
     """
     store = view.store

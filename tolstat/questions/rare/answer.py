@@ -96,7 +96,7 @@ def rare(*views: View, delivery: Delivery = DELIVERY) -> Answer:
         Table(
             "levels", f"Levels to {limit}", LEVELS, levels, seen=[r for r in levels if r["seed"] == seeds[0]["seed"]]
         ),
-        Table("seeds", f"P({limit}) by seed", (), seeds, seen=()),
+        Table("seeds", f"P({limit}) by seed", (), seeds),
         *(Sentence(line, "lead") for line in _sentences(limit, estimate, facts, seeds)),
         *(Sentence(note) for row, view in zip(seeds, views, strict=True) for note in _notes(row, view, limit)),
     ]

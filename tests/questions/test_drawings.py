@@ -28,7 +28,8 @@ from tolstat.display.joint_drawing.geometry import FRONT, MEANINGS, SIDE
 from tolstat.joint import nominal_errors, perturb
 from tolstat.kernel.mechanics import bushing
 from tolstat.kernel.mechanics.topology import ARM, ARM_OF_PIN, BUSHING_BASE, FRAME, PIN, TRIAD
-from tolstat.questions.show import rendering, section
+from tolstat.questions.drawings import answer
+from tolstat.questions.drawings import joints as rendering
 from tolstat.store import ResultFile
 
 ALPHA = 0.3
@@ -308,16 +309,16 @@ def test_what_cannot_be_drawn_is_exit_code_2_and_writes_nothing(here, args, said
 def test_page_marks_the_leading_loads_and_draws_the_worst_joints(tmp_path):
     with ResultFile.open(synthetic.store(tmp_path)) as store:
         view, asked = store.view(), Asked(store.path)
-        marked = section.worst(view, "fork2.T", asked)
-        part, joint = section.sections(view, asked)
+        marked = answer.place_of(view, "fork2.T", asked)
+        joint, _, part, _ = answer.drawings(view).parts
         worst = {int(view.rows(int(np.argmax(LOADS[name].of(view.results))))) for name in view.leading}
     places = {name.partition(".")[0] for name in view.leading} - {"psi"}
     assert (marked.key, marked.title) == ("joint-worst", "fork2: nearest to its limit")
     assert "Marked: fork2." in marked.description
-    panels = joint.blocks[0].panels
+    panels = joint.panels
     assert [panel.key for panel in panels] == ["joint-front", "joint-side", "error-kinds"]
     assert f"Marked: {', '.join(sorted(places))}." in panels[0].description
-    assert {panel.key for panel in part.blocks[0].panels} == {f"drawn-{row}" for row in worst}
+    assert {panel.key for panel in part.panels} == {f"drawn-{row}" for row in worst}
     assert asked.notes == []
 
 

@@ -110,7 +110,12 @@ def compose(view: View, asked: Asked, full: bool = False) -> Page:
         asked.notes.append(f"loads over the input angle are on the page of one operating point: {remedy}")
     sections = questions.sections(view, asked)
     sections.sort(key=lambda section: section.folded)
-    return _page(view, [verdict.section(view, asked), *sections], full)
+    listings = (
+        Facts(tuple(_facts(view.store)), "Provenance"),
+        joint_values.listing(view.store),
+        Listing("The study as it was run", view.store.study_text),
+    )
+    return _page(view, [verdict.section(view, asked), *sections], listings, full)
 
 
 def compose_brief(view: View, asked: Asked) -> Page:
@@ -126,13 +131,10 @@ def compose_brief(view: View, asked: Asked) -> Page:
     return _page(view, sections)
 
 
-def _page(view: View, sections: Sequence[Section], full: bool = False) -> Page:
+def _page(
+    view: View, sections: Sequence[Section], listings: Sequence[Facts | Listing] = (), full: bool = False
+) -> Page:
     store = view.store
-    listings = (
-        Facts(tuple(_facts(store)), "Provenance"),
-        joint_values.listing(store),
-        Listing("The study as it was run", store.study_text),
-    )
     mounted = sentence(in_words(*recorded.mountings(store)))
     return Page(
         view.name,

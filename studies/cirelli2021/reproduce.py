@@ -30,7 +30,8 @@ def build(result: Path, stem: Path) -> str:
             raise ValueError(f"{result} does not hold the paper's cases: give a file of {STUDY.name}")
         study = page_source.read(store)
     page.write(study, stem.with_name(f"{stem.name}_paper.html"))
-    text.csv(page.entries(study), stem, "tables")
+    entries = page.entries(study)
+    text.csv({str(name): entries[name].tolist() for name in entries}, stem, "tables")
     return page.summary(study)
 
 

@@ -61,7 +61,7 @@ def tilted_pin(folder: Path) -> None:
         torque = np.linalg.norm(trace[["cross1.T_e", "cross1.T_t", "cross1.T_z"]], axis=1)
         contact = trace[["pin1.contact_outer", "pin1.contact_inner"]].max(axis=1)
         for ax, values in zip(panels, (torque, contact), strict=True):
-            ax.plot(trace["theta"], values, label=label)
+            ax.plot(np.degrees(trace["theta"]), values, label=label)
     for ax, label in zip(panels, ("torque of cross1 (N m)", "larger contact force of pin 1 (N)"), strict=True):
         ax.set(xlabel="angle of the input shaft (°)", ylabel=label, xticks=range(0, 361, 90), ylim=(0, None))
         ax.grid(alpha=0.3)

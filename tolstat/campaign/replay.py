@@ -94,7 +94,7 @@ class CaseResult(NamedTuple):
     def to_pandas(self) -> pd.DataFrame:
         """Trace of the last revolution, one row per input angle.
 
-        Columns: ``theta`` (deg), ``tau``, ``Psi``, then ``cross1.F_e`` … ``fork4.T_z`` (N and N m, on the lump, in
+        Columns: ``theta`` (rad), ``tau``, ``Psi``, then ``cross1.F_e`` … ``fork4.T_z`` (N and N m, on the lump, in
         the base marker's axes), ``pin1.contact_outer``, ``pin1.contact_inner``, ``pin1.contact_resultant`` … (N),
         ``input.f_x`` … ``output.m_z`` (force and moment about O on the shafts, N and N m, in axes that do not turn) and
         ``pin1.mode`` …
@@ -107,7 +107,7 @@ class CaseResult(NamedTuple):
         tau = histories["tau"].astype(float)
         theta = 2 * math.pi * np.arange(len(tau)) / len(tau)
         columns: dict[str, NDArray[Any]] = {
-            "theta": 360 * np.arange(len(tau)) / len(tau),
+            "theta": theta,
             "tau": tau,
             "Psi": (tau - speed_ratio(theta, self.alpha)) / tau,
         }

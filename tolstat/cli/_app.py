@@ -27,8 +27,6 @@ from tolstat.common.errors import Fault, InputError, TolstatError
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-    import pandas as pd
-
     from tolstat.common.tables import Variant
     from tolstat.display.table import Column, Rows
     from tolstat.joint import Joint
@@ -136,35 +134,17 @@ Workers = Annotated[
     int | None,
     typer.Option("--workers", metavar="W", min=1, help="Number of worker processes; default: one per core."),
 ]
-ByOne = Annotated[
-    str | None,
-    typer.Option(
-        "--by",
-        metavar="LOAD",
-        help="Load, such as cross1.F, pin2.contact or psi; default: that with the limit exceeded most.",
-    ),
-]
-ByMany = Annotated[
-    list[str] | None,
-    typer.Option("--by", metavar="LOAD", help="Load, such as cross1.F; repeatable; default: loads with limits."),
-]
 AtPoints = Annotated[
     str | None,
     typer.Option(
         "--point",
         metavar="POINT",
-        help="Operating point, such as cruise, or the worst of some: cruise+start; default: the worst of all.",
+        help="Operating point, such as cruise, or the worst of some: cruise+start; default: all.",
     ),
 ]
 AtPoint = Annotated[
     str | None,
     typer.Option("--point", metavar="POINT", help="Operating point, such as cruise; needed if FILE has several."),
-]
-AtOne = Annotated[
-    str | None,
-    typer.Option(
-        "--point", metavar="POINT", help="Operating point of STUDY, such as cruise; needed if it has several."
-    ),
 ]
 Accept = Annotated[
     str | None,
@@ -313,18 +293,11 @@ def parse_share(text: str) -> float:
     return share
 
 
-def width_of(wide: bool) -> int | None:
-    """Characters in a line of a table; None for all columns."""
-    from tolstat.display.table import WIDTH
-
-    return None if wide else WIDTH
-
-
-def print_table(columns: Sequence[Column], frame: Rows | pd.DataFrame, wide: bool) -> None:
+def print_table(columns: Sequence[Column], rows: Rows, wide: bool) -> None:
     """Print a table on standard output, and on standard error the columns left out to fit the line."""
     from tolstat.display import table
 
-    shown, missing = table.fitted(columns, frame, width_of(wide))
+    shown, missing = table.fitted(columns, rows, None if wide else table.WIDTH)
     typer.echo(shown)
     if missing:
         say(missing)
@@ -332,10 +305,9 @@ def print_table(columns: Sequence[Column], frame: Rows | pd.DataFrame, wide: boo
 
 def announce_compilation() -> None:
     """Print a message if the kernels have to be compiled first."""
-    from tolstat.solver.compilation import is_compiled
+    from tolstat.solver import compilation
 
-    if not is_compiled():
-        say("compiling the kernels: about half a minute, once per machine and version")
+    compilation.announce()
 
 
 def as_text(summary: dict[str, Any]) -> str:

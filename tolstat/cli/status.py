@@ -105,20 +105,19 @@ def _checked(store: Reader) -> bool:
 
 
 def _print_shares(shares: list[dict[str, Any]], wide: bool) -> None:
-    import pandas as pd
-
     from tolstat.display import text
     from tolstat.display.table import Column
 
-    frame = pd.DataFrame(shares).rename(columns={"limit": "level"}).astype({"lower": float, "upper": float})
+    unknown = float("nan")
+    rows = [{key: unknown if value is None else value for key, value in row.items()} for row in shares]
     columns = (
-        Column("load > limit", text.limit),
+        Column("load > limit", lambda row: text.limit({**row, "level": row["limit"]})),
         Column("above", lambda row: f"{row['above']} of {row['of']}"),
         Column("share", lambda row: text.percent(row["estimate"])),
         Column("95 % interval", lambda row: text.span(row["lower"], row["upper"])),
     )
     typer.echo()
-    print_table(columns, frame.astype({"estimate": float}), wide)
+    print_table(columns, rows, wide)
 
 
 def _summary(store: Reader) -> tuple[dict[str, Any], dict[str, NDArray[np.uint8]]]:

@@ -7,13 +7,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from tolstat.display.blocks import Table
 from tolstat.display.text import align
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 Row = Mapping[Any, Any]
 Rows = Sequence[Row]
@@ -59,20 +56,18 @@ class Column(NamedTuple):
     rank: int = 0
 
 
-def cells(columns: Sequence[Column], table: Rows | pd.DataFrame) -> list[list[str]]:
+def cells(columns: Sequence[Column], rows: Rows) -> list[list[str]]:
     """Headings, then one row of cells for each row of a table; without the columns that have nothing to show."""
-    rows = _rows(table)
     return _cells([column for column in columns if column.shown(rows)], rows)
 
 
-def as_text(columns: Sequence[Column], table: Rows | pd.DataFrame, width: int | None = WIDTH) -> str:
+def as_text(columns: Sequence[Column], rows: Rows, width: int | None = WIDTH) -> str:
     """Aligned text of a table, in lines of at most `width` characters if it can be; None for all columns."""
-    return fitted(columns, table, width)[0]
+    return fitted(columns, rows, width)[0]
 
 
-def fitted(columns: Sequence[Column], table: Rows | pd.DataFrame, width: int | None = WIDTH) -> tuple[str, str]:
+def fitted(columns: Sequence[Column], rows: Rows, width: int | None = WIDTH) -> tuple[str, str]:
     """Text as of `as_text`, and a sentence that names the columns that it leaves out; empty if there are none."""
-    rows = _rows(table)
     able = used = [column for column in columns if column.shown(rows)]
     shown = _text(used, rows)
     while width is not None and max(map(len, shown.splitlines())) > width:
@@ -83,10 +78,6 @@ def fitted(columns: Sequence[Column], table: Rows | pd.DataFrame, width: int | N
         shown = _text(used, rows)
     heads = [column.head for column in able if column not in used]
     return shown, f"with --wide also: {', '.join(heads)}" if heads else ""
-
-
-def _rows(table: Rows | pd.DataFrame) -> Rows:
-    return table if isinstance(table, Sequence) else table.to_dict("records")
 
 
 def _cells(used: Sequence[Column], rows: Rows) -> list[list[str]]:
@@ -112,9 +103,8 @@ def _short(x: Any) -> str:
     return ("-" if math.isnan(x) else f"{x:.5g}") if isinstance(x, float) else str(x)
 
 
-def as_block(title: str, columns: Sequence[Column], table: Rows | pd.DataFrame, verdicts: Sequence[str] = ()) -> Table:
+def as_block(title: str, columns: Sequence[Column], rows: Rows, verdicts: Sequence[str] = ()) -> Table:
     """Block of the page with a table; see `blocks.Table`."""
-    rows = _rows(table)
     used = [column for column in columns if column.shown(rows)]
     head, *body = _cells(used, rows)
     return Table(title, head, body, frozenset({0} | {i for i, own in enumerate(used) if own.words}), verdicts)

@@ -34,16 +34,9 @@ def cell(value: Any) -> Any:
     return f"'{value}" if isinstance(value, str) and value.startswith(("=", "+", "-", "@", "\t", "\r")) else value
 
 
-def cells(table: pd.DataFrame) -> pd.DataFrame:
-    """Return a frame with `cell` applied to its columns of text."""
-    words = [name for name in table if table[name].dtype.kind not in "biuf"]
-    return table.assign(**{str(name): table[name].map(cell) for name in words}) if words else table
-
-
-def csv(table: Mapping[str, Sequence[Any]] | pd.DataFrame, stem: Path, what: str) -> Path:
-    """Write columns or a frame as ``STEM_what.csv``, NaN as an empty cell; return its path."""
+def csv(columns: Mapping[str, Sequence[Any]], stem: Path, what: str) -> Path:
+    """Write columns as ``STEM_what.csv``, NaN as an empty cell; return its path."""
     path = stem.with_name(f"{stem.name}_{what}.csv")
-    columns = table if isinstance(table, Mapping) else {str(name): table[name].tolist() for name in table}
     with atomic_write(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as stream:
         out = writer(stream, lineterminator="\n")
         out.writerow(columns)

@@ -10,12 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from tolstat.common.errors import NotApplicable, StoreError
-from tolstat.display.blocks import Section
+from tolstat.display.blocks import Block, Section, Text
 
 if TYPE_CHECKING:
     from tolstat.display.answer import Answer
@@ -122,8 +124,16 @@ def sections(view: View, asked: Asked) -> list[Section]:
             with asked.noting(f"{question.name} is left out"), suppress(NotApplicable):
                 answer = question.on_page(view, asked)
                 key = question.name.replace("_", "-")
-                found.append(Section(key, answer.title, answer.blocks(), question.page == "folded"))
+                blocks = [_without_folder(block, view.path) for block in answer.blocks()]
+                found.append(Section(key, answer.title, blocks, question.page == "folded"))
     return found
+
+
+def _without_folder(block: Block, path: Path) -> Block:
+    """Name the file without its folder in a paragraph, so that the page does not depend on the folder."""
+    if not isinstance(block, Text):
+        return block
+    return replace(block, text=block.text.replace(quote(str(path)), quote(path.name)).replace(str(path), path.name))
 
 
 def statistics(view: View) -> dict[str, Any]:

@@ -24,6 +24,12 @@ POLL_S = 0.2
 """Time between two looks for kernels that have been compiled, s."""
 
 
+def announce() -> None:
+    """Tell that kernels will be compiled, if they have to be."""
+    if not is_compiled():
+        LOG.info("compiling the kernels: about half a minute, once per machine and version")
+
+
 def _outside() -> NDArray[np.void]:
     """One joint with negative clearance: it ends at once."""
     params = np.zeros(1, PARAM)

@@ -13,6 +13,7 @@ from tolstat.common.aside import Aside
 from tolstat.common.channels import BUSHING_LOADS, CHANNELS, LOAD_HISTORIES, MEASURING, LoadHistory, histories_of
 from tolstat.common.shown import shown
 from tolstat.joint import perturb
+from tolstat.solver import compilation
 from tolstat.solver.compilation import is_compiled, warm_up
 from tolstat.solver.harmonics import restore
 from tolstat.solver.simulation import simulate_rows
@@ -228,6 +229,7 @@ def _simulated(store: Reader, slots: NDArray[np.intp]) -> Again:
     """Simulate joints again with what the file holds of them, and compare with its results."""
     first, steps = int(slots[0]), int(store.options["steps_per_rev"])
     params = perturb(joint_of(store, first), operation_of(store, first), pick(store.errors, slots))
+    compilation.announce()
     attempts, stored = pick(store.attempt, slots), pick(store.results, slots)[LARGEST].copy()
     loads = {h.name: np.empty((len(slots), steps, *h.shape), np.float32) for h in LOAD_HISTORIES}
     apart = np.zeros(len(slots))

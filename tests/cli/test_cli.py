@@ -260,8 +260,8 @@ def test_report_prints_the_table_and_names_the_files_on_stderr(tmp_path):
         r"Shafts rigid along their axes; contact law mode\.",
         sentence.replace("\n", " "),
     )
-    assert table.startswith("load")
-    assert [line.split()[0] for line in table.splitlines()[1:]] == [
+    assert table.startswith("Joints above each limit\nload")
+    assert [line.split()[0] for line in table.splitlines()[2:]] == [
         "cross1.F", "fork1.T", "fork2.T", "fork3.T", "fork4.T", "pin1.contact", "psi"
     ]  # fmt: skip
     assert f"wrote {tmp_path / 'small_exceedance.png'}" in done.stderr
@@ -350,7 +350,7 @@ def test_completion_knows_the_commands_and_loads_nothing_heavy():
 def test_run_ends_with_the_report_and_resumes(study):
     done = call("run", study, "--workers", 1)
     assert done.exit_code == 0, done.stderr
-    verdict, mounting, _, head, *_ = done.stdout.splitlines()
+    verdict, mounting, _, _, head, *_ = done.stdout.splitlines()
     assert verdict.startswith("No verdict")
     assert mounting == "Shafts rigid along their axes; contact law mode."
     assert head.startswith("load")

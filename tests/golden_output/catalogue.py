@@ -12,7 +12,19 @@ MADE = "run"
 FORMS = ("", " --wide", " --json")
 COMMANDS = (
     *("new", "schema", "show", "simulate", "plan", "run", "extend", "merge", "status", "verify", "replay", "report"),
-    *("capability", "lots", "worst", "causes", "fatigue", "bearing-life", "orders", "time-above", "sorting"),
+    *(
+        "capability",
+        "lots",
+        "worst",
+        "causes",
+        "angles",
+        "pairs",
+        "fatigue",
+        "bearing-life",
+        "orders",
+        "time-above",
+        "sorting",
+    ),
     *("reweight", "allocate", "compare", "rare", "selective", "export", "docs", "cache"),
 )
 
@@ -60,6 +72,7 @@ MAIN = Campaign(
     | {
         "pictures": ["orders iso2768_f.h5 --orbits --out orders", "report iso2768_f.h5 --out report --accept '50 %'"],
         "again": ["run iso2768_f.toml --n 64 --out iso2768_f.h5", "process: run iso2768_f.toml --n 64"],
+        "pairs": forms("pairs iso2768_f.h5"),
         "capability_rare": forms("capability iso2768_f.h5 --one-in 100 --delivery 50"),
         "compare": [*forms("compare iso2768_f.h5 rigid_shafts.h5"), "compare iso2768_f.h5 rigid_shafts.h5 --by psi"],
         "worst_by": ["worst iso2768_f.h5 --by psi --top 3", "worst iso2768_f.h5 --by revolutions --top 3"],

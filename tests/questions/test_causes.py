@@ -204,8 +204,8 @@ def test_page_leaves_out_what_a_file_cannot_tell(tmp_path):
     found, notes, leading = shown(synthetic.store(tmp_path))
     assert list(found) == ["worst"]
     assert [note.partition(":")[0] for note in notes] == [
-        "no pairs of errors",
         *(f"no causes of {x.name}" for x in leading),
+        "no pairs of errors",
     ]
     design = synthetic.STUDY.replace("n = 60", 'method = "pick_freeze"\ngroups = "error"\nn = 100')
     found, notes, _ = shown(synthetic.store(tmp_path, design, "design"))

@@ -339,7 +339,7 @@ def test_a_file_that_lacks_joints_is_resumed_by_its_own_command(whole):
         pytest.raises(StoreError, match=r"is not finished\n  hint: resume it: tolstat rare"),
     ):
         rare(store.view())
-    done = CliRunner().invoke(app, ["rare", str(path), "--json"])
+    done = CliRunner().invoke(app, ["rare", str(path), "--run", "--json"])
     assert done.exit_code == 0, done.stderr
     assert json.loads(done.stdout)["facts"]["probability"] == found["probability"]
 
@@ -353,7 +353,7 @@ def test_a_finished_file_of_other_code_is_shown_and_an_unfinished_one_refused(wh
     assert done.exit_code == 0, done.stderr
     with h5py.File(path, "r+") as file:
         file["results/status"][3] = Status.PENDING
-    done = CliRunner().invoke(app, ["rare", str(path)])
+    done = CliRunner().invoke(app, ["rare", str(path), "--run"])
     assert done.exit_code == 2
     assert "run the study into another file (--out OTHER.h5), or resume with" in done.stderr
 

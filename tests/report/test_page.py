@@ -433,7 +433,7 @@ def test_joints_of_different_weight_are_counted_by_it_and_told_so(tmp_path):
     page.write_page(path, tmp_path / "page.html", accepted=0.05, replay=0)
     html = (tmp_path / "page.html").read_text(encoding="utf-8")
     sections = Reading(html).sections
-    assert among(sections, ["verdict", "exceedance", "worst", "modes", "failed", "provenance"])
+    assert among(sections, ["verdict", "exceedance", "failed", "worst", "modes", "provenance"])
     assert not {"capability", "causes"} & set(sections)
     with ResultFile.open(path) as store:
         weights, results = store.origin()["weight"][1:], store.results()[1:]

@@ -55,7 +55,7 @@ def test_failed_and_unsettled_joints_are_counted_both_ways():
     row = table.iloc[0]
     assert (row["n"], row["n_failed"], row["n_unsettled"]) == (200, 7, 5)
     assert row["bound_upper"] - row["bound_lower"] == pytest.approx(12 / 200)
-    assert "with unresolved joints" in as_text(exceedance.LIMITS, table, None)
+    assert "with unresolved joints" in as_text(exceedance.LIMITS, table.to_dict("records"), None)
     assert "with unresolved joints" not in as_text(exceedance.LIMITS, rows.limit_rows(view()), None)
 
 
@@ -225,8 +225,8 @@ def test_report_of_a_random_view(tmp_path):
     assert all(file.parent == tmp_path and file.stat().st_size > 500 for file in made.files)
     assert made.table.splitlines()[0].startswith("67.2 % of the joints keep all 7 limits (39 of 58 with a valid load;")
     assert made.table.splitlines()[1] == "Shafts rigid along their axes; contact law mode."
-    assert made.table.splitlines()[3].split()[:4] == ["load", "limit", "nominal", "above"]
-    assert len(made.table.splitlines()) == 3 + 1 + 7
+    assert made.table.splitlines()[4].split()[:4] == ["load", "limit", "nominal", "above"]
+    assert len(made.table.splitlines()) == 4 + 1 + 7
     assert "60 joints (random sampling), 2 failed, 0 not settled" in made.notes
     limits = pd.read_csv(tmp_path / "small_limits.csv")
     assert list(limits["n"]) == [60] * 7  # the nominal joint is not among them
@@ -250,7 +250,7 @@ def test_report_without_limits_prints_quantiles(tmp_path):
     plain = synthetic.STUDY.partition("[limits]")[0]
     made = reports.build(synthetic.store(tmp_path, plain))
     assert "95 % interval of 99 %" in made.table
-    assert len(made.table.splitlines()) == 2 + 1 + 16
+    assert len(made.table.splitlines()) == 3 + 1 + 16
     assert not (tmp_path / "small_limits.csv").exists()
 
 

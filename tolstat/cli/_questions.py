@@ -10,6 +10,7 @@ from __future__ import annotations
 import inspect
 import json
 import re
+import textwrap
 from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
@@ -27,7 +28,7 @@ from tolstat.cli._app import (
     output_folder,
     print_table,
 )
-from tolstat.cli._talk import progress, say, warn, wrapped
+from tolstat.cli._talk import WIDTH, progress, say, warn, wrapped
 from tolstat.common.errors import Fault, InputError
 from tolstat.display.options import Opt
 from tolstat.questions import Question
@@ -157,7 +158,7 @@ def show(answer: Answer, wide: bool) -> None:
         elif isinstance(part, Listing):
             typer.echo(f"\n{part.title}\n{part.text}")
         elif isinstance(part, Sentence) and part.place == "lead":
-            typer.echo(part.text if wide else wrapped(part.text))
+            typer.echo(part.text if wide else textwrap.fill(part.text, WIDTH))
             first = False
         elif isinstance(part, Sentence) and part.place == "warning":
             warn(wrapped(f"warning: {part.text}"))

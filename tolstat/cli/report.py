@@ -16,6 +16,7 @@ from tolstat.cli._app import (
     Wide,
     announce_compilation,
     as_text,
+    make_folder,
     parse_share,
 )
 from tolstat.cli._talk import progress, say
@@ -73,6 +74,8 @@ def report(
     from tolstat.store import recorded, viewed
 
     with viewed(file) as view:
+        if out is not None:
+            make_folder(out)
         with progress("report"):
             made = answer(view.at(point or ""), accepted)
         if as_json:

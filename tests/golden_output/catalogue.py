@@ -72,7 +72,6 @@ MAIN = Campaign(
     | {
         "pictures": ["orders iso2768_f.h5 --orbits --out orders", "report iso2768_f.h5 --out report --accept '50 %'"],
         "again": ["run iso2768_f.toml --n 64 --out iso2768_f.h5", "process: run iso2768_f.toml --n 64"],
-        "pairs": forms("pairs iso2768_f.h5"),
         "capability_rare": forms("capability iso2768_f.h5 --one-in 100 --delivery 50"),
         "compare": [*forms("compare iso2768_f.h5 rigid_shafts.h5"), "compare iso2768_f.h5 rigid_shafts.h5 --by psi"],
         "worst_by": ["worst iso2768_f.h5 --by psi --top 3", "worst iso2768_f.h5 --by revolutions --top 3"],

@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
 from typing import Annotated, Any
 
 import pytest
 
+from tests.support import synthetic
+from tolstat import sampling
+from tolstat.campaign.work import Work
 from tolstat.cli import _questions
 from tolstat.cli._questions import entries, prose, quantity
 from tolstat.common.errors import InputError
+from tolstat.display.answer import Answer
 from tolstat.display.options import Opt
 from tolstat.questions import QUESTIONS, Question
+from tolstat.store import Writer
 from tolstat.store.view import View
+from tolstat.study import Study, load
 
 OF_QUESTIONS = [question for question in QUESTIONS if isinstance(question, Question)]
 DOCSTRING = """Do this.
@@ -87,3 +95,37 @@ def test_options_have_the_name_limits_and_defaults_of_the_signature(monkeypatch:
     assert number.annotation.__metadata__[0].min == 1
     assert accepted.annotation.__metadata__[0].default == "--accept"
     assert accepted.annotation.__metadata__[0].help == "The share."
+
+
+@pytest.mark.parametrize(("point", "shown"), [("", ["drive", "climb"]), ("climb", ["climb"]), ("valley", None)])
+def test_a_study_is_simulated_whole_and_read_at_the_point_asked_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], point: str, shown: Any
+) -> None:
+    _, _, keys = synthetic.HEAD.partition("[operation]")
+    text = synthetic.STUDY.replace("[operation]", '[[operation]]\nname = "drive"')
+    text = text.replace("[tolerances]", f'[[operation]]\nname = "climb"{keys}[tolerances]', 1)
+    (tmp_path / "two.toml").write_text(text, encoding="utf-8")
+    plan = load(tmp_path / "two.toml")
+    with Writer.create(tmp_path / "two.h5", plan, [sampling.draw(plan)]):
+        pass
+
+    def known(view: View) -> Answer:
+        """Know it."""
+        return Answer("known", "Known", (), {"points": view.points})
+
+    def simulate(study: Study, work: Work) -> list[Path]:
+        """Know it."""
+        assert [(own.name, work.point) for own in study.points] == [("drive", point), ("climb", point)]
+        return [tmp_path / "two.h5"]
+
+    question = Question("known", "Read", "Know it.")
+    monkeypatch.setattr(Question, "functions", lambda self: (known, simulate))
+    monkeypatch.setattr("tolstat.cli._work.announce_compilation", lambda: None)
+    given = {"source": tmp_path / "two.toml", "point": point or None, "workers": None, "out": None, "wide": False}
+    run = _questions.command_of(question)
+    if shown is None:
+        with pytest.raises(InputError, match="valley"):
+            run(**given, study_file=None, as_json=True)
+        return
+    run(**given, study_file=None, as_json=True)
+    assert json.loads(capsys.readouterr().out)["facts"] == {"points": shown}

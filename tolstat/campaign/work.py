@@ -30,6 +30,8 @@ class Work:
         Receives messages.
     study_file : Path, optional
         Study to read instead of the text stored in a result file that is simulated further.
+    point : str
+        Operating point asked for, for a simulation that can have only one.
     """
 
     workers: int | None = None
@@ -37,6 +39,7 @@ class Work:
     display: Display = field(default_factory=Display)
     tell: Callable[[str], None] = silent
     study_file: Path | None = None
+    point: str = ""
 
     def run(self, study: Study, name: str) -> Path:
         """Simulate the pending joints of a campaign into the file `name` of the folder; returns its path.

@@ -154,16 +154,6 @@ Accept = Annotated[
         help='Accepted share of the joints, all limits together, for the verdict: "0.1 %", "1000 ppm" or 0.001.',
     ),
 ]
-Delivery = Annotated[
-    int,
-    typer.Option(
-        "--delivery",
-        metavar="N",
-        min=1,
-        max=10**9,
-        help="Number of joints of the next delivery, for the prediction interval of those above a limit.",
-    ),
-]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON instead of text.")]
 StudyOption = Annotated[
     Path | None,

@@ -123,12 +123,13 @@ def command_of(question: Question) -> Callable[..., None]:
 
         options = {p.name: _value(p, given[p.name]) for p in asked.options}
         sources = [path for name, _, _ in arguments for path in _listed(given[name])]
-        stem, point = "_".join(path.stem for path in sources[:2]), given.get("point") or ""
+        stem, point, is_study = "_".join(path.stem for path in sources[:2]), given.get("point") or "", False
         if asked.simulate is not None:
-            point = "" if sources[0].suffix == ".toml" else point  # the study is simulated at the point
+            is_study = sources[0].suffix == ".toml"
             sources = _simulated(asked, sources[0], given)
         with ExitStack() as stack:
             opened = [stack.enter_context(ResultFile.open(path)) for path in sources]
+            point = "" if is_study and len(opened[0].points) == 1 else point  # the one that was simulated
             views = [store.view(given.get("study_file")).at(point) for store in opened]
             with progress(question.name):
                 answer = asked.answer(*views, **options)
@@ -201,15 +202,17 @@ def _simulated(asked: _Asked, source: Path, given: dict[str, Any]) -> list[Path]
         return [source]
     from tolstat import study
     from tolstat.cli._work import work
+    from tolstat.study.points import names_of
 
     options = {p.name: _value(p, given[p.name]) for p in asked.simulated}
     folder = given["out"] or Path()
     if is_study:
         make_folder(folder)
     what: Any = study.load(source) if is_study else source
-    if is_study and given.get("point"):
-        what = what.at(given["point"])
-    with work(given["workers"], folder, given.get("study_file")) as running:
+    if is_study:
+        names_of(given.get("point") or "", [one.name for one in what.points], str(source))
+    settings = {"workers": given["workers"], "folder": folder, "study_file": given.get("study_file")}
+    with work(**settings, point=given.get("point") or "") as running:
         return asked.simulate(what, running, **options)  # type: ignore[misc]
 
 

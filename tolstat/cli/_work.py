@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -17,19 +16,26 @@ if TYPE_CHECKING:
 
 
 @contextmanager
-def work(workers: int | None, folder: Path, study_file: Path | None = None) -> Iterator[Work]:
-    """Work of one command: worker processes, the folder of its result files, progress on standard error."""
+def exit_codes() -> Iterator[None]:
+    """Say how far a simulation came that was stopped, or lost its workers, and end with the exit code of that."""
     from tolstat.campaign import run as campaign
     from tolstat.campaign.pool import WorkerDied
-    from tolstat.campaign.work import Work
 
-    announce_compilation()
     try:
-        with progress() as shown:
-            yield Work(workers, folder, shown, say, study_file)
+        yield
     except campaign.Interrupted as stop:
         fail(str(stop))
         raise typer.Exit(stop.exit_code) from stop
     except WorkerDied as error:
         fail(f"error: {error}")
         raise typer.Exit(1) from error
+
+
+@contextmanager
+def work(**settings: Any) -> Iterator[Work]:
+    """Work of one command with progress on standard error; `settings` are fields of `Work`."""
+    from tolstat.campaign.work import Work
+
+    announce_compilation()
+    with exit_codes(), progress() as shown:
+        yield Work(display=shown, tell=say, **settings)

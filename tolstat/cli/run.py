@@ -12,15 +12,14 @@ import typer
 
 from tolstat.cli._app import Wide, Workers, announce_compilation, print_study_notes
 from tolstat.cli._shortage import check_memory
-from tolstat.cli._talk import fail, progress, say
+from tolstat.cli._talk import progress, say
+from tolstat.cli._work import exit_codes
 from tolstat.common.errors import Fault, InputError, gather
 
 if TYPE_CHECKING:
     from tolstat.common.counts import Counts
     from tolstat.store import Reader
     from tolstat.study import Study
-
-SECONDS_PER_UNIT = {"s": 1.0, "min": 60.0, "h": 3600.0}
 
 
 class Executor(StrEnum):
@@ -143,24 +142,6 @@ def _cannot_be_combined(rows: str | None, until: str | None, retry: str | None, 
     return faults
 
 
-def parse_time(text: str, option: str) -> float:
-    """Parse the time of an option, such as ``"60 s"``; returns seconds.
-
-    Raises
-    ------
-    InputError
-        When the text is not a time above zero.
-    """
-    number, _, unit = text.partition(" ")
-    try:
-        seconds = float(number) * SECONDS_PER_UNIT[unit.strip()]
-    except (KeyError, ValueError):
-        seconds = 0.0
-    if not 0 < seconds < float("inf"):
-        raise InputError([Fault(option, f"{text!r} is not a time", f'write {option} "60 s", "5 min" or "1 h"')])
-    return seconds
-
-
 def parse_rows(text: str) -> range:
     """Parse a range of rows, ``"5000:10000"``: the first row, and the row after the last.
 
@@ -177,18 +158,9 @@ def parse_rows(text: str) -> range:
 
 def simulate(plan: Study, path: Path, until: str | None = None, **choices: Any) -> None:
     """Simulate a campaign with progress on standard error; `choices` go to `campaign.run`."""
-    from tolstat.campaign import run as campaign
-    from tolstat.campaign.pool import WorkerDied
-
     announce_compilation()
-    try:
+    with exit_codes():
         counts = _campaign_until(until, plan, path, **choices) if until else _campaign(plan, path, **choices)
-    except campaign.Interrupted as stop:
-        fail(str(stop))
-        raise typer.Exit(stop.exit_code) from stop
-    except WorkerDied as error:
-        fail(f"error: {error}")
-        raise typer.Exit(1) from error
     say(f"{path}: {counts.done} {counts.counted}, {counts.shortfall}")
 
 

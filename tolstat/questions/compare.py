@@ -128,7 +128,7 @@ LOADS = (
 def compare(a: View, b: View, by: Loads = None) -> Answer:
     """Compare the exceedances and loads of two campaigns.
 
-    Prints the differences between the studies and, as B - A with its 95 % interval, the difference of the share above
+    Gives the differences between the studies and, as B - A with its 95 % interval, the difference of the share above
     each limit; with --by, or without limits, also of quantiles and means. Joints drawn from the same seed are compared
     in pairs, which makes the intervals narrow.
 

@@ -107,7 +107,7 @@ def lots(
     Parts of one lot deviate together, as the key lot of an entry of [tolerances] says. Simulates 50 lots of 20 joints
     of STUDY into STUDY_lots.h5. To resume after an interruption, run the same command again.
 
-    Prints for each limit, and for all limits together, the share of the joints above it, with a 95 % interval over the
+    Gives for each limit, and for all limits together, the share of the joints above it, with a 95 % interval over the
     lots, the worst lot, and a prediction interval for the next delivery; with --wide or --json also the median lot and
     how much joints of one lot are alike. With --accept, prints the share of the deliveries with more bad joints.
 

@@ -113,7 +113,7 @@ def selective(*views: View) -> Answer:
     campaign for each number of classes, with the same seed, into STUDY_kK.h5; 1 is without sorting. To resume after an
     interruption, run the same command again.
 
-    Prints for each the share of the parts without a partner, the scatter of the clearance, and the yield of the
+    Gives for each the share of the parts without a partner, the scatter of the clearance, and the yield of the
     assembled joints with its 95 % interval.
 
     Example: tolstat selective studies/selective.toml --classes 1 --classes 3

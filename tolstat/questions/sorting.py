@@ -79,7 +79,7 @@ def sorting(view: View, costs: Costs = None) -> Answer:
     Parts are scrapped by the gauge of their entry in [tolerances], joints rejected by [reject]. No joint is simulated:
     each counts by the probability that it is kept.
 
-    Prints the share of parts scrapped and the cost of a part, then for each limit, and for all together, the share
+    Gives the share of parts scrapped and the cost of a part, then for each limit, and for all together, the share
     above it with its 95 % interval and the cost of a good joint, at each stage.
 
     Example: tolstat sorting sorting.h5

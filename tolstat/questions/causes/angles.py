@@ -57,7 +57,7 @@ def angles(
 ) -> Answer:
     """Compute which errors scatter a load at each angle.
 
-    Prints for each error the share of the load's variance that it explains alone, over the whole revolution and at the
+    Gives for each error the share of the load's variance that it explains alone, over the whole revolution and at the
     angle of its largest share (first-order Sobol' indices). With --out writes the shares at each angle, and pictures.
     Joints are simulated again if FILE has no load histories.
 

@@ -60,12 +60,12 @@ LOGARITHMS = "Where a few joints with large loads dominate the variance, it is t
 def causes(view: View, by: Load = None, top: Top = 12, logarithm: bool = False) -> Answer:
     """Compute which tolerances and errors cause a load.
 
-    Prints for each line of the drawing, an entry of [tolerances], the share of the joints above the limit if it were
+    Gives for each line of the drawing, an entry of [tolerances], the share of the joints above the limit if it were
     half as wide, exact, finer or coarser by one class (else by the factors 0.63 and 1.6). With --run, simulates these
     joints, which have the seeds of FILE and keep their loads in it: until the order of the lines is settled, the time
     is up, or each change has --most joints. To go on, run the same command again.
 
-    Prints for each error: the share of the load's variance that it explains alone and in interactions (first-order and
+    Gives for each error: the share of the load's variance that it explains alone and in interactions (first-order and
     total Sobol' indices), the direction of its effect (rank regression), and the probability that a joint above the
     limit (without a limit: above the 90 % quantile) has a larger, or a more extreme, error than a joint below.
 

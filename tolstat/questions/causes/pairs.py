@@ -62,7 +62,7 @@ HOW = (
 def pairs(view: View, by: Load = None) -> Answer:
     """Find which errors of pin and hole together cause a load.
 
-    A joint binds where errors of a pin against its hole use up the clearance. Prints the combinations of tilts and
+    A joint binds where errors of a pin against its hole use up the clearance. Gives the combinations of tilts and
     offsets whose share of the clearance orders the joints best by the load, and how often joints that use most of it
     exceed the limit.
 

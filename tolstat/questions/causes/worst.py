@@ -49,7 +49,7 @@ KEYS = ("load", "unit", "row", "value", "point", "status")
 def worst(view: View, by: Load = None, top: Top = 10) -> Answer:
     """List the joints with the largest load and their errors.
 
-    Prints row, load and status of each joint, and its largest errors in sigma: the standard normal score that has the
+    Gives row, load and status of each joint, and its largest errors in sigma: the standard normal score that has the
     same probability as the error in its own distribution. --by takes columns of the results too, such as revolutions.
 
     Example: tolstat worst iso2768_f.h5 --by cross1.F --top 20

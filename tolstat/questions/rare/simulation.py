@@ -93,7 +93,7 @@ def simulate(
     else:
         if limit is None:
             raise InputError([Fault("--limit", "is missing", 'add --limit "cross1.F > 900 N"')])
-        plan, stem = subset_study(source, limit, n, p0, seed, unresolved), f"{source.path.stem}_rare"
+        plan, stem = subset_study(source.at(work.point), limit, n, p0, seed, unresolved), f"{source.path.stem}_rare"
         plans = {work.folder / f"{stem}{f'_{k + 1}' if k else ''}.h5": _seeded(plan, k) for k in range(repeats)}
     work.display.stage("levels of the subset simulation")
     with kept_workers():

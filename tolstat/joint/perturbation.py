@@ -6,14 +6,14 @@ from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, model_validator
 
 from tolstat.common import units
 from tolstat.common.load_kinds import PINS
 from tolstat.common.parameters import MAX_STATIONS
 from tolstat.common.strict import Strict, refuse
-from tolstat.common.tables import ERROR, HOLES, PARAM
-from tolstat.joint import material
+from tolstat.common.tables import ERROR, FACTORS, HOLES, PARAM
+from tolstat.joint import material, orders
 from tolstat.joint.contact import Contact
 from tolstat.joint.model import Joint
 from tolstat.joint.sections import Array
@@ -49,12 +49,17 @@ class Operation(Strict):
     speed: Annotated[
         units.Speed,
         AfterValidator(units.not_zero),
-        Field(description="speed of the input shaft; negative: turns the other way", examples=["500 rpm"]),
+        Field(
+            description="speed of the input shaft, with orders { mean, orders }; negative: turns the other way",
+            examples=["500 rpm"],
+        ),
     ]
     torque: Annotated[
         units.Torque,
         Field(
-            description="resisting torque on the output shaft; negative: drives the output shaft", examples=["100 N*m"]
+            description="resisting torque on the output shaft, with orders { mean, orders }; negative: drives the "
+            "output shaft",
+            examples=["100 N*m"],
         ),
     ]
     axial_force: Annotated[
@@ -65,6 +70,14 @@ class Operation(Strict):
             examples=["500 N"],
         ),
     ] = 0.0
+    speed_orders: Annotated[orders.SpeedOrders, Field(alias="speed.orders")] = ()
+    torque_orders: Annotated[orders.TorqueOrders, Field(alias="torque.orders")] = ()
+
+    _split = model_validator(mode="before")(orders.split)
+
+
+MEANS = ("alpha", "speed", "torque", "axial_force")
+"""Numbers of an operating point; errors of it are deviations from them."""
 
 
 def nominal_errors(n: int) -> Table:
@@ -73,10 +86,11 @@ def nominal_errors(n: int) -> Table:
     Returns
     -------
     ndarray, shape (n,), dtype ERROR
-        Zero deviations, factor 1 on E.
+        Zero deviations, factors 1.
     """
     errors = np.zeros(n, ERROR)
-    errors["material.E_factor"] = 1.0
+    for name in FACTORS:
+        errors[name] = 1.0
     return errors
 
 
@@ -88,7 +102,7 @@ def operating(operation: Operation, errors: Table) -> dict[str, Array]:
     dict of str to ndarray, shape (n,)
         ``alpha`` (rad), ``speed`` (rad/s), ``torque`` (N m) and ``axial_force`` (N).
     """
-    return {name: getattr(operation, name) + errors[f"operation.{name}"] for name in Operation.model_fields}
+    return {name: getattr(operation, name) + errors[f"operation.{name}"] for name in MEANS}
 
 
 def perturb(joint: Joint, operation: Operation, errors: Table) -> Table:
@@ -119,6 +133,9 @@ def perturb(joint: Joint, operation: Operation, errors: Table) -> Table:
     params["alpha"], params["omega"], params["torque"] = point["alpha"], point["speed"], point["torque"]
     if joint.shaft.slides:
         params["F_a"] = point["axial_force"]
+    swings = [errors[f"operation.{name}_swing"] for name in ("speed", "torque")]
+    for name, value in orders.parameters(operation.speed_orders, operation.torque_orders, *swings).items():
+        params[name] = value
     factor = errors["material.E_factor"]
     for name in ("k_cross", "k_fork", "station_k1", "station_k2", "station_k3"):
         params[name] *= factor[:, None]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.conftest import sliding, with_law
-from tests.kernel.test_dynamics import OPTIONS, SHAFTS, loaded
+from tests.kernel.test_dynamics import OPTIONS, ORDERS, SHAFTS, loaded
 from tests.support import energy, naive
 from tests.support.kernel_energy import ENERGY, ENERGY_FIELDS
 from tolstat.common.tables import PARAM, Method, Options, Status
@@ -86,12 +86,13 @@ def test_kinetic_energy_is_that_of_particles(params, random_errors):
     assert measured(par, t, q, 1.001 * v)["kinetic"] != pytest.approx(expected, rel=1e-9)
 
 
+@ORDERS
 @SHAFTS
 @pytest.mark.parametrize("law", PREDEFINED)
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_powers_are_the_rate_of_the_stored_energy(params, random_errors, law, seed, shaft):
+def test_powers_are_the_rate_of_the_stored_energy(params, random_errors, law, seed, shaft, orders):
     """To 0.5 % of the smallest of them, so that none can be wrong by more; differences extrapolated to h = 0."""
-    par, t, q, v = loaded(params, random_errors, law, seed, shaft=shaft)
+    par, t, q, v = loaded(params, random_errors, law, seed, shaft=shaft, **orders)
     v = 3 * v
     a = np.full(N_DOF, np.nan)
     dynamics.acceleration(t, q, v, par, OPTIONS, make_work(), a)

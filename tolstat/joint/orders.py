@@ -96,12 +96,12 @@ SpeedOrders = Annotated[
     tuple[SpeedOrder, ...],
     AfterValidator(check_numbers),
     AfterValidator(check_turning),
-    Field(max_length=MAX_GIVEN, description="orders of the speed"),
+    Field(max_length=MAX_GIVEN, description="orders of the speed, { n, amplitude, phase } each"),
 ]
 TorqueOrders = Annotated[
     tuple[TorqueOrder, ...],
     AfterValidator(check_numbers),
-    Field(max_length=MAX_GIVEN, description="orders of the resisting torque"),
+    Field(max_length=MAX_GIVEN, description="orders of the resisting torque, { n, amplitude, phase } each"),
 ]
 
 
@@ -128,6 +128,17 @@ def split(data: Any) -> Any:
         if "orders" in table:
             separated[f"{key}.orders"] = table["orders"]
     return separated
+
+
+def join_schemas(properties: dict[str, Any]) -> None:
+    """Put orders into the JSON schemas of speed and torque, which are a quantity or a table."""
+    for key in ("speed", "torque"):
+        waves = properties.pop(f"{key}.orders")
+        quantity = {name: own for name, own in properties[key].items() if name in ("type", "pattern")}
+        table = {"type": "object", "required": ["mean"], "additionalProperties": False}
+        table |= {"properties": {"mean": quantity, "orders": waves}}
+        properties[key] = {name: own for name, own in properties[key].items() if name not in quantity}
+        properties[key] |= {"anyOf": [quantity, table]}
 
 
 def parameters(
@@ -157,9 +168,9 @@ def parameters(
     for order in speed:
         of_wave = order.amplitude * np.array([np.sin(order.phase), np.cos(order.phase)])
         waves["speed_order"][:, numbers.index(order.n)] = np.multiply.outer(speed_swing, of_wave)
-    for order in torque:
-        of_wave = order.amplitude * np.array([np.cos(order.phase), -np.sin(order.phase)])
-        waves["torque_order"][:, numbers.index(order.n)] = np.multiply.outer(torque_swing, of_wave)
+    for wave in torque:
+        of_wave = wave.amplitude * np.array([np.cos(wave.phase), -np.sin(wave.phase)])
+        waves["torque_order"][:, numbers.index(wave.n)] = np.multiply.outer(torque_swing, of_wave)
     padded = np.pad(np.array(numbers, float), (0, MAX_ORDERS - len(numbers)))
     return {"n_orders": len(numbers), "order": padded} | waves
 

@@ -6,7 +6,8 @@ from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Field, GetJsonSchemaHandler, model_validator
+from pydantic_core import CoreSchema
 
 from tolstat.common import units
 from tolstat.common.load_kinds import PINS
@@ -74,6 +75,13 @@ class Operation(Strict):
     torque_orders: Annotated[orders.TorqueOrders, Field(alias="torque.orders")] = ()
 
     _split = model_validator(mode="before")(orders.split)
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        """Return the JSON schema of the table as a file writes it."""
+        schema = super().__get_pydantic_json_schema__(core, handler)
+        orders.join_schemas(handler.resolve_ref_schema(schema)["properties"])
+        return schema
 
 
 MEANS = ("alpha", "speed", "torque", "axial_force")

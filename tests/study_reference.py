@@ -12,8 +12,8 @@ from tolstat.common.loads import LOADS
 from tolstat.common.selected_results import OPTIONAL_FIELDS
 from tolstat.common.tables import ERROR_FIELDS
 from tolstat.joint import Operation
-from tolstat.joint.orders import SpeedOrder, TorqueOrder
 from tolstat.joint.contact import Station
+from tolstat.joint.orders import SpeedOrder, TorqueOrder
 from tolstat.study.costs import CostEntry
 from tolstat.study.fatigue import LineEntry
 from tolstat.study.listed import Range

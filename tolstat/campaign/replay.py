@@ -95,7 +95,8 @@ class CaseResult(NamedTuple):
         """Trace of the last revolution, one row per input angle.
 
         Columns: ``theta`` (rad; with speed orders its mean, omega t), ``tau``, ``Psi``, then ``cross1.F_e`` …
-        ``fork4.T_z`` (N and N m, on the lump, in the base marker's axes), ``pin1.contact_outer``, ``pin1.contact_inner``, ``pin1.contact_resultant`` … (N),
+        ``fork4.T_z`` (N and N m, on the lump, in the base marker's axes), ``pin1.contact_outer``,
+        ``pin1.contact_inner``, ``pin1.contact_resultant`` … (N),
         ``input.f_x`` … ``output.m_z`` (force and moment about O on the shafts, N and N m, in axes that do not turn) and
         ``pin1.mode`` …
         """

@@ -22,25 +22,28 @@ NO_CLOSED_FORM = (
 """Fault of joints that have no closed form, and the remedy."""
 
 
-def speed_ratio(theta: ArrayLike, alpha: float) -> Array:
+def speed_ratio(theta: ArrayLike, alpha: ArrayLike) -> Array:
     """Speed ratio of output to input shaft (Cirelli et al. 2021, eq. 2).
 
     Parameters
     ----------
-    theta : array_like
-        Input angle, rad.
-    alpha : float
-        Misalignment, rad.
+    theta, alpha : array_like
+        Input angle and misalignment, rad; shapes that go together.
 
     Returns
     -------
     ndarray
-        Same shape as `theta`.
     """
     return np.asarray(np.cos(alpha) / (1 - (np.sin(alpha) * np.cos(theta)) ** 2))
 
 
-def output_angle(theta: ArrayLike, alpha: float) -> Array:
+def steepness(theta: ArrayLike, alpha: ArrayLike) -> Array:
+    """Derivative of `speed_ratio` with respect to the input angle."""
+    below = 1 - (np.sin(alpha) * np.cos(theta)) ** 2
+    return np.asarray(-np.cos(alpha) * np.sin(alpha) ** 2 * np.sin(2 * np.asarray(theta)) / below**2)
+
+
+def output_angle(theta: ArrayLike, alpha: ArrayLike) -> Array:
     """Angle of the output shaft, tan(theta_o) = tan(theta) / cos(alpha), continuous in theta.
 
     Parameters and returned value in rad, as in `speed_ratio`.
@@ -145,11 +148,10 @@ def input_motion(phase: ArrayLike, params: NDArray[np.void]) -> tuple[Array, Arr
 def _reversal_with_orders(params: NDArray[np.void], inertia: Array) -> Array:
     """`reversal_torque` of joints with orders; `inertia` of the output shaft and its arms, kg m^2, (n,)."""
     theta, slope, bend, torque = input_motion(np.linspace(0, 2 * np.pi, 721), params)
-    sine, cosine = np.sin(params["alpha"])[:, None], np.cos(params["alpha"])[:, None]
+    alpha = params["alpha"][:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
-        below = 1 - (sine * np.cos(theta)) ** 2
-        steepness = -cosine * sine**2 * np.sin(2 * theta) / below**2
-        turning = params["omega"][:, None] ** 2 * (steepness * slope**2 + cosine / below * bend)
+        bending = steepness(theta, alpha) * slope**2 + speed_ratio(theta, alpha) * bend
+        turning = params["omega"][:, None] ** 2 * bending
     mean = params["torque"][:, None]
     swing = torque - mean + inertia[:, None] * turning
     return np.asarray(-(np.where(mean < 0, -1.0, 1.0) * swing).min(axis=1))

@@ -12,11 +12,12 @@ from pydantic_core import CoreSchema
 from tolstat.common import units
 from tolstat.common.load_kinds import PINS
 from tolstat.common.parameters import MAX_STATIONS
-from tolstat.common.strict import Strict, refuse
+from tolstat.common.strict import Strict
 from tolstat.common.tables import ERROR, FACTORS, HOLES, PARAM
 from tolstat.joint import material, orders
 from tolstat.joint.contact import Contact
 from tolstat.joint.model import Joint
+from tolstat.joint.partner import Partner, add_partner, check_misalignment
 from tolstat.joint.sections import Array
 from tolstat.kernel.mechanics.topology import ARM, ARM_OF_PIN, PIN, TRIAD
 
@@ -26,17 +27,11 @@ Table = NDArray[np.void]
 PIN_TRIADS: Array = TRIAD[PIN : PIN + 4]
 """Rows e, t, z of pins 1 to 4 in axes of the cross frame C; shape (4, 3, 3)."""
 
-HOLE_OF_PIN = {pin: HOLES[arm] for pin, arm in zip(PINS, ARM_OF_PIN, strict=True)}
+HOLE_OF_PIN: dict[str, str] = {pin: HOLES[arm] for pin, arm in zip(PINS, ARM_OF_PIN, strict=True)}
 """Hole in which each pin turns."""
 
 ARM_TRIADS: Array = TRIAD[ARM : ARM + 4]
 """Rows e, t, z of arms 1, 2 (input frame I) and 3, 4 (output frame F); shape (4, 3, 3)."""
-
-
-def _check_misalignment(alpha: float) -> float:
-    if not abs(alpha) < np.pi / 2:
-        raise refuse("a Cardan joint cannot turn at {alpha}", "give less than 90 deg", "alpha")
-    return alpha
 
 
 class Operation(Strict):
@@ -44,7 +39,7 @@ class Operation(Strict):
 
     alpha: Annotated[
         units.Angle,
-        AfterValidator(_check_misalignment),
+        AfterValidator(check_misalignment),
         Field(description="misalignment of the shafts, below 90 deg", examples=["15 deg"]),
     ]
     speed: Annotated[
@@ -73,8 +68,22 @@ class Operation(Strict):
     ] = 0.0
     speed_orders: Annotated[orders.SpeedOrders, Field(alias="speed.orders")] = ()
     torque_orders: Annotated[orders.TorqueOrders, Field(alias="torque.orders")] = ()
+    partner: Annotated[
+        Partner | None,
+        Field(
+            description="the other joint of a drive shaft; speed and torque are then those of the shaft's ends",
+            examples=[{"position": "after", "alpha": "12 deg", "inertia": "0.02 kg*m^2"}],
+        ),
+    ] = None
 
     _split = model_validator(mode="before")(orders.split)
+
+    @model_validator(mode="after")
+    def _check_torsion(self) -> Operation:
+        if self.partner is not None:
+            numbers = (2, *(order.n for order in (*self.speed_orders, *self.torque_orders)))
+            self.partner.check_torsion(self.speed, max(numbers))
+        return self
 
     @classmethod
     def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
@@ -144,6 +153,8 @@ def perturb(joint: Joint, operation: Operation, errors: Table) -> Table:
     swings = [errors[f"operation.{name}_swing"] for name in ("speed", "torque")]
     for name, value in orders.parameters(operation.speed_orders, operation.torque_orders, *swings).items():
         params[name] = value
+    if operation.partner is not None:
+        add_partner(operation.partner, params)
     factor = errors["material.E_factor"]
     for name in ("k_cross", "k_fork", "station_k1", "station_k2", "station_k3"):
         params[name] *= factor[:, None]

@@ -13,6 +13,7 @@ from tolstat.common import loads, strict, units
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.strict import did_you_mean, refuse
 from tolstat.joint import Operation, orders
+from tolstat.joint.partner import Partner
 
 ORDERS = {"speed_orders": orders.SpeedOrder, "torque_orders": orders.TorqueOrder}
 """Model of the orders in each field of an operating point."""
@@ -44,6 +45,10 @@ class Point(NamedTuple):
         said += f", axial force {own.axial_force:.4g} N" if own.axial_force else ""
         for name, given in (("speed", own.speed_orders), ("torque", own.torque_orders)):
             said += f", {orders.in_words(given)} of {name}" if given else ""
+        if own.partner:
+            said += f", {own.partner.in_words}"
+            if not math.isnan(change := own.partner.torsion(own.speed, 2)):
+                said += f" (torsion of the shaft between them changes order 2 by {change:.2%})"
         return f"{said}, {self.share:.4g} of the time" if self.name and not math.isnan(self.share) else said
 
     @classmethod
@@ -53,16 +58,18 @@ class Point(NamedTuple):
         share = own.pop("share")
         for key, order in ORDERS.items():
             own[key] = tuple(order.model_construct(**wave) for wave in own.get(key, ()))
+        own["partner"] = Partner.model_construct(**own["partner"]) if "partner" in own else None
         return cls(name, Operation.model_construct(None, **own), math.nan if share is None else share)
 
     def values(self) -> dict[str, Any]:
         """JSON values of the point.
 
         ``alpha`` (rad), ``speed`` (rad/s), ``torque`` (N m), ``axial_force`` (N), ``share`` or null; if there are any,
-        ``speed_orders`` and ``torque_orders``, each with ``n``, ``amplitude`` (rad, N m) and ``phase`` (rad).
+        ``speed_orders`` and ``torque_orders``, each with ``n``, ``amplitude`` (rad, N m) and ``phase`` (rad), and
+        ``partner`` with its keys in SI units.
         """
         values = self.operation.model_dump()
-        values = {key: value for key, value in values.items() if key not in ORDERS or value}
+        values = {key: value for key, value in values.items() if key not in (*ORDERS, "partner") or value}
         return values | {"share": None if math.isnan(self.share) else self.share}
 
 

@@ -116,26 +116,41 @@ def add_partner(partner: Partner, params: NDArray[np.void]) -> None:
     else:
         theta, slope, bend, torque = ideal.input_motion(phase, params)
         turned = theta - phase
-        torque = _torque_of_second(partner, params, theta, slope, bend, torque)
+        second, _, acceleration = _second_joint(partner, params, theta, slope, bend)
+        torque = (torque + partner.inertia * acceleration) * second
     _expand(turned, torque, params)
 
 
-def _torque_of_second(
-    partner: Partner,
-    params: NDArray[np.void],
-    theta: ideal.Array,
-    slope: ideal.Array,
-    bend: ideal.Array,
-    torque: ideal.Array,
-) -> ideal.Array:
-    """Torque that the second, ideal joint takes from the intermediate shaft, N m, (n, m): T tau + J theta_out'' tau."""
+def output_motion(partner: Partner, params: NDArray[np.void]) -> tuple[ideal.Array, ideal.Array]:
+    """Motion of the output of a drive shaft of two ideal joints.
+
+    Parameters
+    ----------
+    partner : Partner
+        The second joint.
+    params : ndarray of PARAM, shape (n,)
+        First joints, with the orders of the input speed.
+
+    Returns
+    -------
+    ratio, acceleration : ndarray, shape (n, `SAMPLES`)
+        Speed relative to the mean input speed, and acceleration (rad/s^2), over the phase.
+    """
+    theta, slope, bend, _ = ideal.input_motion(2 * np.pi * np.arange(SAMPLES) / SAMPLES, params)
+    return _second_joint(partner, params, theta, slope, bend)[1:]
+
+
+def _second_joint(
+    partner: Partner, params: NDArray[np.void], theta: ideal.Array, slope: ideal.Array, bend: ideal.Array
+) -> tuple[ideal.Array, ideal.Array, ideal.Array]:
+    """Speed ratio of the ideal joint after this one, its output speed over the mean input speed, its acceleration."""
     alpha = params["alpha"][:, None]
     ratio, steepness = ideal.speed_ratio(theta, alpha), ideal.steepness(theta, alpha)
     angle = ideal.output_angle(theta, alpha) + 0.5 * np.pi + partner.offset
     turning, bending = ratio * slope, steepness * slope**2 + ratio * bend
     second = ideal.speed_ratio(angle, partner.alpha)
     acceleration = second * bending + ideal.steepness(angle, partner.alpha) * turning**2
-    return np.asarray((torque + partner.inertia * params["omega"][:, None] ** 2 * acceleration) * second)
+    return second, second * turning, params["omega"][:, None] ** 2 * acceleration
 
 
 def _expand(turned: ideal.Array, torque: ideal.Array, params: NDArray[np.void]) -> None:

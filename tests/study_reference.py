@@ -14,6 +14,7 @@ from tolstat.common.tables import ERROR_FIELDS
 from tolstat.joint import Operation
 from tolstat.joint.contact import Station
 from tolstat.joint.orders import SpeedOrder, TorqueOrder
+from tolstat.joint.partner import Partner
 from tolstat.study.costs import CostEntry
 from tolstat.study.fatigue import LineEntry
 from tolstat.study.listed import Range
@@ -213,6 +214,7 @@ def tables() -> dict[str, str]:
         "cost": CostEntry,
         "torque order": TorqueOrder,
         "speed order": SpeedOrder,
+        "partner": Partner,
         "fit": FitEntry,
     }
     return (

@@ -63,6 +63,7 @@ class Partner(Strict):
     ]
     stiffness: Annotated[
         units.RotaryStiffness | None,
+        AfterValidator(units.positive),
         Field(description="torsional stiffness of the intermediate shaft", examples=["2e4 N*m/rad"]),
     ] = None
 

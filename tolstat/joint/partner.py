@@ -69,14 +69,10 @@ class Partner(Strict):
 
     @property
     def in_words(self) -> str:
-        """``"second joint of a drive shaft, behind a joint of 12 deg"``."""
-        order = (
-            "second joint of a drive shaft, behind"
-            if self.position == "before"
-            else "first joint of a drive shaft, before"
-        )
+        """``"behind a joint of 12 deg"``."""
+        place = "behind" if self.position == "before" else "before"
         turned = f", offset {math.degrees(self.offset):.4g} deg" if self.offset else ""
-        return f"{order} a joint of {math.degrees(self.alpha):.4g} deg{turned}"
+        return f"{place} a joint of {math.degrees(self.alpha):.4g} deg{turned}"
 
     def torsion(self, speed: float, n: int) -> float:
         """Relative change of order `n` by torsion of the intermediate shaft at a speed (rad/s); NaN if not known.

@@ -107,12 +107,16 @@ def shafts(view: View) -> Answer:
     parts.append(Table("output", "How unevenly the output of the shaft turns", OUTPUT, _output(pair)))
     errors = pair.sum_of("psi")
     speed_error = float(np.quantile(errors, QUANTILES[-1])) if errors.size else np.nan
+    partner = pair.first.store.operation.partner
+    torsion = partner.torsion(pair.first.store.operation.speed, 2) if partner else np.nan
+    change = "not known without partner.stiffness" if np.isnan(torsion) else text.percent(torsion)
     parts += [
         Sentence("a shaft: joint i first, joint i + 1 second; intervals count n shafts as n/2 independent ones"),
         Sentence(
             "each joint sees the other as ideal: speed errors Psi of both together, "
             f"{text.percent(speed_error)} at 95 % of the shafts, are left out of the loads"
         ),
+        Sentence(f"torsion of the intermediate shaft is left out: change of order 2 by it {change}"),
         Sentence("the intermediate shaft carries output.* of the first and input.* of the second joint, not their sum"),
     ]
     return Answer("shafts", "The drive shaft", parts)

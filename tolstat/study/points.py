@@ -45,10 +45,7 @@ class Point(NamedTuple):
         said += f", axial force {own.axial_force:.4g} N" if own.axial_force else ""
         for name, given in (("speed", own.speed_orders), ("torque", own.torque_orders)):
             said += f", {orders.in_words(given)} of {name}" if given else ""
-        if own.partner:
-            said += f", {own.partner.in_words}"
-            if not math.isnan(change := own.partner.torsion(own.speed, 2)):
-                said += f" (torsion of the shaft between them changes order 2 by {change:.2%})"
+        said += f", {own.partner.in_words}" if own.partner else ""
         return f"{said}, {self.share:.4g} of the time" if self.name and not math.isnan(self.share) else said
 
     @classmethod

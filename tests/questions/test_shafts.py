@@ -58,7 +58,7 @@ def test_other_studies_hold_no_drive_shaft(tmp_path):
 
 @pytest.mark.parametrize(("alike", "width"), [(0.0, 1.45), (1.0, 1.05)])
 def test_intervals_contain_the_share_of_shafts(alike, width):
-    """Joints that exceed a limit at both places alike are the worst case; counting n shafts as independent misses it."""
+    """Also of joints that exceed it at both places alike; n shafts counted as independent miss the share too often."""
     rng, n, p, seeds = np.random.default_rng(4), 400, 0.05, 2000
     first = rng.random((seeds, n)) < p
     second = np.where(rng.random((seeds, n)) < alike, first, rng.random((seeds, n)) < p)

@@ -12,10 +12,10 @@ import pytest
 from typer.testing import CliRunner
 
 from tests.campaign.test_campaign import datasets
-from tests.support import fakes, reports, synthetic
+from tests.support import exceedance, fakes, reports, synthetic
 from tests.support.synthetic import HEAD
 from tolstat import cli, study
-from tolstat.analysis import binomial, exceedance, sequential
+from tolstat.analysis import binomial, sequential
 from tolstat.campaign import plan, stop_rule
 from tolstat.campaign import run as campaign
 from tolstat.common.errors import InputError

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.special import betaincinv, betaln, stdtrit
 
 from tolstat.common.bisection import first
 from tolstat.common.loads import FloatArray
@@ -32,8 +33,6 @@ def clopper_pearson(count: ArrayLike, n: ArrayLike, confidence: float = 0.95) ->
     ValueError
         When the confidence is not between 0 and 1, or a count is not between 0 and `n`.
     """
-    from scipy.special import betaincinv
-
     if not 0.0 < confidence < 1.0:
         raise ValueError(f"confidence {confidence} must lie between 0 and 1")
     k, m = np.broadcast_arrays(np.asarray(count, dtype=float), np.asarray(n, dtype=float))
@@ -155,8 +154,6 @@ def half_width(confidence: float, freedom: float | FloatArray = np.inf) -> Float
     ValueError
         When the confidence is not between 0 and 1.
     """
-    from scipy.special import stdtrit
-
     if not 0.0 < confidence < 1.0:
         raise ValueError(f"confidence {confidence} must lie between 0 and 1")
     return np.asarray(stdtrit(freedom, 0.5 * (1.0 + confidence)), dtype=float)
@@ -164,8 +161,6 @@ def half_width(confidence: float, freedom: float | FloatArray = np.inf) -> Float
 
 def log_beta_binomial(k: ArrayLike, n: ArrayLike, a: ArrayLike, b: ArrayLike) -> FloatArray:
     """Logarithm of the probability of k of n joints whose share is a beta variate with the parameters a and b."""
-    from scipy.special import betaln
-
     k, n, a, b = (np.asarray(own, dtype=float) for own in (k, n, a, b))
     choose = -np.log(n + 1.0) - betaln(k + 1.0, n - k + 1.0)
     return np.asarray(choose + betaln(k + a, n - k + b) - betaln(a, b))

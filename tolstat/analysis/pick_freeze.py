@@ -14,7 +14,6 @@ from numpy.typing import ArrayLike, NDArray
 from tolstat.analysis.binomial import clopper_pearson, half_width
 from tolstat.analysis.estimates import Estimate
 from tolstat.common.loads import FloatArray
-from tolstat.common.shown import shown
 
 FEWEST = 50
 """Minimum number of points for an index."""
@@ -22,7 +21,6 @@ WIDER = 1.2
 """Factor on standard errors: those of few points are too small (measured)."""
 
 
-@shown
 class Indices(NamedTuple):
     """Sobol' indices.
 

@@ -9,6 +9,10 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
+from tolstat.analysis.binomial import log_beta_binomial
+
 DELIVERY = 1000
 """Joints of the next delivery, unless another number is given."""
 
@@ -55,10 +59,6 @@ def of_counts(least: int, most: int, n: int, number: int, confidence: float = 0.
 
 def _quantile(share: float, number: int, a: int, b: int) -> float:
     """Quantile of the beta-binomial distribution: least count whose distribution function reaches `share`."""
-    import numpy as np
-
-    from tolstat.analysis.binomial import log_beta_binomial
-
     reached = np.cumsum(np.exp(log_beta_binomial(np.arange(number + 1), number, a, b)))
     return float(min(int(np.searchsorted(reached, share)), number))
 

@@ -16,7 +16,6 @@ from numpy.typing import ArrayLike, NDArray
 from tolstat.analysis.binomial import half_width
 from tolstat.analysis.ranks import ranks
 from tolstat.common.loads import FloatArray
-from tolstat.common.shown import shown
 
 WIDER = 1.2
 """Factor on standard errors of shares of a variance, which are too small (measured)."""
@@ -30,7 +29,6 @@ MOST = 20_000
 """Maximum number of joints used for interactions: memory is some 3 kB a joint and error, and more joints add little."""
 
 
-@shown
 class FirstOrder(NamedTuple):
     """Shares of a load's variance that each error explains on its own.
 
@@ -49,7 +47,6 @@ class FirstOrder(NamedTuple):
     variance: FloatArray
 
 
-@shown
 class Total(NamedTuple):
     """Shares of a load's variance in which each error takes part.
 

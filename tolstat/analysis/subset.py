@@ -25,7 +25,6 @@ from numpy.typing import NDArray
 
 from tolstat.analysis.binomial import clopper_pearson, half_width
 from tolstat.common.loads import FloatArray
-from tolstat.common.shown import shown
 
 FIRST_STEP = 0.6
 """Step of level 1 (Papaioannou et al. 2015)."""
@@ -57,7 +56,6 @@ class Candidates(NamedTuple):
     parent: NDArray[np.intp]
 
 
-@shown
 class Level(NamedTuple):
     """Statistics of a completed level.
 
@@ -85,7 +83,6 @@ class Level(NamedTuple):
     step: float
 
 
-@shown
 class Estimate(NamedTuple):
     """Estimated probability of a load above the limit.
 

@@ -15,7 +15,6 @@ from tolstat.common import loads
 from tolstat.common.channels import BUSHING_LOADS, SHAFT_LOADS, LoadHistory
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.load_kinds import CONTACTS, PINS
-from tolstat.common.shown import shown
 from tolstat.common.tables import Motion, Options, Simulation, Status
 from tolstat.solver.compilation import warm_up
 from tolstat.solver.simulation import simulate_rows
@@ -29,7 +28,6 @@ if TYPE_CHECKING:
     from tolstat.study import Case
 
 
-@shown
 class CaseResult(NamedTuple):
     """A simulated case.
 
@@ -162,7 +160,6 @@ def _number(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
-@shown
 class Difference(NamedTuple):
     """A value that differs from the stored one.
 
@@ -186,7 +183,6 @@ class Difference(NamedTuple):
         return abs(self.now - self.stored) / max(abs(self.now), abs(self.stored))
 
 
-@shown
 class Replay(NamedTuple):
     """A joint simulated again.
 

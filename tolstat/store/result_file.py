@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from tolstat.common import draw_records
 from tolstat.common.columns import ERROR_COLUMNS, Column
 from tolstat.common.errors import Fault, InputError
-from tolstat.common.loads import LOADS, limits_in_words
-from tolstat.common.shown import table
+from tolstat.common.loads import LOADS
 from tolstat.common.tables import Status
 from tolstat.store import recorded
 from tolstat.store.layout import MEANINGS
@@ -52,14 +51,6 @@ class ResultFile(Reader):
         joints = f"{self.n - self.first_sample} joints"
         progress = [f"{one.point}: {one._progress()}" if one.point else one._progress() for one in self.each()]
         return f"<result file {self.path.name!r}: {joints} ({'; '.join(progress)})>"
-
-    def _repr_html_(self) -> str:
-        entries: list[tuple[str, object]] = [("study", self.study_name), ("file", str(self.path))]
-        entries += [("sampling", self.sampling["method"]), ("created", self.created)]
-        entries.append(("limits", limits_in_words(self.limits)))
-        if self.is_open:
-            entries.append(("loads", ", ".join(self.loads)))
-        return table(repr(self)[1:-1], entries)
 
     def _progress(self) -> str:
         """Numbers of joints by status, the nominal joint not counted."""
@@ -195,9 +186,6 @@ class NamedLoads:
         names = self.keys()
         named = ", ".join(names) if len(names) <= 3 else f"{names[0]}, {names[1]}, ..., {names[-1]}"
         return f"<{len(names)} loads of {self.view.n} joints: {named}>"
-
-    def _repr_html_(self) -> str:
-        return table(repr(self)[1:-1], [("load", ", ".join(self.keys()))])
 
 
 def described(store: Reader) -> dict[str, Column]:

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from tolstat.common.aside import Aside
 from tolstat.common.channels import BUSHING_LOADS, CHANNELS, LOAD_HISTORIES, MEASURING, LoadHistory, histories_of
-from tolstat.common.shown import shown
 from tolstat.joint import perturb
 from tolstat.solver import compilation
 from tolstat.solver.compilation import is_compiled, warm_up
@@ -36,7 +35,6 @@ Again = tuple[Loads, FloatArray]
 """Loads of joints, and the largest relative difference of each joint's from the stored values, (m,)."""
 
 
-@shown
 class Revolutions(NamedTuple):
     """Loads of some joints over the last revolution.
 

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.common.errors import Fault
-from tolstat.common.shown import shown
 from tolstat.store.hdf5 import DAMAGE_ERRORS, put_attributes, text
 from tolstat.store.layout import GROUPS, MEANINGS, put_meanings
 from tolstat.store.reader import Reader
@@ -30,7 +29,6 @@ DATASETS = {
 """Type, unit and description of each dataset of a set; the first two are the scales of the others."""
 
 
-@shown
 class Altered(NamedTuple):
     """Loads of consecutive joints with one change of the tolerances.
 

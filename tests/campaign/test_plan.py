@@ -146,7 +146,7 @@ def test_the_report_says_that_the_campaign_was_stopped(tmp_path: Path) -> None:
     path = synthetic.store(tmp_path, simulated=40)
     look = stop_rule.Look(39, 0, 4, 0.1, 0.02, 0.25)
     with Writer.open(path) as store:
-        store.record_stop(stop_rule.Outcome(True, look, [20, 39, 60]).record(stop_rule.parse(RULE, {})))
+        store.change(stop=stop_rule.Outcome(True, look, [20, 39, 60]).record(stop_rule.parse(RULE, {})))
     notes = reports.build(path).notes
     assert f"stopped by {RULE} at 39 joints: 95 % interval 0.02000 to 0.25000, valid after any number of looks" in notes
     assert "share 0.10000, biased high if few joints are above (11 % of itself with 10)" in notes

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from tolstat.campaign import pool
 from tolstat.campaign.block import Block, BlockWork, load_kernels, results_of, simulate_block, without_simulation
+from tolstat.campaign.cluster import map_on_cluster
 from tolstat.campaign.pool import Lost, Work
 from tolstat.common.cores import available_cores
 from tolstat.common.solver_options import from_names
@@ -112,8 +113,6 @@ def simulate_pending(
     kept = study.output.histories, study.output.harmonics, store.history_specs
     work, blocks = _work(settings_in_use(study, store), *kept), _blocks(study, store, stop_slot, pace)
     if executor == "dask":
-        from tolstat.campaign.cluster import map_on_cluster
-
         results = map_on_cluster(work, blocks, scheduler, workers, stop)
     else:
         results = pool.map_blocks(work, blocks, max(1, min(workers, -(-todo // pace.size))), stop)

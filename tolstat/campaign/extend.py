@@ -265,28 +265,24 @@ def _copy(file: h5py.File, source: Reader) -> Iterator[tuple[int, str]]:
     """Copy finished joints; yield row and column of those that the file has already with another result."""
     place = layout.place_of(source.point or "") or "/"
     columns = [("ledger", "attempt"), *(("histories", name) for name in source.history_specs)]
-    columns += [("results", c.name) for c in source.columns]  # the status last: it says what a file holds
-    for first in range(0, source.n, BLOCK):
-        own = slice(first, min(first + BLOCK, source.n))
-        there = slice(source.row(own.start), source.row(own.stop))
-        done = source.status(own) != Status.PENDING
-        held = file[place]["results/status"][there] != Status.PENDING
-        for group, name in columns:
-            dataset = file[place][group][name]
-            size = max(1, COPY_BYTES // max(1, dataset.dtype.itemsize * math.prod(dataset.shape[1:])))
-            for begin in range(own.start, own.stop, size):
-                part = slice(begin, min(begin + size, own.stop))
-                here = slice(part.start - own.start, part.stop - own.start)
-                target = slice(source.row(part.start), source.row(part.stop))
-                values, before = source.column(group, name, part), dataset[target]
-                both, new = (done & held)[here], (done & ~held)[here]
-                if group == "ledger":  # also pending joints have an attempt, the one to come
-                    new = ~held[here]
-                same = (_bytes(values[both]) == _bytes(before[both])).all(axis=1)
-                if group != "ledger" and not same.all():
-                    yield int(target.start + np.flatnonzero(both)[np.argmin(same)]), name
-                before[new] = values[new]
-                dataset[target] = before
+    # the status last: it says what a file holds
+    columns += sorted((("results", c.name) for c in source.columns), key=lambda own: own[1] == "status")
+    for group, name in columns:
+        dataset = file[place][group][name]
+        size = min(BLOCK, max(1, COPY_BYTES // (dataset.dtype.itemsize * math.prod(dataset.shape[1:]))))
+        for first in range(0, source.n, size):
+            own = slice(first, min(first + size, source.n))
+            there = slice(source.row(own.start), source.row(own.stop))
+            done = source.status(own) != Status.PENDING
+            held = file[place]["results/status"][there] != Status.PENDING
+            values, before = source.column(group, name, own), dataset[there]
+            new = ~held if group == "ledger" else done & ~held  # also pending joints have an attempt, the one to come
+            both = np.flatnonzero(done & held)
+            same = (_bytes(values[both]) == _bytes(before[both])).all(axis=1)
+            if group != "ledger" and not same.all():
+                yield int(there.start + both[np.argmin(same)]), name
+            before[new] = values[new]
+            dataset[there] = before
 
 
 def _bytes(values: NDArray[Any]) -> NDArray[np.uint8]:

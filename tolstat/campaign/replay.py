@@ -16,6 +16,8 @@ from tolstat.common.channels import BUSHING_LOADS, SHAFT_LOADS, LoadHistory
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.load_kinds import CONTACTS, PINS
 from tolstat.common.tables import Motion, Options, Simulation, Status
+from tolstat.joint import nominal_errors, perturb
+from tolstat.joint.ideal import speed_ratio
 from tolstat.solver.compilation import warm_up
 from tolstat.solver.simulation import simulate_rows
 from tolstat.store import Reader
@@ -99,8 +101,6 @@ class CaseResult(NamedTuple):
         """
         import pandas as pd
 
-        from tolstat.joint.ideal import speed_ratio
-
         histories = {name: values[0] for name, values in self.simulation.histories.items()}
         tau = histories["tau"].astype(float)
         theta = 2 * math.pi * np.arange(len(tau)) / len(tau)
@@ -141,8 +141,6 @@ def simulate_case(case: Case) -> CaseResult:
     -------
     CaseResult
     """
-    from tolstat.joint import nominal_errors, perturb
-
     errors = nominal_errors(2)
     for name, value in case.errors.items():
         errors[name][0] = value

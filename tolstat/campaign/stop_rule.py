@@ -141,7 +141,7 @@ def run_until(study: Study, out: Path, rule: rules.Statement, run: Callable[[int
             joints = sequential.next_look(rule.bound, planned, *counts)
     outcome = Outcome(reached, look, planned)
     with Writer.open(out) as file:
-        file.record_stop(outcome.record(rule))
+        file.change(stop=outcome.record(rule))
     return outcome
 
 

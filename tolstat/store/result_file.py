@@ -127,7 +127,7 @@ class ResultFile(Reader):
         return xarray.Dataset(data, coords={"row": frame.index.to_numpy()}, attrs={"study": self.study_name})
 
 
-class NamedLoads:
+class NamedLoads(Mapping[str, "pd.Series[float]"]):
     """Loads of the joints by name: ``loads["cross1.F"]``, ``list(loads)``, ``dict(loads)``, ``"psi" in loads``.
 
     Parameters
@@ -145,7 +145,7 @@ class NamedLoads:
         Parameters
         ----------
         name : str
-            ``cross1.F``; one of `keys`.
+            ``cross1.F``; one that the study keeps.
 
         Returns
         -------
@@ -166,26 +166,17 @@ class NamedLoads:
         series.attrs["units"] = load.unit
         return series
 
-    def keys(self) -> tuple[str, ...]:
-        """Names of the loads that the study keeps."""
-        return self.view.kept_loads
-
     def __iter__(self) -> Iterator[str]:
-        return iter(self.keys())
+        return iter(self.view.kept_loads)
 
     def __len__(self) -> int:
-        return len(self.keys())
+        return len(self.view.kept_loads)
 
     def __contains__(self, name: object) -> bool:
-        return name in self.keys()
+        return name in self.view.kept_loads
 
     def _ipython_key_completions_(self) -> tuple[str, ...]:
-        return self.keys()
-
-    def __repr__(self) -> str:
-        names = self.keys()
-        named = ", ".join(names) if len(names) <= 3 else f"{names[0]}, {names[1]}, ..., {names[-1]}"
-        return f"<{len(names)} loads of {self.view.n} joints: {named}>"
+        return self.view.kept_loads
 
 
 def described(store: Reader) -> dict[str, Column]:

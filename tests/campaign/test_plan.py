@@ -180,9 +180,6 @@ def test_run_until_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
 def test_wilks(share: float, n: int) -> None:
     assert binomial.wilks(share) == n
     assert 1 - share**n >= 0.95 > 1 - share ** (n - 1)
-    for bad in (0.0, 1.0):
-        with pytest.raises(ValueError, match="must lie between 0 and 1"):
-            binomial.wilks(bad)
 
 
 @pytest.fixture

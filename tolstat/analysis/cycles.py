@@ -84,16 +84,7 @@ def duty_cycle(parts: Sequence[Cycles], shares: Sequence[float]) -> Cycles:
     -------
     Cycles
         A joint without results at one operating point has none.
-
-    Raises
-    ------
-    ValueError
-        When the joints or channels differ, or the shares are not shares.
     """
-    if len(shares) != len(parts) or min(shares, default=0.0) <= 0 or abs(sum(shares) - 1) > 1e-9:
-        raise ValueError(f"{list(shares)} are not the shares of {len(parts)} operating points")
-    if len({(part.channels, len(part.ranges)) for part in parts}) > 1:
-        raise ValueError("the operating points have not the same joints and channels")
     return Cycles(
         parts[0].channels,
         np.concatenate([part.ranges for part in parts], axis=2),

@@ -98,7 +98,7 @@ def shares(a: Sample, b: Sample, levels: ArrayLike, paired: bool, confidence: fl
     Raises
     ------
     ValueError
-        When the lengths of pairs differ or a side has no valid load.
+        When a side has no valid load.
 
     Examples
     --------
@@ -206,8 +206,6 @@ def _have_interval(a: Design, b: Design, claim: Claim) -> bool:
 
 def _valid(a: Sample, b: Sample, paired: bool) -> tuple[Sample, Sample]:
     """Joints with a valid load; of pairs, those that have one in both studies."""
-    if paired and a.values.size != b.values.size:
-        raise ValueError(f"loads of {a.values.size} and {b.values.size} joints are not those of pairs")
     of_a, of_b = a.is_valid, b.is_valid
     if paired:
         of_a = of_b = of_a & of_b

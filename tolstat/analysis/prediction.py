@@ -36,11 +36,6 @@ def of_counts(least: int, most: int, n: int, number: int, confidence: float = 0.
     lower, upper : float
         Whole numbers, ends included.
 
-    Raises
-    ------
-    ValueError
-        When a count is not between 0 and `n`.
-
     Examples
     --------
     5 of 100 joints were above; how many of the next 200?
@@ -48,8 +43,6 @@ def of_counts(least: int, most: int, n: int, number: int, confidence: float = 0.
     >>> of_counts(5, 5, 100, 200)
     (2.0, 25.0)
     """
-    if not 0 <= least <= most <= n:
-        raise ValueError(f"counts {least} and {most} must lie between 0 and {n}")
     tail = 0.5 * (1.0 - confidence)
     # beta-binomial distributions whose tails are those of the hypergeometric test
     lower = _quantile(tail, number, least, n - least + 1) if least else 0.0

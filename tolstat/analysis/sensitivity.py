@@ -116,7 +116,7 @@ def first_order(x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: bool 
     Raises
     ------
     ValueError
-        When the lengths differ, a value is not finite, or there are fewer than `FEWEST` joints.
+        When there are fewer than `FEWEST` joints.
 
     Examples
     --------
@@ -248,10 +248,6 @@ def _with_ends(
 
 def _checked(x: ArrayLike, y: ArrayLike) -> tuple[FloatArray, FloatArray]:
     errors, loads = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
-    if errors.ndim != 2 or loads.ndim not in (1, 2) or len(errors) != len(loads):
-        raise ValueError(f"errors {errors.shape} and loads {loads.shape} must be tables of one length")
-    if not (np.isfinite(errors).all() and np.isfinite(loads).all()):
-        raise ValueError("leave out joints without a valid load")
     if len(loads) < FEWEST:
         raise ValueError(f"{len(loads)} joints are too few: give {FEWEST} or more")
     return errors, loads

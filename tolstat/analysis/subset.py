@@ -176,16 +176,7 @@ class Walk:
         self.next = Candidates(0, noise(0, 0, n), np.full(n, -1))
 
     def take(self, loads: FloatArray) -> None:
-        """Take the loads of the joints `next`, (m,), in the unit of the limit, and update `next` unless `done`.
-
-        Raises
-        ------
-        ValueError
-            When the number of loads differs from `next`, a load is NaN, or the simulation is done.
-        """
-        loads = np.asarray(loads, dtype=float)
-        if self.done or loads.shape != self.next.parent.shape or np.isnan(loads).any():
-            raise ValueError(f"{loads.shape} loads, NaN among them or not, for {self.next.parent.shape} joints")
+        """Take the loads of the joints `next`, (m,), in the unit of the limit, not NaN; update `next` unless `done`."""
         numbers = self._taken + np.arange(loads.size)
         here = _States(self.next.scores, loads, numbers, np.arange(loads.size)[:, None], numbers)
         self._taken += loads.size

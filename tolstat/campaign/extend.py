@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack
 from functools import partial
 from itertools import accumulate, chain
@@ -24,7 +24,6 @@ from tolstat.store import Reader, Writer, layout, what_if
 from tolstat.store.hdf5 import BLOCK
 from tolstat.store.provenance import differing, differing_code
 from tolstat.store.recorded import differing_keys, recall
-from tolstat.store.what_if import Altered
 from tolstat.store.writer import check_free, write_new
 from tolstat.study import Study
 
@@ -52,13 +51,10 @@ class Merged(NamedTuple):
         Numbers of joints of the campaign by status.
     twice : int
         Number of surplus copies of rows that several files hold with the same results.
-    dropped : int
-        Number of changes of the group ``what_if`` that are left out, because the files hold different joints of them.
     """
 
     counts: Counts
     twice: int
-    dropped: int
 
 
 def extend(path: Path, n: int, study_path: Path | None = None) -> Study:
@@ -94,15 +90,10 @@ def extend(path: Path, n: int, study_path: Path | None = None) -> Study:
         more = range(store.n, study.rows)
         altered = what_if.read(store)
         grow(store, study, draw_blocks(study, more), origin_blocks(study, more))
-    _keep(path, altered)
-    return study
-
-
-def _keep(path: Path, altered: Mapping[str, Altered]) -> None:
-    """Write joints with other tolerances to the new file of a campaign: they are samples of that campaign."""
-    if altered:
+    if altered:  # these joints are samples of the larger campaign, too
         with Writer.open(path) as store:
             what_if.write(store, altered)
+    return study
 
 
 def grow(
@@ -177,10 +168,8 @@ def merge(paths: Sequence[Path], out: Path) -> Merged:
             tables["origin"] = (block for store, begin in shares for block in _blocks(store, store.origin, begin))
         write_new(out, held, OTHER_FILE, tables, partial(_copy_results, sources=stores))
         twice = sum(len(store.rows) for store in stores) - rows
-        altered, dropped = what_if.common(what_if.read(store) for store in stores)
-    _keep(out, altered)
     with Reader.open(out) as store:
-        return Merged(store.counts(), twice, dropped)
+        return Merged(store.counts(), twice)
 
 
 def _check_extendable(store: Reader, n: int) -> None:

@@ -309,12 +309,7 @@ def parse_joints(joints: int | str) -> int | None:
     """
     if joints == "all":
         return None
-    try:
-        number = int(joints)
-    except ValueError:
-        found = f"{joints!r} is not a whole number"
-    else:
-        if number >= 1:
-            return number
-        found = f"{number} is less than one"
-    raise InputError([Fault("joints", found, "write --joints 24, or --joints all")])
+    if not (str(joints).isdecimal() and int(joints)):
+        found = f"{joints} is not a whole number of at least one"
+        raise InputError([Fault("joints", found, "write --joints 24, or --joints all")])
+    return int(joints)

@@ -19,8 +19,6 @@ from tolstat.common.tables import UNSETTLED, VALID, Status, worst_status
 CONFIDENCE = 0.95
 LONG_TAIL = 3.0
 """Ratio of the largest load to the median above which a load has a long tail."""
-Ends = tuple[ArrayLike, ArrayLike]
-"""Lower and upper end of the load of each joint."""
 
 _IS_VALID, _IS_UNSETTLED = (np.isin(np.arange(256), states) for states in (VALID, UNSETTLED))
 
@@ -75,7 +73,7 @@ class Sample:
         values: ArrayLike,
         status: ArrayLike,
         design: Design | None = None,
-        ends: Ends | None = None,
+        ends: tuple[ArrayLike, ArrayLike] | None = None,
         name: str = "",
         unit: str = "1",
         limit: float | None = None,
@@ -121,12 +119,6 @@ class Sample:
         low, high = np.where(lost, -np.inf, lower)[joints], np.where(lost, np.inf, upper)[joints]
         own = Independent() if design is None else design
         return cls(name, unit, limit, nominal, Column(value), Inexact(joints, low, high), state, own)
-
-    def __repr__(self) -> str:
-        valid = self.valid
-        span = f", {valid[0]:.4g} to {valid[-1]:.4g} {self.unit}" if valid.size else ""
-        limit = "" if self.limit is None else f", limit {self.limit:.4g} {self.unit}"
-        return f"<load {self.name!r}: {valid.size} of {self.values.size} joints valid{span}{limit}>"
 
     @property
     def values(self) -> FloatArray:

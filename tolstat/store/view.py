@@ -85,11 +85,6 @@ class View:
         self._kept: dict[Hashable, Any] = {}
         self._at: dict[tuple[str, ...], View] = {self.points: self}
 
-    def __repr__(self) -> str:
-        loads = f"{len(self.kept_loads)} loads, {len(self.limits)} with a limit"
-        loads += f", at {' and '.join(self.points)}" if all(self.points) else ""
-        return f"<view of {self.path.name!r}: {self.n} joints ({METHODS.get(self.method, self.method)}), {loads}>"
-
     def kept(self, key: Hashable, compute: Callable[[], T]) -> T:
         """Result of a function of this view that several ask for, computed once for each key; nobody may change it."""
         if key not in self._kept:

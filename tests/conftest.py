@@ -129,7 +129,7 @@ def _small_campaigns_in_this_process() -> Iterator[None]:
     """
 
     def quick(
-        work: pool.Work[Any, Any], blocks: Iterable[Any], workers: int, stop: Callable[[], bool] = pool.never_stop
+        work: pool.Work[Any, Any], blocks: Iterable[Any], workers: int, stop: Callable[[], bool] = lambda: False
     ) -> Iterator[tuple[Any, Any]]:
         if workers > 1:
             yield from IN_WORKERS(work, blocks, workers, stop)

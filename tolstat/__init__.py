@@ -7,9 +7,8 @@
         frame = store.to_pandas()
         found = tolstat.causes(store.view(), "cross1.F")
 
-Functions on arrays (`exceedance`, `quantile`, `capability`) take the loads of joints and their status; those on a view
-of an open result file answer what the command line does. Names are imported when first used, so that the command line
-starts at once.
+Functions of a view of an open result file answer what the command line does. Names are imported when first used, so
+that the command line starts at once.
 """
 
 from __future__ import annotations

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy.stats import norm, qmc
 
-from tolstat.analysis import binomial, exceedance, replicated
+from tests.support import exceedance
+from tolstat.analysis import binomial, replicated
 from tolstat.analysis.replicated import Replicated
 from tolstat.analysis.sample import Sample
 

@@ -212,9 +212,6 @@ def test_direction_and_size_are_told_apart():
     ("call", "message"),
     [
         (lambda: sensitivity.first_order(np.zeros((10, 2)), np.zeros(10)), "too few"),
-        (lambda: sensitivity.first_order(np.zeros((60, 2)), np.zeros(50)), "one length"),
-        (lambda: sensitivity.first_order(np.zeros((60, 2)), np.full(60, np.nan)), "valid load"),
-        (lambda: sensitivity.first_order(np.eye(60), np.arange(60.0), 1.0), "confidence"),
         (lambda: ranks.regression(np.zeros((30, 2)), np.arange(30)), "too few"),
         (lambda: ranks.regression(np.zeros((80, 2)), np.arange(80)), "scatter"),
         (lambda: ranks.tail(np.eye(60), np.arange(60) < 3), "3 of 60 joints"),

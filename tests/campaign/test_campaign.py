@@ -318,12 +318,12 @@ def test_runs_outside_the_main_thread(tmp_path: Path) -> None:
 
 
 def test_signals_mean_the_same_as_before_afterwards(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    before = [signal.getsignal(number) for number in campaign.CAUGHT]
+    before = [signal.getsignal(number) for number in campaign.SIGNALS]
     fakes.run(fakes.Study(), tmp_path / "a.h5", 1)
-    assert [signal.getsignal(number) for number in campaign.CAUGHT] == before
+    assert [signal.getsignal(number) for number in campaign.SIGNALS] == before
     with pytest.raises(KeyboardInterrupt), campaign.signals_caught():
         signal.raise_signal(signal.SIGTERM)
-    assert [signal.getsignal(number) for number in campaign.CAUGHT] == before
+    assert [signal.getsignal(number) for number in campaign.SIGNALS] == before
 
 
 def test_an_ignored_hang_up_stays_ignored() -> None:

@@ -19,7 +19,7 @@ import pytest
 
 from tests.campaign.test_campaign import datasets
 from tests.support import fakes
-from tolstat.campaign.pool import Work, WorkerDied, never_stop
+from tolstat.campaign.pool import Work, WorkerDied
 from tolstat.common.counts import Counts
 from tolstat.common.errors import InputError
 from tolstat.common.tables import Options, Simulation, Status
@@ -112,7 +112,7 @@ def simulate_or_raise(
 @pytest.mark.slow
 def test_a_cluster_whose_workers_cannot_get_ready_ends() -> None:
     with pytest.raises(MemoryError):
-        list(map_on_cluster(Work(abs, prepare=cannot), range(20), None, 1, never_stop))
+        list(map_on_cluster(Work(abs, prepare=cannot), range(20), None, 1, lambda: False))
 
 
 @pytest.mark.slow
@@ -120,7 +120,7 @@ def test_a_cluster_whose_workers_die_ends(monkeypatch: pytest.MonkeyPatch) -> No
     """Dask does not always start workers again."""
     monkeypatch.setattr(cluster_module, "GONE_S", 10.0)
     with pytest.raises(WorkerDied, match=r"10 times in a row .* (all those workers died|killed by SIGKILL)"):
-        list(map_on_cluster(Work(die), range(20), None, 1, never_stop))
+        list(map_on_cluster(Work(die), range(20), None, 1, lambda: False))
 
 
 def die(x: int) -> int:
@@ -146,7 +146,7 @@ def test_a_worker_with_other_versions_is_refused(cluster: Cluster, monkeypatch: 
     with pytest.raises(
         InputError, match=r"the worker tcp.* has other software versions\n    process: \d+ on the worker, \d+"
     ):
-        list(map_on_cluster(Work(abs), range(9), cluster.address, 2, never_stop))
+        list(map_on_cluster(Work(abs), range(9), cluster.address, 2, lambda: False))
 
 
 def process_number() -> dict[str, str]:
@@ -156,7 +156,7 @@ def process_number() -> dict[str, str]:
 def test_a_scheduler_that_is_not_there(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("tolstat.campaign.cluster.CONNECT_S", 0.5)
     with pytest.raises(InputError, match=r"--scheduler: tcp://127.0.0.1:1 does not answer"):
-        list(map_on_cluster(Work(abs), range(9), "tcp://127.0.0.1:1", 2, never_stop))
+        list(map_on_cluster(Work(abs), range(9), "tcp://127.0.0.1:1", 2, lambda: False))
 
 
 @pytest.mark.slow

@@ -5,8 +5,8 @@ import pytest
 from scipy.stats import norm
 from typer.testing import CliRunner
 
-from tests.support import synthetic
-from tolstat.analysis import accuracy, binomial, exceedance, prediction
+from tests.support import exceedance, synthetic
+from tolstat.analysis import accuracy, binomial, prediction
 from tolstat.campaign import checks, verify
 from tolstat.cli import app
 from tolstat.common.errors import InputError

@@ -12,10 +12,10 @@ import pytest
 from typer.testing import CliRunner
 
 from tests.campaign.test_campaign import datasets
-from tests.support import fakes, reports, synthetic
+from tests.support import exceedance, fakes, reports, synthetic
 from tests.support.synthetic import HEAD
 from tolstat import cli, study
-from tolstat.analysis import binomial, exceedance, sequential
+from tolstat.analysis import binomial, sequential
 from tolstat.campaign import plan, stop_rule
 from tolstat.campaign import run as campaign
 from tolstat.common.errors import InputError
@@ -146,7 +146,7 @@ def test_the_report_says_that_the_campaign_was_stopped(tmp_path: Path) -> None:
     path = synthetic.store(tmp_path, simulated=40)
     look = stop_rule.Look(39, 0, 4, 0.1, 0.02, 0.25)
     with Writer.open(path) as store:
-        store.record_stop(stop_rule.Outcome(True, look, [20, 39, 60]).record(stop_rule.parse(RULE, {})))
+        store.change(stop=stop_rule.Outcome(True, look, [20, 39, 60]).record(stop_rule.parse(RULE, {})))
     notes = reports.build(path).notes
     assert f"stopped by {RULE} at 39 joints: 95 % interval 0.02000 to 0.25000, valid after any number of looks" in notes
     assert "share 0.10000, biased high if few joints are above (11 % of itself with 10)" in notes
@@ -180,9 +180,6 @@ def test_run_until_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
 def test_wilks(share: float, n: int) -> None:
     assert binomial.wilks(share) == n
     assert 1 - share**n >= 0.95 > 1 - share ** (n - 1)
-    for bad in (0.0, 1.0):
-        with pytest.raises(ValueError, match="must lie between 0 and 1"):
-            binomial.wilks(bad)
 
 
 @pytest.fixture

@@ -340,16 +340,16 @@ def test_what_cannot_be_verified_is_exit_code_2(tmp_path, monkeypatch):
     for arguments, words in (
         ((tmp_path / "none.h5",), ["does not exist"]),
         ((pending,), ["has no settled joint", "tolstat run"]),
-        ((pending, "--joints", 0), ["0 is less than one"]),
-        ((pending, "--joints", "most"), ["joints: 'most' is not a whole number", "--joints all"]),
-        ((bad, "--joints", 0), ["0 is less than one", "solver.step"]),
+        ((pending, "--joints", 0), ["0 is not a whole number of at least one"]),
+        ((pending, "--joints", "most"), ["joints: most is not a whole number", "--joints all"]),
+        ((bad, "--joints", 0), ["0 is not a whole number", "solver.step"]),
         ((pending, "--out", pending / "a.csv"), ["is no folder"]),
     ):
         done = call("verify", *arguments)
         assert (done.exit_code, done.stdout) == (2, "")
         for word in [*words, "hint: "]:
             assert word in done.stderr
-    with pytest.raises(InputError, match="less than one"):
+    with pytest.raises(InputError, match="at least one"):
         verify.check(written(tmp_path), joints=-1)
     other = synthetic.store(tmp_path, name="other")
     monkeypatch.setattr(provenance, "source_hash", lambda: "0")

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from tolstat.analysis import exceedance, prediction
+from tests.support import exceedance
+from tolstat.analysis import prediction
 from tolstat.analysis.binomial import clopper_pearson
 from tolstat.common.tables import Status
 

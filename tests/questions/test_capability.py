@@ -9,6 +9,8 @@ from scipy.stats import betabinom, lognorm, norm, normaltest, t
 
 from tests.support.views import view
 from tolstat.analysis import binomial, capability, extreme, prediction
+from tolstat.analysis.listed import Listed
+from tolstat.analysis.sample import Sample
 from tolstat.common.loads import ANY_LIMIT
 from tolstat.common.tables import Status
 from tolstat.display.answer import Sentence
@@ -27,6 +29,10 @@ def limits_of(made):
 
 def notes_of(made):
     return " ".join(part.text for part in question.capability(made).parts if isinstance(part, Sentence))
+
+
+def capability_of(values, status, limit, iid=True):
+    return capability.of_sample(Sample.of(values, status, None if iid else Listed()), limit)
 
 
 def within(lower, upper, truth):
@@ -61,7 +67,7 @@ def test_ends_are_where_the_estimate_is_at_the_edge_of_its_distribution(cpk, n):
 
 def test_index_of_few_joints_has_the_standard_deviation_with_divisor_n_less_1():
     loads = [640.0, 655.0, 648.0, 671.0]
-    found = capability.capability(loads, np.ones(4), 700.0)
+    found = capability_of(loads, np.ones(4), 700.0)
     assert found.cpk_normal == pytest.approx((700.0 - fmean(loads)) / (3.0 * stdev(loads)), rel=1e-12)
 
 
@@ -71,7 +77,7 @@ def test_interval_of_quantiles_covers_for_a_skew_load():
     limit = float(load.ppf(0.9999))
     truth = (limit - load.ppf(0.5)) / (load.ppf(capability.REFERENCE) - load.ppf(0.5))
     samples = np.random.default_rng(6).lognormal(0.0, 0.5, (seeds, n))
-    found = [capability.capability(row, np.ones(n), limit) for row in samples]
+    found = [capability_of(row, np.ones(n), limit) for row in samples]
     lower, upper = (np.array([getattr(c, f"cpk_{end}") for c in found]) for end in ("lower", "upper"))
     assert within(lower, upper, truth) >= 0.95 - slack(seeds)
     assert np.all(lower > 0)
@@ -86,7 +92,7 @@ def test_interval_of_mean_and_deviation_covers_for_loads_that_are_not_normal(loa
     n, limit, seeds = 1000, float(load.ppf(0.999)), 200
     truth, missed = (limit - load.mean()) / (3.0 * load.std()), {"own": [0, 0], "of a normal load": [0, 0]}
     for values in load.rvs((seeds, n), random_state=np.random.default_rng(9)):
-        found = capability.capability(values, np.ones(n), limit)
+        found = capability_of(values, np.ones(n), limit)
         plain = capability.cpk_interval((limit - values.mean()) / (3.0 * values.std(ddof=1)), n)
         for name, (low, high) in (
             ("own", (found.cpk_normal_lower, found.cpk_normal_upper)),
@@ -100,9 +106,7 @@ def test_interval_of_mean_and_deviation_covers_for_loads_that_are_not_normal(loa
 
 def test_no_index_of_a_long_tail_and_no_interval_of_few_joints():
     rng = np.random.default_rng(10)
-    long, few = (
-        capability.capability(own, np.ones(own.size), 4.0) for own in (rng.lognormal(size=2000), rng.random(900))
-    )
+    long, few = (capability_of(own, np.ones(own.size), 4.0) for own in (rng.lognormal(size=2000), rng.random(900)))
     assert np.isnan([long.cpk_normal, long.cpk_normal_lower]).all()
     assert np.isfinite(few.cpk_normal)
     assert np.isnan([few.cpk_normal_lower, few.cpk_normal_upper]).all()
@@ -110,7 +114,7 @@ def test_no_index_of_a_long_tail_and_no_interval_of_few_joints():
 
 def test_both_indices_agree_for_a_normal_load():
     loads = np.random.default_rng(3).normal(500.0, 20.0, 200_000)
-    found = capability.capability(loads, np.ones(loads.size), 580.0)
+    found = capability_of(loads, np.ones(loads.size), 580.0)
     assert found.cpk_normal == pytest.approx(80 / 60, rel=5e-3)
     assert found.cpk == pytest.approx(80 / 60, rel=2e-2)
     assert found.normal_p > 0.01
@@ -118,7 +122,7 @@ def test_both_indices_agree_for_a_normal_load():
 
 def test_too_few_joints_have_no_lower_end_and_are_told_the_number_needed():
     loads = np.random.default_rng(4).gamma(3.0, 1.0, 5000)
-    few, enough = (capability.capability(loads[:n], np.ones(n), 20.0) for n in (3000, 4000))
+    few, enough = (capability_of(loads[:n], np.ones(n), 20.0) for n in (3000, 4000))
     assert few.cpk_lower == 0.0
     assert 0.0 < enough.cpk_lower < enough.cpk < enough.cpk_upper
     assert few.needed == 3244  # 1 - 0.99865^n >= 1 - 0.05 / 4
@@ -127,29 +131,30 @@ def test_too_few_joints_have_no_lower_end_and_are_told_the_number_needed():
 def test_unresolved_joints_lower_the_yield():
     loads, status = np.arange(100.0), np.full(100, Status.OK)
     status[:4] = Status.NOT_SETTLED
-    found = capability.capability(loads, status, 89.5)
-    assert found.ppm[0] == pytest.approx(1e6 * 10 / 96)
-    assert found.ppm[2] == 1e6 * binomial.clopper_pearson(14, 100)[1]
-    assert found.ppm[1] == pytest.approx(1e6 * binomial.clopper_pearson(10, 100)[0])
+    found = capability_of(loads, status, 89.5)
+    assert found.above.estimate == pytest.approx(10 / 96)
+    assert found.above.outer_upper == binomial.clopper_pearson(14, 100)[1]
+    assert found.above.outer_lower == pytest.approx(binomial.clopper_pearson(10, 100)[0])
 
 
 def test_dependent_samples_have_no_interval():
-    found = capability.capability(np.arange(50.0), np.ones(50), 60.0, iid=False)
+    found = capability_of(np.arange(50.0), np.ones(50), 60.0, iid=False)
     assert np.isfinite([found.cpk, found.cpk_normal]).all()
-    many = capability.capability(np.arange(2000.0), np.ones(2000), 2100.0, iid=False)
+    many = capability_of(np.arange(2000.0), np.ones(2000), 2100.0, iid=False)
     assert (np.isfinite(many.cpk_normal), np.isnan(many.cpk_normal_lower)) == (True, True)
-    ends = (*found.ppm[1:], found.cpk_lower, found.cpk_upper, found.cpk_normal_lower, found.cpk_normal_upper)
+    above = found.above.outer_lower, found.above.outer_upper
+    ends = (*above, found.cpk_lower, found.cpk_upper, found.cpk_normal_lower, found.cpk_normal_upper)
     assert np.isnan(ends).all()
 
 
 @pytest.mark.parametrize("loads", [[], [3.0], [3.0, 3.0, 3.0]])
 def test_joints_without_scatter_have_no_index(loads):
-    found = capability.capability(loads, np.ones(len(loads)), 4.0)
+    found = capability_of(loads, np.ones(len(loads)), 4.0)
     assert np.isnan([found.cpk, found.cpk_normal, found.cpk_lower]).all()
 
 
 def test_limit_below_the_median_is_a_negative_index():
-    found = capability.capability(np.random.default_rng(1).normal(size=6000), np.ones(6000), -1.0)
+    found = capability_of(np.random.default_rng(1).normal(size=6000), np.ones(6000), -1.0)
     assert found.cpk_lower < found.cpk < found.cpk_upper < 0
     assert found.cpk == pytest.approx(-1 / 3, abs=0.05)
 
@@ -205,7 +210,7 @@ def test_a_tail_that_is_not_generalised_pareto_is_not_extrapolated(monkeypatch):
 def test_normality_is_tested_as_by_scipy(n):
     rng = np.random.default_rng(n)
     for load in (rng.normal(size=n), rng.exponential(size=n), 700.0 + rng.uniform(size=n)):
-        found = capability.capability(load, [Status.OK] * n, 800.0).normal_p
+        found = capability_of(load, [Status.OK] * n, 800.0).normal_p
         assert found == pytest.approx(normaltest(load).pvalue, rel=1e-10)
 
 

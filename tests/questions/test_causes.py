@@ -9,8 +9,8 @@ import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
-from tests.support import synthetic
-from tolstat.analysis import exceedance, sensitivity
+from tests.support import exceedance, synthetic
+from tolstat.analysis import sensitivity
 from tolstat.cli import app
 from tolstat.common.errors import NotApplicable
 from tolstat.common.loads import ANY_LIMIT

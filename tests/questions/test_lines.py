@@ -22,7 +22,7 @@ from tests.support import fakes, synthetic
 from tolstat import sampling, study
 from tolstat.campaign import blocks
 from tolstat.campaign import what_if as sets
-from tolstat.campaign.extend import extend, merge
+from tolstat.campaign.extend import extend
 from tolstat.campaign.pool import kept_workers
 from tolstat.campaign.work import Work
 from tolstat.cli import app
@@ -639,31 +639,6 @@ def test_command_and_page_name_the_point(tmp_path, monkeypatch):
     assert "700 N on cross1.F at start" in found.sentence
     assert "No single line is enough: halving the tilt tolerance of the pins" in found.sentence
     assert lead(on_page(path, 0.01)).startswith("cross1.F at start > 700 N")
-
-
-@pytest.mark.usefixtures("quick")
-@pytest.mark.slow
-def test_merged_files_keep_what_they_agree_on(path, tmp_path):
-    other, out = tmp_path / "other.h5", [tmp_path / f"out{k}.h5" for k in range(3)]
-    other.write_bytes(path.read_bytes())
-    simulated(path)
-    with ResultFile.open(path) as store:
-        held = what_if.read(store)
-    assert merge([path, other], out[0]).dropped == 0
-    name, one = next(iter(held.items()))
-    with Writer.open(other) as store:  # the same joints, fewer of them
-        what_if.write(store, {name: one._replace(loads=one.loads[:50], status=one.status[:50])})
-    assert merge([other, path], out[1]).dropped == 0
-    with Writer.open(other) as store:
-        what_if.write(store, {name: one._replace(loads=1.01 * one.loads)})
-    for target, expected in zip(out[:2], (held, held), strict=True):
-        with ResultFile.open(target) as store:
-            assert what_if.read(store).keys() == expected.keys()
-            np.testing.assert_array_equal(what_if.read(store)[name].loads, one.loads)
-    shown = CliRunner().invoke(app, ["merge", str(path), str(other), "--out", str(out[2])])
-    assert "left out: joints of 1 changes of what_if" in shown.stderr
-    with ResultFile.open(out[2]) as store:
-        assert what_if.read(store).keys() == held.keys() - {name}
 
 
 def test_files_that_are_no_sample_are_refused(tmp_path):

@@ -8,10 +8,10 @@ import pytest
 from typer.testing import CliRunner
 
 import tolstat
-from tests.support import fakes, synthetic
+from tests.support import exceedance, fakes, synthetic
 from tests.support.views import view
 from tolstat import sampling
-from tolstat.analysis import allocation, clustered, exceedance
+from tolstat.analysis import allocation, clustered
 from tolstat.campaign import stop_rule
 from tolstat.campaign.extend import merge
 from tolstat.cli import app

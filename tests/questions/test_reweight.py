@@ -9,9 +9,9 @@ from scipy import stats
 from scipy.stats import norm
 from typer.testing import CliRunner
 
-from tests.support import synthetic
+from tests.support import exceedance, synthetic
 from tolstat import sampling, study
-from tolstat.analysis import binomial, exceedance, reweight, weighted
+from tolstat.analysis import binomial, reweight, weighted
 from tolstat.analysis.reweight import Ratios
 from tolstat.analysis.sample import Sample
 from tolstat.cli import app

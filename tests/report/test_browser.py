@@ -9,8 +9,7 @@ from html import escape, unescape
 import pytest
 
 from tests.report.test_page import TEXT
-from tests.support import synthetic
-from tolstat.analysis import exceedance
+from tests.support import exceedance, synthetic
 from tolstat.report import html, page
 from tolstat.store import ResultFile
 

@@ -13,8 +13,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from tests.support import synthetic
-from tolstat.analysis import exceedance
+from tests.support import exceedance, synthetic
 from tolstat.cli import app
 from tolstat.common.errors import StoreError
 from tolstat.common.tables import Status

@@ -10,9 +10,9 @@ from typer.testing import CliRunner
 
 import tolstat
 from tests.cli.test_cli import simulate
-from tests.support import fakes, synthetic
+from tests.support import exceedance, fakes, synthetic
 from tolstat import sampling, study
-from tolstat.analysis import binomial, exceedance
+from tolstat.analysis import binomial
 from tolstat.analysis.sample import Sample
 from tolstat.analysis.weighted import Weighted
 from tolstat.campaign import extend

@@ -11,9 +11,9 @@ import pytest
 
 from tests.conftest import REFERENCE
 from tests.solver.test_refinement import assert_same
+from tests.support import exceedance
 from tests.support.environment import ROOT
 from tolstat import joint, sampling, study
-from tolstat.analysis import exceedance
 from tolstat.analysis.sample import Sample
 from tolstat.analysis.weighted import Weighted
 from tolstat.campaign import plan

@@ -11,11 +11,9 @@ import pytest
 import tolstat
 from tests.support import synthetic
 from tolstat.analysis.column import Inexact
-from tolstat.analysis.estimates import Quantile
 from tolstat.analysis.sample import largest_of
 from tolstat.common.errors import InputError
 from tolstat.common.loads import LOADS
-from tolstat.common.shown import short, shown
 from tolstat.store import ResultFile, Writer
 
 MAX_REPR = 250
@@ -66,7 +64,7 @@ def test_a_slice_without_the_nominal_joint(tmp_path):
 
 def test_what_is_opened_for_reading_cannot_write(store):
     assert type(store) is ResultFile
-    assert {"create", "write", "finish", "update_study", "begin_retry"} <= WRITING
+    assert {"create", "write", "finish", "change", "begin_retry"} <= WRITING
     assert not WRITING & set(dir(store))
     view = store.view()
     load = view.load("cross1.F")
@@ -121,48 +119,12 @@ def test_intervals_of_loads_follow_their_joints(store):
 
 def test_texts_at_the_prompt_are_short(path, store):
     view = store.view()
-    load = view.load("cross1.F")
     assert repr(store) == "<result file 'small.h5': 60 joints (55 ok, 3 not_settled, 2 newton_failed)>"
     assert repr(view.study) == "<study 'small': 60 joints (random), 4 toleranced errors, 7 limits>"
-    assert repr(load).startswith("<load 'cross1.F': 55 of 60 joints valid, 6")
-    assert repr(load).endswith(" N, limit 700 N>")
-    results = [store, store.loads, view, view.study, load, load.above(700.0), load.quantile(0.5), store.counts()]
-    for result in results:
+    for result in (store, view.study, view.load("cross1.F").quantile(0.5), store.counts()):
         assert len(repr(result)) <= MAX_REPR
         assert "\n" not in repr(result)
-        assert result._repr_html_().startswith("<table>")
+    assert view.study._repr_html_().startswith("<table>")
     closed = tolstat.open(path)
     closed.close()
     assert repr(closed) == "<result file 'small.h5', closed>"
-    assert "closed" in closed._repr_html_()
-
-
-def test_values_are_shown_in_a_few_characters():
-    frame = pd.DataFrame({"a": range(3)})
-    values = [
-        1 / 3,
-        np.float32(2.0),
-        True,
-        None,
-        "a" * 100,
-        np.zeros(3),
-        np.zeros((9, 2)),
-        frame,
-        frame["a"],
-        [1.0, 2.0],
-    ]
-    texts = ["0.3333", "2", "True", "None", repr("a" * 57 + "..."), "[0, 0, 0]", "<array 9 x 2>", "<table 3 x 1>"]
-    assert [short(value) for value in values] == [*texts, "<table 3>", "[1, 2]"]
-    assert short(dict.fromkeys(range(9))) == "<9 entries>"
-    quantile = Quantile(0.5, 3, 0, 0, 1.0, 0.5, 2.0, 0.5, 2.0)
-    assert short([quantile] * 3) == "<3 Quantile>"
-
-    @shown
-    class Pair(tuple):
-        _fields = ("text", "table")
-        text, table = "<b>", frame
-
-    assert repr(Pair()) == "Pair(text='<b>', table=<table 3 x 1>)"
-    html = Pair()._repr_html_()
-    assert "&lt;b&gt;" in html
-    assert "<td>2</td>" in html

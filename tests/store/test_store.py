@@ -22,7 +22,7 @@ from tolstat.common.columns import ERROR_COLUMNS, RESULT_COLUMNS
 from tolstat.common.counts import Counts
 from tolstat.common.errors import StoreError
 from tolstat.common.tables import Motion, Simulation, Status
-from tolstat.store import ResultFile, Writer, provenance
+from tolstat.store import ResultFile, Writer, metadata, provenance
 from tolstat.store.hdf5 import text
 from tolstat.store.metadata import Metadata
 
@@ -177,13 +177,13 @@ def test_limits_are_replaced_whole_or_not_at_all(
 
     with Writer.open(path) as store, monkeypatch.context() as patch:
         patch.setattr("os.replace", full)
-        store.update_study(study)
+        store.change(**metadata.editable(study))
         with pytest.raises(StoreError, match=r"cannot be replaced: No space left on device\n  hint: free disk space"):
-            store.update_study(other)
+            store.change(**metadata.editable(other))
         assert store.limits == study.limits
     assert path.read_bytes() == before
     with Writer.open(path) as store:
-        store.update_study(other)
+        store.change(**metadata.editable(other))
         assert (store.limits, store.study_text, store.study_name) == (other.limits, "# edited", "b")
     with ResultFile.open(path) as store:
         assert (store.limits, store.study_text, store.study_name) == (other.limits, "# edited", "b")

@@ -57,11 +57,6 @@ def loads(results: NDArray[np.void]) -> FloatArray:
     return np.concatenate([of_kind(results, kind) for kind in LOAD_KINDS], axis=1)
 
 
-def sizes(results: NDArray[np.void]) -> FloatArray:
-    """Reference value of each observable in each joint: the largest load of its measure, (m, loads), SI."""
-    return np.column_stack([size(results, kind) for kind in LOAD_KINDS])[:, KIND_OF]
-
-
 def size(results: Results, kind: Kind) -> FloatArray:
     """Reference value of the observables of a kind in each joint, (m,), SI."""
     found = _largest(of_kind(results, measure_of(kind)))
@@ -88,9 +83,9 @@ def differences(base: NDArray[np.void], other: NDArray[np.void]) -> FloatArray:
         `base` less `other`, in the order of `OBSERVABLES`; NaN where a joint is not settled in `base` or has no
         results in `other`.
     """
-    size = sizes(other)
+    sizes = np.column_stack([size(other, kind) for kind in LOAD_KINDS])[:, KIND_OF]
     with np.errstate(divide="ignore", invalid="ignore"):
-        found = np.where(size == 0, 0.0, (loads(base) - loads(other)) / size)
+        found = np.where(sizes == 0, 0.0, (loads(base) - loads(other)) / sizes)
     found[(base["status"] != Status.OK) | ~np.isin(other["status"], SIMULATED)] = np.nan
     return np.asarray(found)
 

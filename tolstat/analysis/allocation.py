@@ -11,8 +11,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import Bounds, minimize
 
 from tolstat.analysis import reweight
+from tolstat.analysis.binomial import clopper_pearson
 from tolstat.analysis.weighted import Split
 from tolstat.common.loads import FloatArray
 
@@ -149,8 +151,6 @@ def _lowest(problem: Problem, share: float) -> FloatArray:
 def _minimise(
     what: Callable[[FloatArray], float], room: Callable[[FloatArray], FloatArray], problem: Problem, start: FloatArray
 ) -> FloatArray:
-    from scipy.optimize import Bounds, minimize
-
     low, high = np.log(problem.lower), np.log(problem.upper)
     settings: Any = {"method": "SLSQP", "options": {"maxiter": 60, "ftol": 1e-5, "eps": 1e-4}}
     settings |= {"bounds": Bounds(low, np.maximum(high, low + 1e-9)), "constraints": {"type": "ineq", "fun": room}}
@@ -196,8 +196,6 @@ def joints_needed(share: float, ess: float, target: float, confidence: float = 0
     >>> joints_needed(share=0.008, ess=1000, target=0.01)
     16.0
     """
-    from tolstat.analysis.binomial import clopper_pearson
-
     factors = 2.0 ** np.arange(0, 24)
     upper = clopper_pearson(share * ess * factors, ess * factors, confidence)[1]
     enough = np.flatnonzero(upper < target)

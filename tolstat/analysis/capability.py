@@ -13,13 +13,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.special import nctdtrinc
 
-from tolstat.analysis import binomial, exceedance
+from tolstat.analysis import binomial
 from tolstat.analysis.estimates import Exceedance
-from tolstat.analysis.listed import Listed
 from tolstat.analysis.sample import Sample
 from tolstat.common.loads import FloatArray
-from tolstat.common.shown import shown
 
 REFERENCE = 0.9986501019683699
 """Share of a normal distribution below mean + 3 sigma."""
@@ -32,7 +31,6 @@ WIDER = 1.3
 """Factor on the width of such an interval: the kurtosis of few joints is too small (measured)."""
 
 
-@shown
 @dataclass(frozen=True)
 class Capability:
     """Capability of a load against its upper limit.
@@ -68,58 +66,39 @@ class Capability:
     cpk_upper: float
     needed: int
 
-    @property
-    def ppm(self) -> tuple[float, float, float]:
-        """Joints above the limit in a million: estimate, lower and upper end, unresolved joints counted both ways."""
-        return 1e6 * self.above.estimate, 1e6 * self.above.outer_lower, 1e6 * self.above.outer_upper
 
-
-def capability(
-    values: ArrayLike, status: ArrayLike, limit: float, confidence: float = 0.95, iid: bool = True
-) -> Capability:
+def of_sample(sample: Sample, limit: float, confidence: float = 0.95) -> Capability:
     """Capability of one load.
 
     Parameters
     ----------
-    values, status : array_like, shape (n,)
-        Load and `tables.Status` of each joint; leave the nominal joint out.
+    sample : Sample
+        Load of joints that count equally.
     limit : float
-        Upper limit, in the unit of the values.
+        Upper limit, in the unit of the load.
     confidence : float
-        Confidence level of the intervals.
-    iid : bool
-        Whether the joints are independent samples; the intervals are NaN when they are not.
+        Confidence level of the intervals; without independent joints these are NaN.
 
     Returns
     -------
     Capability
         Estimates and intervals.
 
-    Raises
-    ------
-    ValueError
-        As `exceedance.exceedance`.
-
     Examples
     --------
     >>> import numpy as np
     >>> load = np.random.default_rng(1).normal(650.0, 10.0, 5000)  # N
-    >>> found = capability(load, [1] * 5000, limit=690.0)
+    >>> found = of_sample(Sample.of(load, [1] * 5000), limit=690.0)
     >>> round(found.cpk_normal, 1), found.above.count, found.needed
     (1.3, 0, 3244)
     """
-    return of_sample(Sample.of(values, status, None if iid else Listed()), limit, confidence)
-
-
-def of_sample(sample: Sample, limit: float, confidence: float = 0.95) -> Capability:
-    """Capability of the load of joints that count equally; other parameters as in `capability`."""
     from scipy.stats import normaltest
 
-    valid, iid = sample.valid, sample.design.has_interval("index")
+    valid = sample.valid
     normal = general = (np.nan, np.nan, np.nan)
     p = np.nan
     if valid.size > 1 and np.ptp(valid) > 0:
-        normal, general = (index(valid, limit, confidence, iid) for index in (_normal, _of_quantiles))
+        normal, general = (index(sample, limit, confidence) for index in (_normal, _of_quantiles))
         p = float(normaltest(valid).pvalue) if valid.size >= 20 else np.nan
     # Bonferroni over two quantiles with two ends each: a quarter of the error probability for this upper end
     needed = binomial.wilks(REFERENCE, 1.0 - 0.25 * (1.0 - confidence))
@@ -146,18 +125,17 @@ def cpk_interval(cpk: ArrayLike, n: int, confidence: float = 0.95) -> tuple[Floa
     lower, upper : ndarray
         Of the shape of `cpk`.
     """
-    from scipy.special import nctdtrinc
-
     scale, tail = 3.0 * np.sqrt(n), 0.5 * (1.0 - confidence)
     t = scale * np.asarray(cpk, dtype=float)
     return nctdtrinc(n - 1, 1.0 - tail, t) / scale, nctdtrinc(n - 1, tail, t) / scale
 
 
-def _normal(valid: FloatArray, limit: float, confidence: float, iid: bool) -> tuple[float, float, float]:
+def _normal(sample: Sample, limit: float, confidence: float) -> tuple[float, float, float]:
     """Index of mean and standard deviation; interval of a normal load, widened for skewness and kurtosis.
 
     The factor is the ratio of standard errors from the central moments (delta method), at least 1, times `WIDER`.
     """
+    valid = sample.valid
     mean, n = valid.mean(), valid.size
     index = float((limit - mean) / (3.0 * valid.std(ddof=1)))
     if n < FEWEST_MOMENTS:
@@ -165,7 +143,7 @@ def _normal(valid: FloatArray, limit: float, confidence: float, iid: bool) -> tu
     middle, upper, high = np.quantile(valid, (0.5, 0.75, 0.95))
     if high - middle > LONGEST_TAIL * (upper - middle):
         return np.nan, np.nan, np.nan
-    if not iid:
+    if not sample.design.has_interval("index"):
         return index, np.nan, np.nan
     scores, z = (valid - mean) / valid.std(), 3.0 * index
     skewness, kurtosis = (scores**3).mean(), (scores**4).mean()
@@ -175,12 +153,12 @@ def _normal(valid: FloatArray, limit: float, confidence: float, iid: bool) -> tu
     return index, index - wider * (index - lower), index + wider * (upper - index)
 
 
-def _of_quantiles(valid: FloatArray, limit: float, confidence: float, iid: bool) -> tuple[float, float, float]:
+def _of_quantiles(sample: Sample, limit: float, confidence: float) -> tuple[float, float, float]:
     """Quantile index; interval from those of both quantiles, half the error probability each (Bonferroni)."""
     each = 0.5 * (1.0 + confidence)
-    middle, high = (exceedance.quantile(valid, np.ones(valid.size), share, each, iid) for share in (0.5, REFERENCE))
+    middle, high = (sample.quantile(share, each) for share in (0.5, REFERENCE))
     index = float(_index(limit, middle.estimate, high.estimate))
-    if not iid:
+    if not sample.design.has_interval("index"):
         return index, np.nan, np.nan
     if not middle.upper < high.lower:
         return index, -np.inf, np.inf

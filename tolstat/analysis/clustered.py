@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.special import expit, logit
 
 from tolstat.analysis import prediction
 from tolstat.analysis.binomial import clopper_pearson, half_width, log_beta_binomial
@@ -71,8 +72,6 @@ def interval(above: ArrayLike, joints: ArrayLike, confidence: float = 0.95) -> L
         is Clopper and Pearson's for lots. Where the joints on a side of the limit, (sum of k)² / sum of k² over the
         lots, are effectively fewer than `FEW`, the interval contains `_credible`, too. NaN for fewer than `LEAST` lots.
     """
-    from scipy.special import expit, logit
-
     k = np.asarray(above, dtype=float)
     n = np.asarray(joints, dtype=float)
     n = np.broadcast_to(n.reshape(n.shape + (1,) * (k.ndim - n.ndim)), k.shape)
@@ -103,8 +102,6 @@ def interval(above: ArrayLike, joints: ArrayLike, confidence: float = 0.95) -> L
 
 def _credible(k: FloatArray, n: FloatArray, confidence: float) -> tuple[FloatArray, FloatArray]:
     """Credible interval of the mean share of m limits, k of n joints in each lot, both (lots, m)."""
-    from scipy.special import expit, logit
-
     p = k.sum(axis=0) / n.sum(axis=0)
     means, spreads = np.arange(logit(p.min()) - REACH, logit(p.max()) + REACH, STEP), SPREADS[::2]
     below = _posterior(k, n, means, spreads)[2].reshape(len(p), len(means), -1).sum(axis=2).cumsum(axis=1)
@@ -122,8 +119,6 @@ def _posterior(
     correlation of two joints of a lot; all limits share it, so that the density is computed once for each pair of k and
     n. The prior distribution of the mean is Jeffreys' of a share, that of the correlation uniform.
     """
-    from scipy.special import expit
-
     mean, r = (own.ravel() for own in np.meshgrid(expit(means), expit(spreads), indexing="ij"))
     a, b = mean * (1.0 - r) / r, (1.0 - mean) * (1.0 - r) / r
     pairs, which = np.unique(np.stack([k.ravel(), n.ravel()]), axis=1, return_inverse=True)
@@ -264,8 +259,6 @@ def law_of(above: ArrayLike, joints: ArrayLike) -> Law:
     -------
     Law
     """
-    from scipy.special import logit
-
     k, n = np.asarray(above, dtype=np.intp), np.asarray(joints, dtype=np.intp)
     p = (k.sum() + 0.5) / (n.sum() + 1.0)
     spread = max(float(np.nan_to_num(interval(k, n).correlation)), 0.05)

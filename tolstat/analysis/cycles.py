@@ -1,8 +1,8 @@
 """Which cycles does a load go through in a revolution? Mixtures, spectra, fatigue damage, and the time above a level.
 
-Cycles are those of one periodic revolution: all numbers are per revolution. `exceedance` and `quantile` evaluate the
-distribution of these values over the *joints*; `share_of_revolution_above` gives the share of a *revolution* during
-which a load is above a level.
+Cycles are those of one periodic revolution: all numbers are per revolution. `sample.Sample` has the distribution of
+these values over the *joints*; `share_of_revolution_above` gives the share of a *revolution* during which a load is
+above a level.
 
 S is a range, twice an amplitude. S–N lines have no knee and no endurance limit (Miner's rule in its elementary form);
 there is no mean-load correction.
@@ -16,12 +16,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tolstat.common.shown import shown
-
 FloatArray = NDArray[np.float64]
 
 
-@shown
 class Cycles(NamedTuple):
     """Rainflow cycles of joints, one revolution or a mixture of revolutions under several operating points.
 
@@ -87,16 +84,7 @@ def duty_cycle(parts: Sequence[Cycles], shares: Sequence[float]) -> Cycles:
     -------
     Cycles
         A joint without results at one operating point has none.
-
-    Raises
-    ------
-    ValueError
-        When the joints or channels differ, or the shares are not shares.
     """
-    if len(shares) != len(parts) or min(shares, default=0.0) <= 0 or abs(sum(shares) - 1) > 1e-9:
-        raise ValueError(f"{list(shares)} are not the shares of {len(parts)} operating points")
-    if len({(part.channels, len(part.ranges)) for part in parts}) > 1:
-        raise ValueError("the operating points have not the same joints and channels")
     return Cycles(
         parts[0].channels,
         np.concatenate([part.ranges for part in parts], axis=2),

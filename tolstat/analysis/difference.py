@@ -12,13 +12,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.special import bdtr
 
 from tolstat.analysis.binomial import clopper_pearson, half_width
 from tolstat.analysis.column import Column
 from tolstat.analysis.design import Claim, Design
 from tolstat.analysis.sample import Sample
 from tolstat.common.loads import FloatArray
-from tolstat.common.shown import shown
 
 RESAMPLES = 500
 """Number of resamples in the bootstrap of paired quantiles."""
@@ -29,7 +29,6 @@ _REACH = 6.0
 _SEED = 20
 
 
-@shown
 class ShareDifference(NamedTuple):
     """Share of the joints above levels in two studies; arrays of shape (m,), one value a level.
 
@@ -66,7 +65,6 @@ class ShareDifference(NamedTuple):
     outer_upper: FloatArray
 
 
-@shown
 class Difference(NamedTuple):
     """A statistic in two studies: its values `a` and `b`, `estimate` = b - a, and the interval of that."""
 
@@ -100,7 +98,7 @@ def shares(a: Sample, b: Sample, levels: ArrayLike, paired: bool, confidence: fl
     Raises
     ------
     ValueError
-        When the lengths of pairs differ or a side has no valid load.
+        When a side has no valid load.
 
     Examples
     --------
@@ -110,8 +108,6 @@ def shares(a: Sample, b: Sample, levels: ArrayLike, paired: bool, confidence: fl
     >>> found.only_a.tolist(), found.only_b.tolist(), found.estimate.tolist(), found.p.tolist()
     ([0], [1], [0.25], [1.0])
     """
-    from scipy.special import bdtr
-
     _valid(a, b, paired)
     level = np.atleast_1d(np.asarray(levels, dtype=float))
     kind = _pairs if paired else _apart
@@ -210,8 +206,6 @@ def _have_interval(a: Design, b: Design, claim: Claim) -> bool:
 
 def _valid(a: Sample, b: Sample, paired: bool) -> tuple[Sample, Sample]:
     """Joints with a valid load; of pairs, those that have one in both studies."""
-    if paired and a.values.size != b.values.size:
-        raise ValueError(f"loads of {a.values.size} and {b.values.size} joints are not those of pairs")
     of_a, of_b = a.is_valid, b.is_valid
     if paired:
         of_a = of_b = of_a & of_b

@@ -7,12 +7,9 @@ from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from tolstat.common.shown import shown
-
 T = TypeVar("T")
 
 
-@shown
 class Estimate(NamedTuple, Generic[T]):
     """A number, or an array of them, and its interval; NaN ends for dependent samples."""
 
@@ -21,7 +18,6 @@ class Estimate(NamedTuple, Generic[T]):
     upper: T
 
 
-@shown
 @dataclass(frozen=True)
 class Exceedance:
     """Share of the joints whose load is above a level.
@@ -65,7 +61,6 @@ CURVE = np.dtype([(f.name, "i8" if f.type == "int" else "f8") for f in fields(Ex
 """A row of a curve: the fields of `Exceedance`."""
 
 
-@shown
 class Quantile(NamedTuple):
     """Load that a share of the joints stays at or below.
 

@@ -13,12 +13,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.special import gammaincinv, xlog1py, xlogy
 
 from tolstat.analysis import pareto
 from tolstat.analysis.estimates import Estimate
 from tolstat.analysis.sample import Sample
 from tolstat.common.loads import FloatArray
-from tolstat.common.shown import shown
 
 MIN_EXCESSES = 50
 """Minimum number of excesses for a fit."""
@@ -40,7 +40,6 @@ class TooThinError(ValueError):
         )
 
 
-@shown
 @dataclass(frozen=True)
 class Tail:
     """Generalised Pareto tail of a load.
@@ -176,8 +175,6 @@ def fit(sample: Sample, share: float | None = None, confidence: float = 0.95) ->
     TooThinError
         When fewer than `MIN_EXCESSES` joints are above the threshold.
     """
-    from scipy.special import gammaincinv, xlog1py, xlogy
-
     valid, lost, iid = sample.valid, sum(sample.unresolved), sample.design.has_interval("tail")
     joints = valid.size + lost
     share = min(0.1, 3.0 / np.sqrt(max(valid.size, 1))) if share is None else share

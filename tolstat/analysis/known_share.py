@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import betainc
 
 from tolstat.analysis import process
 from tolstat.analysis.column import Mask
@@ -21,7 +22,6 @@ from tolstat.analysis.reweight import LARGEST_SPREAD, LEAST_ESS
 from tolstat.analysis.weighted import Split
 from tolstat.common.bisection import first
 from tolstat.common.loads import FloatArray
-from tolstat.common.shown import shown
 
 BLOCK = 1 << 20
 """Number of weights that are held at a time."""
@@ -44,7 +44,6 @@ class Mixture(NamedTuple):
     parts: tuple[int | None, ...]
 
 
-@shown
 class KnownShare(NamedTuple):
     """Share of the joints above a level.
 
@@ -161,8 +160,6 @@ def intervals(
 
 def _upper_end(split: Split, side: int, usable: Mask, tail: float) -> float:
     """Largest share of a side, above (0) or below (1), that is exceeded with the probability `tail`."""
-    from scipy.special import betainc
-
     own, other = (parameter[side] for parameter in split.far())
     inner = usable & (split.total[1 - side] > 0.0) & np.isfinite(own) & (own > 0.0) & (other > 0.0)
 

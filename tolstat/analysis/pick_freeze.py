@@ -14,7 +14,6 @@ from numpy.typing import ArrayLike, NDArray
 from tolstat.analysis.binomial import clopper_pearson, half_width
 from tolstat.analysis.estimates import Estimate
 from tolstat.common.loads import FloatArray
-from tolstat.common.shown import shown
 
 FEWEST = 50
 """Minimum number of points for an index."""
@@ -22,7 +21,6 @@ WIDER = 1.2
 """Factor on standard errors: those of few points are too small (measured)."""
 
 
-@shown
 class Indices(NamedTuple):
     """Sobol' indices.
 
@@ -67,7 +65,7 @@ def indices(a: ArrayLike, b: ArrayLike, ab: ArrayLike, confidence: float = 0.95)
     Raises
     ------
     ValueError
-        When the lengths differ, the load does not scatter, an index has fewer than `FEWEST` points, or so few points
+        When the load does not scatter, an index has fewer than `FEWEST` points, or so few points
         make up the variance that its own interval contains zero: decompose the logarithm of such a load.
 
     Examples
@@ -127,8 +125,6 @@ def of_event(a: ArrayLike, b: ArrayLike, ab: ArrayLike, confidence: float = 0.95
 def _checked(a: ArrayLike, b: ArrayLike, ab: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Loads of the points that have those of A and B."""
     x, y, mixed = (np.asarray(v, dtype=float) for v in (a, b, ab))
-    if x.ndim != 1 or x.shape != y.shape or mixed.ndim != 2 or len(mixed) != len(x):
-        raise ValueError(f"loads {x.shape}, {y.shape} and {mixed.shape} are not those of one design")
     both = np.isfinite(x) & np.isfinite(y)
     x, y, mixed = x[both], y[both], mixed[both]
     valid = np.isfinite(mixed)

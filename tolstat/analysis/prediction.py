@@ -9,6 +9,10 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
+from tolstat.analysis.binomial import log_beta_binomial
+
 DELIVERY = 1000
 """Joints of the next delivery, unless another number is given."""
 
@@ -32,11 +36,6 @@ def of_counts(least: int, most: int, n: int, number: int, confidence: float = 0.
     lower, upper : float
         Whole numbers, ends included.
 
-    Raises
-    ------
-    ValueError
-        When a count is not between 0 and `n`.
-
     Examples
     --------
     5 of 100 joints were above; how many of the next 200?
@@ -44,8 +43,6 @@ def of_counts(least: int, most: int, n: int, number: int, confidence: float = 0.
     >>> of_counts(5, 5, 100, 200)
     (2.0, 25.0)
     """
-    if not 0 <= least <= most <= n:
-        raise ValueError(f"counts {least} and {most} must lie between 0 and {n}")
     tail = 0.5 * (1.0 - confidence)
     # beta-binomial distributions whose tails are those of the hypergeometric test
     lower = _quantile(tail, number, least, n - least + 1) if least else 0.0
@@ -55,10 +52,6 @@ def of_counts(least: int, most: int, n: int, number: int, confidence: float = 0.
 
 def _quantile(share: float, number: int, a: int, b: int) -> float:
     """Quantile of the beta-binomial distribution: least count whose distribution function reaches `share`."""
-    import numpy as np
-
-    from tolstat.analysis.binomial import log_beta_binomial
-
     reached = np.cumsum(np.exp(log_beta_binomial(np.arange(number + 1), number, a, b)))
     return float(min(int(np.searchsorted(reached, share)), number))
 

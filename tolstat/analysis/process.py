@@ -14,6 +14,7 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import chdtri, ndtri, roots_genlaguerre
 
 from tolstat.analysis.column import frozen
 from tolstat.common.loads import FloatArray
@@ -54,15 +55,12 @@ def deviation(u: FloatArray, parts: int) -> FloatArray:
 
     The mean is normal about 0 with the deviation b / sqrt(parts).
     """
-    from scipy.special import chdtri
-
     return np.asarray(np.sqrt((parts - 1) / chdtri(parts - 1, u)))
 
 
 @cache
 def draws(parts: tuple[int, ...]) -> Draws:
     """`DRAWS` likely processes of entries known from so many parts each, at scrambled Sobol' points."""
-    from scipy.special import ndtri
     from scipy.stats import qmc
 
     points = qmc.Sobol(2 * len(parts), seed=np.random.default_rng(SEED)).random(DRAWS)
@@ -140,8 +138,6 @@ def log_mean_square(drawn: Draws, known: tuple[Known, ...], over: tuple[int | No
 
 def _over_student(a: FloatArray, b: FloatArray, known: Known) -> FloatArray:
     """The same of one entry drawn from a posterior predictive, by Gauss quadrature along and across the mean, (K,)."""
-    from scipy.special import roots_genlaguerre
-
     d, free = known.errors, known.parts - 1
     x, along = np.polynomial.hermite.hermgauss(NODES)
     r, across = roots_genlaguerre(NODES, 0.5 * (d - 1) - 1.0) if d > 1 else (np.zeros(1), np.ones(1))

@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.special import expit, logit
 
 from tolstat.analysis.binomial import half_width
 from tolstat.common.loads import FloatArray
@@ -218,8 +219,6 @@ def _larger(
     The quantile is Student's, with Welch's (1947) degrees of freedom. `found` has the `places` of all joints,
     (d, n).
     """
-    from scipy.special import expit, logit
-
     m, k = int(over.sum()), int((~over).sum())
     joint = from_places(found)
     of_above = (joint[:, over] - from_places(found[:, over])) / k  # share of the others that each one surpasses

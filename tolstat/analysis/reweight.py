@@ -21,7 +21,6 @@ from tolstat.analysis.column import Mask
 from tolstat.analysis.sample import Sample
 from tolstat.analysis.weighted import Split, Weighted
 from tolstat.common.loads import FloatArray
-from tolstat.common.shown import shown
 
 LEAST_ESS = 50
 """Minimum number of joints that count, by the exact mean square of the ratio; see `Ratios.needed`."""
@@ -68,7 +67,6 @@ class Ratios(NamedTuple):
         return self.effective >= self.needed and self.log_unbounded <= math.log(LARGEST_SPREAD)
 
 
-@shown
 class Support(NamedTuple):
     """How well joints support the share above a level.
 
@@ -89,7 +87,6 @@ class Support(NamedTuple):
     usable: bool
 
 
-@shown
 class Share(NamedTuple):
     """Share of the joints above a level, under the new tolerances.
 
@@ -114,7 +111,6 @@ class Share(NamedTuple):
     support: Support
 
 
-@shown
 class Load(NamedTuple):
     """Load that a share of the joints stays at or below, under the new tolerances.
 

@@ -14,14 +14,11 @@ from tolstat.analysis.design import Design
 from tolstat.analysis.estimates import CURVE, Exceedance, Quantile
 from tolstat.analysis.independent import Independent
 from tolstat.common.loads import FloatArray
-from tolstat.common.shown import table
 from tolstat.common.tables import UNSETTLED, VALID, Status, worst_status
 
 CONFIDENCE = 0.95
 LONG_TAIL = 3.0
 """Ratio of the largest load to the median above which a load has a long tail."""
-Ends = tuple[ArrayLike, ArrayLike]
-"""Lower and upper end of the load of each joint."""
 
 _IS_VALID, _IS_UNSETTLED = (np.isin(np.arange(256), states) for states in (VALID, UNSETTLED))
 
@@ -29,6 +26,10 @@ _IS_VALID, _IS_UNSETTLED = (np.isin(np.arange(256), states) for states in (VALID
 @dataclass(frozen=True, eq=False, repr=False)
 class Sample:
     """Largest load over the revolution of n joints.
+
+    Two uncertainties of a share are reported separately. *Sampling*: other joints could have been drawn; an interval
+    covers it. *Unresolved joints*: a joint that failed or did not settle has no valid load; counting all of them below
+    the level, then all of them above it, bounds their effect. They are never dropped silently.
 
     Attributes
     ----------
@@ -72,7 +73,7 @@ class Sample:
         values: ArrayLike,
         status: ArrayLike,
         design: Design | None = None,
-        ends: Ends | None = None,
+        ends: tuple[ArrayLike, ArrayLike] | None = None,
         name: str = "",
         unit: str = "1",
         limit: float | None = None,
@@ -97,6 +98,15 @@ class Sample:
         ------
         ValueError
             When the shapes differ or are not one-dimensional.
+
+        Examples
+        --------
+        >>> load = Sample.of([640.0, 655.0, 720.0, 690.0], status=[1, 1, 1, 2], unit="N")  # the last has not settled
+        >>> found = load.above(700.0)
+        >>> found.count, round(found.estimate, 3), round(found.lower, 4), round(found.upper, 3)
+        (1, 0.333, 0.0084, 0.906)
+        >>> found.bound_lower, found.bound_upper
+        (0.25, 0.5)
         """
         load, state = np.asarray(values, dtype=float), np.asarray(status).astype(np.uint8, copy=False)
         if load.ndim != 1 or load.shape != state.shape:
@@ -109,17 +119,6 @@ class Sample:
         low, high = np.where(lost, -np.inf, lower)[joints], np.where(lost, np.inf, upper)[joints]
         own = Independent() if design is None else design
         return cls(name, unit, limit, nominal, Column(value), Inexact(joints, low, high), state, own)
-
-    def __repr__(self) -> str:
-        valid = self.valid
-        span = f", {valid[0]:.4g} to {valid[-1]:.4g} {self.unit}" if valid.size else ""
-        limit = "" if self.limit is None else f", limit {self.limit:.4g} {self.unit}"
-        return f"<load {self.name!r}: {valid.size} of {self.values.size} joints valid{span}{limit}>"
-
-    def _repr_html_(self) -> str:
-        shares = (0.5, 0.9, 0.99) if self.valid.size else ()
-        entries = [(f"{share:.0%} quantile", f"{self.quantile(share).estimate:.4g} {self.unit}") for share in shares]
-        return table(repr(self)[1:-1], [("nominal", f"{self.nominal:.4g} {self.unit}"), *entries])
 
     @property
     def values(self) -> FloatArray:

@@ -16,7 +16,6 @@ from numpy.typing import ArrayLike, NDArray
 from tolstat.analysis.binomial import half_width
 from tolstat.analysis.ranks import ranks
 from tolstat.common.loads import FloatArray
-from tolstat.common.shown import shown
 
 WIDER = 1.2
 """Factor on standard errors of shares of a variance, which are too small (measured)."""
@@ -30,7 +29,6 @@ MOST = 20_000
 """Maximum number of joints used for interactions: memory is some 3 kB a joint and error, and more joints add little."""
 
 
-@shown
 class FirstOrder(NamedTuple):
     """Shares of a load's variance that each error explains on its own.
 
@@ -49,7 +47,6 @@ class FirstOrder(NamedTuple):
     variance: FloatArray
 
 
-@shown
 class Total(NamedTuple):
     """Shares of a load's variance in which each error takes part.
 
@@ -119,7 +116,7 @@ def first_order(x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: bool 
     Raises
     ------
     ValueError
-        When the lengths differ, a value is not finite, or there are fewer than `FEWEST` joints.
+        When there are fewer than `FEWEST` joints.
 
     Examples
     --------
@@ -251,10 +248,6 @@ def _with_ends(
 
 def _checked(x: ArrayLike, y: ArrayLike) -> tuple[FloatArray, FloatArray]:
     errors, loads = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
-    if errors.ndim != 2 or loads.ndim not in (1, 2) or len(errors) != len(loads):
-        raise ValueError(f"errors {errors.shape} and loads {loads.shape} must be tables of one length")
-    if not (np.isfinite(errors).all() and np.isfinite(loads).all()):
-        raise ValueError("leave out joints without a valid load")
     if len(loads) < FEWEST:
         raise ValueError(f"{len(loads)} joints are too few: give {FEWEST} or more")
     return errors, loads

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.special import ndtr
 
 from tolstat.analysis.binomial import clopper_pearson, mean_interval
 from tolstat.analysis.column import Mask
@@ -192,8 +193,6 @@ def critical_factor(collective: Collective, line: Line, lives: float = 1.0) -> F
 
 def probability(factor: FloatArray, T_S: float) -> FloatArray:
     """Share of the parts whose strength is below `factor` times the median; see `Line.T_S`."""
-    from scipy.special import ndtr
-
     if T_S <= 1.0:
         return np.where(np.isnan(factor), np.nan, (factor >= 1.0).astype(float))
     with np.errstate(divide="ignore"):

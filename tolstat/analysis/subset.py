@@ -25,7 +25,6 @@ from numpy.typing import NDArray
 
 from tolstat.analysis.binomial import clopper_pearson, half_width
 from tolstat.common.loads import FloatArray
-from tolstat.common.shown import shown
 
 FIRST_STEP = 0.6
 """Step of level 1 (Papaioannou et al. 2015)."""
@@ -57,7 +56,6 @@ class Candidates(NamedTuple):
     parent: NDArray[np.intp]
 
 
-@shown
 class Level(NamedTuple):
     """Statistics of a completed level.
 
@@ -85,7 +83,6 @@ class Level(NamedTuple):
     step: float
 
 
-@shown
 class Estimate(NamedTuple):
     """Estimated probability of a load above the limit.
 
@@ -179,16 +176,7 @@ class Walk:
         self.next = Candidates(0, noise(0, 0, n), np.full(n, -1))
 
     def take(self, loads: FloatArray) -> None:
-        """Take the loads of the joints `next`, (m,), in the unit of the limit, and update `next` unless `done`.
-
-        Raises
-        ------
-        ValueError
-            When the number of loads differs from `next`, a load is NaN, or the simulation is done.
-        """
-        loads = np.asarray(loads, dtype=float)
-        if self.done or loads.shape != self.next.parent.shape or np.isnan(loads).any():
-            raise ValueError(f"{loads.shape} loads, NaN among them or not, for {self.next.parent.shape} joints")
+        """Take the loads of the joints `next`, (m,), in the unit of the limit, not NaN; update `next` unless `done`."""
         numbers = self._taken + np.arange(loads.size)
         here = _States(self.next.scores, loads, numbers, np.arange(loads.size)[:, None], numbers)
         self._taken += loads.size

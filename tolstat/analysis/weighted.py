@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.special import betainc, betaincinv
 
 from tolstat.analysis import pareto
 from tolstat.analysis.column import Column
@@ -92,8 +93,6 @@ class Split(NamedTuple):
             share at which as many as found have the probability of the tail, if only cases with `least` or more are
             looked at.
         """
-        from scipy.special import betainc, betaincinv
-
         tail = 0.5 * (1.0 - confidence)
         own, other = self.far()
 

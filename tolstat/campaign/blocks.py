@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from tolstat.campaign import pool
 from tolstat.campaign.block import Block, BlockWork, load_kernels, results_of, simulate_block, without_simulation
+from tolstat.campaign.cluster import map_on_cluster
 from tolstat.campaign.pool import Lost, Work
 from tolstat.common.cores import available_cores
 from tolstat.common.solver_options import from_names
@@ -112,8 +113,6 @@ def simulate_pending(
     kept = study.output.histories, study.output.harmonics, store.history_specs
     work, blocks = _work(settings_in_use(study, store), *kept), _blocks(study, store, stop_slot, pace)
     if executor == "dask":
-        from tolstat.campaign.cluster import map_on_cluster
-
         results = map_on_cluster(work, blocks, scheduler, workers, stop)
     else:
         results = pool.map_blocks(work, blocks, max(1, min(workers, -(-todo // pace.size))), stop)
@@ -152,8 +151,13 @@ def default_block(n_pending: int, workers: int) -> int:
 
 def settings_in_use(study: Study, store: Reader) -> list[Options]:
     """Return the solver options of all joints of a file, each once."""
-    retried = [from_names(retry["options"]) for retry in store.retries]
-    return list(dict.fromkeys([*(settings(solver, store.fidelity) for solver in study.solvers), *retried]))
+    return list(dict.fromkeys(_each_settings(study, store)))
+
+
+def _each_settings(study: Study, store: Reader) -> list[Options]:
+    """Solver options of each variant of a study, then of each retry."""
+    variants = [settings(solver, store.fidelity) for solver in study.solvers]
+    return variants + [from_names(retry["options"]) for retry in store.retries]
 
 
 def _compile_missing(options: Options, params: NDArray[np.void] | None = None) -> None:
@@ -175,19 +179,13 @@ def compile_for(study: Study, store: Reader) -> None:
 def _blocks(study: Study, store: Reader, stop_slot: int, pace: Pace) -> Iterator[Block]:
     """Yield the pending file slots below `stop_slot` as blocks whose joints have the same point and solver options."""
     studies = {point: study.at(point) for point in store.points}
-    variant_options = [settings(solver, store.fidelity) for solver in study.solvers]
-    retry_options = [from_names(retry["options"]) for retry in store.retries]
     distinct = settings_in_use(study, store)
+    numbers = np.array([distinct.index(own) for own in _each_settings(study, store)])
     for one, slots in store.pending_blocks(stop_slot):
         read = slice(slots[0], slots[-1] + 1)
         errors, attempt = store.errors(read), one.attempt(read)[slots - slots[0]]
         point = one.point or ""
-        variant = variants(study, store.row(slots))
-        options = [
-            retry_options[k - 1] if k else variant_options[i]
-            for i, k in zip(variant.tolist(), attempt.tolist(), strict=True)
-        ]
-        option = np.array([distinct.index(own) for own in options])
+        option = numbers[np.where(attempt, len(study.solvers) + attempt - 1, variants(study, store.row(slots)))]
         for number in np.unique(option):
             left = slots[option == number]
             while left.size:

@@ -14,6 +14,7 @@ from tolstat.campaign.pool import Lost, Work, kept_workers
 from tolstat.common.counts import Counts
 from tolstat.common.solver_options import to_names
 from tolstat.common.tables import RESULT, Fidelity, Method, Options, Simulation, Start, Status, without_results
+from tolstat.solver.reference import reference_rows
 from tolstat.store.verification import Check
 
 QUICK_CHECKS = ("half_step", "newton", "settling")
@@ -129,8 +130,6 @@ def _references(
 
 
 def _reference(joint: Single) -> NDArray[np.void]:
-    from tolstat.solver.reference import reference_rows
-
     _, params, options = joint
     return reference_rows(params, options)
 

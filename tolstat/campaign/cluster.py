@@ -6,6 +6,7 @@ cluster again. A cluster of this machine whose workers do not come back leaves a
 
 from __future__ import annotations
 
+import fcntl
 import os
 import queue
 import tempfile
@@ -133,8 +134,6 @@ _versions = cache(versions)
 def _prepare(prepare: Callable[[], object]) -> None:
     """Prepare this process once; processes of a machine take turns, since they may compile into one cache."""
     with open(os.path.join(tempfile.gettempdir(), f"tolstat-{os.getuid()}.lock"), "w") as lock:
-        import fcntl
-
         fcntl.flock(lock, fcntl.LOCK_EX)
         prepare()
 

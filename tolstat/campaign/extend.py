@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack
 from functools import partial
 from itertools import accumulate, chain
@@ -24,7 +24,6 @@ from tolstat.store import Reader, Writer, layout, what_if
 from tolstat.store.hdf5 import BLOCK
 from tolstat.store.provenance import differing, differing_code
 from tolstat.store.recorded import differing_keys, recall
-from tolstat.store.what_if import Altered
 from tolstat.store.writer import check_free, write_new
 from tolstat.study import Study
 
@@ -52,13 +51,10 @@ class Merged(NamedTuple):
         Numbers of joints of the campaign by status.
     twice : int
         Number of surplus copies of rows that several files hold with the same results.
-    dropped : int
-        Number of changes of the group ``what_if`` that are left out, because the files hold different joints of them.
     """
 
     counts: Counts
     twice: int
-    dropped: int
 
 
 def extend(path: Path, n: int, study_path: Path | None = None) -> Study:
@@ -94,15 +90,10 @@ def extend(path: Path, n: int, study_path: Path | None = None) -> Study:
         more = range(store.n, study.rows)
         altered = what_if.read(store)
         grow(store, study, draw_blocks(study, more), origin_blocks(study, more))
-    _keep(path, altered)
-    return study
-
-
-def _keep(path: Path, altered: Mapping[str, Altered]) -> None:
-    """Write joints with other tolerances to the new file of a campaign: they are samples of that campaign."""
-    if altered:
+    if altered:  # these joints are samples of the larger campaign, too
         with Writer.open(path) as store:
             what_if.write(store, altered)
+    return study
 
 
 def grow(
@@ -177,10 +168,8 @@ def merge(paths: Sequence[Path], out: Path) -> Merged:
             tables["origin"] = (block for store, begin in shares for block in _blocks(store, store.origin, begin))
         write_new(out, held, OTHER_FILE, tables, partial(_copy_results, sources=stores))
         twice = sum(len(store.rows) for store in stores) - rows
-        altered, dropped = what_if.common(what_if.read(store) for store in stores)
-    _keep(out, altered)
     with Reader.open(out) as store:
-        return Merged(store.counts(), twice, dropped)
+        return Merged(store.counts(), twice)
 
 
 def _check_extendable(store: Reader, n: int) -> None:
@@ -265,28 +254,24 @@ def _copy(file: h5py.File, source: Reader) -> Iterator[tuple[int, str]]:
     """Copy finished joints; yield row and column of those that the file has already with another result."""
     place = layout.place_of(source.point or "") or "/"
     columns = [("ledger", "attempt"), *(("histories", name) for name in source.history_specs)]
-    columns += [("results", c.name) for c in source.columns]  # the status last: it says what a file holds
-    for first in range(0, source.n, BLOCK):
-        own = slice(first, min(first + BLOCK, source.n))
-        there = slice(source.row(own.start), source.row(own.stop))
-        done = source.status(own) != Status.PENDING
-        held = file[place]["results/status"][there] != Status.PENDING
-        for group, name in columns:
-            dataset = file[place][group][name]
-            size = max(1, COPY_BYTES // max(1, dataset.dtype.itemsize * math.prod(dataset.shape[1:])))
-            for begin in range(own.start, own.stop, size):
-                part = slice(begin, min(begin + size, own.stop))
-                here = slice(part.start - own.start, part.stop - own.start)
-                target = slice(source.row(part.start), source.row(part.stop))
-                values, before = source.column(group, name, part), dataset[target]
-                both, new = (done & held)[here], (done & ~held)[here]
-                if group == "ledger":  # also pending joints have an attempt, the one to come
-                    new = ~held[here]
-                same = (_bytes(values[both]) == _bytes(before[both])).all(axis=1)
-                if group != "ledger" and not same.all():
-                    yield int(target.start + np.flatnonzero(both)[np.argmin(same)]), name
-                before[new] = values[new]
-                dataset[target] = before
+    # the status last: it says what a file holds
+    columns += sorted((("results", c.name) for c in source.columns), key=lambda own: own[1] == "status")
+    for group, name in columns:
+        dataset = file[place][group][name]
+        size = min(BLOCK, max(1, COPY_BYTES // (dataset.dtype.itemsize * math.prod(dataset.shape[1:]))))
+        for first in range(0, source.n, size):
+            own = slice(first, min(first + size, source.n))
+            there = slice(source.row(own.start), source.row(own.stop))
+            done = source.status(own) != Status.PENDING
+            held = file[place]["results/status"][there] != Status.PENDING
+            values, before = source.column(group, name, own), dataset[there]
+            new = ~held if group == "ledger" else done & ~held  # also pending joints have an attempt, the one to come
+            both = np.flatnonzero(done & held)
+            same = (_bytes(values[both]) == _bytes(before[both])).all(axis=1)
+            if group != "ledger" and not same.all():
+                yield int(there.start + both[np.argmin(same)]), name
+            before[new] = values[new]
+            dataset[there] = before
 
 
 def _bytes(values: NDArray[Any]) -> NDArray[np.uint8]:

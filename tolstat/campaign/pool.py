@@ -11,6 +11,7 @@ it does not have.
 
 from __future__ import annotations
 
+import fcntl
 import multiprocessing
 import os
 import pickle
@@ -39,8 +40,8 @@ MAX_FAILURES = 10
 Nine attempts lead from a block of 256 to a joint, so that one joint never ends a map."""
 READY, RESULT, RAISED, DIED = "ready", "result", "raised", "died"
 """Kinds of messages from a worker, and what stands for one from a worker that has died."""
-IGNORED = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
-"""Signals that workers ignore: their parent decides when to stop."""
+SIGNALS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
+"""Signals that end a campaign. Workers ignore them: their parent decides when to stop."""
 F_SETSIG = 10
 """Command of Linux's fcntl that says which signal a file sends; the standard library has no name for it."""
 HINT = (
@@ -59,18 +60,8 @@ class Lost(NamedTuple):
     reason: str
 
 
-def unsplit(block: BlockT) -> Sequence[BlockT]:
-    """Return a block as its only piece."""
-    return [block]
-
-
 def no_preparation() -> None:
     """Do nothing before the first block."""
-
-
-def never_stop() -> bool:
-    """Return False: no stop is requested."""
-    return False
 
 
 @dataclass(frozen=True)
@@ -88,12 +79,12 @@ class Work(Generic[BlockT, ResultT]):
     """
 
     function: Callable[[BlockT], ResultT]
-    split: Callable[[BlockT], Sequence[BlockT]] = unsplit
+    split: Callable[[BlockT], Sequence[BlockT]] = lambda block: [block]
     prepare: Callable[[], object] = no_preparation
 
 
 def map_blocks(
-    work: Work[BlockT, ResultT], blocks: Iterable[BlockT], workers: int, stop: Callable[[], bool] = never_stop
+    work: Work[BlockT, ResultT], blocks: Iterable[BlockT], workers: int, stop: Callable[[], bool] = lambda: False
 ) -> Generator[tuple[BlockT, ResultT | Lost], None, None]:
     """Apply the function to every block in worker processes and yield the results as they arrive.
 
@@ -294,10 +285,7 @@ def _reason(failure: str | Exception) -> str:
 @contextmanager
 def signals_blocked() -> Iterator[None]:
     """Let processes started inside inherit blocked signals, until they ignore them."""
-    if not hasattr(signal, "pthread_sigmask"):
-        yield
-        return
-    mask = signal.pthread_sigmask(signal.SIG_BLOCK, IGNORED)
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
     try:
         yield
     finally:
@@ -306,7 +294,7 @@ def signals_blocked() -> Iterator[None]:
 
 def serve(connection: Connection, prepare: Callable[[], object]) -> None:
     """Main loop of a worker: apply functions to blocks until the parent closes the pipe or ends."""
-    for number in IGNORED:
+    for number in SIGNALS:
         signal.signal(number, signal.SIG_IGN)
     _end_with_parent()
     prepare()
@@ -338,8 +326,6 @@ def _end_with_parent() -> None:
     parent = multiprocessing.parent_process()
     if parent is None or not sys.platform.startswith("linux"):
         return
-    import fcntl
-
     fcntl.fcntl(parent.sentinel, fcntl.F_SETOWN, os.getpid())
     fcntl.fcntl(parent.sentinel, F_SETSIG, signal.SIGKILL)
     fcntl.fcntl(parent.sentinel, fcntl.F_SETFL, fcntl.fcntl(parent.sentinel, fcntl.F_GETFL) | os.O_ASYNC)

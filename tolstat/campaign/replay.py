@@ -15,8 +15,8 @@ from tolstat.common import loads
 from tolstat.common.channels import BUSHING_LOADS, SHAFT_LOADS, LoadHistory
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.load_kinds import CONTACTS, PINS
-from tolstat.common.shown import shown
 from tolstat.common.tables import Motion, Options, Simulation, Status
+from tolstat.joint import ideal, nominal_errors, perturb
 from tolstat.solver.compilation import warm_up
 from tolstat.solver.simulation import simulate_rows
 from tolstat.store import Reader
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from tolstat.study import Case
 
 
-@shown
 class CaseResult(NamedTuple):
     """A simulated case.
 
@@ -102,8 +101,6 @@ class CaseResult(NamedTuple):
         """
         import pandas as pd
 
-        from tolstat.joint import ideal
-
         histories = {name: values[0] for name, values in self.simulation.histories.items()}
         tau = histories["tau"].astype(float)
         theta = 2 * math.pi * np.arange(len(tau)) / len(tau)
@@ -145,8 +142,6 @@ def simulate_case(case: Case) -> CaseResult:
     -------
     CaseResult
     """
-    from tolstat.joint import nominal_errors, perturb
-
     errors = nominal_errors(2)
     for name, value in case.errors.items():
         errors[name][0] = value
@@ -164,7 +159,6 @@ def _number(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
-@shown
 class Difference(NamedTuple):
     """A value that differs from the stored one.
 
@@ -188,7 +182,6 @@ class Difference(NamedTuple):
         return abs(self.now - self.stored) / max(abs(self.now), abs(self.stored))
 
 
-@shown
 class Replay(NamedTuple):
     """A joint simulated again.
 

@@ -17,7 +17,7 @@ from tolstat.campaign import verify
 from tolstat.campaign.block import Block
 from tolstat.campaign.blocks import Executor, compile_for, simulate_beside, simulate_pending
 from tolstat.campaign.extend import NOT_EXTENDABLE, OTHER_CODE, code_of
-from tolstat.campaign.pool import WorkerDied, kept_workers
+from tolstat.campaign.pool import SIGNALS, WorkerDied, kept_workers
 from tolstat.campaign.remedy import Retry, begin_retry
 from tolstat.common.counts import Counts
 from tolstat.common.errors import Fault, InputError, StoreError
@@ -27,13 +27,11 @@ from tolstat.sampling import dimensions, draw_blocks, origin_blocks
 from tolstat.solver import fidelity, rainflow
 from tolstat.solver.compilation import stage_name
 from tolstat.solver.simulation import Histories, history_specs
-from tolstat.store import Reader, Writer
+from tolstat.store import Reader, Writer, metadata
 from tolstat.store.hdf5 import store_error
 from tolstat.store.provenance import differing_code
 from tolstat.store.recorded import differing_keys, perturbed, settings
 from tolstat.study import Study
-
-CAUGHT = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 
 
 class Stop:
@@ -67,7 +65,7 @@ class Stop:
         """Handle a signal."""
         again, self._asked, self.number = self._asked, True, signal.Signals(number)
         if again:  # no signal may interrupt the cleanup that follows
-            for caught in CAUGHT:
+            for caught in SIGNALS:
                 signal.signal(caught, signal.SIG_IGN)
         if again or not self._deferred:
             raise KeyboardInterrupt
@@ -83,14 +81,14 @@ def signals_caught() -> Iterator[Stop]:
     stop = Stop()
     before: dict[int, Any] = {}
     if threading.current_thread() is threading.main_thread():
-        for number in CAUGHT:
-            if number.name != "SIGHUP" or signal.getsignal(number) is not signal.SIG_IGN:
+        for number in SIGNALS:
+            if number != signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN:
                 before[number] = signal.signal(number, stop.handle)
     try:
         yield stop
     finally:
-        for number, handler in before.items():
-            signal.signal(number, signal.SIG_DFL if handler is None else handler)
+        for caught, handler in before.items():
+            signal.signal(caught, signal.SIG_DFL if handler is None else handler)
 
 
 class Interrupted(Exception):
@@ -181,7 +179,11 @@ def run(
     WorkerDied
         When worker processes die whichever block they work on; the file holds all finished blocks.
     """
-    _check_positive(workers=workers, block=block)
+    numbers = {"workers": workers, "block": block}
+    wrong = {name: number for name, number in numbers.items() if number is not None and number < 1}
+    if wrong:
+        remedy = "give a whole number of at least 1"
+        raise InputError([Fault(name, f"{number} is too small", remedy) for name, number in wrong.items()])
     path = Path(out)
     stage("drawing the errors" if not path.exists() else "opening the file")
     with signals_caught() as stop, _create_or_resume(study, path, rows, tell) as store, kept_workers():
@@ -252,7 +254,7 @@ def _create_or_resume(study: Study, path: Path, rows: range | None, tell: Tell) 
     store = Writer.open(path)
     try:
         _check_same(store, study, rows)
-        store.update_study(study)
+        store.change(**metadata.editable(study))
     except StoreError:
         store.close()
         raise
@@ -304,16 +306,6 @@ def _of_number(store: Reader, asked: int) -> StoreError:
     elif method in NOT_EXTENDABLE:
         remedy = f"give another file: --out OTHER.h5; {NOT_EXTENDABLE[method]}"
     return store_error(path, f"is the result file of this study with {held} joints, not {asked}", remedy)
-
-
-def _check_positive(**numbers: int | None) -> None:
-    faults = [
-        Fault(name, f"{value} is too small", "give a whole number of at least 1")
-        for name, value in numbers.items()
-        if value is not None and value < 1
-    ]
-    if faults:
-        raise InputError(faults)
 
 
 def _history_options(study: Study) -> tuple[Histories, int]:

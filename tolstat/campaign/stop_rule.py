@@ -11,7 +11,8 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from tolstat.analysis import exceedance, sequential
+from tolstat.analysis import sequential
+from tolstat.analysis.sample import Sample
 from tolstat.campaign.pool import kept_workers
 from tolstat.common import selected_results
 from tolstat.common.errors import Fault, InputError
@@ -140,7 +141,7 @@ def run_until(study: Study, out: Path, rule: rules.Statement, run: Callable[[int
             joints = sequential.next_look(rule.bound, planned, *counts)
     outcome = Outcome(reached, look, planned)
     with Writer.open(out) as file:
-        file.record_stop(outcome.record(rule))
+        file.change(stop=outcome.record(rule))
     return outcome
 
 
@@ -149,7 +150,7 @@ def _look(store: Reader, limit: Limit, rows: range) -> Look:
     for begin in range(0, len(rows), BLOCK):
         block = rows[begin : begin + BLOCK]
         parts = {one.point or "": one.results(slice(block.start, block.stop)) for one in store.each()}
-        part = exceedance.exceedance(*worst.limit_of(parts, limit), limit.level, iid=False)
+        part = Sample.of(*worst.limit_of(parts, limit)).above(limit.level)
         count += part.count
         unresolved += part.n_failed + part.n_unsettled
     lower, upper = sequential.interval(count, unresolved, len(rows))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +15,7 @@ from tolstat.common.errors import Fault, InputError, gather
 from tolstat.common.loads import LOADS, Limit, load_of, split
 from tolstat.common.tables import Status
 from tolstat.sampling import draw
+from tolstat.solver import compilation
 from tolstat.store import Reader, Writer, verification
 from tolstat.store.hdf5 import pick, store_error
 from tolstat.store.provenance import differing_code
@@ -97,14 +98,12 @@ def check(
     path: Path,
     joints: int | str = 24,
     seed: int | None = None,
-    on_start: Callable[[], None] = lambda: None,
     workers: int = 1,
     progress: Progress = no_progress,
 ) -> Verification:
     """Check joints of a study file (``.toml``) or of a result file; see `check_study` and `check_file`.
 
-    `joints` is a number, or ``"all"`` for all settled joints, the nominal one included. `on_start` is called after the
-    input has been validated, before the simulations.
+    `joints` is a number, or ``"all"`` for all settled joints, the nominal one included.
 
     Raises
     ------
@@ -120,8 +119,7 @@ def check(
     if faults:
         raise InputError(faults)
     if path.suffix != ".toml":
-        return check_file(path, number, seed, ALL_CHECKS, on_start, workers, progress)
-    on_start()
+        return check_file(path, number, seed, ALL_CHECKS, workers, progress)
     return check_study(study, number, seed, ALL_CHECKS, workers, progress)
 
 
@@ -130,7 +128,6 @@ def check_file(
     joints: int | None,
     seed: int | None = None,
     names: Iterable[str] = ALL_CHECKS,
-    on_start: Callable[[], None] = lambda: None,
     workers: int = 1,
     progress: Progress = no_progress,
 ) -> Verification:
@@ -146,8 +143,6 @@ def check_file(
         Seed of the random choice; the campaign's own seed without it.
     names : iterable of str
         Names from `ALL_CHECKS`.
-    on_start : callable
-        Called after the file has been validated, before the simulations.
     workers, progress
         As in `run_checks`.
 
@@ -165,7 +160,7 @@ def check_file(
         seed = int(store.sampling["seed"]) if seed is None else seed
         if not any((one.status() == Status.OK).any() for one in store.each()):
             raise store_error(path, "has no settled joint", f"run the campaign first: tolstat run STUDY --out {path}")
-        on_start()
+        compilation.announce()
         for one in store.each():
             if found := check_campaign(one, names, joints, seed, workers, progress):
                 verification.write([(one, found)])
@@ -205,7 +200,6 @@ def check_near(
     path: Path,
     text: str,
     joints: int | str = LEAST_NEAR,
-    on_start: Callable[[], None] = lambda: None,
     workers: int = 1,
     progress: Progress = no_progress,
 ) -> Verification:
@@ -219,7 +213,7 @@ def check_near(
         ``"cross*.F > 700 N"``, or ``"any limit"``.
     joints : int
         Number of joints for each load of the limit, at least `LEAST_NEAR`.
-    on_start, workers, progress
+    workers, progress
         As in `check_file`.
 
     Returns
@@ -250,7 +244,7 @@ def check_near(
         if fewest < LEAST_NEAR:
             found = f"has {fewest} settled joints; {LEAST_NEAR} are needed"
             raise store_error(path, found, f"add joints: tolstat extend {path}")
-        on_start()
+        compilation.announce()
         for one, slots in chosen:
             before = verification.read(one, verification.NEAR)
             new = slots if before is None else slots[~np.isin(one.row(slots), before.rows)]
@@ -289,6 +283,7 @@ def check_study(
     if study.solver.fidelity == "auto":
         found, remedy = "'auto' is resolved when the campaign runs", "run the study, and verify its result file"
         raise InputError([study.fault("solver.fidelity", found, remedy)])
+    compilation.announce()
     seed = study.sampling.seed if seed is None else seed
     rows = choose(np.arange(0 if joints is None else study.first_sample, study.rows), joints, seed)
     errors = draw(study)[rows]
@@ -314,12 +309,7 @@ def parse_joints(joints: int | str) -> int | None:
     """
     if joints == "all":
         return None
-    try:
-        number = int(joints)
-    except ValueError:
-        found = f"{joints!r} is not a whole number"
-    else:
-        if number >= 1:
-            return number
-        found = f"{number} is less than one"
-    raise InputError([Fault("joints", found, "write --joints 24, or --joints all")])
+    if not (str(joints).isdecimal() and int(joints)):
+        found = f"{joints} is not a whole number of at least one"
+        raise InputError([Fault("joints", found, "write --joints 24, or --joints all")])
+    return int(joints)

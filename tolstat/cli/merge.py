@@ -21,7 +21,6 @@ def merge(
 
     Slices are made by tolstat run --rows. They must have the same study and version of the code, and together hold all
     rows of the campaign; a row in several slices must have identical results. FILE then equals that of a single run.
-    Joints with other tolerances (what_if) are kept, unless the slices hold different results of them.
 
     Prints the number of joints by outcome on standard error.
 
@@ -35,8 +34,6 @@ def merge(
     pending = counts.total - counts.done
     lines = [f"{out}: {counts.done} {counts.counted}, {counts.shortfall}"]
     lines += [f"{merged.twice} surplus copies of rows, with identical results"] * bool(merged.twice)
-    dropped = f"left out: joints of {merged.dropped} changes of what_if, of which the slices hold different results"
-    lines += [dropped] * bool(merged.dropped)
     again = f"{pending} {counts.counted} are pending; to simulate them: tolstat run STUDY --out {out}"
     lines += [again] * bool(pending)
     lines += [f"next: tolstat report {quote(str(out))} --out {quote(str(out.with_suffix('.html')))}"] * (not pending)

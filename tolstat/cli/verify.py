@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tolstat.cli._app import AsJson, Wide, Workers, announce_compilation, as_text, output_file, print_table
+from tolstat.cli._app import AsJson, Wide, Workers, as_text, output_file, print_table
 from tolstat.cli._talk import progress, say
 
 if TYPE_CHECKING:
@@ -65,9 +65,9 @@ def verify(
     with progress("checks, then tight references") as shown:
         count = workers or available_cores()
         if near is None:
-            found = verification.check(what, joints or 24, seed, announce_compilation, count, progress=shown)
+            found = verification.check(what, joints or 24, seed, count, progress=shown)
         else:
-            found = check_near(what, near, joints or LEAST_NEAR, announce_compilation, count, shown)
+            found = check_near(what, near, joints or LEAST_NEAR, count, shown)
     if as_json:
         typer.echo(as_text(_summary(found)))
     else:

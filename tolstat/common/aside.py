@@ -72,11 +72,23 @@ def _send(function: Callable[[], object], end: Connection, parents: Connection) 
 
 
 def mapped(functions: Sequence[Callable[[], T]], processes: int) -> list[T]:
-    """Results of functions, in their order, evaluated in so many processes: every other one here, if these are two."""
-    parts = [functions[first::processes] for first in range(min(processes, max(1, len(functions))))]
-    others = [Aside(partial(_all, part)) for part in parts[1:]]
-    found = [_all(parts[0]), *(other.result() for other in others)]
-    return [found[i % len(parts)][i // len(parts)] for i in range(len(functions))]
+    """Results of functions, in their order, evaluated in so many processes, this one among them."""
+    return in_order(begun(functions, processes, here=1))
+
+
+def begun(functions: Sequence[Callable[[], T]], processes: int, here: int) -> list[Aside[list[T]]]:
+    """Begin to evaluate functions in so many processes: every other one in the same, if these are two.
+
+    What is left to the first `here` of them is evaluated in this process when the results are asked for.
+    """
+    number = min(processes, len(functions))
+    return [Aside(partial(_all, functions[first::number]), first >= here) for first in range(number)]
+
+
+def in_order(parts: Sequence[Aside[list[T]]]) -> list[T]:
+    """Results of the functions that `begun` divides among processes."""
+    found = [part.result() for part in parts]
+    return [found[i % len(found)][i // len(found)] for i in range(sum(map(len, found)))]
 
 
 def _all(functions: Sequence[Callable[[], T]]) -> list[T]:

@@ -7,11 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.shown import shown
 from tolstat.common.tables import FAILED, UNSETTLED, Status
 
 
-@shown
 class Counts(NamedTuple):
     """Numbers of joints by status.
 

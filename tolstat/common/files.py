@@ -50,7 +50,7 @@ def read_input(path: Path, encoding: str = "utf-8") -> str:
     UnicodeDecodeError
         When it is not text.
     """
-    handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+    handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
     with open(handle, "rb") as file:
         held = os.fstat(handle)
         if stat.S_ISDIR(held.st_mode):
@@ -157,10 +157,7 @@ def check_disk_space(path: Path, size: int) -> None:
 
 def sync(path: Path) -> None:
     """Flush a file, or the entries of a folder, to the disk."""
-    folder = path.is_dir()
-    if folder and os.name != "posix":  # other systems do not open folders
-        return
-    handle = os.open(path, os.O_RDONLY if folder else os.O_RDWR)
+    handle = os.open(path, os.O_RDONLY if path.is_dir() else os.O_RDWR)
     try:
         os.fsync(handle)
     finally:

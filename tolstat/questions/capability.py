@@ -16,7 +16,6 @@ from tolstat.analysis.sample import total_interval
 from tolstat.common.aside import mapped
 from tolstat.common.errors import Fault, InputError, NotApplicable
 from tolstat.common.loads import ANY_LIMIT
-from tolstat.common.once import once
 from tolstat.common.tables import VALID
 from tolstat.display import text
 from tolstat.display.answer import Answer, Part, Sentence, Table
@@ -168,9 +167,12 @@ def limit_rows(view: View, confidence: float = 0.95, delivery: int = DELIVERY) -
     return rows
 
 
-@once
 def good(view: View, name: str = ANY_LIMIT, confidence: float = 0.95, delivery: int = DELIVERY) -> Mapping[str, Any]:
     """Yield, joints above in a million, and in the next delivery: the keys of `limit_rows` that are no indices."""
+    return view.kept(("good", name, confidence, delivery), lambda: _good(view, name, confidence, delivery))
+
+
+def _good(view: View, name: str, confidence: float, delivery: int) -> Mapping[str, Any]:
     load = view.load(name)
     assert load.limit is not None
     loads, above = error_budget.with_error(view, load), load.above(load.limit, confidence)

@@ -14,7 +14,6 @@ from tolstat.analysis.column import frozen
 from tolstat.analysis.sample import Sample, largest_of
 from tolstat.common.load_kinds import Kind
 from tolstat.common.loads import ANY_LIMIT, LOADS, FloatArray
-from tolstat.common.once import once
 from tolstat.store.view import View
 
 
@@ -42,10 +41,9 @@ def _shifted(view: View, load: Sample) -> tuple[Sample, Sample] | None:
     return load.shifted(-by), load.shifted(by)
 
 
-@once
 def _largest(view: View, kind: Kind) -> FloatArray:
     """Largest load that errors of a kind are relative to in each joint, (n,), see `accuracy.size`."""
-    return frozen(size(view.results, kind))
+    return view.kept(("largest", kind.key), lambda: frozen(size(view.results, kind)))
 
 
 def near(view: View, load: Sample) -> tuple[Sample, Sample] | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import fcntl
 import os
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
@@ -101,10 +102,6 @@ def is_at(file: h5py.File, path: Path) -> bool:
 
 def is_locked(path: Path) -> bool:
     """Whether a process has locked the file for writing; tested by a shared lock that is released at once."""
-    try:
-        import fcntl
-    except ImportError:  # a system without file locks: unknown, taken as not locked
-        return False
     with open(path, "rb") as file:
         try:
             fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
@@ -194,21 +191,9 @@ def put_scale(group: h5py.Group, name: str, values: NDArray[Any], unit: str, des
 
 
 def text(attrs: h5py.AttributeManager, name: str) -> str:
-    """Read a text attribute of fixed or variable length.
-
-    Raises
-    ------
-    KeyError
-        When there is no attribute of that name.
-    ValueError
-        When it is not a text in UTF-8.
-    """
+    """Read a text attribute of fixed or variable length; `KeyError` without one, `ValueError` if it is not UTF-8."""
     value = attrs[name]
-    if isinstance(value, bytes):
-        return value.decode("utf-8")
-    if isinstance(value, str):
-        return value
-    raise ValueError(f"attribute {name} is not a text")
+    return value.decode("utf-8") if isinstance(value, bytes) else str(value)
 
 
 def pick(read: Callable[[slice], NDArray[Any]], slots: NDArray[np.intp]) -> NDArray[Any]:

@@ -13,7 +13,6 @@ from tolstat.analysis.known_share import KnownShare, Mixture
 from tolstat.analysis.process import Known, Sums
 from tolstat.analysis.weighted import Split
 from tolstat.common.loads import ANY_LIMIT
-from tolstat.common.once import once
 from tolstat.common.tables import Status
 from tolstat.store import error_budget
 from tolstat.store.recorded import mentions
@@ -27,9 +26,12 @@ KEYS = ("known_from", "law")
 """Keys of an entry of ``[tolerances]`` that is known from measured parts."""
 
 
-@once
 def of(view: View) -> KnownParts | None:
     """Read what a file's study knows of its processes; None if it takes its tolerances as exact."""
+    return view.kept("known_parts", lambda: _of(view))
+
+
+def _of(view: View) -> KnownParts | None:
     if not (view.sampled and view.limits and mentions(view.store, KEYS, "tolerances")):
         return None
     entries = known.of(view.study.entries)

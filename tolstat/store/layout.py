@@ -158,8 +158,6 @@ def create(file: h5py.File, metadata: Metadata, tables: Tables) -> None:
     nominal.dims[0].attach_scale(row)
     put_attributes(nominal, {"units": "1", "description": "1 for the nominal joint, which is no sample"})
     put_meanings(nominal, MEANINGS["nominal"])
-    if tables.keys() != held.keys() - set(AT_POINTS):
-        raise ValueError(f"the tables {', '.join(tables)} are not those of this campaign")
     for group, blocks in tables.items():
         create_table(file, group, held[group], n, blocks, codes)
     for point in metadata.points:

@@ -11,7 +11,6 @@ import time
 from collections.abc import Iterator, Sequence
 from copy import copy
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self, TypeVar
 
 import h5py
@@ -138,9 +137,7 @@ class Reader:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:

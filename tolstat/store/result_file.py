@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from tolstat.common import draw_records
 from tolstat.common.columns import ERROR_COLUMNS, Column
 from tolstat.common.errors import Fault, InputError
-from tolstat.common.loads import LOADS, limits_in_words
-from tolstat.common.shown import table
+from tolstat.common.loads import LOADS
 from tolstat.common.tables import Status
 from tolstat.store import recorded
 from tolstat.store.layout import MEANINGS
@@ -52,14 +51,6 @@ class ResultFile(Reader):
         joints = f"{self.n - self.first_sample} joints"
         progress = [f"{one.point}: {one._progress()}" if one.point else one._progress() for one in self.each()]
         return f"<result file {self.path.name!r}: {joints} ({'; '.join(progress)})>"
-
-    def _repr_html_(self) -> str:
-        entries: list[tuple[str, object]] = [("study", self.study_name), ("file", str(self.path))]
-        entries += [("sampling", self.sampling["method"]), ("created", self.created)]
-        entries.append(("limits", limits_in_words(self.limits)))
-        if self.is_open:
-            entries.append(("loads", ", ".join(self.loads)))
-        return table(repr(self)[1:-1], entries)
 
     def _progress(self) -> str:
         """Numbers of joints by status, the nominal joint not counted."""
@@ -136,7 +127,7 @@ class ResultFile(Reader):
         return xarray.Dataset(data, coords={"row": frame.index.to_numpy()}, attrs={"study": self.study_name})
 
 
-class NamedLoads:
+class NamedLoads(Mapping[str, "pd.Series[float]"]):
     """Loads of the joints by name: ``loads["cross1.F"]``, ``list(loads)``, ``dict(loads)``, ``"psi" in loads``.
 
     Parameters
@@ -154,7 +145,7 @@ class NamedLoads:
         Parameters
         ----------
         name : str
-            ``cross1.F``; one of `keys`.
+            ``cross1.F``; one that the study keeps.
 
         Returns
         -------
@@ -175,29 +166,17 @@ class NamedLoads:
         series.attrs["units"] = load.unit
         return series
 
-    def keys(self) -> tuple[str, ...]:
-        """Names of the loads that the study keeps."""
-        return self.view.kept_loads
-
     def __iter__(self) -> Iterator[str]:
-        return iter(self.keys())
+        return iter(self.view.kept_loads)
 
     def __len__(self) -> int:
-        return len(self.keys())
+        return len(self.view.kept_loads)
 
     def __contains__(self, name: object) -> bool:
-        return name in self.keys()
+        return name in self.view.kept_loads
 
     def _ipython_key_completions_(self) -> tuple[str, ...]:
-        return self.keys()
-
-    def __repr__(self) -> str:
-        names = self.keys()
-        named = ", ".join(names) if len(names) <= 3 else f"{names[0]}, {names[1]}, ..., {names[-1]}"
-        return f"<{len(names)} loads of {self.view.n} joints: {named}>"
-
-    def _repr_html_(self) -> str:
-        return table(repr(self)[1:-1], [("load", ", ".join(self.keys()))])
+        return self.view.kept_loads
 
 
 def described(store: Reader) -> dict[str, Column]:

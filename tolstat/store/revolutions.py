@@ -9,9 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.aside import Aside
+from tolstat.common.aside import Aside, begun, in_order
 from tolstat.common.channels import BUSHING_LOADS, CHANNELS, LOAD_HISTORIES, MEASURING, LoadHistory, histories_of
-from tolstat.common.shown import shown
 from tolstat.joint import perturb
 from tolstat.solver import compilation
 from tolstat.solver.compilation import is_compiled, warm_up
@@ -36,7 +35,6 @@ Again = tuple[Loads, FloatArray]
 """Loads of joints, and the largest relative difference of each joint's from the stored values, (m,)."""
 
 
-@shown
 class Revolutions(NamedTuple):
     """Loads of some joints over the last revolution.
 
@@ -172,7 +170,7 @@ class Ahead(NamedTuple):
     slots : ndarray, shape (m,)
         File slots, ascending.
     parts : list of Aside
-        Simulations of `blocks` of them, every other one in the same process if these are two.
+        Simulations of `blocks` of them.
     """
 
     slots: NDArray[np.intp]
@@ -183,8 +181,7 @@ class Ahead(NamedTuple):
         place = np.searchsorted(self.slots, slots)
         if not np.array_equal(self.slots[np.minimum(place, len(self.slots) - 1)], slots):
             return None
-        found = [part.result() for part in self.parts]
-        pieces = [found[i % len(found)][i // len(found)] for i in range(sum(map(len, found)))]
+        pieces = in_order(self.parts)
         block, own = np.divmod(place, JOINTS_PER_BLOCK)
         loads = {
             history.name: np.stack([pieces[b][0][history.name][k] for b, k in zip(block, own, strict=True)])
@@ -207,15 +204,8 @@ def ahead(store: Reader, slots: NDArray[np.intp], processes: int) -> None:
     """
     if processes > 1 and not is_compiled():
         warm_up()  # one process compiles
-    parts = [slots[part] for part in blocks(len(slots))]
-    number = min(max(1, processes - 1), len(parts))
-    store.ahead = Ahead(
-        slots, [Aside(partial(_all, store, parts[first::number]), processes > 1) for first in range(number)]
-    )
-
-
-def _all(store: Reader, parts: list[NDArray[np.intp]]) -> list[Again]:
-    return [_simulated(store, part) for part in parts]
+    each = [partial(_simulated, store, slots[part]) for part in blocks(len(slots))]
+    store.ahead = Ahead(slots, begun(each, max(1, processes - 1), here=int(processes == 1)))
 
 
 def _again(store: Reader, slots: NDArray[np.intp]) -> tuple[Loads, float]:

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from tolstat.common import selected_results, tables
 from tolstat.common.columns import Column
-from tolstat.common.shown import shown
 from tolstat.store import layout
 from tolstat.store.hdf5 import DAMAGE_ERRORS, pick, put_attributes, put_scale, store_error, text
 from tolstat.store.metadata import CHECKSUM
@@ -24,7 +23,6 @@ VERIFY, NEAR = "verify", "near"
 """Groups of joints: chosen at random, and those nearest to limits."""
 
 
-@shown
 class Check(NamedTuple):
     """Results of the joints with other settings or another solver.
 
@@ -43,7 +41,6 @@ class Check(NamedTuple):
     results: NDArray[np.void]
 
 
-@shown
 class Verification(NamedTuple):
     """Some joints of a campaign: their results in the campaign and in each check.
 

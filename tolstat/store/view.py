@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,8 +25,7 @@ from tolstat.common import selected_results
 from tolstat.common.counts import Counts
 from tolstat.common.draw_records import METHODS
 from tolstat.common.errors import Fault, InputError
-from tolstat.common.loads import ANY_LIMIT, LOADS, SHOWN_LOADS, FloatArray, Limit, limits_in_words, split
-from tolstat.common.shown import table
+from tolstat.common.loads import ANY_LIMIT, LOADS, SHOWN_LOADS, FloatArray, Limit, split
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import ERROR, Status
 from tolstat.store import verification, what_if, worst
@@ -38,6 +37,8 @@ from tolstat.store.what_if import Altered
 from tolstat.store.worst import FirstPass
 from tolstat.study import Study
 from tolstat.study.points import limits_at, names_of
+
+T = TypeVar("T")
 
 
 class View:
@@ -81,16 +82,15 @@ class View:
         self.n = store.n - store.first_sample
         self._study_path = study_path
         self._loads: dict[str, Sample] = {}
+        self._kept: dict[Hashable, Any] = {}
         self._at: dict[tuple[str, ...], View] = {self.points: self}
 
-    def __repr__(self) -> str:
-        loads = f"{len(self.kept_loads)} loads, {len(self.limits)} with a limit"
-        loads += f", at {' and '.join(self.points)}" if all(self.points) else ""
-        return f"<view of {self.path.name!r}: {self.n} joints ({METHODS.get(self.method, self.method)}), {loads}>"
-
-    def _repr_html_(self) -> str:
-        loads = [("loads", ", ".join(self.kept_loads)), ("limits", limits_in_words(self.limits))]
-        return table(repr(self)[1:-1], [("study", self.name), *loads])
+    def kept(self, key: Hashable, compute: Callable[[], T]) -> T:
+        """Result of a function of this view that several ask for, computed once for each key; nobody may change it."""
+        if key not in self._kept:
+            self._kept[key] = compute()
+        found: T = self._kept[key]
+        return found
 
     def at(self, selection: str) -> View:
         """View of one operating point, ``"cruise"``, or the worst of several, ``"cruise+start"``; ``""`` for all."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import logging
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import h5py
@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.common.errors import Fault
-from tolstat.common.shown import shown
 from tolstat.store.hdf5 import DAMAGE_ERRORS, put_attributes, text
 from tolstat.store.layout import GROUPS, MEANINGS, put_meanings
 from tolstat.store.reader import Reader
@@ -30,7 +29,6 @@ DATASETS = {
 """Type, unit and description of each dataset of a set; the first two are the scales of the others."""
 
 
-@shown
 class Altered(NamedTuple):
     """Loads of consecutive joints with one change of the tolerances.
 
@@ -123,26 +121,6 @@ def write(store: Writer, sets: Mapping[str, Altered]) -> None:
     """
     growth = sum(one.loads.nbytes + one.status.nbytes for one in sets.values())
     store.replace(lambda file: _write(file, sets), growth)
-
-
-def common(files: Iterable[Mapping[str, Altered]]) -> tuple[dict[str, Altered], int]:
-    """Sets of several files of one campaign: of each change the longest, unless the others differ from its beginning.
-
-    Returns
-    -------
-    sets : dict of str to Altered
-    dropped : int
-        Number of changes whose sets differ.
-    """
-    found: dict[str, Altered] = {}
-    differing = set()
-    for sets in files:
-        for name, one in sets.items():
-            short, long = sorted((one, found.get(name, one)), key=lambda own: own.end)
-            found[name], n = long, len(short.status)
-            if _check(long._replace(loads=long.loads[:n], status=long.status[:n])) != _check(short):
-                differing.add(name)
-    return {name: one for name, one in found.items() if name not in differing}, len(differing)
 
 
 def _write(file: h5py.File, sets: Mapping[str, Altered]) -> None:

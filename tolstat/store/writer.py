@@ -185,27 +185,31 @@ class Writer(Reader):
             self._written[:] = False
             self._put_session(0, np.nan, self._checked.number + 1)
 
-    def update_study(self, study: Study) -> None:
-        """Take values that do not affect results (limits, text, name) from a study of equal identity.
+    def change(self, change: Callable[[h5py.File], None] = lambda file: None, **values: Any) -> None:
+        """Give the file other metadata, such as limits or the outcome of a stop rule, unless it has these already.
 
-        Does nothing if the file has them already.
-
-        Raises
-        ------
-        StoreError
-            When there is no room for a second copy of the file.
-        """
-        self._change(self.metadata.changed(**metadata.editable(study)))
-
-    def record_stop(self, stop: Mapping[str, Any]) -> None:
-        """Record why the campaign ends before all rows are simulated; does nothing if `stop` is recorded already.
+        Parameters
+        ----------
+        change : callable
+            Called with the changed copy of the file, open for writing.
+        values
+            Fields of `Metadata`.
 
         Raises
         ------
         StoreError
             When there is no room for a second copy of the file.
         """
-        self._change(self.metadata.changed(stop=dict(stop)))
+        held = self.metadata.changed(**values)
+        if held == self.metadata:
+            return
+
+        def both(file: h5py.File) -> None:
+            metadata.write(file, held)
+            change(file)
+
+        self.replace(both)
+        self._describe(held)
 
     def begin_retry(self, rows: Mapping[str, NDArray[np.intp]], entry: Mapping[str, Any]) -> None:
         """Mark joints as pending that are to be simulated again, with the settings of `entry`.
@@ -222,19 +226,19 @@ class Writer(Reader):
         StoreError
             When there is no room for a second copy of the file.
         """
-        held = self.metadata.changed(retries=(*self.retries, dict(entry)))
+        retries = (*self.retries, dict(entry))
 
         def mark(file: h5py.File) -> None:
             file["session"]["number"][()] = self._checked.number | 1  # its checksums no longer hold
             for point, slots in rows.items():
-                number, pending = len(held.retries), np.full(slots.size, Status.PENDING, np.uint8)
+                number, pending = len(retries), np.full(slots.size, Status.PENDING, np.uint8)
                 attempt = {"attempt": np.full(slots.size, number, np.int32)}
                 put(file[layout.path_of(point, "ledger", "")], slots, attempt)
                 put(file[layout.path_of(point, "results", "")], slots, {"status": pending})
 
         for slots in rows.values():
             self._written[slots // ROWS] = True
-        self._change(held, mark)
+        self.change(mark, retries=retries)
 
     def replace(self, change: Callable[[h5py.File], None], growth: int = 0) -> None:
         """Change the structure of the file by way of a copy that takes its place.
@@ -253,17 +257,6 @@ class Writer(Reader):
         """
         with self._told("cannot be replaced", "free disk space for a second copy, " + KEPT):
             self._checked.use(replace(self.path, self._checked.file, change, growth), self.metadata)
-
-    def _change(self, held: Metadata, change: Callable[[h5py.File], None] = lambda file: None) -> None:
-        if held == self.metadata:
-            return
-
-        def both(file: h5py.File) -> None:
-            metadata.write(file, held)
-            change(file)
-
-        self.replace(both)
-        self._describe(held)
 
     def _begin_writing(self, rows: NDArray[np.intp]) -> None:
         """Tell readers, on the disk, that checksums of results do not hold until `finish`."""

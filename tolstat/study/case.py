@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from html import escape
 from pathlib import Path
 
-from tolstat.common import shown
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.strict import dotted, with_lines
 from tolstat.joint import Joint, Operation
@@ -58,7 +58,8 @@ class Case:
         return f"<case {self.name!r}: one joint, {errors}, {self.solver.fidelity}>"
 
     def _repr_html_(self) -> str:
-        return shown.table(repr(self)[1:-1], self._entries())
+        rows = (f"<tr><th>{escape(name)}</th><td>{escape(str(value))}</td></tr>" for name, value in self._entries())
+        return f"<table><caption>{escape(repr(self)[1:-1])}</caption>{''.join(rows)}</table>"
 
     def _entries(self) -> list[tuple[str, object]]:
         """Named values that a notebook shows."""

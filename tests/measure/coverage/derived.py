@@ -55,7 +55,7 @@ def _capability(law: Law, n: int) -> Experiment:
 
     def once(rng: Rng) -> list[Found]:
         own = capability.of_sample(sample_of(law.draw(rng, n)), limit)
-        _, lower, upper = own.ppm
+        lower, upper = 1e6 * own.above.outer_lower, 1e6 * own.above.outer_upper
         normal = Found(own.cpk_normal_lower, own.cpk_normal_upper, by_moments)
         return [normal, Found(own.cpk_lower, own.cpk_upper, by_quantiles), Found(lower, upper, 1e3)]
 

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from tolstat.analysis.estimates import CURVE
 from tolstat.analysis.sample import Sample, total_interval
 from tolstat.common.loads import ANY_LIMIT, SHOWN_LOADS, load_of, unit_text
-from tolstat.common.once import once
 from tolstat.display.table import Row, Rows
 from tolstat.store import error_budget, known_parts
 from tolstat.store.view import View
@@ -34,7 +33,6 @@ READER_LEVELS = 240
 """Approximate number of levels at which the reader tool of the page has values; the levels are round numbers."""
 
 
-@once
 def limit_rows(view: View, confidence: float = 0.95) -> Rows:
     """Share of the joints above each of the study's limits.
 
@@ -56,7 +54,9 @@ def limit_rows(view: View, confidence: float = 0.95) -> Rows:
         Loads in SI units. Shares and intervals are NaN where weighted joints do not support them, see
         `Sample.doubt`.
     """
-    return [_above_limit(view, view.load(name), confidence) for name in view.limits]
+    return view.kept(
+        ("limit_rows", confidence), lambda: [_above_limit(view, view.load(name), confidence) for name in view.limits]
+    )
 
 
 def most_exceeded(view: View, rows: Rows) -> Row:
@@ -64,13 +64,12 @@ def most_exceeded(view: View, rows: Rows) -> Row:
     return max(rows, key=lambda row: (np.nan_to_num(row["estimate"], nan=-1.0), row["load"] in view.leading))
 
 
-@once
 def all_limits(view: View, confidence: float = 0.95) -> dict[str, Any]:
     """Share of the joints above at least one limit: a row as those of `limit_rows`, of the load `ANY_LIMIT`.
 
     Its level is 1, and its loads are the largest ratios of load to limit.
     """
-    return _above_limit(view, view.load(ANY_LIMIT), confidence)
+    return view.kept(("all_limits", confidence), lambda: _above_limit(view, view.load(ANY_LIMIT), confidence))
 
 
 def _above_limit(view: View, load: Sample, confidence: float) -> dict[str, Any]:

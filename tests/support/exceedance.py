@@ -1,0 +1,17 @@
+"""Shares and quantiles of arrays of loads, whose joints are drawn independently, listed or weighted."""
+
+from tolstat.analysis.listed import Listed
+from tolstat.analysis.sample import Sample
+from tolstat.analysis.weighted import Weighted
+
+
+def exceedance(values, status, level, confidence=0.95, iid=True):
+    return Sample.of(values, status, None if iid else Listed()).above(level, confidence)
+
+
+def quantile(values, status, share, confidence=0.95, iid=True):
+    return Sample.of(values, status, None if iid else Listed()).quantile(share, confidence)
+
+
+def weighted_exceedance(values, status, weights, level):
+    return Sample.of(values, status, Weighted(weights)).above(level)

@@ -237,10 +237,10 @@ def _reason(view: View, records: Sequence[Row]) -> str:
 def _causes(view: View) -> Iterator[str]:
     """Most frequent status of the joints without a valid load, its meaning, and the remedy for the first of them."""
     states = sorted((s for s in (*FAILED, *UNSETTLED) if view.count(s)), key=lambda s: -view.count(s))
-    first = {joint.status: joint for joint in reversed(joints.without_load(view))} if states else {}
     for state in states[:1]:
         said = f"{view.count(state)} {state.label}: {STATUS_TEXT[state]}"
-        yield f"{said}. Row {first[state.label].row}: {first[state.label].remedy}" if state.label in first else said
+        first = next((joint for joint in joints.without_load(view) if joint["status"] == state.label), None)
+        yield f"{said}. Row {first['row']}: {first['remedy']}" if first else said
 
 
 def _pending(view: View) -> tuple[str, ...]:

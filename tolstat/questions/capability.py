@@ -17,10 +17,9 @@ from tolstat.common.errors import Fault, InputError, NotApplicable
 from tolstat.common.loads import ANY_LIMIT
 from tolstat.common.tables import VALID
 from tolstat.display import text
-from tolstat.display.answer import Answer, Part, Sentence, Table
+from tolstat.display.answer import Answer, Column, Part, Rows, Sentence, Table
 from tolstat.display.asked import Asked
 from tolstat.display.options import Delivery, Opt
-from tolstat.display.table import Column, Rows
 from tolstat.questions import shares
 from tolstat.store import error_budget, known_parts
 from tolstat.store.view import View

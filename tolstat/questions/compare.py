@@ -7,7 +7,7 @@ import math
 import re
 from collections.abc import Iterator, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,16 +22,12 @@ from tolstat.common.loads import ANY_LIMIT, FloatArray, unit_text
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import Status
 from tolstat.display import drawing, style, text
-from tolstat.display.answer import Answer, Sentence, Table
+from tolstat.display.answer import Answer, Axes, Column, Row, Rows, Sentence, Table
 from tolstat.display.blocks import Panel, Panels
 from tolstat.display.mpl import patches
 from tolstat.display.options import Loads
-from tolstat.display.table import Column, Row, Rows
 from tolstat.questions.shares import NO_INTERVALS, inapplicable, share, word
 from tolstat.store.view import View
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 SHARES = (0.5, 0.9, 0.99)
 """Quantiles that are compared."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -13,17 +13,13 @@ from tolstat.common.loads import FloatArray
 from tolstat.common.tables import VALID
 from tolstat.common.units import DISPLAY_UNITS
 from tolstat.display import drawing, style, text
-from tolstat.display.answer import Answer, Part, Sentence
+from tolstat.display.answer import Answer, Axes, Panel, Panels, Part, Sentence
 from tolstat.display.asked import Asked
-from tolstat.display.blocks import Panel, Panels
 from tolstat.display.mpl import ticker
 from tolstat.questions.shares import inapplicable
 from tolstat.store.view import View
 from tolstat.study import axes
 from tolstat.study.tolerances.entry import SingleEntry
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 JOINTS = 20_000
 """Maximum number of joints (the first ones) whose errors are counted."""

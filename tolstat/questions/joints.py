@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,16 +13,12 @@ from tolstat.common import units
 from tolstat.common.load_kinds import PINS
 from tolstat.common.tables import FAILED, STATUS_TEXT, UNSETTLED, Mode, Status
 from tolstat.display import drawing, style, text
-from tolstat.display.answer import Answer, Part, Sentence, Table
+from tolstat.display.answer import Answer, Axes, Panel, Panels, Part, Sentence, Table
 from tolstat.display.asked import Asked
-from tolstat.display.blocks import Panel, Panels
 from tolstat.display.table import Column, Rows
 from tolstat.questions.shares import inapplicable, rows_of, share, word
 from tolstat.store.view import View
 from tolstat.study.tolerances import meaning
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 MAX_JOINTS = 20_000
 """Number of joints (the first ones) whose errors are compared."""

@@ -4,21 +4,16 @@ from __future__ import annotations
 
 import math
 from functools import partial
-from typing import TYPE_CHECKING
 
 from tolstat.analysis.sample import CONFIDENCE
 from tolstat.common.loads import ANY_LIMIT
 from tolstat.display import drawing, style, text
-from tolstat.display.answer import Answer, Part, Sentence, Table
+from tolstat.display.answer import Answer, Axes, Column, Part, Row, Rows, Sentence, Table
 from tolstat.display.blocks import Panel, Panels, Text
 from tolstat.display.mpl import lines
-from tolstat.display.table import Column, Row, Rows
 from tolstat.questions import shares
 from tolstat.store import known_parts as known
 from tolstat.store.view import View
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 DRAWN = 6
 """Maximum number of shares in the picture."""

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,20 +22,15 @@ from tolstat.common.errors import Fault, InputError, NotApplicable, StoreError
 from tolstat.common.loads import ANY_LIMIT
 from tolstat.common.tables import VALID
 from tolstat.display import drawing, style, text
-from tolstat.display.answer import Answer, Sentence, Table
+from tolstat.display.answer import Answer, Axes, Column, Panel, Panels, Row, Rows, Sentence, Table, has, has_unresolved
 from tolstat.display.asked import Asked
-from tolstat.display.blocks import Panel, Panels
 from tolstat.display.options import Accepted, Opt
-from tolstat.display.table import Column, Row, Rows, has, has_unresolved
 from tolstat.questions import shares
 from tolstat.store import error_budget
 from tolstat.store.hdf5 import store_error
 from tolstat.store.view import View
 from tolstat.study import Study, load
 from tolstat.study.rewriting import with_keys
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 Integers = NDArray[np.intp]
 LOTS, JOINTS = 50, 20

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,19 +15,14 @@ from tolstat.common.load_kinds import LOAD_KINDS, ORDERS, SHAFTS
 from tolstat.common.loads import LOADS, FloatArray, load_of
 from tolstat.common.tables import VALID
 from tolstat.display import drawing, style, text
-from tolstat.display.answer import Answer, Part, Sentence, Table
+from tolstat.display.answer import Answer, Axes, Column, Panel, Panels, Part, Row, Rows, Sentence, Table, has
 from tolstat.display.asked import Asked
-from tolstat.display.blocks import Panel, Panels
 from tolstat.display.mpl import lines, patches, ticker
-from tolstat.display.table import Column, Row, Rows, has
 from tolstat.questions.shares import value, values, word
 from tolstat.store import revolutions
 from tolstat.store.hdf5 import store_error
 from tolstat.store.points import point_of
 from tolstat.store.view import View
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 SHARES = {"q5": 0.05, "qmedian": 0.5, "q95": 0.95}
 """Shares of the joints at which quantiles of an amplitude are given, by key."""

@@ -23,9 +23,8 @@ from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import ANY_LIMIT, FloatArray
 from tolstat.common.tables import Status
 from tolstat.display import text
-from tolstat.display.answer import Answer, Document, Sentence, Table
+from tolstat.display.answer import Answer, Column, Document, Row, Rows, Sentence, Table, has
 from tolstat.display.options import Delivery, Opt
-from tolstat.display.table import Column, Row, Rows, has
 from tolstat.questions import shares
 from tolstat.store import error_budget
 from tolstat.store.hdf5 import store_error

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import numpy as np
 
@@ -13,11 +13,9 @@ from tolstat.common import units
 from tolstat.common.errors import InputError, NotApplicable
 from tolstat.common.tables import VALID
 from tolstat.display import drawing, style, text
-from tolstat.display.answer import Answer, Sentence, Table
+from tolstat.display.answer import Answer, Axes, Column, Panel, Panels, Row, Rows, Sentence, Table
 from tolstat.display.asked import Asked
-from tolstat.display.blocks import Panel, Panels
 from tolstat.display.options import Opt
-from tolstat.display.table import Column, Row, Rows
 from tolstat.joint.perturbation import HOLE_OF_PIN
 from tolstat.questions import shares
 from tolstat.store.hdf5 import BLOCK
@@ -25,9 +23,6 @@ from tolstat.store.view import View
 from tolstat.study import Study, load
 from tolstat.study.rewriting import with_keys
 from tolstat.study.selective import KINDS, MAX_CLASSES, Matching, matching
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 TITLE = "Selective assembly"
 NUMBERS = (1, 2, 3, 5)

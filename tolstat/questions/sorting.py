@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,11 +15,9 @@ from tolstat.analysis.weighted import Weighted
 from tolstat.common.errors import NotApplicable
 from tolstat.common.loads import ANY_LIMIT, FloatArray
 from tolstat.display import drawing, style, text
-from tolstat.display.answer import Answer, Table
+from tolstat.display.answer import Answer, Axes, Column, Panel, Panels, Row, Rows, Table, Text
 from tolstat.display.asked import Asked
-from tolstat.display.blocks import Panel, Panels, Text
 from tolstat.display.options import Costs
-from tolstat.display.table import Column, Row, Rows
 from tolstat.questions import shares
 from tolstat.store import error_budget
 from tolstat.store.hdf5 import store_error
@@ -29,9 +27,6 @@ from tolstat.study import costs as cost_tables
 from tolstat.study import scaling
 from tolstat.study import sorting as gauges
 from tolstat.study.sorting import PARTS, Gauge
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 MADE, SCRAPPED, INSPECTED = "all joints", "parts scrapped", "joints rejected"
 """Stages: parts as they are made; without those that are scrapped; without joints that are rejected, too."""

@@ -16,10 +16,10 @@ from tolstat.common.strict import read_section
 from tolstat.common.tables import ERROR_FIELDS, FAILED, SIMULATED, UNSETTLED, Status
 from tolstat.common.units import DISPLAY_UNITS
 from tolstat.display import drawing, style, text
-from tolstat.display.answer import Answer, Part, Sheet, Table
+from tolstat.display.answer import Answer, Axes, Part, Row, Sheet, Table
 from tolstat.display.blocks import Panel, Panels
 from tolstat.display.mpl import lines, ticker
-from tolstat.display.table import Row, plain
+from tolstat.display.table import plain
 from tolstat.questions.shares import inapplicable, rows_of
 from tolstat.store import recorded
 from tolstat.store.view import View
@@ -28,7 +28,6 @@ from tolstat.study.swept import KEYS
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 MAX_LEGEND = 6

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,18 +20,14 @@ from tolstat.common.loads import FloatArray
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import Status
 from tolstat.display import drawing, style, text
-from tolstat.display.answer import Answer, Part, Sentence, Table
+from tolstat.display.answer import Answer, Axes, Column, Part, Row, Rows, Sentence, Table
 from tolstat.display.blocks import Panel, Panels
 from tolstat.display.options import Loads, Opt
-from tolstat.display.table import Column, Row, Rows
 from tolstat.questions.shares import NO_INTERVALS, Cell
 from tolstat.store import revolutions
 from tolstat.store.hdf5 import store_error
 from tolstat.store.view import View
 from tolstat.study.selection import Entry, quantity
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 SHARES = (0.5, 0.9, 0.99)
 """Shares of the joints at which quantiles of the time above are given."""

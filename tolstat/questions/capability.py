@@ -28,6 +28,9 @@ NOT_NORMAL = 0.01
 """p-value of the test of normality below which the index of a normal load tells no share above the limit."""
 ON_PAGE = (1e3, 1e4, 1e5)
 """Numbers of joints of which one exceeds the rare loads on the page."""
+FIGURES: tuple[str, ...] = ("estimate", "lower", "upper", "bound_lower", "bound_upper")
+FIGURES += tuple(f"{key}{end}" for key in ("fleet", "shape") for end in ("", "_lower", "_upper"))
+"""Keys of `return_rows` that are NaN where a tail is not extrapolated."""
 RARE = "Load that one in N joints exceeds; median of the largest load of N joints"
 
 LIMITS = (
@@ -210,13 +213,9 @@ def return_rows(view: View, name: str, one_in: Sequence[float], confidence: floa
     tail = extreme.fit(load, None, confidence)
     rows = []
     for number in one_in:
+        figures = *tail.level(1.0 / number), *tail.bounds(1.0 / number), *tail.largest(int(number)), *tail.shape
         row: dict[str, Any] = {"load": name, "unit": load.unit, "one_in": number}
-        row |= tail.level(1.0 / number)._asdict()
-        row["bound_lower"], row["bound_upper"] = tail.bounds(1.0 / number)
-        row |= dict(zip(("fleet", "fleet_lower", "fleet_upper"), tail.largest(int(number)), strict=True))
-        row |= dict(zip(("shape", "shape_lower", "shape_upper"), tail.shape, strict=True))
-        if tail.refusal:
-            row |= dict.fromkeys(list(row)[3:], np.nan)
+        row |= dict.fromkeys(FIGURES, np.nan) if tail.refusal else dict(zip(FIGURES, figures, strict=True))
         rows.append({**row, "p": tail.p, "n_above": tail.n_above, "refusal": tail.refusal})
     return rows
 

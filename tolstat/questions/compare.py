@@ -314,14 +314,8 @@ def _draw(ax: Axes, both: Sides, name: str, limits: Sequence[float], labels: Seq
     else:
         tables = (load.curve(levels) for load in (a, b))
         curves = [np.array([own[end] for end in ("estimate", "lower", "upper")]).clip(0.1 * floor) for own in tables]
-    handles: list[Any] = []
-    colours = (style.INK,) if change else style.COLOURS
-    for (estimate, low, high), colour, dash in zip(curves, colours, style.DASHES, strict=False):
-        handles += ax.step(levels, estimate, where="post", color=colour, ls=dash)
-        if both.has_intervals:
-            ax.fill_between(levels, low, high, step="post", color=colour, alpha=0.2, lw=0)
-    for level in limits:
-        ax.axvline(level, color=style.FAINT, lw=1.0, ls=style.DASHES[2])
+    look: Any = {"step": "post", "colours": (style.INK,) if change else style.COLOURS}
+    handles = drawing.curves(ax, levels, curves, limits, bands=len(curves) if both.has_intervals else 0, **look)
     if labels:
         band = [patches.Patch(color=style.FAINT, alpha=0.3, lw=0)] if both.has_intervals else []
         drawing.legend_above(ax, [*([] if change else handles), *band], labels)

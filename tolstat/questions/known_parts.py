@@ -25,6 +25,8 @@ INTERVALS = {
     "both": ("both_lower", "both_upper", style.INK),
 }
 """Keys of the ends of each interval and its colour, from the top of a row of the picture."""
+OF_BOTH = ("expected", "parts_lower", "parts_upper", "both_lower", "both_upper", "unsupported")
+"""Keys of a row for the fields of `known_share.KnownShare`."""
 COLUMNS = (
     Column("load > limit", text.limit),
     Column("share as stated", shares.share("estimate")),
@@ -82,13 +84,12 @@ def known_parts(view: View) -> Answer:
 
 
 def _row(view: View, own: known.KnownParts, name: str) -> Row:
-    load, found = view.load(name), own.share(name, CONFIDENCE)
+    load = view.load(name)
     assert load.limit is not None
     above = load.above(load.limit)
-    row = {"load": load.name, "unit": load.unit, "level": load.limit}
-    row |= {"estimate": above.estimate, "lower": above.lower, "upper": above.upper, "expected": found.expected}
-    row |= {"parts_lower": found.parts_lower, "parts_upper": found.parts_upper}
-    return row | {"both_lower": found.lower, "both_upper": found.upper, "unsupported": found.unsupported}
+    row = {"load": name, "unit": load.unit, "level": load.limit}
+    row |= {key: getattr(above, key) for key in ("estimate", "lower", "upper")}
+    return row | dict(zip(OF_BOTH, own.share(name, CONFIDENCE), strict=True))
 
 
 def _panel(rows: Rows) -> Panel:

@@ -19,7 +19,7 @@ from tolstat.common.errors import Fault, InputError, gather
 from tolstat.common.loads import FloatArray
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import Status
-from tolstat.display import drawing, style, text
+from tolstat.display import drawing, text
 from tolstat.display.answer import Answer, Axes, Column, Part, Row, Rows, Sentence, Table
 from tolstat.display.blocks import Panel, Panels
 from tolstat.display.options import Loads, Opt
@@ -35,12 +35,7 @@ POINTS = 60
 """Number of levels of a curve."""
 MAX_LOADS = 4
 """Maximum number of loads in pictures."""
-LINES = {
-    "time": "mean joint",
-    "time_50": "median joint",
-    "time_90": "90 % below",
-    "time_99": "99 % below",
-}
+LINES = {"time": "mean joint", "time_50": "median joint", "time_90": "90 % below", "time_99": "99 % below"}
 """Labels of the curves of time above, by key."""
 
 
@@ -210,17 +205,11 @@ def _panels(name: str, rows: Rows, levels: FloatArray) -> Iterator[Panel]:
 
 def _curves(ax: Axes, own: Mapping[str, Any], labels: Mapping[str, str], levels: FloatArray) -> None:
     """Draw curves over the level, the first with its interval; with a legend if there are several."""
-    x, handles = np.array(own["level"]), []
-    for name, colour, dash in zip(labels, style.COLOURS, style.DASHES, strict=False):
-        middle, low, high = (100.0 * np.array(own[f"{name}{end}"]) for end in ("", "_lower", "_upper"))
-        handles += ax.plot(x, middle, color=colour, ls=dash)
-        if len(handles) == 1 and np.isfinite(low).all():
-            ax.fill_between(x, low, high, color=colour, alpha=0.2, lw=0)
-    for level in levels:
-        ax.axvline(float(level), color=style.FAINT, lw=1.0, ls=style.DASHES[2])
+    x, ends = np.array(own["level"]), ("", "_lower", "_upper")
+    curves = [[100.0 * np.array(own[f"{name}{end}"]) for end in ends] for name in labels]
+    handles = drawing.curves(ax, x, curves, levels, bands=int(np.isfinite(curves[0][1]).all()))
     unit = drawing.loads_axis(ax.xaxis, float(np.abs(x).max()), own["unit"][0])
-    several = len(handles) > 1
-    ax.set_ylabel("time above, % of a revolution" if several else "joints that exceed the level, %")
     ax.set(xlabel=f"level [{unit}]", ylim=(0.0, None))
-    if several:
+    ax.set_ylabel("time above, % of a revolution" if len(labels) > 1 else "joints that exceed the level, %")
+    if len(labels) > 1:
         drawing.legend_above(ax, handles, list(labels.values()))

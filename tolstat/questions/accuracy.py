@@ -122,7 +122,8 @@ def note(verification: Verification, limits: Iterable[str] = ()) -> str:
     total = [row for row in error_rows(verification) if row["error"] == TOTAL]
     shown = [row for row in total if row["load"] in kinds or KIND[row["load"]].shown] or total
     known = [row for row in shown if not np.isnan(row["worst"])]
-    words = [f"{_called(row['load'])} {_small(row['median'])}, at worst {_small(row['worst'])}" for row in known]
+    called = {kind.key: kind.symbol if kind.symbol == kind.key else kind.noun for kind in LOAD_KINDS}
+    words = [f"{called[row['load']]} {_small(row['median'])}, at worst {_small(row['worst'])}" for row in known]
     noun = "error of numerics and fidelity" if FIDELITY in verification.checks else "numerical error"
     unknown = f"; {unsettled}" if (unsettled := _unsettled(verification)) else ""
     return f"{noun}, {basis(verification)}: {'; '.join(words) or 'unknown'}{unknown}"
@@ -147,12 +148,6 @@ def _kept(verification: Verification) -> NDArray[np.bool_]:
     """Which of `OBSERVABLES` the campaign keeps, (loads,); all if no joint has a value."""
     kept = ~np.isnan(comparison.loads(verification.base)).all(axis=0)
     return np.asarray(kept | ~kept.any())
-
-
-def _called(key: str) -> str:
-    """Kind of loads in a sentence: its symbol, or what a load is called where several kinds share the symbol."""
-    kind = KIND[key]
-    return kind.symbol if kind.symbol == key else kind.noun
 
 
 def _unsettled(verification: Verification) -> str:

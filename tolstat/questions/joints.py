@@ -237,19 +237,15 @@ def _draw_modes(ax: Axes, rows: Rows) -> None:
 
 
 def _errors_panel(rows: Rows) -> Panel:
-    words = (
+    each = (
         f"{row['error']}: larger {row['direction']:.2f}, farther from the middle {row['size']:.2f}" for row in rows[:4]
     )
-    left = drawing.rows_left([row["error"] for row in rows])
-    return Panel(
-        "errors-without-load",
-        "Failures in the space of errors",
-        f"Probability that a joint without a valid result has the larger error than a settled one. {'; '.join(words)}",
-        partial(_draw_errors, rows=rows),
-        (drawing.WIDTH, drawing.rows_height(len(rows)) + 0.2),
-        left,
-        drawing.legend_room(list(COMPARED.values()), left),
+    words = (
+        f"Probability that a joint without a valid result has the larger error than a settled one. {'; '.join(each)}"
     )
+    left, title = drawing.rows_left([row["error"] for row in rows]), "Failures in the space of errors"
+    size, room = (drawing.WIDTH, drawing.rows_height(len(rows)) + 0.2), drawing.legend_room([*COMPARED.values()], left)
+    return Panel("errors-without-load", title, words, partial(_draw_errors, rows=rows), size, left, room)
 
 
 def _draw_errors(ax: Axes, rows: Rows) -> None:

@@ -27,7 +27,6 @@ from tolstat.display.asked import Asked
 from tolstat.display.options import Accepted, Opt
 from tolstat.questions import shares
 from tolstat.store import error_budget
-from tolstat.store.hdf5 import store_error
 from tolstat.store.view import View
 from tolstat.study import Study, load
 from tolstat.study.rewriting import with_keys
@@ -210,7 +209,7 @@ def _lots_of(view: View) -> tuple[Clustered, Integers]:
     joints = view.design.counts(view.load(ANY_LIMIT).upper, [1.0])[1].astype(np.intp)
     if (done := np.count_nonzero(joints)) < clustered.LEAST:
         found = f"has joints of {done} lots simulated, and fewer than {clustered.LEAST} have no interval"
-        raise store_error(view.path, found, "simulate the others: run the same command again, or tolstat run STUDY")
+        raise shares.unusable(view, found, "simulate the others: run the same command again, or tolstat run STUDY")
     return view.design, joints
 
 

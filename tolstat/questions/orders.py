@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tolstat.analysis.sample import CONFIDENCE
 from tolstat.common.columns import RESULT_COLUMNS
 from tolstat.common.errors import NotApplicable
 from tolstat.common.load_kinds import LOAD_KINDS, ORDERS, SHAFTS
@@ -18,9 +17,8 @@ from tolstat.display import drawing, style, text
 from tolstat.display.answer import Answer, Axes, Column, Panel, Panels, Part, Row, Rows, Sentence, Table, has
 from tolstat.display.asked import Asked
 from tolstat.display.mpl import lines, patches, ticker
-from tolstat.questions.shares import value, values, word
+from tolstat.questions.shares import unusable, value, values, word
 from tolstat.store import revolutions
-from tolstat.store.hdf5 import store_error
 from tolstat.store.points import point_of
 from tolstat.store.view import View
 
@@ -134,10 +132,10 @@ def orders(view: View, orbits: bool = False) -> Answer:
     names = [name for name in view.kept_loads if LOADS[name].kind.orders]
     if not names:
         remedy = 'let [output] results of the study select them, such as "*_1x_max", and run it again'
-        raise store_error(view.path, "holds no amplitudes of orders", remedy)
+        raise unusable(view, "holds no amplitudes of orders", remedy)
     joints = view.count(*VALID)
     if not joints:
-        raise store_error(view.path, "has no joint with a valid result", "resume the campaign")
+        raise unusable(view, "has no joint with a valid result", "resume the campaign")
     rows = [_amplitude(view, name) for name in sorted(names, key=lambda name: LOAD_KINDS.index(LOADS[name].kind))]
     facts: dict[str, Any] = {"joints": joints, "left_out": view.counts.done - joints}
     parts: list[Part] = [Table("amplitudes", "Amplitudes over the joints", COLUMNS, rows)]
@@ -180,7 +178,7 @@ def _amplitude(view: View, name: str) -> Row:
     row = {"quantity": quantity, "noun": LOADS[name].kind.noun, "order": int(order), "load": name, "unit": load.unit}
     row["nominal"] = load.nominal
     for key, share in SHARES.items():
-        found = load.quantile(share, CONFIDENCE)
+        found = load.quantile(share)
         row |= {key: found.estimate, f"{key}_lower": max(found.lower, 0.0), f"{key}_upper": found.upper}
     return row
 
@@ -193,24 +191,17 @@ def _orbits(view: View) -> tuple[list[Orbit], str, float]:
         if name not in view.kept_loads or not view.load(name).valid.size:
             continue
         at = view.at(point_of(view, name))
+        load, slots = at.load(name), {"nominal": int(at.nominal_slots[0])} if at.nominal_slots.size else {}
+        for near, share in NEAR.items():
+            away = np.abs(load.values - load.quantile(share).estimate)
+            slots |= {near: int(at.slots(np.nanargmin(away)))} if np.isfinite(away).any() else {}
         names, samples = [f"{shaft}.f_x", f"{shaft}.f_y"], int(at.store.options["steps_per_rev"])
-        for near, slot in _near(at, name).items():
+        for near, slot in slots.items():
             read = revolutions.read(at.store, np.array([slot]), names, samples)
-            force = np.column_stack([read.loads[own][0] for own in names])
+            force = np.column_stack([read.loads[component][0] for component in names])
             origin, apart = read.origin, max(apart, read.apart)
             found.append(Orbit(shaft, near, int(at.store.row(slot)), at.points[0], force))
     return found, origin, apart
-
-
-def _near(view: View, name: str) -> dict[str, int]:
-    """File slots of the joints whose orbits are shown for a lateral force, by `Orbit.near`."""
-    load = view.load(name)
-    found = {"nominal": int(view.nominal_slots[0])} if view.nominal_slots.size else {}
-    for near, share in NEAR.items():
-        apart = np.abs(load.values - load.quantile(share).estimate)
-        if np.isfinite(apart).any():
-            found[near] = int(view.slots(np.nanargmin(apart)))
-    return found
 
 
 def _points(orbit: Orbit) -> Rows:

@@ -27,7 +27,6 @@ from tolstat.display.answer import Answer, Column, Document, Row, Rows, Sentence
 from tolstat.display.options import Delivery, Opt
 from tolstat.questions import shares
 from tolstat.store import error_budget
-from tolstat.store.hdf5 import store_error
 from tolstat.store.view import View
 from tolstat.study import Study
 from tolstat.study.axes import columns_of
@@ -138,7 +137,7 @@ def reweight(
     done = np.flatnonzero(view.status != Status.PENDING)
     ratios = _ratios(view, new, names, done)
     if not ratios.values.any():
-        raise store_error(view.path, "the new tolerances make none of the joints", remedy)
+        raise shares.unusable(view, "the new tolerances make none of the joints", remedy)
     rows = _rows(view, done, ratios, delivery)
     verdict, usable = _verdict(ratios, rows), all(row["usable"] for row in rows)
     facts = {"usable": usable, "effective": ratios.effective, "needed": ratios.needed, "verdict": verdict}
@@ -155,7 +154,7 @@ def _rows(view: View, done: NDArray[np.intp], ratios: Ratios, delivery: int) -> 
     loads = view.loads(list(view.limits) or list(view.shown_loads))
     if lacking := [load.name for load in loads if not load.is_valid.any()]:
         found = f"holds no joint with a valid load: {', '.join(lacking)}"
-        raise store_error(view.path, found, f"see why: tolstat status {view.path}")
+        raise shares.unusable(view, found, f"see why: tolstat status {view.path}")
     if view.limits:
         rows = [_share_above(view, load, done, ratios, delivery) for load in (*loads, view.load(ANY_LIMIT))]
     else:

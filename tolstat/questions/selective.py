@@ -172,17 +172,13 @@ def _row(view: View) -> Row:
         raise shares.inapplicable(view, "is of a study without [limits]", remedy)
     classes, kept = classes_of(view), shares.good(view)
     number, unmatched = (1, 0.0) if classes is None else (classes.matched.size, classes.unmatched)
-    row = {"classes": number, "unmatched": unmatched, "clearance": _clearance(view)}
+    errors = view.errors(np.arange(min(view.n, BLOCK)))  # of a large campaign the first joints
+    clearances = (0.5 * (errors[f"{hole}.diameter"] - errors[f"{pin}.diameter"]) for pin, hole in HOLE_OF_PIN.items())
+    deviation = float(np.sqrt(np.mean([clearance.var() for clearance in clearances])))
+    row = {"classes": number, "unmatched": unmatched, "clearance": deviation}
     ends = ("good", "good_lower", "good_upper")
     row |= {key: kept[key] for key in ("n", "count", "n_failed", "n_unsettled", *ends)}
     return row | {key.replace("good", "of_all"): (1.0 - unmatched) * kept[key] for key in ends}
-
-
-def _clearance(view: View) -> float:
-    """Standard deviation of the radial clearance of the pairs, m; from the first joints of a large campaign."""
-    errors = view.errors(np.arange(min(view.n, BLOCK)))
-    each = [0.5 * (errors[f"{hole}.diameter"] - errors[f"{pin}.diameter"]) for pin, hole in HOLE_OF_PIN.items()]
-    return float(np.sqrt(np.mean([own.var() for own in each])))
 
 
 def _draw(ax: Axes, rows: Rows) -> None:

@@ -10,7 +10,7 @@ from tolstat.analysis import binomial
 from tolstat.analysis.estimates import Exceedance
 from tolstat.analysis.prediction import DELIVERY
 from tolstat.analysis.sample import total_interval
-from tolstat.common.errors import Fault, NotApplicable
+from tolstat.common.errors import Fault, NotApplicable, StoreError
 from tolstat.common.loads import ANY_LIMIT
 from tolstat.common.once import once
 from tolstat.display import text
@@ -62,6 +62,11 @@ def rows_of(columns: Mapping[str, Iterable[Any]]) -> list[dict[str, Any]]:
 def inapplicable(view: View, found: str, remedy: str) -> NotApplicable:
     """Make the error of a question that does not apply to a file."""
     return NotApplicable(str(Fault(str(view.path), found, remedy)))
+
+
+def unusable(view: View, found: str, remedy: str) -> StoreError:
+    """Make the error of a file that cannot be used for a question."""
+    return StoreError(str(Fault(str(view.path), found, remedy)))
 
 
 def grouped(reasons: Iterable[tuple[str, str]]) -> str:

@@ -20,7 +20,6 @@ from tolstat.display.asked import Asked
 from tolstat.display.options import Costs
 from tolstat.questions import shares
 from tolstat.store import error_budget
-from tolstat.store.hdf5 import store_error
 from tolstat.store.recorded import mentions
 from tolstat.store.view import View
 from tolstat.study import costs as cost_tables
@@ -120,7 +119,7 @@ def _parts(view: View, costs: Costs) -> tuple[Panel, Table, Table]:
         remedy = "give an entry of [tolerances] a gauge, or add [reject]; and [limits]"
         raise shares.inapplicable(view, "is of a study that sorts nothing, or has no limits", remedy)
     if not view.design.has_interval("reweighting"):
-        raise store_error(view.path, "holds joints that are not independent", 'write sampling.method = "random"')
+        raise shares.unusable(view, "holds joints that are not independent", 'write sampling.method = "random"')
     kept, base = np.ones(view.n), view.design.counts_as(view.n)
     parts: list[dict[str, Any]] = []
     for part, price in _prices(scaling.tolerances(study), costs).items():

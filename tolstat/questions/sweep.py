@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from fnmatch import fnmatchcase
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -69,7 +69,9 @@ def sweep(view: View) -> Answer:
     seen = [_short(row) for row in rows]
     ranked = [name for name in (seen[0] if seen else ()) if "." in name][1:]
     table = Table("sweep", "Worst bushing", plain(seen, ranked), rows, seen=seen)
-    pictures: list[Part] = [Panels(_panels(view)), Sheet("sweep", partial(sheet, view))] if view.bushing_loads else []
+    pictures: list[Part] = (
+        [Panels([*_panels(view)]), Sheet("sweep", partial(sheet, view))] if view.bushing_loads else []
+    )
     return Answer("sweep", "Loads against the swept value", [*pictures, table])
 
 
@@ -87,7 +89,7 @@ def _short(row: Row) -> Row:
     return short
 
 
-def _panels(view: View) -> list[Panel]:
+def _panels(view: View) -> Iterator[Panel]:
     axes = swept_axes(view)
     room = drawing.legend_room(_legend(view, axes)[1])
 
@@ -95,18 +97,12 @@ def _panels(view: View) -> list[Panel]:
         _draw(ax, view, axes, group, kind)
         drawing.legend_above(ax, *_legend(view, axes))
 
-    return [
-        Panel(
-            f"sweep-{group}-{kind.symbol}",
-            f"{group.capitalize()} bushings, {QUANTITY[kind.unit]}",
-            f"Largest {QUANTITY[kind.unit]}s of the {group} bushings against the swept value",
-            partial(draw, group=group, kind=kind),
-            (drawing.WIDTH, 3.3 + room),
-            top=room,
-        )
-        for group, kind in PANELS
-        if any(name in view.bushing_loads for name in names_of(group, kind))
-    ]
+    for group, kind in PANELS:
+        if any(name in view.bushing_loads for name in names_of(group, kind)):
+            title, key = f"{group.capitalize()} bushings, {QUANTITY[kind.unit]}", f"sweep-{group}-{kind.symbol}"
+            words = f"Largest {QUANTITY[kind.unit]}s of the {group} bushings against the swept value"
+            size, draw_loads = (drawing.WIDTH, 3.3 + room), partial(draw, group=group, kind=kind)
+            yield Panel(key, title, words, draw_loads, size, top=room)
 
 
 def sheet(view: View) -> Figure:

@@ -23,9 +23,8 @@ from tolstat.display import drawing, text
 from tolstat.display.answer import Answer, Axes, Column, Part, Row, Rows, Sentence, Table
 from tolstat.display.blocks import Panel, Panels
 from tolstat.display.options import Loads, Opt
-from tolstat.questions.shares import NO_INTERVALS, Cell
+from tolstat.questions.shares import NO_INTERVALS, Cell, unusable
 from tolstat.store import revolutions
-from tolstat.store.hdf5 import store_error
 from tolstat.store.view import View
 from tolstat.study.selection import Entry, quantity
 
@@ -104,7 +103,7 @@ def time_above(
     asked = _levels(view, by or (), levels or ())
     settled = np.flatnonzero(view.status == Status.OK)
     if not settled.size:
-        raise store_error(view.path, "has no settled joint", "resume the campaign")
+        raise unusable(view, "has no settled joint", "resume the campaign")
     rows, ends = _rows(view, settled, asked)
     parts: list[Part] = [Table("levels", "Time above levels within a revolution", LEVELS, rows)]
     if curves:

@@ -22,7 +22,7 @@ from tolstat.study.tolerances import meaning
 
 MAX_JOINTS = 20_000
 """Number of joints (the first ones) whose errors are compared."""
-SIGNIFICANT = 0.05
+SIGNIFICANT, TEST = 0.05, "(Wilcoxon–Mann–Whitney, Holm)"
 MOST_ERRORS = 10
 """Number of errors that the picture shows."""
 COMPARED = {"direction": "larger", "size": "farther from the middle"}
@@ -214,15 +214,10 @@ def _failed(view: View, compared: Rows) -> Answer:
     if compared:
         parts.append(Panels([_errors_panel(compared[:MOST_ERRORS])]))
         marked = [row["error"] for row in compared if min(row["direction_p"], row["size_p"]) < SIGNIFICANT]
-        test = "(Wilcoxon–Mann–Whitney, Holm)"
-        words = (
-            f"Beyond chance {test}: {', '.join(marked)}." if marked else f"No error plays a part beyond chance {test}."
-        )
-    return Answer(
-        "failed",
-        "Failed and unsettled joints",
-        [*parts, Sentence(words), Table("first", "The first of them", FIRST, joints)],
-    )
+        words = f"Beyond chance {TEST}: {', '.join(marked)}."
+        words = words if marked else f"No error plays a part beyond chance {TEST}."
+    first = Table("first", "The first of them", FIRST, joints)
+    return Answer("failed", "Failed and unsettled joints", [*parts, Sentence(words), first])
 
 
 def _draw_modes(ax: Axes, rows: Rows) -> None:
@@ -237,12 +232,10 @@ def _draw_modes(ax: Axes, rows: Rows) -> None:
 
 
 def _errors_panel(rows: Rows) -> Panel:
-    each = (
-        f"{row['error']}: larger {row['direction']:.2f}, farther from the middle {row['size']:.2f}" for row in rows[:4]
-    )
-    words = (
-        f"Probability that a joint without a valid result has the larger error than a settled one. {'; '.join(each)}"
-    )
+    words = "Probability that a joint without a valid result has the larger error than a settled one."
+    for number, row in enumerate(rows[:4]):
+        words += f"{';' if number else ''} {row['error']}: larger {row['direction']:.2f}, "
+        words += f"farther from the middle {row['size']:.2f}"
     left, title = drawing.rows_left([row["error"] for row in rows]), "Failures in the space of errors"
     size, room = (drawing.WIDTH, drawing.rows_height(len(rows)) + 0.2), drawing.legend_room([*COMPARED.values()], left)
     return Panel("errors-without-load", title, words, partial(_draw_errors, rows=rows), size, left, room)

@@ -5,6 +5,7 @@ import pytest
 from scipy import stats
 
 from tolstat.analysis import known_share, process, weighted
+from tolstat.analysis.column import Column
 from tolstat.analysis.known_share import Mixture
 from tolstat.analysis.process import Draws, Known, Sums
 
@@ -61,6 +62,27 @@ def test_with_very_many_parts_both_is_the_interval_of_the_joints():
     assert (found.lower, found.upper) == (pytest.approx(lower[0], rel=0.02), pytest.approx(upper[0], rel=0.02))
     assert found.expected == pytest.approx(one.share[0], rel=0.01)
     assert found.parts_upper - found.parts_lower < 0.2 * (found.upper - found.lower)
+
+
+def test_with_few_joints_above_both_is_not_narrower_than_the_interval_of_the_joints():
+    """One joint of 97 above: the joint added has the largest weight that a joint can have, as for the joints alone."""
+    rng = np.random.default_rng(6)
+    z, weights = rng.standard_normal((97, 3)), rng.uniform(0.5, 1.3, 97)
+    above, every = z.sum(axis=1) >= np.sort(z.sum(axis=1))[-1], np.ones(97, dtype=bool)
+    alone = weighted.Weighted(weights, heaviest=5.0).shares(Column(above.astype(float)), np.array([0.5]), 0.95)
+
+    def both(parts, heaviest):
+        drawn, known = process.draws((parts,)), (Known(parts, 3),)
+        (split,) = known_share.tallies([sums(z)], known, drawn, weights, [(above, every)], heaviest)
+        return known_share.intervals(split, [split], [split], np.ones(1024, dtype=bool))
+
+    many, fewer = both(100_000, 5.0), both(300, 5.0)
+    assert (many.lower, many.upper) == (
+        pytest.approx(alone.lower[0], rel=0.02),
+        pytest.approx(alone.upper[0], rel=0.02),
+    )
+    assert fewer.lower <= many.lower < many.upper <= fewer.upper
+    assert both(100_000, 0.0).upper < 0.6 * alone.upper[0]  # with the largest weight drawn it is too narrow
 
 
 def test_processes_without_support_count_at_both_ends():

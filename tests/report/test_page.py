@@ -316,13 +316,13 @@ def test_joints_without_a_load_are_named_with_what_to_do_and_compared_with_the_o
     assert view.count(Status.NOT_SETTLED) == 12
     found = joints.without_load(view)
     assert len(found) == MAX_LISTED
-    assert {joint.row for joint in found} <= set(range(401 - 27, 401))
-    assert all(joint.remedy for joint in found)
+    assert {joint["row"] for joint in found} <= set(range(401 - 27, 401))
+    assert all(joint["remedy"] for joint in found)
     rows = joints.their_errors(view)
     assert list(rows[0])[:2] == ["error", "direction"]
     assert min(row["direction_p"] for row in rows) > 0.01  # they are the last rows: chance
     answer = joints.failed(view)
-    assert answer.frame("first")["row"].tolist() == [joint.row for joint in found]
+    assert answer.frame("first")["row"].tolist() == [joint["row"] for joint in found]
     assert answer.frame("states").set_index("status")["joints"][Status.NEWTON_FAILED.label] == 15
 
 

@@ -91,7 +91,12 @@ def supported(n: int, drawn: Draws, known: tuple[Known, ...], mixture: Sequence[
 
 
 def tallies(
-    sums: Sequence[Sums], known: Sequence[Known], drawn: Draws, weights: FloatArray, events: Sequence[tuple[Mask, Mask]]
+    sums: Sequence[Sums],
+    known: Sequence[Known],
+    drawn: Draws,
+    weights: FloatArray,
+    events: Sequence[tuple[Mask, Mask]],
+    heaviest: float = 0.0,
 ) -> list[Split]:
     """Weights above and below, of each event, for each process.
 
@@ -105,6 +110,9 @@ def tallies(
         Density of each joint under the tolerances over that which it was drawn from.
     events : sequence of pairs of ndarray of bool, (n,)
         Joints that are above a level, and joints that count.
+    heaviest : float
+        Largest weight that a joint can have at the tolerances as stated; 0 if no bound is known. Where few joints are
+        on a side, the joint added there has at least this weight, as in the interval of the joints alone.
 
     Returns
     -------
@@ -124,7 +132,7 @@ def tallies(
         )
         block = np.exp(logs - logs.max(axis=0))  # weights, up to a factor of each process
         largest = np.stack([block[mask].max(axis=0, initial=0.0) for mask in sides])
-        every = np.broadcast_to(block.max(axis=0), largest.shape)
+        every = np.broadcast_to(np.maximum(block.max(axis=0), heaviest * np.exp(-logs.max(axis=0))), largest.shape)
         tables.append([members @ block, members @ np.square(block), largest, every])
     *found, every = (np.concatenate(parts, axis=1) for parts in zip(*tables, strict=True))
     return [Split.of([own[k : k + 2] for own in found], every[k : k + 2]) for k in range(0, len(sides), 2)]

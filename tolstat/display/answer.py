@@ -1,6 +1,7 @@
 """The answer to a question: tables, figures and sentences in reading order, and facts by name.
 
-A question returns an `Answer`; terminal, page, JSON, CSV and notebook are generic functions of it.
+A question returns an `Answer`; terminal, page, JSON, CSV and notebook are generic functions of it. It imports from here
+all that an answer is made of.
 """
 
 from __future__ import annotations
@@ -12,12 +13,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from tolstat.display import drawing, style, text
-from tolstat.display.blocks import Block, Facts, Listing, Panels, Reader, Text
-from tolstat.display.table import Column, Rows, as_block
+from tolstat.display.blocks import Axes, Block, Facts, Listing, Panel, Panels, Reader, Text
+from tolstat.display.table import Column, Row, Rows, as_block, has, has_unresolved
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
+
+__all__ = ["Answer", "Axes", "Column", "Document", "Listing", "Panel", "Panels", "Part", "Reader", "Row", "Rows"]
+__all__ += ["Sentence", "Sheet", "Table", "Text", "has", "has_unresolved"]
 
 Place = Literal["lead", "note", "warning"]
 

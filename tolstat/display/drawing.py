@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+
+from numpy.typing import ArrayLike
 
 from tolstat.display import schemes, style, text
 from tolstat.display.blocks import Panel
@@ -161,6 +163,29 @@ def _legend_columns(labels: Sequence[str], width: float) -> int:
         if LETTER * letters + KEY * columns <= width:
             return columns
     return 1
+
+
+def curves(
+    ax: Axes,
+    x: ArrayLike,
+    lines: Iterable[Iterable[ArrayLike]],
+    marks: Iterable[float],
+    bands: int,
+    colours: Sequence[str] = style.COLOURS,
+    step: Literal["post"] | None = None,
+) -> list[Artist]:
+    """Draw lines, each with the ends of its interval, over `x`, the first of them with `bands`; return the lines.
+
+    Vertical lines mark some values of `x`; steps go on to the right of each value.
+    """
+    handles: list[Artist] = []
+    for (middle, low, high), colour, dash in zip(lines, colours, style.DASHES, strict=False):
+        handles += ax.plot(x, middle, color=colour, ls=dash, drawstyle="steps-post" if step else "default")
+        if len(handles) <= bands:
+            ax.fill_between(x, low, high, step=step, color=colour, alpha=0.2, lw=0)
+    for mark in marks:
+        ax.axvline(float(mark), color=style.FAINT, lw=1.0, ls=style.DASHES[2])
+    return handles
 
 
 def loads_axis(axis: Axis, typical: float, unit: str) -> str:

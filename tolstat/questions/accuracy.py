@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 
 from tolstat.analysis import accuracy as comparison
 from tolstat.analysis.accuracy import FIDELITY, KIND_OF, OBSERVABLES, REFERENCE
-from tolstat.common.errors import Fault, NotApplicable
 from tolstat.common.load_kinds import KIND, LOAD_KINDS
 from tolstat.common.loads import UNIT_OF_LOAD, FloatArray, load_of
 from tolstat.common.tables import Status
 from tolstat.display import text
 from tolstat.display.answer import Answer, Sentence, Table
 from tolstat.display.table import Column, Rows
+from tolstat.questions.shares import inapplicable, word
 from tolstat.store.verification import Verification
 from tolstat.store.view import View
 
@@ -29,9 +29,9 @@ def _small(x: float) -> str:
 
 
 ERRORS = (
-    Column("load", lambda row: str(row["load"])),
-    Column("error", lambda row: str(row["error"]), words=True),
-    Column("joints", lambda row: str(row["joints"])),
+    Column("load", word("load")),
+    Column("error", word("error"), words=True),
+    Column("joints", word("joints")),
     Column("median", lambda row: _small(row["median"])),
     Column("95 % below", lambda row: _small(row["usual"])),
     Column("worst", lambda row: _small(row["worst"])),
@@ -61,11 +61,11 @@ def accuracy(view: View) -> Answer:
     checks = view.verification
     if checks is None:
         remedy = f"check some joints: tolstat verify {view.path}"
-        raise NotApplicable(str(Fault(str(view.path), "holds no checks of the numerical error", remedy)))
+        raise inapplicable(view, "holds no checks of the numerical error", remedy)
     title = "Relative to the largest load of its kind in the joint"
     table = Table("errors", title, ERRORS, error_rows(checks), dict.fromkeys(("median", "usual", "worst"), "1"))
-    said = Sentence(text.sentence(note(checks, view.limits)), "lead")
-    return Answer("accuracy", "Numerical error", [said, table], {"numerical_error": view.numerical_error})
+    lead = Sentence(text.sentence(note(checks, view.limits)), "lead")
+    return Answer("accuracy", "Numerical error", [lead, table], {"numerical_error": view.numerical_error})
 
 
 def error_rows(verification: Verification, by_kind: bool = True) -> Rows:
@@ -83,13 +83,8 @@ def error_rows(verification: Verification, by_kind: bool = True) -> Rows:
         found = {name: comparison.by_kind(values) for name, values in found.items()}
     else:
         columns = {OBSERVABLES[k]: k for k in np.flatnonzero(kept)}
-    rows = []
-    for load, k in columns.items():
-        for name, values in found.items():
-            n, median, usual, worst = comparison.spread(values[:, k])
-            row = {"load": load, "error": name, "joints": n, "median": median, "usual": usual, "worst": worst}
-            rows.append(row)
-    return rows
+    each = ((load, name, *comparison.spread(found[name][:, k])) for load, k in columns.items() for name in found)
+    return [dict(zip(("load", "error", "joints", "median", "usual", "worst"), row, strict=True)) for row in each]
 
 
 def errors(verification: Verification) -> dict[str, FloatArray]:
@@ -108,16 +103,16 @@ def joint_rows(verification: Verification) -> Rows:
         ``row``, ``check``, ``status`` (of the check), ``load``, ``unit``, ``campaign`` and ``value`` (SI), ``error``:
         the campaign's value minus the check's, relative to the largest load of the measure.
     """
-    base, kept = comparison.loads(verification.base), np.flatnonzero(_kept(verification))
-    rows = []
+    base, rows = comparison.loads(verification.base), []
     for name, check in verification.checks.items():
         other, error = comparison.loads(check.results), comparison.differences(verification.base, check.results)
-        for k in kept:
-            values = zip(verification.rows, check.results["status"], base[:, k], other[:, k], error[:, k], strict=True)
-            for row, status, campaign, value, relative in values:
-                head = {"row": int(row), "check": name, "status": Status(status).label, "load": OBSERVABLES[k]}
-                head["unit"] = UNIT_OF_LOAD[OBSERVABLES[k]]
-                rows.append({**head, "campaign": float(campaign), "value": float(value), "error": float(relative)})
+        states = [Status(code).label for code in check.results["status"]]
+        for k in np.flatnonzero(_kept(verification)):
+            fixed = {"load": OBSERVABLES[k], "unit": UNIT_OF_LOAD[OBSERVABLES[k]]}
+            values = zip(verification.rows, states, base[:, k], other[:, k], error[:, k], strict=True)
+            for row, status, *numbers in values:
+                figures = dict(zip(("campaign", "value", "error"), map(float, numbers), strict=True))
+                rows.append({"row": int(row), "check": name, "status": status, **fixed, **figures})
     return rows
 
 
@@ -127,9 +122,11 @@ def note(verification: Verification, limits: Iterable[str] = ()) -> str:
     total = [row for row in error_rows(verification) if row["error"] == TOTAL]
     shown = [row for row in total if row["load"] in kinds or KIND[row["load"]].shown] or total
     known = [row for row in shown if not np.isnan(row["worst"])]
-    words = [f"{_called(row['load'])} {_small(row['median'])}, at worst {_small(row['worst'])}" for row in known]
+    called = {kind.key: kind.symbol if kind.symbol == kind.key else kind.noun for kind in LOAD_KINDS}
+    words = [f"{called[row['load']]} {_small(row['median'])}, at worst {_small(row['worst'])}" for row in known]
     noun = "error of numerics and fidelity" if FIDELITY in verification.checks else "numerical error"
-    return "; ".join([f"{noun}, {basis(verification)}: {'; '.join(words) or 'unknown'}", *_unknown(verification)])
+    unknown = f"; {unsettled}" if (unsettled := _unsettled(verification)) else ""
+    return f"{noun}, {basis(verification)}: {'; '.join(words) or 'unknown'}{unknown}"
 
 
 def basis(verification: Verification) -> str:
@@ -153,17 +150,10 @@ def _kept(verification: Verification) -> NDArray[np.bool_]:
     return np.asarray(kept | ~kept.any())
 
 
-def _called(key: str) -> str:
-    """Kind of loads in a sentence: its symbol, or what a load is called where several kinds share the symbol."""
-    kind = KIND[key]
-    return kind.symbol if kind.symbol == key else kind.noun
-
-
-def _unknown(verification: Verification) -> list[str]:
+def _unsettled(verification: Verification) -> str:
     """Words on joints that failed or did not settle in the campaign or in a check; empty if there are none."""
     base = verification.base["status"] == Status.OK
-    words = [] if base.all() else [f"{int((~base).sum())} not settled"]
+    counts = {"": int((~base).sum())}
     for name, check in verification.checks.items():
-        bad = int((base & (check.results["status"] != Status.OK)).sum())
-        words += [f"{bad} not settled in {name}"] if bad else []
-    return [", ".join(words)] if words else []
+        counts[f" in {name}"] = int((base & (check.results["status"] != Status.OK)).sum())
+    return ", ".join(f"{count} not settled{where}" for where, count in counts.items() if count)

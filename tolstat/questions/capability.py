@@ -3,42 +3,42 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any
 
 import numpy as np
 
 from tolstat.analysis import binomial, extreme
 from tolstat.analysis import capability as indices
 from tolstat.analysis.prediction import DELIVERY
-from tolstat.analysis.sample import total_interval
 from tolstat.common.aside import mapped
 from tolstat.common.errors import Fault, InputError, NotApplicable
 from tolstat.common.loads import ANY_LIMIT
 from tolstat.common.tables import VALID
 from tolstat.display import text
-from tolstat.display.answer import Answer, Part, Sentence, Table
+from tolstat.display.answer import Answer, Column, Part, Rows, Sentence, Table
 from tolstat.display.asked import Asked
 from tolstat.display.options import Delivery, Opt
-from tolstat.display.table import Column, Row, Rows
+from tolstat.questions import shares
 from tolstat.store import error_budget, known_parts
 from tolstat.store.view import View
 
 NOT_NORMAL = 0.01
 """p-value of the test of normality below which the index of a normal load tells no share above the limit."""
-WIDEST = 0.5
-"""Total interval of a yield, or its bounds without one, from which on it says too little for a verdict."""
 ON_PAGE = (1e3, 1e4, 1e5)
 """Numbers of joints of which one exceeds the rare loads on the page."""
+FIGURES: tuple[str, ...] = ("estimate", "lower", "upper", "bound_lower", "bound_upper")
+FIGURES += tuple(f"{key}{end}" for key in ("fleet", "shape") for end in ("", "_lower", "_upper"))
+"""Keys of `return_rows` that are NaN where a tail is not extrapolated."""
 RARE = "Load that one in N joints exceeds; median of the largest load of N joints"
 
 LIMITS = (
-    Column("load", lambda row: str(row["load"])),
-    Column("limit", lambda row: "-" if row["load"] == ANY_LIMIT else text.value(row["limit"], row["unit"])),
+    Column("load", shares.word("load")),
+    Column("limit", shares.limit),
     Column("above", lambda row: f"{row['count']} of {row['n'] - row['n_failed'] - row['n_unsettled']}"),
-    Column("yield", lambda row: text.percent(row["good"])),
-    Column("total interval", lambda row: text.span(row["good_lower"], row["good_upper"])),
+    Column("yield", shares.share("good")),
+    Column("total interval", shares.shares("good_lower", "good_upper")),
     Column("ppm", lambda row: text.number(row["ppm"]), rank=1),
     Column("interval of ppm", lambda row: text.span_of(row["ppm_lower"], row["ppm_upper"], "1"), rank=2),
     Column("above in delivery", text.delivery, rank=3),
@@ -48,12 +48,12 @@ LIMITS = (
 )
 """Columns of the table ``limits``; the total interval is that of the yield."""
 RETURNS = (
-    Column("load", lambda row: str(row["load"])),
+    Column("load", shares.word("load")),
     Column("one joint in", lambda row: f"{row['one_in']:,.0f}".replace(",", " ")),
-    Column("exceeds", lambda row: text.value(row["estimate"], row["unit"])),
-    Column("95 % interval", lambda row: text.span_of(row["lower"], row["upper"], row["unit"])),
-    Column("largest of so many", lambda row: text.value(row["fleet"], row["unit"])),
-    Column("interval of it", lambda row: text.span_of(row["fleet_lower"], row["fleet_upper"], row["unit"]), rank=2),
+    Column("exceeds", shares.value("estimate")),
+    Column("95 % interval", shares.values("lower", "upper")),
+    Column("largest of so many", shares.value("fleet")),
+    Column("interval of it", shares.values("fleet_lower", "fleet_upper"), rank=2),
     Column("fit, p", lambda row: f"{row['p']:.2g}", rank=1),
 )
 """Columns of the table ``one_in``; the largest of N joints is the median of it over fleets of N."""
@@ -101,21 +101,22 @@ def capability(
     """
     if not view.limits or view.method in ("sweep", "cases"):
         remedy = 'give the result file of a study with [limits] and sampling.method "random", "sobol" or "lhs"'
-        raise NotApplicable(str(Fault(str(view.path), "has no limits, or its joints are no random sample", remedy)))
+        raise shares.inapplicable(view, "has no limits, or its joints are no random sample", remedy)
     view.check("index")
     rows = limit_rows(view, delivery=delivery)
     parts: list[Part] = [Table("limits", "Against each limit, and all of them together", LIMITS, rows)]
-    notes = [*_notes(rows), *([unknown] if (unknown := error_budget.unknown(view)) else [])]
+    notes = [Sentence(note) for note in (*_notes(rows), error_budget.unknown(view)) if note]
     if not one_in:
-        return Answer("capability", "Capability", [*parts, *map(Sentence, notes)])
+        return Answer("capability", "Capability", [*parts, *notes])
     try:
         rare = [row for load in view.limits for row in return_rows(view, load, one_in)]
     except ValueError as error:
         found, _, remedy = str(error).partition(": ")
         raise InputError([Fault("--one-in", found, remedy)]) from error
-    parts += [Table("one_in", RARE, RETURNS, rare), *map(Sentence, notes)]
-    if refused := _refused(rare):
-        parts.append(Sentence(f"{refused}; tolstat rare, a subset simulation, needs no tail", "warning"))
+    parts += [Table("one_in", RARE, RETURNS, rare), *notes]
+    if refused := shares.grouped((row["load"], row["refusal"]) for row in rare if row["refusal"]):
+        warning = f"{refused}: not extrapolated; tolstat rare, a subset simulation, needs no tail"
+        parts.append(Sentence(warning, "warning"))
     return Answer("capability", "Capability and rare loads", parts)
 
 
@@ -126,10 +127,24 @@ def capability_on_page(view: View, asked: Asked) -> Answer:
     parts = list(capability(view).parts) if view.limits else []
     if known_parts.of(view) is not None:
         parts.append(Sentence("for the tolerances as stated: what measured parts leave open is not in these"))
-    parts += _rare_loads(view, min(asked.processes, 2))
+    tails = [partial(_rare_loads, view, name) for name in view.leading]
+    found = dict(zip(view.leading, mapped(tails, min(asked.processes, 2)), strict=True))
+    if rows := [row for own in found.values() if not isinstance(own, str) for row in own]:
+        parts.append(Table("one_in", f"{RARE}, from a generalised Pareto tail", RETURNS, rows))
+    if reasons := shares.grouped((name, own) for name, own in found.items() if isinstance(own, str)):
+        parts.append(Sentence(f"Rare loads. {reasons}."))
     if not parts:
         raise NotApplicable
     return Answer("capability", "Capability and rare loads" if view.limits else "Rare loads", parts)
+
+
+def _rare_loads(view: View, name: str) -> Rows | str:
+    """Return loads of a load, or why it has none."""
+    try:
+        rows = return_rows(view, name, ON_PAGE)
+    except ValueError as error:
+        return str(error)
+    return f"{rows[0]['refusal']}: not extrapolated" if rows[0]["refusal"] else rows
 
 
 def limit_rows(view: View, confidence: float = 0.95, delivery: int = DELIVERY) -> Rows:
@@ -156,8 +171,8 @@ def limit_rows(view: View, confidence: float = 0.95, delivery: int = DELIVERY) -
         matter (`analysis.binomial.unresolved_matter`).
     """
     rows = []
-    for load in [*view.loads(list(view.limits)), view.load(ANY_LIMIT)]:
-        row = dict(good(view, load.name, confidence, delivery))
+    for load in view.loads([*view.limits, ANY_LIMIT]):
+        row = dict(shares.good(view, load.name, confidence, delivery))
         c = indices.of_sample(load, row["limit"], confidence)
         names = [f"{key}{end}" for key in ("cpk", "cpk_normal") for end in ("", "_lower", "_upper")]
         row |= {key: getattr(c, key) for key in (*names, "normal_p", "needed")}
@@ -165,23 +180,6 @@ def limit_rows(view: View, confidence: float = 0.95, delivery: int = DELIVERY) -
             row |= dict.fromkeys(names, np.nan)
         rows.append(row)
     return rows
-
-
-def good(view: View, name: str = ANY_LIMIT, confidence: float = 0.95, delivery: int = DELIVERY) -> Mapping[str, Any]:
-    """Yield, joints above in a million, and in the next delivery: the keys of `limit_rows` that are no indices."""
-    return view.kept(("good", name, confidence, delivery), lambda: _good(view, name, confidence, delivery))
-
-
-def _good(view: View, name: str, confidence: float, delivery: int) -> Mapping[str, Any]:
-    load = view.load(name)
-    assert load.limit is not None
-    loads, above = error_budget.with_error(view, load), load.above(load.limit, confidence)
-    row = {"load": load.name, "unit": load.unit, "limit": load.limit, "n": above.n}
-    row |= {key: getattr(above, key) for key in ("n_failed", "n_unsettled", "count")}
-    low, high = total_interval(loads, load.limit, confidence)
-    row |= {"good": 1.0 - above.estimate, "good_lower": 1.0 - high, "good_upper": 1.0 - low}
-    row |= {"ppm": 1e6 * above.estimate, "ppm_lower": 1e6 * low, "ppm_upper": 1e6 * high}
-    return row | error_budget.delivery(loads, load.limit, delivery, confidence)
 
 
 def return_rows(view: View, name: str, one_in: Sequence[float], confidence: float = 0.95) -> Rows:
@@ -215,56 +213,11 @@ def return_rows(view: View, name: str, one_in: Sequence[float], confidence: floa
     tail = extreme.fit(load, None, confidence)
     rows = []
     for number in one_in:
+        figures = *tail.level(1.0 / number), *tail.bounds(1.0 / number), *tail.largest(int(number)), *tail.shape
         row: dict[str, Any] = {"load": name, "unit": load.unit, "one_in": number}
-        row |= tail.level(1.0 / number)._asdict()
-        row["bound_lower"], row["bound_upper"] = tail.bounds(1.0 / number)
-        row |= dict(zip(("fleet", "fleet_lower", "fleet_upper"), tail.largest(int(number)), strict=True))
-        row |= dict(zip(("shape", "shape_lower", "shape_upper"), tail.shape, strict=True))
-        if tail.refusal:
-            row |= dict.fromkeys(list(row)[3:], np.nan)
+        row |= dict.fromkeys(FIGURES, np.nan) if tail.refusal else dict(zip(FIGURES, figures, strict=True))
         rows.append({**row, "p": tail.p, "n_above": tail.n_above, "refusal": tail.refusal})
     return rows
-
-
-class Yield(NamedTuple):
-    """Yield of all limits together, in words.
-
-    Attributes
-    ----------
-    value : str
-        The estimate, or the interval where joints without a valid load matter.
-    words : str
-        What it is the share of, number of joints, total interval.
-    decides : bool
-        Whether the interval is narrower than `WIDEST`.
-    """
-
-    value: str
-    words: str
-    decides: bool
-
-
-def together(row: Row, limits: int) -> Yield:
-    """Share of the joints that keep all of some limits, from `good`."""
-    n, above = int(row["n"]), int(row["count"])
-    unresolved = int(row["n_failed"] + row["n_unsettled"])
-    valid, low, high = n - unresolved, row["good_lower"], row["good_upper"]
-    keep = f"keep all {limits} limits" if limits > 1 else "keep the limit"
-    kind, known = "total interval", not math.isnan(low)
-    if not known:
-        low, high = ((valid - above) / n, 1.0 - above / n) if n else (0.0, 1.0)
-    counted = f"{valid - above} of {valid}" + (" with a valid load" if unresolved else "")
-    if binomial.unresolved_matter(above, n, unresolved):
-        covers = kind if known else "bounds"
-        return Yield(text.span(low, high), f"of the joints {keep} ({counted}; {covers})", high - low < WIDEST)
-    interval = f"{kind} {text.span(low, high)}" if known else "no interval"
-    return Yield(text.percent(row["good"]), f"of the joints {keep} ({counted}; {interval})", high - low < WIDEST)
-
-
-def delivered(row: Row, limits: int) -> str:
-    """What `good` predicts of the next `DELIVERY` joints; empty without an interval."""
-    exceeded = "at least one limit" if limits > 1 else "the limit"
-    return "" if math.isnan(row["next_lower"]) else f"of the next {DELIVERY} joints exceed {exceeded}"
 
 
 def _notes(rows: Rows) -> Iterator[str]:
@@ -281,39 +234,4 @@ def _notes(rows: Rows) -> Iterator[str]:
     if any(row["normal_p"] < NOT_NORMAL for row in rows):
         yield f"'Cpk by sigma' tells no share above of a load that is not normal (p < {NOT_NORMAL:g})"
     if all(math.isnan(row["ppm_lower"]) for row in rows):
-        yield "no intervals: they hold for independent samples only; run replicates of other seeds"
-
-
-def _refused(rows: Rows) -> str:
-    """Which loads have a tail that cannot be extrapolated, and why; empty if there are none."""
-    loads: dict[str, list[str]] = {}
-    for name, reason in dict.fromkeys((row["load"], row["refusal"]) for row in rows if row["refusal"]):
-        loads.setdefault(reason, []).append(name)
-    parts = [f"{', '.join(names)}: {reason}" for reason, names in loads.items()]
-    return f"{'; '.join(parts)}: not extrapolated" if parts else ""
-
-
-def _rare_loads(view: View, processes: int) -> list[Part]:
-    """Rare loads of the leading loads, and why others have none."""
-    rows: list[Row] = []
-    reasons: dict[str, list[str]] = {}
-    found = mapped([partial(_tried, view, name) for name in view.leading], processes)
-    for name, own in zip(view.leading, found, strict=True):
-        if isinstance(own, str):
-            reasons.setdefault(own, []).append(name)
-        else:
-            rows += own
-    parts: list[Part] = [Table("one_in", f"{RARE}, from a generalised Pareto tail", RETURNS, rows)] if rows else []
-    if reasons:
-        words = "; ".join(f"{', '.join(names)}: {reason}" for reason, names in reasons.items())
-        parts.append(Sentence(f"Rare loads. {words}."))
-    return parts
-
-
-def _tried(view: View, name: str) -> Rows | str:
-    """Return loads of one load, or why it has none."""
-    try:
-        rows = return_rows(view, name, ON_PAGE)
-    except ValueError as error:
-        return str(error)
-    return _refused(rows).removeprefix(f"{name}: ") or rows
+        yield f"{shares.NO_INTERVALS}; run replicates of other seeds"

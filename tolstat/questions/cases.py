@@ -11,11 +11,11 @@ from tolstat.analysis import accuracy
 from tolstat.analysis.gamma import gamma as relative_errors
 from tolstat.campaign.remedy import remedy
 from tolstat.common import selected_results
-from tolstat.common.errors import Fault, NotApplicable
 from tolstat.common.load_kinds import BUSHINGS
 from tolstat.common.tables import Motion, Status, Variant
 from tolstat.display.answer import Answer, Document, Part, Sentence, Table
 from tolstat.display.table import Row, Rows, plain
+from tolstat.questions.shares import inapplicable, rows_of
 from tolstat.solver import refinement
 from tolstat.store import Reader, recorded, verification
 from tolstat.store.view import View
@@ -51,8 +51,7 @@ def cases(view: View) -> Answer:
     """
     store = view.store
     if not store.case_names:
-        remedy = "give the result file of a study that lists its joints"
-        raise NotApplicable(str(Fault(str(view.path), "does not list its joints", remedy)))
+        raise inapplicable(view, "does not list its joints", "give the result file of a study that lists its joints")
     rows = _rows(store)
     seen = [_worst(row) for row in rows]
     title, counts = "Change of the loads by the errors of each joint", store.counts()
@@ -78,7 +77,7 @@ def _rows(store: Reader) -> Rows:
         "motion": [_motion(row) for row in results],
         "revolutions": results["revolutions"].tolist(),
         "cost": (work / max(1.0, float(work[0]))).tolist(),
-        "remedy": [remedy(row, store.options | _own(v, "solver")) for row, v in zip(results, variants, strict=True)],
+        "remedy": [remedy(row, store.options | _solver(v)) for row, v in zip(results, variants, strict=True)],
     }
     gamma = relative_errors(results, design["group"])
     for b, bushing in enumerate(BUSHINGS):
@@ -86,8 +85,7 @@ def _rows(store: Reader) -> Rows:
             if selected_results.holds(store.columns, f"{bushing}.{letter}"):
                 columns[f"{bushing}.{letter} [{unit}]"] = results[f"{letter}_max"][:, b].tolist()
                 columns[f"{bushing}.Gamma_{letter} [%]"] = gamma[:, b, load].tolist()
-    columns |= _reference(store)
-    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+    return rows_of(columns | _reference(store))
 
 
 def _reference(store: Reader) -> dict[str, Sequence[Any]]:
@@ -95,13 +93,13 @@ def _reference(store: Reader) -> dict[str, Sequence[Any]]:
     found = verification.read(store)
     if found is None or accuracy.REFERENCE not in found.checks:
         return {}
-    true = found.checks[accuracy.REFERENCE].results
-    error, change, state = np.full((store.n, 2), np.nan), np.full(store.n, np.nan), np.full(store.n, "", object)
-    slots = store.slot(found.rows)
-    error[slots] = accuracy.by_kind(accuracy.differences(found.base, true))[:, :2]
-    change[slots] = true["closure"]
-    state[slots] = [Status(int(code)).label for code in true["status"]]
-    columns = {"reference": state, "reference_change": change, "error_F": error[:, 0], "error_T": error[:, 1]}
+    true, slots = found.checks[accuracy.REFERENCE].results, store.slot(found.rows)
+    columns = {"reference": np.full(store.n, "", object)}
+    columns |= {key: np.full(store.n, np.nan) for key in ("reference_change", "error_F", "error_T")}
+    columns["reference"][slots] = [Status(int(code)).label for code in true["status"]]
+    columns["reference_change"][slots] = true["closure"]
+    error = accuracy.by_kind(accuracy.differences(found.base, true))
+    columns["error_F"][slots], columns["error_T"][slots] = error[:, 0], error[:, 1]
     return {name: values.tolist() for name, values in columns.items()}
 
 
@@ -110,18 +108,17 @@ def _motion(row: np.void) -> str:
     return f"{motion.label} {row['period']}" if motion == Motion.SUBHARMONIC else motion.label
 
 
-def _own(variant: Variant, section: str) -> dict[str, Any]:
-    """Values of a variant in one section of the study, by key."""
-    return {k.partition(".")[2]: value for k, value in variant.values.items() if k.startswith(f"{section}.")}
+def _solver(variant: Variant) -> dict[str, Any]:
+    """Options of the solver that a variant sets."""
+    return {key.removeprefix("solver."): own for key, own in variant.values.items() if key.startswith("solver.")}
 
 
 def _worst(row: Row) -> dict[str, Any]:
     """Row for people: Gamma of the largest modulus among the bushings kept, signed, for force and for torque."""
     short = {key: row[key] for key in ("variant", "alpha [deg]", "case", "status", "motion")}
-    for letter in "FT":
-        gamma = _of_bushings(row, f"Gamma_{letter} [%]")
-        if gamma:
-            short[f"Gamma_{letter} [%]"] = max(gamma, key=lambda x: -1.0 if np.isnan(x) else abs(x))
+    for head in ("Gamma_F [%]", "Gamma_T [%]"):
+        if gamma := _of_bushings(row, head):
+            short[head] = max(gamma, key=lambda x: -1.0 if np.isnan(x) else abs(x))
     return short
 
 
@@ -140,11 +137,10 @@ def _markdown(rows: Rows) -> str:
     heads += ["error of F", "error of T"] if checked else []
     lines = [f"| {' | '.join(heads)} |", f"|{'---|' * len(heads)}"]
     for row in rows:
-        name = row["variant"] if row["case"] == IDEAL else f"{row['variant']}, {row['case']}"
-        note = row["note"] if row["case"] == IDEAL else ""
+        joint = [row["variant"], row["note"]] if row["case"] == IDEAL else [f"{row['variant']}, {row['case']}", ""]
         largest = (float(np.fmax.reduce(_of_bushings(row, load), initial=np.nan)) for load in ("F [N]", "T [N*m]"))
         numbers = (f"{x:.3g}" for x in (row["revolutions"], *largest, row["cost"]))
-        cells = [name, note, row["status"], row["motion"], *numbers, *(_errors(row) if checked else [])]
+        cells = [*joint, row["status"], row["motion"], *numbers, *(_errors(row) if checked else [])]
         lines.append(f"| {' | '.join(cells)} |".replace("nan", "–"))
     return "\n".join(lines) + "\n"
 

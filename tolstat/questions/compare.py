@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,20 +17,17 @@ from tolstat.analysis.design import Claim
 from tolstat.analysis.sample import Sample
 from tolstat.common.counts import Counts
 from tolstat.common.draw_records import DRAWN
-from tolstat.common.errors import Fault, InputError, NotApplicable, StoreError
+from tolstat.common.errors import Fault, InputError, StoreError
 from tolstat.common.loads import ANY_LIMIT, FloatArray, unit_text
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import Status
 from tolstat.display import drawing, style, text
-from tolstat.display.answer import Answer, Sentence, Table
+from tolstat.display.answer import Answer, Axes, Column, Row, Rows, Sentence, Table
 from tolstat.display.blocks import Panel, Panels
 from tolstat.display.mpl import patches
 from tolstat.display.options import Loads
-from tolstat.display.table import Column, Row, Rows
+from tolstat.questions.shares import NO_INTERVALS, inapplicable, share, word
 from tolstat.store.view import View
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 SHARES = (0.5, 0.9, 0.99)
 """Quantiles that are compared."""
@@ -70,21 +67,12 @@ class Sides(NamedTuple):
         """Row of each joint of A in its campaign, (n,)."""
         return self.views[0].rows(self.samples[0])
 
-    @property
-    def unresolved(self) -> int:
-        """Number of joints that failed or did not settle."""
-        counts = [Counts.of(view.status[own]) for view, own in zip(self.views, self.samples, strict=True)]
-        return sum(own.failed + own.unsettled for own in counts)
-
     def load(self, name: str) -> tuple[Sample, Sample]:
         """Load of the joints of A and of B."""
-        both = zip(self.views, self.samples, strict=True)
-        a, b = (_only(view.load(name), own) for view, own in both)
+        both = zip((view.load(name) for view in self.views), self.samples, strict=True)
+        # a million joints are not copied
+        a, b = (load if len(own) == load.values.size else load.only(own) for load, own in both)
         return a, b
-
-
-def _only(load: Sample, samples: NDArray[np.intp]) -> Sample:
-    return load if len(samples) == load.values.size else load.only(samples)  # a million joints are not copied
 
 
 def _unit(row: Row) -> str:
@@ -98,26 +86,23 @@ def _interval(row: Row, factor: float, unit: str) -> str:
 
 def _share_columns(paired: bool) -> tuple[Column, ...]:
     """Columns of the table ``shares``; joints above on one side only are counted for pairs."""
-
-    def only(side: str) -> Callable[[Row], str]:
-        return lambda row: str(row[f"only_{side}"]) if paired else "-"
-
+    only_a, only_b = map(word, ("only_a", "only_b")) if paired else (lambda _: "-", lambda _: "-")
     return (
         Column("load > limit", text.limit),
-        Column("A", lambda row: text.percent(row["a"])),
-        Column("B", lambda row: text.percent(row["b"])),
+        Column("A", share("a")),
+        Column("B", share("b")),
         Column("B - A", lambda row: f"{100 * row['estimate']:+.3g} %"),
         Column("ppm", lambda row: f"{1e6 * row['estimate']:+.4g}", rank=2),
         Column("95 % interval", lambda row: _interval(row, 100.0, " %")),
-        Column("only A", only("a"), rank=1),
-        Column("only B", only("b"), rank=1),
+        Column("only A", only_a, rank=1),
+        Column("only B", only_b, rank=1),
         Column("p", lambda row: text.formed(row["p"], ".2g")),
     )
 
 
 LOADS = (
-    Column("load", lambda row: str(row["load"])),
-    Column("statistic", lambda row: str(row["statistic"])),
+    Column("load", word("load")),
+    Column("statistic", word("statistic")),
     Column("A", lambda row: f"{row['a']:.4g}{_unit(row)}"),
     Column("B", lambda row: f"{row['b']:.4g}{_unit(row)}"),
     Column("B - A", lambda row: f"{row['estimate']:+.3g}{_unit(row)}"),
@@ -177,26 +162,24 @@ def compare(a: View, b: View, by: Loads = None) -> Answer:
     for view in (a, b):
         if view.method not in DRAWN:
             remedy = 'compare files of studies with sampling.method "random", "sobol" or "lhs"'
-            raise NotApplicable(str(Fault(str(view.path), "holds joints that are not drawn from tolerances", remedy)))
-    limits = [*a.limits.items(), *(limit for limit in b.limits.items() if limit not in a.limits.items())]
-    names = _names(a, b, by or (), [name for name, _ in limits])
-    both = sides(a, b)
+            raise inapplicable(view, "holds joints that are not drawn from tolerances", remedy)
+    limits = list(dict.fromkeys([*a.limits.items(), *b.limits.items()]))
+    names, both = _names(a, b, by or (), [name for name, _ in limits]), sides(a, b)
     try:
-        shares = [_share(both, name, level) for name, level in limits]
-        shares += [_share(both, ANY_LIMIT, 1.0)] if a.limits and b.limits else []
+        rows = [_share(both, *limit) for limit in [*limits, *([(ANY_LIMIT, 1.0)] if a.limits and b.limits else [])]]
         loads = [row for name in names for row in _statistics(both, name)]
     except ValueError as error:
         raise StoreError(str(Fault(f"{a.path}, {b.path}", str(error), "resume both campaigns"))) from error
-    switched = [row for name, level in limits for row in _switched(both, name, level)] if both.paired else []
+    switched = [row for limit in limits for row in _switched(both, *limit)] if both.paired else []
     differing = changes(a, b)
     every = [{"key": key, "a": one, "b": other} for keys, one, other in differing for key in keys]
     return Answer(
         "compare",
         "Two campaigns side by side",
         [
-            Panels([panel for name in names[:MAX_LOADS] for panel in _panels(both, name, shares, loads)]),
-            Table("shares", "Shares above the limits", _share_columns(both.paired) if shares else (), shares),
-            Table("loads", "Quantiles and means", LOADS if by or not shares else (), loads),
+            Panels([panel for name in names[:MAX_LOADS] for panel in _panels(both, name, rows, loads)]),
+            Table("shares", "Shares above the limits", _share_columns(both.paired) if rows else (), rows),
+            Table("loads", "Quantiles and means", LOADS if by or not rows else (), loads),
             Table("switched", "Pairs with one joint above a limit", (), switched),
             Table("changes", "Differences between the studies", (), every),
             *map(Sentence, _notes(both, differing, len(switched))),
@@ -289,11 +272,12 @@ def _notes(both: Sides, differing: Sequence[tuple[list[str], Any, Any]], switche
         yield f"{switched} times only one joint of a pair is above a limit"
     else:
         yield f"{a} and {b} joints with different random numbers"
-    if unresolved := both.unresolved:
+    counts = [Counts.of(view.status[own]) for view, own in zip(both.views, both.samples, strict=True)]
+    if unresolved := sum(own.failed + own.unsettled for own in counts):
         bounds = "the bounds in JSON and CSV count them below, then above"
         yield f"{unresolved} joints without a valid load: left out; {bounds}"
     if not both.has_intervals:
-        yield "no intervals: they hold for independent samples only"
+        yield NO_INTERVALS
 
 
 def _in_words(value: object) -> str:
@@ -303,60 +287,42 @@ def _in_words(value: object) -> str:
     return "nothing" if value is None else re.sub(r"(?<=[A-Za-z])\*(?=[A-Za-z])", " ", str(value))
 
 
-def _panels(both: Sides, name: str, shares: Rows, loads: Rows) -> Iterator[Panel]:
+def _panels(both: Sides, name: str, rows: Rows, loads: Rows) -> Iterator[Panel]:
     """Pictures of a load: exceedance of both campaigns, and their difference, with pointwise 95 % intervals."""
-    a, b = both.load(name)
-    limits = [row["level"] for row in shares if row["load"] == name]
-    labels = [f"{side}: {view.path.stem}" for side, view in zip("AB", both.views, strict=True)]
+    limits = [row["level"] for row in rows if row["load"] == name]
     band = ["95 % band"] if both.has_intervals else []
-    curves = partial(_draw_curves, a=a, b=b, labels=[*labels, *band], limits=limits)
-    top = drawing.legend_room([*labels, *band])
+    labels = [*(f"{side}: {view.path.stem}" for side, view in zip("AB", both.views, strict=True)), *band]
+    draw = partial(_draw, both=both, name=name, limits=limits)
     median = next(row for row in loads if row["load"] == name and row["statistic"] == "50 %")
-    medians = " and ".join(text.value(median[side], a.unit) for side in "ab")
-    yield Panel(name, f"{name}: joints above a load", f"Medians of A and B: {medians}", curves, SIZE, top=top)
+    words = f"Medians of A and B: {' and '.join(text.value(median[side], median['unit']) for side in 'ab')}"
+    curves, top = partial(draw, labels=labels, change=False), drawing.legend_room(labels)
+    yield Panel(name, f"{name}: joints above a load", words, curves, SIZE, top=top)
     title, key = f"{name}: B less A{', pairs' if both.paired else ''}", f"{name}-difference"
-    change = partial(_draw_difference, a=a, b=b, paired=both.paired, labels=band, limits=limits)
-    description = "Difference of the shares of the joints above a load"
-    yield Panel(key, title, description, change, SIZE, top=drawing.legend_room(band) if band else Panel.top)
+    words = "Difference of the shares of the joints above a load"
+    change, top = partial(draw, labels=band, change=True), drawing.legend_room(band) if band else Panel.top
+    yield Panel(key, title, words, change, SIZE, top=top)
 
 
-def _draw_curves(ax: Axes, a: Sample, b: Sample, labels: Sequence[str], limits: Sequence[float]) -> None:
-    """Draw the exceedance of both campaigns; of `labels` the third is that of the bands, if they have any."""
+def _draw(ax: Axes, both: Sides, name: str, limits: Sequence[float], labels: Sequence[str], change: bool) -> None:
+    """Draw the exceedance of both campaigns, or the share of B less that of A; the last of `labels` is of the bands."""
+    a, b = both.load(name)
     levels, floor = _levels(a.values, b.values), 0.5 / max(a.values.size, b.values.size)
-    handles: list[Any] = []
-    for load, colour, dash in zip((a, b), style.COLOURS, style.DASHES, strict=False):
-        table = load.curve(levels)
-        handles += ax.step(levels, table["estimate"].clip(0.1 * floor), where="post", color=colour, ls=dash)
-        if len(labels) > 2:
-            ends = table["lower"].clip(0.1 * floor), table["upper"]
-            ax.fill_between(levels, *ends, step="post", color=colour, alpha=0.2, lw=0)
-    _frame(ax, a, labels, handles, limits)
-    style.share_axis(ax, floor)
-    ax.set_ylabel("share of the joints above x")
-
-
-def _draw_difference(
-    ax: Axes, a: Sample, b: Sample, paired: bool, labels: Sequence[str], limits: Sequence[float]
-) -> None:
-    """Draw the share of B less that of A; `labels` has that of the band, if there is one."""
-    levels = _levels(a.values, b.values)
-    found = difference.shares(a, b, levels, paired)
-    ax.axhline(0.0, color=style.FAINT, lw=1.0)
-    ax.step(levels, 100.0 * found.estimate, where="post", color=style.INK)
+    if change:
+        ax.axhline(0.0, color=style.FAINT, lw=1.0)
+        found = difference.shares(a, b, levels, both.paired)
+        curves = [100.0 * np.array([found.estimate, found.lower, found.upper])]
+    else:
+        tables = (load.curve(levels) for load in (a, b))
+        curves = [np.array([own[end] for end in ("estimate", "lower", "upper")]).clip(0.1 * floor) for own in tables]
+    look: Any = {"step": "post", "colours": (style.INK,) if change else style.COLOURS}
+    handles = drawing.curves(ax, levels, curves, limits, bands=len(curves) if both.has_intervals else 0, **look)
     if labels:
-        ax.fill_between(levels, 100.0 * found.lower, 100.0 * found.upper, step="post", color=style.INK, alpha=0.2, lw=0)
-    _frame(ax, a, labels, [], limits)
-    ax.set_ylabel("B less A, % of the joints")
-
-
-def _frame(ax: Axes, load: Sample, labels: Sequence[str], handles: Sequence[Any], limits: Sequence[float]) -> None:
-    """Draw limits, legend, and label of the x axis."""
-    for level in limits:
-        ax.axvline(level, color=style.FAINT, lw=1.0, ls=style.DASHES[2])
-    if labels:
-        band = [patches.Patch(color=style.FAINT, alpha=0.3, lw=0)] * (len(labels) - len(handles))
-        drawing.legend_above(ax, [*handles, *band], labels)
-    ax.set_xlabel(f"x [{unit_text(load.unit)}]" if load.unit != "1" else "x")
+        band = [patches.Patch(color=style.FAINT, alpha=0.3, lw=0)] if both.has_intervals else []
+        drawing.legend_above(ax, [*([] if change else handles), *band], labels)
+    ax.set_xlabel(f"x [{unit_text(a.unit)}]" if a.unit != "1" else "x")
+    ax.set_ylabel("B less A, % of the joints" if change else "share of the joints above x")
+    if not change:
+        style.share_axis(ax, floor)
 
 
 def _levels(a: FloatArray, b: FloatArray) -> FloatArray:

@@ -4,26 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from tolstat.analysis.sample import Sample
-from tolstat.common.errors import Fault, NotApplicable
 from tolstat.common.loads import FloatArray
 from tolstat.common.tables import VALID
 from tolstat.common.units import DISPLAY_UNITS
 from tolstat.display import drawing, style, text
-from tolstat.display.answer import Answer, Part, Sentence
+from tolstat.display.answer import Answer, Axes, Panel, Panels, Part, Sentence
 from tolstat.display.asked import Asked
-from tolstat.display.blocks import Panel, Panels
 from tolstat.display.mpl import ticker
+from tolstat.questions.shares import inapplicable
 from tolstat.store.view import View
 from tolstat.study import axes
 from tolstat.study.tolerances.entry import SingleEntry
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 JOINTS = 20_000
 """Maximum number of joints (the first ones) whose errors are counted."""
@@ -87,15 +83,14 @@ def histograms(view: View) -> Answer:
     InputError, StoreError
         When the study cannot be read.
     """
-    return _answer(view, drawn(view) if view.sampled else [])
+    return _answer(view, drawn(view))
 
 
 def histograms_on_page(view: View, asked: Asked) -> Answer:
     """As `histograms`; the loads alone if the study cannot be read."""
     found: list[Drawn] = []
-    if view.sampled:
-        with asked.noting("no histograms of errors"):
-            found = drawn(view)
+    with asked.noting("no histograms of errors"):
+        found = drawn(view)
     return _answer(view, found)
 
 
@@ -103,33 +98,33 @@ def drawn(view: View) -> list[Drawn]:
     """Histogram of the errors of each entry, in the study's order, over the first `JOINTS` joints.
 
     Joints are counted by their weights. Entries that say more than one thing, such as zones of offset and tilt, have
-    several; empty for a study without tolerances.
+    several; empty for joints that are no sample of a production, and for a study without tolerances.
 
     Raises
     ------
     InputError, StoreError
         When the study cannot be read.
     """
-    found: dict[tuple[Any, ...], list[str]] = {}
+    found: dict[tuple[Any, ...], dict[str, None]] = {}
     entries_of: dict[str, list[str]] = {}
-    for entry in view.study.entries:
+    for entry in view.study.entries if view.sampled and view.n else ():
         for site, model in entry.models:
-            band = model.band(site) if isinstance(model, SingleEntry) else None
-            for meaning in model.meaning(site):
-                found.setdefault((entry.pattern, meaning.number, meaning.unit, band), []).extend(meaning.errors)
-            for name in _moved(site.name, [name for meaning in model.meaning(site) for name in meaning.errors]):
+            band, meanings = model.band(site) if isinstance(model, SingleEntry) else None, model.meaning(site)
+            for meaning in meanings:
+                key = (entry.pattern, meaning.number, meaning.unit, band)
+                found.setdefault(key, {}).update(dict.fromkeys(meaning.errors))
+            for name in _moved(site.name, [name for meaning in meanings for name in meaning.errors]):
                 entries_of.setdefault(name, []).append(entry.pattern)
-    if not (found and view.n):
+    if not found:
         return []
     samples = np.arange(min(view.n, JOINTS))
     table = view.errors(samples, sorted({name for names in found.values() for name in names}))
     weights = view.design.counts_as(view.n)[: len(samples)]
     histograms = []
     for (pattern, number, unit, band), names in found.items():
-        errors = tuple(dict.fromkeys(names))
-        others = dict.fromkeys(own for name in errors for own in entries_of[name] if own != pattern)
-        counted = _counted_errors(np.concatenate([table[name] for name in errors]), np.tile(weights, len(errors)), band)
-        histograms.append(Drawn(pattern, number, errors, unit, band, counted[0], tuple(others), *counted[1:]))
+        others = dict.fromkeys(other for name in names for other in entries_of[name] if other != pattern)
+        counted = _counted(np.concatenate([table[name] for name in names]), np.tile(weights, len(names)), band)
+        histograms.append(Drawn(pattern, number, tuple(names), unit, band, counted[0], tuple(others), *counted[1:]))
     return histograms
 
 
@@ -158,17 +153,15 @@ def _moved(zone: str, errors: Sequence[str]) -> set[str]:
     return {*errors, *(axes.columns_of(zone) if tilts_pair else ())}
 
 
-def _counted_errors(
+def _counted(
     values: FloatArray, weights: FloatArray, band: tuple[float, float] | None
 ) -> tuple[float, FloatArray, FloatArray]:
     """Share outside the band, edges, and shares in the bins; the bins cover values and band."""
-    outside = np.nan
-    if band is not None:
-        beyond = (values < band[0]) | (values > band[1])
-        outside = float(weights[beyond].sum() / weights.sum())
-    low, high = min([values.min(), *(band or ())]), max([values.max(), *(band or ())])
+    ends = band or ()
+    outside = weights[(values < band[0]) | (values > band[1])].sum() / weights.sum() if band else np.nan
+    low, high = min([values.min(), *ends]), max([values.max(), *ends])
     edges = np.linspace(low, high, BINS + 1) if high > low else np.array([low, low + max(abs(low), 1e-9) * 1e-3])
-    return outside, edges, _shares(values, edges, weights)
+    return float(outside), edges, _shares(values, edges, weights)
 
 
 def _shares(values: FloatArray, edges: FloatArray, weights: FloatArray) -> FloatArray:
@@ -180,27 +173,22 @@ def _answer(view: View, found: Sequence[Drawn]) -> Answer:
     if view.sampled and view.leading and view.count(*VALID):
         parts.append(Panels([_load_panel(load) for load in view.loads(view.leading)]))
     if found:
-        said = "Small pictures: all errors that an entry of the tolerances sets, in one histogram; between the dashed "
-        said += "lines its tolerance band."
-        said += f" The first {JOINTS} joints." if view.n > JOINTS else ""
+        words = "Small pictures: all errors that an entry of the tolerances sets, in one histogram; between the dashed "
+        words += f"lines its tolerance band.{f' The first {JOINTS} joints.' if view.n > JOINTS else ''}"
         pictures = Panels([_drawn_panel(own, k, found) for k, own in enumerate(found)], small=True)
-        parts += [pictures, Sentence(f"{said} {view.design.counting}".rstrip())]
+        parts += [pictures, Sentence(f"{words} {view.design.counting}".rstrip())]
     if not parts:
         remedy = "give the result file of a study with [tolerances] whose joints are drawn at random"
-        raise NotApplicable(str(Fault(str(view.path), "holds no errors or loads of a random sample", remedy)))
+        raise inapplicable(view, "holds no errors or loads of a random sample", remedy)
     return Answer("histograms", "What was drawn, and the loads that came of it", parts)
 
 
 def _load_panel(load: Sample) -> Panel:
     median, most = (text.value(load.quantile(share).estimate, load.unit) for share in (0.5, 0.95))
     scale = "logarithmic" if load.long_tailed else "linear"
-    return Panel(
-        f"histogram-{load.name}",
-        f"{load.name}: distribution of the joints",
-        f"Half of the joints are below {median}, 95 % below {most}; scale of loads {scale}",
-        partial(_draw_load, load=load),
-        (4.9, 2.7),
-    )
+    title = f"{load.name}: distribution of the joints"
+    words = f"Half of the joints are below {median}, 95 % below {most}; scale of loads {scale}"
+    return Panel(f"histogram-{load.name}", title, words, partial(_draw_load, load=load), (drawing.WIDTH, 2.7))
 
 
 def _draw_load(ax: Axes, load: Sample) -> None:
@@ -231,15 +219,9 @@ def _drawn_panel(found: Drawn, k: int, every: Sequence[Drawn]) -> Panel:
     kind = f", {' and '.join(kinds)}" if sum(own.entry == found.entry for own in every) > 1 else ""
     outside = "" if found.band is None else f"; {text.percent(found.outside)} outside"
     others = f"; includes {' and '.join(found.others)}" if found.others else ""
-    return Panel(
-        f"drawn-errors-{k}",
-        f"{found.entry}{kind}: {found.number}{outside}{others}",
-        f"Histogram of {', '.join(found.errors)}",
-        partial(_draw_errors, found=found),
-        (2.5, 1.4),
-        0.15,
-        0.06,
-    )
+    title = f"{found.entry}{kind}: {found.number}{outside}{others}"
+    words, draw = f"Histogram of {', '.join(found.errors)}", partial(_draw_errors, found=found)
+    return Panel(f"drawn-errors-{k}", title, words, draw, (2.5, 1.4), 0.15, 0.06)
 
 
 def _draw_errors(ax: Axes, found: Drawn) -> None:

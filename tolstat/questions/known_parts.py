@@ -3,23 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from functools import partial
-from typing import TYPE_CHECKING
 
 from tolstat.analysis.sample import CONFIDENCE
-from tolstat.common.errors import Fault, NotApplicable
 from tolstat.common.loads import ANY_LIMIT
 from tolstat.display import drawing, style, text
-from tolstat.display.answer import Answer, Part, Sentence, Table
+from tolstat.display.answer import Answer, Axes, Column, Part, Row, Rows, Sentence, Table
 from tolstat.display.blocks import Panel, Panels, Text
 from tolstat.display.mpl import lines
-from tolstat.display.table import Column, Row, Rows
+from tolstat.questions import shares
 from tolstat.store import known_parts as known
 from tolstat.store.view import View
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 DRAWN = 6
 """Maximum number of shares in the picture."""
@@ -31,14 +25,21 @@ INTERVALS = {
     "both": ("both_lower", "both_upper", style.INK),
 }
 """Keys of the ends of each interval and its colour, from the top of a row of the picture."""
+OF_BOTH = ("expected", "parts_lower", "parts_upper", "both_lower", "both_upper", "unsupported")
+"""Keys of a row for the fields of `known_share.KnownShare`."""
 COLUMNS = (
     Column("load > limit", text.limit),
-    Column("share as stated", lambda row: text.percent(row["estimate"])),
-    Column("joints", lambda row: text.span(row["lower"], row["upper"])),
-    Column("parts", lambda row: text.span(row["parts_lower"], row["parts_upper"])),
-    Column("both", lambda row: text.span(row["both_lower"], row["both_upper"])),
-    Column("next joint", lambda row: text.percent(row["expected"]), rank=1),
-    Column("not supported", lambda row: text.percent(row["unsupported"]), rank=2),
+    Column("share as stated", shares.share("estimate")),
+    Column("joints", shares.shares("lower", "upper")),
+    Column("parts", shares.shares("parts_lower", "parts_upper")),
+    Column("both", shares.shares("both_lower", "both_upper")),
+    Column("next joint", shares.share("expected"), rank=1),
+    Column("not supported", shares.share("unsupported"), rank=2),
+)
+EXPLANATION = (
+    "Joints: the tolerances are as stated, and the joints are a sample. Parts: the process may be any that the "
+    "parts make likely. Both: the verdict's, with joints without a valid load and the numerical error. Grey line: "
+    "the share at the tolerances as stated."
 )
 
 
@@ -66,39 +67,29 @@ def known_parts(view: View) -> Answer:
     own = known.of(view)
     if own is None or not view.counts.done:
         remedy = "give an entry of [tolerances] known_from, and the study [limits]"
-        raise NotApplicable(str(Fault(str(view.path), "has no share that measured parts leave open", remedy)))
+        raise shares.inapplicable(view, "has no share that measured parts leave open", remedy)
     names = [*view.limits, *([ANY_LIMIT] if len(view.limits) > 1 else [])]
-    rows = [_row(view, own, name) for name in names]
-    rows.sort(key=lambda row: (row["load"] != ANY_LIMIT, -row["estimate"]))
+    rows = sorted(
+        (_row(view, own, name) for name in names), key=lambda row: (row["load"] != ANY_LIMIT, -row["estimate"])
+    )
     given = [row for row in rows if not math.isnan(row["both_upper"])][:DRAWN]
-    beside = [Text(line, small=True) for line in _how(own)]
-    parts: list[Part] = [Panels([_panel(given)], beside=beside)] if given else []
+    entries = ", ".join(f"{entry.pattern} from {entry.parts}" for entry in own.entries)
+    words = (f"Mean and deviation are estimated from measured parts: {entries}.", EXPLANATION)
+    parts: list[Part] = [Panels([_panel(given)], beside=[Text(line, small=True) for line in words])] if given else []
     parts.append(Table("intervals", "Shares above the limits, with what leaves them open", COLUMNS, rows))
     if len(given) < min(len(rows), DRAWN):
         most = text.percent(max(row["unsupported"] for row in rows))
-        words = f"The joints do not support {most} of the likely processes. {own.remedy}."
-        parts.append(Sentence(words, "lead"))
+        parts.append(Sentence(f"The joints do not support {most} of the likely processes. {own.remedy}.", "lead"))
     return Answer("known_parts", "Tolerances known from measured parts", parts)
 
 
 def _row(view: View, own: known.KnownParts, name: str) -> Row:
-    load, found = view.load(name), own.share(name, CONFIDENCE)
+    load = view.load(name)
     assert load.limit is not None
     above = load.above(load.limit)
-    row = {"load": load.name, "unit": load.unit, "level": load.limit}
-    row |= {"estimate": above.estimate, "lower": above.lower, "upper": above.upper, "expected": found.expected}
-    row |= {"parts_lower": found.parts_lower, "parts_upper": found.parts_upper}
-    return row | {"both_lower": found.lower, "both_upper": found.upper, "unsupported": found.unsupported}
-
-
-def _how(own: known.KnownParts) -> Iterator[str]:
-    entries = ", ".join(f"{entry.pattern} from {entry.parts}" for entry in own.entries)
-    yield f"Mean and deviation are estimated from measured parts: {entries}."
-    yield (
-        "Joints: the tolerances are as stated, and the joints are a sample. Parts: the process may be any that the "
-        "parts make likely. Both: the verdict's, with joints without a valid load and the numerical error. Grey line: "
-        "the share at the tolerances as stated."
-    )
+    row = {"load": name, "unit": load.unit, "level": load.limit}
+    row |= {key: getattr(above, key) for key in ("estimate", "lower", "upper")}
+    return row | dict(zip(OF_BOTH, own.share(name, CONFIDENCE), strict=True))
 
 
 def _panel(rows: Rows) -> Panel:
@@ -107,8 +98,8 @@ def _panel(rows: Rows) -> Panel:
     top = drawing.legend_room(list(INTERVALS), left)
     size = (drawing.WIDTH, 0.47 * len(rows) + drawing.BOTTOM + top + 0.1)
     spans = "; ".join(f"{row['load']}: {text.span(row['both_lower'], row['both_upper'])}" for row in rows)
-    title, description = "What joints and parts leave open", f"Intervals of both: {spans}"
-    return Panel("intervals", title, description, partial(_draw, rows=rows), size, left, top)
+    title = "What joints and parts leave open"
+    return Panel("intervals", title, f"Intervals of both: {spans}", partial(_draw, rows=rows), size, left, top)
 
 
 def _draw(ax: Axes, rows: Rows) -> None:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,46 +16,44 @@ from scipy.special import bdtr
 from tolstat.analysis import clustered, prediction
 from tolstat.analysis.clustered import Clustered, Delivery
 from tolstat.analysis.column import Column as Values
-from tolstat.analysis.design import Design
 from tolstat.analysis.sample import CONFIDENCE, Sample, total_interval
 from tolstat.campaign.work import Work
 from tolstat.common.errors import Fault, InputError, NotApplicable, StoreError
 from tolstat.common.loads import ANY_LIMIT
 from tolstat.common.tables import VALID
 from tolstat.display import drawing, style, text
-from tolstat.display.answer import Answer, Sentence, Table
+from tolstat.display.answer import Answer, Axes, Column, Panel, Panels, Row, Rows, Sentence, Table, has, has_unresolved
 from tolstat.display.asked import Asked
-from tolstat.display.blocks import Panel, Panels
 from tolstat.display.options import Accepted, Opt
-from tolstat.display.table import Column, Row, Rows, has
+from tolstat.questions import shares
 from tolstat.store import error_budget
 from tolstat.store.view import View
 from tolstat.study import Study, load
 from tolstat.study.rewriting import with_keys
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-Counts = tuple[NDArray[np.intp], NDArray[np.intp]]
-"""Joints above a limit, and joints, of each lot with a joint done, (lots,) each."""
+Integers = NDArray[np.intp]
 LOTS, JOINTS = 50, 20
 """Number of lots, and of joints of each, that are simulated unless told otherwise."""
 LINES = ("lots simulated", "expected of a new lot", "if joints did not depend on their lot")
 
+DELIVERY = 500
+"""Joints of the next delivery, unless another number is given."""
 COLUMNS = (
-    Column("load", lambda row: str(row["load"])),
-    Column("limit", lambda row: "-" if row["load"] == ANY_LIMIT else text.value(row["limit"], row["unit"])),
-    Column("above", lambda row: text.percent(row["estimate"])),
-    Column("total interval", lambda row: text.span(row["lower"], row["upper"])),
-    Column("lots without", lambda row: text.percent(row["without"]), rank=2),
-    Column("median lot", lambda row: text.percent(row["median"]), rank=4),
+    Column("load", shares.word("load")),
+    Column("limit", shares.limit),
+    Column("above", shares.share("estimate")),
+    Column("total interval", shares.shares("lower", "upper")),
+    Column("lots without", shares.share("without"), rank=2),
+    Column("median lot", shares.share("median"), rank=4),
     Column("one lot in ten", lambda row: f"> {text.percent(row['high'])}", rank=3),
-    Column("worst lot", lambda row: text.percent(row["worst"]), rank=1),
+    Column("worst lot", shares.share("worst"), rank=1),
     Column("correlation", lambda row: text.formed(row["correlation"], ".2f"), rank=5),
     Column("above in delivery", text.delivery),
-    Column("bad deliveries", lambda row: text.percent(row["bad"]), shown=has("bad")),
+    Column("bad deliveries", shares.share("bad"), shown=has("bad")),
 )
 """Columns of the table ``limits``; bad deliveries with an accepted share."""
+Joints = Annotated[int, Opt("N", 1, 10**5)]
+NewLots = Annotated[int, Opt("K", least=1)]
 
 
 def simulate(
@@ -63,6 +61,8 @@ def simulate(
     work: Work,
     number: Annotated[int | None, Opt("L", least=clustered.LEAST, name="lots")] = None,
     joints: Annotated[int | None, Opt("M", least=2)] = None,
+    delivery: Joints = DELIVERY,
+    from_lots: NewLots = 1,
 ) -> list[Path]:
     """Simulate lots of a study into ``STUDY_lots.h5``.
 
@@ -76,7 +76,10 @@ def simulate(
         Number of lots; default: that of STUDY, or 50.
     joints : int, optional
         Joints of each lot; default: those of STUDY, or 20.
+    delivery, from_lots : int
+        As in `lots`, so that what that refuses is not simulated.
     """
+    _check_delivery(delivery, from_lots)
     return [work.run(study_of(study, number, joints), f"{study.path.stem}_lots.h5")]
 
 
@@ -98,8 +101,8 @@ def study_of(study: Study, number: int | None = None, joints: int | None = None)
 
 def lots(
     view: View,
-    delivery: Annotated[int, Opt("N", 1, 10**5)] = 500,
-    from_lots: Annotated[int, Opt("K", least=1)] = 1,
+    delivery: Joints = DELIVERY,
+    from_lots: NewLots = 1,
     accepted: Accepted = math.nan,
 ) -> Answer:
     """Compute which share of a lot or of a delivery exceeds limits.
@@ -145,40 +148,34 @@ def lots(
     StoreError
         When fewer than `clustered.LEAST` lots have joints done.
     """
-    if delivery < from_lots:
-        raise InputError([Fault("--from-lots", f"{from_lots} lots of {delivery} joints", "give fewer lots")])
-    _check(view)
-    loads = [*view.loads(list(view.limits)), view.load(ANY_LIMIT)]
-    known: dict[bytes, Delivery] = {}
+    _check_delivery(delivery, from_lots)
+    design, joints = _lots_of(view)
+    n = joints[joints > 0]
 
-    def predicted(counts: Counts) -> Delivery:
-        key = b"".join(own.tobytes() for own in counts)  # equal counts have one prediction
-        if key not in known:
-            known[key] = clustered.law_of(*counts).delivery(delivery, from_lots)
-        return known[key]
+    def above(x: Values, limit: float | None) -> Integers:
+        return np.asarray(design.counts(x, [limit or 0.0])[0][joints > 0, 0], dtype=np.intp)
 
-    rows = []
-    for own in loads:
-        samples = error_budget.with_error(view, own)
-        least = predicted(_counted(own, samples[1 % len(samples)].lower))
-        most = predicted(_counted(own, samples[-1].upper))
-        bad = math.nan if math.isnan(accepted) else most.more_than(accepted)
-        ends = prediction.columns((least.ends()[0], most.ends()[1]), delivery)
-        rows.append({**_shares(own, samples), **ends, "from_lots": from_lots, "bad": bad})
-    counts = {own.name: _counted(own, own.value) for own in loads}
-    above, n = counts[ANY_LIMIT]
-    columns = {"lot": _numbers(loads[-1]), "n": n} | {name: own[0] for name, own in counts.items()}
-    of_lots = [dict(zip(columns, values, strict=True)) for values in zip(*columns.values(), strict=True)]
-    size = int(view.store.sampling["joints_per_lot"])
+    @cache
+    def predicted(*counts: int) -> Delivery:
+        return clustered.law_of(counts, n).delivery(delivery, from_lots)
+
+    rows, counts = [], {}
+    for sample in view.loads([*view.limits, ANY_LIMIT]):
+        ends, counts[sample.name] = error_budget.with_error(view, sample), above(sample.value, sample.limit)
+        least, most = (predicted(*above(x, sample.limit)) for x in (ends[1 % len(ends)].lower, ends[-1].upper))
+        row = _shares(sample, ends, counts[sample.name], n)
+        row |= prediction.columns((least.ends()[0], most.ends()[1]), delivery) | {"from_lots": from_lots}
+        rows.append(row | {"bad": math.nan if math.isnan(accepted) else most.more_than(accepted)})
+    numbers, size = design.numbers[joints > 0], int(view.store.sampling["joints_per_lot"])
+    notes = [*_notes(rows, size, accepted), error_budget.unknown(view)]
     return Answer(
         "lots",
         "Lots, and the next delivery",
         [
-            Panels([_panel(rows[-1], above, n, size)]),
+            Panels([_panel(rows[-1], counts[ANY_LIMIT], n, size)]),
             Table("limits", "Lots against each limit, and all of them together", COLUMNS, rows),
-            Table("lots", "Joints above the limits, by lot", (), of_lots),
-            *map(Sentence, _notes(rows, size, accepted)),
-            *([Sentence(unknown)] if (unknown := error_budget.unknown(view)) else []),
+            Table("lots", "Joints above the limits, by lot", (), shares.rows_of({"lot": numbers, "n": n} | counts)),
+            *(Sentence(note) for note in notes if note),
         ],
         {"joints_per_lot": size},
     )
@@ -197,51 +194,35 @@ def lots_on_page(view: View, asked: Asked) -> Answer:
     return replace(answer, parts=[part for part in answer.parts if part != unknown])
 
 
-def _check(view: View) -> None:
-    """Raise a StoreError for a file whose lots tell nothing; the hint names what can be used."""
-    own = view.load(ANY_LIMIT) if view.limits and isinstance(view.design, Clustered) else None
-    if own is None:
-        alone = not isinstance(view.design, Clustered)
-        found = "holds joints that are each its own lot" if alone else "is of a study without [limits]"
+def _check_delivery(delivery: int, from_lots: int) -> None:
+    if delivery < from_lots:
+        raise InputError([Fault("--from-lots", f"{from_lots} lots of {delivery} joints", "give fewer lots")])
+
+
+def _lots_of(view: View) -> tuple[Clustered, Integers]:
+    """Design of a file, and the joints done of each lot, (lots,); raises a StoreError where lots tell nothing."""
+    if not isinstance(view.design, Clustered) or not view.limits:
+        in_lots = isinstance(view.design, Clustered)
+        found = "is of a study without [limits]" if in_lots else "holds joints that are each its own lot"
         remedy = "give the file of a study with [limits], or simulate its lots: tolstat lots STUDY"
-        raise NotApplicable(str(Fault(str(view.path), found, remedy)))
-    done = len(_counted(own, own.value)[1])
-    if done < clustered.LEAST:
+        raise shares.inapplicable(view, found, remedy)
+    joints = view.design.counts(view.load(ANY_LIMIT).upper, [1.0])[1].astype(np.intp)
+    if (done := np.count_nonzero(joints)) < clustered.LEAST:
         found = f"has joints of {done} lots simulated, and fewer than {clustered.LEAST} have no interval"
-        remedy = "simulate the others: run the same command again, or tolstat run STUDY"
-        raise StoreError(str(Fault(str(view.path), found, remedy)))
+        raise shares.unusable(view, found, "simulate the others: run the same command again, or tolstat run STUDY")
+    return view.design, joints
 
 
-def _lots_of(design: Design) -> Clustered:
-    assert isinstance(design, Clustered)
-    return design
-
-
-def _counted(own: Sample, x: Values) -> Counts:
-    """Joints above the limit of a load, by its values or their lower or upper ends `x`, and joints of each lot."""
-    lots, levels = _lots_of(own.design), [own.limit or 0.0]
-    n = lots.counts(own.upper, levels)[1]
-    return lots.counts(x, levels)[0][n > 0, 0].astype(np.intp), n[n > 0].astype(np.intp)
-
-
-def _numbers(own: Sample) -> NDArray[np.intp]:
-    """Number of each lot with a joint done."""
-    lots = _lots_of(own.design)
-    return lots.numbers[lots.counts(own.upper, [1.0])[1] > 0]
-
-
-def _shares(own: Sample, samples: tuple[Sample, ...]) -> Row:
-    """Shares of the joints and of the lots above the limit of a load."""
-    assert own.limit is not None
-    above = own.above(own.limit)
-    low, high = total_interval(samples, own.limit, CONFIDENCE)
-    count, n = _counted(own, own.value)
-    share = count / n
-    row = {"load": own.name, "unit": own.unit, "limit": own.limit, "lots": len(n)}
-    row |= {key: getattr(above, key) for key in ("n", "n_failed", "n_unsettled", "count", "estimate")}
-    row |= {"lower": low, "upper": high, "correlation": float(clustered.interval(count, n).correlation)}
-    row |= {"without": float(np.mean(count == 0)), "median": float(np.median(share))}
-    return row | {"high": float(np.quantile(share, 0.9, method="inverted_cdf")), "worst": float(share.max())}
+def _shares(sample: Sample, ends: tuple[Sample, ...], count: Integers, n: Integers) -> dict[str, Any]:
+    """Shares of the joints and of the lots above the limit of a load, `count` of `n` joints in each lot."""
+    assert sample.limit is not None
+    share, above = count / n, sample.above(sample.limit)
+    low, high = total_interval(ends, sample.limit, CONFIDENCE)
+    row = {"load": sample.name, "unit": sample.unit, "limit": sample.limit, "lots": len(n), **shares.counts(above)}
+    row |= {"estimate": above.estimate, "lower": low, "upper": high}
+    row |= {"correlation": float(clustered.interval(count, n).correlation), "without": float(np.mean(count == 0))}
+    row |= {"median": float(np.median(share)), "high": float(np.quantile(share, 0.9, method="inverted_cdf"))}
+    return row | {"worst": float(share.max())}
 
 
 def _notes(rows: Rows, size: int, accepted: float) -> Iterator[str]:
@@ -251,32 +232,31 @@ def _notes(rows: Rows, size: int, accepted: float) -> Iterator[str]:
     yield f"delivery: {delivery} joints of {origin}, 95 % prediction interval"
     if not math.isnan(accepted):
         yield f"bad deliveries: more than {text.percent(accepted)} of the joints above"
-    if any(row["n_failed"] + row["n_unsettled"] for row in rows):
+    if has_unresolved(rows):
         yield "joints without a valid load: below a limit at lower ends, above it at upper ends"
 
 
-def _panel(row: Row, above: NDArray[np.intp], n: NDArray[np.intp], size: int) -> Panel:
+def _panel(row: Row, above: Integers, n: Integers, size: int) -> Panel:
     """Picture of the shares of the lots that exceed at least one limit; `row` is that of all limits together."""
     title = f"{row['lots']} lots: which share of their joints is bad"
     half, worst = text.percent(row["median"]), text.percent(row["worst"])
     description = f"Half of the lots have at most {half}, the worst has {worst}"
     draw = partial(_draw, above=above, n=n, size=size)
-    return Panel("lots", title, description, draw, (4.9, 3.2), top=drawing.legend_room(LINES))
+    return Panel("lots", title, description, draw, (drawing.WIDTH, 3.2), top=drawing.legend_room(LINES))
 
 
-def _draw(ax: Axes, above: NDArray[np.intp], n: NDArray[np.intp], size: int) -> None:
+def _draw(ax: Axes, above: Integers, n: Integers, size: int) -> None:
     """Draw the share of the lots with at most a share of bad joints: simulated, expected, and without lots."""
     share = np.sort(above / n)
     top = max(2, int(np.ceil(size * min(1.0, share[-1] * 1.15 + 1.0 / size))))
-    at = np.arange(top + 1)
+    at, x = np.arange(top + 1), np.arange(top + 2) / size
     expected = np.cumsum(clustered.law_of(above, n).delivery(size).probability)[at]
     alone = bdtr(at, size, above.sum() / n.sum())
-    x = np.append(at / size, (top + 1) / size)
     for cdf, colour, dash in ((alone, style.FAINT, style.DASHES[2]), (expected, style.COLOURS[1], style.DASHES[1])):
         ax.step(x, 100.0 * np.append(cdf, cdf[-1]), where="post", color=colour, ls=dash)
     steps = 100.0 * np.arange(1, share.size + 1) / share.size
     ax.step(np.append(share, x[-1]), np.append(steps, 100.0), where="post", color=style.COLOURS[0])
-    drawing.legend_above(ax, [ax.lines[2], ax.lines[1], ax.lines[0]], LINES)
+    drawing.legend_above(ax, ax.lines[::-1], LINES)
     ax.set(xlim=(0.0, x[-1]), ylim=(0.0, 104.0), ylabel="lots with at most this share [%]")
     ax.xaxis.set_major_formatter(lambda value, _: f"{100.0 * value:g} %")
     ax.set_xlabel("share of the joints of a lot that exceed at least one limit")

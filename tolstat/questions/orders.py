@@ -2,33 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tolstat.analysis.sample import CONFIDENCE
 from tolstat.common.columns import RESULT_COLUMNS
-from tolstat.common.errors import Fault, NotApplicable, StoreError
+from tolstat.common.errors import NotApplicable
 from tolstat.common.load_kinds import LOAD_KINDS, ORDERS, SHAFTS
-from tolstat.common.loads import LOADS, load_of
+from tolstat.common.loads import LOADS, FloatArray, load_of
 from tolstat.common.tables import VALID
 from tolstat.display import drawing, style, text
-from tolstat.display.answer import Answer, Part, Sentence, Table
+from tolstat.display.answer import Answer, Axes, Column, Panel, Panels, Part, Row, Rows, Sentence, Table, has
 from tolstat.display.asked import Asked
-from tolstat.display.blocks import Panel, Panels
 from tolstat.display.mpl import lines, patches, ticker
-from tolstat.display.table import Column, Row, Rows, has
+from tolstat.questions.shares import unusable, value, values, word
 from tolstat.store import revolutions
 from tolstat.store.points import point_of
 from tolstat.store.view import View
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-SHARES = {"5": 0.05, "median": 0.5, "95": 0.95}
+SHARES = {"q5": 0.05, "qmedian": 0.5, "q95": 0.95}
 """Shares of the joints at which quantiles of an amplitude are given, by key."""
 NEAR = {"median": 0.5, "95 %": 0.95}
 """Quantiles of the largest lateral force; the orbit of the joint nearest to each is shown."""
@@ -75,7 +69,7 @@ class Orbit(NamedTuple):
     near: str
     row: int
     point: str
-    force: NDArray[np.float64]
+    force: FloatArray
 
     @property
     def label(self) -> str:
@@ -83,33 +77,20 @@ class Orbit(NamedTuple):
         return LOOKS[self.near][0]
 
     @property
-    def place(self) -> str:
-        """The shaft, and the operating point if it has a name."""
-        return f"{self.shaft} shaft{f' at {self.point}' if self.point else ''}"
-
-    @property
     def largest(self) -> float:
         """Largest force, N."""
         return float(np.linalg.norm(self.force, axis=1).max())
 
 
-def _value(key: str) -> Callable[[Row], str]:
-    return lambda row: text.value(row[key], row["unit"])
-
-
-def _interval(key: str) -> Callable[[Row], str]:
-    return lambda row: text.span_of(row[f"{key}_lower"], row[f"{key}_upper"], row["unit"])
-
-
 COLUMNS = (
-    Column("amplitude", lambda row: str(row["load"])),
-    Column("nominal joint", _value("nominal")),
-    Column("5 %", _value("q5")),
-    Column("interval of 5 %", _interval("q5"), shown=has("q5_lower"), rank=3),
-    Column("median", _value("qmedian")),
-    Column("interval of median", _interval("qmedian"), shown=has("qmedian_lower"), rank=2),
-    Column("95 %", _value("q95")),
-    Column("interval of 95 %", _interval("q95"), shown=has("q95_lower"), rank=1),
+    Column("amplitude", word("load")),
+    Column("nominal joint", value("nominal")),
+    Column("5 %", value("q5")),
+    Column("interval of 5 %", values("q5_lower", "q5_upper"), shown=has("q5_lower"), rank=3),
+    Column("median", value("qmedian")),
+    Column("interval of median", values("qmedian_lower", "qmedian_upper"), shown=has("qmedian_lower"), rank=2),
+    Column("95 %", value("q95")),
+    Column("interval of 95 %", values("q95_lower", "q95_upper"), shown=has("q95_lower"), rank=1),
 )
 """Columns of the table ``amplitudes``: quantiles over the joints with their intervals."""
 
@@ -151,30 +132,27 @@ def orders(view: View, orbits: bool = False) -> Answer:
     names = [name for name in view.kept_loads if LOADS[name].kind.orders]
     if not names:
         remedy = 'let [output] results of the study select them, such as "*_1x_max", and run it again'
-        raise StoreError(str(Fault(str(view.path), "holds no amplitudes of orders", remedy)))
+        raise unusable(view, "holds no amplitudes of orders", remedy)
     joints = view.count(*VALID)
     if not joints:
-        raise StoreError(str(Fault(str(view.path), "has no joint with a valid result", "resume the campaign")))
-    names.sort(key=lambda name: LOAD_KINDS.index(LOADS[name].kind))
-    rows = [_amplitude(view, name) for name in names]
+        raise unusable(view, "has no joint with a valid result", "resume the campaign")
+    rows = [_amplitude(view, name) for name in sorted(names, key=lambda name: LOAD_KINDS.index(LOADS[name].kind))]
     facts: dict[str, Any] = {"joints": joints, "left_out": view.counts.done - joints}
     parts: list[Part] = [Table("amplitudes", "Amplitudes over the joints", COLUMNS, rows)]
-    counts = f"{joints} joints, {facts['left_out']} without a valid load left out"
+    notes = [f"{joints} joints, {facts['left_out']} without a valid load left out"]
     if has("q95_lower")(rows):
-        notes = [f"{counts}; 95 % intervals"]
+        notes[0] += "; 95 % intervals"
     else:
-        notes = [counts, "no intervals: the joints are not independent"]
+        notes.append("no intervals: the joints are not independent")
     found, origin, apart = _orbits(view) if orbits else ([], "", 0.0)
     if found:
         facts |= {"origin": origin, "apart": apart}
         points, units = [row for orbit in found for row in _points(orbit)], {"theta": "rad", "f_x": "N", "f_y": "N"}
         parts.append(Table("orbits", "Lateral force over one revolution", (), points, units))
-        notes.append(f"{_which(found)}; {ORIGIN[origin]}")
+        notes.append(f"orbits: {'; '.join(_which(found))}; nearest in the largest lateral force; {ORIGIN[origin]}")
     if apart:
-        notes.append(
-            f"largest loads of these joints differ by up to {apart:.1e} (relative) from the stored ones, which "
-            "another machine or version computed"
-        )
+        words = f"largest loads of these joints differ by up to {apart:.1e} (relative) from the stored ones"
+        notes.append(f"{words}, which another machine or version computed")
     drawn = Panels([*_amplitude_panels(rows), *_orbit_panels(found)])
     return Answer("orders", "Orders of what the shafts carry", [drawn, *parts, *map(Sentence, notes)], facts)
 
@@ -196,15 +174,12 @@ def are_asked(view: View) -> bool:
 
 def _amplitude(view: View, name: str) -> Row:
     """One row of the table ``amplitudes``."""
-    load, kind = view.load(name), LOADS[name].kind
-    order = kind.orders[LOADS[name].element % len(kind.orders)]
-    quantity = ".".join(filter(None, (LOADS[name].place.name, kind.symbol)))
-    row = {"quantity": quantity, "noun": kind.noun, "order": order, "load": name, "unit": load.unit}
+    load, (quantity, _, order) = view.load(name), name.removesuffix("x").rpartition("_")
+    row = {"quantity": quantity, "noun": LOADS[name].kind.noun, "order": int(order), "load": name, "unit": load.unit}
     row["nominal"] = load.nominal
     for key, share in SHARES.items():
-        found = load.quantile(share, CONFIDENCE)
-        ends = {"lower": float(np.maximum(found.lower, 0.0)), "upper": found.upper}
-        row |= {f"q{key}": found.estimate} | {f"q{key}_{end}": value for end, value in ends.items()}
+        found = load.quantile(share)
+        row |= {key: found.estimate, f"{key}_lower": max(found.lower, 0.0), f"{key}_upper": found.upper}
     return row
 
 
@@ -216,24 +191,17 @@ def _orbits(view: View) -> tuple[list[Orbit], str, float]:
         if name not in view.kept_loads or not view.load(name).valid.size:
             continue
         at = view.at(point_of(view, name))
+        load, slots = at.load(name), {"nominal": int(at.nominal_slots[0])} if at.nominal_slots.size else {}
+        for near, share in NEAR.items():
+            away = np.abs(load.values - load.quantile(share).estimate)
+            slots |= {near: int(at.slots(np.nanargmin(away)))} if np.isfinite(away).any() else {}
         names, samples = [f"{shaft}.f_x", f"{shaft}.f_y"], int(at.store.options["steps_per_rev"])
-        for near, slot in _near(at, name).items():
+        for near, slot in slots.items():
             read = revolutions.read(at.store, np.array([slot]), names, samples)
-            force = np.column_stack([read.loads[own][0] for own in names])
+            force = np.column_stack([read.loads[component][0] for component in names])
             origin, apart = read.origin, max(apart, read.apart)
             found.append(Orbit(shaft, near, int(at.store.row(slot)), at.points[0], force))
     return found, origin, apart
-
-
-def _near(view: View, name: str) -> dict[str, int]:
-    """File slots of the joints whose orbits are shown for a lateral force, by `Orbit.near`."""
-    load = view.load(name)
-    found = {"nominal": int(view.nominal_slots[0])} if view.nominal_slots.size else {}
-    for near, share in NEAR.items():
-        apart = np.abs(load.values - load.quantile(share).estimate)
-        if np.isfinite(apart).any():
-            found[near] = int(view.slots(np.nanargmin(apart)))
-    return found
 
 
 def _points(orbit: Orbit) -> Rows:
@@ -243,54 +211,48 @@ def _points(orbit: Orbit) -> Rows:
     return [head | {"theta": angle, "f_x": x, "f_y": y} for angle, (x, y) in zip(theta, orbit.force, strict=True)]
 
 
-def _which(orbits: Sequence[Orbit]) -> str:
-    """Words on which joints the orbits are of."""
-    of_shaft: dict[str, list[str]] = {}
-    for orbit in orbits:
-        of_shaft.setdefault(orbit.place, []).append(f"{orbit.label} row {orbit.row}")
-    parts = [f"{place} {', '.join(joints)}" for place, joints in of_shaft.items()]
-    return f"orbits: {'; '.join(parts)}; nearest in the largest lateral force"
+def _which(orbits: Sequence[Orbit]) -> Iterator[str]:
+    """Words on which joints the orbits of each shaft are of."""
+    for (shaft, point), own in _by_shaft(orbits).items():
+        place = f"{shaft} shaft{f' at {point}' if point else ''}"
+        yield f"{place} {', '.join(f'{orbit.label} row {orbit.row}' for orbit in own)}"
 
 
-def _amplitude_panels(rows: Rows) -> list[Panel]:
+def _by_shaft(orbits: Sequence[Orbit]) -> dict[tuple[str, str], list[Orbit]]:
+    """Orbits by shaft and operating point."""
+    places = dict.fromkeys((orbit.shaft, orbit.point) for orbit in orbits)
+    return {place: [orbit for orbit in orbits if (orbit.shaft, orbit.point) == place] for place in places}
+
+
+def _amplitude_panels(rows: Rows) -> Iterator[Panel]:
     """Pictures of the amplitude over the order, one of each quantity."""
-    panels = []
     for name in dict.fromkeys(row["quantity"] for row in rows):
         own = [row for row in rows if row["quantity"] == name]
-        most, noun, (place, _, _) = max(own, key=_median), own[0]["noun"], name.rpartition(".")
-        where = f", {place} shaft" if place else ""
-        title = f"{noun[0].upper()}{noun[1:]}{where}".replace("Psi", "Ψ")
-        largest = f"order {most['order']}, {text.value(most['qmedian'], most['unit'])}"
-        words = f"The median of the joints is largest at {largest}."
+        most, noun, (place, _, _) = (
+            max(own, key=lambda row: float(row["qmedian"])),
+            own[0]["noun"],
+            name.rpartition("."),
+        )
+        title = f"{noun[0].upper()}{noun[1:]}{f', {place} shaft' if place else ''}".replace("Psi", "Ψ")
+        words = f"The median of the joints is largest at order {most['order']}, {value('qmedian')(most)}."
         draw, room = partial(_bars, rows=own), drawing.legend_room(AMPLITUDES)
-        panels.append(Panel(f"amplitude-{name}", title, words, draw, (drawing.WIDTH, 2.7), top=room))
-    return panels
+        yield Panel(f"amplitude-{name}", title, words, draw, (drawing.WIDTH, 2.7), top=room)
 
 
-def _median(row: Row) -> float:
-    return float(row["qmedian"])
-
-
-def _orbit_panels(orbits: Sequence[Orbit]) -> list[Panel]:
+def _orbit_panels(orbits: Sequence[Orbit]) -> Iterator[Panel]:
     """Pictures of the lateral force on each shaft."""
-    panels = []
-    for shaft in dict.fromkeys(orbit.shaft for orbit in orbits):
-        own = [orbit for orbit in orbits if orbit.shaft == shaft]
-        at = f", at {own[0].point}" if own[0].point else ""
-        title = f"Lateral force on the {shaft} shaft over one revolution{at}"
+    for (shaft, point), own in _by_shaft(orbits).items():
+        title = f"Lateral force on the {shaft} shaft over one revolution{f', at {point}' if point else ''}"
         words = "Orbit of the force in axes that do not turn, of the nominal joint and of two others. "
         words += " ".join(f"{orbit.label}: up to {text.value(orbit.largest, 'N')}." for orbit in own)
         draw, room = partial(_draw_orbits, orbits=own), drawing.legend_room([orbit.label for orbit in own])
-        panels.append(Panel(f"orbit-{shaft}", title, words, draw, (drawing.WIDTH, 4.6), top=room))
-    return panels
+        yield Panel(f"orbit-{shaft}", title, words, draw, (drawing.WIDTH, 4.6), top=room)
 
 
 def _bars(ax: Axes, rows: Rows) -> None:
     """Draw the nominal joint beside the median, with the range from 5 to 95 % of the joints."""
-    order, nominal, low, middle, high = (
-        np.array([row[key] for row in rows]) for key in ("order", "nominal", "q5", "qmedian", "q95")
-    )
-    nominal = np.nan_to_num(nominal)
+    keys = ("order", "nominal", "q5", "qmedian", "q95")
+    order, nominal, low, middle, high = (np.nan_to_num([row[key] for row in rows]) for key in keys)
     ends = np.clip([middle - low, high - middle], 0.0, None)
     ax.bar(order - 0.18, nominal, 0.32, color=drawing.GREY)
     ax.bar(order + 0.18, middle, 0.32, color=style.COLOURS[0])
@@ -303,12 +265,8 @@ def _bars(ax: Axes, rows: Rows) -> None:
     if not unit:
         ax.yaxis.set_major_formatter(ticker.FuncFormatter(lambda x, _: f"{x:.3g}"))
     ax.set_ylabel(f"amplitude [{unit or '1'}]")
-    handles = [
-        patches.Patch(color=drawing.GREY),
-        patches.Patch(color=style.COLOURS[0]),
-        lines.Line2D([], [], color=style.INK, lw=1.3, marker="|", ms=8.0),
-    ]
-    drawing.legend_above(ax, handles, AMPLITUDES)
+    bars = [patches.Patch(color=colour) for colour in (drawing.GREY, style.COLOURS[0])]
+    drawing.legend_above(ax, [*bars, lines.Line2D([], [], color=style.INK, lw=1.3, marker="|", ms=8.0)], AMPLITUDES)
 
 
 def _draw_orbits(ax: Axes, orbits: Sequence[Orbit]) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from shlex import quote
 from typing import Annotated, Any
@@ -19,13 +19,13 @@ from tolstat.analysis.prediction import DELIVERY
 from tolstat.analysis.reweight import Ratios
 from tolstat.analysis.sample import CONFIDENCE, Sample
 from tolstat.analysis.weighted import Weighted
-from tolstat.common.errors import Fault, InputError, StoreError
-from tolstat.common.loads import FloatArray
+from tolstat.common.errors import Fault, InputError
+from tolstat.common.loads import ANY_LIMIT, FloatArray
 from tolstat.common.tables import Status
 from tolstat.display import text
-from tolstat.display.answer import Answer, Document, Part, Sentence, Table
+from tolstat.display.answer import Answer, Column, Document, Row, Rows, Sentence, Table, has
 from tolstat.display.options import Delivery, Opt
-from tolstat.display.table import Column, Row, Rows, has
+from tolstat.questions import shares
 from tolstat.store import error_budget
 from tolstat.store.view import View
 from tolstat.study import Study
@@ -46,18 +46,6 @@ DRAWS = 1 << 15
 _ENDS = np.array([1e-12, 1 - 1e-12])
 
 
-def _value(key: str) -> Callable[[Row], str]:
-    return lambda row: text.value(row[key], row["unit"])
-
-
-def _share(key: str) -> Callable[[Row], str]:
-    return lambda row: text.percent(row[key])
-
-
-def _interval(key: str) -> Callable[[Row], str]:
-    return lambda row: text.span(row[f"{key}lower"], row[f"{key}upper"])
-
-
 def _any_unresolved(rows: Rows) -> bool:
     return any(row["bound_upper"] > row["bound_lower"] for row in rows)
 
@@ -65,21 +53,21 @@ def _any_unresolved(rows: Rows) -> bool:
 COUNTS = Column("counts as joints", lambda row: text.formed(row["ess"], ".0f"), rank=1)
 LIMITS = (
     Column("load > limit", text.limit),
-    Column("before", _share("before")),
-    Column("after", _share("estimate")),
-    Column("95 % interval", _interval("")),
+    Column("before", shares.share("before")),
+    Column("after", shares.share("estimate")),
+    Column("95 % interval", shares.shares("lower", "upper")),
     COUNTS,
-    Column("with numerical error", _interval("total_"), shown=has("total_lower"), rank=1),
-    Column("with unresolved joints", _interval("bound_"), shown=_any_unresolved, rank=2),
+    Column("with numerical error", shares.shares("total_lower", "total_upper"), shown=has("total_lower"), rank=1),
+    Column("with unresolved joints", shares.shares("bound_lower", "bound_upper"), shown=_any_unresolved, rank=2),
     Column("ppm", lambda row: text.ppm(row["estimate"]), rank=2),
     Column("above in delivery", text.delivery, rank=3),
 )
 """Columns of the table ``loads`` of a study with limits: shares above them."""
 QUANTILES = (
     Column("quantile", lambda row: f"{row['load']}, {100 * row['share']:g} % stay below"),
-    Column("before", _value("before")),
-    Column("after", _value("estimate")),
-    Column("95 % interval", lambda row: text.span_of(row["lower"], row["upper"], row["unit"])),
+    Column("before", shares.value("before")),
+    Column("after", shares.value("estimate")),
+    Column("95 % interval", shares.values("lower", "upper")),
     COUNTS,
 )
 """Columns of the table ``loads`` of a study without limits."""
@@ -142,36 +130,33 @@ def reweight(
     old = view.study.tolerances
     new = changed(view.study, settings)
     names = [name for name in new if new[name].describe() != old[name].describe()]
-    faults = [fault for name in names for fault in _check_range(name, old[name], new[name])]
-    if faults:
+    remedy = "run a study with these tolerances"
+    beyond = {name: _beyond(old[name], new[name]) for name in names}
+    if faults := [Fault(f"tolerances.{name}", found, remedy) for name, found in beyond.items() if found]:
         raise InputError(faults)
     done = np.flatnonzero(view.status != Status.PENDING)
     ratios = _ratios(view, new, names, done)
+    if not ratios.values.any():
+        raise shares.unusable(view, "the new tolerances make none of the joints", remedy)
     rows = _rows(view, done, ratios, delivery)
     verdict, usable = _verdict(ratios, rows), all(row["usable"] for row in rows)
     facts = {"usable": usable, "effective": ratios.effective, "needed": ratios.needed, "verdict": verdict}
-    title = "Shares above the limits" if view.limits else "Quantiles"
-    parts: list[Part] = [Table("loads", f"{title}, reweighted", LIMITS if view.limits else QUANTILES, rows)]
-    parts.append(Sentence(f"{len(names)} errors changed; {verdict}"))
-    if unknown := error_budget.unknown(view):
-        parts.append(Sentence(unknown))
-    if not usable:
-        parts.append(Sentence(f"fresh joints, same seeds: {_remedy(view, settings)}"))
-    parts.append(Document(".toml", rewritten(view.study, settings)))
-    return Answer("reweight", "Other tolerances", parts, facts | {"changed": names})
+    title, columns = ("Shares above the limits", LIMITS) if view.limits else ("Quantiles", QUANTILES)
+    again = "" if usable else f"fresh joints, same seeds: {_remedy(view, settings)}"
+    words = (f"{len(names)} errors changed; {verdict}", error_budget.unknown(view), again)
+    notes, other = [Sentence(note) for note in words if note], Document(".toml", rewritten(view.study, settings))
+    table = Table("loads", f"{title}, reweighted", columns, rows)
+    return Answer("reweight", "Other tolerances", [table, *notes, other], facts | {"changed": names})
 
 
 def _rows(view: View, done: NDArray[np.intp], ratios: Ratios, delivery: int) -> list[Row]:
     """Rows of the table ``loads``; `ratios` are those of the joints `done`."""
-    if not ratios.values.any():
-        found = "the new tolerances make none of the joints"
-        raise StoreError(str(Fault(str(view.path), found, "run a study with these tolerances")))
     loads = view.loads(list(view.limits) or list(view.shown_loads))
     if lacking := [load.name for load in loads if not load.is_valid.any()]:
         found = f"holds no joint with a valid load: {', '.join(lacking)}"
-        raise StoreError(str(Fault(str(view.path), found, f"see why: tolstat status {view.path}")))
+        raise shares.unusable(view, found, f"see why: tolstat status {view.path}")
     if view.limits:
-        rows = [_share_above(view, load, done, ratios, delivery) for load in (*loads, view.together)]
+        rows = [_share_above(view, load, done, ratios, delivery) for load in (*loads, view.load(ANY_LIMIT))]
     else:
         rows = [_quantile(load.only(done), ratios, share) for load in loads for share in SHARES]
     return [row if row["usable"] else row | dict.fromkeys(WITHHELD & row.keys(), np.nan) for row in rows]
@@ -202,15 +187,15 @@ def _ratios(view: View, new: Mapping[str, Distribution], names: Sequence[str], d
     """Density ratios of the joints `done`, with their exact mean square."""
     study, values = view.study, np.exp(_log_ratios(view, new, names)[done])
     correlated = [name for name in names if name in study.copula.names]
-    exact = density_ratio.exact((new[name], study.tolerances[name]) for name in names if name not in correlated)
-    square, open_square, largest = exact
+    square, open_square, largest = density_ratio.exact(
+        (new[name], study.tolerances[name]) for name in names if name not in correlated
+    )
     if correlated:
         own = _mean_square_of_correlated(study, new, correlated)
         square, open_square, largest = square + own, open_square + own, np.inf
-    if isinstance(view.design, Weighted):
-        # the tolerances have at least the share 1 / heaviest of the mixture drawn from
-        square, largest = square + np.log(view.design.heaviest), largest + np.log(view.design.heaviest)
-    return Ratios(values, float(square), float(open_square), float(np.exp(largest)))
+    # the tolerances have at least the share 1 / heaviest of the mixture drawn from
+    heaviest = np.log(view.design.heaviest) if isinstance(view.design, Weighted) else 0.0
+    return Ratios(values, float(square + heaviest), float(open_square), float(np.exp(largest + heaviest)))
 
 
 def _mean_square_of_correlated(study: Study, new: Mapping[str, Distribution], names: Sequence[str]) -> float:
@@ -220,24 +205,18 @@ def _mean_square_of_correlated(study: Study, new: Mapping[str, Distribution], na
     return float(np.log(np.mean(np.exp(_block_log_ratios(study, new, names, errors)))))
 
 
-def _check_range(name: str, old: Distribution, new: Distribution) -> list[Fault]:
-    """Faults of a new distribution that has values where the old one has none."""
-    place, remedy = f"tolerances.{name}", "run a study with these tolerances"
-    if old.discrete or new.discrete:
-        if not (old.discrete and new.discrete):
-            found = "is of measured parts before or after the change, not both: the joints lack the new values"
-            return [Fault(place, found, remedy)]
-        middle = (np.arange(10_000) + 0.5) / 10_000
-        outside = float(np.mean(np.isneginf(old.logpdf(new.ppf(middle)))))
+def _beyond(old: Distribution, new: Distribution) -> str:
+    """Words on a new distribution that has values where the old one has none; empty if it has not."""
+    if old.discrete != new.discrete:
+        return "is of measured parts before or after the change, not both: the joints lack the new values"
+    if old.discrete:
+        outside = float(np.mean(np.isneginf(old.logpdf(new.ppf((np.arange(10_000) + 0.5) / 10_000)))))
     else:
         low, high = old.ppf(_ENDS)
         u = np.concatenate([np.geomspace(1e-12, 0.5, 2000), 1 - np.geomspace(1e-12, 0.5, 2000)[::-1]])
         x = new.ppf(u)
         outside = float(np.max(u[x < low], initial=0.0) + np.max(1 - u[x > high], initial=0.0))
-    if outside > MAX_OUTSIDE:
-        found = f"{outside:.2g} of the new errors lie where the study draws none"
-        return [Fault(place, found, remedy)]
-    return []
+    return f"{outside:.2g} of the new errors lie where the study draws none" if outside > MAX_OUTSIDE else ""
 
 
 def _log_ratios(view: View, new: Mapping[str, Distribution], names: Sequence[str]) -> FloatArray:
@@ -277,11 +256,10 @@ def _share_above(view: View, load: Sample, done: NDArray[np.intp], ratios: Ratio
 
     def widest(confidence: float) -> tuple[float, float]:
         """Ends of the interval; with the numerical error where that is known."""
-        ends = [share(one, confidence) for one in (load, *(known or ()))]
-        return min(one.lower for one in ends), max(one.upper for one in ends)
+        ends = [share(end, confidence) for end in (load, *(known or ()))]
+        return min(end.lower for end in ends), max(end.upper for end in ends)
 
-    found = share(load, CONFIDENCE)
-    before = load.only(done).above(level, CONFIDENCE).estimate
+    found, before = share(load, CONFIDENCE), load.only(done).above(level, CONFIDENCE).estimate
     row = {"load": load.name, "unit": load.unit, "level": level, "before": before}
     row |= {key: getattr(found, key) for key in GIVEN}
     row["total_lower"], row["total_upper"] = widest(CONFIDENCE) if known else (np.nan, np.nan)
@@ -291,6 +269,5 @@ def _share_above(view: View, load: Sample, done: NDArray[np.intp], ratios: Ratio
 
 def _quantile(load: Sample, ratios: Ratios, share: float) -> dict[str, Any]:
     """Row of the table for a quantile; `ratios` are those of the joints of `load`."""
-    found = weighting.quantile(load, ratios, share, CONFIDENCE)
-    before = load.quantile(share, CONFIDENCE).estimate
+    found, before = weighting.quantile(load, ratios, share, CONFIDENCE), load.quantile(share, CONFIDENCE).estimate
     return {"load": load.name, "unit": load.unit, "share": share, "before": before, **found._asdict()}

@@ -4,32 +4,25 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import numpy as np
 
-from tolstat.analysis.sample import CONFIDENCE, total_interval
 from tolstat.campaign.work import Work
 from tolstat.common import units
-from tolstat.common.errors import Fault, InputError, NotApplicable
-from tolstat.common.loads import ANY_LIMIT
+from tolstat.common.errors import InputError, NotApplicable
 from tolstat.common.tables import VALID
 from tolstat.display import drawing, style, text
-from tolstat.display.answer import Answer, Sentence, Table
+from tolstat.display.answer import Answer, Axes, Column, Panel, Panels, Row, Rows, Sentence, Table
 from tolstat.display.asked import Asked
-from tolstat.display.blocks import Panel, Panels
 from tolstat.display.options import Opt
-from tolstat.display.table import Column, Row, Rows
 from tolstat.joint.perturbation import HOLE_OF_PIN
-from tolstat.store import error_budget
+from tolstat.questions import shares
 from tolstat.store.hdf5 import BLOCK
 from tolstat.store.view import View
 from tolstat.study import Study, load
 from tolstat.study.rewriting import with_keys
 from tolstat.study.selective import KINDS, MAX_CLASSES, Matching, matching
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 TITLE = "Selective assembly"
 NUMBERS = (1, 2, 3, 5)
@@ -51,19 +44,19 @@ def _length(value: float, digits: int) -> str:
 
 
 COLUMNS = (
-    Column("classes", lambda row: f"{row['classes']:.0f}"),
-    Column("unmatched", lambda row: text.percent(row["unmatched"])),
+    Column("classes", shares.word("classes")),
+    Column("unmatched", shares.share("unmatched")),
     Column("clearance, sigma", lambda row: _length(row["clearance"], 3)),
-    Column("yield", lambda row: text.percent(row["good"])),
-    Column("total interval", lambda row: text.span(row["good_lower"], row["good_upper"])),
-    Column("of all crosses", lambda row: text.percent(row["of_all"])),
+    Column("yield", shares.share("good")),
+    Column("total interval", shares.shares("good_lower", "good_upper")),
+    Column("of all crosses", shares.share("of_all")),
 )
 OF_ONE = (
-    Column("class", lambda row: f"{row['class']:.0f}"),
+    Column("class", shares.word("class")),
     Column("pin up to", lambda row: _length(row["pins"], 4)),
     Column("hole up to", lambda row: _length(row["holes"], 4)),
-    *(Column(kind.name, lambda row, name=kind.name: text.percent(row[name])) for kind in KINDS),  # type: ignore[misc]
-    Column("matched", lambda row: text.percent(row["matched"])),
+    *(Column(kind.name, shares.share(kind.name)) for kind in KINDS),
+    Column("matched", shares.share("matched")),
 )
 """Columns of the classes of one campaign."""
 
@@ -154,14 +147,13 @@ def selective_on_page(view: View, asked: Asked) -> Answer:
         raise NotApplicable
     words = f"{text.percent(found.unmatched)} of the crosses and forks have no partner of their class."
     if view.limits:
-        row = _row(view)
-        ends = text.span(row["good_lower"], row["good_upper"])
-        words += f" {text.percent(row['good'])} of the assembled joints keep all limits (total interval {ends})."
+        kept = shares.good(view)
+        ends = text.span(kept["good_lower"], kept["good_upper"])
+        words += f" {text.percent(kept['good'])} of the assembled joints keep all limits (total interval {ends})."
     columns = {"class": range(1, found.matched.size + 1), "pins": found.edges[0, 1:], "holes": found.edges[1, 1:]}
-    columns |= {kind.name: found.shares[k] for k, kind in enumerate(KINDS)} | {"matched": found.matched}
-    rows = [dict(zip(columns, values, strict=True)) for values in zip(*columns.values(), strict=True)]
-    title = "Classes by measured diameter, deviation from nominal"
-    table = Table("edges", title, OF_ONE, rows, {"pins": "m", "holes": "m"})
+    columns |= {kind.name: own for kind, own in zip(KINDS, found.shares, strict=True)} | {"matched": found.matched}
+    title, units_of = "Classes by measured diameter, deviation from nominal", {"pins": "m", "holes": "m"}
+    table = Table("edges", title, OF_ONE, shares.rows_of(columns), units_of)
     return Answer("selective", TITLE, [Sentence(words, "lead"), table, *NOTES])
 
 
@@ -177,23 +169,16 @@ def _row(view: View) -> Row:
     view.check("mean")
     if not view.limits:
         remedy = "add [limits] to the study, and run the same command again"
-        raise NotApplicable(str(Fault(str(view.path), "is of a study without [limits]", remedy)))
-    classes, own = classes_of(view), view.load(ANY_LIMIT)
-    above = own.above(1.0)
-    low, high = total_interval(error_budget.with_error(view, own), 1.0, CONFIDENCE)
-    unmatched = 0.0 if classes is None else classes.unmatched
-    row: dict[str, Any] = {"classes": 1 if classes is None else classes.matched.size, "unmatched": unmatched}
-    row |= {"clearance": _clearance(view)}
-    row |= {key: getattr(above, key) for key in ("n", "count", "n_failed", "n_unsettled")}
-    good = {"good": 1.0 - above.estimate, "good_lower": 1.0 - high, "good_upper": 1.0 - low}
-    return row | good | {key.replace("good", "of_all"): (1.0 - unmatched) * share for key, share in good.items()}
-
-
-def _clearance(view: View) -> float:
-    """Standard deviation of the radial clearance of the pairs, m; from the first joints of a large campaign."""
-    errors = view.errors(np.arange(min(view.n, BLOCK)))
-    each = [0.5 * (errors[f"{hole}.diameter"] - errors[f"{pin}.diameter"]) for pin, hole in HOLE_OF_PIN.items()]
-    return float(np.sqrt(np.mean([own.var() for own in each])))
+        raise shares.inapplicable(view, "is of a study without [limits]", remedy)
+    classes, kept = classes_of(view), shares.good(view)
+    number, unmatched = (1, 0.0) if classes is None else (classes.matched.size, classes.unmatched)
+    errors = view.errors(np.arange(min(view.n, BLOCK)))  # of a large campaign the first joints
+    clearances = (0.5 * (errors[f"{hole}.diameter"] - errors[f"{pin}.diameter"]) for pin, hole in HOLE_OF_PIN.items())
+    deviation = float(np.sqrt(np.mean([clearance.var() for clearance in clearances])))
+    row = {"classes": number, "unmatched": unmatched, "clearance": deviation}
+    ends = ("good", "good_lower", "good_upper")
+    row |= {key: kept[key] for key in ("n", "count", "n_failed", "n_unsettled", *ends)}
+    return row | {key.replace("good", "of_all"): (1.0 - unmatched) * kept[key] for key in ends}
 
 
 def _draw(ax: Axes, rows: Rows) -> None:

@@ -6,34 +6,30 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from tolstat.analysis.sample import CONFIDENCE, Sample, total_interval
 from tolstat.analysis.weighted import Weighted
-from tolstat.common.errors import Fault, NotApplicable, StoreError
+from tolstat.common.errors import NotApplicable
 from tolstat.common.loads import ANY_LIMIT, FloatArray
 from tolstat.display import drawing, style, text
-from tolstat.display.answer import Answer, Table
+from tolstat.display.answer import Answer, Axes, Column, Panel, Panels, Row, Rows, Table, Text
 from tolstat.display.asked import Asked
-from tolstat.display.blocks import Panel, Panels, Text
 from tolstat.display.options import Costs
-from tolstat.display.table import Column, Row, Rows
+from tolstat.questions import shares
 from tolstat.store import error_budget
 from tolstat.store.recorded import mentions
 from tolstat.store.view import View
-from tolstat.study import Study, scaling
 from tolstat.study import costs as cost_tables
+from tolstat.study import scaling
 from tolstat.study import sorting as gauges
-from tolstat.study.costs import Cost
 from tolstat.study.sorting import PARTS, Gauge
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 MADE, SCRAPPED, INSPECTED = "all joints", "parts scrapped", "joints rejected"
 """Stages: parts as they are made; without those that are scrapped; without joints that are rejected, too."""
+TITLE = "Parts scrapped, joints rejected"
 ON_PAGE = (
     "Each joint counts by the probability that the gauges accept its parts, and the inspection the joint. The verdict, "
     "and all else on this page, is on all joints.",
@@ -48,29 +44,20 @@ def _cost(row: Row, name: str) -> str:
 
 
 OF_PARTS = (
-    Column("part", lambda row: str(row["part"])),
-    Column("scrapped", lambda row: text.percent(row["scrapped"])),
+    Column("part", shares.word("part")),
+    Column("scrapped", shares.share("scrapped")),
     Column("cost of one made", lambda row: _cost(row, "cost")),
     Column("of one used", lambda row: _cost(row, "cost_used")),
 )
 STAGES = (
     Column("load > limit", text.limit),
-    Column("stage", lambda row: str(row["stage"]), words=True),
-    Column("above", lambda row: text.percent(row["estimate"])),
-    Column("95 % interval", lambda row: text.span(row["lower"], row["upper"])),
+    Column("stage", shares.word("stage"), words=True),
+    Column("above", shares.share("estimate")),
+    Column("95 % interval", shares.shares("lower", "upper")),
     Column("rejected", lambda row: text.percent(row["rejected"]) if row["rejected"] else "-", rank=1),
     Column("cost of a joint", lambda row: _cost(row, "cost"), rank=2),
     Column("of a good one", lambda row: _cost(row, "cost_good")),
 )
-
-
-class _Stage(NamedTuple):
-    """Stage: probability of each joint to get there, (n,); share that is rejected; cost of a joint delivered."""
-
-    name: str
-    kept: FloatArray
-    rejected: float
-    cost: float
 
 
 def sorting(view: View, costs: Costs = None) -> Answer:
@@ -109,36 +96,8 @@ def sorting(view: View, costs: Costs = None) -> Answer:
     StoreError
         When its joints are not independent.
     """
-    scrap = gauges.of_parts(view.study.entries)
-    if not (scrap or view.study.rejects) or not view.limits:
-        remedy = "give an entry of [tolerances] a gauge, or add [reject]; and [limits]"
-        raise NotApplicable(str(Fault(str(view.path), "is of a study that sorts nothing, or has no limits", remedy)))
-    if not view.design.has_interval("reweighting"):
-        remedy = 'write sampling.method = "random"'
-        raise StoreError(str(Fault(str(view.path), "holds joints that are not independent", remedy)))
-    of_part = {part: _accepted(view, [own for own in scrap if own.part == part]) for part in PARTS}
-    base = view.design.counts_as(view.n)
-    used = {part: float(np.average(kept, weights=base)) for part, kept in of_part.items()}
-    price = _prices(view.study, cost_tables.of(scaling.tolerances(view.study), costs))
-    parts = [
-        {"part": part, "scrapped": 1.0 - used[part], "cost": price[part], "cost_used": price[part] / used[part]}
-        for part in PARTS
-    ]
-    stages = [_Stage(MADE, np.ones(view.n), 0.0, sum(price.values()))]
-    kept = np.prod(list(of_part.values()), axis=0)
-    assembled = sum(price[part] / used[part] for part in PARTS)
-    if scrap:
-        stages.append(_Stage(SCRAPPED, kept, 0.0, assembled))
-    if view.study.rejects:
-        passed = _accepted(view, view.study.rejects)
-        share = float(np.average(passed, weights=base * kept))
-        stages.append(_Stage(INSPECTED, kept * passed, 1.0 - share, assembled / share))
-    names = [*([ANY_LIMIT] if len(view.limits) > 1 else []), *view.limits]
-    rows = [_row(view, load, stage) for load in view.loads(names) for stage in stages]
-    pictures = Panels([_panel(rows[: len(stages)])])
-    title = "Shares above the limits, and what a joint costs"
-    tables = Table("parts", "Parts", OF_PARTS, parts), Table("stages", title, STAGES, rows)
-    return Answer("sorting", "Parts scrapped, joints rejected", [pictures, *tables])
+    panel, *tables = _parts(view, costs)
+    return Answer("sorting", TITLE, [Panels([panel]), *tables])
 
 
 def sorting_on_page(view: View, asked: Asked) -> Answer:
@@ -146,52 +105,78 @@ def sorting_on_page(view: View, asked: Asked) -> Answer:
     written = mentions(view.store, ["gauge"], "tolerances") or mentions(view.store, ["below", "above"], "reject")
     if not (written and view.sampled and view.limits and view.counts.done):
         raise NotApplicable
-    answer = sorting(view)
-    pictures, parts, stages = answer.parts
-    assert isinstance(pictures, Panels)
-    assert isinstance(stages, Table)
+    panel, parts, stages = _parts(view, None)
     shown = {stages.rows[0]["load"], *view.leading}
     seen = [row for row in stages.rows if row["load"] in shown]
-    beside = replace(pictures, beside=[Text(line, small=True) for line in ON_PAGE])
-    return replace(answer, parts=[beside, parts, replace(stages, seen=seen)])
+    pictures = Panels([panel], beside=[Text(line, small=True) for line in ON_PAGE])
+    return Answer("sorting", TITLE, [pictures, parts, replace(stages, seen=seen)])
+
+
+def _parts(view: View, costs: Costs) -> tuple[Panel, Table, Table]:
+    """Picture and tables ``parts`` and ``stages``; raises as `sorting`."""
+    study, scrap = view.study, gauges.of_parts(view.study.entries)
+    if not (scrap or study.rejects) or not view.limits:
+        remedy = "give an entry of [tolerances] a gauge, or add [reject]; and [limits]"
+        raise shares.inapplicable(view, "is of a study that sorts nothing, or has no limits", remedy)
+    if not view.design.has_interval("reweighting"):
+        raise shares.unusable(view, "holds joints that are not independent", 'write sampling.method = "random"')
+    kept, base = np.ones(view.n), view.design.counts_as(view.n)
+    parts: list[dict[str, Any]] = []
+    for part, price in _prices(scaling.tolerances(study), costs).items():
+        used = _accepted(view, [gauge for gauge in scrap if gauge.part == part])
+        share, kept = float(np.average(used, weights=base)), kept * used
+        parts.append({"part": part, "scrapped": 1.0 - share, "cost": price, "cost_used": price / share})
+    made, cost = (sum(row[key] for row in parts) for key in ("cost", "cost_used"))
+    stages: list[tuple[str, FloatArray | None, float, float]] = [(MADE, None, 0.0, made)]
+    if scrap:
+        stages.append((SCRAPPED, kept, 0.0, cost))
+    if study.rejects:
+        passed = _accepted(view, study.rejects)
+        share = float(np.average(passed, weights=base * kept))
+        stages.append((INSPECTED, kept * passed, 1.0 - share, cost / share))
+    loads = view.loads([*([ANY_LIMIT] if len(view.limits) > 1 else []), *view.limits])
+    rows = [_row(view, load, *stage) for load in loads for stage in stages]
+    title = "Shares above the limits, and what a joint costs"
+    tables = Table("parts", "Parts", OF_PARTS, parts), Table("stages", title, STAGES, rows)
+    return _panel(rows[: len(stages)]), *tables
+
+
+def _prices(tolerances: Sequence[scaling.Tolerance], costs: Costs) -> dict[str, float]:
+    """Cost of the tolerances of each part, as they are."""
+    prices = dict.fromkeys(PARTS, 0.0)
+    for tolerance, cost in zip(tolerances, cost_tables.of(tolerances, costs), strict=True):
+        for name, entry in zip(tolerance.names, cost.entries, strict=True):
+            if (part := gauges.part_of(name)) in prices:
+                prices[part] += cost._replace(entries=(entry,)).at(1.0)
+    return prices
 
 
 def _accepted(view: View, sizes: Sequence[Gauge]) -> FloatArray:
     """Probability that each joint is accepted by all of some gauges, (n,)."""
     if not sizes:
         return np.ones(view.n)
-    columns = list(dict.fromkeys(column for gauge in sizes for column in gauge.columns))
-    blocks = view.error_blocks(columns)
+    blocks = view.error_blocks(list(dict.fromkeys(column for gauge in sizes for column in gauge.columns)))
     parts = [np.prod([gauge.accepted(errors, view.study.joint) for gauge in sizes], axis=0) for errors in blocks]
     return np.concatenate(parts)
 
 
-def _prices(study: Study, prices: Sequence[Cost]) -> dict[str, float]:
-    """Cost of the tolerances of each part, as they are."""
-    found = dict.fromkeys(PARTS, 0.0)
-    for tolerance, cost in zip(scaling.tolerances(study), prices, strict=True):
-        for name, entry in zip(tolerance.names, cost.entries, strict=True):
-            found[gauges.part_of(name)] += Cost(cost.width, (entry,)).at(1.0)
-    return found
-
-
-def _row(view: View, load: Sample, stage: _Stage) -> Row:
+def _row(view: View, load: Sample, stage: str, kept: FloatArray | None, rejected: float, cost: float) -> Row:
+    """Share above a limit at a stage, which each joint reaches with the probability `kept`, (n,)."""
     assert load.limit is not None
     loads = error_budget.with_error(view, load)
-    if stage.name != MADE:  # each joint counts by its probability to be kept
+    if kept is not None:
         base = load.design if isinstance(load.design, Weighted) else Weighted(np.ones(view.n), 1.0)
-        design = base.times(stage.kept)
-        loads = tuple(replace(own, design=design) for own in loads)
+        loads = tuple(replace(end, design=base.times(kept)) for end in loads)
     share = loads[0].above(load.limit).estimate
     lower, upper = total_interval(loads, load.limit, CONFIDENCE)
-    row = {"stage": stage.name, "load": load.name, "unit": load.unit, "level": load.limit, "estimate": share}
-    row |= {"lower": lower, "upper": upper, "rejected": stage.rejected, "cost": stage.cost}
-    return row | {"cost_good": stage.cost / (1.0 - share) if share < 1.0 else np.inf}
+    row = {"stage": stage, "load": load.name, "unit": load.unit, "level": load.limit, "estimate": share}
+    row |= {"lower": lower, "upper": upper, "rejected": rejected, "cost": cost}
+    return row | {"cost_good": cost / (1.0 - share) if share < 1.0 else np.inf}
 
 
 def _panel(rows: Rows) -> Panel:
     """Picture of the share above the limits at each stage."""
-    left = drawing.rows_left([str(row["stage"]) for row in rows])
+    left = drawing.rows_left([row["stage"] for row in rows])
     size = (drawing.WIDTH, 0.55 * len(rows) + drawing.BOTTOM + 0.1)
     description = "; ".join(f"{row['stage']}: {text.percent(row['estimate'])}" for row in rows)
     title = "Joints above a limit, before and after"
@@ -200,13 +185,12 @@ def _panel(rows: Rows) -> Panel:
 
 def _draw(ax: Axes, rows: Rows) -> None:
     """Draw the share above the limits at each stage, with its interval, and beside it what a good joint costs."""
-    drawing.rows(ax, [str(row["stage"]) for row in rows])
+    drawing.rows(ax, [row["stage"] for row in rows])
     high = 1.25 * max(float(row["upper"]) for row in rows)
-    ax.set_xlim(0.0, 100.0 * high)
+    ax.set(xlim=(0.0, 100.0 * high), xlabel="share of the joints above a limit, per cent")
     for i, row in enumerate(rows):
         ax.plot([100.0 * row["lower"], 100.0 * row["upper"]], [i, i], color=style.COLOURS[0], lw=3.0)
         ax.plot(100.0 * row["estimate"], i, "o", color=style.COLOURS[0], ms=6.0)
         label = f"a good joint costs {_cost(row, 'cost_good')}"
         at, side = (row["lower"], "left") if row["lower"] < 0.5 * high else (row["upper"], "right")
         ax.text(100.0 * at, i - 0.14, label, ha=side, va="bottom", size=8.0, color=style.INK)
-    ax.set_xlabel("share of the joints above a limit, per cent")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from fnmatch import fnmatchcase
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -10,17 +10,17 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.errors import Fault, NotApplicable
 from tolstat.common.load_kinds import Kind
 from tolstat.common.loads import PANELS, QUANTITY, UNIT_OF_LOAD, FloatArray, names_of, unit_text
 from tolstat.common.strict import read_section
 from tolstat.common.tables import ERROR_FIELDS, FAILED, SIMULATED, UNSETTLED, Status
 from tolstat.common.units import DISPLAY_UNITS
 from tolstat.display import drawing, style, text
-from tolstat.display.answer import Answer, Part, Sheet, Table
+from tolstat.display.answer import Answer, Axes, Part, Row, Sheet, Table
 from tolstat.display.blocks import Panel, Panels
 from tolstat.display.mpl import lines, ticker
-from tolstat.display.table import Row, Rows, plain
+from tolstat.display.table import plain
+from tolstat.questions.shares import inapplicable, rows_of
 from tolstat.store import recorded
 from tolstat.store.view import View
 from tolstat.study.selection import UNITS
@@ -28,12 +28,15 @@ from tolstat.study.swept import KEYS
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Mask = NDArray[np.bool_]
 MAX_LEGEND = 6
 """Maximum number of values of the second swept quantity in the legend."""
+Look = dict[str, Any]
+JOINTS: Look = {"marker": "o", "ms": 3.2}
+NOMINAL: Look = {"color": style.FAINT, "lw": 1.1, "ls": (0.0, (1.0, 2.0))}
+UNSETTLED_JOINTS: Look = {"ls": "", "marker": "o", "ms": 6.5, "mfc": "white"}
+FAILED_JOINTS: Look = {"ls": "", "marker": "x", "color": style.INK}
 
 
 def sweep(view: View) -> Answer:
@@ -57,57 +60,49 @@ def sweep(view: View) -> Answer:
         When the campaign is no sweep.
     """
     if view.method != "sweep":
-        remedy = "give the result file of a study with [sweep]"
-        raise NotApplicable(str(Fault(str(view.path), "holds no sweep", remedy)))
-    rows = _rows(view)
+        raise inapplicable(view, "holds no sweep", "give the result file of a study with [sweep]")
+    columns: dict[str, Sequence[object]] = {axis.head: axis.values.tolist() for axis in swept_axes(view)}
+    columns["status"] = [Status(int(code)).label for code in view.status]
+    names = dict.fromkeys([*view.shown_loads, *(name for name in view.kept_loads if name == "psi")])
+    columns |= {_head(name, UNIT_OF_LOAD[name]): view.simulated(name).tolist() for name in names}
+    rows = rows_of(columns)
     seen = [_short(row) for row in rows]
-    names = [name for name in (seen[0] if seen else ()) if "." in name]
-    table = Table("sweep", "Worst bushing", plain(seen, names[1:]), rows, seen=seen)
-    pictures: list[Part] = [Panels(_panels(view)), Sheet("sweep", partial(sheet, view))] if view.bushing_loads else []
+    ranked = [name for name in (seen[0] if seen else ()) if "." in name][1:]
+    table = Table("sweep", "Worst bushing", plain(seen, ranked), rows, seen=seen)
+    pictures: list[Part] = (
+        [Panels([*_panels(view)]), Sheet("sweep", partial(sheet, view))] if view.bushing_loads else []
+    )
     return Answer("sweep", "Loads against the swept value", [*pictures, table])
 
 
-def _rows(view: View) -> Rows:
-    columns: dict[str, Sequence[object]] = {_head(axis): axis.values.tolist() for axis in swept_axes(view)}
-    columns["status"] = [Status(int(code)).label for code in view.status]
-    names = dict.fromkeys([*view.shown_loads, *(name for name in view.kept_loads if name == "psi")])
-    for load in view.loads(list(names)):
-        head = load.name if load.unit == "1" else f"{load.name} [{load.unit}]"
-        columns[head] = view.simulated(load.name).tolist()
-    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+def _head(name: str, unit: str) -> str:
+    return name if unit in ("", "1") else f"{name} [{unit}]"
 
 
 def _short(row: Row) -> Row:
     """Row for people: largest force and torque of the cross bushings and of the fork bushings."""
-    groups = {f"{group}.{kind.symbol} [{kind.unit}]": names_of(group, kind) for group, kind in PANELS}
-    loads = {f"{name} [{UNIT_OF_LOAD[name]}]" for names in groups.values() for name in names}
-    short = {key: value for key, value in row.items() if key not in loads}
-    for head, names in groups.items():
-        held = [row[key] for name in names if (key := f"{name} [{UNIT_OF_LOAD[name]}]") in row]
-        if held:
-            short[head] = float(np.fmax.reduce(held))
+    short = dict(row)
+    for group, kind in PANELS:
+        heads = [_head(name, kind.unit) for name in names_of(group, kind)]
+        if kept := [short.pop(head) for head in heads if head in short]:
+            short[f"{group}.{kind.symbol} [{kind.unit}]"] = float(np.fmax.reduce(kept))
     return short
 
 
-def _panels(view: View) -> list[Panel]:
-    room = drawing.legend_room(key(view)[1])
-    return [
-        Panel(
-            f"sweep-{group}-{kind.symbol}",
-            f"{group.capitalize()} bushings, {QUANTITY[kind.unit]}",
-            f"Largest {QUANTITY[kind.unit]}s of the {group} bushings against the swept value",
-            partial(_with_legend, view=view, group=group, kind=kind),
-            (4.9, 3.3 + room),
-            top=room,
-        )
-        for group, kind in PANELS
-        if any(name in view.bushing_loads for name in names_of(group, kind))
-    ]
+def _panels(view: View) -> Iterator[Panel]:
+    axes = swept_axes(view)
+    room = drawing.legend_room(_legend(view, axes)[1])
 
+    def draw(ax: Axes, group: str, kind: Kind) -> None:
+        _draw(ax, view, axes, group, kind)
+        drawing.legend_above(ax, *_legend(view, axes))
 
-def _with_legend(ax: Axes, view: View, group: str, kind: Kind) -> None:
-    panel(ax, view, group, kind)
-    drawing.legend_above(ax, *key(view))
+    for group, kind in PANELS:
+        if any(name in view.bushing_loads for name in names_of(group, kind)):
+            title, key = f"{group.capitalize()} bushings, {QUANTITY[kind.unit]}", f"sweep-{group}-{kind.symbol}"
+            words = f"Largest {QUANTITY[kind.unit]}s of the {group} bushings against the swept value"
+            size, draw_loads = (drawing.WIDTH, 3.3 + room), partial(draw, group=group, kind=kind)
+            yield Panel(key, title, words, draw_loads, size, top=room)
 
 
 def sheet(view: View) -> Figure:
@@ -126,125 +121,81 @@ def sheet(view: View) -> Figure:
     Figure
         Four panels; joints that did not settle are hollow, those without a result are crosses at the foot.
     """
-    axes = swept_axes(view)
+    axes, small = swept_axes(view), "largest modulus over the last revolution of each joint"
+    if len(axes) > 1:
+        small = f"largest of the four bushings, coloured by {axes[1].head}"
+    if len(axes) > 2:
+        small += f"; one line for each {', '.join(axis.label for axis in axes[2:])}"
     with style.settings():
         title = f"{view.name}: largest loads against " + (axes[0].label if axes else "the joint's number")
-        page, panels = style.panels(title, f"{view.head()}\n{_note(axes)}")
+        page, panels = style.panels(title, f"{view.head()}\n{small}")
         for group, kind, ax in panels:
-            panel(ax, view, group, kind)
-        style.legend(page, *key(view))
+            _draw(ax, view, axes, group, kind)
+        style.legend(page, *_legend(view, axes))
     return page
 
 
-def panel(ax: Axes, view: View, group: str, kind: Kind) -> None:
+def _draw(ax: Axes, view: View, axes: list[Axis], group: str, kind: Kind) -> None:
     """Draw the loads of one kind at four bushings: ``cross`` or ``fork``."""
-    axes = swept_axes(view)
     first = axes[0] if axes else Axis("joint", "", np.arange(1, view.n + 1, dtype=np.float64))
-    ax.set_xlabel(_head(first))
+    ax.set(xlabel=first.head, ylabel=f"largest |{kind.symbol}| [{unit_text(kind.unit)}]")
     ax.xaxis.set_major_locator(ticker.MaxNLocator(6))
-    ax.set_ylabel(f"largest |{kind.symbol}| [{unit_text(kind.unit)}]")
-    _lines(ax, view, [first, *axes[1:]], group, kind)
-
-
-def _head(axis: Axis) -> str:
-    return f"{axis.label} [{axis.unit}]" if axis.unit else axis.label
-
-
-def _note(axes: list[Axis]) -> str:
-    if len(axes) < 2:
-        return "largest modulus over the last revolution of each joint"
-    others = ", ".join(axis.label for axis in axes[2:])
-    said = f"largest of the four bushings, coloured by {_head(axes[1])}"
-    return said + (f"; one line for each {others}" if others else "")
-
-
-def _lines(ax: Axes, view: View, axes: list[Axis], group: str, kind: Kind) -> None:
-    number = {name: i for i, name in enumerate(names_of(group, kind))}
-    names = [name for name in number if name in view.bushing_loads]
-    if not names:
-        ax.text(0.5, 0.5, "not kept by the study", ha="center", transform=ax.transAxes)
-        ax.set(xticks=[], yticks=[])
+    loads = {name: view.simulated(name) for name in names_of(group, kind) if name in view.bushing_loads}
+    if not loads:
+        drawing.empty(ax, "not kept by the study")
         return
-    loads = [view.simulated(name) for name in names]
-    if len(axes) == 1:
-        for name, values in zip(names, loads, strict=True):
-            i = number[name]
-            every = np.ones(values.size, dtype=bool)
-            _line(ax, view, axes[0].values, values, every, style.COLOURS[i], style.DASHES[i])
+    if len(axes) < 2:
+        for name, colour, dash in zip(names_of(group, kind), style.COLOURS, style.DASHES, strict=True):
+            if name in loads:
+                _line(ax, view, first, loads[name], np.arange(view.n), color=colour, ls=dash)
     else:
-        for colour, rows in _combinations(axes):
-            _line(ax, view, axes[0].values, np.max(loads, axis=0), rows, colour, "-")
+        largest, others = np.max(list(loads.values()), axis=0), np.column_stack([axis.values for axis in axes[1:]])
+        shades = _shades(axes[1])
+        for point in np.unique(others, axis=0):
+            _line(ax, view, first, largest, np.flatnonzero((others == point).all(axis=1)), color=shades[point[0]])
     if len(view.nominal):
-        nominal = max(load.nominal for load in view.loads(names))
-        ax.axhline(nominal, color=style.FAINT, lw=1.1, ls=(0.0, (1.0, 2.0)), zorder=1.5)
-    limits = {view.limits[name] for name in names if name in view.limits}
+        ax.axhline(max(load.nominal for load in view.loads(list(loads))), zorder=1.5, **NOMINAL)
     bottom, top = ax.get_ylim()
-    for limit in sorted(limits):
+    for limit in sorted({view.limits[name] for name in loads if name in view.limits}):
         if limit < top + 0.5 * (top - bottom):
             ax.axhline(limit, color=style.INK, lw=1.3, ls=(0.0, (8.0, 3.0)))
             style.note(ax, f"limit {text.value(limit, kind.unit)}", limit)
 
 
-def _line(
-    ax: Axes,
-    view: View,
-    x: NDArray[np.float64],
-    values: NDArray[np.float64],
-    rows: Mask,
-    colour: str,
-    dash: style.Dash,
-) -> None:
-    """Draw one line over the joints `rows`; it is broken where a joint has no result."""
-    order = np.flatnonzero(rows)[np.argsort(x[rows], kind="stable")]
-    status = view.status[order]
-    shown = np.where(np.isin(status, SIMULATED), values[order], np.nan)
-    ax.plot(x[order], shown, color=colour, ls=dash, marker="o", ms=3.2, zorder=3)
-    loose = np.isin(status, UNSETTLED)
-    ax.plot(x[order][loose], shown[loose], ls="", marker="o", ms=6.5, mfc="white", mec=colour, zorder=4)
-    gone = np.isin(status, FAILED)
+def _line(ax: Axes, view: View, axis: Axis, values: FloatArray, joints: NDArray[np.intp], **look: Any) -> None:
+    """Draw one line over some joints; it is broken where a joint has no result."""
+    joints = joints[np.argsort(axis.values[joints], kind="stable")]
+    x, status = axis.values[joints], view.status[joints]
+    shown = np.where(np.isin(status, SIMULATED), values[joints], np.nan)
+    ax.plot(x, shown, zorder=3, **JOINTS, **look)
+    loose, gone = np.isin(status, UNSETTLED), np.isin(status, FAILED)
+    ax.plot(x[loose], shown[loose], mec=look["color"], zorder=4, **UNSETTLED_JOINTS)
     foot = np.full(int(gone.sum()), 0.02)
-    ax.plot(x[order][gone], foot, ls="", marker="x", color=style.INK, transform=ax.get_xaxis_transform(), zorder=4)
+    ax.plot(x[gone], foot, transform=ax.get_xaxis_transform(), zorder=4, **FAILED_JOINTS)
 
 
-def _combinations(axes: list[Axis]) -> list[tuple[str, Mask]]:
-    """Colour and rows of every combination of the quantities after the first."""
-    second = np.unique(axes[1].values)
-    shades = dict(zip(second, _shades(second.size), strict=True))
-    grid = np.column_stack([axis.values for axis in axes[1:]])
-    return [(shades[point[0]], (grid == point).all(axis=1)) for point in np.unique(grid, axis=0)]
+def _shades(axis: Axis) -> dict[float, str]:
+    """Colour of `style.SHADES` of each value of a swept quantity, ascending."""
+    values = np.unique(axis.values)
+    places = np.linspace(0, len(style.SHADES) - 1, values.size).round().astype(int)
+    return {value: style.SHADES[i] for value, i in zip(values, places, strict=True)}
 
 
-def _shades(count: int) -> list[str]:
-    """Colours of `style.SHADES` for so many values, in order."""
-    return [style.SHADES[i] for i in np.linspace(0, len(style.SHADES) - 1, count).round().astype(int)]
-
-
-def key(view: View) -> tuple[list[Artist], list[str]]:
+def _legend(view: View, axes: list[Axis]) -> tuple[list[Artist], list[str]]:
     """Handles and labels of a panel's legend."""
-    axes = swept_axes(view)
-    handles: list[Artist]
+    entries: list[tuple[str, Look]]
     if len(axes) < 2:
-        handles = [
-            lines.Line2D([], [], color=c, ls=d, marker="o", ms=3.2)
-            for c, d in zip(style.COLOURS, style.DASHES, strict=True)
-        ]
-        labels = [f"bushing {i}" for i in (1, 2, 3, 4)]
+        looks = zip(style.COLOURS, style.DASHES, strict=True)
+        entries = [(f"bushing {i}", {"color": c, "ls": d} | JOINTS) for i, (c, d) in enumerate(looks, 1)]
     else:
-        second = np.unique(axes[1].values)
-        named = np.unique(np.linspace(0, second.size - 1, MAX_LEGEND).round().astype(int))
-        shades = _shades(second.size)
-        handles = [lines.Line2D([], [], color=shades[i], marker="o", ms=3.2) for i in named]
-        labels = [f"{second[i]:.4g} {axes[1].unit}".strip() for i in named]
-    if len(view.nominal):
-        handles.append(lines.Line2D([], [], color=style.FAINT, lw=1.1, ls=(0.0, (1.0, 2.0))))
-        labels.append("nominal joint, largest")
-    if view.count(*UNSETTLED):
-        handles.append(lines.Line2D([], [], ls="", marker="o", ms=6.5, mfc="white", mec=style.INK))
-        labels.append("not settled")
-    if view.count(*FAILED):
-        handles.append(lines.Line2D([], [], ls="", marker="x", color=style.INK))
-        labels.append("no result")
-    return handles, labels
+        shades = list(_shades(axes[1]).items())
+        named = np.unique(np.linspace(0, len(shades) - 1, MAX_LEGEND).round().astype(int))
+        unit = axes[1].unit
+        entries = [(f"{shades[i][0]:.4g} {unit}".strip(), {"color": shades[i][1]} | JOINTS) for i in named]
+    entries += [("nominal joint, largest", NOMINAL)] if len(view.nominal) else []
+    entries += [("not settled", UNSETTLED_JOINTS | {"mec": style.INK})] if view.count(*UNSETTLED) else []
+    entries += [("no result", FAILED_JOINTS)] if view.count(*FAILED) else []
+    return [lines.Line2D([], [], **look) for _, look in entries], [label for label, _ in entries]
 
 
 class Axis(NamedTuple):
@@ -263,6 +214,11 @@ class Axis(NamedTuple):
     label: str
     unit: str
     values: FloatArray
+
+    @property
+    def head(self) -> str:
+        """Label and unit."""
+        return _head(self.label, self.unit)
 
 
 def swept_axes(view: View) -> list[Axis]:
@@ -294,11 +250,10 @@ def swept_axes(view: View) -> list[Axis]:
             groups.setdefault(column.tobytes(), []).append(key)
     axes = []
     for keys in groups.values():
-        names = [name for name, _ in keys]
         unit, factor = DISPLAY_UNITS.get(keys[0][1], (keys[0][1], 1.0))
         values = columns[keys[0]] * factor
         values[np.abs(values) < 1e-12 * np.abs(values).max()] = 0.0  # rounding error of a sweep through zero
-        axes.append(Axis(_label(names, patterns), unit, values))
+        axes.append(Axis(_label([name for name, _ in keys], patterns), unit, values))
     rank = {pattern: i for i, pattern in enumerate(patterns)}
     return sorted(axes, key=lambda axis: rank.get(axis.label, len(rank)))
 
@@ -313,7 +268,5 @@ def _patterns(table: Mapping[str, Any], before: str = "") -> list[str]:
 
 
 def _label(names: list[str], patterns: list[str]) -> str:
-    for pattern in patterns:
-        if all(fnmatchcase(name, pattern) for name in names):
-            return pattern
-    return names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more"
+    every = (pattern for pattern in patterns if all(fnmatchcase(name, pattern) for name in names))
+    return next(every, names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more")

@@ -14,7 +14,7 @@ from tolstat.display import text
 from tolstat.display.answer import Answer, Part, Sentence, Sheet, Table
 from tolstat.display.asked import silent
 from tolstat.joint.mounting import in_words
-from tolstat.questions import accuracy, capability
+from tolstat.questions import accuracy, shares
 from tolstat.questions.cases import cases
 from tolstat.questions.exceedance import answer as exceedance
 from tolstat.questions.exceedance import curves
@@ -136,7 +136,7 @@ def _sheet(view: View) -> Figure:
 def _yield(view: View, judged: bool) -> Iterator[Part]:
     """Share of the joints that keep all limits, unless the verdict says it."""
     if judged and tells_yield(view):
-        kept = capability.together(capability.good(view), len(view.limits))
+        kept = shares.together(shares.good(view), len(view.limits))
         yield Sentence(f"Yield: {kept.value} {kept.words}.", "lead")
 
 

@@ -12,7 +12,7 @@ from tolstat.common.loads import ANY_LIMIT
 from tolstat.common.tables import FAILED, STATUS_TEXT, UNSETTLED, VALID
 from tolstat.display import text
 from tolstat.display.table import Row
-from tolstat.questions import capability, joints
+from tolstat.questions import joints, shares
 from tolstat.questions.exceedance import rows as exceedance
 from tolstat.questions.exceedance.verdicts import WORDS, ends, share_of, unresolved_matter, verdict
 from tolstat.store import known_parts
@@ -204,14 +204,14 @@ def _yield(view: View, records: Sequence[Row]) -> Headline:
         if row["load"] == ANY_LIMIT and worst["count"] and not np.isnan(worst["estimate"]):
             said += _most_often(view, records, worst)
         return Headline("", share_of(row), said, notes, worst["load"])
-    found = capability.together(capability.good(view), len(view.limits))
+    found = shares.together(shares.good(view), len(view.limits))
     if not found.decides:
         return Headline("none", WORDS["none"], _reason(view, [_decisive(view, records)]), notes)
     return Headline("", found.value, found.words, notes, exceedance.most_exceeded(view, records)["load"])
 
 
 def _undecided(records: Sequence[Row]) -> bool:
-    return max(high - low for low, high in map(ends, records)) >= capability.WIDEST
+    return max(high - low for low, high in map(ends, records)) >= shares.WIDEST
 
 
 def _reason(view: View, records: Sequence[Row]) -> str:
@@ -237,10 +237,10 @@ def _reason(view: View, records: Sequence[Row]) -> str:
 def _causes(view: View) -> Iterator[str]:
     """Most frequent status of the joints without a valid load, its meaning, and the remedy for the first of them."""
     states = sorted((s for s in (*FAILED, *UNSETTLED) if view.count(s)), key=lambda s: -view.count(s))
-    first = {joint.status: joint for joint in reversed(joints.without_load(view))} if states else {}
     for state in states[:1]:
         said = f"{view.count(state)} {state.label}: {STATUS_TEXT[state]}"
-        yield f"{said}. Row {first[state.label].row}: {first[state.label].remedy}" if state.label in first else said
+        first = next((joint for joint in joints.without_load(view) if joint["status"] == state.label), None)
+        yield f"{said}. Row {first['row']}: {first['remedy']}" if first else said
 
 
 def _pending(view: View) -> tuple[str, ...]:

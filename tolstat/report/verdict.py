@@ -13,7 +13,7 @@ from tolstat.display import text
 from tolstat.display.asked import Asked
 from tolstat.display.blocks import Card, Decision, Section, Table, Text
 from tolstat.display.table import Column, as_block, has
-from tolstat.questions import accuracy, capability
+from tolstat.questions import accuracy, shares
 from tolstat.questions.drawings.answer import place_of
 from tolstat.questions.exceedance import rows as exceedance
 from tolstat.questions.exceedance.answer import above
@@ -42,7 +42,7 @@ def _points(view: View) -> list[Table]:
         point = part.store.points[part.points[0]]
         row = {"point": point.name, "operation": point._replace(share=np.nan).in_words, "share": point.share}
         if part.sampled and part.limits and tells_yield(part):
-            found = capability.together(capability.good(part), len(part.limits))
+            found = shares.together(shares.good(part), len(part.limits))
             row |= {"kept": found.value if found.decides else WORDS["none"]}
         rows.append(row)
     return [as_block("Operating points", POINTS, rows)]
@@ -80,11 +80,11 @@ def _cards(view: View, found: Headline | None) -> list[Card]:
     """Unless the verdict says it, the yield and the limit exceeded most; next delivery, number of joints, errors."""
     cards = []
     if found is not None and tells_yield(view):
-        row = capability.good(view)
+        row = shares.good(view)
         if found.answer:
-            together = capability.together(row, len(view.limits))
+            together = shares.together(row, len(view.limits))
             cards.append(Card(together.value, together.words, "Yield"))
-        if predicted := capability.delivered(row, len(view.limits)):
+        if predicted := shares.delivered(row, len(view.limits)):
             interval = text.ends(row["next_lower"], row["next_upper"], ".0f")
             cards.append(Card(interval, predicted, "95 % prediction interval"))
     if found is not None and found.load and found.load not in found.words:

@@ -11,7 +11,7 @@ from tolstat.analysis import known_share, process
 from tolstat.analysis.column import Mask
 from tolstat.analysis.known_share import KnownShare, Mixture
 from tolstat.analysis.process import Known, Sums
-from tolstat.analysis.weighted import Split
+from tolstat.analysis.weighted import Split, Weighted
 from tolstat.common.loads import ANY_LIMIT
 from tolstat.common.tables import Status
 from tolstat.store import error_budget
@@ -120,8 +120,10 @@ class KnownParts:
             places.append((len(events), len(ends)))
             events += own
         events = [(above[done], counted[done]) for above, counted in events]
-        weights = view.design.counts_as(view.n)[done]
-        found = known_share.tallies(self._sums(), self._known, self._drawn, weights, events)
+        weights, heaviest = view.design.counts_as(view.n)[done], 0.0
+        if isinstance(view.design, Weighted) and np.isfinite(view.design.heaviest):
+            heaviest = view.design.heaviest
+        found = known_share.tallies(self._sums(), self._known, self._drawn, weights, events, heaviest)
         return {
             name: (found[k], found[k + 1 : k + 1 + m], found[k + 1 + m : k + 1 + 2 * m])
             for name, (k, m) in zip(names, places, strict=True)

@@ -181,7 +181,8 @@ def _known(load: Load, parts: int, n: int, share: float) -> Experiment:
         weights = 1.0 / (TOLERANCES + (1.0 - TOLERANCES) * ratio)
         errors = center[:, None, None] + spread[:, None, None] * z
         above = load.of(np.concatenate(list(errors), axis=1)) > level
-        (split,) = known_share.tallies(sums, known, drawn, weights, [(above, np.ones(n, dtype=bool))])
+        event = (above, np.ones(n, dtype=bool))
+        (split,) = known_share.tallies(sums, known, drawn, weights, [event], 1.0 / TOLERANCES)
         own = known_share.intervals(split, [split], [split], usable)
         stated = sample_of(above, Weighted(weights, 1.0 / TOLERANCES)).above(0.5)
         return found(own, [share]) + found(stated, [share])

@@ -1,0 +1,138 @@
+"""What several questions have in common: shares above limits as cells, rows and words, and reasons for refusals."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, NamedTuple
+
+from tolstat.analysis import binomial
+from tolstat.analysis.estimates import Exceedance
+from tolstat.analysis.prediction import DELIVERY
+from tolstat.analysis.sample import total_interval
+from tolstat.common.errors import Fault, NotApplicable, StoreError
+from tolstat.common.loads import ANY_LIMIT
+from tolstat.display import text
+from tolstat.display.table import Row
+from tolstat.store import error_budget
+from tolstat.store.view import View
+
+WIDEST = 0.5
+"""Total interval of a yield, or its bounds without one, from which on it says too little for a verdict."""
+NO_INTERVALS = "no intervals: they hold for independent samples only"
+Cell = Callable[[Row], str]
+
+
+def word(key: str) -> Cell:
+    """Make a `Column.cell` of a value that is text, or a whole number."""
+    return lambda row: str(row[key])
+
+
+def share(key: str) -> Cell:
+    """Make a `Column.cell` of a share, in per cent."""
+    return lambda row: text.percent(row[key])
+
+
+def shares(lower: str, upper: str) -> Cell:
+    """Make a `Column.cell` of an interval of shares, in per cent."""
+    return lambda row: text.span(row[lower], row[upper])
+
+
+def value(key: str) -> Cell:
+    """Make a `Column.cell` of a load, in the row's ``unit``."""
+    return lambda row: text.value(row[key], row["unit"])
+
+
+def values(lower: str, upper: str) -> Cell:
+    """Make a `Column.cell` of an interval of loads, in the row's ``unit``."""
+    return lambda row: text.span_of(row[lower], row[upper], row["unit"])
+
+
+def limit(row: Row) -> str:
+    """Cell of the ``limit`` of a row; a dash for all limits together."""
+    return "-" if row["load"] == ANY_LIMIT else text.value(row["limit"], row["unit"])
+
+
+def rows_of(columns: Mapping[str, Iterable[Any]]) -> list[dict[str, Any]]:
+    """Rows of a table from its columns, which are of one length."""
+    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+
+
+def inapplicable(view: View, found: str, remedy: str) -> NotApplicable:
+    """Make the error of a question that does not apply to a file."""
+    return NotApplicable(str(Fault(str(view.path), found, remedy)))
+
+
+def unusable(view: View, found: str, remedy: str) -> StoreError:
+    """Make the error of a file that cannot be used for a question."""
+    return StoreError(str(Fault(str(view.path), found, remedy)))
+
+
+def grouped(reasons: Iterable[tuple[str, str]]) -> str:
+    """Words on loads and the reason of each: ``cross1.F, cross2.F: reason; fork1.T: other reason``."""
+    loads: dict[str, list[str]] = {}
+    for name, reason in dict.fromkeys(reasons):
+        loads.setdefault(reason, []).append(name)
+    return "; ".join(f"{', '.join(names)}: {reason}" for reason, names in loads.items())
+
+
+def good(view: View, name: str = ANY_LIMIT, confidence: float = 0.95, delivery: int = DELIVERY) -> Mapping[str, Any]:
+    """Yield, joints above in a million and in the next delivery: the keys of `capability.limit_rows` but indices."""
+    return view.kept(("good", name, confidence, delivery), lambda: _good(view, name, confidence, delivery))
+
+
+def _good(view: View, name: str, confidence: float, delivery: int) -> Mapping[str, Any]:
+    load = view.load(name)
+    assert load.limit is not None
+    loads, above = error_budget.with_error(view, load), load.above(load.limit, confidence)
+    row = {"load": load.name, "unit": load.unit, "limit": load.limit, **counts(above)}
+    low, high = total_interval(loads, load.limit, confidence)
+    row |= {"good": 1.0 - above.estimate, "good_lower": 1.0 - high, "good_upper": 1.0 - low}
+    row |= {"ppm": 1e6 * above.estimate, "ppm_lower": 1e6 * low, "ppm_upper": 1e6 * high}
+    return row | error_budget.delivery(loads, load.limit, delivery, confidence)
+
+
+def counts(above: Exceedance) -> dict[str, int]:
+    """Columns of a table: numbers of joints, of those without a valid load, and of those above a level."""
+    return {"n": above.n, "n_failed": above.n_failed, "n_unsettled": above.n_unsettled, "count": above.count}
+
+
+class Yield(NamedTuple):
+    """Yield of all limits together, in words.
+
+    Attributes
+    ----------
+    value : str
+        The estimate, or the interval where joints without a valid load matter.
+    words : str
+        What it is the share of, number of joints, total interval.
+    decides : bool
+        Whether the interval is narrower than `WIDEST`.
+    """
+
+    value: str
+    words: str
+    decides: bool
+
+
+def together(row: Row, limits: int) -> Yield:
+    """Share of the joints that keep all of some limits, from `good`."""
+    n, above, unresolved = int(row["n"]), int(row["count"]), int(row["n_failed"] + row["n_unsettled"])
+    valid, low, high = n - unresolved, row["good_lower"], row["good_upper"]
+    kind = "bounds" if math.isnan(low) else "total interval"
+    if kind == "bounds":
+        low, high = ((valid - above) / n, 1.0 - above / n) if n else (0.0, 1.0)
+    span, counted = text.span(low, high), f"{valid - above} of {valid}{' with a valid load' if unresolved else ''}"
+    figure = text.percent(row["good"])
+    if binomial.unresolved_matter(above, n, unresolved):
+        figure, interval = span, kind
+    else:
+        interval = "no interval" if kind == "bounds" else f"{kind} {span}"
+    keep = f"keep all {limits} limits" if limits > 1 else "keep the limit"
+    return Yield(figure, f"of the joints {keep} ({counted}; {interval})", high - low < WIDEST)
+
+
+def delivered(row: Row, limits: int) -> str:
+    """What `good` predicts of the next `DELIVERY` joints; empty without an interval."""
+    exceeded = "at least one limit" if limits > 1 else "the limit"
+    return "" if math.isnan(row["next_lower"]) else f"of the next {DELIVERY} joints exceed {exceeded}"

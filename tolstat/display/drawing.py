@@ -8,9 +8,9 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
-from tolstat.display import schemes, style, text
+from tolstat.display import style, text
 from tolstat.display.blocks import Panel
 from tolstat.display.mpl import figure as figures
 from tolstat.display.mpl import mpl, ticker
@@ -32,37 +32,19 @@ LETTER, KEY = 0.071, 0.5
 GREY = "#B8B8B8"
 
 
-class Frame(NamedTuple):
-    """Edges of the axes (points from the left and the top of the picture), and the loads at both ends of the x axis."""
-
-    left: float
-    right: float
-    top: float
-    bottom: float
-    low: float
-    high: float
-
-
 @contextmanager
 def settings() -> Iterator[None]:
     """Apply the common style with font and line sizes for a single panel."""
-    given: dict[Any, Any] = {
-        "font.size": 9.2,
-        "axes.labelsize": 9.0,
-        "axes.titlesize": 9.0,
-        "xtick.labelsize": 8.5,
-        "ytick.labelsize": 8.5,
-        "legend.fontsize": 8.5,
+    given: Any = {
+        "font.size": 8.8,
         "lines.linewidth": 1.6,
-        "axes.linewidth": 0.8,
-        "grid.linewidth": 0.7,
         "legend.frameon": True,
         "legend.framealpha": 0.95,
         "legend.facecolor": "white",
         "legend.edgecolor": "none",
+        "svg.fonttype": "none",  # keep text as text: small, sharp, searchable, readable aloud
     }
     with style.settings(), mpl.rc_context(given):
-        mpl.rcParams["svg.fonttype"] = "none"  # keep text as text: small, sharp, searchable, readable aloud
         yield
 
 
@@ -79,8 +61,16 @@ def _place(panel: Panel) -> tuple[float, float, float, float]:
     )
 
 
-def svg(panel: Panel) -> tuple[str, Frame]:
-    """Draw a panel as inline SVG: the same panel gives the same bytes, and all ids are unique on the page."""
+def svg(panel: Panel) -> tuple[str, tuple[float, ...]]:
+    """Draw a panel as inline SVG: the same panel gives the same bytes, and all ids are unique on the page.
+
+    Returns
+    -------
+    str
+        The element.
+    tuple of float
+        Left, right, upper, lower edge of the axes, points from the left and the top; loads at both ends of the x axis.
+    """
     with settings():
         figure = figures.Figure(figsize=panel.size, dpi=72)
         ax = figure.add_axes(_place(panel))
@@ -88,8 +78,7 @@ def svg(panel: Panel) -> tuple[str, Frame]:
         buffer = io.StringIO()
         figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None}, transparent=True)
     box, height = ax.get_window_extent(), figure.bbox.height
-    low, high = ax.get_xlim()
-    frame = Frame(box.x0, box.x1, height - box.y1, height - box.y0, low, high)
+    frame = (box.x0, box.x1, height - box.y1, height - box.y0, *ax.get_xlim())
     return _inline(buffer.getvalue(), panel), frame
 
 
@@ -112,7 +101,7 @@ def switched(artist: Artist, name: str) -> None:
 
 def _inline(drawn: str, panel: Panel) -> str:
     """Body of an SVG file as an element of the page, whose style sheet has fonts, joins and colours of all pictures."""
-    body = schemes.with_variables(visible(drawn[drawn.index("<svg") :]))
+    body = style.with_variables(visible(drawn[drawn.index("<svg") :]))
     body = re.sub(r"<metadata>.*?</metadata>|<style.*?</style>", "", body, flags=re.DOTALL)
     body = body.replace("font-family: 'DejaVu Sans'; ", "")
     body = re.sub(r'<path d="[^"]*" style="fill: none"/>', "", body)  # background of figure and axes

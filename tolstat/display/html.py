@@ -13,7 +13,7 @@ import jinja2
 from markupsafe import Markup
 
 from tolstat.common.aside import mapped
-from tolstat.display import drawing, schemes
+from tolstat.display import drawing, style
 from tolstat.display.blocks import Block, Decision, Panel, Panels
 from tolstat.display.unseen import visible
 
@@ -33,7 +33,7 @@ def environment(figure: Callable[[Panel], dict[str, Any]]) -> jinja2.Environment
     """
     files = jinja2.FileSystemLoader(TEMPLATES)
     made = jinja2.Environment(loader=files, autoescape=True, trim_blocks=True, lstrip_blocks=True, finalize=_shown)
-    made.globals |= {"figure": figure, "schemes": Markup(schemes.style_sheet())}
+    made.globals |= {"figure": figure, "schemes": Markup(style.style_sheet())}
     made.filters |= {"data": _data, "grouped": grouped, "bound": bound}
     return made
 

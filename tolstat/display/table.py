@@ -57,8 +57,8 @@ class Column(NamedTuple):
 
 
 def cells(columns: Sequence[Column], rows: Rows) -> list[list[str]]:
-    """Headings, then one row of cells for each row of a table; without the columns that have nothing to show."""
-    return _cells([column for column in columns if column.shown(rows)], rows)
+    """Headings, then one row of cells for each row of a table."""
+    return [[column.head for column in columns], *([column.cell(row) for column in columns] for row in rows)]
 
 
 def as_text(columns: Sequence[Column], rows: Rows, width: int | None = WIDTH) -> str:
@@ -69,23 +69,14 @@ def as_text(columns: Sequence[Column], rows: Rows, width: int | None = WIDTH) ->
 def fitted(columns: Sequence[Column], rows: Rows, width: int | None = WIDTH) -> tuple[str, str]:
     """Text as of `as_text`, and a sentence that names the columns that it leaves out; empty if there are none."""
     able = used = [column for column in columns if column.shown(rows)]
-    shown = _text(used, rows)
-    while width is not None and max(map(len, shown.splitlines())) > width:
+    while True:
+        shown = align(cells(used, rows), [column.words for column in used])
         last = max(used, key=lambda column: column.rank)
-        if not last.rank:
+        if width is None or not last.rank or max(map(len, shown.splitlines())) <= width:
             break
         used = [column for column in used if column is not last]
-        shown = _text(used, rows)
     heads = [column.head for column in able if column not in used]
     return shown, f"with --wide also: {', '.join(heads)}" if heads else ""
-
-
-def _cells(used: Sequence[Column], rows: Rows) -> list[list[str]]:
-    return [[c.head for c in used], *([c.cell(row) for c in used] for row in rows)]
-
-
-def _text(used: Sequence[Column], rows: Rows) -> str:
-    return align(_cells(used, rows), [column.words for column in used])
 
 
 def plain(rows: Rows, ranked: Sequence[str] = ()) -> list[Column]:
@@ -106,5 +97,5 @@ def _short(x: Any) -> str:
 def as_block(title: str, columns: Sequence[Column], rows: Rows, verdicts: Sequence[str] = ()) -> Table:
     """Block of the page with a table; see `blocks.Table`."""
     used = [column for column in columns if column.shown(rows)]
-    head, *body = _cells(used, rows)
+    head, *body = cells(used, rows)
     return Table(title, head, body, frozenset({0} | {i for i, own in enumerate(used) if own.words}), verdicts)

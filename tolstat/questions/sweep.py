@@ -215,8 +215,9 @@ def _combinations(axes: list[Axis]) -> list[tuple[str, Mask]]:
 
 
 def _shades(count: int) -> list[str]:
-    """Colours of `style.SHADES` for so many values, in order."""
-    return [style.SHADES[i] for i in np.linspace(0, len(style.SHADES) - 1, count).round().astype(int)]
+    """Colours of `style.shades` for so many values, in order."""
+    shades = style.shades()
+    return [shades[i] for i in np.linspace(0, len(shades) - 1, count).round().astype(int)]
 
 
 def key(view: View) -> tuple[list[Artist], list[str]]:

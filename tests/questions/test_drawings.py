@@ -294,7 +294,7 @@ def test_row_prints_the_errors_of_the_file(here):
         (("cirelli", "--row", 3), "cirelli: has no rows"),
         (("cirelli",), "did you mean 'cirelli2021'"),
         (("none.toml",), "none.toml: cannot be read"),
-        (("none.h5",), "none.h5: is neither a file nor"),
+        (("none.h5",), "no joint is named 'none.h5'"),
         (("small.h5", "--row", 1000), "has rows 0 to 60, not 1000"),
         (("cirelli2021", "--alpha", "3"), "--alpha: alpha: '3' has no unit"),
         (("cirelli2021", "--alpha", "95 deg"), "--alpha: alpha: a Cardan joint cannot turn"),

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from html import escape
 from pathlib import Path
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 from tolstat.display import style, text
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
+    from matplotlib.figure import Figure
 
 BOTTOM, RIGHT = 0.5, 0.12
 """Margins below and beside the axes, inches; `Panel.left` and `Panel.top` are the others."""
@@ -52,13 +54,8 @@ def _place(panel: Panel) -> tuple[float, float, float, float]:
     """Position of the axes as fractions of the panel's size: left, bottom, width, height."""
     if panel.bare:
         return (0.0, 0.0, 1.0, 1.0)
-    width, height = panel.size
-    return (
-        panel.left / width,
-        BOTTOM / height,
-        1.0 - (panel.left + RIGHT) / width,
-        1.0 - (BOTTOM + panel.top) / height,
-    )
+    (width, height), across, along = panel.size, panel.left + RIGHT, BOTTOM + panel.top
+    return (panel.left / width, BOTTOM / height, 1.0 - across / width, 1.0 - along / height)
 
 
 def svg(panel: Panel) -> tuple[str, tuple[float, ...]]:
@@ -84,14 +81,26 @@ def svg(panel: Panel) -> tuple[str, tuple[float, ...]]:
 
 def save(panel: Panel, stem: Path) -> list[Path]:
     """Write a panel as PNG and SVG with its title above it; returns the files written."""
-    width, height = panel.size
+    return style.save(sheet([panel]), stem)
+
+
+def sheet(panels: Sequence[Panel], title: str = "", notes: Sequence[str] = (), columns: int = 1) -> Figure:
+    """Put panels with their titles on one sheet, `columns` side by side, below a headline and above small print."""
+    heights = [panel.size[1] + TITLE for panel in panels[::columns]]
+    head, foot = wrap(title, 44 * columns), [line for note in notes for line in wrap(note, 62 * columns)]
+    size = (columns * panels[0].size[0], sum(heights) + 0.35 * len(head) + 0.2 * len(foot))
     with settings():
-        figure = figures.Figure(figsize=(width, height + TITLE))
-        left, bottom, wide, high = _place(panel)
-        shrink = height / (height + TITLE)
-        panel.draw(figure.add_axes((left, bottom * shrink, wide, high * shrink)))
-        figure.text(0.02, 1.0 - 0.5 * TITLE / (height + TITLE), panel.title, va="center", fontsize=10, wrap=True)
-    return style.save(figure, stem)
+        figure = figures.Figure(figsize=size, layout="constrained")
+        axes = figure.subplots(len(heights), columns, squeeze=False, height_ratios=heights)
+        for panel, ax in zip(panels, axes.flat, strict=True):
+            panel.draw(ax)
+            pad = 6.0 if panel.bare else 72.0 * panel.top
+            ax.set_title("\n".join(wrap(panel.title, 62)), fontsize=10, fontweight="normal", pad=pad)
+            ax.set_anchor("N")
+        left = {"x": 0.1 / size[0], "ha": "left"}
+        figure.suptitle("\n".join(head), **left, fontsize=12.5, fontweight="bold")
+        figure.supxlabel("\n".join(foot), **left, fontsize=8.8, linespacing=1.5)
+    return figure
 
 
 def switched(artist: Artist, name: str) -> None:

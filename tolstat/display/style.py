@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
@@ -18,7 +18,6 @@ from tolstat.display.mpl import figure as figures
 from tolstat.display.mpl import mpl, ticker
 
 if TYPE_CHECKING:
-    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -130,15 +129,13 @@ def panels(title: str, subtitle: str) -> tuple[Figure, list[tuple[str, Kind, Axe
         One for each of `loads.PANELS`.
     """
     figure = figures.Figure(figsize=(11.0, 8.5))
-    axes = figure.subplots(2, 2)
+    axes = figure.subplots(2, 2).ravel()
     figure.subplots_adjust(left=0.085, right=0.975, top=0.82, bottom=0.125, hspace=0.42, wspace=0.16)
     figure.text(0.02, 0.972, title, fontsize=15, fontweight="bold", va="top")
     figure.text(0.02, 0.932, subtitle, fontsize=9.5, color="#444444", va="top", linespacing=1.45)
-    page = []
-    for (group, kind), ax in zip(PANELS, axes.flat, strict=True):
+    for (group, kind), ax in zip(PANELS, axes, strict=True):
         ax.set_title(f"{group.capitalize()} bushings, {QUANTITY[kind.unit]}", pad=21)
-        page.append((group, kind, ax))
-    return figure, page
+    return figure, [(group, kind, ax) for (group, kind), ax in zip(PANELS, axes, strict=True)]
 
 
 def share_axis(ax: Axes, low: float, which: str = "y", high: float = 1.0) -> None:
@@ -166,7 +163,8 @@ def _near_view(low: float, high: float) -> ticker.FixedLocator:
 
 def mark(ax: Axes, x: float, y: float, colour: str) -> None:
     """Mark the nominal joint by a small triangle."""
-    ax.plot(x, y, marker="v", ms=7.5, mec="white", mew=0.7, color=colour, clip_on=False, zorder=5)
+    look: Any = {"ms": 7.5, "mec": "white", "mew": 0.7, "ls": "", "clip_on": False, "zorder": 5}
+    ax.plot(x, y, "v", color=colour, label="nominal joint", **look)
 
 
 def note(ax: Axes, text: str, y: float) -> None:
@@ -174,7 +172,7 @@ def note(ax: Axes, text: str, y: float) -> None:
     ax.annotate(text, (1.0, y), (-2, 3), ax.get_yaxis_transform(), "offset points", ha="right", fontsize=9)
 
 
-def legend(figure: Figure, handles: list[Artist], labels: list[str]) -> None:
+def legend(figure: Figure, handles: Sequence[Any], labels: Sequence[str]) -> None:
     """Put one legend for all panels at the foot of the page, in one or two rows."""
     columns = len(labels) if sum(len(label) + 7 for label in labels) < 140 else -(-len(labels) // 2)
     look: Any = {"handlelength": 2.4, "columnspacing": 1.3, "fontsize": 9.5}

@@ -5,12 +5,11 @@ Text fits a line of `WIDTH` characters: columns are left out, those of the highe
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from tolstat.display.blocks import Table
-from tolstat.display.text import align
+from tolstat.display.text import align, formed
 
 Row = Mapping[Any, Any]
 Rows = Sequence[Row]
@@ -85,13 +84,14 @@ def plain(rows: Rows, ranked: Sequence[str] = ()) -> list[Column]:
     def column(name: str) -> Column:
         words = any(isinstance(row[name], str) for row in rows)
         rank = 1 + list(ranked).index(name) if name in ranked else 0
-        return Column(name.replace("N*m", "N m"), lambda row: _short(row[name]), words, rank=rank)
+        return Column(
+            name.replace("N*m", "N m"),
+            lambda row: formed(row[name], ".5g") if isinstance(row[name], float) else str(row[name]),
+            words,
+            rank=rank,
+        )
 
     return [column(name) for name in (rows[0] if rows else ())]
-
-
-def _short(x: Any) -> str:
-    return ("-" if math.isnan(x) else f"{x:.5g}") if isinstance(x, float) else str(x)
 
 
 def as_block(title: str, columns: Sequence[Column], rows: Rows, verdicts: Sequence[str] = ()) -> Table:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
-from textwrap import wrap
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,7 +21,6 @@ from tolstat.display import drawing, text
 from tolstat.display.answer import Answer, Part, Sentence
 from tolstat.display.asked import Asked
 from tolstat.display.blocks import Panel, Panels
-from tolstat.display.mpl import figure as figures
 from tolstat.display.table import Rows
 from tolstat.joint import Joint, Operation
 from tolstat.questions.drawings import views
@@ -51,6 +49,10 @@ NOTES = (
 """How to read the drawing of a joint."""
 ERRORS = ("Dashed: without error. e points away from the centre of the joint; every pin and hole has its own e, t, z.",)
 """How to read the drawing of the kinds of errors."""
+ROW = (
+    "Diameters and contact to scale. Cross and forks in their ideal place: they give way where pin and hole overlap.",
+)
+"""How to read the drawing of the errors of one joint."""
 
 
 def place_of(view: View, load: str, asked: Asked) -> Panel | None:
@@ -181,13 +183,7 @@ def read(
             case.points[0].name if isinstance(case, study.Study) else "",
         )
     else:
-        try:
-            joint = joints.load(source, {}, str(source))
-        except InputError as error:
-            if path.suffix == ".toml":
-                raise
-            remedy = error.faults[0].remedy
-            raise InputError([Fault(str(source), "is neither a file nor the name of a joint", remedy)]) from error
+        joint = joints.load(source, {}, str(source))
         title = joint.description or path.stem
     return joint, given if alpha else own, f"{title}, at {point}" if point else title, errors
 
@@ -211,12 +207,12 @@ def draw_joint(joint: Joint, alpha: float, title: str = "", columns: int = 2) ->
     matplotlib.figure.Figure
         Its parts have their names as ids in an SVG.
     """
-    return _sheet(views.views(joint, alpha), title or joint.description or "Cardan joint", NOTES, columns)
+    return drawing.sheet(views.views(joint, alpha), title or joint.description or "Cardan joint", NOTES, columns)
 
 
 def draw_errors(joint: Joint) -> Figure:
     """Draw what a positive error of each kind means, on pin 1 and hole 4 of a joint."""
-    return _sheet([views.kinds_of_errors(joint)], "Errors of a pin and a hole", ERRORS)
+    return drawing.sheet([views.kinds_of_errors(joint)], "Errors of a pin and a hole", ERRORS)
 
 
 def draw_row(joint: Joint, errors: NDArray[np.void], title: str = "") -> Figure:
@@ -232,25 +228,7 @@ def draw_row(joint: Joint, errors: NDArray[np.void], title: str = "") -> Figure:
         Headline.
     """
     panel = views.errors_of(joint, errors, "Seen along z and along t of each pin", "row")
-    return _sheet([panel], title or "Errors of one joint")
-
-
-def _sheet(panels: Sequence[Panel], title: str, notes: Sequence[str] = (), columns: int = 1) -> Figure:
-    """Put panels with their titles on one sheet, `columns` side by side, below a headline and above small print."""
-    heights = [panel.size[1] + 0.3 for panel in panels[::columns]]
-    foot = [line for note in notes for line in wrap(note, 62 * columns)]
-    size = (columns * drawing.WIDTH, sum(heights) + 0.35 + 0.2 * len(foot))
-    with drawing.settings():
-        sheet = figures.Figure(figsize=size, layout="constrained")
-        axes = sheet.subplots(len(heights), columns, squeeze=False, height_ratios=heights)
-        for panel, ax in zip(panels, axes.flat, strict=True):
-            panel.draw(ax)
-            ax.set_title(panel.title, fontsize=10, fontweight="normal")
-            ax.set_anchor("N")
-        left = {"x": 0.1 / size[0], "ha": "left"}
-        sheet.suptitle("\n".join(wrap(title, 44 * columns)), **left, fontsize=12.5, fontweight="bold")
-        sheet.supxlabel("\n".join(foot), **left, fontsize=8.8, linespacing=1.5)
-    return sheet
+    return drawing.sheet([panel], title or "Errors of one joint", ROW)
 
 
 def lengths(joint: Joint, alpha: float) -> Rows:

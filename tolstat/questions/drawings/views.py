@@ -52,13 +52,14 @@ WALL = 0.12
 CROSS, INPUT, OUTPUT = "#CFE4F3", "#F6DFC6", "#CDEBDD"
 """Tints of cross, input fork and output fork; names stand beside them."""
 MARKED, SOFT, HATCH = "#C04A00", "#666666", "////"
-DASHED: Look = {"edgecolor": SOFT, "linestyle": (0.0, (4.0, 2.0)), "linewidth": 0.9, "facecolor": "none", "hatch": None}
 EDGE: Look = {"edgecolor": INK, "linewidth": 1.2, "zorder": 2}
 ARROW: Look = {"arrowstyle": "<|-,head_width=0.18,head_length=0.42", "lw": 1.2, "shrinkA": 0, "shrinkB": 0}
 """Arrow with its tip at the text."""
 BETWEEN = ARROW | {"arrowstyle": "<|-|>,head_width=0.12,head_length=0.35", "lw": 0.7}
 ON_CROSS: Look = {"facecolor": CROSS, "edgecolor": "none", "pad": 1.0}
 LEADER: Look = {"arrowstyle": "-", "lw": 0.6, "shrinkA": 0, "shrinkB": 0}
+HEIGHT = 1.6
+"""Height of a pin in its hole with what is written above it, inches."""
 X, Y = np.eye(2)
 
 
@@ -82,6 +83,10 @@ class Feature(NamedTuple):
 
 Pair = tuple[Feature, Feature]
 """A pin and the hole that it turns in."""
+
+
+Cell = tuple[str, str, Array, dict[str, tuple[Pair, Look]]]
+"""Drawing of a pin in its hole: a headline, words, direction of view, pairs by name and how they look."""
 
 
 def pairs(joint: Joint, errors: NDArray[np.void]) -> list[Pair]:
@@ -122,8 +127,7 @@ def numbers(joint: Joint, errors: NDArray[np.void]) -> Rows:
     rows = []
     for pin, hole in pairs(joint, errors):
         for name in (pin.name, hole.name):
-            units = (np.degrees(1.0) if kind.startswith("tilt") else 1e3 for kind in MEANINGS)
-            sizes = [unit * errors[f"{name}.{kind}"][0] for unit, kind in zip(units, MEANINGS, strict=True)]
+            sizes = [(np.degrees(1.0) if "tilt" in kind else 1e3) * errors[f"{name}.{kind}"][0] for kind in MEANINGS]
             cells = (round(float(x), 4) for x in (*sizes, 5e2 * (hole.diameter - pin.diameter)))
             rows.append(dict(zip(HEADS, (name, *cells), strict=True)))
     return rows
@@ -155,8 +159,22 @@ def views(joint: Joint, alpha: float, marked: Collection[str] = ()) -> tuple[Pan
 def kinds_of_errors(joint: Joint) -> Panel:
     """What a positive error of each kind means, on pin 1 and hole 4."""
     description = "; ".join(f"{kind}: {meaning}" for kind, meaning in MEANINGS.items())
-    draw = partial(_kinds, joint=joint)
-    return Panel("error-kinds", "What a positive error means", description, draw, (WIDTH, 4.8), bare=True)
+    solid: Look = {"edgecolor": COLOURS[0]}
+    dashed: Look = {
+        "edgecolor": SOFT,
+        "linestyle": (0.0, (4.0, 2.0)),
+        "linewidth": 0.9,
+        "facecolor": "none",
+        "hatch": None,
+    }
+    cells: list[Cell] = []
+    ideal = pairs(joint, nominal_errors(1))[0]
+    for kind, meaning in MEANINGS.items():
+        view = SIDE if kind in ("offset_z", "tilt_t") else ALONG_Z
+        both = {f"{kind}.moved": (positive(joint, kind), solid), f"{kind}.ideal": (ideal, dashed)}
+        cells.append((kind, meaning, view, both))
+    draw = partial(_cells, joint=joint, cells=cells, factor=1.0)
+    return Panel("error-kinds", "What a positive error means", description, draw, (WIDTH, 3 * HEIGHT), bare=True)
 
 
 def errors_of(joint: Joint, errors: NDArray[np.void], title: str, key: str) -> Panel:
@@ -166,14 +184,18 @@ def errors_of(joint: Joint, errors: NDArray[np.void], title: str, key: str) -> P
     largest error or clearance is drawn as a sixth to a quarter of the pin's size. `errors` has shape (1,), dtype ERROR.
     """
     both, z = pairs(joint, errors), joint.contact.z
-    gaps = [abs(hole.diameter - pin.diameter) / 2.0 for pin, hole in both]
     moved = [abs(feature.ends(z) - feature.ends(z, 0.0)).max() for pair in both for feature in pair]
-    largest = max(*moved, *gaps)
+    largest = max(*moved, *(0.5 * abs(hole.diameter - pin.diameter) for pin, hole in both))
     factor = float(f"{0.08 * (joint.contact.D_P + z) / largest:.0e}") if largest > 0.0 else 1.0
-    clearances = ", ".join(f"{pair[0].name} {_gap(*pair)}" for pair in both)
-    description = f"Pins in their holes, errors and clearance enlarged {factor:g} times. Clearances: {clearances}."
-    draw = partial(_row, joint=joint, both=both, factor=factor)
-    return Panel(key, title, description, draw, (WIDTH, 2.8), bare=True)
+    cells: list[Cell] = []
+    for pair in both:
+        gap = f"gap {5e5 * (pair[1].diameter - pair[0].diameter):.4g} µm, drawn × {factor:g}".replace("-", "−")
+        for way, view in (("z", ALONG_Z), ("t", SIDE)):
+            head, look = f"{pair[0].name} in {pair[1].name}, along {way}", {"alpha": 0.85}
+            cells.append((head, gap, view, {f"along_{way}": (pair, look)}))
+    description = f"Pins in their holes, errors and clearance enlarged {factor:g} times."
+    draw = partial(_cells, joint=joint, cells=cells, factor=factor)
+    return Panel(key, title, description, draw, (WIDTH, 4 * HEIGHT), bare=True)
 
 
 def _sketched(joint: Joint) -> tuple[float, float, float]:
@@ -282,36 +304,17 @@ def _mark(ax: Axes, marked: Collection[str]) -> None:
             )
 
 
-def _kinds(ax: Axes, joint: Joint) -> None:
-    """Draw a pin in its hole with a positive error of each kind in both, and without error, dashed."""
+def _cells(ax: Axes, joint: Joint, cells: Sequence[Cell], factor: float) -> None:
+    """Draw pins in their holes, two cells side by side, with the axes e, t, z."""
     inch = max((1.0 + 2.0 * WALL) * joint.contact.D_H / 0.95, joint.contact.z / 0.36)
-    _frame(ax, 0.5 * WIDTH * inch, -2.4 * inch, 2.4 * inch)
-    for i, (kind, meaning) in enumerate(MEANINGS.items()):
-        view = SIDE if kind in ("offset_z", "tilt_t") else ALONG_Z
-        at = inch * np.array([(-0.85, 1.55)[i % 2], 1.45 - 1.6 * (i // 2)])
-        _label(ax, at, kind, (-20.0, 54.0), fontweight="bold")
-        _label(ax, at, meaning, (-20.0, 41.0))
-        _triad(ax, at - 0.95 * inch * X, np.eye(3), view, kind)
-        _pair(ax, joint, positive(joint, kind), at, view, f"{kind}.moved", 1.0, edgecolor=COLOURS[0])
-        _pair(ax, joint, pairs(joint, nominal_errors(1))[0], at, view, f"{kind}.ideal", 1.0, **DASHED)
-
-
-def _row(ax: Axes, joint: Joint, both: Sequence[Pair], factor: float) -> None:
-    """Draw the pins of a joint in their holes, seen along z and along t."""
-    D, z = joint.contact.D_P, joint.contact.z
-    inch = max((0.8 * D + 0.3 * z) / 0.54, (0.68 * z + 0.18 * D) / 0.38)
-    _frame(ax, 0.5 * WIDTH * inch, -1.4 * inch, 1.4 * inch)
-    for way, view, y in (("along_z", ALONG_Z, 0.5), ("along_t", SIDE, -0.5)):
-        _triad(ax, inch * np.array([-2.0, y - 0.1]), np.eye(3), view, way)
-        for i, pair in enumerate(both):
-            _pair(ax, joint, pair, inch * np.array([-1.1 + 1.02 * i, y]), view, way, factor, alpha=0.85)
-    for i, (pin, hole) in enumerate(both):
-        _label(
-            ax, (inch * (-1.1 + 1.02 * i), 1.2 * inch), f"{pin.name} in {hole.name}\n{_gap(pin, hole)}", fontsize=7.0
-        )
-    scale = f"To scale: pin ⌀ {_millimetres(D)}, contact {_millimetres(z)} long. Errors, clearance: × {factor:g}."
-    give = "Cross and forks are in their ideal place: at work they give way where pin and hole overlap."
-    _label(ax, (0.0, -1.2 * inch), f"{scale}\n{give}", fontsize=6.8)
+    _frame(ax, 0.5 * WIDTH * inch, -HEIGHT * (len(cells) // 2) * inch, 0.0)
+    for i, (head, words, view, drawn) in enumerate(cells):
+        at = inch * np.array([(-0.85, 1.55)[i % 2], -HEIGHT * (i // 2) - 1.0])
+        _label(ax, at, head, (-20.0, 55.0), fontweight="bold")
+        _label(ax, at, words, (-20.0, 42.0))
+        _triad(ax, at - 1.05 * inch * X, np.eye(3), view, f"axes.{i}")
+        for name, (pair, look) in drawn.items():
+            _pair(ax, joint, pair, at, view, name, factor, **look)
 
 
 def _pair(ax: Axes, joint: Joint, pair: Pair, at: Array, view: Array, name: str, factor: float, **look: Any) -> None:
@@ -382,8 +385,3 @@ def _triad(ax: Axes, at: Array, axes: Array, view: Array, name: str) -> None:
 
 def _millimetres(x: float) -> str:
     return f"{1e3 * x:.4g} mm"
-
-
-def _gap(pin: Feature, hole: Feature) -> str:
-    """Radial clearance in words."""
-    return f"{5e5 * (hole.diameter - pin.diameter):.4g} µm".replace("-", "−")

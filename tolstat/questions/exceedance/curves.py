@@ -14,14 +14,13 @@ from tolstat.analysis.sample import Sample
 from tolstat.common.loads import LOADS, PANELS, load_of, names_of
 from tolstat.display import drawing, style, text
 from tolstat.display.blocks import Panel, Reader
-from tolstat.display.mpl import lines, patches, ticker
+from tolstat.display.mpl import lines, ticker
 from tolstat.display.table import Rows
 from tolstat.questions.exceedance.rows import curve, limit_rows, most_exceeded, readings
 from tolstat.questions.exceedance.verdicts import ends
 from tolstat.store.view import View
 
 if TYPE_CHECKING:
-    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -30,8 +29,6 @@ DRAWN_LEVELS = 200
 THIN_LEVELS = 80
 """Maximum number of points of a curve without a band."""
 LIMIT_DASH = (0.0, (8.0, 3.0))
-NONE_EXCEEDS: Any = {"color": style.FAINT, "lw": 1.1, "ls": (0.0, (1.0, 2.0))}
-"""Line of the upper end of the interval where no joint exceeds the load."""
 
 
 def sheet(view: View, subtitle: str) -> Figure:
@@ -49,7 +46,6 @@ def sheet(view: View, subtitle: str) -> Figure:
     Figure
         Four panels, empty where no load is kept; share of the joints on a logarithmic axis down to half a joint.
     """
-    has_intervals = view.design.has_interval("share")
     with style.settings():
         page, panels = style.panels(f"{view.name}: share of joints whose largest load exceeds x", subtitle)
         for group, kind, ax in panels:
@@ -64,20 +60,13 @@ def sheet(view: View, subtitle: str) -> Figure:
             )
             ax.set_xlabel(f"x: largest |{kind.symbol}| over the revolution [{unit}]")
             ax.set_ylabel("share of joints above x" if kind == PANELS[0][1] else "")
-            if has_intervals:
+            if view.design.has_interval("share"):
                 end = max(curve(load, DRAWN_LEVELS)["outer_upper"][-1] for load in loads.values())
-                ax.axhline(end, **NONE_EXCEEDS, zorder=1.5)
-        handles: list[Artist] = [
-            lines.Line2D([], [], color=c, ls=dash) for c, dash in zip(style.COLOURS, style.DASHES, strict=True)
-        ]
-        labels = [f"bushing {i}" for i in (1, 2, 3, 4)]
-        if has_intervals:
-            handles += [patches.Patch(color=style.FAINT, alpha=0.4, lw=0), lines.Line2D([], [], **NONE_EXCEEDS)]
-            labels += ["95 % band", "upper end where none exceeds x"]
-        if len(view.nominal):
-            handles.append(lines.Line2D([], [], marker="v", color=style.FAINT, ls="", ms=7.5))
-            labels.append("nominal joint")
-        style.legend(page, handles, labels)
+                look: Any = {"color": style.FAINT, "lw": 1.1, "ls": (0.0, (1.0, 2.0)), "zorder": 1.5}
+                ax.axhline(end, **look, label="upper end where none exceeds x")
+        legends = [ax.get_legend_handles_labels() for _, _, ax in panels]
+        entries = {label: handle for legend in legends for handle, label in zip(*legend, strict=True)}
+        style.legend(page, list(entries.values()), list(entries))
     return page
 
 
@@ -99,7 +88,9 @@ def _draw(ax: Axes, loads: Mapping[int, Sample], others: Sequence[Sample] = ()) 
     style.share_axis(ax, floor)
     for i, table in tables.items():
         _bands(ax, table, floor, style.COLOURS[i])
-        _step(ax, table, table["estimate"], floor, color=style.COLOURS[i], ls=style.DASHES[i], zorder=3)
+        look: Any = {"color": style.COLOURS[i], "ls": style.DASHES[i], "zorder": 3, "label": f"bushing {i + 1}"}
+        _step(ax, table, table["estimate"], floor, **look)
+    for i in tables:
         if low <= loads[i].nominal <= high:
             style.mark(ax, loads[i].nominal, 1.0, style.COLOURS[i])
     for name, table in thin.items():
@@ -137,7 +128,8 @@ def _bands(ax: Axes, table: NDArray[np.void], floor: float, colour: str) -> None
         bands.append(("outer_lower", "outer_upper", 0.1) if known else ("bound_lower", "bound_upper", 0.1))
     for lower, upper, alpha in bands:
         low, high = (table[end].clip(1e-3 * floor, 1.0) for end in (lower, upper))
-        ax.fill_between(_steps(ax, table), low, high, step="post", color=colour, alpha=alpha, lw=0)
+        label = "95 % band" if lower == "lower" else None
+        ax.fill_between(_steps(ax, table), low, high, step="post", color=colour, alpha=alpha, lw=0, label=label)
 
 
 def _limits(ax: Axes, limits: Mapping[float, Sequence[int]], unit: str, count: int) -> None:

@@ -24,12 +24,7 @@ if TYPE_CHECKING:
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#56B4E9")
 """Colours of bushings 1 to 4: the four of Okabe and Ito's colours (2008) that dichromats tell apart best."""
 Dash = str | tuple[float, tuple[float, ...]]
-DASHES: tuple[Dash, ...] = (
-    "-",
-    (0.0, (6.0, 2.0)),
-    (0.0, (3.0, 1.5)),
-    (0.0, (1.2, 0.9)),
-)
+DASHES: tuple[Dash, ...] = ("-", (0.0, (6.0, 2.0)), (0.0, (3.0, 1.5)), (0.0, (1.2, 0.9)))
 """Dashes of bushings 1 to 4: where curves coincide, the lower one shows through the gaps."""
 INK, FAINT = "#222222", "#777777"
 
@@ -143,10 +138,8 @@ def share_axis(ax: Axes, low: float, which: str = "y", high: float = 1.0) -> Non
 
     An axis of less than two decades has marks at 1, 2 and 5.
     """
-    upright = which == "y"
-    (ax.set_yscale if upright else ax.set_xscale)("log")
-    (ax.set_ylim if upright else ax.set_xlim)(low, high * (high / low) ** 0.04)
-    axis = ax.yaxis if upright else ax.xaxis
+    ax.set(**{f"{which}scale": "log", f"{which}lim": (low, high * (high / low) ** 0.04)})
+    axis = ax.yaxis if which == "y" else ax.xaxis
     if high < 100.0 * low:
         axis.set_major_locator(ticker.LogLocator(subs=(1.0, 2.0, 5.0)))
     axis.set_major_formatter(ticker.FuncFormatter(lambda x, _: f"{100.0 * x:g} %"))

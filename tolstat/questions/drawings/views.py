@@ -263,17 +263,13 @@ def _side(ax: Axes, joint: Joint, alpha: float, marked: Collection[str]) -> None
     ):
         for i, (begin, stop, low, high) in enumerate([*fork, (bridge, end, -shaft, shaft)], 1):
             _strip(ax, (begin * way, stop * way), (low, high), colour, gid=f"side.{name}.{i}")
-        left, arrow = 1.3 * shaft * np.array([-way[1], way[0]]), ARROW | {"connectionstyle": "arc3,rad=-0.2"}
-        _label(
-            ax, end * way - left, letter, end * way + left, textcoords="data", gid=f"turning.{name}", arrowprops=arrow
-        )
+        tail, tip = (end * way + side * 1.3 * shaft * np.array([-way[1], way[0]]) for side in (-1.0, 1.0))
+        look = {"textcoords": "data", "arrowprops": ARROW | {"connectionstyle": "arc3,rad=-0.2"}}
+        _label(ax, tail, letter, tip, gid=f"turning.{name}", **look)
         _centre_line(ax, -0.5 * end * way, (end + 0.22 * inch) * way)
         _label(ax, (yoke + 0.56 * R) * way, f"{name} shaft", (0.0, -8.0), rotation=angle)
-    for radius, colour, name in (
-        (eye, OUTPUT, "arm4"),
-        (0.5 * contact.D_H, "white", "hole4"),
-        (0.5 * contact.D_P, CROSS, "pin1"),
-    ):
+    circles = ((eye, OUTPUT, "arm4"), (0.5 * contact.D_H, "white", "hole4"), (0.5 * contact.D_P, CROSS, "pin1"))
+    for radius, colour, name in circles:
         ax.add_patch(patches.Circle((0.0, 0.0), radius, **EDGE, facecolor=colour, gid=f"side.{name}"))
     _label(ax, -0.24 * contact.D_P * Y, "pin 1")
     _centre_line(ax, 0.0 * X, (end + 0.22 * inch) * X)
@@ -297,11 +293,11 @@ def _mark(ax: Axes, marked: Collection[str]) -> None:
     for text in ax.texts:
         if any(name in text.get_text().replace("pin ", "pin") for name in marked):
             text.set(color=MARKED, fontweight="bold")
+    parts = {name.replace("fork3", "fork4") for name in marked}
     for artist in (*ax.patches, *ax.lines):
-        if not {name.replace("fork3", "fork4") for name in marked}.isdisjoint((artist.get_gid() or "").split(".")):
-            artist.set(
-                **({"mfc": MARKED, "ms": 13.0} if artist in ax.lines else {"edgecolor": MARKED, "linewidth": 2.4})
-            )
+        if not parts.isdisjoint((artist.get_gid() or "").split(".")):
+            line = {"markerfacecolor": MARKED, "markersize": 13.0}
+            artist.set(**(line if artist in ax.lines else {"edgecolor": MARKED, "linewidth": 2.4}))
 
 
 def _cells(ax: Axes, joint: Joint, cells: Sequence[Cell], factor: float) -> None:

@@ -163,15 +163,9 @@ def leading_panel(view: View, name: str) -> Panel:
     if load.valid.size:
         half, few = (text.value(load.quantile(share).estimate, load.unit) for share in (0.5, 0.99))
         description = f"half of the joints exceed {half}, 1 % {few}"
-    return Panel(
-        f"leading-{name}",
-        f"{name}: share of the joints above x",
-        f"{name}: {description}",
-        partial(_leading, view=view, load=load, others=others),
-        (4.9, 3.7),
-        reads=(name, *others),
-        switches=switches,
-    )
+    title, draw = f"{name}: share of the joints above x", partial(_leading, view=view, load=load, others=others)
+    looks: Any = {"size": (4.9, 3.7), "reads": (name, *others), "switches": switches}
+    return Panel(f"leading-{name}", title, f"{name}: {description}", draw, **looks)
 
 
 def _leading(ax: Axes, view: View, load: Sample, others: list[str]) -> None:

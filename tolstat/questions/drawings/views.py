@@ -53,11 +53,11 @@ CROSS, INPUT, OUTPUT = "#CFE4F3", "#F6DFC6", "#CDEBDD"
 """Tints of cross, input fork and output fork; names stand beside them."""
 MARKED, SOFT, HATCH = "#C04A00", "#666666", "////"
 EDGE: Look = {"edgecolor": INK, "linewidth": 1.2, "zorder": 2}
-ARROW: Look = {"arrowstyle": "<|-,head_width=0.18,head_length=0.42", "lw": 1.2, "shrinkA": 0, "shrinkB": 0}
+LEADER: Look = {"arrowstyle": "-", "lw": 0.6, "color": INK, "shrinkA": 0, "shrinkB": 0}
+ARROW = LEADER | {"arrowstyle": "<|-,head_width=0.18,head_length=0.42", "lw": 1.2}
 """Arrow with its tip at the text."""
 BETWEEN = ARROW | {"arrowstyle": "<|-|>,head_width=0.12,head_length=0.35", "lw": 0.7}
 ON_CROSS: Look = {"facecolor": CROSS, "edgecolor": "none", "pad": 1.0}
-LEADER: Look = {"arrowstyle": "-", "lw": 0.6, "shrinkA": 0, "shrinkB": 0}
 HEIGHT = 1.6
 """Height of a pin in its hole with what is written above it, inches."""
 X, Y = np.eye(2)

@@ -26,9 +26,9 @@ if TYPE_CHECKING:
     from tolstat.common.errors import TolstatError as TolstatError
     from tolstat.common.tables import Status as Status
     from tolstat.joint import perturb as perturb
-    from tolstat.questions.drawings.joints import draw_errors as draw_errors
-    from tolstat.questions.drawings.joints import draw_joint as draw_joint
-    from tolstat.questions.drawings.joints import draw_row as draw_row
+    from tolstat.questions.drawings.answer import draw_errors as draw_errors
+    from tolstat.questions.drawings.answer import draw_joint as draw_joint
+    from tolstat.questions.drawings.answer import draw_row as draw_row
     from tolstat.report.answer import write_report as write_report
     from tolstat.report.page import write_page as write_page
     from tolstat.report.summary import statistics as statistics
@@ -48,9 +48,9 @@ _HOMES = {
     "StoreError": "tolstat.common.errors:StoreError",
     "TolstatError": "tolstat.common.errors:TolstatError",
     "draw": "tolstat.sampling:draw",
-    "draw_errors": "tolstat.questions.drawings.joints:draw_errors",
-    "draw_joint": "tolstat.questions.drawings.joints:draw_joint",
-    "draw_row": "tolstat.questions.drawings.joints:draw_row",
+    "draw_errors": "tolstat.questions.drawings.answer:draw_errors",
+    "draw_joint": "tolstat.questions.drawings.answer:draw_joint",
+    "draw_row": "tolstat.questions.drawings.answer:draw_row",
     "load": "tolstat.study:load",
     "load_case": "tolstat.study:load_case",
     "open": "tolstat.store:ResultFile.open",

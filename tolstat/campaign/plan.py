@@ -257,9 +257,9 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT, stage: Te
         assembly=_assembly(study, iid),
         fit=fit_in_words(study),
         sweep=swept.meaning(study.sweep, study.joint),
-        tolerances=text.records(meaning.table(study.entries)),
+        tolerances=text.plain(meaning.table(study.entries).to_dict("records")),
         exact=meaning.exact(study.entries, study.errors),
-        correlations=text.records(meaning.correlations(study.copula, study.tolerances)),
+        correlations=text.plain(meaning.correlations(study.copula, study.tolerances).to_dict("records")),
     )
 
 

@@ -50,7 +50,7 @@ def show(
     """
     from tolstat.display import style
     from tolstat.display.table import as_text, plain
-    from tolstat.questions.drawings import joints
+    from tolstat.questions.drawings import answer, views
 
     target = out or Path("errors.svg" if errors else "joint.svg" if row is None else f"row{row}.svg")
     faults = []
@@ -60,13 +60,13 @@ def show(
         faults.append(Fault(f"--out {target}", "is not a picture", f"end its name in {', '.join(FORMATS)}"))
     if faults:
         raise InputError(faults)
-    joint, own_alpha, title, own_errors = joints.read(source, row, alpha)
+    joint, own_alpha, title, own_errors = answer.read(source, row, alpha)
     if errors:
-        figure, table = joints.draw_errors(joint), joints.meanings()
+        figure, table = answer.draw_errors(joint), answer.meanings()
     elif own_errors is not None:
-        figure, table = joints.draw_row(joint, own_errors, title), joints.numbers(joint, own_errors)
+        figure, table = answer.draw_row(joint, own_errors, title), views.numbers(joint, own_errors)
     else:
-        figure, table = joints.draw_joint(joint, own_alpha, title, columns), joints.lengths(joint, own_alpha)
+        figure, table = answer.draw_joint(joint, own_alpha, title, columns), answer.lengths(joint, own_alpha)
     make_folder(target.parent)
     with output_folder(target.parent):
         (path,) = style.save(figure, target.with_suffix(""), (target.suffix.lower(),))

@@ -83,7 +83,7 @@ def verify(
 
 def _summary(found: Verification) -> dict[str, Any]:
     """Return the distributions of errors as plain values, by kind of load and by load; None for unknown values."""
-    from tolstat.display.answer import plain
+    from tolstat.display.text import plain
     from tolstat.questions import accuracy
 
     facts: dict[str, Any] = {"rows": found.rows.tolist(), "seed": found.seed}

@@ -6,7 +6,6 @@ all that an answer is made of.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -138,8 +137,10 @@ class Answer:
     def values(self) -> dict[str, Any]:
         """JSON values: ``facts``, ``sentences`` and ``tables``; numbers that are not finite are None."""
         sentences = [{"place": part.place, "text": part.text} for part in self.parts if isinstance(part, Sentence)]
-        tables = {name: {"units": dict(table.units), "rows": plain(table.rows)} for name, table in self.tables.items()}
-        return {"facts": plain(self.facts), "sentences": sentences, "tables": tables}
+        tables = {
+            name: {"units": dict(table.units), "rows": text.plain(table.rows)} for name, table in self.tables.items()
+        }
+        return {"facts": text.plain(self.facts), "sentences": sentences, "tables": tables}
 
     def blocks(self) -> list[Block]:
         """Blocks of a page."""
@@ -175,23 +176,10 @@ class Answer:
     def _repr_html_(self) -> str:
         from tolstat.display import html
 
-        return html.fragment(self.title, [*self.blocks(), *self._facts()])
-
-    def _facts(self) -> list[Block]:
-        items = [(name.replace("_", " "), _short(value)) for name, value in self.facts.items()]
-        return [Facts(items)] if items else []
-
-
-def plain(value: Any) -> Any:
-    """Value for JSON: containers and numbers of Python, None for what is not finite."""
-    if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [plain(item) for item in value]
-    value = value.tolist() if hasattr(value, "tolist") else value
-    if isinstance(value, list):
-        return [plain(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+        items = [
+            (key.replace("_", " "), f"{x:.4g}" if isinstance(x, float) else str(x)) for key, x in self.facts.items()
+        ]
+        return html.fragment(self.title, [*self.blocks(), *([Facts(items)] if items else [])])
 
 
 def _block(part: Part) -> Block | None:
@@ -201,7 +189,3 @@ def _block(part: Part) -> Block | None:
     if isinstance(part, Table):
         return as_block(part.title, part.columns, part.for_people, part.verdicts) if part.columns else None
     return None if isinstance(part, Document | Sheet) else part
-
-
-def _short(value: Any) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else str(value)

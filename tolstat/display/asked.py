@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from tolstat.common.errors import TolstatError
-
-
-def silent(text: str) -> None:
-    """Ignore the name of a stage."""
+from tolstat.display.progress import Tell, silent
 
 
 @dataclass(frozen=True)
@@ -40,13 +37,8 @@ class Asked:
     accepted: float = math.nan
     replay: int = 0
     notes: list[str] = field(default_factory=list)
-    stage: Callable[[str], None] = silent
+    stage: Tell = silent
     processes: int = 1
-
-    @property
-    def judges(self) -> bool:
-        """Whether an accepted share is given."""
-        return math.isfinite(self.accepted)
 
     @contextmanager
     def noting(self, what: str) -> Iterator[None]:

@@ -8,11 +8,12 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from textwrap import wrap
+from typing import TYPE_CHECKING, Any, Literal
 
 from numpy.typing import ArrayLike
 
-from tolstat.display import schemes, style, text
+from tolstat.display import style, text
 from tolstat.display.blocks import Panel
 from tolstat.display.mpl import figure as figures
 from tolstat.display.mpl import mpl, ticker
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
+    from matplotlib.figure import Figure
 
 BOTTOM, RIGHT = 0.5, 0.12
 """Margins below and beside the axes, inches; `Panel.left` and `Panel.top` are the others."""
@@ -34,37 +36,19 @@ LETTER, KEY = 0.071, 0.5
 GREY = "#B8B8B8"
 
 
-class Frame(NamedTuple):
-    """Edges of the axes (points from the left and the top of the picture), and the loads at both ends of the x axis."""
-
-    left: float
-    right: float
-    top: float
-    bottom: float
-    low: float
-    high: float
-
-
 @contextmanager
 def settings() -> Iterator[None]:
     """Apply the common style with font and line sizes for a single panel."""
-    given: dict[Any, Any] = {
-        "font.size": 9.2,
-        "axes.labelsize": 9.0,
-        "axes.titlesize": 9.0,
-        "xtick.labelsize": 8.5,
-        "ytick.labelsize": 8.5,
-        "legend.fontsize": 8.5,
+    given: Any = {
+        "font.size": 8.8,
         "lines.linewidth": 1.6,
-        "axes.linewidth": 0.8,
-        "grid.linewidth": 0.7,
         "legend.frameon": True,
         "legend.framealpha": 0.95,
         "legend.facecolor": "white",
         "legend.edgecolor": "none",
+        "svg.fonttype": "none",  # keep text as text: small, sharp, searchable, readable aloud
     }
     with style.settings(), mpl.rc_context(given):
-        mpl.rcParams["svg.fonttype"] = "none"  # keep text as text: small, sharp, searchable, readable aloud
         yield
 
 
@@ -72,17 +56,20 @@ def _place(panel: Panel) -> tuple[float, float, float, float]:
     """Position of the axes as fractions of the panel's size: left, bottom, width, height."""
     if panel.bare:
         return (0.0, 0.0, 1.0, 1.0)
-    width, height = panel.size
-    return (
-        panel.left / width,
-        BOTTOM / height,
-        1.0 - (panel.left + RIGHT) / width,
-        1.0 - (BOTTOM + panel.top) / height,
-    )
+    (width, height), across, along = panel.size, panel.left + RIGHT, BOTTOM + panel.top
+    return (panel.left / width, BOTTOM / height, 1.0 - across / width, 1.0 - along / height)
 
 
-def svg(panel: Panel) -> tuple[str, Frame]:
-    """Draw a panel as inline SVG: the same panel gives the same bytes, and all ids are unique on the page."""
+def svg(panel: Panel) -> tuple[str, tuple[float, ...]]:
+    """Draw a panel as inline SVG: the same panel gives the same bytes, and all ids are unique on the page.
+
+    Returns
+    -------
+    str
+        The element.
+    tuple of float
+        Left, right, upper, lower edge of the axes, points from the left and the top; loads at both ends of the x axis.
+    """
     with settings():
         figure = figures.Figure(figsize=panel.size, dpi=72)
         ax = figure.add_axes(_place(panel))
@@ -90,21 +77,32 @@ def svg(panel: Panel) -> tuple[str, Frame]:
         buffer = io.StringIO()
         figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None}, transparent=True)
     box, height = ax.get_window_extent(), figure.bbox.height
-    low, high = ax.get_xlim()
-    frame = Frame(box.x0, box.x1, height - box.y1, height - box.y0, low, high)
+    frame = (box.x0, box.x1, height - box.y1, height - box.y0, *ax.get_xlim())
     return _inline(buffer.getvalue(), panel), frame
 
 
 def save(panel: Panel, stem: Path) -> list[Path]:
     """Write a panel as PNG and SVG with its title above it; returns the files written."""
-    width, height = panel.size
+    return style.save(sheet([panel]), stem)
+
+
+def sheet(panels: Sequence[Panel], title: str = "", notes: Sequence[str] = (), columns: int = 1) -> Figure:
+    """Put panels with their titles on one sheet, `columns` side by side, below a headline and above small print."""
+    heights = [panel.size[1] + TITLE for panel in panels[::columns]]
+    head, foot = wrap(title, 44 * columns), [line for note in notes for line in wrap(note, 62 * columns)]
+    size = (columns * panels[0].size[0], sum(heights) + 0.35 * len(head) + 0.2 * len(foot))
     with settings():
-        figure = figures.Figure(figsize=(width, height + TITLE))
-        left, bottom, wide, high = _place(panel)
-        shrink = height / (height + TITLE)
-        panel.draw(figure.add_axes((left, bottom * shrink, wide, high * shrink)))
-        figure.text(0.02, 1.0 - 0.5 * TITLE / (height + TITLE), panel.title, va="center", fontsize=10, wrap=True)
-    return style.save(figure, stem)
+        figure = figures.Figure(figsize=size, layout="constrained")
+        axes = figure.subplots(len(heights), columns, squeeze=False, height_ratios=heights)
+        for panel, ax in zip(panels, axes.flat, strict=True):
+            panel.draw(ax)
+            pad = 6.0 if panel.bare else 72.0 * panel.top
+            ax.set_title("\n".join(wrap(panel.title, 62)), fontsize=10, fontweight="normal", pad=pad)
+            ax.set_anchor("N")
+        left = {"x": 0.1 / size[0], "ha": "left"}
+        figure.suptitle("\n".join(head), **left, fontsize=12.5, fontweight="bold")
+        figure.supxlabel("\n".join(foot), **left, fontsize=8.8, linespacing=1.5)
+    return figure
 
 
 def switched(artist: Artist, name: str) -> None:
@@ -114,7 +112,7 @@ def switched(artist: Artist, name: str) -> None:
 
 def _inline(drawn: str, panel: Panel) -> str:
     """Body of an SVG file as an element of the page, whose style sheet has fonts, joins and colours of all pictures."""
-    body = schemes.with_variables(visible(drawn[drawn.index("<svg") :]))
+    body = style.with_variables(visible(drawn[drawn.index("<svg") :]))
     body = re.sub(r"<metadata>.*?</metadata>|<style.*?</style>", "", body, flags=re.DOTALL)
     body = body.replace("font-family: 'DejaVu Sans'; ", "")
     body = re.sub(r'<path d="[^"]*" style="fill: none"/>', "", body)  # background of figure and axes

@@ -13,7 +13,7 @@ import jinja2
 from markupsafe import Markup
 
 from tolstat.common.aside import mapped
-from tolstat.display import drawing, schemes
+from tolstat.display import drawing, style
 from tolstat.display.blocks import Block, Decision, Panel, Panels
 from tolstat.display.unseen import visible
 
@@ -33,7 +33,7 @@ def environment(figure: Callable[[Panel], dict[str, Any]]) -> jinja2.Environment
     """
     files = jinja2.FileSystemLoader(TEMPLATES)
     made = jinja2.Environment(loader=files, autoescape=True, trim_blocks=True, lstrip_blocks=True, finalize=_shown)
-    made.globals |= {"figure": figure, "schemes": Markup(schemes.style_sheet())}
+    made.globals |= {"figure": figure, "schemes": Markup(style.style_sheet())}
     made.filters |= {"data": _data, "grouped": grouped, "bound": bound}
     return made
 
@@ -47,9 +47,9 @@ def fragment(title: str, blocks: Sequence[Block]) -> str:
 def figures(blocks: Sequence[Block], processes: int) -> Callable[[Panel], dict[str, Any]]:
     """Draw the pictures of some blocks; the function returned gives a panel's ``svg`` and the ``frame`` of its axes."""
     panels = [panel for block in blocks for panel in _panels(block)]
-    drawn = mapped([partial(_figure, panel) for panel in panels], processes)
-    by_key = {panel.key: figure for panel, figure in zip(panels, drawn, strict=True)}
-    return lambda panel: by_key[panel.key]
+    drawn = zip(panels, mapped([partial(drawing.svg, panel) for panel in panels], processes), strict=True)
+    made = {p.key: {"svg": Markup(svg), "frame": " ".join(f"{x:.7g}" for x in frame)} for p, (svg, frame) in drawn}
+    return lambda panel: made[panel.key]
 
 
 def grouped(words: str) -> str:
@@ -67,11 +67,6 @@ def _panels(block: Block) -> Sequence[Panel]:
     if isinstance(block, Panels):
         return block.panels
     return [block.picture] if isinstance(block, Decision) and block.picture else []
-
-
-def _figure(panel: Panel) -> dict[str, Any]:
-    picture, frame = drawing.svg(panel)
-    return {"svg": Markup(picture), "frame": " ".join(f"{x:.7g}" for x in frame)}
 
 
 def _data(value: Any) -> Markup:

@@ -7,8 +7,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
-from types import TracebackType
-from typing import TYPE_CHECKING, Protocol, Self
+from typing import TYPE_CHECKING, Self
 
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
@@ -23,13 +22,8 @@ JOINTS = "joints"
 """Name of the stage in which the joints of a campaign are simulated."""
 
 Tell = Callable[[str], None]
-
-
-class Reporter(Protocol):
-    """Callback for the progress of a campaign; called once at the start, then after every block."""
-
-    def __call__(self, counts: Counts) -> None:
-        """Report the progress `counts`."""
+Reporter = Callable[["Counts"], None]
+"""Callback for the progress of a campaign; called once at the start, then after every block."""
 
 
 def text(counts: Counts, begun: int, seconds: float, budget: float = math.inf) -> str:
@@ -85,35 +79,29 @@ class Display:
         Receives messages.
     detail : callable
         Receives the time of each stage when it ends.
-    time : callable
+    now : callable
         () -> time, s.
     """
 
     def __init__(self, tell: Tell = note, detail: Tell = silent, now: Callable[[], float] = time.monotonic) -> None:
-        self.note = tell
-        self._detail = detail
-        self._now = now
-        self._name = ""
-        self._begun_at = 0.0
-        self._ends_at = math.inf
+        self.note, self._detail, self._now = tell, detail, now
+        self._name, self._begun_at, self._ends_at = "", 0.0, math.inf
         self._counts: Counts | None = None
         self._start = 0
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self._end()
 
     def stage(self, name: str, budget: float = math.inf) -> None:
         """Begin the stage `name`, which ends after the time `budget`, s, at the latest; that before it has ended."""
-        if name == self._name:
-            return
-        self._end()
-        self._name, self._begun_at, self._counts = name, self._now(), None
-        self._ends_at = self._begun_at + budget
+        if name != self._name:
+            self._end()
+            self._name, self._begun_at, self._counts = name, self._now(), None
+            self._ends_at = self._begun_at + budget
+            self._begin()
 
     def __call__(self, counts: Counts) -> None:
         """Report the counts of a campaign, or of the joints of the current stage."""
@@ -132,6 +120,9 @@ class Display:
         own = text(self._counts, self._start, seconds, self._ends_at - self._now())
         return own if self._name == JOINTS else f"{self._name}: {own}"
 
+    def _begin(self) -> None:
+        """Show that a stage has begun."""
+
     def _end(self) -> None:
         if self._name:
             self._detail(f"{self._name}: {self._now() - self._begun_at:.2f} s")
@@ -141,19 +132,14 @@ class Display:
 class Lines(Display):
     """One line a minute, and one at the end of a campaign's joints; for a stderr that is no terminal."""
 
-    _thread: threading.Thread | None = None
-
     def __enter__(self) -> Self:
         self._ended = threading.Event()
-        self._thread = threading.Thread(target=self._every_minute, daemon=True)
-        self._thread.start()
+        threading.Thread(target=self._every_minute, daemon=True).start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self._ended.set()
-        super().__exit__(kind, value, trace)
+        super().__exit__(*error)
 
     def _every_minute(self) -> None:
         while not self._ended.wait(LINE_INTERVAL_S):
@@ -173,7 +159,7 @@ class Lines(Display):
 class Bar(Display):
     """A bar of the current stage on a terminal; that of the joints stays at the end."""
 
-    _bar: Progress | None = None
+    _bar: Progress
     _task: TaskID | None = None
 
     def __enter__(self) -> Self:
@@ -188,29 +174,21 @@ class Bar(Display):
         self._bar.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        super().__exit__(kind, value, trace)
-        if self._bar is not None:
-            self._bar.stop()
+    def __exit__(self, *error: object) -> None:
+        super().__exit__(*error)
+        self._bar.stop()
 
-    def stage(self, name: str, budget: float = math.inf) -> None:
-        """Begin the stage `name` with a bar of its own."""
-        if name == self._name:
-            return
-        super().stage(name, budget)
-        if self._bar is not None:
-            self._task = self._bar.add_task(name, total=None)
+    def _begin(self) -> None:
+        self._task = self._bar.add_task(self._name, total=None)
 
     def __call__(self, counts: Counts) -> None:
         """Move the bar to `counts`."""
         super().__call__(counts)
-        if self._bar is not None and self._task is not None:
+        if self._task is not None:
             self._bar.update(self._task, total=counts.total, completed=counts.done, description=self.words)
 
     def _end(self) -> None:
-        if self._bar is not None and self._task is not None and self._name != JOINTS:
+        if self._task is not None and self._name != JOINTS:
             self._bar.remove_task(self._task)
         self._task = None
         super()._end()
@@ -218,6 +196,5 @@ class Bar(Display):
 
 def display(tell: Tell = note, detail: Tell = silent, quiet: bool = False) -> Display:
     """Return the display of progress that suits stderr: a context manager to pass to `campaign.run`."""
-    if quiet:
-        return Display(tell, detail)
-    return Bar(tell, detail) if sys.stderr.isatty() else Lines(tell, detail)
+    kind = Display if quiet else Bar if sys.stderr.isatty() else Lines
+    return kind(tell, detail)

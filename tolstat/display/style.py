@@ -1,9 +1,11 @@
-"""Common style of all figures, with colours that colour-blind readers can tell apart; writing of figure files."""
+"""Common style of all figures, colours that colour-blind readers can tell apart, on dark paper too; figure files."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import re
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,50 +18,34 @@ from tolstat.display.mpl import figure as figures
 from tolstat.display.mpl import mpl, ticker
 
 if TYPE_CHECKING:
-    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#56B4E9")
 """Colours of bushings 1 to 4: the four of Okabe and Ito's colours (2008) that dichromats tell apart best."""
 Dash = str | tuple[float, tuple[float, ...]]
-DASHES: tuple[Dash, ...] = (
-    "-",
-    (0.0, (6.0, 2.0)),
-    (0.0, (3.0, 1.5)),
-    (0.0, (1.2, 0.9)),
-)
+DASHES: tuple[Dash, ...] = ("-", (0.0, (6.0, 2.0)), (0.0, (3.0, 1.5)), (0.0, (1.2, 0.9)))
 """Dashes of bushings 1 to 4: where curves coincide, the lower one shows through the gaps."""
-SHADES = (
-    "#440154",
-    "#481d6f",
-    "#453781",
-    "#3c4f8a",
-    "#32648e",
-    "#2a788e",
-    "#228b8d",
-    "#1f9f88",
-    "#2cb17e",
-    "#4ec36b",
-    "#7ad151",
-    "#b0dd2f",
-)
-DARK_SHADES = (
-    "#fde725",
-    "#d8e219",
-    "#b0dd2f",
-    "#89d548",
-    "#65cb5e",
-    "#46c06f",
-    "#2eb37c",
-    "#21a585",
-    "#1f968b",
-    "#23888e",
-    "#297a8e",
-    "#2f6c8e",
-)
-"""Colours of viridis in order, which stay in order in grey and for colour-blind readers, on white and on dark paper."""
 INK, FAINT = "#222222", "#777777"
+
+_DARK = {
+    "#ffffff": ("paper", "#16171a"),
+    INK: ("ink", "#e8e8ea"),
+    "#666666": ("soft", "#a9adb5"),
+    FAINT: ("faint", "#8d929b"),
+    "#b8b8b8": ("grey", "#6b7079"),
+    "#e2e2e2": ("grid", "#33363c"),
+    "#e6e6e6": ("pale", "#41454d"),
+    COLOURS[0].lower(): ("line1", "#58aee6"),
+    COLOURS[1].lower(): ("line2", "#f08c4e"),
+    COLOURS[2].lower(): ("line3", "#3fbf93"),
+    COLOURS[3].lower(): ("line4", "#b3dcf7"),
+    "#c04a00": ("marked", "#ff9552"),
+    "#cfe4f3": ("cross", "#24465e"),
+    "#f6dfc6": ("input", "#5c4527"),
+    "#cdebdd": ("output", "#24513d"),
+}
+"""Name of the CSS variable and dark value of colours that pictures are drawn with, as matplotlib writes them."""
 
 _SETTINGS: Any = {
     "font.family": "DejaVu Sans",
@@ -68,7 +54,6 @@ _SETTINGS: Any = {
     "axes.titleweight": "bold",
     "axes.titlelocation": "left",
     "axes.titley": 1.0,  # where it is put, so that nothing is measured to find out
-    "axes.labelsize": 10.0,
     "axes.edgecolor": FAINT,
     "axes.labelcolor": INK,
     "axes.spines.top": False,
@@ -85,6 +70,35 @@ _SETTINGS: Any = {
     "svg.hashsalt": "tolstat",
     "text.parse_math": False,  # the name of a study may contain a dollar sign
 }
+
+
+def shades(first: float = 0.0, last: float = 0.88) -> list[str]:
+    """Twelve colours of viridis, which stay in order in grey and for colour-blind readers."""
+    return [mpl.colors.to_hex(mpl.colormaps["viridis"](x)) for x in np.linspace(first, last, 12)]
+
+
+@cache
+def _schemes() -> dict[str, tuple[str, str]]:
+    """CSS variables and dark values of the page's colours: on dark paper `shades` begin with the light ones."""
+    dark = enumerate(zip(shades(), shades(1.0, 0.35), strict=True))
+    return _DARK | {light: (f"shade{i}", shade) for i, (light, shade) in dark}
+
+
+def with_variables(svg: str) -> str:
+    """Replace the colours of an SVG by CSS variables; `style_sheet` gives their values.
+
+    Colours without a dark value stay as they are in both schemes.
+    """
+    names = {colour: f"var(--{name})" for colour, (name, _) in _schemes().items()}
+    svg = re.sub(r' fill="(#[0-9a-f]{6})"', r' style="fill: \1"', svg)
+    return re.sub(r'style="[^"]+"', lambda own: re.sub("#[0-9a-f]{6}", lambda m: names.get(m[0], m[0]), own[0]), svg)
+
+
+def style_sheet() -> str:
+    """CSS that defines the variables: light, and dark on a screen whose reader prefers it."""
+    light = "; ".join(f"--{name}: {colour}" for colour, (name, _) in _schemes().items())
+    dark = "; ".join(f"--{name}: {colour}" for name, colour in _schemes().values())
+    return f":root {{ {light}; }}\n@media screen and (prefers-color-scheme: dark) {{ :root {{ {dark}; }} }}"
 
 
 @contextmanager
@@ -110,15 +124,13 @@ def panels(title: str, subtitle: str) -> tuple[Figure, list[tuple[str, Kind, Axe
         One for each of `loads.PANELS`.
     """
     figure = figures.Figure(figsize=(11.0, 8.5))
-    axes = figure.subplots(2, 2)
+    axes = figure.subplots(2, 2).ravel()
     figure.subplots_adjust(left=0.085, right=0.975, top=0.82, bottom=0.125, hspace=0.42, wspace=0.16)
     figure.text(0.02, 0.972, title, fontsize=15, fontweight="bold", va="top")
     figure.text(0.02, 0.932, subtitle, fontsize=9.5, color="#444444", va="top", linespacing=1.45)
-    page = []
-    for (group, kind), ax in zip(PANELS, axes.flat, strict=True):
+    for (group, kind), ax in zip(PANELS, axes, strict=True):
         ax.set_title(f"{group.capitalize()} bushings, {QUANTITY[kind.unit]}", pad=21)
-        page.append((group, kind, ax))
-    return figure, page
+    return figure, [(group, kind, ax) for (group, kind), ax in zip(PANELS, axes, strict=True)]
 
 
 def share_axis(ax: Axes, low: float, which: str = "y", high: float = 1.0) -> None:
@@ -126,10 +138,8 @@ def share_axis(ax: Axes, low: float, which: str = "y", high: float = 1.0) -> Non
 
     An axis of less than two decades has marks at 1, 2 and 5.
     """
-    upright = which == "y"
-    (ax.set_yscale if upright else ax.set_xscale)("log")
-    (ax.set_ylim if upright else ax.set_xlim)(low, high * (high / low) ** 0.04)
-    axis = ax.yaxis if upright else ax.xaxis
+    ax.set(**{f"{which}scale": "log", f"{which}lim": (low, high * (high / low) ** 0.04)})
+    axis = ax.yaxis if which == "y" else ax.xaxis
     if high < 100.0 * low:
         axis.set_major_locator(ticker.LogLocator(subs=(1.0, 2.0, 5.0)))
     axis.set_major_formatter(ticker.FuncFormatter(lambda x, _: f"{100.0 * x:g} %"))
@@ -146,35 +156,20 @@ def _near_view(low: float, high: float) -> ticker.FixedLocator:
 
 def mark(ax: Axes, x: float, y: float, colour: str) -> None:
     """Mark the nominal joint by a small triangle."""
-    ax.plot(x, y, marker="v", ms=7.5, mec="white", mew=0.7, color=colour, clip_on=False, zorder=5)
+    look: Any = {"ms": 7.5, "mec": "white", "mew": 0.7, "ls": "", "clip_on": False, "zorder": 5}
+    ax.plot(x, y, "v", color=colour, label="nominal joint", **look)
 
 
 def note(ax: Axes, text: str, y: float) -> None:
     """Write a note on a horizontal line, at its right end."""
-    ax.annotate(
-        text,
-        (1.0, y),
-        xycoords=ax.get_yaxis_transform(),
-        xytext=(-2, 3),
-        textcoords="offset points",
-        ha="right",
-        fontsize=9,
-    )
+    ax.annotate(text, (1.0, y), (-2, 3), ax.get_yaxis_transform(), "offset points", ha="right", fontsize=9)
 
 
-def legend(figure: Figure, handles: list[Artist], labels: list[str]) -> None:
+def legend(figure: Figure, handles: Sequence[Any], labels: Sequence[str]) -> None:
     """Put one legend for all panels at the foot of the page, in one or two rows."""
-    letters = sum(len(label) + 7 for label in labels)
-    figure.legend(
-        handles,
-        labels,
-        loc="lower center",
-        ncols=len(labels) if letters < 140 else -(-len(labels) // 2),
-        bbox_to_anchor=(0.5, 0.0),
-        handlelength=2.4,
-        columnspacing=1.3,
-        fontsize=9.5,
-    )
+    columns = len(labels) if sum(len(label) + 7 for label in labels) < 140 else -(-len(labels) // 2)
+    look: Any = {"handlelength": 2.4, "columnspacing": 1.3, "fontsize": 9.5}
+    figure.legend(handles, labels, loc="lower center", ncols=columns, bbox_to_anchor=(0.5, 0.0), **look)
 
 
 def save(figure: Figure, stem: Path, suffixes: tuple[str, ...] = (".png", ".svg")) -> list[Path]:
@@ -185,11 +180,9 @@ def save(figure: Figure, stem: Path, suffixes: tuple[str, ...] = (".png", ".svg"
     list of Path
         The files written: `stem` with each suffix appended.
     """
-    files = []
-    for suffix in suffixes:
-        path = stem.with_name(stem.name + suffix)
-        metadata = {"Date": None} if suffix == ".svg" else None
+    files = [stem.with_name(stem.name + suffix) for suffix in suffixes]
+    for path, suffix in zip(files, suffixes, strict=True):
         with settings(), atomic_write(path) as temporary:
+            metadata = {"Date": None} if suffix == ".svg" else None
             figure.savefig(temporary, format=suffix.lstrip("."), dpi=150, metadata=metadata)
-        files.append(path)
     return files

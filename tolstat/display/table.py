@@ -5,12 +5,11 @@ Text fits a line of `WIDTH` characters: columns are left out, those of the highe
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from tolstat.display.blocks import Table
-from tolstat.display.text import align
+from tolstat.display.text import align, formed
 
 Row = Mapping[Any, Any]
 Rows = Sequence[Row]
@@ -57,8 +56,8 @@ class Column(NamedTuple):
 
 
 def cells(columns: Sequence[Column], rows: Rows) -> list[list[str]]:
-    """Headings, then one row of cells for each row of a table; without the columns that have nothing to show."""
-    return _cells([column for column in columns if column.shown(rows)], rows)
+    """Headings, then one row of cells for each row of a table."""
+    return [[column.head for column in columns], *([column.cell(row) for column in columns] for row in rows)]
 
 
 def as_text(columns: Sequence[Column], rows: Rows, width: int | None = WIDTH) -> str:
@@ -69,23 +68,14 @@ def as_text(columns: Sequence[Column], rows: Rows, width: int | None = WIDTH) ->
 def fitted(columns: Sequence[Column], rows: Rows, width: int | None = WIDTH) -> tuple[str, str]:
     """Text as of `as_text`, and a sentence that names the columns that it leaves out; empty if there are none."""
     able = used = [column for column in columns if column.shown(rows)]
-    shown = _text(used, rows)
-    while width is not None and max(map(len, shown.splitlines())) > width:
+    while True:
+        shown = align(cells(used, rows), [column.words for column in used])
         last = max(used, key=lambda column: column.rank)
-        if not last.rank:
+        if width is None or not last.rank or max(map(len, shown.splitlines())) <= width:
             break
         used = [column for column in used if column is not last]
-        shown = _text(used, rows)
     heads = [column.head for column in able if column not in used]
     return shown, f"with --wide also: {', '.join(heads)}" if heads else ""
-
-
-def _cells(used: Sequence[Column], rows: Rows) -> list[list[str]]:
-    return [[c.head for c in used], *([c.cell(row) for c in used] for row in rows)]
-
-
-def _text(used: Sequence[Column], rows: Rows) -> str:
-    return align(_cells(used, rows), [column.words for column in used])
 
 
 def plain(rows: Rows, ranked: Sequence[str] = ()) -> list[Column]:
@@ -94,17 +84,18 @@ def plain(rows: Rows, ranked: Sequence[str] = ()) -> list[Column]:
     def column(name: str) -> Column:
         words = any(isinstance(row[name], str) for row in rows)
         rank = 1 + list(ranked).index(name) if name in ranked else 0
-        return Column(name.replace("N*m", "N m"), lambda row: _short(row[name]), words, rank=rank)
+        return Column(
+            name.replace("N*m", "N m"),
+            lambda row: formed(row[name], ".5g") if isinstance(row[name], float) else str(row[name]),
+            words,
+            rank=rank,
+        )
 
     return [column(name) for name in (rows[0] if rows else ())]
-
-
-def _short(x: Any) -> str:
-    return ("-" if math.isnan(x) else f"{x:.5g}") if isinstance(x, float) else str(x)
 
 
 def as_block(title: str, columns: Sequence[Column], rows: Rows, verdicts: Sequence[str] = ()) -> Table:
     """Block of the page with a table; see `blocks.Table`."""
     used = [column for column in columns if column.shown(rows)]
-    head, *body = _cells(used, rows)
+    head, *body = cells(used, rows)
     return Table(title, head, body, frozenset({0} | {i for i, own in enumerate(used) if own.words}), verdicts)

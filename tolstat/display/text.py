@@ -6,27 +6,25 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from csv import writer
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from tolstat.common.files import atomic_write
 from tolstat.common.loads import ANY_LIMIT, unit_text
-
-if TYPE_CHECKING:
-    import pandas as pd
-
 
 LEAST_SHARE = 1e-9
 """Smallest share that is shown: one joint in a billion is beyond what any campaign tells."""
 
 
-def records(table: pd.DataFrame) -> list[dict[str, Any]]:
-    """Rows of a frame for JSON; NaN and infinity, which JSON lacks, become None."""
-
-    def plain_number(x: Any) -> Any:
-        x = x.item() if hasattr(x, "item") else x
-        return None if isinstance(x, float) and not math.isfinite(x) else x
-
-    return [{str(k): plain_number(v) for k, v in row.items()} for row in table.to_dict("records")]
+def plain(value: Any) -> Any:
+    """Value for JSON: containers and numbers of Python, None for what is not finite."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(item) for item in value]
+    value = value.tolist() if hasattr(value, "tolist") else value
+    if isinstance(value, list):
+        return [plain(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def cell(value: Any) -> Any:

@@ -175,10 +175,10 @@ def _line(ax: Axes, view: View, axis: Axis, values: FloatArray, joints: NDArray[
 
 
 def _shades(axis: Axis) -> dict[float, str]:
-    """Colour of `style.SHADES` of each value of a swept quantity, ascending."""
-    values = np.unique(axis.values)
-    places = np.linspace(0, len(style.SHADES) - 1, values.size).round().astype(int)
-    return {value: style.SHADES[i] for value, i in zip(values, places, strict=True)}
+    """Colour of `style.shades` of each value of a swept quantity, ascending."""
+    values, shades = np.unique(axis.values), style.shades()
+    places = np.linspace(0, len(shades) - 1, values.size).round().astype(int)
+    return {value: shades[i] for value, i in zip(values, places, strict=True)}
 
 
 def _legend(view: View, axes: list[Axis]) -> tuple[list[Artist], list[str]]:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from tolstat.common.errors import Fault, InputError
 from tolstat.display import text
 from tolstat.display.answer import Answer, Part, Sentence, Sheet, Table
-from tolstat.display.asked import silent
+from tolstat.display.progress import silent
 from tolstat.joint.mounting import in_words
 from tolstat.questions import accuracy, shares
 from tolstat.questions.cases import cases

@@ -1,24 +1,36 @@
-"""The joint on the page: with the place of a load marked, from all sides, and the errors of the worst joints, drawn."""
+"""What a joint looks like: the joint on the page, with the place of a load marked; figures and tables of any joint."""
 
 from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
+from tolstat import joint as joints
+from tolstat import study
+from tolstat.common.errors import Fault, InputError
 from tolstat.common.load_kinds import PLACES
 from tolstat.common.loads import load_of
+from tolstat.common.strict import read_toml, validate
 from tolstat.common.tables import SIMULATED
-from tolstat.display import text
+from tolstat.display import drawing, text
 from tolstat.display.answer import Answer, Part, Sentence
 from tolstat.display.asked import Asked
 from tolstat.display.blocks import Panel, Panels
-from tolstat.display.joint_drawing import sheets
-from tolstat.questions.drawings import joints
+from tolstat.display.table import Rows
+from tolstat.joint import Joint, Operation
+from tolstat.questions.drawings import views
+from tolstat.store import ResultFile
 from tolstat.store.points import point_of
-from tolstat.store.recorded import joint_of
+from tolstat.store.recorded import joint_of, operation_of
 from tolstat.store.view import View
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 LEGEND = (
     "The joint from its own dimensions. Marked: the bushings, pins and shafts of the leading loads. Loads of cross1–4 "
@@ -27,6 +39,20 @@ LEGEND = (
 """Text below the drawings of the joint."""
 WORST = "Pins and holes stand where their errors have them. To draw another joint: tolstat show FILE --row ROW"
 """Text below the drawings of the worst joints."""
+NOTES = (
+    "⊕ bushings: cross1–4 carry the pins, fork1–4 the arms. Their loads, the force F and the bending moment T at the "
+    "root of pin or arm, act on the pin or arm; components are along and about its e, t, z.",
+    "pin1.contact: force between pin 1 and the hole of arm 4. ⊙ axis towards the reader, ⊗ away from the reader.",
+    "Blue: cross; orange: input fork; green: output fork.",
+    "Sketched, since the model has no such dimension: walls of the holes, forks, shafts, width of the hub.",
+)
+"""How to read the drawing of a joint."""
+ERRORS = ("Dashed: without error. e points away from the centre of the joint; every pin and hole has its own e, t, z.",)
+"""How to read the drawing of the kinds of errors."""
+ROW = (
+    "Diameters and contact to scale. Cross and forks in their ideal place: they give way where pin and hole overlap.",
+)
+"""How to read the drawing of the errors of one joint."""
 
 
 def place_of(view: View, load: str, asked: Asked) -> Panel | None:
@@ -42,24 +68,22 @@ def place_of(view: View, load: str, asked: Asked) -> Panel | None:
         Takes a note if there is no drawing.
     """
     with asked.noting("the joint is not drawn"):
-        place = load_of(load).place if load else PLACES[""]
-        front, side = _joint(view, [place.name], load)
-        title = "The joint"
+        place, title = load_of(load).place if load else PLACES[""], "The joint"
         if load:
             own, title = view.load(load), f"{place.name or load}: the largest loads"
             if own.limit is not None:
                 often = "most often above" if own.above(own.limit).count else "nearest to"
                 title = f"{place.name or load}: {often} its limit"
             title += f", at {point_of(view, load)}" if len(view.points) > 1 else ""
-        return replace(side if place.view == "side" else front, key="joint-worst", title=title)
+        panel = _joint(view, [place.name], load)[place.view == "side"]
+        return replace(panel, key="joint-worst", title=title)
     return None
 
 
 def _joint(view: View, marked: Collection[str], load: str) -> tuple[Panel, Panel]:
     """Drawings of the joint at the operating point at which a load matters most; at the first one without a load."""
     point = point_of(view, load) if load else view.points[0]
-    d = joints.dimensions(joint_of(view.store, 0), view.at(point).store.operation.alpha)
-    front, side = sheets.joint(d, marked)
+    front, side = views.views(joint_of(view.store, 0), view.at(point).store.operation.alpha, marked)
     return front, replace(side, title=f"{side.title}, at {point}") if point else side
 
 
@@ -78,8 +102,7 @@ def drawings(view: View) -> Answer:
         of the joints with the largest leading loads, enlarged.
     """
     marked = sorted({load_of(name).place.name for name in view.leading} - {""})
-    joint = joint_of(view.store, 0)
-    kinds = sheets.errors(joints.positive(joint), joints.dimensions(joint, 0.0))
+    kinds = views.kinds_of_errors(joint_of(view.store, 0))
     parts: list[Part] = [Panels([*_joint(view, marked, next(iter(view.leading), "")), kinds]), Sentence(LEGEND)]
     if view.method != "sweep" and (worst := _worst(view)):
         parts += [Panels(worst), Sentence(WORST)]
@@ -95,8 +118,141 @@ def _worst(view: View) -> list[Panel]:
         sample = int(np.nanargmax(values))
         loads.setdefault(sample, []).append(f"{name} {text.value(float(values[sample]), load.unit)}")
     panels = []
-    for sample, said in loads.items():
+    for sample, words in loads.items():
         joint, row = joint_of(view.store, int(view.slots(sample))), int(view.rows(sample))
-        pairs, d = joints.pairs(joint, view.errors(np.array([sample]))), joints.dimensions(joint, 0.0)
-        panels.append(sheets.one(pairs, d, f"Row {row}: {', '.join(said)}", f"drawn-{row}"))
+        errors, title = view.errors(np.array([sample])), f"Row {row}: {', '.join(words)}"
+        panels.append(views.errors_of(joint, errors, title, f"drawn-{row}"))
     return panels
+
+
+def read(
+    source: str | Path, row: int | None = None, alpha: str | None = None
+) -> tuple[Joint, float, str, NDArray[np.void] | None]:
+    """Read the joint to be drawn.
+
+    Parameters
+    ----------
+    source : str or Path
+        Name of a joint that comes with the package, a joint file, study or case (TOML), or a result file (HDF5).
+    row : int, optional
+        Row of the campaign whose errors are drawn; of a result file.
+    alpha : str, optional
+        Misalignment in place of the source's own, ``"20 deg"``; a joint file has none: 15 deg by default.
+
+    Returns
+    -------
+    joint : Joint
+        The nominal joint; of a result file that of its first slot, or of the row.
+    alpha : float
+        Its misalignment, rad; of several operating points that of the first.
+    title : str
+        A headline.
+    errors : ndarray, shape (1,), dtype ERROR, or None
+        Errors of the row.
+
+    Raises
+    ------
+    InputError, StoreError
+        When there is no such joint, row or misalignment, or a file cannot be read.
+    """
+    path, errors = Path(source), None
+    given = validate(Operation, {"alpha": alpha or "15 deg", "speed": "1 rpm", "torque": "1 N*m"}, "--alpha").alpha
+    own, point, title = given, "", path.stem
+    if path.is_file() and path.suffix != ".toml":
+        with ResultFile.open(path) as store:
+            if row is not None and row not in store.rows:
+                found = f"has rows {store.rows[0]} to {store.rows[-1]}, not {row}"
+                remedy = f"give one of these rows, for example --row {store.rows[0]}"
+                raise InputError([Fault(str(path), found, remedy)])
+            at, slot = store.each()[0], 0 if row is None else store.slot(row)
+            joint, own, point, title = (
+                joint_of(store, slot),
+                operation_of(at, slot).alpha,
+                at.point or "",
+                store.study_name,
+            )
+            if row is not None:
+                errors, title, point = store.errors(slice(slot, slot + 1)), f"{title}, row {row}", ""
+    elif row is not None:
+        raise InputError([Fault(str(source), "has no rows, which --row asks for", "give a result file: FILE.h5")])
+    elif path.suffix == ".toml" and not {"joint", "operation"}.isdisjoint(data := read_toml(path)):
+        case = study.load(path) if "sampling" in data else study.load_case(path)
+        joint, own, point = (
+            case.joint,
+            case.operation.alpha,
+            case.points[0].name if isinstance(case, study.Study) else "",
+        )
+    else:
+        joint = joints.load(source, {}, str(source))
+        title = joint.description or path.stem
+    return joint, given if alpha else own, f"{title}, at {point}" if point else title, errors
+
+
+def draw_joint(joint: Joint, alpha: float, title: str = "", columns: int = 2) -> Figure:
+    """Draw a joint from its dimensions: the cross in its holes, both shafts, bushings, dimensions.
+
+    Parameters
+    ----------
+    joint : Joint
+        The nominal joint, such as ``study.joint``.
+    alpha : float
+        Misalignment, rad.
+    title : str
+        Headline; the joint's description by default.
+    columns : int
+        Number of drawings side by side: 1 for a narrow page.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Its parts have their names as ids in an SVG.
+    """
+    return drawing.sheet(views.views(joint, alpha), title or joint.description or "Cardan joint", NOTES, columns)
+
+
+def draw_errors(joint: Joint) -> Figure:
+    """Draw what a positive error of each kind means, on pin 1 and hole 4 of a joint."""
+    return drawing.sheet([views.kinds_of_errors(joint)], "Errors of a pin and a hole", ERRORS)
+
+
+def draw_row(joint: Joint, errors: NDArray[np.void], title: str = "") -> Figure:
+    """Draw the errors of one joint, enlarged together with its clearances.
+
+    Parameters
+    ----------
+    joint : Joint
+        The nominal joint.
+    errors : ndarray, shape (1,), dtype ERROR
+        Errors of the joint, such as ``store.errors(slice(17, 18))``.
+    title : str
+        Headline.
+    """
+    panel = views.errors_of(joint, errors, "Seen along z and along t of each pin", "row")
+    return drawing.sheet([panel], title or "Errors of one joint", ROW)
+
+
+def lengths(joint: Joint, alpha: float) -> Rows:
+    """Dimensions on the drawing: ``dimension``, ``value`` with its unit, ``meaning``."""
+    arm, contact = joint.arm, joint.contact
+    rows = [
+        ("cross.R", joint.cross.R, "centre of the joint to the middle of pin and hole"),
+        ("cross.r_b", joint.cross.r_b, "centre of the joint to a cross bushing"),
+        ("arm.l_f", arm.l_f, "middle of a hole to a fork bushing, along the shaft"),
+        ("contact.D_P", contact.D_P, "diameter of the pins"),
+        ("contact.D_H", contact.D_H, "diameter of the holes"),
+        ("clearance", 0.5 * (contact.D_H - contact.D_P), "radial clearance"),
+        ("contact.z", contact.z, "length of the contact"),
+        ("pin.d", joint.pin.d, "diameter of a pin's beam"),
+        ("pin.l", joint.pin.l, "length of a pin's beam"),
+        ("arm.width", arm.width, "side of an arm's section along t"),
+        ("arm.depth", arm.depth, "side of an arm's section along e"),
+        ("arm.d", arm.d, "diameter of a round arm"),
+    ]
+    found = [(name, f"{1e3 * x:.5g} mm", meaning) for name, x, meaning in rows if x is not None]
+    found.append(("operation.alpha", f"{np.degrees(alpha):.5g} deg", "misalignment of the shafts"))
+    return [dict(zip(("dimension", "value", "meaning"), row, strict=True)) for row in found]
+
+
+def meanings() -> Rows:
+    """Kinds of errors: ``error``, and what ``a positive value`` does."""
+    return [{"error": error, "a positive value": meaning} for error, meaning in views.MEANINGS.items()]

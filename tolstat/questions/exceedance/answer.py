@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from functools import partial
+from typing import Any
 
 from tolstat.common.errors import Fault, NotApplicable
 from tolstat.common.tables import VALID, Status
@@ -23,15 +24,17 @@ from tolstat.store.recorded import joint_of
 from tolstat.store.view import View
 
 
+def _span(row: Row, ends: str) -> str:
+    return text.span(row[f"{ends}_lower"], row[f"{ends}_upper"])
+
+
 def _differs(rows: Rows) -> bool:
     """Whether the interval of sampling says something beside the total one."""
-    shown = [(text.span(row["lower"], row["upper"]), text.span(row["total_lower"], row["total_upper"])) for row in rows]
-    return any(own != total for own, total in shown)
+    return any(text.span(row["lower"], row["upper"]) != _span(row, "total") for row in rows)
 
 
 def _outer(row: Row) -> str:
-    kind = "bound" if math.isnan(row["outer_lower"]) else "outer"
-    return text.span(row[f"{kind}_lower"], row[f"{kind}_upper"])
+    return _span(row, "bound" if math.isnan(row["outer_lower"]) else "outer")
 
 
 def above(row: Row) -> str:
@@ -48,21 +51,10 @@ LIMITS = (
     Column("share", lambda row: text.percent(row["estimate"])),
     Column("95 % interval", lambda row: text.span(row["lower"], row["upper"]), shown=_differs, rank=3),
     Column("with unresolved joints", _outer, shown=has_unresolved, rank=2),
+    Column("total interval", partial(_span, ends="total"), shown=has("numerical_error")),
+    Column("with measured parts", partial(_span, ends="both"), shown=lambda rows: "both_lower" in rows[0], rank=1),
     Column(
-        "total interval",
-        lambda row: text.span(row["total_lower"], row["total_upper"]),
-        shown=has("numerical_error"),
-    ),
-    Column(
-        "with measured parts",
-        lambda row: text.span(row["both_lower"], row["both_upper"]),
-        shown=lambda rows: bool(rows) and "both_lower" in rows[0],
-        rank=1,
-    ),
-    Column(
-        "at most, if ways are missed",
-        lambda row: text.percent(row["unsearched_upper"]),
-        shown=has("unsearched_upper"),
+        "at most, if ways are missed", lambda row: text.percent(row["unsearched_upper"]), shown=has("unsearched_upper")
     ),
 )
 """Columns of the table ``limits``. Joints above are counted among the valid ones, as the share is; the last columns
@@ -103,18 +95,22 @@ def exceedance(view: View, accepted: Accepted = math.nan) -> Answer:
     if view.method in ("sweep", "cases"):
         remedy = 'give the result file of a study with sampling.method "random", "sobol" or "lhs"'
         raise NotApplicable(str(Fault(str(view.path), "its joints are no sample of a production", remedy)))
-    parts: list[Part] = [*limit_tables(view, accepted), *quantile_tables(view)]
-    pictures = [leading_panel(view, name) for name in view.leading] if view.count(*VALID) else []
-    parts += [Panels(pictures)] if pictures else []
-    return Answer("exceedance", "Which load is exceeded by which share", [*parts, Sentence(note(view))])
+    parts = [*limit_tables(view, accepted), *quantile_tables(view), *_pictures(view), Sentence(note(view))]
+    return Answer("exceedance", "Which load is exceeded by which share", parts)
 
 
 def exceedance_on_page(view: View, asked: Asked) -> Answer:
     """Curves of the leading loads, and the reader."""
     if not (view.method != "sweep" and view.shown_loads and view.count(*VALID)):
         raise NotApplicable
-    parts: list[Part] = [Panels([leading_panel(view, name) for name in view.leading])] if view.leading else []
-    return Answer("exceedance", "Which load is exceeded by which share", [*parts, Sentence(_note(view)), reader(view)])
+    parts = [*_pictures(view), Sentence(_note(view)), reader(view)]
+    return Answer("exceedance", "Which load is exceeded by which share", parts)
+
+
+def _pictures(view: View) -> list[Part]:
+    """Curves of the leading loads; none without a valid joint."""
+    pictures = [leading_panel(view, name) for name in view.leading] if view.count(*VALID) else []
+    return [Panels(pictures)] if pictures else []
 
 
 def limits(view: View, accepted: Accepted = math.nan) -> Answer:
@@ -171,11 +167,9 @@ def quantiles(view: View) -> Answer:
     """
     if not (view.method != "sweep" and view.shown_loads and view.count(*VALID)):
         raise NotApplicable(str(Fault(str(view.path), "has no sample of valid loads", "simulate more joints")))
-    rows = of.quantile_rows(view)
     title = f"Quantiles with 95 % intervals {view.design.of_quantiles}, and one-sided tolerance limits (Wilks)"
     title = title if view.design.has_interval("quantile") else "Quantiles"
-    columns = _quantile_columns(of.tolerance_limits(view))
-    return Answer("quantiles", "Quantiles", [Table("quantiles", title, columns, rows, seen=_by_load(rows))])
+    return Answer("quantiles", "Quantiles", [_quantiles(view, title, True)])
 
 
 def limit_tables(view: View, accepted: float = math.nan) -> list[Table]:
@@ -190,29 +184,64 @@ def limit_tables(view: View, accepted: float = math.nan) -> list[Table]:
     found = [Table("limits", "Joints above each limit", LIMITS, rows, seen=seen, verdicts=verdicts)]
     if points := of.point_rows(view):
         title = "Share of the joints above each limit at each operating point"
+        columns = [LIMITS[0], Column("limit", lambda row: text.value(row["level"], row["unit"]))]
+        columns += [Column(point, partial(_share_at, point)) for point in view.points]
         shown = one_force(points, "level", view.points[0])
-        found.append(Table("at_points", title, _point_columns(view), points, seen=shown))
+        found.append(Table("at_points", title, columns, points, seen=shown))
     return found
 
 
 def quantile_tables(view: View) -> list[Table]:
     """Table of quantiles with the interval of the largest share; none where no load is shown."""
-    if not view.shown_loads:
-        return []
+    return [_quantiles(view, "Quantiles of the largest loads", False)] if view.shown_loads else []
+
+
+def _quantiles(view: View, title: str, whole: bool) -> Table:
+    """Table of quantiles; people see one row per load, `whole` with all intervals and with tolerance limits."""
     rows = of.quantile_rows(view)
-    return [Table("quantiles", "Quantiles of the largest loads", _quantile_columns(), rows, seen=_by_load(rows))]
+    seen: dict[str, dict[Any, Any]] = {}
+    for row in rows:
+        seen.setdefault(row["load"], {**row})[row["share"]] = row
+
+    def quantile(share: float, row: Row) -> str:
+        estimate, lower, upper, unit = (row[share][key] for key in ("estimate", "lower", "upper", "unit"))
+        size = text.multiple(estimate, unit)[0]
+        ends = f" ({text.number(lower / size)} .. {text.number(upper / size)})"
+        return text.value(estimate, unit) + (ends if whole and not math.isnan(lower) else "")
+
+    def last(row: Row) -> str:
+        if not whole:
+            return text.span_of(*(row[of.SHARES[-1]][key] for key in ("lower", "upper", "unit")))
+        # Wilks (1941): the upper end of the two-sided 90 % interval
+        upper = view.load(row["load"]).quantile(of.COVERED, 0.9).upper
+        return "needs more joints" if math.isinf(upper) else text.value(upper, row["unit"])
+
+    columns = [
+        Column("load", lambda row: str(row["load"])),
+        Column("nominal", lambda row: text.value(row["nominal"], row["unit"]), rank=1),
+    ]
+    for share in of.SHARES:
+        rank = 3 if share in of.SHARES[1:-1] else 0
+        columns.append(Column(f"{100 * share:g} %{whole * ' stay below'}", partial(quantile, share), rank=rank))
+    head = "tolerance limit 99 % / 95 %" if whole else f"95 % interval of {100 * of.SHARES[-1]:g} %"
+    return Table("quantiles", title, [*columns, Column(head, last)], rows, seen=list(seen.values()))
+
+
+def _share_at(point: str, row: Row) -> str:
+    return text.percent(row[point])
 
 
 def note(view: View) -> str:
     """Sentence on what the intervals cover."""
     doubts = [(name, view.load(name).doubt(level)) for name, level in view.limits.items()]
     poor = [f"{name} ({doubt})" for name, doubt in doubts if doubt]
-    said = view.design.covers
-    said += f"; no share, needs more joints or other proposals: {', '.join(poor)}" if poor else ""
-    said += f"; {view.design.caveat}" if view.design.caveat else ""
-    if view.count(*VALID, Status.PENDING) < view.n:
-        said += "; light bands: with the others counted below and above every x"
-    return said
+    clauses = [
+        view.design.covers,
+        f"no share, needs more joints or other proposals: {', '.join(poor)}" if poor else "",
+        view.design.caveat,
+        "light bands: with the others counted below and above every x" * (view.count(*VALID, Status.PENDING) < view.n),
+    ]
+    return "; ".join(clause for clause in clauses if clause)
 
 
 def _note(view: View) -> str:
@@ -264,10 +293,10 @@ def _how(view: View, accepted: float) -> Iterator[str]:
 def _uncertain(view: View) -> list[Part]:
     """What makes the shares uncertain, where a part exceeds a tenth of sampling."""
     rows = [row for row in of.limit_rows(view) if not math.isnan(row["numerical_lower"])]
-    if not any(
-        max(_numerical(row), row["bound_upper"] - row["bound_lower"]) > NOTABLE * 0.5 * (row["upper"] - row["lower"])
-        for row in rows
-    ):
+    parts = [
+        (max(_numerical(row), row["bound_upper"] - row["bound_lower"]), row["upper"] - row["lower"]) for row in rows
+    ]
+    if not any(largest > NOTABLE * 0.5 * sampling for largest, sampling in parts):
         return []
     title = "What makes the shares above limits uncertain, in per cent of the joints"
     return [Table("uncertainty", title, BUDGET, rows, seen=one_force(rows, "level", "estimate"))]
@@ -276,52 +305,3 @@ def _uncertain(view: View) -> list[Part]:
 def _numerical(row: Row) -> float:
     """Largest change of a share by the numerical error."""
     return max(float(abs(row[f"numerical_{end}"] - row["estimate"])) for end in ("lower", "upper"))
-
-
-def _point_columns(view: View) -> tuple[Column, ...]:
-    head = (Column("load", lambda row: str(row["load"])), Column("limit", lambda r: text.value(r["level"], r["unit"])))
-    return (*head, *(Column(point, partial(_share_at, point)) for point in view.points))
-
-
-def _share_at(point: str, row: Row) -> str:
-    return text.percent(row[point])
-
-
-def _quantile_columns(tolerance: dict[str, float] | None = None) -> tuple[Column, ...]:
-    """Columns of the rows `_by_load`: quantiles with intervals and, if given, tolerance limits by load."""
-
-    def limit(row: Row) -> str:
-        upper = (tolerance or {})[row["load"]]
-        return "needs more joints" if math.isinf(upper) else text.value(upper, row["unit"])
-
-    def quantile(share: float) -> Column:
-        def cell(row: Row) -> str:
-            own, lower, upper = row[share]
-            size = text.multiple(own, row["unit"])[0]
-            ends = f" ({text.number(lower / size)} .. {text.number(upper / size)})"
-            ends = ends if tolerance and not math.isnan(lower) else ""
-            return text.value(own, row["unit"]) + ends
-
-        rank = {of.SHARES[-1]: 0, of.SHARES[0]: 0}.get(share, 3)
-        return Column(f"{100 * share:g} %" + (" stay below" if tolerance else ""), cell, rank=rank)
-
-    def interval(row: Row) -> str:
-        _, lower, upper = row[of.SHARES[-1]]
-        return text.span_of(lower, upper, row["unit"])
-
-    head = (
-        Column("load", lambda row: str(row["load"])),
-        Column("nominal", lambda r: text.value(r["nominal"], r["unit"]), rank=1),
-    )
-    last = Column(f"95 % interval of {100 * of.SHARES[-1]:g} %", interval) if tolerance is None else None
-    last = last or Column("tolerance limit 99 % / 95 %", limit)
-    return (*head, *(quantile(share) for share in of.SHARES), last)
-
-
-def _by_load(quantiles: Rows) -> Rows:
-    """One row per load: for each share (estimate, lower, upper)."""
-    rows: dict[str, dict[object, object]] = {}
-    for row in quantiles:
-        own = rows.setdefault(row["load"], {name: row[name] for name in ("load", "unit", "nominal")})
-        own[row["share"]] = (row["estimate"], row["lower"], row["upper"])
-    return list(rows.values())

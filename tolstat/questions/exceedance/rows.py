@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.analysis.estimates import CURVE
-from tolstat.analysis.sample import Sample, total_interval
+from tolstat.analysis.sample import CONFIDENCE, Sample, total_interval
 from tolstat.common.loads import ANY_LIMIT, SHOWN_LOADS, load_of, unit_text
 from tolstat.display.table import Row, Rows
 from tolstat.store import error_budget, known_parts
@@ -33,30 +32,21 @@ READER_LEVELS = 240
 """Approximate number of levels at which the reader tool of the page has values; the levels are round numbers."""
 
 
-def limit_rows(view: View, confidence: float = 0.95) -> Rows:
+def limit_rows(view: View) -> Rows:
     """Share of the joints above each of the study's limits.
-
-    Parameters
-    ----------
-    view : View
-        A campaign.
-    confidence : float
-        Confidence level of the intervals.
 
     Returns
     -------
     sequence of mapping
         One row per limit, in the study's order: ``load``, ``unit``, ``nominal``, then the fields of
         `analysis.estimates.Exceedance` (``level`` is the limit), then ``confidence``, the error budget, see
-        `_error_budget`, and ``unsearched_upper``, the upper end whatever the proposals of importance sampling miss.
+        `_above_limit`, and ``unsearched_upper``, the upper end whatever the proposals of importance sampling miss.
         Where tolerances are known from measured parts also ``both_lower``, ``both_upper`` and the fields `KNOWN`, see
         `known_share.KnownShare`: with unresolved joints and the numerical error; NaN without support.
         Loads in SI units. Shares and intervals are NaN where weighted joints do not support them, see
         `Sample.doubt`.
     """
-    return view.kept(
-        ("limit_rows", confidence), lambda: [_above_limit(view, view.load(name), confidence) for name in view.limits]
-    )
+    return view.kept("limit_rows", lambda: [_above_limit(view, view.load(name)) for name in view.limits])
 
 
 def most_exceeded(view: View, rows: Rows) -> Row:
@@ -64,25 +54,33 @@ def most_exceeded(view: View, rows: Rows) -> Row:
     return max(rows, key=lambda row: (np.nan_to_num(row["estimate"], nan=-1.0), row["load"] in view.leading))
 
 
-def all_limits(view: View, confidence: float = 0.95) -> dict[str, Any]:
+def all_limits(view: View) -> dict[str, Any]:
     """Share of the joints above at least one limit: a row as those of `limit_rows`, of the load `ANY_LIMIT`.
 
     Its level is 1, and its loads are the largest ratios of load to limit.
     """
-    return view.kept(("all_limits", confidence), lambda: _above_limit(view, view.load(ANY_LIMIT), confidence))
+    return view.kept("all_limits", lambda: _above_limit(view, view.load(ANY_LIMIT)))
 
 
-def _above_limit(view: View, load: Sample, confidence: float) -> dict[str, Any]:
+def _above_limit(view: View, load: Sample) -> dict[str, Any]:
+    """Row of a load; the error budget is bounds of the share with every load shifted by the numerical error.
+
+    ``numerical_error`` is relative to the largest load of the kind in the joint; ``numerical_lower`` and
+    ``numerical_upper`` are the estimates with loads shifted down and up; ``total_lower`` and ``total_upper`` the outer
+    ends of their intervals: they cover numerical error, sampling and unresolved joints. NaN where it is unknown.
+    """
     level = load.limit
     assert level is not None
-    head = {"load": load.name, "unit": load.unit, "nominal": load.nominal}
-    loads = error_budget.with_error(view, load)
-    budget = _error_budget(view, loads, level, confidence)
-    row = {**head, **vars(load.above(level, confidence)), "confidence": confidence, **budget}
-    row["unsearched_upper"] = max(own.upper_if_missed(level, confidence) for own in (loads[0], loads[-1]))
-    parts = known_parts.of(view)
-    if parts is not None:
-        known = parts.share(load.name, confidence)
+    loads, budget = error_budget.with_error(view, load), [np.nan] * 4
+    if len(loads) > 1:
+        estimates = (end.above(level, CONFIDENCE).estimate for end in loads[1:])
+        budget = [*estimates, *total_interval(loads, level, CONFIDENCE)]
+    row = {"load": load.name, "unit": load.unit, "nominal": load.nominal} | vars(load.above(level, CONFIDENCE))
+    row |= {"confidence": CONFIDENCE, "numerical_error": error_budget.relative(view, load.name)}
+    row |= dict(zip(ERROR_BUDGET, budget, strict=True))
+    row["unsearched_upper"] = max(end.upper_if_missed(level, CONFIDENCE) for end in (loads[0], loads[-1]))
+    if (parts := known_parts.of(view)) is not None:
+        known = parts.share(load.name, CONFIDENCE)
         row |= {"both_lower": known.lower, "both_upper": known.upper}
         row |= {name: getattr(known, name) for name in KNOWN}
     return row | dict.fromkeys(WITHHELD, np.nan) if load.doubt(level) else row
@@ -109,25 +107,7 @@ def point_rows(view: View) -> Rows:
     return rows
 
 
-def _error_budget(view: View, loads: Sequence[Sample], level: float, confidence: float) -> dict[str, float]:
-    """Bounds of a share with every load shifted down and up by the numerical error; `loads` are of `with_error`.
-
-    Returns
-    -------
-    dict
-        ``numerical_error``, relative to the largest load of the kind in the joint, NaN if unknown; ``numerical_lower``
-        and ``numerical_upper``, the estimates with loads shifted down and up; ``total_lower`` and ``total_upper``,
-        their ends ``outer_lower`` and ``outer_upper``: cover numerical error, sampling and unresolved joints.
-    """
-    error = error_budget.relative(view, loads[0].name)
-    if len(loads) == 1:
-        return {"numerical_error": error} | dict.fromkeys(ERROR_BUDGET, np.nan)
-    estimates = (end.above(level, confidence).estimate for end in loads[1:])
-    bounds = (*estimates, *total_interval(loads, level, confidence))
-    return {"numerical_error": error, **dict(zip(ERROR_BUDGET, bounds, strict=True))}
-
-
-def quantile_rows(view: View, confidence: float = 0.95) -> Rows:
+def quantile_rows(view: View) -> Rows:
     """Quantiles of the loads that tables show, see `View.shown_loads`.
 
     Returns
@@ -136,24 +116,16 @@ def quantile_rows(view: View, confidence: float = 0.95) -> Rows:
         One row per load and share: ``load``, ``unit``, ``nominal``, the fields of `analysis.estimates.Quantile`,
         ``confidence``. Loads in SI units.
     """
-    rows = []
-    for load in view.loads(view.shown_loads):
-        head = {"load": load.name, "unit": load.unit, "nominal": load.nominal}
-        for share in SHARES:
-            rows.append({**head, **load.quantile(share, confidence)._asdict(), "confidence": confidence})
-    return rows
+    return [
+        {"load": load.name, "unit": load.unit, "nominal": load.nominal}
+        | load.quantile(share)._asdict()
+        | {"confidence": CONFIDENCE}
+        for load in view.loads(view.shown_loads)
+        for share in SHARES
+    ]
 
 
-def tolerance_limits(view: View) -> dict[str, float]:
-    """One-sided tolerance limit of each load shown: covers the share `COVERED` of the joints with 95 % confidence.
-
-    Wilks (1941): the upper end of the two-sided 90 % interval of the quantile; infinite with too few joints, NaN for
-    dependent samples.
-    """
-    return {load.name: load.quantile(COVERED, 0.9).upper for load in view.loads(view.shown_loads)}
-
-
-def curve_rows(view: View, confidence: float = 0.95) -> Rows:
+def curve_rows(view: View) -> Rows:
     """Exceedance curves of the loads that tables show, as one table.
 
     Returns
@@ -162,15 +134,14 @@ def curve_rows(view: View, confidence: float = 0.95) -> Rows:
         ``load``, ``unit``, then the fields of `analysis.estimates.Exceedance`; SI units, at most
         `MAX_LEVELS` levels per load.
     """
-    names = CURVE.names or ()
     return [
-        {"load": load.name, "unit": load.unit} | dict(zip(names, point, strict=True))
+        {"load": load.name, "unit": load.unit} | dict(zip(CURVE.names or (), point, strict=True))
         for load in view.loads(view.shown_loads)
-        for point in curve(load, confidence, MAX_LEVELS).tolist()
+        for point in curve(load, MAX_LEVELS).tolist()
     ]
 
 
-def curve(load: Sample, confidence: float, max_levels: int) -> NDArray[np.void]:
+def curve(load: Sample, max_levels: int) -> NDArray[np.void]:
     """Exceedance curve of a load, thinned to `max_levels` levels: denser at the largest loads."""
     levels = np.unique(load.valid)
     if levels.size > max_levels:
@@ -178,7 +149,7 @@ def curve(load: Sample, confidence: float, max_levels: int) -> NDArray[np.void]:
         even = np.linspace(0, levels.size - 1, max_levels // 2).round().astype(int)
         levels = levels[np.union1d(top, even)]
     below = np.nextafter(levels[:1], -np.inf)  # a level that every valid joint exceeds
-    return load.curve(np.concatenate([below, levels]), confidence)
+    return load.curve(np.concatenate([below, levels]))
 
 
 def readings(view: View) -> dict[str, Any]:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from itertools import accumulate
-from operator import mul
 from shlex import quote
 from typing import Any
 
@@ -16,7 +14,7 @@ from scipy.special import chdtrc
 from tolstat.analysis import accuracy, prediction
 from tolstat.analysis.prediction import DELIVERY
 from tolstat.analysis.sample import CONFIDENCE
-from tolstat.analysis.subset import Estimate, Level
+from tolstat.analysis.subset import Estimate
 from tolstat.common.errors import Fault, InputError, StoreError
 from tolstat.common.loads import LOADS, Limit
 from tolstat.common.tables import VALID
@@ -24,7 +22,7 @@ from tolstat.display import text
 from tolstat.display.answer import Answer, Part, Sentence, Table
 from tolstat.display.options import Delivery
 from tolstat.display.table import Column, Row, Rows
-from tolstat.questions.rare.simulation import plan_of, settings_of, simulate, stage_of, take, walk_of
+from tolstat.questions.rare.simulation import Subsets, plan_of, simulate
 from tolstat.store import error_budget, verification
 from tolstat.store.reader import Reader
 from tolstat.store.view import View
@@ -80,22 +78,21 @@ def rare(*views: View, delivery: Delivery = DELIVERY) -> Answer:
     StoreError
         When a file is none of a subset simulation, or it is not finished.
     """
-    limits = {settings_of(plan_of(view)).limit for view in views}
+    limits = {Subsets(plan_of(view)).settings.limit for view in views}
     if len(limits) != 1:
         remedy = "give files of one simulation, which differ in the seed alone"
         raise InputError([Fault(", ".join(str(view.path) for view in views), "are of several limits", remedy)])
-    found = [seed_row(view, delivery) for view in views]
-    seeds, levels = [row for row, _ in found], [row for _, rows in found for row in rows]
     limit = limits.pop()
+    seeds, by_seed = zip(*(seed_row(view, delivery) for view in views), strict=True)
     estimate, agree = together([Estimate(*(row[key] for key in Estimate._fields)) for row in seeds])
-    facts: dict[str, Any] = {"load": limit.name, "above": limit.level, "unit": limit.unit} | estimate._asdict()
+    facts = {"load": limit.name, "above": limit.level, "unit": limit.unit, **estimate._asdict()}
     facts |= {"agree": agree, "delivery": delivery}
-    facts |= {"next_lower": min(row["next_lower"] for row in seeds)}
-    facts |= {"next_upper": max(row["next_upper"] for row in seeds)}
+    facts |= {
+        "next_lower": min(row["next_lower"] for row in seeds),
+        "next_upper": max(row["next_upper"] for row in seeds),
+    }
     parts: list[Part] = [
-        Table(
-            "levels", f"Levels to {limit}", LEVELS, levels, seen=[r for r in levels if r["seed"] == seeds[0]["seed"]]
-        ),
+        Table("levels", f"Levels to {limit}", LEVELS, [row for rows in by_seed for row in rows], seen=by_seed[0]),
         Table("seeds", f"P({limit}) by seed", (), seeds),
         *(Sentence(line, "lead") for line in _sentences(limit, estimate, facts, seeds)),
         *(Sentence(note) for row, view in zip(seeds, views, strict=True) for note in _notes(row, view, limit)),
@@ -121,30 +118,31 @@ def seed_row(view: View, delivery: int) -> tuple[dict[str, Any], Rows]:
     sequence of mapping
         Rows of the table ``levels``.
     """
-    plan, store = plan_of(view), view.parts[0].store
-    own, walk, first = settings_of(plan), walk_of(plan), plan.first_sample
-    unresolved, complete = [], store.complete
+    store, subsets, unresolved = view.parts[0].store, Subsets(plan_of(view)), []
+    walk, own, before, complete = subsets.walk, subsets.settings, subsets.first, store.complete
     while not walk.done:
-        stage = stage_of(walk, first)
-        if store.n < stage.stop or not complete:
+        if store.n < subsets.stage.stop or not complete:
             remedy = f"resume it: tolstat rare {quote(str(view.path))} --run"
             raise StoreError(str(Fault(str(view.path), "is not finished", remedy)))
-        unresolved.append(take(walk, plan, store, stage))
-        first = stage.stop
+        unresolved.append(subsets.take(store))
     found, wide = walk.estimate(), walk.estimate(prediction.half(CONFIDENCE))
     p, deviation = found.probability, found.deviation
-    factors = numerical(store, own.limit, walk.last + plan.first_sample)
+    factors = numerical(store, own.limit, walk.last + before)
     low, high = factors or (1.0, 1.0)
     following = prediction.of_share(wide.lower * low, min(1.0, wide.upper * high), delivery, CONFIDENCE)
     row = {"file": view.path.name, "seed": own.seed, "reached": walk.reached} | found._asdict()
     row["as_sure_as"] = (1.0 - p) / (p * deviation**2) if deviation > 0 else math.nan
     row["upper_if_above"] = min(1.0, found.upper + unresolved[0] / own.per_level)
-    row |= {"joints": first - plan.first_sample, "unresolved": sum(unresolved), "unresolved_first": unresolved[0]}
+    row |= {"joints": subsets.first - before, "unresolved": sum(unresolved), "unresolved_first": unresolved[0]}
     row |= {"ancestors": walk.ancestors, "per_level": own.per_level, "counted": own.unresolved}
     row["numerical_lower"], row["numerical_upper"] = factors or (math.nan, math.nan)
-    return row | dict(zip(("next_lower", "next_upper"), following, strict=True)), _levels(
-        own.seed, walk.levels, own.limit
-    )
+    row["next_lower"], row["next_upper"] = following
+    levels, probability = [], 1.0
+    for number, level in enumerate(walk.levels):
+        head = {"seed": own.seed, "load": own.limit.name, "unit": own.limit.unit, "level": number}
+        levels.append(head | {"threshold": level.threshold, "probability": probability} | level._asdict())
+        probability *= level.share
+    return row, levels
 
 
 def numerical(store: Reader, limit: Limit, last: NDArray[np.intp]) -> tuple[float, float] | None:
@@ -217,16 +215,6 @@ def together(estimates: Sequence[Estimate]) -> tuple[Estimate, bool]:
     quantile = 0.5 * math.log(one.upper / one.lower) / one.deviation if one.lower and one.deviation else 1.96
     lower, upper = (min(1.0, mean * math.exp(0.5 * deviation**2 + s * quantile * deviation)) for s in (-1, 1))
     return Estimate(mean, lower, upper, deviation), agree
-
-
-def _levels(seed: int, levels: Sequence[Level], limit: Limit) -> Rows:
-    """Rows of the table ``levels`` of one seed."""
-    head = {"seed": seed, "load": limit.name, "unit": limit.unit}
-    above = accumulate([1.0, *(level.share for level in levels[:-1])], mul)
-    return [
-        head | {"level": number, "threshold": level.threshold, "probability": probability} | level._asdict()
-        for number, (level, probability) in enumerate(zip(levels, above, strict=True))
-    ]
 
 
 def _sentences(limit: Limit, estimate: Estimate, facts: Row, seeds: Rows) -> Iterator[str]:

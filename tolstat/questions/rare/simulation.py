@@ -9,23 +9,23 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tolstat import sampling
 from tolstat.analysis.sample import is_valid
-from tolstat.analysis.subset import Candidates, Walk
+from tolstat.analysis.subset import Walk
 from tolstat.campaign import run as campaign
 from tolstat.campaign.extend import grow
 from tolstat.campaign.pool import kept_workers
 from tolstat.campaign.work import Work
 from tolstat.common.draw_records import SUBSET
 from tolstat.common.errors import Fault, InputError, StoreError
-from tolstat.common.loads import FloatArray, Limit
+from tolstat.common.loads import FloatArray
 from tolstat.display.options import Opt
 from tolstat.store import ResultFile, Writer
 from tolstat.store.reader import Reader
@@ -93,8 +93,11 @@ def simulate(
     else:
         if limit is None:
             raise InputError([Fault("--limit", "is missing", 'add --limit "cross1.F > 900 N"')])
-        plan, stem = subset_study(source.at(work.point), limit, n, p0, seed, unresolved), f"{source.path.stem}_rare"
-        plans = {work.folder / f"{stem}{f'_{k + 1}' if k else ''}.h5": _seeded(plan, k) for k in range(repeats)}
+        plan, plans = subset_study(source.at(work.point), limit, n, p0, seed, unresolved), {}
+        for k in range(repeats):
+            path = work.folder / f"{source.path.stem}_rare{f'_{k + 1}' if k else ''}.h5"
+            seeded = plan.sampling.model_copy(update={"seed": plan.sampling.seed + k})
+            plans[path] = replace(plan, sampling=seeded)
     work.display.stage("levels of the subset simulation")
     with kept_workers():
         for path, plan in plans.items():
@@ -113,15 +116,10 @@ def subset_study(
 ) -> Study:
     """Make the study of a subset simulation, whose ``sampling`` is a `study.model.Subset`; see `simulate`."""
     study = study.at("")
-    found = parse_limit(limit, study.limits)
+    found = rule.limit_of(limit, study.limits, "--limit", EXAMPLE)
     levels = dict(zip(found.loads, found.levels, strict=True))
     fields = {"load": found.name, "levels": levels, "per_level": n, "p0": p0, "unresolved": unresolved}
     return subset_of(study, fields | ({} if seed is None else {"seed": seed}))
-
-
-def parse_limit(text: str, limits: Mapping[str, float]) -> Limit:
-    """Read a limit such as ``"cross*.F > 900 N"``; `limits` are those of the study, which ``"any limit"`` names."""
-    return rule.limit_of(text, limits, "--limit", EXAMPLE)
 
 
 def plan_of(view: View) -> Study:
@@ -133,104 +131,102 @@ def plan_of(view: View) -> Study:
         When it holds none.
     """
     if view.method != "subset":
-        found, remedy = (
-            "is not a result file of tolstat rare",
-            'tolstat rare STUDY --limit "cross1.F > 900 N" --out DIR',
-        )
-        raise StoreError(str(Fault(str(view.path), found, f"give the study: {remedy}")))
+        remedy = 'give the study: tolstat rare STUDY --limit "cross1.F > 900 N" --out DIR'
+        raise StoreError(str(Fault(str(view.path), "is not a result file of tolstat rare", remedy)))
     return view.study
 
 
-def settings_of(plan: Study) -> Subset:
-    """Limit and settings of the study of a subset simulation."""
-    assert isinstance(plan.sampling, Subset)
-    return plan.sampling
+class Subsets:
+    """A subset simulation of one seed at its beginning.
 
-
-def walk_of(plan: Study) -> Walk:
-    """A simulation at its beginning."""
-    own = settings_of(plan)
-
-    def noise(level: int, first: int, count: int) -> FloatArray:
-        """Standard normal scores of the joints of level 0; at other levels the random numbers of their moves."""
-        if level == 0:
-            return sampling.scores(plan, range(first, first + count))
-        return sampling.noise(plan, level, first, count)
-
-    return Walk(own.per_level, own.p0, own.limit.level, noise)
-
-
-def stage_of(walk: Walk, first: int) -> range:
-    """Rows of the joints that a walk has next; `first` is the first row that it has not taken."""
-    return range(first, first + walk.next.parent.size)
-
-
-def take(walk: Walk, plan: Study, store: Reader, stage: range) -> int:
-    """Give a walk the loads of a stage, inf or -inf where not valid; returns the number of joints that are not.
-
-    The joints of the file are no sample of a production; it holds all rows, and the rows of a stage are its file slots.
-
-    Raises
-    ------
-    StoreError
-        When the joints of the file do not follow from the loads before them.
+    Attributes
+    ----------
+    plan : Study
+        Its study.
+    settings : Subset
+        Limit and settings.
+    walk : Walk
+        The levels.
+    first : int
+        First row that the walk has not taken.
     """
-    slots, joints, own = slice(stage.start, stage.stop), walk.next, settings_of(plan)
-    results, origin = store.results(slots), store.origin(slots)
-    if (origin["level"] != joints.level).any() or (origin["parent"] != _parents(plan, joints)).any():
-        found = f"rows {stage.start}:{stage.stop} do not follow from the loads before them"
-        raise StoreError(str(Fault(str(store.path), found, "run the study again into another folder (--out DIR)")))
-    loads = own.limit.of(results).copy()
-    valid = is_valid(loads, results["status"])
-    loads[~valid] = math.inf if own.unresolved == "above" else -math.inf
-    walk.take(loads)
-    return int(np.count_nonzero(~valid))
+
+    def __init__(self, plan: Study) -> None:
+        assert isinstance(plan.sampling, Subset)
+        self.plan, self.settings, self.first = plan, plan.sampling, plan.first_sample
+
+        def noise(level: int, first: int, count: int) -> FloatArray:
+            """Standard normal scores of the joints of level 0; at other levels the random numbers of their moves."""
+            if level == 0:
+                return sampling.scores(plan, range(first, first + count))
+            return sampling.noise(plan, level, first, count)
+
+        self.walk = Walk(self.settings.per_level, self.settings.p0, self.settings.limit.level, noise)
+
+    @property
+    def stage(self) -> range:
+        """Rows of the joints that the walk has next."""
+        return range(self.first, self.first + self.walk.next.parent.size)
+
+    @property
+    def origin(self) -> NDArray[np.void]:
+        """Level of each joint of the stage, and the row that it was moved from, -1 at level 0; (n,) SUBSET."""
+        joints, origin = self.walk.next, np.empty(len(self.stage), SUBSET)
+        origin["level"] = joints.level
+        origin["parent"] = np.where(joints.parent < 0, -1, joints.parent + self.plan.first_sample)
+        return origin
+
+    def take(self, store: Reader) -> int:
+        """Give the walk the loads of a stage, inf or -inf where not valid; returns the number of joints that are not.
+
+        The joints of the file are no sample of a production; it holds all rows, and the rows of a stage are its file
+        slots.
+
+        Raises
+        ------
+        StoreError
+            When the joints of the file do not follow from the loads before them.
+        """
+        stage = self.stage
+        slots = slice(stage.start, stage.stop)
+        results, origin, expected = store.results(slots), store.origin(slots), self.origin
+        if any((origin[name] != expected[name]).any() for name in ("level", "parent")):
+            found = f"rows {stage.start}:{stage.stop} do not follow from the loads before them"
+            raise StoreError(str(Fault(str(store.path), found, "run the study again into another folder (--out DIR)")))
+        loads = self.settings.limit.of(results).copy()
+        valid = is_valid(loads, results["status"])
+        loads[~valid] = math.inf if self.settings.unresolved == "above" else -math.inf
+        self.walk.take(loads)
+        self.first = stage.stop
+        return int(np.count_nonzero(~valid))
 
 
 def run(plan: Study, out: Path, work: Work) -> None:
     """Run or resume a simulation of one seed, see `simulate`."""
-    walk, first, told = walk_of(plan), plan.first_sample, 0
-    rows = _rows(out) or first + settings_of(plan).per_level
-    held = _is_done(_sized(plan, rows), out)  # by any version of the code: reading it needs no simulation
-    if not held:
-        _simulate(plan, out, rows, rows, work)  # also checks that the file is of the same plan and code
-    while not walk.done:
-        stage = stage_of(walk, first)
+    subsets, told, whole = Subsets(plan), 0, False
+    rows = subsets.stage.stop
+    if out.exists():
+        with ResultFile.open(out) as store:
+            rows = store.n
+            wanted = json.loads(json.dumps(_sized(plan, rows).identity()))
+            whole = store.complete and not differing_keys(store.identity, wanted)
+    if not whole:  # a whole file is read by any version of the code; otherwise it must be of the same plan and code
+        _simulate(plan, out, rows, rows, work)
+    while not subsets.walk.done:
+        stage = subsets.stage
         if rows < stage.stop:
-            if held:
+            if whole:
                 _simulate(plan, out, rows, rows, work)  # nothing to simulate: checks before rows are appended
-                held = False
-            rows = stage.stop
-            _append(plan, out, stage, walk.next)
+            rows, whole = stage.stop, False
+            with Writer.open(out) as store:
+                scores = sampling.from_scores(plan, subsets.walk.next.scores)
+                grow(store, _sized(plan, rows), [scores], [subsets.origin])
             _simulate(plan, out, rows, len(stage), work)
         with ResultFile.open(out) as store:
-            take(walk, plan, store, stage)
-        first = stage.stop
-        for number, level in enumerate(walk.levels[told:], told):
+            subsets.take(store)
+        for number, level in enumerate(subsets.walk.levels[told:], told):
             work.tell(f"level {number}: {level.joints} joints, {level.share:.3g} of them above the next threshold")
-        told = len(walk.levels)
-
-
-def _seeded(plan: Study, k: int) -> Study:
-    """The study with the k-th seed after its own."""
-    return replace(plan, sampling=plan.sampling.model_copy(update={"seed": plan.sampling.seed + k}))
-
-
-def _rows(out: Path) -> int:
-    """Number of rows of the file, 0 if there is none."""
-    if not out.exists():
-        return 0
-    with ResultFile.open(out) as store:
-        return store.n
-
-
-def _is_done(plan: Study, out: Path) -> bool:
-    """Whether the file has all rows of the study simulated."""
-    if not out.exists():
-        return False
-    with ResultFile.open(out) as store:
-        differing = differing_keys(store.identity, json.loads(json.dumps(plan.identity())))
-        return store.complete and not differing
+        told = len(subsets.walk.levels)
 
 
 def _sized(plan: Study, rows: int) -> Study:
@@ -243,16 +239,3 @@ def _simulate(plan: Study, out: Path, rows: int, count: int, work: Work) -> None
     alone = work.workers is None and count < MIN_PARALLEL
     workers, block = (1, count) if alone else (work.workers, None)
     campaign.run(_sized(plan, rows), out, workers, block, tell=work.tell, check=False, progress=work.display)
-
-
-def _append(plan: Study, out: Path, stage: range, joints: Candidates) -> None:
-    """Append the joints of a stage to the file, as pending rows."""
-    origin = np.empty(len(stage), SUBSET)
-    origin["level"], origin["parent"] = joints.level, _parents(plan, joints)
-    with Writer.open(out) as store:
-        grow(store, _sized(plan, stage.stop), [sampling.from_scores(plan, joints.scores)], [origin])
-
-
-def _parents(plan: Study, joints: Candidates) -> np.ndarray:
-    """Row that each joint was moved from, -1 at level 0."""
-    return np.where(joints.parent < 0, -1, joints.parent + plan.first_sample)

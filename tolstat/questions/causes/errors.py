@@ -23,7 +23,7 @@ from tolstat.display.answer import Answer, Part, Sentence, Table
 from tolstat.display.asked import Asked
 from tolstat.display.blocks import Panel, Panels
 from tolstat.display.mpl import patches
-from tolstat.display.options import Load, Opt, Top
+from tolstat.display.options import Costs, Load, Opt, Top
 from tolstat.display.table import Column, Row, Rows, has
 from tolstat.display.text import ends
 from tolstat.questions.causes import lines, lines_run
@@ -57,13 +57,14 @@ GREY = "Grey: share that the error takes part in, alone or with others (bounds o
 LOGARITHMS = "Where a few joints with large loads dominate the variance, it is that of the logarithm."
 
 
-def causes(view: View, by: Load = None, top: Top = 12, logarithm: bool = False) -> Answer:
+def causes(view: View, by: Load = None, top: Top = 12, logarithm: bool = False, costs: Costs = None) -> Answer:
     """Compute which tolerances and errors cause a load.
 
     Gives for each line of the drawing, an entry of [tolerances], the share of the joints above the limit if it were
-    half as wide, exact, finer or coarser by one class (else by the factors 0.63 and 1.6). With --run, simulates these
-    joints, which have the seeds of FILE and keep their loads in it: until the order of the lines is settled, the time
-    is up, or each change has --most joints. To go on, run the same command again.
+    half as wide, exact, finer or coarser by one class (else by the factors 0.63 and 1.6); of a fit, with the next
+    fundamental deviations and grades. With --run, simulates these joints, which have the seeds of FILE and keep their
+    loads in it: until the order of the lines is settled, the time is up, or each change has --most joints. All else
+    stays as drawn. To go on, run the same command again.
 
     Gives for each error: the share of the load's variance that it explains alone and in interactions (first-order and
     total Sobol' indices), the direction of its effect (rank regression), and the probability that a joint above the
@@ -85,6 +86,8 @@ def causes(view: View, by: Load = None, top: Top = 12, logarithm: bool = False) 
         Number of errors in the printed table.
     logarithm : bool
         Explain the variance of the load's logarithm instead of the load's.
+    costs : Path, optional
+        Cost of each tolerance, TOML or CSV (see tolstat docs allocate): what each change of a line costs.
 
     Returns
     -------
@@ -95,7 +98,8 @@ def causes(view: View, by: Load = None, top: Top = 12, logarithm: bool = False) 
     Raises
     ------
     InputError
-        When there is no such load, the study does not keep it, or `logarithm` is set and a value is not positive.
+        When there is no such load, the study does not keep it, or `logarithm` is set and a value is not positive; with
+        every fault of the costs, and when the file holds no joints with a line changed that they are for.
     StoreError
         When the file has too few valid joints, or joints that are not drawn from tolerances or differ in weight.
 
@@ -110,9 +114,12 @@ def causes(view: View, by: Load = None, top: Top = 12, logarithm: bool = False) 
     facts, rows = indices(view, load, logarithm)
     parts: list[Part] = []
     command = f"tolstat causes {quote(str(view.path))} --run"
+    if costs is not None and not view.altered:
+        found = f"is about changes of lines, and {view.path} holds no joints with one"
+        raise InputError([Fault("--costs", found, f"simulate them: {command}")])
     if view.altered:
         with suppress(NotApplicable):  # joints of other lines, or at other operating points
-            changed = lines.lines(view, load)
+            changed = lines.lines(view, load, costs=costs)
             parts, facts = list(changed.parts), {**facts, "lines": changed.facts}
     elif not _from_design(facts):
         parts.append(Sentence(f"which line of the drawing to change: {command}"))
@@ -165,15 +172,22 @@ def simulate(
     InputError
         When options of the one are given with the other.
     """
+    of_study = {"--points": points != POINTS, "--groups": groups != "tolerance"}
+    of_file = {"--each": each != "entry", "--group": bool(group)}
+    of_file |= {"--budget": budget != lines_run.BUDGET_S, "--most": most != lines_run.MOST}
     if isinstance(source, Path):
-        if (points, groups) != (POINTS, "tolerance"):
-            raise InputError([Fault("--points, --groups", "are about the design of a study", "give a study (TOML)")])
+        _refuse(of_study, "about the design of a study", "give a study (TOML)")
         return lines_run.simulate(source, work, by, each, group, budget, most)
-    if group or each != "entry":
-        raise InputError([Fault("--each, --group", "say what --run simulates into FILE", "give a result file")])
+    _refuse(of_file, "about what --run simulates into FILE", "give a result file")
     keys = {"method": "pick_freeze", "n": points, "groups": groups}
     text = with_keys(source.text, {("sampling",): keys}, str(source.path))
     return [work.run(study.load(source.path, text=text), f"{source.path.stem}_causes.h5")]
+
+
+def _refuse(given: Mapping[str, bool], found: str, remedy: str) -> None:
+    """Refuse those of some options that are given."""
+    if used := [option for option, is_given in given.items() if is_given]:
+        raise InputError([Fault(", ".join(used), f"{'are' if len(used) > 1 else 'is'} {found}", remedy)])
 
 
 def causes_on_page(view: View, asked: Asked) -> Answer:

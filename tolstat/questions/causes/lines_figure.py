@@ -22,24 +22,29 @@ CURVES = 4
 """Number of lines whose curve has a colour; the others are grey."""
 _ACCEPTED: dict[str, Any] = {"color": style.COLOURS[2], "lw": 1.4, "ls": (0.0, (6.0, 2.0))}
 """Style of the accepted share."""
-_STEPS = ("half as wide", "one step coarser", "exact")
+_STEPS = ("half as wide", "one step coarser", "another fit", "exact")
 """Legend of the tornado."""
 _BARS = ((COARSER, style.COLOURS[1], 0.3, -0.1), (HALF, style.COLOURS[0], 0.56, 0.1))
 """Bars of the tornado: step, colour, height, and how far above the middle of the bar its whisker is."""
+_FIT = style.COLOURS[3]
+"""Colour of another fit."""
 _EXACT: dict[str, Any] = {"ls": "", "mfc": "white", "mec": style.INK, "ms": 5.5}
 """Style of the mark of an exact line."""
 
 
 def tornado(found: Lines, accepted: float) -> Panel:
-    """Share above the level with each line half as wide, exact, and coarser."""
+    """Share above the level with each line half as wide, exact, and coarser; and with each other fit."""
     halves = "; ".join(f"{row['line']} {text.percent(row.get(HALF, np.nan))}" for row in found.by_line)
+    others = "; ".join(f"{row['step']} {text.percent(row['share'])}" for row in found.other_fits)
+    halves = ". ".join(words for words in (f"Half as wide: {halves}" if halves else "", others) if words)
     labels = [f"{row['line']}\n{row['size']}" if row["size"] else str(row["line"]) for row in found.by_line]
+    labels += [f"{row['step']}\nin place of {row['size']}" for row in found.other_fits]
     left = drawing.rows_left([part for label in labels for part in label.split("\n")])
-    top = drawing.legend_room(_STEPS, left)
+    top = drawing.legend_room(list(_legend(found)), left)
     return Panel(
         f"lines-{found.facts['load']}",
         f"Share of the joints with {found.event}, if one line is changed",
-        f"As drawn {text.percent(found.facts['share'])}. Half as wide: {halves}",
+        f"As drawn {text.percent(found.facts['share'])}. {halves}",
         partial(_tornado, found=found, labels=labels, accepted=accepted),
         (drawing.WIDTH, 0.34 * (len(labels) + 2.2) + drawing.BOTTOM + top),
         left,
@@ -47,19 +52,21 @@ def tornado(found: Lines, accepted: float) -> Panel:
     )
 
 
-def curves(found: Lines, accepted: float) -> Panel:
-    """Share above the level against the width of each line."""
+def curves(found: Lines, accepted: float) -> list[Panel]:
+    """Share above the level against the width of each line; none without a line whose width is changed."""
     by_line: dict[str, list[Row]] = {}
     for row in found.rows:
         if np.isfinite(row["factor"]):
             by_line.setdefault(row["line"], []).append(row)
+    if not by_line:
+        return []
     words = {
         line: ", ".join(f"{row['factor']:.3g} {text.percent(row['share'])}" for row in rows)
         for line, rows in by_line.items()
     }
     labels = [*list(by_line)[:CURVES], *(["the other lines"] if len(by_line) > CURVES else [])]
     labels += [f"accepted {text.percent(accepted)}"] if accepted > 0.0 else []
-    return Panel(
+    panel = Panel(
         f"widths-{found.facts['load']}",
         "The share against the width of each line",
         "; ".join(f"{line}: {own}" for line, own in words.items()),
@@ -67,6 +74,7 @@ def curves(found: Lines, accepted: float) -> Panel:
         (drawing.WIDTH, 3.4 + (room := drawing.legend_room(labels))),
         top=room,
     )
+    return [panel]
 
 
 def _tornado(ax: Axes, found: Lines, labels: list[str], accepted: float) -> None:
@@ -86,14 +94,25 @@ def _tornado(ax: Axes, found: Lines, labels: list[str], accepted: float) -> None
         if EXACT in row:
             marker = "o" if row[EXACT] >= floor else markers.CARETLEFT
             ax.plot(max(row[EXACT], floor), place, marker=marker, zorder=4, clip_on=False, **_EXACT)
+    for place, row in enumerate(found.other_fits, start=len(found.by_line)):
+        ax.barh(place, max(row["share"], floor) - drawn, 0.4, left=drawn, color=_FIT, zorder=2)
+        _whisker(ax, place, row["share_lower"], row["share_upper"], floor)
     words: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 8.0, "backgroundcolor": "white"}
     ax.text(drawn, -0.9, f"as drawn {text.percent(drawn)}", **words)
     if accepted > 0.0:
         ax.axvline(accepted, **_ACCEPTED)
         ax.text(accepted, len(labels) + 0.1, f"accepted {text.percent(accepted)}", **words)
-    bars = [patches.Patch(color=style.COLOURS[k]) for k in (0, 1)]
-    drawing.legend_above(ax, [*bars, lines.Line2D([], [], marker="o", **_EXACT)], _STEPS)
+    legend = _legend(found)
+    drawing.legend_above(ax, list(legend.values()), list(legend))
     ax.set_xlabel(f"share of the joints above {found.limit}")
+
+
+def _legend(found: Lines) -> dict[str, Artist]:
+    """Legend of the tornado: what is in it, by label."""
+    handles: list[Artist] = [patches.Patch(color=colour) for colour in (style.COLOURS[0], style.COLOURS[1], _FIT)]
+    legend = dict(zip(_STEPS, [*handles, lines.Line2D([], [], marker="o", **_EXACT)], strict=True))
+    fits, widths = bool(found.other_fits), bool(found.by_line)
+    return {label: handle for label, handle in legend.items() if (fits if label == _STEPS[2] else widths)}
 
 
 def _whisker(ax: Axes, y: float, low: float, high: float, floor: float) -> None:

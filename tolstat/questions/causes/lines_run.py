@@ -25,7 +25,7 @@ from tolstat.store.view import View
 from tolstat.study import widths
 from tolstat.study.points import names_of
 from tolstat.study.study import Study
-from tolstat.study.widths import HALF, STEPS, Line
+from tolstat.study.widths import STEPS, Line
 
 FIRST, LEAST, MOST = 1024, 128, 16_384
 """Number of joints of each change at the first look, the smallest if time is short, and by default the largest."""
@@ -94,6 +94,7 @@ def simulate(
             remedy = 'name what a study can change: --group "tilts = pin*.tilt_*, hole*.tilt_*"'
             raise StoreError(str(Fault(str(path), "has no line whose width can be changed", remedy)))
         warm_up()
+        work.tell("each change is one line of the drawing; all else of the joint stays as drawn")
         looks = _Looks(store, view, lines, load, work, budget, most)
         looks.run()
         work.tell(f"simulated {looks.simulated} joints in {looks.spent:.0f} s, {looks.outcome}")
@@ -148,11 +149,11 @@ class _Looks:
         """Look until the order is settled, then bring the other steps to as many joints."""
         n = self._first()
         self._count = 1 + math.ceil(math.log2(max(self._most / n, 1.0)))
-        self._look(n, STEPS)
+        self._look(n)
         while not self.settled and (more := self._next()) > self.each:
-            self._look(more, (HALF,))
+            self._look(more, decisive=True)
         if self.simulated and self._left > 0.0:
-            self._look(self.each, STEPS)
+            self._look(self.each)
 
     @property
     def _left(self) -> float:
@@ -161,7 +162,8 @@ class _Looks:
     def _first(self) -> int:
         """Joints at the first look: those of the campaign, fewer if half of the budget does not suffice for them."""
         own = lines_shares.own_joints(self._view)
-        affordable = int(0.5 * self._budget / (self._seconds * ((len(STEPS) + 0.5) * len(self._lines) + 1.0)))
+        changes = sum(len(widths.steps(self._view.study, line)) + 0.5 for line in self._lines) + 1.0
+        affordable = int(0.5 * self._budget / (self._seconds * changes))
         return max(LEAST, min(own if LEAST < own < FIRST else FIRST, affordable, self._most))
 
     def _next(self) -> int:
@@ -170,9 +172,9 @@ class _Looks:
         more = min(2 * self.each, affordable, self._most)
         return more if more > 1.1 * self.each else self.each
 
-    def _look(self, n: int, steps: Sequence[str]) -> None:
-        """Simulate what is missing of `n` joints of each line after these steps, and compare the lines half as wide."""
-        wanted, left = self._wanted(n, steps), self._left
+    def _look(self, n: int, decisive: bool = False) -> None:
+        """Simulate what is missing of `n` joints of each line after all or its `decisive` step; compare the lines."""
+        wanted, left = self._wanted(n, decisive), self._left
         self._looks += 1
         if lacking := self._lacking(wanted):
             self._announce(n, lacking, left)
@@ -199,14 +201,16 @@ class _Looks:
         names = self._asked.names(self._view.study)
         return sum(len(sets.missing(self._held, one, names)) for one in wanted)
 
-    def _wanted(self, n: int, steps: Sequence[str]) -> list[Change]:
+    def _wanted(self, n: int, decisive: bool) -> list[Change]:
         """Sets of a look, what the order needs first."""
         study, own = self._view.study, lines_shares.own_joints(self._view)
         found = [sets.as_drawn(study, range(own, n))] if n > own else []
-        for step in steps:
-            found += [sets.narrowed(study, line, step, range(n)) for line in self._lines]
-        if len(steps) == 1:
-            return found
+        if decisive:
+            joints = lines_shares.Joints(self._view, self._load, self._held)
+            return found + [sets.stepped(study, line, joints.decisive(line)[0], range(n)) for line in self._lines]
+        each = [(line, step) for line in self._lines for step in widths.steps(study, line)]
+        each.sort(key=lambda own: STEPS.index(own[1]) if own[1] in STEPS else 0)
+        found += [sets.stepped(study, line, step, range(n)) for line, step in each]
         apart = [line for line in self._lines if _independent(study, line)]
         return found + [sets.exchanged(study, line, range(n // 2)) for line in apart]
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from tolstat import sampling
 from tolstat.analysis import pick_freeze, ranks, sensitivity
+from tolstat.analysis.design import Claim
 from tolstat.analysis.sample import Sample
 from tolstat.common.errors import Fault, InputError, StoreError
 from tolstat.common.loads import ANY_LIMIT, FloatArray
@@ -93,6 +94,21 @@ def indices(
         "r2": ranks.r2 if ranks else math.nan,
     }
     return facts, rows
+
+
+def check_sample(view: View, statistic: Claim) -> None:
+    """Refuse joints that are not drawn from tolerances, do not support a statistic, or form a pick-freeze design.
+
+    Raises
+    ------
+    StoreError
+        The hint names what can be used.
+    """
+    view.check_drawn()
+    view.check(statistic)
+    if view.study.groups:
+        remedy = 'give the file of a study with sampling.method "random", "sobol" or "lhs"'
+        raise StoreError(str(Fault(str(view.path), "holds a pick-freeze design", remedy)))
 
 
 def scattering(components: Mapping[str, FloatArray]) -> dict[str, FloatArray]:

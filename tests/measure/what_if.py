@@ -27,7 +27,7 @@ from tolstat.campaign import what_if as sets
 from tolstat.common.loads import ANY_LIMIT, LOADS
 from tolstat.common.tables import VALID
 from tolstat.joint import perturb
-from tolstat.questions.causes.lines_shares import evaluate
+from tolstat.questions.causes.shares import evaluate
 from tolstat.solver.compilation import warm_up
 from tolstat.solver.simulation import simulate_rows
 from tolstat.study import widths

@@ -35,9 +35,8 @@ from tolstat.display.asked import Asked
 from tolstat.display.progress import Display
 from tolstat.joint import perturb
 from tolstat.questions.causes import lines as question
-from tolstat.questions.causes import lines_figure
-from tolstat.questions.causes import lines_run as runner
-from tolstat.questions.causes import lines_shares as shares
+from tolstat.questions.causes import shares
+from tolstat.questions.causes import simulation as runner
 from tolstat.report.headline import headline
 from tolstat.solver import stationary
 from tolstat.solver.simulation import simulate_rows
@@ -283,16 +282,16 @@ def test_the_line_to_change_may_be_a_fit(tmp_path, monkeypatch):
     without = found._replace(rows=[{**row, "change_upper": abs(row["change_upper"])} for row in found.rows])
     assert question.sentence(without) == ""
     # 4 holes of 3 in IT 8 and 4 pins of 1: a grade coarser, 74 in place of 46 um, saves 12 (1 - 46 / 74)
-    assert rows["F9/h6"]["cost_before"] == pytest.approx(16.0)
+    assert rows["F9/h6"]["cost"] - rows["F9/h6"]["extra_cost"] == pytest.approx(16.0)
     assert rows["F9/h6"]["cost"] == pytest.approx(4.0 + 12.0 * 46.0 / 74.0)
-    assert rows["E8/h6"]["cost"] == rows["E8/h6"]["cost_before"]
+    assert (rows["E8/h6"]["cost"], rows["E8/h6"]["extra_cost"]) == (16.0, 0.0)
     widths_of = answer.tables["lines"].rows
     assert {row["line"] for row in widths_of} == {"pin*.tilt_t", "pin*.offset_z", "fit F8/h6"}
     assert all(np.isnan(row["cost"]) for row in widths_of if row["line"] != "fit F8/h6")
     assert "other_fits" in causes.tables
     assert [row["line"] for row in answer.tables["lines"].seen] == ["pin*.tilt_t", "pin*.offset_z"]
     ax = Figure().subplots()
-    lines_figure.tornado(found, 0.01).draw(ax)
+    question._tornado(found, 0.01).draw(ax)
     assert "E8/h6\nin place of F8/h6" in [label.get_text() for label in ax.get_yticklabels()]
     files = answer.write(tmp_path / "made_lines")
     assert {"made_lines_lines.csv", "made_lines_other_fits.csv"} <= {file.name for file in files}
@@ -664,7 +663,7 @@ def test_whiskers_and_bands_are_the_intervals_of_the_table(path):
         found = shares.evaluate(store.view(), "cross1.F")
     table = pd.DataFrame(found.by_line)
     ax = Figure().subplots()
-    lines_figure.tornado(found, 0.01).draw(ax)
+    question._tornado(found, 0.01).draw(ax)
     half = table.loc[table["half"] > 0.01].iloc[0]
     drawn = [line.get_xdata() for line in ax.lines if len(line.get_xdata()) == 2]
     assert any(np.allclose(x, [half["half_lower"], half["half_upper"]]) for x in drawn)

@@ -26,7 +26,7 @@ from tolstat.display.mpl import patches
 from tolstat.display.options import Costs, Load, Opt, Top
 from tolstat.display.table import Column, Row, Rows, has
 from tolstat.display.text import ends
-from tolstat.questions.causes import lines, lines_run
+from tolstat.questions.causes import lines, simulation
 from tolstat.questions.causes.indices import indices
 from tolstat.store.view import View
 from tolstat.study import Study
@@ -134,17 +134,17 @@ def simulate(
     by: Load = None,
     points: Annotated[int, Opt("N", least=50)] = POINTS,
     groups: Groups = "tolerance",
-    each: lines_run.Each = "entry",
+    each: simulation.Each = "entry",
     group: Annotated[list[str] | None, Opt("NAME=PATTERN,...")] = None,
-    budget: Annotated[float, Opt("TIME", unit="s")] = lines_run.BUDGET_S,
-    most: Annotated[int, Opt("N", least=lines_run.LEAST)] = lines_run.MOST,
+    budget: Annotated[float, Opt("TIME", unit="s")] = simulation.BUDGET_S,
+    most: Annotated[int, Opt("N", least=simulation.LEAST)] = simulation.MOST,
 ) -> list[Path]:
     """Simulate a pick-freeze design of a study, or into a result file joints with other widths of each line.
 
     Parameters
     ----------
     source : Study or Path
-        The study, or the result file, see `lines_run.simulate`.
+        The study, or the result file, see `simulation.simulate`.
     work : Work
         Workers, folder and progress.
     by : str, optional
@@ -174,10 +174,10 @@ def simulate(
     """
     of_study = {"--points": points != POINTS, "--groups": groups != "tolerance"}
     of_file = {"--each": each != "entry", "--group": bool(group)}
-    of_file |= {"--budget": budget != lines_run.BUDGET_S, "--most": most != lines_run.MOST}
+    of_file |= {"--budget": budget != simulation.BUDGET_S, "--most": most != simulation.MOST}
     if isinstance(source, Path):
         _refuse(of_study, "about the design of a study", "give a study (TOML)")
-        return lines_run.simulate(source, work, by, each, group, budget, most)
+        return simulation.simulate(source, work, by, each, group, budget, most)
     _refuse(of_file, "about what --run simulates into FILE", "give a result file")
     keys = {"method": "pick_freeze", "n": points, "groups": groups}
     text = with_keys(source.text, {("sampling",): keys}, str(source.path))

@@ -6,23 +6,28 @@ import math
 from collections.abc import Iterator
 from functools import partial
 from shlex import quote
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
 from tolstat.common.errors import Fault, NotApplicable
 from tolstat.common.loads import ANY_LIMIT
 from tolstat.common.tables import VALID
-from tolstat.display import text
+from tolstat.display import drawing, style, text
 from tolstat.display.answer import Answer, Part, Sentence, Table
 from tolstat.display.asked import Asked
-from tolstat.display.blocks import Panels
+from tolstat.display.blocks import Panel, Panels
+from tolstat.display.mpl import markers, patches
 from tolstat.display.options import Accepted, Costs, Opt
 from tolstat.display.table import Column, Row, has
-from tolstat.questions.causes import lines_figure, lines_shares
-from tolstat.questions.causes.lines_shares import INDICES, Lines
+from tolstat.questions.causes import shares
+from tolstat.questions.causes.shares import INDICES, Lines
 from tolstat.store.view import View
 from tolstat.study.widths import COARSER, EXACT, FINER, HALF, STEPS
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
 
 TITLE = "Which line of the drawing to change"
 ON_PAGE = (
@@ -38,14 +43,26 @@ FITS_ON_PAGE = (
 COSTS_ON_PAGE = "tolstat causes FILE --costs TABLE prints what each change costs."
 _KINDS = {"offset", "tilt", "diameter", "clearance", "position"}
 """Errors whose lines have a name in words."""
-_SHARES = ("factor", *(f"{name}{end}" for name in ("share", "change") for end in lines_shares.ENDS))
+_SHARES = ("factor", *(f"{name}{end}" for name in ("share", "change") for end in shares.ENDS))
 
 
-def _interval(row: Row, name: str, form: str = ".1f") -> str:
-    """Estimate in per cent with the ends of its interval; a dash where there is none."""
-    value = 100 * row.get(name, np.nan)
-    if np.isnan(value):
+CURVES = 4
+"""Number of lines whose curve has a colour; the others are grey."""
+_ACCEPTED: dict[str, Any] = {"color": style.COLOURS[2], "lw": 1.4, "ls": (0.0, (6.0, 2.0))}
+"""Style of the accepted share."""
+_BARS = ((COARSER, style.COLOURS[1], 0.3, -0.1), (HALF, style.COLOURS[0], 0.56, 0.1))
+"""Bars of the tornado: step, colour, height, and how far above the middle of the bar its whisker is."""
+_FIT = style.COLOURS[3]
+"""Colour of another fit."""
+_EXACT: dict[str, Any] = {"ls": "", "mfc": "white", "mec": style.INK, "ms": 5.5}
+"""Style of the mark of an exact line."""
+
+
+def _interval(row: Row, name: str, form: str = ".1f", low: float = -np.inf, high: float = np.inf) -> str:
+    """Estimate in per cent, between two bounds, with the ends of its interval; a dash where there is none."""
+    if np.isnan(row.get(name, np.nan)):
         return "-"
+    value = 100 * np.clip(row[name], low, high) + 0.0  # no -0
     return f"{value:{form}} ({text.ends(100 * row[f'{name}_lower'], 100 * row[f'{name}_upper'], form)})"
 
 
@@ -54,32 +71,35 @@ def _cost(row: Row, name: str) -> str:
     return text.formed(row.get(name, np.nan) + 0.0, "+.4g")  # no -0
 
 
-def _index(row: Row, name: str) -> str:
-    """Share of the variance: estimates may scatter beyond 0 and 1, where no share is."""
-    return _interval({**row, name: np.clip(row[name], 0.0, 1.0) + 0.0}, name)
+def _share(head: str, name: str, rank: int = 0, form: str = ".1f") -> Column:
+    return Column(head, partial(_interval, name=name, form=form), shown=has(name), rank=rank)
 
 
+def _costs(head: str, name: str, rank: int = 0) -> Column:
+    return Column(head, partial(_cost, name=name), shown=has(name), rank=rank)
+
+
+LINE = Column("line", lambda row: str(row["line"]), words=True)
 COLUMNS = (
-    Column("line", lambda row: str(row["line"]), words=True),
+    LINE,
     Column("tolerance", lambda row: row["size"] or "-", rank=3),
-    Column("half as wide, %", partial(_interval, name=HALF), shown=has(HALF)),
-    Column("exact, %", partial(_interval, name=EXACT), shown=has(EXACT), rank=1),
-    Column("finer, %", partial(_interval, name=FINER), shown=has(FINER), rank=5),
-    Column("coarser, %", partial(_interval, name=COARSER), shown=has(COARSER), rank=2),
+    _share("half as wide, %", HALF),
+    _share("exact, %", EXACT, 1),
+    _share("finer, %", FINER, 5),
+    _share("coarser, %", COARSER, 2),
     Column("finer, coarser", lambda row: ", ".join(row["by"]) or "-", words=True, rank=4),
-    Column("half: change, %", partial(_interval, name=f"{HALF}_change", form="+.1f"), shown=has(HALF), rank=6),
-    *(
-        Column(f"{step}: extra cost", partial(_cost, name=f"{step}_cost"), shown=has(f"{step}_cost"), rank=rank)
-        for step, rank in ((HALF, 0), (FINER, 5), (COARSER, 2))
-    ),
+    _share("half: change, %", f"{HALF}_change", 6, "+.1f"),
+    _costs("half: extra cost", f"{HALF}_cost"),
+    _costs("finer: extra cost", f"{FINER}_cost", 5),
+    _costs("coarser: extra cost", f"{COARSER}_cost", 2),
 )
 """Columns of `Lines.by_line`: a line, its tolerance, and the share above the level after each step."""
 FITS = (
     Column("fit", lambda row: str(row["step"])),
     Column("in place of", lambda row: str(row["size"]), words=True),
-    Column("share, %", partial(_interval, name="share")),
-    Column("change, %", partial(_interval, name="change", form="+.1f")),
-    Column("extra cost", lambda row: _cost({"cost": row["cost"] - row["cost_before"]}, "cost"), shown=has("cost")),
+    _share("share, %", "share"),
+    _share("change, %", "change", 0, "+.1f"),
+    _costs("extra cost", "extra_cost"),
     Column("what changes", lambda row: str(row["words"]), words=True, rank=1),
 )
 """Columns of `Lines.other_fits`."""
@@ -115,7 +135,7 @@ def lines(
     -------
     Answer
         Tables ``lines`` (all rows), ``other_fits`` (those of a fit) and ``line_indices``, and facts, see
-        `lines_shares.Lines`; also a fact is ``sentence``, see `sentence`.
+        `shares.Lines`; also a fact is ``sentence``, see `sentence`.
 
     Raises
     ------
@@ -126,7 +146,7 @@ def lines(
     StoreError
         When the joints are not drawn from tolerances, or differ in weight.
     """
-    found = lines_shares.evaluate(view, by or view.decisive, costs)
+    found = shares.evaluate(view, by or view.decisive, costs)
     if found is None:
         remedy = f"simulate them: tolstat causes {quote(str(view.path))} --run"
         raise NotApplicable(str(Fault(str(view.path), "holds no joints with other widths of a line", remedy)))
@@ -138,7 +158,7 @@ def lines_on_page(view: View, asked: Asked) -> Answer:
     applies = view.sampled and view.limits and view.store.whole and view.count(*VALID)
     if not applies or view.design.refuses("difference"):
         raise NotApplicable
-    found = lines_shares.evaluate(view, view.decisive)
+    found = shares.evaluate(view, view.decisive)
     if found is not None:
         explained = " ".join([ON_PAGE, *([FITS_ON_PAGE] if found.other_fits else []), COSTS_ON_PAGE])
         return Answer("lines", TITLE, [*_parts(found, asked.accepted), Sentence(explained)])
@@ -151,7 +171,7 @@ def lines_on_page(view: View, asked: Asked) -> Answer:
 
 def advice(view: View, load: str, accepted: float) -> str:
     """Return the `sentence` of a load for the verdict; empty where the file holds no joints with lines changed."""
-    found = lines_shares.evaluate(view, load) if view.altered else None
+    found = shares.evaluate(view, load) if view.altered else None
     return "" if found is None else sentence(found, accepted)
 
 
@@ -189,7 +209,7 @@ def _parts(found: Lines, accepted: float) -> list[Part]:
     title, units = f"Share of the joints with {found.event}, with", dict.fromkeys(_SHARES, "1")
     made: list[Part] = [
         Sentence(f"{text.sentence(drawn)} {sentence(found, accepted) or none}.", "lead"),
-        Panels([lines_figure.tornado(found, accepted), *lines_figure.curves(found, accepted)]),
+        Panels([_tornado(found, accepted), *_curves(found, accepted)]),
         Table("lines", f"{title} one line changed", COLUMNS if found.by_line else (), found.rows, units, found.by_line),
     ]
     if others:
@@ -201,16 +221,13 @@ def _parts(found: Lines, accepted: float) -> list[Part]:
 
 
 def _indices(found: Lines) -> list[Column]:
-    """Columns of `Lines.indices`: of the load and of the event, with intervals."""
+    """Columns of `Lines.indices`: of the load and of the event, with intervals; no share is beyond 0 and 1."""
     load = "largest load over its limit" if found.facts["load"] == ANY_LIMIT else found.facts["load"]
     load = f"log {load}" if found.facts["logarithmic"] else load
-    return [
-        COLUMNS[0],
-        Column(f"{load}: alone, %", partial(_index, name="alone"), rank=3),
-        Column(f"{load}: in all, %", partial(_index, name="in_all"), rank=2),
-        Column("above: alone, %", partial(_index, name="above_alone"), rank=1),
-        Column("above: in all, %", partial(_index, name="above_in_all")),
-    ]
+    names = {f"{load}: alone": "alone", f"{load}: in all": "in_all"}
+    names |= {"above: alone": "above_alone", "above: in all": "above_in_all"}
+    cells = [(head, partial(_interval, name=name, low=0.0, high=1.0)) for head, name in names.items()]
+    return [LINE, *(Column(f"{head}, %", cell, rank=3 - i) for i, (head, cell) in enumerate(cells))]
 
 
 def _notes(found: Lines) -> Iterator[str]:
@@ -248,3 +265,117 @@ def _phrase(row: Row) -> str:
     if len(kinds) > 1 or not kinds <= _KINDS or not bodies <= {"pin", "hole"} or len(features) % 4:
         return f'tolerance "{row["line"]}"' if "." in row["line"] else f"tolerances of {row['line']}"
     return f"{kinds.pop()} tolerance of the {' and '.join(sorted(f'{body}s' for body in bodies)[::-1])}"
+
+
+def _tornado(found: Lines, accepted: float) -> Panel:
+    """Share above the level with each line half as wide, exact, and coarser; and with each other fit."""
+    halves = "; ".join(f"{row['line']} {text.percent(row.get(HALF, np.nan))}" for row in found.by_line)
+    others = "; ".join(f"{row['step']} {text.percent(row['share'])}" for row in found.other_fits)
+    told = ". ".join(words for words in (f"Half as wide: {halves}" if halves else "", others) if words)
+    labels = [f"{row['line']}\n{row['size']}" if row["size"] else str(row["line"]) for row in found.by_line]
+    labels += [f"{row['step']}\nin place of {row['size']}" for row in found.other_fits]
+    legend = {"half as wide": style.COLOURS[0], "one step coarser": style.COLOURS[1]} if halves else {}
+    legend |= {"another fit": _FIT} if others else {}
+    left = drawing.rows_left([part for label in labels for part in label.split("\n")])
+    top = drawing.legend_room([*legend, *(["exact"] if halves else [])], left)
+    floor, drawn, lower, upper = _floor(found, accepted), *(found.facts[name] for name in ("share", "lower", "upper"))
+
+    def whisker(ax: Axes, y: float, low: float, high: float) -> None:
+        ax.plot([max(low, floor), max(high, floor)], [y, y], color=style.INK, lw=1.2, zorder=3)
+        if low < floor:  # an arrow at the left edge stands for an end that is smaller than what the axis shows
+            ax.plot(floor, y, marker=markers.CARETLEFT, color=style.INK, ms=5.0, zorder=4, clip_on=False)
+
+    def draw(ax: Axes) -> None:
+        drawing.rows(ax, labels)
+        ax.set_ylim(len(labels) + 0.6, -1.2)  # a row above and one below, for what the vertical lines are
+        ax.tick_params(axis="y", labelsize=7.6)
+        style.share_axis(ax, floor, "x")
+        ax.set_xlim(floor, min(1.0, 1.4 * float(np.nanmax([upper, *(row["share_upper"] for row in found.rows)]))))
+        ax.axvspan(max(lower, floor), upper, color=drawing.GREY, alpha=0.3, lw=0)
+        ax.axvline(drawn, color=style.INK, lw=1.2)
+        for place, row in enumerate(found.by_line):
+            for step, colour, height, above in _BARS:
+                if step in row:
+                    ax.barh(place, max(row[step], floor) - drawn, height, left=drawn, color=colour, zorder=2)
+                    whisker(ax, place - above, row[f"{step}_lower"], row[f"{step}_upper"])
+            if EXACT in row:
+                marker = "o" if row[EXACT] >= floor else markers.CARETLEFT
+                ax.plot(max(row[EXACT], floor), place, marker=marker, zorder=4, clip_on=False, **_EXACT)
+        for place, row in enumerate(found.other_fits, start=len(found.by_line)):
+            ax.barh(place, max(row["share"], floor) - drawn, 0.4, left=drawn, color=_FIT, zorder=2)
+            whisker(ax, place, row["share_lower"], row["share_upper"])
+        words: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 8.0, "backgroundcolor": "white"}
+        ax.text(drawn, -0.9, f"as drawn {text.percent(drawn)}", **words)
+        if accepted > 0.0:
+            ax.axvline(accepted, **_ACCEPTED)
+            ax.text(accepted, len(labels) + 0.1, f"accepted {text.percent(accepted)}", **words)
+        handles: list[Artist] = [patches.Patch(color=colour) for colour in legend.values()]
+        handles += ax.plot([], [], marker="o", **_EXACT) if halves else []
+        drawing.legend_above(ax, handles, [*legend, *(["exact"] if halves else [])])
+        ax.set_xlabel(f"share of the joints above {found.limit}")
+
+    return Panel(
+        f"lines-{found.facts['load']}",
+        f"Share of the joints with {found.event}, if one line is changed",
+        f"As drawn {text.percent(drawn)}. {told}",
+        draw,
+        (drawing.WIDTH, 0.34 * (len(labels) + 2.2) + drawing.BOTTOM + top),
+        left,
+        top,
+    )
+
+
+def _curves(found: Lines, accepted: float) -> Iterator[Panel]:
+    """Share above the level against the width of each line; none without a line whose width is changed."""
+    by_line: dict[str, list[Row]] = {}
+    for row in found.rows:
+        if np.isfinite(row["factor"]):
+            by_line.setdefault(row["line"], []).append(row)
+    if not by_line:
+        return
+    labels = [*list(by_line)[:CURVES], *(["the other lines"] if len(by_line) > CURVES else [])]
+    labels += [f"accepted {text.percent(accepted)}"] if accepted > 0.0 else []
+    floor, facts = _floor(found, accepted), found.facts
+    drawn = {"factor": 1.0, "share": facts["share"], "share_lower": facts["lower"], "share_upper": facts["upper"]}
+
+    def draw(ax: Axes) -> None:
+        style.share_axis(ax, floor)
+        top = floor
+        handles: list[Artist] = []
+        for place, rows in enumerate(by_line.values()):
+            ordered = sorted([*rows, drawn], key=lambda row: row["factor"])
+            x, y, low, high = (np.array([row[name] for row in ordered]) for name in drawn)
+            top, grey = max(top, float(y.max())), place >= CURVES
+            colour, dash = (drawing.GREY, "-") if grey else (style.COLOURS[place], style.DASHES[place])
+            look: dict[str, Any] = {"color": colour, "ls": dash, "lw": 1.0 if grey else 1.6}
+            (curve,) = ax.plot(x, np.maximum(y, floor), marker="o", ms=3.0, **look)
+            at_edge = np.full(int((y < floor).sum()), floor)
+            ax.plot(x[y < floor], at_edge, marker=markers.CARETDOWN, ls="", color=colour, ms=5.0, clip_on=False)
+            handles += [curve] if place <= CURVES else []
+            if place == 0:
+                ax.fill_between(x, np.maximum(low, floor), np.maximum(high, floor), color=colour, alpha=0.18, lw=0)
+        ax.plot(1.0, facts["share"], "D", color=style.INK, ms=6.0, zorder=5)
+        ax.set_ylim(floor, min(1.0, 2.0 * top))
+        if accepted > 0.0:
+            handles.append(ax.axhline(accepted, **_ACCEPTED))
+        ax.set(xlabel="width of the line, relative to the drawing", ylabel=f"share above {found.limit}")
+        drawing.legend_above(ax, handles, labels)
+
+    told = {
+        line: ", ".join(f"{row['factor']:.3g} {text.percent(row['share'])}" for row in rows)
+        for line, rows in by_line.items()
+    }
+    yield Panel(
+        f"widths-{facts['load']}",
+        "The share against the width of each line",
+        "; ".join(f"{line}: {own}" for line, own in told.items()),
+        draw,
+        (drawing.WIDTH, 3.4 + (room := drawing.legend_room(labels))),
+        top=room,
+    )
+
+
+def _floor(found: Lines, accepted: float) -> float:
+    """Lower end of an axis of shares: below all shares that are not zero, and below the accepted share."""
+    least = [value for value in [*(row["share"] for row in found.rows), found.facts["share"], accepted] if value > 0.0]
+    return float(0.6 * max(min(least, default=1.0), 0.5 / max(found.facts["n"], 1)))

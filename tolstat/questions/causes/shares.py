@@ -1,4 +1,4 @@
-"""Share of the joints above a limit if a line of the drawing had another width, from joints with the same seeds."""
+"""Share of the joints above a limit if a line of the drawing were changed, from joints with the same seeds."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from tolstat.common.loads import ANY_LIMIT, FloatArray
 from tolstat.common.tables import Status
 from tolstat.display import text
 from tolstat.display.table import Row, Rows
+from tolstat.questions.causes.indices import TAIL_STARTS_AT, check_sample
 from tolstat.store import what_if as kept
 from tolstat.store.view import View
 from tolstat.store.what_if import Altered
@@ -29,8 +30,6 @@ from tolstat.study.widths import COARSER, EXACT, FINER, HALF, STEPS, Line
 
 NEGLIGIBLE = 0.1
 """Difference of two lines that does not matter for their order, relative to the share of the joints as drawn."""
-TAIL_STARTS_AT = 0.9
-"""Quantile of the load that takes the place of a limit where the study sets none."""
 ENDS = ("", "_lower", "_upper")
 """Ends of the keys of an estimate and its interval."""
 INDICES = tuple(f"{name}{word}{end}" for name in ("", "above_") for word in ("alone", "in_all") for end in ENDS)
@@ -57,7 +56,7 @@ class Lines(NamedTuple):
         ``line``, ``names``, ``size``, ``step`` (of a fit the other code), ``words``, ``factor`` (NaN if it differs
         within the line, and of a fit), ``n``, ``share`` with ``_lower`` and ``_upper``, and ``change`` from the joints
         as drawn, with ends; see `Joints.estimates`. Where costs are given, ``cost`` of the line after the step and
-        ``cost_before``, NaN where it has none.
+        ``extra_cost``, how much more that is than as drawn; NaN where it has none.
     indices : sequence of mapping
         One row per line that can be exchanged: ``line``, ``pairs``; ``alone`` and ``in_all`` with ends, the closed and
         total Sobol' index of the load, or of its logarithm; ``above_alone`` and ``above_in_all``, those of the event
@@ -81,7 +80,7 @@ class Lines(NamedTuple):
                 line = found.setdefault(row["line"], {"line": row["line"], "size": row["size"], "by": []})
                 line |= {f"{step}{end}": row[f"share{end}"] for end in ENDS}
                 line |= {f"{step}_change{end}": row[f"change{end}"] for end in ENDS}
-                line |= {f"{step}_cost": row["cost"] - row["cost_before"]} if "cost" in row else {}
+                line |= {f"{step}_cost": row.get("extra_cost", np.nan)}
                 line["by"] += [row["words"]] if step in (FINER, COARSER) else []
         return list(found.values())
 
@@ -127,7 +126,7 @@ def evaluate(view: View, by: str, costs: Path | None = None) -> Lines | None:
     Returns
     -------
     Lines or None
-        None where the file holds no such joints (`lines_run.simulate` adds them). All intervals are 95 %.
+        None where the file holds no such joints (`simulation.simulate` adds them). All intervals are 95 %.
 
     Raises
     ------
@@ -139,19 +138,17 @@ def evaluate(view: View, by: str, costs: Path | None = None) -> Lines | None:
     check(view)
     joints = Joints(view, by, view.altered)
     rows = joints.rows() if np.isfinite(joints.base).any() else []
-    if costs is not None:
-        rows = _with_costs(view.study, rows, costs)
+    rows = rows if costs is None else _with_costs(view.study, rows, costs)
     if not rows:
         return None
     lines, entries = list(dict.fromkeys(row["line"] for row in rows)), widths.lines(view.study)
+    decisive = {row["line"] for row in rows if is_decisive(row["step"])}
     facts = {"load": by, "unit": joints.load.unit, "level": joints.level, "n": len(joints.base)}
     facts |= dict(zip(("share", "lower", "upper"), joints.share(joints.base), strict=True))
-    decisive = {row["line"] for row in rows if is_decisive(row["step"])}
-    settled = joints.settled([line for line in entries if line.label in decisive])
-    facts |= {"logarithmic": joints.load.long_tailed, "settled": settled}
-    missing = [line.label for line in entries if line.label not in lines]
-    facts |= {"missing": missing, "left_out": widths.left_out(view.study)}
-    return Lines(facts, rows, joints.indices(lines))
+    facts |= {"logarithmic": joints.load.long_tailed}
+    facts |= {"settled": joints.settled([line for line in entries if line.label in decisive])}
+    facts |= {"missing": [line.label for line in entries if line.label not in lines]}
+    return Lines(facts | {"left_out": widths.left_out(view.study)}, rows, joints.indices(lines))
 
 
 def check(view: View) -> None:
@@ -162,11 +159,7 @@ def check(view: View) -> None:
     StoreError
         The hint names what can be used.
     """
-    view.check_drawn()
-    view.check("difference")
-    if view.study.groups:
-        remedy = 'give the file of a study with sampling.method "random", "sobol" or "lhs"'
-        raise StoreError(str(Fault(str(view.path), "holds a pick-freeze design", remedy)))
+    check_sample(view, "difference")
     if not view.store.whole:
         remedy = "merge all slices first: tolstat merge SLICE... --out FILE"
         raise StoreError(str(Fault(str(view.path), "holds a part of the campaign only", remedy)))
@@ -197,7 +190,7 @@ class Joints:
     load : Sample
         The load in the campaign.
     level : float
-        Its limit; without one, its quantile `TAIL_STARTS_AT`.
+        Its limit; without one, its quantile `indices.TAIL_STARTS_AT`.
     base : ndarray, shape (n,)
         Load of the joints as drawn, from sample 0 on, NaN without a valid one: the campaign's, then fresh ones.
     """
@@ -272,20 +265,22 @@ class Joints:
                 held.setdefault(Line(about["label"], tuple(about["tolerances"])), {})[about["step"]] = about, values
         rows, places = [], dict[str, tuple[int, float]]()
         for line, steps in held.items():
-            size = widths.size(self._study, line)
+            about_line = {"line": line.label, "names": line.names, "size": widths.size(self._study, line)}
             for step, (about, values) in steps.items():
                 half = steps[HALF][1] if step in (EXACT, FINER) and HALF in steps else None
                 share, change = self.estimates(values, half)
                 factors = {own.get("factor", np.nan) for own in about["tolerances"].values()}
-                row = {"line": line.label, "names": line.names, "size": size, "step": step, "words": about["words"]}
+                row = {**about_line, "step": step, "words": about["words"]}
                 row |= {"factor": factors.pop() if len(factors) == 1 else np.nan, "n": len(values)}
                 rows.append(row | _named("share", share) | _named("change", change))
                 place = 0 if is_decisive(step) else 1 if step == EXACT else 2, share[0]
                 places[line.label] = min(places.get(line.label, place), place)
         orders = {step: (place, 0.0) for place, step in enumerate(STEPS)}
-        return sorted(
-            rows, key=lambda row: (*places[row["line"]], row["line"], orders.get(row["step"], (0, row["share"])))
-        )
+
+        def order(row: Row) -> Any:
+            return *places[row["line"]], row["line"], orders.get(row["step"], (0, row["share"]))
+
+        return sorted(rows, key=order)
 
     def indices(self, lines: Sequence[str]) -> list[dict[str, Any]]:
         """Rows of `Lines.indices`, in the order of these lines."""
@@ -318,8 +313,8 @@ class Joints:
         return float(found.estimate[0]), float(found.outer_lower[0]), float(found.outer_upper[0])
 
 
-def _with_costs(study: Study, rows: Rows, table: Path) -> list[dict[str, Any]]:
-    """Rows with the cost of the line after the step, and as drawn."""
+def _with_costs(study: Study, rows: list[dict[str, Any]], table: Path) -> list[dict[str, Any]]:
+    """Rows with the cost of the line after the step, and what that is more than as drawn."""
     tolerances = scaling.tolerances(study)
     prices = {
         name: Cost(cost.width, (entry,))
@@ -327,15 +322,13 @@ def _with_costs(study: Study, rows: Rows, table: Path) -> list[dict[str, Any]]:
         for name, entry in zip(tolerance.names, cost.entries, strict=True)
         if not entry.keep
     }
-    found = []
     for row in rows:
         factors = widths.factors(study, Line(row["line"], row["names"]), row["step"])
-        own = [(prices.get(name), factor) for name, factor in factors.items()]
-        known = [(cost, factor) for cost, factor in own if cost is not None and factor > 0.0]
-        ends = [sum(cost.at(x) for cost, x in known), sum(cost.at(1.0) for cost, _ in known)]
-        ends = ends if len(known) == len(own) else [np.nan, np.nan]
-        found.append({**row, **dict(zip(("cost", "cost_before"), ends, strict=True))})
-    return found
+        known = all(name in prices and factor > 0.0 for name, factor in factors.items())
+        cost = sum(prices[name].at(factor) for name, factor in factors.items()) if known else np.nan
+        before = sum(prices[name].at(1.0) for name in factors) if known else np.nan
+        row |= {"cost": cost, "extra_cost": cost - before}
+    return rows
 
 
 def names_at_points(view: View, load: str) -> tuple[str, ...]:

@@ -17,7 +17,7 @@ from tolstat.common.errors import Fault, StoreError
 from tolstat.common.loads import ANY_LIMIT, split
 from tolstat.display.options import Opt
 from tolstat.display.progress import clock
-from tolstat.questions.causes import lines_shares
+from tolstat.questions.causes import shares
 from tolstat.solver.compilation import warm_up
 from tolstat.store import Writer, what_if
 from tolstat.store.provenance import versions
@@ -161,7 +161,7 @@ class _Looks:
 
     def _first(self) -> int:
         """Joints at the first look: those of the campaign, fewer if half of the budget does not suffice for them."""
-        own = lines_shares.own_joints(self._view)
+        own = shares.own_joints(self._view)
         changes = sum(len(widths.steps(self._view.study, line)) + 0.5 for line in self._lines) + 1.0
         affordable = int(0.5 * self._budget / (self._seconds * changes))
         return max(LEAST, min(own if LEAST < own < FIRST else FIRST, affordable, self._most))
@@ -186,7 +186,7 @@ class _Looks:
             if done > RELIABLE:
                 self._seconds = (left - self._left) / done
             self.simulated += done
-        joints = lines_shares.Joints(self._view, self._load, self._held)
+        joints = shares.Joints(self._view, self._load, self._held)
         self.each, self.settled = n, joints.settled(self._lines, 1.0 - 0.05 / self._count)
 
     def _announce(self, n: int, lacking: int, left: float) -> None:
@@ -203,10 +203,10 @@ class _Looks:
 
     def _wanted(self, n: int, decisive: bool) -> list[Change]:
         """Sets of a look, what the order needs first."""
-        study, own = self._view.study, lines_shares.own_joints(self._view)
+        study, own = self._view.study, shares.own_joints(self._view)
         found = [sets.as_drawn(study, range(own, n))] if n > own else []
         if decisive:
-            joints = lines_shares.Joints(self._view, self._load, self._held)
+            joints = shares.Joints(self._view, self._load, self._held)
             return found + [sets.stepped(study, line, joints.decisive(line)[0], range(n)) for line in self._lines]
         each = [(line, step) for line in self._lines for step in widths.steps(study, line)]
         each.sort(key=lambda own: STEPS.index(own[1]) if own[1] in STEPS else 0)
@@ -224,7 +224,7 @@ def _independent(study: Study, line: Line) -> bool:
 
 def _checked(view: View, by: str | None) -> str:
     """Load that orders the lines; refuse a file that the code cannot continue."""
-    lines_shares.check(view)
+    shares.check(view)
     load = by or view.decisive
     view.load(load)
     store = view.store

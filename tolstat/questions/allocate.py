@@ -18,7 +18,7 @@ from tolstat.analysis.prediction import DELIVERY
 from tolstat.analysis.reweight import Ratios
 from tolstat.analysis.sample import CONFIDENCE, Sample
 from tolstat.common import selected_results
-from tolstat.common.errors import Fault, InputError, StoreError, gather
+from tolstat.common.errors import Fault, InputError, gather
 from tolstat.common.loads import ANY_LIMIT, FloatArray, unit_text
 from tolstat.common.tables import Status
 from tolstat.common.units import DISPLAY_UNITS
@@ -28,6 +28,7 @@ from tolstat.display.blocks import Listing
 from tolstat.display.options import Costs, Delivery, Opt
 from tolstat.display.table import Column, Row, Rows
 from tolstat.store import error_budget
+from tolstat.store.hdf5 import store_error
 from tolstat.store.view import View
 from tolstat.study import Study, axes, rule, scaling, selection
 from tolstat.study import costs as prices
@@ -164,14 +165,14 @@ def allocate(
     if view.study.groups:
         remedy = 'give the file of a study with sampling.method = "random"'
         found = "holds joints that share errors with others, so that one half of them is no check of the other"
-        raise StoreError(str(Fault(str(view.path), found, remedy)))
+        raise store_error(view.path, found, remedy)
     request = _read_request(view, targets, costs, keep or ())
     done = np.flatnonzero(view.status != Status.PENDING)
     events = [_above(view, statement, done) for statement in request.statements]
     searched, checked = allocation.halves(view.design.units(view.n)[done], MAX_SEARCHED)
     if len(checked) < 4 * reweight.LEAST_ESS:
-        found = f"has {len(done)} joints simulated"
-        raise StoreError(str(Fault(str(view.path), found, f"run {8 * reweight.LEAST_ESS} joints or more")))
+        remedy = f"run {8 * reweight.LEAST_ESS} joints or more"
+        raise store_error(view.path, f"has {len(done)} joints simulated", remedy)
     choice = _search(view, request, np.column_stack([own[0][searched] for own in events]), done[searched])
     entries = {
         t.pattern: t.scaled(float(f), DIGITS)

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Container, Sequence
-from functools import partial
+from collections.abc import Container, Iterator, Sequence
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import numpy as np
@@ -14,7 +13,7 @@ from tolstat import sampling
 from tolstat.analysis import sensitivity
 from tolstat.analysis.sensitivity import FirstOrder
 from tolstat.common.channels import CHANNELS
-from tolstat.common.errors import Fault, InputError, NotApplicable, StoreError
+from tolstat.common.errors import Fault, InputError, NotApplicable
 from tolstat.common.loads import FloatArray, unit_text
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import VALID, Status
@@ -27,6 +26,7 @@ from tolstat.display.table import Column, Row
 from tolstat.display.text import ends
 from tolstat.questions.causes.indices import check_sample, scattering
 from tolstat.store import revolutions
+from tolstat.store.hdf5 import store_error
 from tolstat.store.view import View
 
 if TYPE_CHECKING:
@@ -256,8 +256,8 @@ def evaluated(view: View, joints: int) -> tuple[NDArray[np.intp], NDArray[np.int
     check_sample(view, "index")
     samples = np.flatnonzero(view.status == Status.OK)[:joints]
     if len(samples) < MIN_JOINTS:
-        too_few = f"has {len(samples)} settled joints to evaluate"
-        raise StoreError(str(Fault(str(view.path), too_few, f"{MIN_JOINTS} are needed: run more joints")))
+        found = f"has {len(samples)} settled joints to evaluate"
+        raise store_error(view.path, found, f"{MIN_JOINTS} are needed: run more joints")
     return view.nominal_slots[view.nominal["status"] == Status.OK], samples
 
 
@@ -329,54 +329,39 @@ def _note(found: Sequence[AgainstAngle]) -> str:
     return sentences
 
 
-def _panels(angle: AgainstAngle) -> list[Panel]:
+def _panels(angle: AgainstAngle) -> Iterator[Panel]:
     """Load over the revolution, and shares of its variance."""
-    key, unit, middle = angle.load, unit_text(angle.unit), angle.spread[1]
-    estimates = list(zip(angle.names, angle.overall.estimate, strict=True))
-    top = ", ".join(f"{name} {100 * share:.1f} %" for name, share in estimates[:LINES])
-    return [
-        Panel(
-            f"angle-{key}",
-            f"{angle.load} over the revolution",
-            f"Median of the joints between {middle.min():.4g} and {middle.max():.4g} {unit} over the input angle; "
-            f"95 % of the joints stay below {angle.spread[2].max():.4g} {unit} everywhere",
-            partial(_draw_loads, angle=angle),
-            (4.9, 3.1),
-            top=drawing.legend_room(LOADS),
-        ),
-        Panel(
-            f"angle-shares-{key}",
-            f"{angle.quantity}: share of the variance over the input angle",
-            f"Over the whole revolution: {top}",
-            partial(_draw_shares, angle=angle),
-            (4.9, 3.1),
-            top=drawing.legend_room(angle.names[:LINES]),
-        ),
-    ]
+    key, unit, leading = angle.load, unit_text(angle.unit), angle.names[:LINES]
+    low, middle, high = angle.spread
 
+    def draw_loads(ax: Axes) -> None:
+        theta = theta_axis(ax, angle.angles)
+        ax.fill_between(theta, closed(low), closed(high), color=style.COLOURS[0], alpha=0.2, lw=0, label=LOADS[0])
+        ax.plot(theta, closed(middle), color=style.COLOURS[0], label=LOADS[1])
+        if np.isfinite(angle.nominal).all():
+            ax.plot(theta, closed(angle.nominal), color=style.INK, lw=1.0, ls=(0.0, (4.0, 2.0)), label=LOADS[2])
+        ax.set_ylabel(f"|{key}| [{unit}]")
+        ax.set_ylim(0.0, 1.05 * max(high.max(), np.nan_to_num(angle.nominal).max()))
+        drawing.legend_above(ax, *ax.get_legend_handles_labels())
 
-def _draw_loads(ax: Axes, angle: AgainstAngle) -> None:
-    """Draw a load over the revolution: nominal joint, median and 5 to 95 % band of the others."""
-    theta = theta_axis(ax, angle.angles)
-    low, middle, high = closed(angle.spread)
-    ax.fill_between(theta, low, high, color=style.COLOURS[0], alpha=0.2, lw=0, label=LOADS[0])
-    ax.plot(theta, middle, color=style.COLOURS[0], label=LOADS[1])
-    if np.isfinite(angle.nominal).all():
-        ax.plot(theta, closed(angle.nominal), color=style.INK, lw=1.0, ls=(0.0, (4.0, 2.0)), label=LOADS[2])
-    ax.set_ylabel(f"|{angle.load}| [{unit_text(angle.unit)}]")
-    ax.set_ylim(0.0, 1.05 * max(high.max(), np.nan_to_num(angle.nominal).max()))
-    drawing.legend_above(ax, *ax.get_legend_handles_labels())
+    def draw_shares(ax: Axes) -> None:
+        theta, ceiling = theta_axis(ax, angle.angles), 0.0
+        for i, name in enumerate(leading):
+            share, lower, upper = (100.0 * closed(part[i]) for part in angle.first[:3])
+            if np.isfinite(lower).all():
+                ax.fill_between(theta, lower, upper, color=style.COLOURS[i], alpha=0.15, lw=0)
+            ax.plot(theta, share, color=style.COLOURS[i], ls=style.DASHES[i], label=name)
+            ceiling = max(ceiling, float(np.nanmax(np.where(np.isfinite(upper), upper, share), initial=0.0)))
+        ax.set(ylim=(0.0, 1.05 * max(ceiling, 1.0)), ylabel="share of the variance [%]")
+        drawing.legend_above(ax, *ax.get_legend_handles_labels())
 
-
-def _draw_shares(ax: Axes, angle: AgainstAngle) -> None:
-    """Draw the shares of the variance of the `LINES` errors with the largest share over the revolution."""
-    theta = theta_axis(ax, angle.angles)
-    ceiling = 0.0
-    for i, name in enumerate(angle.names[:LINES]):
-        share, low, high = (100.0 * closed(part[i]) for part in angle.first[:3])
-        if np.isfinite(low).all():
-            ax.fill_between(theta, low, high, color=style.COLOURS[i], alpha=0.15, lw=0)
-        ax.plot(theta, share, color=style.COLOURS[i], ls=style.DASHES[i], label=name)
-        ceiling = max(ceiling, float(np.nanmax(np.where(np.isfinite(high), high, share), initial=0.0)))
-    ax.set(ylim=(0.0, 1.05 * max(ceiling, 1.0)), ylabel="share of the variance [%]")
-    drawing.legend_above(ax, *ax.get_legend_handles_labels())
+    told = (
+        f"Median of the joints between {middle.min():.4g} and {middle.max():.4g} {unit} over the input angle; "
+        f"95 % of the joints stay below {high.max():.4g} {unit} everywhere"
+    )
+    size, room = (4.9, 3.1), drawing.legend_room
+    yield Panel(f"angle-{key}", f"{key} over the revolution", told, draw_loads, size, top=room(LOADS))
+    estimates = zip(leading, angle.overall.estimate, strict=False)
+    told = "Over the whole revolution: " + ", ".join(f"{name} {100 * share:.1f} %" for name, share in estimates)
+    title = f"{angle.quantity}: share of the variance over the input angle"
+    yield Panel(f"angle-shares-{key}", title, told, draw_shares, size, top=room(leading))

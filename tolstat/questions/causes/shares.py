@@ -13,13 +13,13 @@ import numpy as np
 from tolstat.analysis import difference, pick_freeze
 from tolstat.analysis.sample import Sample
 from tolstat.campaign import what_if as sets
-from tolstat.common.errors import Fault, StoreError
 from tolstat.common.loads import ANY_LIMIT, FloatArray
 from tolstat.common.tables import Status
 from tolstat.display import text
 from tolstat.display.table import Row, Rows
 from tolstat.questions.causes.indices import TAIL_STARTS_AT, check_sample
 from tolstat.store import what_if as kept
+from tolstat.store.hdf5 import store_error
 from tolstat.store.view import View
 from tolstat.store.what_if import Altered
 from tolstat.study import Study, scaling, widths
@@ -162,7 +162,7 @@ def check(view: View) -> None:
     check_sample(view, "difference")
     if not view.store.whole:
         remedy = "merge all slices first: tolstat merge SLICE... --out FILE"
-        raise StoreError(str(Fault(str(view.path), "holds a part of the campaign only", remedy)))
+        raise store_error(view.path, "holds a part of the campaign only", remedy)
 
 
 def own_joints(view: View) -> int:

@@ -6,25 +6,25 @@ import math
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Literal
+
+import numpy as np
 
 from tolstat.campaign import what_if as sets
 from tolstat.campaign.pool import kept_workers
 from tolstat.campaign.what_if import Asked, Change
 from tolstat.campaign.work import Work
 from tolstat.common.cores import available_cores
-from tolstat.common.errors import Fault, StoreError
 from tolstat.common.loads import ANY_LIMIT, split
-from tolstat.display.options import Opt
 from tolstat.display.progress import clock
 from tolstat.questions.causes import shares
 from tolstat.solver.compilation import warm_up
 from tolstat.store import Writer, what_if
+from tolstat.store.hdf5 import store_error
 from tolstat.store.provenance import versions
 from tolstat.store.view import View
 from tolstat.study import widths
 from tolstat.study.points import names_of
-from tolstat.study.study import Study
 from tolstat.study.widths import STEPS, Line
 
 FIRST, LEAST, MOST = 1024, 128, 16_384
@@ -45,13 +45,13 @@ LINES = {"entry": widths.lines, "feature": widths.features, "error": widths.erro
 def simulate(
     path: Path,
     work: Work,
-    by: Annotated[str | None, Opt("LOAD")] = None,
+    by: str | None = None,
     each: Each = "entry",
-    group: Annotated[list[str] | None, Opt("NAME=PATTERN,...")] = None,
-    budget: Annotated[float, Opt("TIME", unit="s")] = BUDGET_S,
-    most: Annotated[int, Opt("N", least=LEAST)] = MOST,
+    group: Sequence[str] = (),
+    budget: float = BUDGET_S,
+    most: int = MOST,
 ) -> list[Path]:
-    """Simulate joints with other widths of each line, and keep their loads in the file.
+    """Simulate joints with each line changed, and keep their loads in the file.
 
     Of several operating points those that `by` or a limit of the study is about. Ends when the order of the lines is
     settled, the time is up, or each change has `most` joints. What is done by then stays in the file; the same call
@@ -66,13 +66,13 @@ def simulate(
     by : str, optional
         Load whose limit orders the lines; by default all limits together, or the only one.
     each : {"entry", "feature", "error"}
-        With --run: a line is an entry of [tolerances], a pin with its hole, or an error.
-    group : list of str, optional
-        With --run: also change these errors together, "tilts = pin*.tilt_*, hole*.tilt_*"; repeatable.
+        A line is an entry of [tolerances], a pin with its hole, or an error.
+    group : sequence of str
+        Errors that are changed together, too: ``"tilts = pin*.tilt_*, hole*.tilt_*"``.
     budget : float
-        With --run: time limit, with unit s, min or h; 5 min unless given.
+        Time limit, s.
     most : int
-        With --run: largest number of joints of each change.
+        Largest number of joints of each change.
 
     Returns
     -------
@@ -88,16 +88,19 @@ def simulate(
     """
     with Writer.open(path) as store, kept_workers():
         view = View(store)
-        load = _checked(view, by)
-        lines = [*LINES[each](view.study), *widths.named(view.study, group or [])]
+        shares.check(view)
+        load = by or view.decisive
+        view.load(load)  # which refuses what is none
+        if any(store.versions.get(name) != versions()[name] for name in ("tolstat", "sources")):
+            remedy = "use that version, or run the campaign again: tolstat run STUDY --out OTHER.h5"
+            raise store_error(path, "was made by another version of the code", remedy)
+        lines = [*LINES[each](view.study), *widths.named(view.study, group)]
         if not lines:
             remedy = 'name what a study can change: --group "tilts = pin*.tilt_*, hole*.tilt_*"'
-            raise StoreError(str(Fault(str(path), "has no line whose width can be changed", remedy)))
+            raise store_error(path, "has no line that can be changed", remedy)
         warm_up()
         work.tell("each change is one line of the drawing; all else of the joint stays as drawn")
-        looks = _Looks(store, view, lines, load, work, budget, most)
-        looks.run()
-        work.tell(f"simulated {looks.simulated} joints in {looks.spent:.0f} s, {looks.outcome}")
+        work.tell(_Looks(store, view, lines, load, work, budget, most).run())
     return [path]
 
 
@@ -111,73 +114,62 @@ def points_of(view: View, by: str) -> tuple[str, ...]:
 
 
 class _Looks:
-    """Looks at the order of the lines, each with more joints of the changes than the one before.
-
-    Attributes
-    ----------
-    each, simulated : int
-        Number of joints of each change at the last look; of all joints simulated.
-    settled : bool
-        Whether the order of the lines is settled.
-    """
+    """Looks at the order of the lines, each with more joints of the changes than the one before."""
 
     def __init__(
         self, store: Writer, view: View, lines: Sequence[Line], load: str, work: Work, budget: float, most: int
     ) -> None:
-        self._begin, self._budget, self._most = time.monotonic(), budget, most
+        self._budget, self._end, self._most = budget, time.monotonic() + budget, most
         self._store, self._view, self._lines, self._load, self._work = store, view, lines, load, work
         self._workers = work.workers or available_cores()
         self._held, self._asked = what_if.read(store), Asked(view.kept_loads, points_of(view, load))
         options = sets.options_of(view.study, store)
         self._seconds = sets.seconds_per_joint(view.study, options, PILOT, self._asked.points) / self._workers
-        self.each, self.simulated, self.settled = 0, 0, False
-        self._looks, self._count, self._cut = 0, 1, False
-
-    @property
-    def spent(self) -> float:
-        """Time since the beginning, s."""
-        return time.monotonic() - self._begin
-
-    @property
-    def outcome(self) -> str:
-        """What the last look found, in words."""
-        more = "a larger --most" if self.each >= self._most else "a longer --budget"
-        order = "settled" if self.settled else f"not settled: {more} goes on"
-        return f"{'up to ' if self._cut else ''}{self.each} of each change; order of lines {order}"
-
-    def run(self) -> None:
-        """Look until the order is settled, then bring the other steps to as many joints."""
-        n = self._first()
-        self._count = 1 + math.ceil(math.log2(max(self._most / n, 1.0)))
-        self._look(n)
-        while not self.settled and (more := self._next()) > self.each:
-            self._look(more, decisive=True)
-        if self.simulated and self._left > 0.0:
-            self._look(self.each)
+        self._own = shares.own_joints(view)
+        self._looks, self._simulated, self._cut = 0, 0, False
 
     @property
     def _left(self) -> float:
-        return self._budget - self.spent
+        return self._end - time.monotonic()
 
-    def _first(self) -> int:
-        """Joints at the first look: those of the campaign, fewer if half of the budget does not suffice for them."""
-        own = shares.own_joints(self._view)
+    def run(self) -> str:
+        """Look until the order is settled, then bring the other steps to as many joints; returns what was done."""
+        # those of the campaign at first, fewer if half of the budget does not suffice for them
         changes = sum(len(widths.steps(self._view.study, line)) + 0.5 for line in self._lines) + 1.0
         affordable = int(0.5 * self._budget / (self._seconds * changes))
-        return max(LEAST, min(own if LEAST < own < FIRST else FIRST, affordable, self._most))
+        n = max(LEAST, min(self._own if LEAST < self._own < FIRST else FIRST, affordable, self._most))
+        confidence = 1.0 - 0.05 / (1 + math.ceil(math.log2(max(self._most / n, 1.0))))
+        settled = self._look(n, confidence)
+        while not settled:
+            affordable = n + int(0.9 * self._left / (self._seconds * (len(self._lines) + 1.0)))
+            more = min(2 * n, affordable, self._most)
+            if more <= 1.1 * n:
+                break
+            n, settled = more, self._look(more, confidence, decisive=True)
+        if self._simulated and self._left > 0.0:
+            settled = self._look(n, confidence)
+        more_of = "a larger --most" if n >= self._most else "a longer --budget"
+        order = "settled" if settled else f"not settled: {more_of} goes on"
+        done = f"simulated {self._simulated} joints in {self._budget - self._left:.0f} s"
+        return f"{done}, {'up to ' if self._cut else ''}{n} of each change; order of lines {order}"
 
-    def _next(self) -> int:
-        """Joints at the next look: twice as many, or what the time suffices for if that is a tenth more."""
-        affordable = self.each + int(0.9 * self._left / (self._seconds * (len(self._lines) + 1.0)))
-        more = min(2 * self.each, affordable, self._most)
-        return more if more > 1.1 * self.each else self.each
+    def _look(self, n: int, confidence: float, decisive: bool = False) -> bool:
+        """Simulate what is missing of `n` joints of each line after all its steps, or after its `decisive` one.
 
-    def _look(self, n: int, decisive: bool = False) -> None:
-        """Simulate what is missing of `n` joints of each line after all or its `decisive` step; compare the lines."""
+        Returns
+        -------
+        bool
+            Whether the order of the lines is settled then.
+        """
         wanted, left = self._wanted(n, decisive), self._left
         self._looks += 1
         if lacking := self._lacking(wanted):
-            self._announce(n, lacking, left)
+            needed, points = self._seconds * lacking, self._asked.points
+            where = f" at {', '.join(points)}" if all(points) else ""
+            cost = f"about {clock(needed)} on {self._workers} processes"
+            cost += f", of which {clock(max(left, 0.0))} are left" if needed > left else ""
+            lines = f"{len(self._lines)} lines, {n} joints of each change"
+            self._work.tell(f"{lines}: {lacking} joints to simulate{where}, {cost}")
             self._work.display.stage(f"look {self._looks}", left)
             stop, shown = (lambda: self._left <= 0.0), self._work.display
             self._held = sets.simulate(self._view.study, self._store, wanted, self._asked, self._workers, stop, shown)
@@ -185,17 +177,8 @@ class _Looks:
             self._cut = still > 0
             if done > RELIABLE:
                 self._seconds = (left - self._left) / done
-            self.simulated += done
-        joints = shares.Joints(self._view, self._load, self._held)
-        self.each, self.settled = n, joints.settled(self._lines, 1.0 - 0.05 / self._count)
-
-    def _announce(self, n: int, lacking: int, left: float) -> None:
-        needed, points = self._seconds * lacking, self._asked.points
-        where = f" at {', '.join(points)}" if all(points) else ""
-        cost = f"about {clock(needed)} on {self._workers} processes"
-        cost += f", of which {clock(max(left, 0.0))} are left" if needed > left else ""
-        lines = f"{len(self._lines)} lines, {n} joints of each change"
-        self._work.tell(f"{lines}: {lacking} joints to simulate{where}, {cost}")
+            self._simulated += done
+        return shares.Joints(self._view, self._load, self._held).settled(self._lines, confidence)
 
     def _lacking(self, wanted: Sequence[Change]) -> int:
         names = self._asked.names(self._view.study)
@@ -203,32 +186,16 @@ class _Looks:
 
     def _wanted(self, n: int, decisive: bool) -> list[Change]:
         """Sets of a look, what the order needs first."""
-        study, own = self._view.study, shares.own_joints(self._view)
-        found = [sets.as_drawn(study, range(own, n))] if n > own else []
+        study, lines = self._view.study, self._lines
+        found = [sets.as_drawn(study, range(self._own, n))] if n > self._own else []
         if decisive:
             joints = shares.Joints(self._view, self._load, self._held)
-            return found + [sets.stepped(study, line, joints.decisive(line)[0], range(n)) for line in self._lines]
-        each = [(line, step) for line in self._lines for step in widths.steps(study, line)]
+            return found + [sets.stepped(study, line, joints.decisive(line)[0], range(n)) for line in lines]
+        each = [(line, step) for line in lines for step in widths.steps(study, line)]
         each.sort(key=lambda own: STEPS.index(own[1]) if own[1] in STEPS else 0)
         found += [sets.stepped(study, line, step, range(n)) for line, step in each]
-        apart = [line for line in self._lines if _independent(study, line)]
-        return found + [sets.exchanged(study, line, range(n // 2)) for line in apart]
-
-
-def _independent(study: Study, line: Line) -> bool:
-    """Whether no error of a line is correlated with one of another line, so that it can be exchanged."""
-    own = [name in line.names for name in study.copula.names]
-    others = [not within for within in own]
-    return not study.copula.matrix[own][:, others].any()
-
-
-def _checked(view: View, by: str | None) -> str:
-    """Load that orders the lines; refuse a file that the code cannot continue."""
-    shares.check(view)
-    load = by or view.decisive
-    view.load(load)
-    store = view.store
-    if any(store.versions.get(name) != value for name, value in versions().items() if name in ("tolstat", "sources")):
-        remedy = "use that version, or run the campaign again: tolstat run STUDY --out OTHER.h5"
-        raise StoreError(str(Fault(str(view.path), "was made by another version of the code", remedy)))
-    return load
+        for line in lines:
+            inside = np.array([name in line.names for name in study.copula.names], bool)
+            if not study.copula.matrix[inside][:, ~inside].any():  # else an exchange would break the correlation
+                found.append(sets.exchanged(study, line, range(n // 2)))
+        return found

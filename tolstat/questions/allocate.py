@@ -81,6 +81,8 @@ LIMITS = (
 
 Entries = dict[str, dict[str, Any]]
 """Keys of entries of ``[tolerances]`` by pattern."""
+_Judged = tuple[str, float, Sequence[NDArray[np.bool_]]]
+"""A statement or `ANY_LIMIT`, its target, and which joints are above, see `_above`."""
 
 
 class _Request(NamedTuple):
@@ -184,17 +186,14 @@ def allocate(
         for errors in view.error_blocks(request.columns)
     ]
     ratios = _ratios(np.concatenate([logs for logs, _ in blocks])[done[checked]], blocks[-1][1])
-    judged = [(one.text, one.bound, own) for one, own in zip(request.statements, events, strict=True)]
+    judged: list[_Judged] = [(one.text, one.bound, own) for one, own in zip(request.statements, events, strict=True)]
     if len(events) > 1:  # with both ends of the numerical error where it is known of all
-        either = [np.any(own, axis=0) for own in zip(*events, strict=False)]
-        judged.append((ANY_LIMIT, np.nan, either))
-    limits = [_limit(view, *one, checked, ratios, delivery) for one in judged]
-    own = limits[: len(events)]
-    needed = ratios.effective * max(
-        allocation.joints_needed(row["estimate"], row["ess"], row["target"], CONFIDENCE) for row in own
-    )
+        judged.append((ANY_LIMIT, np.nan, [np.any(own, axis=0) for own in zip(*events, strict=False)]))
+    limits = [_limit(view, one, checked, ratios, delivery) for one in judged]
+    each = [(row["estimate"], row["ess"], row["target"]) for row in limits[: len(events)]]
+    needed = ratios.effective * max(allocation.joints_needed(*own, CONFIDENCE) for own in each)
     limits = [row if row["usable"] else row | dict.fromkeys(WITHHELD, np.nan) for row in limits]
-    holds, verdict = _verdict(limits[: len(own)], ratios, needed)
+    holds, verdict = _verdict(limits[: len(events)], ratios, needed)
     facts = {"holds": holds, "verdict": verdict, "aim": choice.aim, "effective": ratios.effective}
     facts |= {"joints_needed": needed, "entries": entries}
     return Answer("allocate", "Tolerances proposed", _parts(view, _tolerances(request, entries), limits, facts), facts)
@@ -355,31 +354,20 @@ def _search(view: View, request: _Request, above: NDArray[np.bool_], samples: ND
     return allocation.search(problem)
 
 
-def _limit(
-    view: View,
-    name: str,
-    target: float,
-    above: Sequence[NDArray[np.bool_]],
-    checked: NDArray[np.intp],
-    ratios: Ratios,
-    delivery: int,
-) -> dict[str, Any]:
-    """One row of the table ``limits``; `above` as `_above` returns it, `checked` are the joints of the check."""
+def _limit(view: View, judged: _Judged, checked: NDArray[np.intp], ratios: Ratios, delivery: int) -> dict[str, Any]:
+    """One row of the table ``limits``; `checked` are the joints of the check."""
+    name, target, above = judged
+    samples = [Sample.of(own[checked], np.full(checked.size, Status.OK), view.design) for own in above]
 
-    def shares(confidence: float) -> list[reweight.Share]:
-        status = np.full(checked.size, Status.OK)
-        samples = [Sample.of(own[checked], status, view.design) for own in above]
-        return [reweight.share_above(sample, ratios, 0.5, confidence) for sample in samples]
+    def estimated(confidence: float) -> tuple[reweight.Share, float, float]:
+        shares = [reweight.share_above(sample, ratios, 0.5, confidence) for sample in samples]
+        return shares[0], min(share.lower for share in shares), max(share.upper for share in shares)
 
-    def widest(shares: Sequence[reweight.Share]) -> tuple[float, float]:
-        return min(share.lower for share in shares), max(share.upper for share in shares)
-
-    found = shares(CONFIDENCE)
-    row = {"limit": name, "target": target, "before": float(above[0].mean()), "estimate": found[0].estimate}
-    row["lower"], row["upper"] = widest(found)
-    following = prediction.of_share(*widest(shares(prediction.half(CONFIDENCE))), delivery, CONFIDENCE)
-    row |= prediction.columns(following, delivery)
-    return row | {"ess": found[0].ess, "usable": found[0].support.usable, "numerical": len(above) > 1}
+    share, lower, upper = estimated(CONFIDENCE)
+    row = {"limit": name, "target": target, "before": float(above[0].mean()), "estimate": share.estimate}
+    following = prediction.of_share(*estimated(prediction.half(CONFIDENCE))[1:], delivery, CONFIDENCE)
+    row |= {"lower": lower, "upper": upper} | prediction.columns(following, delivery)
+    return row | {"ess": share.ess, "usable": share.support.usable, "numerical": len(above) > 1}
 
 
 def _tolerances(request: _Request, entries: Entries) -> list[dict[str, Any]]:

@@ -27,7 +27,7 @@ from tolstat.display.options import Costs, Load, Opt, Top
 from tolstat.display.table import Column, Row, Rows, has
 from tolstat.display.text import ends
 from tolstat.questions.causes import lines, simulation
-from tolstat.questions.causes.indices import Indices, indices
+from tolstat.questions.causes.indices import Indices, estimated, indices
 from tolstat.store.view import View
 from tolstat.study import Study
 from tolstat.study.rewriting import with_keys
@@ -215,10 +215,9 @@ def causes_on_page(view: View, asked: Asked) -> Answer:
 
 def _tried(job: Callable[[], Indices]) -> Indices | None:
     """Result of a job; None where it cannot be had."""
-    try:
+    with suppress(TolstatError):
         return job()
-    except TolstatError:
-        return None
+    return None
 
 
 def _has_narrow_bounds(rows: Rows) -> bool:
@@ -234,14 +233,14 @@ def _table(name: str, found: Indices, shown: int) -> Table:
     the larger error (``direction``) and the error farther from the middle (``size``), where ``*`` marks
     p < `SIGNIFICANT`.
     """
-    total = Column("in all, %", partial(_interval, name="total", factor=100), shown=has("total"))
+    total = estimated("in all, %", "total", ends=(0.0, 1.0))
     if not found.of_design:  # given data yield bounds only
-        total = Column("in all, %", partial(_ends, name="total", factor=100), shown=_has_narrow_bounds, rank=3)
+        total = Column("in all, %", _bounds, shown=_has_narrow_bounds, rank=3)
     columns = [
         Column("error", lambda row: str(row["error"])),
-        Column("alone, %", partial(_interval, name="first", factor=100), shown=has("first")),
+        estimated("alone, %", "first", ends=(0.0, 1.0)),
         total,
-        Column("rank coefficient", partial(_interval, name="srrc"), shown=has("srrc")),
+        estimated("rank coefficient", "srrc", form="+.2f"),
         Column("tail: larger", partial(_tail, name="direction"), shown=has("direction"), rank=2),
         Column("tail: farther out", partial(_tail, name="size"), shown=has("size"), rank=1),
     ]
@@ -251,17 +250,8 @@ def _table(name: str, found: Indices, shown: int) -> Table:
     return Table(name, title, columns, found.rows, seen=seen)
 
 
-def _interval(row: Row, name: str, factor: float = 1.0) -> str:
-    value = row[name]
-    if math.isnan(value):
-        return "-"
-    # estimates of shares may scatter beyond 0 and 1, where no share is
-    own = f"{factor * min(max(value, 0.0), 1.0):.1f}" if factor > 1 else f"{value:+.2f}"
-    return own if math.isnan(row[f"{name}_lower"]) else f"{own} ({_ends(row, name, factor)})"
-
-
-def _ends(row: Row, name: str, factor: float = 1.0) -> str:
-    return ends(factor * row[f"{name}_lower"], factor * row[f"{name}_upper"], ".1f" if factor > 1 else "+.2f")
+def _bounds(row: Row) -> str:
+    return ends(100.0 * row["total_lower"], 100.0 * row["total_upper"], ".1f")
 
 
 def _tail(row: Row, name: str) -> str:
@@ -318,12 +308,7 @@ def _tornado(found: Indices) -> Panel:
         drawing.legend_above(ax, handles, labels)
         ax.set_xlabel(f"share of the variance of {found.quantity} [%]")
 
-    return Panel(
-        f"tornado-{found.facts['load']}",
-        f"{found.quantity}: share of the variance by error",
-        f"Largest first-order indices: {top}; all errors alone {100 * found.facts['additive']:.0f} %",
-        draw,
-        (4.9, drawing.rows_height(len(rows)) + 0.25),
-        left := drawing.rows_left(names),
-        drawing.legend_room(labels, left),
-    )
+    told = f"Largest first-order indices: {top}; all errors alone {100 * found.facts['additive']:.0f} %"
+    title, size = f"{found.quantity}: share of the variance by error", (4.9, drawing.rows_height(len(rows)) + 0.25)
+    left, key = drawing.rows_left(names), f"tornado-{found.facts['load']}"
+    return Panel(key, title, told, draw, size, left, drawing.legend_room(labels, left))

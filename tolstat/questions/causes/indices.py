@@ -14,7 +14,8 @@ from tolstat.analysis.design import Claim
 from tolstat.analysis.sample import Sample
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import ANY_LIMIT, FloatArray
-from tolstat.display.table import Rows
+from tolstat.display import text
+from tolstat.display.table import Column, Row, Rows, has
 from tolstat.store.hdf5 import store_error
 from tolstat.store.view import View
 
@@ -68,6 +69,22 @@ class Indices(NamedTuple):
         return not all(math.isnan(row["first_lower"]) for row in self.rows)
 
 
+def estimated(
+    head: str, name: str, rank: int = 0, form: str = ".1f", ends: tuple[float, float] | None = None
+) -> Column:
+    """Column of an estimate between two `ends`, in per cent unless `form` has two digits, with its interval."""
+    factor = 1.0 if form.endswith("2f") else 100.0
+
+    def cell(row: Row) -> str:
+        if math.isnan(value := row.get(name, math.nan)):
+            return "-"
+        low, high = (factor * row[f"{name}{end}"] for end in ("_lower", "_upper"))
+        value = factor * (value if ends is None else min(max(value, ends[0]), ends[1])) + 0.0  # no -0
+        return f"{value:{form}}" + ("" if math.isnan(low) else f" ({text.ends(low, high, form)})")
+
+    return Column(head, cell, shown=has(name), rank=rank)
+
+
 def indices(
     view: View, by: str, logarithm: bool = False, joints: int | None = None, confidence: float = 0.95
 ) -> Indices:
@@ -107,19 +124,10 @@ def indices(
     first: Any = parts["first"]
     ranks: Any = parts.get("srrc")
     valid, level = load.valid, _tail_level(load)
-    facts = {
-        "load": load.name,
-        "unit": load.unit,
-        "logarithm": logarithm,
-        "joints": valid.size,
-        "used": min(valid.size, MAX_JOINTS) if ranks else valid.size,
-        "without_load": sum(load.unresolved),
-        "level": level,
-        "above": int((valid > level).sum()),
-        "std": math.sqrt(variance),
-        "additive": float(first.estimate.sum()),
-        "r2": ranks.r2 if ranks else math.nan,
-    }
+    facts = {"load": load.name, "unit": load.unit, "logarithm": logarithm, "joints": valid.size}
+    facts |= {"used": min(valid.size, MAX_JOINTS) if ranks else valid.size, "without_load": sum(load.unresolved)}
+    facts |= {"level": level, "above": int((valid > level).sum()), "std": math.sqrt(variance)}
+    facts |= {"additive": float(first.estimate.sum()), "r2": ranks.r2 if ranks else math.nan}
     columns: dict[str, Any] = {"error": names}
     for kind in KINDS:
         found = parts[kind]._asdict() if kind in parts else {}

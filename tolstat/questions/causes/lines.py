@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from functools import partial
 from shlex import quote
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,9 +17,10 @@ from tolstat.display.answer import Answer, Part, Sentence, Table
 from tolstat.display.asked import Asked
 from tolstat.display.blocks import Panel, Panels
 from tolstat.display.mpl import markers, patches
-from tolstat.display.options import Accepted, Costs, Opt
+from tolstat.display.options import Accepted, Costs, Load
 from tolstat.display.table import Column, Row, has
 from tolstat.questions.causes import shares
+from tolstat.questions.causes.indices import estimated
 from tolstat.questions.causes.shares import INDICES, Lines
 from tolstat.store.view import View
 from tolstat.study.widths import COARSER, EXACT, FINER, HALF, STEPS
@@ -58,59 +58,42 @@ _EXACT: dict[str, Any] = {"ls": "", "mfc": "white", "mec": style.INK, "ms": 5.5}
 """Style of the mark of an exact line."""
 
 
-def _interval(row: Row, name: str, form: str = ".1f", low: float = -np.inf, high: float = np.inf) -> str:
-    """Estimate in per cent, between two bounds, with the ends of its interval; a dash where there is none."""
-    if np.isnan(row.get(name, np.nan)):
-        return "-"
-    value = 100 * np.clip(row[name], low, high) + 0.0  # no -0
-    return f"{value:{form}} ({text.ends(100 * row[f'{name}_lower'], 100 * row[f'{name}_upper'], form)})"
+def _cost(head: str, name: str, rank: int = 0) -> Column:
+    """Column of what a change costs more than the drawing."""
 
+    def cell(row: Row) -> str:
+        return text.formed(row.get(name, np.nan) + 0.0, "+.4g")  # no -0
 
-def _cost(row: Row, name: str) -> str:
-    """What a change costs more than the drawing; a dash where that is not known."""
-    return text.formed(row.get(name, np.nan) + 0.0, "+.4g")  # no -0
-
-
-def _share(head: str, name: str, rank: int = 0, form: str = ".1f") -> Column:
-    return Column(head, partial(_interval, name=name, form=form), shown=has(name), rank=rank)
-
-
-def _costs(head: str, name: str, rank: int = 0) -> Column:
-    return Column(head, partial(_cost, name=name), shown=has(name), rank=rank)
+    return Column(head, cell, shown=has(name), rank=rank)
 
 
 LINE = Column("line", lambda row: str(row["line"]), words=True)
 COLUMNS = (
     LINE,
     Column("tolerance", lambda row: row["size"] or "-", rank=3),
-    _share("half as wide, %", HALF),
-    _share("exact, %", EXACT, 1),
-    _share("finer, %", FINER, 5),
-    _share("coarser, %", COARSER, 2),
+    estimated("half as wide, %", HALF),
+    estimated("exact, %", EXACT, 1),
+    estimated("finer, %", FINER, 5),
+    estimated("coarser, %", COARSER, 2),
     Column("finer, coarser", lambda row: ", ".join(row["by"]) or "-", words=True, rank=4),
-    _share("half: change, %", f"{HALF}_change", 6, "+.1f"),
-    _costs("half: extra cost", f"{HALF}_cost"),
-    _costs("finer: extra cost", f"{FINER}_cost", 5),
-    _costs("coarser: extra cost", f"{COARSER}_cost", 2),
+    estimated("half: change, %", f"{HALF}_change", 6, "+.1f"),
+    _cost("half: extra cost", f"{HALF}_cost"),
+    _cost("finer: extra cost", f"{FINER}_cost", 5),
+    _cost("coarser: extra cost", f"{COARSER}_cost", 2),
 )
 """Columns of `Lines.by_line`: a line, its tolerance, and the share above the level after each step."""
 FITS = (
     Column("fit", lambda row: str(row["step"])),
     Column("in place of", lambda row: str(row["size"]), words=True),
-    _share("share, %", "share"),
-    _share("change, %", "change", 0, "+.1f"),
-    _costs("extra cost", "extra_cost"),
+    estimated("share, %", "share"),
+    estimated("change, %", "change", 0, "+.1f"),
+    _cost("extra cost", "extra_cost"),
     Column("what changes", lambda row: str(row["words"]), words=True, rank=1),
 )
 """Columns of `Lines.other_fits`."""
 
 
-def lines(
-    view: View,
-    by: Annotated[str | None, Opt("LOAD")] = None,
-    accepted: Accepted = math.nan,
-    costs: Costs = None,
-) -> Answer:
+def lines(view: View, by: Load = None, accepted: Accepted = math.nan, costs: Costs = None) -> Answer:
     """List what each line of the drawing would change.
 
     Gives for each line of the drawing, an entry of [tolerances], the share of the joints above the limit if it were
@@ -224,10 +207,9 @@ def _indices(found: Lines) -> list[Column]:
     """Columns of `Lines.indices`: of the load and of the event, with intervals; no share is beyond 0 and 1."""
     load = "largest load over its limit" if found.facts["load"] == ANY_LIMIT else found.facts["load"]
     load = f"log {load}" if found.facts["logarithmic"] else load
-    names = {f"{load}: alone": "alone", f"{load}: in all": "in_all"}
-    names |= {"above: alone": "above_alone", "above: in all": "above_in_all"}
-    cells = [(head, partial(_interval, name=name, low=0.0, high=1.0)) for head, name in names.items()]
-    return [LINE, *(Column(f"{head}, %", cell, rank=3 - i) for i, (head, cell) in enumerate(cells))]
+    names = {f"{load}: alone, %": "alone", f"{load}: in all, %": "in_all"}
+    names |= {"above: alone, %": "above_alone", "above: in all, %": "above_in_all"}
+    return [LINE, *(estimated(head, name, 3 - i, ends=(0.0, 1.0)) for i, (head, name) in enumerate(names.items()))]
 
 
 def _notes(found: Lines) -> Iterator[str]:
@@ -314,15 +296,12 @@ def _tornado(found: Lines, accepted: float) -> Panel:
         drawing.legend_above(ax, handles, [*legend, *(["exact"] if halves else [])])
         ax.set_xlabel(f"share of the joints above {found.limit}")
 
-    return Panel(
-        f"lines-{found.facts['load']}",
+    title, told = (
         f"Share of the joints with {found.event}, if one line is changed",
         f"As drawn {text.percent(drawn)}. {told}",
-        draw,
-        (drawing.WIDTH, 0.34 * (len(labels) + 2.2) + drawing.BOTTOM + top),
-        left,
-        top,
     )
+    size = drawing.WIDTH, 0.34 * (len(labels) + 2.2) + drawing.BOTTOM + top
+    return Panel(f"lines-{found.facts['load']}", title, told, draw, size, left, top)
 
 
 def _curves(found: Lines, accepted: float) -> Iterator[Panel]:
@@ -365,14 +344,9 @@ def _curves(found: Lines, accepted: float) -> Iterator[Panel]:
         line: ", ".join(f"{row['factor']:.3g} {text.percent(row['share'])}" for row in rows)
         for line, rows in by_line.items()
     }
-    yield Panel(
-        f"widths-{facts['load']}",
-        "The share against the width of each line",
-        "; ".join(f"{line}: {own}" for line, own in told.items()),
-        draw,
-        (drawing.WIDTH, 3.4 + (room := drawing.legend_room(labels))),
-        top=room,
-    )
+    title, words = "The share against the width of each line", "; ".join(f"{line}: {own}" for line, own in told.items())
+    size = drawing.WIDTH, 3.4 + (room := drawing.legend_room(labels))
+    yield Panel(f"widths-{facts['load']}", title, words, draw, size, top=room)
 
 
 def _floor(found: Lines, accepted: float) -> float:

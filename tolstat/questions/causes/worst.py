@@ -104,13 +104,17 @@ def worst_on_page(view: View, asked: Asked) -> Answer:
     if view.method == "sweep" or not view.count(*VALID) or not view.leading:
         raise NotApplicable
     rows = [row for load in view.leading for row in joint_rows(view, load, ON_PAGE)]
-    panels = _panels(view, rows, asked.replay) if asked.replay and len(view.points) == 1 else []
+    followed = [load for load in view.leading if load in CHANNELS and asked.replay and len(view.points) == 1]
+    spreads: dict[str, tuple[FloatArray, FloatArray]] = {}
+    with suppress(TolstatError):  # which `angles` notes
+        spreads = angles.spreads(view, followed, asked.replay) if followed else {}
+    panels = [_panel(view, [row for row in rows if row["load"] == load], spreads.get(load)) for load in followed]
     columns = [
         Column("load", lambda row: str(row["load"])),
         ROW,
         Column("largest", lambda row: text.value(row["value"], row["unit"])),
         *WHERE,
-        Column("largest errors, in standard deviations", _errors_on_page, words=True),
+        Column("largest errors, in standard deviations", _errors, words=True),
     ]
     at = " --point POINT" if len(view.points) > 1 else ""
     command = f"tolstat replay {quote(view.path.name)} --row ROW{at} --out trace.csv"
@@ -218,17 +222,8 @@ def _error(row: Row, place: int) -> str:
     return f"{errors[place][0]} {errors[place][1]:+.2f}" if place < len(errors) else "-"
 
 
-def _errors_on_page(row: Row) -> str:
+def _errors(row: Row) -> str:
     return ",  ".join(f"{name} {z:+.1f} σ" for name, z in largest_errors(row)[:ERRORS_ON_PAGE])
-
-
-def _panels(view: View, rows: Rows, joints: int) -> list[Panel]:
-    """Loads of the worst joints over the revolution, with those of all joints where they are known."""
-    followed = [load for load in view.leading if load in CHANNELS]
-    spreads: dict[str, tuple[FloatArray, FloatArray]] = {}
-    with suppress(TolstatError):  # which `angles` notes
-        spreads = angles.spreads(view, followed, joints)
-    return [_panel(view, [row for row in rows if row["load"] == load], spreads.get(load)) for load in followed]
 
 
 def _panel(view: View, rows: Rows, spread: tuple[FloatArray, FloatArray] | None) -> Panel:

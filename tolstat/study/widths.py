@@ -200,7 +200,7 @@ def after(study: Study, line: Line, step: str) -> Study:
     fit = study.fit._replace(entry=study.fit.entry.model_copy(update={"code": step}))
     diameters = {f"contact.{key}": units.to_si(value, "m") for key, value in fit.diameters.items()}
     # the joint file need not be there any more: the joint in hand has all that it gave
-    return applied(load(study.path, text=text, joint=varied(study.joint, diameters)), {})
+    return applied(load(study.path, study.sampling.n, text, varied(study.joint, diameters)), {})
 
 
 def changed(study: Study, line: Line, step: str) -> dict[str, Distribution]:

@@ -10,7 +10,7 @@ the same scores as those of the study.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -113,13 +113,13 @@ def features(study: Study) -> list[Line]:
     return [
         Line(label, names)
         for pin, hole, label in pairs
-        if (names := tuple(n for n in _names(study) if n.partition(".")[0] in (pin, hole)))
+        if (names := tuple(n for n in _drawn(study) if n.partition(".")[0] in (pin, hole)))
     ]
 
 
 def errors(study: Study) -> list[Line]:
     """Each quantity that the study draws, by itself."""
-    return [Line(name, (name,)) for name in _names(study)]
+    return [Line(name, (name,)) for name in _drawn(study)]
 
 
 def named(study: Study, texts: Sequence[str]) -> list[Line]:
@@ -137,7 +137,7 @@ def named(study: Study, texts: Sequence[str]) -> list[Line]:
     InputError
         With every fault of the texts.
     """
-    found, faults, known = [], list[Fault](), _names(study)
+    found, faults, known = [], list[Fault](), list(_drawn(study))
     for text in texts:
         label, equals, patterns = (part.strip() for part in text.partition("="))
         names: dict[str, None] = {}
@@ -215,20 +215,21 @@ def changed(study: Study, line: Line, step: str) -> dict[str, Distribution]:
     step : str
         One of `STEPS`.
     """
-    every = {name: (entry, site, model) for entry, name, site, model in _drawn(study)}
-    found: dict[str, Distribution] = {}
-    for name in line.names:
-        entry, site, model = every[name]
+    drawn, found = _drawn(study), dict[str, Distribution]()
+    for name, factor in factors(study, line, step).items():
+        _, site, model = drawn[name]
+        band = model.band(site) if isinstance(model, SingleEntry) else None
         base = study.tolerances[name]
-        found[name] = Rescaled(base, _middle(name, site, model, base), _width(entry, site, step)[0])
+        middle = 0.0 if is_zone(name) else base.moments.mean if band is None else 0.5 * (band[0] + band[1])
+        found[name] = Rescaled(base, middle, factor)
     return found
 
 
 def factors(study: Study, line: Line, step: str) -> dict[str, float]:
     """How many times as wide each quantity of a line is after one of its `steps`."""
     if step in STEPS:
-        drawn = {name: (entry, site) for entry, name, site, _ in _drawn(study)}
-        return {name: _width(*drawn[name], step)[0] for name in line.names}
+        drawn = _drawn(study)
+        return {name: _width(*drawn[name][:2], step)[0] for name in line.names}
     assert study.fit is not None
     pairs = zip(other_fits(study.fit)[step], study.fit.entry.zones, strict=True)
     hole, pin = (new.half / old.half for new, old in pairs)
@@ -253,22 +254,20 @@ def words(study: Study, line: Line, step: str) -> str:
         old, new = study.fit.entry.zones, other_fits(study.fit)[step]
         looser = 0.25 * (new.least + new.largest - old.least - old.largest)  # of the radius, half of each middle
         return f"mean radial clearance {looser:+.3g} µm".replace("-", "−")
-    return ", ".join(
-        dict.fromkeys(_width(entry, site, step)[1] for entry, name, site, _ in _drawn(study) if name in line.names)
-    )
+    drawn = _drawn(study)
+    return ", ".join(dict.fromkeys(_width(*drawn[name][:2], step)[1] for name in line.names))
 
 
 def size(study: Study, line: Line) -> str:
     """Tolerance of a line, ``"±0.5 deg"``, or code of its fit; empty if its quantities have several."""
     if study.fit is not None and line.label == _fit_label(study):
         return study.fit.entry.code
-    found = set()
-    for entry, name, site, model in _drawn(study):
-        if name in line.names:
-            if entry.keys["distribution"] not in scaling.SCALED:
-                return ""
-            size = units.shown(scaling.width(entry.keys, site), site.unit)
-            found.add(scaling.marked(scaling.mark(model), size))
+    found, drawn = set(), _drawn(study)
+    for entry, site, model in map(drawn.__getitem__, line.names):
+        if entry.keys["distribution"] not in scaling.SCALED:
+            return ""
+        size = units.shown(scaling.width(entry.keys, site), site.unit)
+        found.add(scaling.marked(scaling.mark(model), size))
     return found.pop() if len(found) == 1 else ""
 
 
@@ -283,14 +282,6 @@ def _width(entry: Toleranced, site: Site, step: str) -> tuple[float, str]:
         if new != old:
             return new / old, f"class {other}"
     return FACTORS[step], f"× {FACTORS[step]:g}" if side else step
-
-
-def _middle(name: str, site: Site, model: ToleranceEntry, distribution: Distribution) -> float:
-    """Value that a quantity is narrowed about."""
-    if is_zone(name):
-        return 0.0
-    band = model.band(site) if isinstance(model, SingleEntry) else None
-    return distribution.moments.mean if band is None else 0.5 * (band[0] + band[1])
 
 
 def _fit_label(study: Study) -> str:
@@ -309,13 +300,12 @@ def _free(study: Study, entry: Toleranced) -> bool:
     return not any(site.shared or study.has_bonus(site.name) for one in together for site, _ in one.models)
 
 
-def _drawn(study: Study) -> Iterator[tuple[Toleranced, str, Site, ToleranceEntry]]:
-    for entry in study.entries:
-        if _free(study, entry):
-            for site, model in entry.models:
-                for name in model.quantities(site):
-                    yield entry, name, site, model
-
-
-def _names(study: Study) -> list[str]:
-    return [name for _, name, _, _ in _drawn(study)]
+def _drawn(study: Study) -> dict[str, tuple[Toleranced, Site, ToleranceEntry]]:
+    """Entry, place and model of each quantity of the entries that can be changed, by its name."""
+    return {
+        name: (entry, site, model)
+        for entry in study.entries
+        if _free(study, entry)
+        for site, model in entry.models
+        for name in model.quantities(site)
+    }

@@ -50,10 +50,12 @@ CURVES = 4
 """Number of lines whose curve has a colour; the others are grey."""
 _ACCEPTED: dict[str, Any] = {"color": style.COLOURS[2], "lw": 1.4, "ls": (0.0, (6.0, 2.0))}
 """Style of the accepted share."""
-_BARS = ((COARSER, style.COLOURS[1], 0.3, -0.1), (HALF, style.COLOURS[0], 0.56, 0.1))
-"""Bars of the tornado: step, colour, height, and how far above the middle of the bar its whisker is."""
-_FIT = style.COLOURS[3]
-"""Colour of another fit."""
+_BARS = {
+    COARSER: ("one step coarser", style.COLOURS[1], 0.3, -0.1),
+    HALF: ("half as wide", style.COLOURS[0], 0.56, 0.1),
+    "share": ("another fit", style.COLOURS[3], 0.4, 0.0),
+}
+"""Bars of the tornado: label, colour, height, and how far above the middle of the bar its whisker is."""
 _EXACT: dict[str, Any] = {"ls": "", "mfc": "white", "mec": style.INK, "ms": 5.5}
 """Style of the mark of an exact line."""
 
@@ -256,10 +258,10 @@ def _tornado(found: Lines, accepted: float) -> Panel:
     told = ". ".join(words for words in (f"Half as wide: {halves}" if halves else "", others) if words)
     labels = [f"{row['line']}\n{row['size']}" if row["size"] else str(row["line"]) for row in found.by_line]
     labels += [f"{row['step']}\nin place of {row['size']}" for row in found.other_fits]
-    legend = {"half as wide": style.COLOURS[0], "one step coarser": style.COLOURS[1]} if halves else {}
-    legend |= {"another fit": _FIT} if others else {}
+    bars = [*([HALF, COARSER] if halves else []), *(["share"] if others else [])]
+    keys = [*(_BARS[name][0] for name in bars), *(["exact"] if halves else [])]
     left = drawing.rows_left([part for label in labels for part in label.split("\n")])
-    top = drawing.legend_room([*legend, *(["exact"] if halves else [])], left)
+    top = drawing.legend_room(keys, left)
     floor, drawn, lower, upper = _floor(found, accepted), *(found.facts[name] for name in ("share", "lower", "upper"))
 
     def whisker(ax: Axes, y: float, low: float, high: float) -> None:
@@ -275,25 +277,22 @@ def _tornado(found: Lines, accepted: float) -> Panel:
         ax.set_xlim(floor, min(1.0, 1.4 * float(np.nanmax([upper, *(row["share_upper"] for row in found.rows)]))))
         ax.axvspan(max(lower, floor), upper, color=drawing.GREY, alpha=0.3, lw=0)
         ax.axvline(drawn, color=style.INK, lw=1.2)
-        for place, row in enumerate(found.by_line):
-            for step, colour, height, above in _BARS:
-                if step in row:
-                    ax.barh(place, max(row[step], floor) - drawn, height, left=drawn, color=colour, zorder=2)
-                    whisker(ax, place - above, row[f"{step}_lower"], row[f"{step}_upper"])
+        for place, row in enumerate([*found.by_line, *found.other_fits]):
+            for name, (_, colour, height, above) in _BARS.items():
+                if name in row:
+                    ax.barh(place, max(row[name], floor) - drawn, height, left=drawn, color=colour, zorder=2)
+                    whisker(ax, place - above, row[f"{name}_lower"], row[f"{name}_upper"])
             if EXACT in row:
                 marker = "o" if row[EXACT] >= floor else markers.CARETLEFT
                 ax.plot(max(row[EXACT], floor), place, marker=marker, zorder=4, clip_on=False, **_EXACT)
-        for place, row in enumerate(found.other_fits, start=len(found.by_line)):
-            ax.barh(place, max(row["share"], floor) - drawn, 0.4, left=drawn, color=_FIT, zorder=2)
-            whisker(ax, place, row["share_lower"], row["share_upper"])
         words: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 8.0, "backgroundcolor": "white"}
         ax.text(drawn, -0.9, f"as drawn {text.percent(drawn)}", **words)
         if accepted > 0.0:
             ax.axvline(accepted, **_ACCEPTED)
             ax.text(accepted, len(labels) + 0.1, f"accepted {text.percent(accepted)}", **words)
-        handles: list[Artist] = [patches.Patch(color=colour) for colour in legend.values()]
+        handles: list[Artist] = [patches.Patch(color=_BARS[name][1]) for name in bars]
         handles += ax.plot([], [], marker="o", **_EXACT) if halves else []
-        drawing.legend_above(ax, handles, [*legend, *(["exact"] if halves else [])])
+        drawing.legend_above(ax, handles, keys)
         ax.set_xlabel(f"share of the joints above {found.limit}")
 
     title, told = (

@@ -60,7 +60,7 @@ def examples(tmp_path_factory):
     fewer = campaign(folder, TWO.replace("n = 12000", "n = 500"), "fewer")
     known = made(folder, TEXT.replace("3000", "600"))
     return {
-        **{name: {"path": two} for name in ("questions.allocate.answer", "questions.reweight", "report.summary")},
+        **{name: {"path": two} for name in ("questions.allocate", "questions.reweight", "report.summary")},
         "questions.compare": {"path": two, "other": fewer},
         "questions.causes.errors": {"path": known},
     }
@@ -69,7 +69,7 @@ def examples(tmp_path_factory):
 @pytest.mark.parametrize(
     "module",
     [
-        "questions.allocate.answer",
+        "questions.allocate",
         "questions.reweight",
         "questions.compare",
         "questions.causes.errors",

@@ -195,8 +195,9 @@ def test_too_few_points_and_options_that_go_with_a_design_are_refused(tmp_path):
     for arguments, text in (
         ((path,), "run 50 points or more"),
         ((path, "--points", 100), "add --run, or give a study (TOML)"),
-        ((path, "--run", "--points", 100), "are about the design of a study"),
-        ((path.with_suffix(".toml"), "--each", "error"), "say what --run simulates into FILE"),
+        ((path, "--run", "--points", 100), "is about the design of a study"),
+        ((path.with_suffix(".toml"), "--each", "error"), "is about what --run simulates into FILE"),
+        ((path.with_suffix(".toml"), "--budget", "1 min", "--most", 300), "--budget, --most: are about what --run"),
     ):
         done = CliRunner().invoke(cli.app, ["causes", *map(str, arguments)])
         assert done.exit_code == 2, text

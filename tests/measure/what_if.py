@@ -27,7 +27,7 @@ from tolstat.campaign import what_if as sets
 from tolstat.common.loads import ANY_LIMIT, LOADS
 from tolstat.common.tables import VALID
 from tolstat.joint import perturb
-from tolstat.questions.causes.lines_shares import evaluate
+from tolstat.questions.causes.shares import evaluate
 from tolstat.solver.compilation import warm_up
 from tolstat.solver.simulation import simulate_rows
 from tolstat.study import widths
@@ -59,8 +59,8 @@ def simulate(path: Path, job: Job) -> NDArray[np.int64]:
     study, options, limits = _campaign(path)
     fresh = replace(study, sampling=study.sampling.model_copy(update={"seed": job.seed}))
     line = next(one for one in widths.lines(study) if one.label == job.line)
-    errors = sets.narrowed(fresh, line, job.step, job.numbers).draw(job.numbers)
-    results = simulate_rows(perturb(study.joint, study.operation, errors), options).results
+    change = sets.stepped(fresh, line, job.step, job.numbers)
+    results = simulate_rows(perturb(change.study.joint, study.operation, change.draw(job.numbers)), options).results
     valid = np.isin(results["status"], VALID)
     above = np.column_stack([LOADS[name].of(results) > level for name, level in limits.items()]) & valid[:, None]
     return np.array([*above.sum(axis=0), above.any(axis=1).sum(), (~valid).sum()])
@@ -69,7 +69,7 @@ def simulate(path: Path, job: Job) -> NDArray[np.int64]:
 def count(path: Path, joints: int, kept: Path) -> dict[str, list[int]]:
     """Counts of each change, ``line|step``: those of `simulate`, then the number of joints."""
     study, _, limits = _campaign(path)
-    changes = [(line.label, step) for line in widths.lines(study) for step in widths.STEPS]
+    changes = [(line.label, step) for line in widths.lines(study) for step in widths.steps(study, line)]
     found: dict[str, list[int]] = json.loads(kept.read_text()) if kept.exists() else {}
     found = {f"{line}|{step}": found.get(f"{line}|{step}", [0] * (len(limits) + 3)) for line, step in changes}
     warm_up()

@@ -16,9 +16,8 @@ from tolstat.common.load_kinds import BUSHINGS
 from tolstat.common.loads import LOADS, SHOWN_LOADS
 from tolstat.display.asked import Asked
 from tolstat.questions.causes import angles
-from tolstat.questions.causes.angles import angles_on_page
+from tolstat.questions.causes.angles import against_angle, angles_on_page
 from tolstat.questions.causes.errors import causes_on_page
-from tolstat.questions.causes.revolution import against_angle
 from tolstat.questions.causes.worst import drawn, joint_rows, worst_on_page
 from tolstat.store import ResultFile, revolutions
 from tolstat.store.revolutions import Revolutions

@@ -117,7 +117,7 @@ def test_shares_in_all_are_offered_until_they_are_simulated(path, monkeypatch):
     assert not any("--run" in text for text in after)
 
 
-def refuses(view, load):
+def refuses(view, load, costs):
     raise NotApplicable("no joints with other widths")
 
 

@@ -27,6 +27,7 @@ from tolstat.campaign.pool import kept_workers
 from tolstat.campaign.work import Work
 from tolstat.cli import app
 from tolstat.common.errors import InputError, NotApplicable, StoreError
+from tolstat.common.loads import LOADS
 from tolstat.common.tables import RESULT, Simulation, Status
 from tolstat.display import text
 from tolstat.display.answer import Sentence
@@ -34,14 +35,15 @@ from tolstat.display.asked import Asked
 from tolstat.display.progress import Display
 from tolstat.joint import perturb
 from tolstat.questions.causes import lines as question
-from tolstat.questions.causes import lines_figure
-from tolstat.questions.causes import lines_run as runner
-from tolstat.questions.causes import lines_shares as shares
+from tolstat.questions.causes import shares
+from tolstat.questions.causes import simulation as runner
 from tolstat.report.headline import headline
 from tolstat.solver import stationary
 from tolstat.solver.simulation import simulate_rows
 from tolstat.store import ResultFile, Writer, what_if
 from tolstat.study import widths
+from tolstat.study.starter import joint_text
+from tolstat.study.tolerances import fits, iso286
 from tolstat.study.widths import COARSER, EXACT, FINER, HALF, Line
 
 TEXT = (
@@ -90,13 +92,13 @@ def quick(monkeypatch):
     monkeypatch.setattr(runner, "MOST", 1024)
 
 
-def made(folder, text=TEXT):
+def made(folder, text=TEXT, solver=stand_in):
     """Campaign of the stand-in."""
     plan = loaded(folder, text)
     errors = sampling.draw(plan)
     file = folder / "made.h5"
     with Writer.create(file, plan, [errors]) as store:
-        store.write(np.arange(plan.rows), stand_in(perturb(plan.joint, plan.operation, errors), None))
+        store.write(np.arange(plan.rows), solver(perturb(plan.joint, plan.operation, errors), None))
     return file
 
 
@@ -140,7 +142,7 @@ def test_other_lines_keep_their_errors_to_the_last_bit(tmp_path):
     plan = loaded(tmp_path)
     base = sampling.draw(plan)
     for step in widths.STEPS:
-        change = sets.narrowed(plan, line(plan, "pin*.tilt_t"), step, range(N))
+        change = sets.stepped(plan, line(plan, "pin*.tilt_t"), step, range(N))
         errors = change.draw(range(N))
         for name in errors.dtype.names:
             same = errors[name].tobytes() == base[name][plan.first_sample :].tobytes()
@@ -151,7 +153,7 @@ def test_other_lines_keep_their_errors_to_the_last_bit(tmp_path):
 def test_a_band_is_narrowed_about_its_middle(tmp_path, step, factor):
     plan = loaded(tmp_path)
     base = sampling.draw(plan)["hole2.diameter"][plan.first_sample :]
-    errors = sets.narrowed(plan, line(plan, "hole*.diameter"), step, range(N)).draw(range(N))
+    errors = sets.stepped(plan, line(plan, "hole*.diameter"), step, range(N)).draw(range(N))
     np.testing.assert_allclose(errors["hole2.diameter"], 15e-6 + factor * (base - 15e-6), rtol=0, atol=1e-18)
 
 
@@ -164,22 +166,154 @@ def test_iso_classes_are_followed_where_there_are_any(tmp_path):
     assert widths.words(plan, line(plan, "pin*.tilt_t"), COARSER) == "× 1.6"
 
 
-def test_a_finer_fit_keeps_the_limit_at_the_basic_size(tmp_path):
-    fit = 'fit = { basic = "76 mm", code = "H7/f7", distribution = "uniform" }'
-    holes = '"hole*.diameter" = { lower = "0 mm", upper = "0.030 mm", distribution = "uniform" }'
-    plan = loaded(tmp_path, TEXT.replace(holes, fit))
-    hole, pin = line(plan, "hole*.diameter"), line(plan, "pin*.diameter")
-    assert [widths.words(plan, own, FINER) for own in (hole, pin)] == [
-        "H6 (mean clearance −2.75 µm)",  # radial: half of 9.5 - 15 um
-        "f6 (mean clearance −2.75 µm)",
+FIT = 'fit = { basic = "76 mm", code = "F8/h6", distribution = "normal", cpk = 1.0 }'
+HOLES = '"hole*.diameter" = { lower = "0 mm", upper = "0.030 mm", distribution = "uniform" }'
+FITTED = TEXT.replace(HOLES, FIT)
+TABLES = {code: FITTED.replace("F8/h6", code) for code in ("E8/h6", "G8/h6", "F7/h6", "F9/h6")}
+
+
+@pytest.mark.parametrize(
+    ("code", "others"),
+    [
+        ("F8/h6", ["E8/h6", "G8/h6", "F7/h6", "F9/h6"]),
+        ("H7/f7", ["H6/f7", "H8/f7", "H7/e7", "H7/g7", "H7/f6", "H7/f8"]),  # system of the basic hole
+        ("C18/h6", ["D18/h6", "C17/h6"]),  # edges of the tables
+        ("H7/h6", ["H6/h6", "H8/h6", "H7/g6", "H7/h5", "H7/h7"]),  # with H7/js6 pins may be larger than holes
+        ("H7/c7", ["H6/c7", "H8/c7", "H7/d7", "H7/c6", "H7/c8"]),
+        ("JS7/g6", None),
+    ],
+)
+def test_other_fits_are_the_next_in_the_tables_without_interference(tmp_path, code, others):
+    if others is None:
+        with pytest.raises(InputError, match="transition fit"):
+            loaded(tmp_path, FITTED.replace("F8/h6", code))
+        return
+    plan = loaded(tmp_path, FITTED.replace("F8/h6", code))
+    assert widths.steps(plan, line(plan, f"fit {code}")) == tuple(others)
+    assert [own.label for own in widths.lines(plan)] == ["pin*.tilt_t", "pin*.offset_z", f"fit {code}"]
+
+
+def test_no_other_fit_interferes_at_any_size(tmp_path):
+    drawn = [f"{hole}7/{shaft}7" for hole in ("C", "E", "F", "G", "H", "JS") for shaft in iso286.CLEARANCE]
+    for size in (2.0, 25.0, 76.0, 450.0):
+        for code in drawn:
+            zones = iso286.zones(iso286.parse(code), size)
+            if zones.least < 0.0:
+                continue
+            scatter = {"basic": f"{size} mm", "code": code, "distribution": "uniform"}
+            for other in widths.other_fits(fits.read({"fit": scatter}, "study")):
+                assert iso286.zones(iso286.parse(other), size).least >= 0.0
+
+
+@pytest.mark.parametrize("contact", ["", 'contact.law = "uniform"', 'contact.law = "point"'])
+@pytest.mark.parametrize("code", TABLES)
+def test_another_fit_gives_the_joints_of_the_study_with_that_fit(tmp_path, code, contact):
+    """Errors and parameters are the same bytes as those of a study in which the fit is written by hand."""
+    text = FITTED.replace('"cirelli2021"\n', f'"cirelli2021"\n{contact}\n', 1)
+    plan = loaded(tmp_path, text)
+    change = sets.stepped(plan, line(plan, "fit F8/h6"), code, range(N))
+    other = study.load(tmp_path / "other.toml", text=text.replace("F8/h6", code))
+    errors, found = sampling.draw(other)[other.first_sample :], change.draw(range(N))
+    assert found.tobytes() == errors.tobytes()
+    params = [
+        perturb(joint, plan.operation, own) for joint, own in ((change.study.joint, found), (other.joint, errors))
     ]
-    assert widths.words(plan, pin, COARSER) == "f8 (mean clearance +4 µm)"
-    ends = np.array([0.0, 1.0])
-    middle = 15e-6  # of H7, which the nominal diameter is
-    found = widths.changed(plan, hole, FINER)["hole1.diameter"].ppf(ends) + middle
-    np.testing.assert_allclose(found, [0.0, 19e-6], atol=1e-12)  # ISO 286-1: H6 at 76 mm is 0 to +19 um
-    found = widths.changed(plan, pin, COARSER)["pin1.diameter"].ppf(ends) - 45e-6
-    np.testing.assert_allclose(found, [-76e-6, -30e-6], atol=1e-12)  # f8: -30 to -76 um
+    assert params[0].tobytes() == params[1].tobytes()
+    base = sampling.draw(plan)[plan.first_sample :]
+    assert all(found[name].tobytes() == base[name].tobytes() for name in found.dtype.names if "diameter" not in name)
+
+
+@pytest.mark.slow
+def test_loads_with_another_fit_are_those_of_the_study_with_that_fit(tmp_path, monkeypatch):
+    """Kept in the file of the campaign, whose joint file is not there any more; simulated, not stood in for."""
+    monkeypatch.setattr(runner, "FIRST", 4)
+    monkeypatch.setattr(runner, "LEAST", 4)
+    own = tmp_path / "own.toml"
+    own.write_text(joint_text(), encoding="utf-8")
+    text = FITTED.replace('"cirelli2021"', '"./own.toml"').replace("n = 400", "n = 4")
+    path = made(tmp_path, text)
+    other = study.load(tmp_path / "other.toml", text=text.replace("F8/h6", "E8/h6"))
+    own.unlink()
+    runner.simulate(path, Work(workers=1), budget=600.0, most=4)
+    with ResultFile.open(path) as store:
+        found = next(one for one in what_if.read(store).values() if one.about.get("step") == "E8/h6")
+    errors = sampling.draw(other)[other.first_sample :]
+    results = simulate_rows(perturb(other.joint, other.operation, errors), other.solver.options()).results
+    for name in found.names:
+        assert found.valid([name]).tobytes() == LOADS[name].of(results).tobytes()
+
+
+def by_clearance(params, options, histories="none", n_harmonics=0):
+    """Loads of the stand-in that fall with the clearance: 40 N less for 10 um."""
+    found = stand_in(params, options)
+    found.results["F_max"] -= (4e6 * (params["clearance"].mean(axis=1) - 35e-6))[:, None]
+    stationary.fill_intervals(found.results)
+    return found
+
+
+@pytest.mark.usefixtures("quick")
+def test_the_line_to_change_may_be_a_fit(tmp_path, monkeypatch):
+    monkeypatch.setattr(blocks, "simulate_rows", by_clearance)
+    path = made(tmp_path, FITTED, by_clearance)
+    simulated(path, most=512)
+    prices = tmp_path / "costs.toml"
+    prices.write_text('"hole*.diameter" = { cost = 3.0 }\n"pin*.diameter" = { cost = 1.0 }\n', encoding="utf-8")
+    with ResultFile.open(path) as store:
+        view = store.view()
+        found, answer = shares.evaluate(view, "cross1.F"), tolstat.lines(view, "cross1.F", costs=prices)
+        verdict = headline(view, 0.01).words
+        page = question.lines_on_page(view, Asked(path, accepted=0.01))
+        causes = tolstat.causes(view, costs=prices)
+    rows = {row["step"]: row for row in answer.tables["other_fits"].rows}
+    assert set(rows) == set(TABLES)
+    other = loaded(tmp_path, TABLES["E8/h6"])
+    joints = sampling.draw(study.load(other.path, n=rows["E8/h6"]["n"]))[other.first_sample :]
+    expected = by_clearance(perturb(other.joint, other.operation, joints), None).results["F_max"][:, 0] > 700.0
+    assert rows["E8/h6"]["share"] == pytest.approx(expected.mean(), abs=1e-12)
+    assert rows["E8/h6"]["change_upper"] < 0.0 < rows["G8/h6"]["change_lower"]
+    assert (rows["E8/h6"]["size"], rows["E8/h6"]["words"]) == ("F8/h6", "mean radial clearance +15 µm")
+    share = f"{text.percent(rows['E8/h6']['share'])} ({100 * rows['E8/h6']['share_lower']:.3g} to "
+    assert question.sentence(found).startswith(f"Write E8/h6 in place of F8/h6 and {share}")
+    assert question.sentence(found).endswith(" exceed the limit")
+    short = question.sentence(found, 0.5 * rows["E8/h6"]["share"])
+    assert short.startswith(("Another fit is not enough: E8/h6 in place", "No single line is enough: E8/h6 in place"))
+    assert "E8/h6 in place of F8/h6" in verdict
+    assert "E8/h6 in place of F8/h6" in lead(page)
+    without = found._replace(rows=[{**row, "change_upper": abs(row["change_upper"])} for row in found.rows])
+    assert question.sentence(without) == ""
+    # 4 holes of 3 in IT 8 and 4 pins of 1: a grade coarser, 74 in place of 46 um, saves 12 (1 - 46 / 74)
+    assert rows["F9/h6"]["cost"] - rows["F9/h6"]["extra_cost"] == pytest.approx(16.0)
+    assert rows["F9/h6"]["cost"] == pytest.approx(4.0 + 12.0 * 46.0 / 74.0)
+    assert (rows["E8/h6"]["cost"], rows["E8/h6"]["extra_cost"]) == (16.0, 0.0)
+    widths_of = answer.tables["lines"].rows
+    assert {row["line"] for row in widths_of} == {"pin*.tilt_t", "pin*.offset_z", "fit F8/h6"}
+    assert all(np.isnan(row["cost"]) for row in widths_of if row["line"] != "fit F8/h6")
+    assert "other_fits" in causes.tables
+    assert [row["line"] for row in answer.tables["lines"].seen] == ["pin*.tilt_t", "pin*.offset_z"]
+    ax = Figure().subplots()
+    question._tornado(found, 0.01).draw(ax)
+    assert "E8/h6\nin place of F8/h6" in [label.get_text() for label in ax.get_yticklabels()]
+    files = answer.write(tmp_path / "made_lines")
+    assert {"made_lines_lines.csv", "made_lines_other_fits.csv"} <= {file.name for file in files}
+
+
+@pytest.mark.usefixtures("quick")
+def test_a_study_with_a_fit_only_has_no_line_of_a_width(tmp_path):
+    head, rest = FITTED.split("[tolerances]\n")
+    path = made(tmp_path, f"{head}[tolerances]\n{FIT}\n\n[sampling]{rest.split('[sampling]')[1]}")
+    simulated(path)
+    answer = evaluated(path)
+    assert {row["line"] for row in answer.tables["lines"].rows} == {"fit F8/h6"}
+    assert "No line that is made half as wide, and no other fit, surely lowers it." in lead(answer)
+    assert on_page(path).blocks()
+
+
+def test_single_diameters_of_a_fit_change_their_width(tmp_path):
+    plan = loaded(tmp_path, FITTED)
+    single = next(own for own in widths.errors(plan) if own.label == "hole2.diameter")
+    assert widths.steps(plan, single) == widths.STEPS
+    ends = widths.changed(plan, single, FINER)["hole2.diameter"].ppf(norm.cdf([-3.0, 3.0]))
+    np.testing.assert_allclose(ends, [-0.63 * 23e-6, 0.63 * 23e-6])  # F8 at 76 mm: +30 to +76 um
 
 
 def test_density_of_a_rescaled_distribution(tmp_path):
@@ -529,7 +663,7 @@ def test_whiskers_and_bands_are_the_intervals_of_the_table(path):
         found = shares.evaluate(store.view(), "cross1.F")
     table = pd.DataFrame(found.by_line)
     ax = Figure().subplots()
-    lines_figure.tornado(found, 0.01).draw(ax)
+    question._tornado(found, 0.01).draw(ax)
     half = table.loc[table["half"] > 0.01].iloc[0]
     drawn = [line.get_xdata() for line in ax.lines if len(line.get_xdata()) == 2]
     assert any(np.allclose(x, [half["half_lower"], half["half_upper"]]) for x in drawn)

@@ -38,7 +38,7 @@ PAIRS = [
     (distributions.Beta(1.5, 1.0, -1.0, 3.0), stats.beta(1.5, 1.0, -1.0, 4.0)),
     (Rayleigh(2.0), stats.rayleigh(scale=2.0)),
     (Disc(3.0), stats.powerlaw(2.0, scale=3.0)),
-    (widths.Rescaled(distributions.Normal(1.0, 2.0), 0.5, 0.25, 0.1), stats.norm(0.725, 0.5)),
+    (widths.Rescaled(distributions.Normal(1.0, 2.0), 0.5, 0.25), stats.norm(0.625, 0.5)),
 ]
 
 

@@ -26,8 +26,8 @@ from tolstat.study import Study, axes, widths
 from tolstat.study.points import at
 from tolstat.study.widths import Line
 
-WIDTH, EXCHANGE, AS_DRAWN = "width", "exchange", "as drawn"
-"""Kinds of sets: a line with another width; a line's errors from another joint; no change."""
+WIDTH, FIT, EXCHANGE, AS_DRAWN = "width", "fit", "exchange", "as drawn"
+"""Kinds of sets: a line with another width; another fit; a line's errors from another joint; no change."""
 BLOCK = 128
 """Number of joints that a worker takes at a time: enough to keep the lanes busy, and 0.2 s on the main job."""
 SLOW_S = 60.0
@@ -43,6 +43,8 @@ class Change(NamedTuple):
     ----------
     about : dict
         See `Altered.about`.
+    study : Study
+        The study as changed: its tolerances and its nominal joint.
     draw : callable
         Range of consecutive joints -> their errors, table ERROR.
     numbers : range
@@ -50,34 +52,39 @@ class Change(NamedTuple):
     """
 
     about: Mapping[str, Any]
+    study: Study
     draw: Callable[[range], NDArray[np.void]]
     numbers: range
 
 
-def narrowed(study: Study, line: Line, step: str, numbers: range) -> Change:
-    """A line with the width of a step (`widths.STEPS`); joint i is sample i of the campaign but for this line."""
-    other = widths.changed(study, line, step)
+def stepped(study: Study, line: Line, step: str, numbers: range) -> Change:
+    """A line after a step (`widths.steps`); joint i is sample i of the campaign but for this line."""
+    own = widths.after(study, line, step)
     about = {
         "kind": WIDTH,
         "label": line.label,
         "step": step,
         "words": widths.words(study, line, step),
         "seed": study.sampling.seed,
-        "tolerances": {name: own.describe() for name, own in other.items()},
+        "tolerances": {name: own.tolerances[name].describe() for name in line.names},
     }
-    return Change(about, partial(_draw, widths.applied(study, other)), numbers)
+    if step not in widths.STEPS and own.fit is not None:
+        about |= {"kind": FIT, "diameters": own.fit.diameters}
+    return Change(about, own, partial(_draw, own), numbers)
 
 
 def exchanged(study: Study, line: Line, numbers: range) -> Change:
     """Joint i is sample 2i of the campaign with the line's errors of sample 2i + 1."""
     about = {"kind": EXCHANGE, "label": line.label, "seed": study.sampling.seed, "names": list(line.names)}
-    return Change(about, partial(_exchange, widths.applied(study, {}), line), numbers)
+    own = widths.applied(study, {})
+    return Change(about, own, partial(_exchange, own, line), numbers)
 
 
 def as_drawn(study: Study, numbers: range) -> Change:
     """Further samples of the campaign, or samples at random of one that is not: nothing is changed."""
     about = {"kind": AS_DRAWN, "label": "no line", "seed": study.sampling.seed}
-    return Change(about, partial(_draw, widths.applied(study, {})), numbers)
+    own = widths.applied(study, {})
+    return Change(about, own, partial(_draw, own), numbers)
 
 
 class Asked(NamedTuple):
@@ -196,7 +203,7 @@ class _Table:
     def sets(self, held: Mapping[str, Altered]) -> dict[str, Altered]:
         """Sets that have grown: of each, the joints before the first that is not done, behind those held."""
         found, begin = {}, 0
-        for about, _, numbers in self.todo:
+        for about, _, _, numbers in self.todo:
             here = slice(begin, begin + len(numbers))
             begin = here.stop
             waiting = np.flatnonzero((self.status[here] == Status.PENDING).any(axis=1))
@@ -214,12 +221,12 @@ class _Table:
 
 def _blocks(study: Study, options: Options, todo: Sequence[Change], points: Sequence[str]) -> Iterator[Block]:
     operations, begin = {point: study.at(point).operation for point in points}, 0
-    for _, draw, numbers in todo:
+    for _, changed, draw, numbers in todo:
         for first in range(0, len(numbers), BLOCK):
             own = numbers[first : first + BLOCK]
             slots, errors = np.arange(begin + first, begin + first + len(own)), draw(own)
             for point, operation in operations.items():
-                yield Block(point, slots, perturb(study.joint, operation, errors), options)
+                yield Block(point, slots, perturb(changed.joint, operation, errors), options)
         begin += len(numbers)
 
 

@@ -101,7 +101,7 @@ QUESTIONS = (
     Question("accuracy", "", "Give the numerical error of the loads, from checks of joints.", "folded", counted=True),
     Question("time_above", "Read", "Estimate how much of a revolution loads are above levels."),
     Question("reweight", "Decide", "Estimate exceedances for changed tolerances."),
-    Question("allocate", "Decide", "Propose the cheapest tolerances that meet the targets.", file="allocate.answer"),
+    Question("allocate", "Decide", "Propose the cheapest tolerances that meet the targets."),
     Question("compare", "Decide", "Compare the exceedances and loads of two campaigns."),
     Question("rare", "Decide", "Estimate a rare exceedance by subset simulation.", file="rare.answer"),
 )

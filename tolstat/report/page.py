@@ -17,7 +17,7 @@ from tolstat.display.blocks import Facts, Listing, Page, Panels, Section, Text
 from tolstat.display.progress import silent
 from tolstat.display.text import sentence
 from tolstat.joint.mounting import in_words
-from tolstat.questions.causes import ahead
+from tolstat.questions.causes import worst
 from tolstat.questions.causes.lines import lines_on_page
 from tolstat.report import joint_values
 from tolstat.solver import fidelity
@@ -101,7 +101,7 @@ def compose(view: View, asked: Asked, full: bool = False) -> Page:
 
     What cannot be evaluated is left out, and a note in the first section says why.
     """
-    ahead.begin(view, asked)
+    worst.begin_replay(view, asked)
     from tolstat.report import verdict  # draws, and takes long to import: joints are being simulated
 
     asked.notes.extend(_notes(view))

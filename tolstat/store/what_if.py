@@ -35,8 +35,8 @@ class Altered(NamedTuple):
     Attributes
     ----------
     about : dict
-        The change, as JSON values: ``kind`` (``width``, ``exchange`` or ``as drawn``), ``label``, ``seed``, and what
-        determines the errors.
+        The change, as JSON values: ``kind`` (``width``, ``fit``, ``exchange`` or ``as drawn``), ``label``, ``seed``,
+        and what determines the errors.
     first : int
         Sample of the first joint; of an exchange, the number of the first pair.
     names : tuple of str

@@ -1,15 +1,16 @@
-"""Change the width of lines of the drawing: entries of ``[tolerances]``, and groups of what they draw.
+"""Change lines of the drawing: entries of ``[tolerances]``, and groups of what they draw.
 
 A distribution is narrowed or widened about the middle of its band, so its shape and Cpk stay: 0 to +30 um becomes +7.5
 to +22.5 um if it is half as wide, and exactly +15 um if it is exact. An entry without a band (a standard deviation,
-measured parts) is narrowed about its mean, a zone about the ideal axis. Random numbers belong to names, so the joints
-of a changed study have the same scores as those of the study.
+measured parts) is narrowed about its mean, a zone about the ideal axis. A fit gets another code in the text of the
+study, so that the nominal diameters change, too. Random numbers belong to names, so the joints of a changed study have
+the same scores as those of the study.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -18,16 +19,16 @@ import numpy as np
 from tolstat.common import units
 from tolstat.common.errors import Fault, InputError, gather
 from tolstat.common.strict import did_you_mean
-from tolstat.joint import HOLE_OF_PIN
-from tolstat.study import scaling, selection
+from tolstat.joint import HOLE_OF_PIN, varied
+from tolstat.study import rewriting, scaling, selection
 from tolstat.study.axes import is_zone
-from tolstat.study.study import Study
+from tolstat.study.study import Study, load
 from tolstat.study.tolerances import fits, iso286, iso2768
 from tolstat.study.tolerances.distributions import Array, Distribution
 from tolstat.study.tolerances.entry import SingleEntry, Site, Toleranced, ToleranceEntry
 
 HALF, EXACT, FINER, COARSER = STEPS = ("half", "exact", "finer", "coarser")
-"""Changes of a width: by one half, to zero, and by one class of ISO 286 or ISO 2768, finer or coarser."""
+"""Changes of a width: by one half, to zero, and by one class of ISO 2768, finer or coarser."""
 FACTORS = {HALF: 0.5, EXACT: 0.0, FINER: 0.63, COARSER: 1.6}
 """Factor of each step; of a class where the entry has none: neighbouring grades of ISO 286 differ by 10^(1/5)."""
 CLASSES = ("f", "m")
@@ -36,13 +37,13 @@ CLASSES = ("f", "m")
 
 @dataclass(frozen=True)
 class Rescaled(Distribution):
-    """Distribution made `factor` times as wide about `middle`, then moved by `shift`.
+    """Distribution made `factor` times as wide about `middle`.
 
     Attributes
     ----------
     every : Distribution
         Distribution as drawn.
-    middle, shift : float
+    middle : float
         SI.
     factor : float
         Zero for an exact value.
@@ -51,22 +52,21 @@ class Rescaled(Distribution):
     every: Distribution
     middle: float
     factor: float
-    shift: float = 0.0
 
     def ppf(self, u: Array) -> Array:
         """See `Distribution.ppf`."""
-        return self.middle + self.shift + self.factor * (self.every.ppf(u) - self.middle)
+        return self.middle + self.factor * (self.every.ppf(u) - self.middle)
 
     def cdf(self, x: Array) -> Array:
         """See `Distribution.cdf`."""
-        off = x - self.shift - self.middle
+        off = x - self.middle
         if self.factor == 0.0:
             return np.where(off >= 0.0, 1.0, 0.0)
         return self.every.cdf(self.middle + off / self.factor)
 
     def logpdf(self, x: Array) -> Array:
         """See `Distribution.logpdf`."""
-        off = x - self.shift - self.middle
+        off = x - self.middle
         if self.factor == 0.0:
             return np.where(off == 0.0, 0.0, -np.inf)
         return self.every.logpdf(self.middle + off / self.factor) - (0.0 if self.discrete else math.log(self.factor))
@@ -78,7 +78,7 @@ class Rescaled(Distribution):
 
     def describe(self) -> dict[str, Any]:
         """See `Distribution.describe`."""
-        own = {"middle": self.middle, "factor": self.factor, "shift": self.shift}
+        own = {"middle": self.middle, "factor": self.factor}
         return {"distribution": "rescaled", "every": self.every.describe(), **own}
 
 
@@ -97,26 +97,14 @@ class Line(NamedTuple):
     names: tuple[str, ...]
 
 
-class Width(NamedTuple):
-    """Width of one quantity after a step.
-
-    Attributes
-    ----------
-    factor, shift : float
-        As in `Rescaled`.
-    words : str
-        ``"half"``, ``"exact"``, ``"× 0.63"``, ``"class m"``,
-        ``"f8 (mean clearance +8 µm)"``: of a fit with the change of the mean radial clearance.
-    """
-
-    factor: float
-    shift: float
-    words: str
-
-
 def lines(study: Study) -> list[Line]:
-    """Entries of ``[tolerances]`` whose width can be changed, in their order."""
-    return [Line(entry.pattern, tuple(entry.quantities)) for entry in study.entries if _free(study, entry)]
+    """Entries of ``[tolerances]`` that can be changed, in their order; the diameters of a fit are one of them."""
+    found: dict[str, tuple[str, ...]] = {}
+    for entry in study.entries:
+        if _free(study, entry):
+            label = _fit_label(study) if _is_of_fit(study, entry) else entry.pattern
+            found[label] = (*found.get(label, ()), *entry.quantities)
+    return [Line(label, names) for label, names in found.items()]
 
 
 def features(study: Study) -> list[Line]:
@@ -125,13 +113,13 @@ def features(study: Study) -> list[Line]:
     return [
         Line(label, names)
         for pin, hole, label in pairs
-        if (names := tuple(n for n in _names(study) if n.partition(".")[0] in (pin, hole)))
+        if (names := tuple(n for n in _drawn(study) if n.partition(".")[0] in (pin, hole)))
     ]
 
 
 def errors(study: Study) -> list[Line]:
     """Each quantity that the study draws, by itself."""
-    return [Line(name, (name,)) for name in _names(study)]
+    return [Line(name, (name,)) for name in _drawn(study)]
 
 
 def named(study: Study, texts: Sequence[str]) -> list[Line]:
@@ -149,7 +137,7 @@ def named(study: Study, texts: Sequence[str]) -> list[Line]:
     InputError
         With every fault of the texts.
     """
-    found, faults, known = [], list[Fault](), _names(study)
+    found, faults, known = [], list[Fault](), list(_drawn(study))
     for text in texts:
         label, equals, patterns = (part.strip() for part in text.partition("="))
         names: dict[str, None] = {}
@@ -175,8 +163,48 @@ def left_out(study: Study) -> list[str]:
     return [entry.pattern for entry in study.entries if not _free(study, entry)]
 
 
+def steps(study: Study, line: Line) -> tuple[str, ...]:
+    """Changes of a line: `STEPS`; of a fit the codes of `other_fits`."""
+    return STEPS if study.fit is None or line.label != _fit_label(study) else tuple(other_fits(study.fit))
+
+
+def other_fits(fit: fits.Fit) -> dict[str, iso286.Zones]:
+    """Fits next to that of the drawing, with their zones.
+
+    They have the hole's fundamental deviation or grade that follows in the tables, on either side. In the system of
+    the basic hole, H, the hole keeps its deviation, and the shaft's deviation and grade are changed, too. Fits are left
+    out with which a pin of its zone may be larger than a hole of its zone.
+    """
+    code = iso286.parse(fit.entry.code)
+    is_basis = code.hole == "H"
+    changes = [] if is_basis else [("hole", iso286.HOLES)]
+    changes += [("hole_grade", iso286.GRADE_NAMES)]
+    changes += [("shaft", iso286.SHAFTS), ("shaft_grade", iso286.GRADE_NAMES)] if is_basis else []
+    found = {}
+    for part, names in changes:
+        place = names.index(getattr(code, part))
+        for name in names[max(place - 1, 0) : place + 2]:
+            other = code._replace(**{part: name})
+            zones = iso286.zones(other, fit.entry.size)
+            if other != code and zones.least >= 0.0:
+                found[str(other)] = zones
+    return found
+
+
+def after(study: Study, line: Line, step: str) -> Study:
+    """Study with a line after one of its `steps`, with joints as `applied` draws them."""
+    if step in STEPS:
+        return applied(study, changed(study, line, step))
+    text = rewriting.with_keys(study.text, {fits.PATH: {"code": step}}, f"{study.name}.toml")
+    assert study.fit is not None
+    fit = study.fit._replace(entry=study.fit.entry.model_copy(update={"code": step}))
+    diameters = {f"contact.{key}": units.to_si(value, "m") for key, value in fit.diameters.items()}
+    # the joint file need not be there any more: the joint in hand has all that it gave
+    return applied(load(study.path, study.sampling.n, text, varied(study.joint, diameters)), {})
+
+
 def changed(study: Study, line: Line, step: str) -> dict[str, Distribution]:
-    """Distributions of a line after a step, by name of the quantity.
+    """Distributions of a line with another width, by name of the quantity.
 
     Parameters
     ----------
@@ -187,14 +215,25 @@ def changed(study: Study, line: Line, step: str) -> dict[str, Distribution]:
     step : str
         One of `STEPS`.
     """
-    every = {name: (entry, site, model) for entry, name, site, model in _drawn(study)}
-    found: dict[str, Distribution] = {}
-    for name in line.names:
-        entry, site, model = every[name]
-        own = width(study, entry, site, model, step)
+    drawn, found = _drawn(study), dict[str, Distribution]()
+    for name, factor in factors(study, line, step).items():
+        _, site, model = drawn[name]
+        band = model.band(site) if isinstance(model, SingleEntry) else None
         base = study.tolerances[name]
-        found[name] = Rescaled(base, _middle(name, site, model, base), own.factor, own.shift)
+        middle = 0.0 if is_zone(name) else base.moments.mean if band is None else 0.5 * (band[0] + band[1])
+        found[name] = Rescaled(base, middle, factor)
     return found
+
+
+def factors(study: Study, line: Line, step: str) -> dict[str, float]:
+    """How many times as wide each quantity of a line is after one of its `steps`."""
+    if step in STEPS:
+        drawn = _drawn(study)
+        return {name: _width(*drawn[name][:2], step)[0] for name in line.names}
+    assert study.fit is not None
+    pairs = zip(other_fits(study.fit)[step], study.fit.entry.zones, strict=True)
+    hole, pin = (new.half / old.half for new, old in pairs)
+    return {name: hole if name.startswith("hole") else pin for name in line.names}
 
 
 def applied(study: Study, distributions: Mapping[str, Distribution]) -> Study:
@@ -209,81 +248,64 @@ def applied(study: Study, distributions: Mapping[str, Distribution]) -> Study:
 
 
 def words(study: Study, line: Line, step: str) -> str:
-    """What a step does to a line, in words: ``"half"``, ``"class m"``; several are joined by commas."""
-    every = {name: (entry, site, model) for entry, name, site, model in _drawn(study)}
-    return ", ".join(dict.fromkeys(width(study, *every[name], step).words for name in line.names))
+    """What a step does to a line: ``"half"``, ``"class m"``, ``"mean radial clearance +15 µm"``; several in a row."""
+    if step not in STEPS:
+        assert study.fit is not None
+        old, new = study.fit.entry.zones, other_fits(study.fit)[step]
+        looser = 0.25 * (new.least + new.largest - old.least - old.largest)  # of the radius, half of each middle
+        return f"mean radial clearance {looser:+.3g} µm".replace("-", "−")
+    drawn = _drawn(study)
+    return ", ".join(dict.fromkeys(_width(*drawn[name][:2], step)[1] for name in line.names))
 
 
-def size(study: Study, line: Line, factor: float = 1.0) -> str:
-    """Tolerance of a line, made `factor` times as wide: ``"±0.5 deg"``; empty if its quantities have several."""
-    found = set()
-    for entry, name, site, model in _drawn(study):
-        if name in line.names:
-            if entry.keys["distribution"] not in scaling.SCALED:
-                return ""
-            size = units.shown(factor * scaling.width(entry.keys, site), site.unit)
-            found.add(scaling.marked(scaling.mark(model), size))
+def size(study: Study, line: Line) -> str:
+    """Tolerance of a line, ``"±0.5 deg"``, or code of its fit; empty if its quantities have several."""
+    if study.fit is not None and line.label == _fit_label(study):
+        return study.fit.entry.code
+    found, drawn = set(), _drawn(study)
+    for entry, site, model in map(drawn.__getitem__, line.names):
+        if entry.keys["distribution"] not in scaling.SCALED:
+            return ""
+        size = units.shown(scaling.width(entry.keys, site), site.unit)
+        found.add(scaling.marked(scaling.mark(model), size))
     return found.pop() if len(found) == 1 else ""
 
 
-def width(study: Study, entry: Toleranced, site: Site, model: ToleranceEntry, step: str) -> Width:
-    """Width of one quantity of an entry after a step."""
-    factor, side = FACTORS[step], {FINER: -1, COARSER: 1}.get(step, 0)
-    if side and study.fit is not None and entry.pattern in (fits.HOLE, fits.PIN):
-        return _graded(study.fit, entry.pattern == fits.HOLE, side) or Width(factor, 0.0, f"× {factor:g}")
-    if side and (found := _classed(entry, site, side)) is not None:
-        return found
-    return Width(factor, 0.0, f"× {factor:g}" if side else step)
-
-
-def _graded(fit: fits.Fit, is_hole: bool, side: int) -> Width | None:
-    """Width of the diameters of a fit in the neighbouring grade, with the shift of the middle of the zone."""
-    code = iso286.parse(fit.entry.code)
-    letter, grade = (code.hole, code.hole_grade) if is_hole else (code.shaft, code.shaft_grade)
-    place = iso286.GRADE_NAMES.index(grade) + side
-    if not 0 <= place < len(iso286.GRADE_NAMES):
-        return None
-    other = iso286.GRADE_NAMES[place]
-    moved = code._replace(**{"hole_grade" if is_hole else "shaft_grade": other})
-    zones = fit.entry.zones, iso286.zones(moved, round(1e3 * fit.entry.basic, 9))
-    old, new = (zone.hole if is_hole else zone.shaft for zone in zones)
-    moved_by = new.middle - old.middle
-    looser = 0.5 * (moved_by if is_hole else -moved_by)
-    said = f"{letter}{other} (mean clearance {looser:+.3g} µm)".replace("-", "−")
-    return Width(new.half / old.half, 1e-6 * moved_by, said)
-
-
-def _classed(entry: Toleranced, site: Site, side: int) -> Width | None:
-    """Width in the neighbouring class of ISO 2768; None without a class, or where the tables have no other width."""
+def _width(entry: Toleranced, site: Site, step: str) -> tuple[float, str]:
+    """Factor of the width of a quantity after one of `STEPS`, and the step in words."""
+    side = {FINER: -1, COARSER: 1}.get(step, 0)
     own = entry.keys.get("iso2768")
-    if own not in CLASSES or not 0 <= CLASSES.index(own) + side < len(CLASSES):
-        return None
-    other, kind = CLASSES[CLASSES.index(own) + side], "angular" if site.unit == "rad" else "linear"
-    nominal = units.to_si(entry.keys["nominal"], "m")
-    old, new = (iso2768.deviation(kind, one, nominal) for one in (own, other))
-    return None if new == old else Width(new / old, 0.0, f"class {other}")
+    if side and own in CLASSES and 0 <= CLASSES.index(own) + side < len(CLASSES):
+        other, kind = CLASSES[CLASSES.index(own) + side], "angular" if site.unit == "rad" else "linear"
+        nominal = units.to_si(entry.keys["nominal"], "m")
+        old, new = (iso2768.deviation(kind, name, nominal) for name in (own, other))
+        if new != old:
+            return new / old, f"class {other}"
+    return FACTORS[step], f"× {FACTORS[step]:g}" if side else step
 
 
-def _middle(name: str, site: Site, model: ToleranceEntry, distribution: Distribution) -> float:
-    """Value that a quantity is narrowed about."""
-    if is_zone(name):
-        return 0.0
-    band = model.band(site) if isinstance(model, SingleEntry) else None
-    return distribution.moments.mean if band is None else 0.5 * (band[0] + band[1])
+def _fit_label(study: Study) -> str:
+    assert study.fit is not None
+    return f"fit {study.fit.entry.code}"
+
+
+def _is_of_fit(study: Study, entry: Toleranced) -> bool:
+    return study.fit is not None and entry.pattern in (fits.HOLE, fits.PIN)
 
 
 def _free(study: Study, entry: Toleranced) -> bool:
-    """Whether the width of an entry can be changed without regard to other entries."""
-    return not any(site.shared or study.has_bonus(site.name) for site, _ in entry.models)
+    """Whether an entry, or the fit that it belongs to, can be changed without regard to other entries."""
+    is_of_fit = _is_of_fit(study, entry)
+    together = [one for one in study.entries if one is entry or (is_of_fit and _is_of_fit(study, one))]
+    return not any(site.shared or study.has_bonus(site.name) for one in together for site, _ in one.models)
 
 
-def _drawn(study: Study) -> Iterator[tuple[Toleranced, str, Site, ToleranceEntry]]:
-    for entry in study.entries:
-        if _free(study, entry):
-            for site, model in entry.models:
-                for name in model.quantities(site):
-                    yield entry, name, site, model
-
-
-def _names(study: Study) -> list[str]:
-    return [name for _, name, _, _ in _drawn(study)]
+def _drawn(study: Study) -> dict[str, tuple[Toleranced, Site, ToleranceEntry]]:
+    """Entry, place and model of each quantity of the entries that can be changed, by its name."""
+    return {
+        name: (entry, site, model)
+        for entry in study.entries
+        if _free(study, entry)
+        for site, model in entry.models
+        for name in model.quantities(site)
+    }

@@ -1,18 +1,22 @@
-"""Which errors make a load scatter at which input angle."""
+"""Which errors make a load scatter at which input angle: from histories of joints, or from joints simulated again."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Container, Sequence
-from functools import partial
-from typing import TYPE_CHECKING, Annotated
+from collections.abc import Container, Iterator, Sequence
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
+from tolstat import sampling
+from tolstat.analysis import sensitivity
+from tolstat.analysis.sensitivity import FirstOrder
 from tolstat.common.channels import CHANNELS
-from tolstat.common.errors import NotApplicable
+from tolstat.common.errors import Fault, InputError, NotApplicable
 from tolstat.common.loads import FloatArray, unit_text
-from tolstat.common.tables import VALID
+from tolstat.common.strict import did_you_mean
+from tolstat.common.tables import VALID, Status
 from tolstat.display import drawing, style
 from tolstat.display.answer import Answer, Part, Sentence, Table
 from tolstat.display.asked import Asked
@@ -20,12 +24,21 @@ from tolstat.display.blocks import Panel, Panels
 from tolstat.display.options import Load, Opt, Top
 from tolstat.display.table import Column, Row
 from tolstat.display.text import ends
-from tolstat.questions.causes.revolution import JOINTS, MIN_JOINTS, AgainstAngle, against_angle
+from tolstat.questions.causes.indices import check_sample, scattering
+from tolstat.store import revolutions
+from tolstat.store.hdf5 import store_error
 from tolstat.store.view import View
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+JOINTS = 1000
+"""Default number of joints evaluated, the first settled ones: some 2 s if they are simulated again."""
+MIN_JOINTS = 100
+"""Minimum number of joints for shares to be given."""
+SPREAD = (0.05, 0.5, 0.95)
+"""Shares of the joints at which quantiles of the load are shown."""
+TITLE = "Causes over the input angle"
 LINES = 4
 """Number of errors whose share is drawn."""
 LOADS = ("5 to 95 % of the joints", "median", "without errors")
@@ -92,15 +105,10 @@ def angles(
     """
     view, load = view.narrowed(by or view.most_exceeded)
     (found,) = against_angle(view, [load], joints, (load,) if logarithm else ())
-    facts = {key: getattr(found, key) for key in ("load", "unit", "logarithm", "joints", "origin", "apart")}
-    facts["additive"] = _additive(found)
-    parts: list[Part] = [
-        Panels(_panels(found)),
-        _table([found], found.names[:top]),
-        Table("angles", "Shares at each input angle", (), _angle_rows(found), {"theta": "rad"}),
-        Sentence(_note([found])),
-    ]
-    return Answer("angles", "Causes over the input angle", parts, facts)
+    keys = ("load", "unit", "logarithm", "joints", "origin", "apart", "additive")
+    parts = _parts([found], found.names[:top])
+    parts.insert(2, Table("angles", "Shares at each input angle", (), _angle_rows(found), {"theta": "rad"}))
+    return Answer("angles", TITLE, parts, {key: getattr(found, key) for key in keys})
 
 
 def angles_on_page(view: View, asked: Asked) -> Answer:
@@ -112,11 +120,149 @@ def angles_on_page(view: View, asked: Asked) -> Answer:
     with asked.noting("nothing over the input angle"):
         logarithmic = {load.name for load in view.loads(view.leading) if load.long_tailed}
         found = against_angle(view, followed, asked.replay, logarithmic)
-        panels = Panels([panel for angle in found for panel in _panels(angle)])
-        drawn = {name for angle in found for name in angle.names[:LINES]}
-        parts: list[Part] = [panels, _table(found, drawn), Sentence(_note(found))]
-        return Answer("angles", "Causes over the input angle", parts)
+        return Answer("angles", TITLE, _parts(found, {name for angle in found for name in angle.names[:LINES]}))
     raise NotApplicable
+
+
+class AgainstAngle(NamedTuple):
+    """First-order indices of a load at each input angle.
+
+    Attributes
+    ----------
+    load : str
+        ``cross1.F``: the load at an angle, not its largest over the revolution.
+    logarithm : bool
+        Whether the variance of the logarithm is decomposed.
+    joints : int
+        Number of joints evaluated.
+    origin, apart
+        As in `revolutions.Revolutions`.
+    angles : ndarray, shape (k,)
+        Input angles, rad.
+    nominal : ndarray, shape (k,)
+        Load of the nominal joint; NaN if there is none that settled.
+    spread : ndarray, shape (3, k)
+        Quantiles of the load over the joints, at the shares `SPREAD`.
+    names : tuple of str
+        The d errors, in descending order of their share over the revolution.
+    first : FirstOrder
+        Shares of the variance at each angle, (d, k); variance (k,).
+    overall : FirstOrder
+        Shares over the whole revolution, (d,).
+    """
+
+    load: str
+    logarithm: bool
+    joints: int
+    origin: str
+    apart: float
+    angles: FloatArray
+    nominal: FloatArray
+    spread: FloatArray
+    names: tuple[str, ...]
+    first: FirstOrder
+    overall: FirstOrder
+
+    @property
+    def unit(self) -> str:
+        """SI unit of the load."""
+        return CHANNELS[self.load].unit
+
+    @property
+    def additive(self) -> float:
+        """Share of the variance over the revolution that all errors explain alone."""
+        return float(np.nansum(self.overall.estimate))
+
+    @property
+    def quantity(self) -> str:
+        """Name of the decomposed quantity: the load, or its logarithm."""
+        return f"log {self.load}" if self.logarithm else self.load
+
+
+def against_angle(
+    view: View, loads: Sequence[str], joints: int = JOINTS, logarithmic: Container[str] = ()
+) -> list[AgainstAngle]:
+    """Find which errors make loads scatter at which input angle.
+
+    Parameters
+    ----------
+    view : View
+        A campaign whose joints are drawn from tolerances, all of the same weight.
+    loads : sequence of str
+        Keys of `channels.CHANNELS`: ``cross1.F``, ``output.moment``.
+    joints : int
+        Number of joints evaluated, the first settled ones. Without stored histories they are simulated again.
+    logarithmic : container of str
+        Loads for which the variance of the logarithm is decomposed.
+
+    Returns
+    -------
+    list of AgainstAngle
+        One for each load.
+
+    Raises
+    ------
+    InputError
+        When a name is not a load over the input angle.
+    StoreError
+        When the joints are not drawn from tolerances, differ in weight or form a pick-freeze design, or fewer than
+        `MIN_JOINTS` have settled.
+    """
+    for name in loads:
+        if name not in CHANNELS:
+            raise InputError([Fault(name, "is not a load over the input angle", did_you_mean(name, list(CHANNELS)))])
+    nominal, samples = evaluated(view, joints)
+    found = revolutions.read(view.store, np.concatenate([nominal, view.slots(samples)]), loads)
+    errors = view.errors(samples, sampling.columns(view.study))
+    components = scattering(sampling.components(view.study, errors))
+    x, names, independent = (
+        np.column_stack(list(components.values())),
+        list(components),
+        view.design.has_interval("index"),
+    )
+    each = []
+    for name in loads:
+        y, without_errors = found.loads[name][len(nominal) :], found.loads[name][: len(nominal)]
+        response = np.log(y) if name in logarithmic else y
+        first, overall = sensitivity.over_revolution(x, response, iid=independent)
+        order = np.argsort(-overall.estimate, kind="stable")
+        ordered = [
+            FirstOrder(own.estimate[order], own.lower[order], own.upper[order], own.variance)
+            for own in (first, overall)
+        ]
+        about = name, name in logarithmic, len(y), found.origin, found.apart, found.angles
+        drawn = without_errors[0] if len(nominal) else np.full(len(found.angles), np.nan)
+        each.append(AgainstAngle(*about, drawn, _quantiles(y), tuple(names[i] for i in order), *ordered))
+    return each
+
+
+def spreads(view: View, loads: Sequence[str], joints: int) -> dict[str, tuple[FloatArray, FloatArray]]:
+    """Input angles, rad, and quantiles over the joints at the shares `SPREAD`, (3, k), of the loads of `against_angle`.
+
+    Raises as `against_angle`.
+    """
+    found = revolutions.read(view.store, view.slots(evaluated(view, joints)[1]), loads)
+    return {name: (found.angles, _quantiles(found.loads[name])) for name in loads}
+
+
+def evaluated(view: View, joints: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """File slots of the nominal joint, (1,), if it settled, else (0,); and the samples that `against_angle` evaluates.
+
+    Raises
+    ------
+    StoreError
+        As `against_angle`.
+    """
+    check_sample(view, "index")
+    samples = np.flatnonzero(view.status == Status.OK)[:joints]
+    if len(samples) < MIN_JOINTS:
+        found = f"has {len(samples)} settled joints to evaluate"
+        raise store_error(view.path, found, f"{MIN_JOINTS} are needed: run more joints")
+    return view.nominal_slots[view.nominal["status"] == Status.OK], samples
+
+
+def _quantiles(values: FloatArray) -> FloatArray:
+    return np.asarray(np.quantile(values, SPREAD, axis=0, method="inverted_cdf"))
 
 
 def closed(values: FloatArray) -> FloatArray:
@@ -130,23 +276,35 @@ def theta_axis(ax: Axes, theta: FloatArray) -> FloatArray:
     return np.append(np.degrees(theta), 360.0)
 
 
-def _overall_rows(found: AgainstAngle) -> list[Row]:
-    rows: list[Row] = []
-    for i, name in enumerate(found.names):
-        share, low, high = (float(part[i]) for part in found.overall[:3])
-        k = int(np.argmax(found.first.estimate[i]))
-        head = {"load": found.load, "error": name, "share": share, "share_lower": low, "share_upper": high}
-        rows.append({**head, "largest": float(found.first.estimate[i, k]), "theta": float(found.angles[k])})
-    return rows
+def _parts(found: Sequence[AgainstAngle], shown: Container[str]) -> list[Part]:
+    """Pictures; shares over the revolution, of which people see those of the errors `shown`; a note."""
+    rows = [row for angle in found for row in _overall_rows(angle)]
+    seen = [row for row in rows if row["error"] in shown]
+    table = Table("revolution", OVER_REVOLUTION, COLUMNS, rows, {"theta": "rad"}, seen)
+    return [Panels([panel for angle in found for panel in _panels(angle)]), table, Sentence(_note(found))]
 
 
-def _angle_rows(found: AgainstAngle) -> list[Row]:
-    theta, std, shares = found.angles.tolist(), np.sqrt(found.first.variance).tolist(), found.first[:3]
+def _share(indices: FirstOrder, place: int | tuple[int, int]) -> dict[str, float]:
+    """One share with the ends of its interval."""
+    return {f"share{end}": float(part[place]) for end, part in zip(("", "_lower", "_upper"), indices[:3], strict=True)}
+
+
+def _overall_rows(angle: AgainstAngle) -> list[Row]:
+    largest = angle.first.estimate.argmax(axis=1)
     return [
-        {"theta": theta[k], "load": found.load, "unit": found.unit, "std": std[k], "error": name}
-        | {f"share{end}": float(part[i, k]) for end, part in zip(("", "_lower", "_upper"), shares, strict=True)}
-        for k in range(len(theta))
-        for i, name in enumerate(found.names)
+        {"load": angle.load, "error": name, **_share(angle.overall, i)}
+        | {"largest": float(angle.first.estimate[i, k]), "theta": float(angle.angles[k])}
+        for i, (name, k) in enumerate(zip(angle.names, largest, strict=True))
+    ]
+
+
+def _angle_rows(angle: AgainstAngle) -> list[Row]:
+    std = np.sqrt(angle.first.variance).tolist()
+    return [
+        {"theta": theta, "load": angle.load, "unit": angle.unit, "std": std[k], "error": name}
+        | _share(angle.first, (i, k))
+        for k, theta in enumerate(angle.angles.tolist())
+        for i, name in enumerate(angle.names)
     ]
 
 
@@ -154,22 +312,10 @@ def _percent(share: float) -> str:
     return f"{round(100.0 * share, 1) + 0.0:.1f}"  # no -0
 
 
-def _table(found: Sequence[AgainstAngle], shown: Container[str]) -> Table:
-    """Shares over the revolution; people see those of the errors `shown`."""
-    rows = [row for angle in found for row in _overall_rows(angle)]
-    seen = [row for row in rows if row["error"] in shown]
-    return Table("revolution", OVER_REVOLUTION, COLUMNS, rows, {"theta": "rad"}, seen)
-
-
-def _additive(angle: AgainstAngle) -> float:
-    """Share of the variance over the revolution that all errors explain alone."""
-    return float(np.nansum(angle.overall.estimate))
-
-
 def _note(found: Sequence[AgainstAngle]) -> str:
     """Sums of the shares, joints, source of the histories, bias correction."""
     first = found[0]
-    alone = ", ".join(f"{100 * _additive(angle):.0f} % of the variance of {angle.quantity}" for angle in found)
+    alone = ", ".join(f"{100 * angle.additive:.0f} % of the variance of {angle.quantity}" for angle in found)
     sentences = (
         f"All errors alone explain {alone}. Over the input angle: the first {first.joints} settled joints, "
         f"{ORIGIN[first.origin]}; bands are the 95 % intervals at each angle. Shares are corrected for chance: an "
@@ -183,54 +329,39 @@ def _note(found: Sequence[AgainstAngle]) -> str:
     return sentences
 
 
-def _panels(angle: AgainstAngle) -> list[Panel]:
+def _panels(angle: AgainstAngle) -> Iterator[Panel]:
     """Load over the revolution, and shares of its variance."""
-    key, unit, middle = angle.load, unit_text(angle.unit), angle.spread[1]
-    estimates = list(zip(angle.names, angle.overall.estimate, strict=True))
-    top = ", ".join(f"{name} {100 * share:.1f} %" for name, share in estimates[:LINES])
-    return [
-        Panel(
-            f"angle-{key}",
-            f"{angle.load} over the revolution",
-            f"Median of the joints between {middle.min():.4g} and {middle.max():.4g} {unit} over the input angle; "
-            f"95 % of the joints stay below {angle.spread[2].max():.4g} {unit} everywhere",
-            partial(_draw_loads, angle=angle),
-            (4.9, 3.1),
-            top=drawing.legend_room(LOADS),
-        ),
-        Panel(
-            f"angle-shares-{key}",
-            f"{angle.quantity}: share of the variance over the input angle",
-            f"Over the whole revolution: {top}",
-            partial(_draw_shares, angle=angle),
-            (4.9, 3.1),
-            top=drawing.legend_room(angle.names[:LINES]),
-        ),
-    ]
+    key, unit, leading = angle.load, unit_text(angle.unit), angle.names[:LINES]
+    low, middle, high = angle.spread
 
+    def draw_loads(ax: Axes) -> None:
+        theta = theta_axis(ax, angle.angles)
+        ax.fill_between(theta, closed(low), closed(high), color=style.COLOURS[0], alpha=0.2, lw=0, label=LOADS[0])
+        ax.plot(theta, closed(middle), color=style.COLOURS[0], label=LOADS[1])
+        if np.isfinite(angle.nominal).all():
+            ax.plot(theta, closed(angle.nominal), color=style.INK, lw=1.0, ls=(0.0, (4.0, 2.0)), label=LOADS[2])
+        ax.set_ylabel(f"|{key}| [{unit}]")
+        ax.set_ylim(0.0, 1.05 * max(high.max(), np.nan_to_num(angle.nominal).max()))
+        drawing.legend_above(ax, *ax.get_legend_handles_labels())
 
-def _draw_loads(ax: Axes, angle: AgainstAngle) -> None:
-    """Draw a load over the revolution: nominal joint, median and 5 to 95 % band of the others."""
-    theta = theta_axis(ax, angle.angles)
-    low, middle, high = closed(angle.spread)
-    ax.fill_between(theta, low, high, color=style.COLOURS[0], alpha=0.2, lw=0, label=LOADS[0])
-    ax.plot(theta, middle, color=style.COLOURS[0], label=LOADS[1])
-    if np.isfinite(angle.nominal).all():
-        ax.plot(theta, closed(angle.nominal), color=style.INK, lw=1.0, ls=(0.0, (4.0, 2.0)), label=LOADS[2])
-    ax.set_ylabel(f"|{angle.load}| [{unit_text(angle.unit)}]")
-    ax.set_ylim(0.0, 1.05 * max(high.max(), np.nan_to_num(angle.nominal).max()))
-    drawing.legend_above(ax, *ax.get_legend_handles_labels())
+    def draw_shares(ax: Axes) -> None:
+        theta, ceiling = theta_axis(ax, angle.angles), 0.0
+        for i, name in enumerate(leading):
+            share, lower, upper = (100.0 * closed(part[i]) for part in angle.first[:3])
+            if np.isfinite(lower).all():
+                ax.fill_between(theta, lower, upper, color=style.COLOURS[i], alpha=0.15, lw=0)
+            ax.plot(theta, share, color=style.COLOURS[i], ls=style.DASHES[i], label=name)
+            ceiling = max(ceiling, float(np.nanmax(np.where(np.isfinite(upper), upper, share), initial=0.0)))
+        ax.set(ylim=(0.0, 1.05 * max(ceiling, 1.0)), ylabel="share of the variance [%]")
+        drawing.legend_above(ax, *ax.get_legend_handles_labels())
 
-
-def _draw_shares(ax: Axes, angle: AgainstAngle) -> None:
-    """Draw the shares of the variance of the `LINES` errors with the largest share over the revolution."""
-    theta = theta_axis(ax, angle.angles)
-    ceiling = 0.0
-    for i, name in enumerate(angle.names[:LINES]):
-        share, low, high = (100.0 * closed(part[i]) for part in angle.first[:3])
-        if np.isfinite(low).all():
-            ax.fill_between(theta, low, high, color=style.COLOURS[i], alpha=0.15, lw=0)
-        ax.plot(theta, share, color=style.COLOURS[i], ls=style.DASHES[i], label=name)
-        ceiling = max(ceiling, float(np.nanmax(np.where(np.isfinite(high), high, share), initial=0.0)))
-    ax.set(ylim=(0.0, 1.05 * max(ceiling, 1.0)), ylabel="share of the variance [%]")
-    drawing.legend_above(ax, *ax.get_legend_handles_labels())
+    told = (
+        f"Median of the joints between {middle.min():.4g} and {middle.max():.4g} {unit} over the input angle; "
+        f"95 % of the joints stay below {high.max():.4g} {unit} everywhere"
+    )
+    size, room = (4.9, 3.1), drawing.legend_room
+    yield Panel(f"angle-{key}", f"{key} over the revolution", told, draw_loads, size, top=room(LOADS))
+    estimates = zip(leading, angle.overall.estimate, strict=False)
+    told = "Over the whole revolution: " + ", ".join(f"{name} {100 * share:.1f} %" for name, share in estimates)
+    title = f"{angle.quantity}: share of the variance over the input angle"
+    yield Panel(f"angle-shares-{key}", title, told, draw_shares, size, top=room(leading))

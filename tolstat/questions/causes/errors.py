@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
@@ -23,17 +23,16 @@ from tolstat.display.answer import Answer, Part, Sentence, Table
 from tolstat.display.asked import Asked
 from tolstat.display.blocks import Panel, Panels
 from tolstat.display.mpl import patches
-from tolstat.display.options import Load, Opt, Top
+from tolstat.display.options import Costs, Load, Opt, Top
 from tolstat.display.table import Column, Row, Rows, has
 from tolstat.display.text import ends
-from tolstat.questions.causes import lines, lines_run
-from tolstat.questions.causes.indices import indices
+from tolstat.questions.causes import lines, simulation
+from tolstat.questions.causes.indices import Indices, estimated, indices
 from tolstat.store.view import View
 from tolstat.study import Study
 from tolstat.study.rewriting import with_keys
 
 if TYPE_CHECKING:
-    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
 
 SIGNIFICANT = 0.05
@@ -42,8 +41,6 @@ SHOWN = 10
 """Number of errors shown for each load on the page."""
 JOINTS = 20_000
 """Maximum number of joints (the first ones) of which the page takes causes: more add little and take memory."""
-Found = tuple[Mapping[str, Any], Rows]
-"""What `indices` returns."""
 POINTS = 1024
 """Default number of points of a pick-freeze design."""
 Groups = Literal["tolerance", "error"]
@@ -57,13 +54,14 @@ GREY = "Grey: share that the error takes part in, alone or with others (bounds o
 LOGARITHMS = "Where a few joints with large loads dominate the variance, it is that of the logarithm."
 
 
-def causes(view: View, by: Load = None, top: Top = 12, logarithm: bool = False) -> Answer:
+def causes(view: View, by: Load = None, top: Top = 12, logarithm: bool = False, costs: Costs = None) -> Answer:
     """Compute which tolerances and errors cause a load.
 
     Gives for each line of the drawing, an entry of [tolerances], the share of the joints above the limit if it were
-    half as wide, exact, finer or coarser by one class (else by the factors 0.63 and 1.6). With --run, simulates these
-    joints, which have the seeds of FILE and keep their loads in it: until the order of the lines is settled, the time
-    is up, or each change has --most joints. To go on, run the same command again.
+    half as wide, exact, finer or coarser by one class (else by the factors 0.63 and 1.6); of a fit, with the next
+    fundamental deviations and grades. With --run, simulates these joints, which have the seeds of FILE and keep their
+    loads in it: until the order of the lines is settled, the time is up, or each change has --most joints. All else
+    stays as drawn. To go on, run the same command again.
 
     Gives for each error: the share of the load's variance that it explains alone and in interactions (first-order and
     total Sobol' indices), the direction of its effect (rank regression), and the probability that a joint above the
@@ -85,6 +83,8 @@ def causes(view: View, by: Load = None, top: Top = 12, logarithm: bool = False) 
         Number of errors in the printed table.
     logarithm : bool
         Explain the variance of the load's logarithm instead of the load's.
+    costs : Path, optional
+        Cost of each tolerance, TOML or CSV (see tolstat docs allocate): what each change of a line costs.
 
     Returns
     -------
@@ -95,7 +95,8 @@ def causes(view: View, by: Load = None, top: Top = 12, logarithm: bool = False) 
     Raises
     ------
     InputError
-        When there is no such load, the study does not keep it, or `logarithm` is set and a value is not positive.
+        When there is no such load, the study does not keep it, or `logarithm` is set and a value is not positive; with
+        every fault of the costs, and when the file holds no joints with a line changed that they are for.
     StoreError
         When the file has too few valid joints, or joints that are not drawn from tolerances or differ in weight.
 
@@ -107,17 +108,20 @@ def causes(view: View, by: Load = None, top: Top = 12, logarithm: bool = False) 
     ['pin1.offset_t', 'pin2.offset_z']
     """
     load = by or view.decisive
-    facts, rows = indices(view, load, logarithm)
-    parts: list[Part] = []
+    found = indices(view, load, logarithm)
+    facts, parts = found.facts, list[Part]()
     command = f"tolstat causes {quote(str(view.path))} --run"
+    if costs is not None and not view.altered:
+        missing = f"is about changes of lines, and {view.path} holds no joints with one"
+        raise InputError([Fault("--costs", missing, f"simulate them: {command}")])
     if view.altered:
         with suppress(NotApplicable):  # joints of other lines, or at other operating points
-            changed = lines.lines(view, load)
+            changed = lines.lines(view, load, costs=costs)
             parts, facts = list(changed.parts), {**facts, "lines": changed.facts}
-    elif not _from_design(facts):
+    elif not found.of_design:
         parts.append(Sentence(f"which line of the drawing to change: {command}"))
-    parts += [Panels([_tornado_panel(facts, rows)]), _table("errors", facts, rows, top)]
-    parts += map(Sentence, _notes(facts, rows, "" if view.altered else command))
+    parts += [Panels([_tornado(found)]), _table("errors", found, top)]
+    parts += map(Sentence, _notes(found, "" if view.altered else command))
     return Answer("causes", "Causes by error", parts, facts)
 
 
@@ -127,17 +131,17 @@ def simulate(
     by: Load = None,
     points: Annotated[int, Opt("N", least=50)] = POINTS,
     groups: Groups = "tolerance",
-    each: lines_run.Each = "entry",
+    each: simulation.Each = "entry",
     group: Annotated[list[str] | None, Opt("NAME=PATTERN,...")] = None,
-    budget: Annotated[float, Opt("TIME", unit="s")] = lines_run.BUDGET_S,
-    most: Annotated[int, Opt("N", least=lines_run.LEAST)] = lines_run.MOST,
+    budget: Annotated[float, Opt("TIME", unit="s")] = simulation.BUDGET_S,
+    most: Annotated[int, Opt("N", least=simulation.LEAST)] = simulation.MOST,
 ) -> list[Path]:
     """Simulate a pick-freeze design of a study, or into a result file joints with other widths of each line.
 
     Parameters
     ----------
     source : Study or Path
-        The study, or the result file, see `lines_run.simulate`.
+        The study, or the result file, see `simulation.simulate`.
     work : Work
         Workers, folder and progress.
     by : str, optional
@@ -165,22 +169,29 @@ def simulate(
     InputError
         When options of the one are given with the other.
     """
+    of_study = {"--points": points != POINTS, "--groups": groups != "tolerance"}
+    of_file = {"--each": each != "entry", "--group": bool(group)}
+    of_file |= {"--budget": budget != simulation.BUDGET_S, "--most": most != simulation.MOST}
     if isinstance(source, Path):
-        if (points, groups) != (POINTS, "tolerance"):
-            raise InputError([Fault("--points, --groups", "are about the design of a study", "give a study (TOML)")])
-        return lines_run.simulate(source, work, by, each, group, budget, most)
-    if group or each != "entry":
-        raise InputError([Fault("--each, --group", "say what --run simulates into FILE", "give a result file")])
+        _refuse(of_study, "about the design of a study", "give a study (TOML)")
+        return simulation.simulate(source, work, by, each, group or (), budget, most)
+    _refuse(of_file, "about what --run simulates into FILE", "give a result file")
     keys = {"method": "pick_freeze", "n": points, "groups": groups}
     text = with_keys(source.text, {("sampling",): keys}, str(source.path))
     return [work.run(study.load(source.path, text=text), f"{source.path.stem}_causes.h5")]
+
+
+def _refuse(given: Mapping[str, bool], found: str, remedy: str) -> None:
+    """Refuse those of some options that are given."""
+    if used := [option for option, is_given in given.items() if is_given]:
+        raise InputError([Fault(", ".join(used), f"{'are' if len(used) > 1 else 'is'} {found}", remedy)])
 
 
 def causes_on_page(view: View, asked: Asked) -> Answer:
     """Causes of the leading loads; of a load with a long tail, those of its logarithm."""
     if view.method == "sweep" or not view.count(*VALID):
         raise NotApplicable
-    found: list[Found] = []
+    found: list[Indices] = []
     with asked.noting("causes are left out"):
         view.check("index")
         loads = view.loads(view.leading)
@@ -191,31 +202,22 @@ def causes_on_page(view: View, asked: Asked) -> Answer:
                 found.append(own or job())  # which raises what it raised before
     if not found:
         raise NotApplicable
-    panels = Panels([_tornado_panel(facts, rows) for facts, rows in found])
-    parts: list[Part] = [Sentence(_introduction(found), "lead"), panels]
+    introduction = [BARS, *([GREY] if any(_has_narrow_bounds(own.rows) for own in found) else [])]
+    introduction += [LOGARITHMS] if any(own.facts["logarithm"] for own in found) else []
+    introduction += [] if found[0].has_intervals else ["No intervals: the samples are not independent."]
+    parts: list[Part] = [Sentence(" ".join(introduction), "lead"), Panels(list(map(_tornado, found)))]
     command = "" if view.altered else f"tolstat causes {quote(view.path.name)} --run"
-    for facts, rows in found:
-        parts.append(_table(f"errors_{facts['load']}", facts, rows, SHOWN))
-        parts += map(Sentence, _notes(facts, rows, command))
+    for own in found:
+        parts.append(_table(f"errors_{own.facts['load']}", own, SHOWN))
+        parts += map(Sentence, _notes(own, command))
     return Answer("causes", "Causes by error", parts)
 
 
-def _tried(job: Callable[[], Found]) -> Found | None:
+def _tried(job: Callable[[], Indices]) -> Indices | None:
     """Result of a job; None where it cannot be had."""
-    try:
+    with suppress(TolstatError):
         return job()
-    except TolstatError:
-        return None
-
-
-def _from_design(facts: Mapping[str, Any]) -> bool:
-    """Whether the joints are a pick-freeze design."""
-    return math.isnan(facts["r2"])
-
-
-def _quantity(facts: Mapping[str, Any]) -> str:
-    """Name of the decomposed quantity: the load, or its logarithm."""
-    return f"log {facts['load']}" if facts["logarithm"] else str(facts["load"])
+    return None
 
 
 def _has_narrow_bounds(rows: Rows) -> bool:
@@ -224,53 +226,32 @@ def _has_narrow_bounds(rows: Rows) -> bool:
     return bool(widths) and bool(np.median(widths) < 0.5)  # false without bounds (NaN)
 
 
-def _introduction(found: Sequence[Found]) -> str:
-    sentences = [BARS]
-    if any(_has_narrow_bounds(rows) for _, rows in found):
-        sentences.append(GREY)
-    if any(facts["logarithm"] for facts, _ in found):
-        sentences.append(LOGARITHMS)
-    if all(math.isnan(row["first_lower"]) for row in found[0][1]):
-        sentences.append("No intervals: the samples are not independent.")
-    return " ".join(sentences)
-
-
-def _table(name: str, facts: Mapping[str, Any], rows: Rows, shown: int) -> Table:
+def _table(name: str, found: Indices, shown: int) -> Table:
     """Table of all errors; people see the `shown` with the largest shares, and those with an effect on the tail.
 
     Shares of the variance in per cent and rank coefficients, with intervals; probability that a joint of the tail has
     the larger error (``direction``) and the error farther from the middle (``size``), where ``*`` marks
     p < `SIGNIFICANT`.
     """
-    if _from_design(facts):
-        total = Column("in all, %", partial(_interval, name="total", factor=100), shown=has("total"))
-    else:  # given data yield bounds only
-        total = Column("in all, %", partial(_ends, name="total", factor=100), shown=_has_narrow_bounds, rank=3)
+    total = estimated("in all, %", "total", ends=(0.0, 1.0))
+    if not found.of_design:  # given data yield bounds only
+        total = Column("in all, %", _bounds, shown=_has_narrow_bounds, rank=3)
     columns = [
         Column("error", lambda row: str(row["error"])),
-        Column("alone, %", partial(_interval, name="first", factor=100), shown=has("first")),
+        estimated("alone, %", "first", ends=(0.0, 1.0)),
         total,
-        Column("rank coefficient", partial(_interval, name="srrc"), shown=has("srrc")),
+        estimated("rank coefficient", "srrc", form="+.2f"),
         Column("tail: larger", partial(_tail, name="direction"), shown=has("direction"), rank=2),
         Column("tail: farther out", partial(_tail, name="size"), shown=has("size"), rank=1),
     ]
-    marked = [min(row["direction_p"], row["size_p"]) < SIGNIFICANT for row in rows]
-    seen = [row for i, row in enumerate(rows) if i < shown or marked[i]]
-    title = f"Scatter of {_quantity(facts)} over all joints, not of exceeding a limit, by error"
-    return Table(name, title, columns, rows, seen=seen)
+    marked = [min(row["direction_p"], row["size_p"]) < SIGNIFICANT for row in found.rows]
+    seen = [row for i, row in enumerate(found.rows) if i < shown or marked[i]]
+    title = f"Scatter of {found.quantity} over all joints, not of exceeding a limit, by error"
+    return Table(name, title, columns, found.rows, seen=seen)
 
 
-def _interval(row: Row, name: str, factor: float = 1.0) -> str:
-    value = row[name]
-    if math.isnan(value):
-        return "-"
-    # estimates of shares may scatter beyond 0 and 1, where no share is
-    own = f"{factor * min(max(value, 0.0), 1.0):.1f}" if factor > 1 else f"{value:+.2f}"
-    return own if math.isnan(row[f"{name}_lower"]) else f"{own} ({_ends(row, name, factor)})"
-
-
-def _ends(row: Row, name: str, factor: float = 1.0) -> str:
-    return ends(factor * row[f"{name}_lower"], factor * row[f"{name}_upper"], ".1f" if factor > 1 else "+.2f")
+def _bounds(row: Row) -> str:
+    return ends(100.0 * row["total_lower"], 100.0 * row["total_upper"], ".1f")
 
 
 def _tail(row: Row, name: str) -> str:
@@ -278,62 +259,56 @@ def _tail(row: Row, name: str) -> str:
     return "-" if math.isnan(row[name]) else f"{row[name]:.2f}{star}"
 
 
-def _notes(facts: Mapping[str, Any], rows: Rows, command: str) -> list[str]:
+def _notes(found: Indices, command: str) -> list[str]:
     """Joints, explained variance, restrictions; `command` gives shares in all, empty if it has been run."""
+    facts, rows = found
     unit, std = unit_text(facts["unit"]), f"{facts['std']:.4g}"
     std = f"{std}, of the logarithm" if facts["logarithm"] else f"{std} {unit}".rstrip()
-    if _from_design(facts):
-        what, ranks, tail = "groups of errors", "", "from a pick-freeze design"
-    else:
-        what, ranks = "errors", f", ranks {100 * facts['r2']:.0f} %"
-        tail = f"tail: {facts['above']} joints above {facts['level']:.5g} {unit}".rstrip()
+    what, tail = "groups of errors", "; from a pick-freeze design"
+    if not found.of_design:
+        what, tail = "errors", f", ranks {100 * facts['r2']:.0f} %"
+        tail += f"; tail: {facts['above']} joints above {facts['level']:.5g} {unit}".rstrip()
     notes = [
         f"{facts['load']}: {facts['joints']} joints, {facts['without_load']} without a valid load left out; "
         f"standard deviation {std}",
-        f"{what} alone explain {100 * facts['additive']:.0f} % of the variance{ranks}; {tail}",
+        f"{what} alone explain {100 * facts['additive']:.0f} % of the variance{tail}",
     ]
     if (used := facts["used"]) < facts["joints"]:
         notes.append(f"shares and ranks are from the first {used} joints, the tail from at most as many on either side")
     if all(math.isnan(row["total"]) for row in rows):
         notes.append("errors are correlated: shares overlap, and shares in all are not given")
-    elif not (_from_design(facts) or _has_narrow_bounds(rows)):
+    elif not (found.of_design or _has_narrow_bounds(rows)):
         remedy = f"; {command} gives them" if command else ""
         notes.append(f"no shares in all: given joints bound them too widely{remedy}")
-    if all(math.isnan(row["first_lower"]) for row in rows):
-        notes.append("no intervals: they hold for independent samples only")
-    return notes
+    return notes if found.has_intervals else [*notes, "no intervals: they hold for independent samples only"]
 
 
-def _tornado_panel(facts: Mapping[str, Any], rows: Rows) -> Panel:
-    quantity, part = _quantity(facts), rows[:SHOWN]
-    top = ", ".join(f"{row['error']} {100 * row['first']:.1f} %" for row in part[:5])
-    return Panel(
-        f"tornado-{facts['load']}",
-        f"{quantity}: share of the variance by error",
-        f"Largest first-order indices: {top}; all errors alone {100 * facts['additive']:.0f} %",
-        partial(_tornado, rows=part, quantity=quantity),
-        (4.9, drawing.rows_height(len(part)) + 0.25),
-        left := drawing.rows_left([row["error"] for row in part]),
-        drawing.legend_room([ALONE, *([IN_ALL] if _has_narrow_bounds(part) else [])], left),
-    )
+def _tornado(found: Indices) -> Panel:
+    rows = found.rows[:SHOWN]
+    names, is_narrow = [str(row["error"]) for row in rows], _has_narrow_bounds(rows)
+    top = ", ".join(f"{row['error']} {100 * row['first']:.1f} %" for row in rows[:5])
+    labels = [ALONE, *([IN_ALL] if is_narrow else [])]
 
+    def draw(ax: Axes) -> None:
+        place = np.arange(len(rows))
+        first, low, high, total_low, total_high = (
+            100.0 * np.array([row[key] for row in rows])
+            for key in ("first", "first_lower", "first_upper", "total_lower", "total_upper")
+        )
+        drawing.rows(ax, names)
+        ax.barh(place, first.clip(min=0.0), height=0.5, color=style.COLOURS[0], zorder=2)
+        handles = [patches.Patch(color=style.COLOURS[0])]
+        if is_narrow:
+            grey: dict[str, Any] = {"color": drawing.GREY, "alpha": 0.45}
+            ax.barh(place, total_high - total_low, left=total_low, height=0.74, zorder=1, **grey)
+            handles.append(patches.Patch(**grey))
+        if np.isfinite(low).any():
+            ax.hlines(place, low, high, color=style.INK, lw=1.2, zorder=3)
+        ax.set_xlim(0.0, None)
+        drawing.legend_above(ax, handles, labels)
+        ax.set_xlabel(f"share of the variance of {found.quantity} [%]")
 
-def _tornado(ax: Axes, rows: Rows, quantity: str) -> None:
-    place = np.arange(len(rows))
-    first, low, high, total_low, total_high = (
-        100.0 * np.array([row[key] for row in rows])
-        for key in ("first", "first_lower", "first_upper", "total_lower", "total_upper")
-    )
-    drawing.rows(ax, [row["error"] for row in rows])
-    ax.barh(place, first.clip(min=0.0), height=0.5, color=style.COLOURS[0], zorder=2)
-    handles: list[Artist] = [patches.Patch(color=style.COLOURS[0])]
-    labels = [ALONE]
-    if _has_narrow_bounds(rows):
-        ax.barh(place, total_high - total_low, left=total_low, height=0.74, color=drawing.GREY, alpha=0.45, zorder=1)
-        handles.append(patches.Patch(color=drawing.GREY, alpha=0.45))
-        labels.append(IN_ALL)
-    if np.isfinite(low).any():
-        ax.hlines(place, low, high, color=style.INK, lw=1.2, zorder=3)
-    ax.set_xlim(0.0, None)
-    drawing.legend_above(ax, handles, labels)
-    ax.set_xlabel(f"share of the variance of {quantity} [%]")
+    told = f"Largest first-order indices: {top}; all errors alone {100 * found.facts['additive']:.0f} %"
+    title, size = f"{found.quantity}: share of the variance by error", (4.9, drawing.rows_height(len(rows)) + 0.25)
+    left, key = drawing.rows_left(names), f"tornado-{found.facts['load']}"
+    return Panel(key, title, told, draw, size, left, drawing.legend_room(labels, left))

@@ -7,14 +7,16 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tolstat import sampling
 from tolstat.analysis import pick_freeze, ranks, sensitivity
+from tolstat.analysis.design import Claim
 from tolstat.analysis.sample import Sample
-from tolstat.common.errors import Fault, InputError, StoreError
+from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import ANY_LIMIT, FloatArray
-from tolstat.display.table import Row, Rows
+from tolstat.display import text
+from tolstat.display.table import Column, Row, Rows, has
+from tolstat.store.hdf5 import store_error
 from tolstat.store.view import View
 
 TAIL_STARTS_AT = 0.9
@@ -31,9 +33,61 @@ Parts = Mapping[str, NamedTuple]
 """Estimates of all errors with their ends, by name of `KINDS`."""
 
 
+class Indices(NamedTuple):
+    """What each error contributes to a load.
+
+    Attributes
+    ----------
+    facts : mapping
+        ``load``, ``unit``, ``logarithm``; ``joints`` (valid), ``used`` (of them for shares and ranks),
+        ``without_load``; ``level`` at which the tail begins, SI: the study's limit or, without one, the 90 % quantile;
+        ``above``: number of joints above it; ``std`` of the load or its logarithm; ``additive``: sum of the
+        first-order indices; ``r2`` of the rank regression, NaN for a pick-freeze design.
+    rows : sequence of mapping
+        One row per error that scatters (two per vector of a zone), the largest first-order index first: ``error``; with
+        ``_lower`` and ``_upper``: ``first``, ``total`` (NaN for correlated errors), ``srrc``, ``direction`` and
+        ``size``; the last two also with ``_p``, and NaN if too few joints are on either side of the level. For a
+        pick-freeze design, one row per group of errors, with ``first`` and ``total`` only.
+    """
+
+    facts: Mapping[str, Any]
+    rows: Rows
+
+    @property
+    def quantity(self) -> str:
+        """Name of the decomposed quantity: the load, or its logarithm."""
+        return f"log {self.facts['load']}" if self.facts["logarithm"] else str(self.facts["load"])
+
+    @property
+    def of_design(self) -> bool:
+        """Whether the joints are a pick-freeze design."""
+        return math.isnan(self.facts["r2"])
+
+    @property
+    def has_intervals(self) -> bool:
+        """Whether the samples are independent."""
+        return not all(math.isnan(row["first_lower"]) for row in self.rows)
+
+
+def estimated(
+    head: str, name: str, rank: int = 0, form: str = ".1f", ends: tuple[float, float] | None = None
+) -> Column:
+    """Column of an estimate between two `ends`, in per cent unless `form` has two digits, with its interval."""
+    factor = 1.0 if form.endswith("2f") else 100.0
+
+    def cell(row: Row) -> str:
+        if math.isnan(value := row.get(name, math.nan)):
+            return "-"
+        low, high = (factor * row[f"{name}{end}"] for end in ("_lower", "_upper"))
+        value = factor * (value if ends is None else min(max(value, ends[0]), ends[1])) + 0.0  # no -0
+        return f"{value:{form}}" + ("" if math.isnan(low) else f" ({text.ends(low, high, form)})")
+
+    return Column(head, cell, shown=has(name), rank=rank)
+
+
 def indices(
     view: View, by: str, logarithm: bool = False, joints: int | None = None, confidence: float = 0.95
-) -> tuple[Mapping[str, Any], Rows]:
+) -> Indices:
     """Estimate what each error contributes to a load.
 
     Parameters
@@ -51,16 +105,7 @@ def indices(
 
     Returns
     -------
-    facts : mapping
-        ``load``, ``unit``, ``logarithm``; ``joints`` (valid), ``used`` (of them for shares and ranks),
-        ``without_load``; ``level`` at which the tail begins, SI: the study's limit or, without one, the 90 % quantile;
-        ``above``: number of joints above it; ``std`` of the load or its logarithm; ``additive``: sum of the
-        first-order indices; ``r2`` of the rank regression, NaN for a pick-freeze design.
-    rows : sequence of mapping
-        One row per error that scatters (two per vector of a zone), the largest first-order index first: ``error``; with
-        ``_lower`` and ``_upper``: ``first``, ``total`` (NaN for correlated errors), ``srrc``, ``direction`` and
-        ``size``; the last two also with ``_p``, and NaN if too few joints are on either side of the level. For a
-        pick-freeze design, one row per group of errors, with ``first`` and ``total`` only.
+    Indices
 
     Raises
     ------
@@ -75,109 +120,14 @@ def indices(
     if joints is not None and not view.study.groups:
         load = load.only(np.arange(min(joints, view.n)))
     estimate = _of_design if view.study.groups else _of_samples
-    names, parts, variance, level = estimate(view, load, logarithm, confidence)
-    valid, rows = load.valid, _rows(names, parts)
+    names, parts, variance = estimate(view, load, logarithm, confidence)
     first: Any = parts["first"]
     ranks: Any = parts.get("srrc")
-    facts = {
-        "load": load.name,
-        "unit": load.unit,
-        "logarithm": logarithm,
-        "joints": valid.size,
-        "used": min(valid.size, MAX_JOINTS) if ranks else valid.size,
-        "without_load": sum(load.unresolved),
-        "level": level,
-        "above": int((valid > level).sum()),
-        "std": math.sqrt(variance),
-        "additive": float(first.estimate.sum()),
-        "r2": ranks.r2 if ranks else math.nan,
-    }
-    return facts, rows
-
-
-def scattering(components: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
-    """Those of the components (`sampling.components`) that vary over the joints."""
-    return {name: own for name, own in components.items() if np.ptp(own) > 0}
-
-
-def _of_samples(view: View, load: Sample, logarithm: bool, confidence: float) -> tuple[list[str], Parts, float, float]:
-    """Names, estimates, variance and tail level from joints that are all drawn from the same tolerances."""
-    study, independent = view.study, view.design.has_interval("index")
-    samples = np.flatnonzero(load.is_valid)
-    values = load.values[samples]
-    _check_samples(view, load, values)
-    if logarithm:
-        _check_positive(load.name, values)
-    errors = view.errors(samples[:MAX_JOINTS], sampling.columns(study))
-    own = scattering(sampling.components(study, errors))
-    names, x, y = list(own), np.column_stack(list(own.values())), values[:MAX_JOINTS]
-    response = np.log(y) if logarithm else y
-    parts: dict[str, NamedTuple] = {"srrc": ranks.regression(x, y, confidence, independent)}
-    if study.copula.names or study.sampling.is_matched:
-        first = sensitivity.first_order(x, response, confidence, independent)
-    else:
-        first, parts["total"] = sensitivity.first_and_total(x, response, confidence, independent)
-    level = _tail_level(load)
-    above = values > level
-    if ranks.FEWEST <= above.sum() <= above.size - ranks.FEWEST:
-        parts |= _over_represented(view, names, samples, above, confidence)
-    return names, parts | {"first": first}, float(first.variance), level
-
-
-def _check_samples(view: View, load: Sample, values: FloatArray) -> None:
-    """Refuse too few joints, and a load without scatter."""
-    needed = max(MIN_JOINTS, len(sampling.streams(view.study)) + 2 * ranks.GROUPS)
-    if values.size < needed:
-        what = "load on all limits" if load.name == ANY_LIMIT else load.name
-        found = f"has {values.size} joints with a valid {what}"
-        raise StoreError(str(Fault(str(view.path), found, f"run {needed} joints or more")))
-    if np.ptp(values) == 0:
-        found = f"has the same {load.name} in all joints: no error causes it"
-        raise StoreError(str(Fault(str(view.path), found, "name another load with --by")))
-
-
-def _over_represented(
-    view: View, names: list[str], samples: NDArray[np.intp], above: NDArray[np.bool_], confidence: float
-) -> dict[str, NamedTuple]:
-    """Compare the errors of the first `MAX_JOINTS` joints above the level with those of at most as many below it."""
-    chosen = np.sort(np.concatenate([np.flatnonzero(side)[:MAX_JOINTS] for side in (above, ~above)]))
-    errors = view.errors(samples[chosen], sampling.columns(view.study))
-    scores = sampling.normal_scores(view.study, errors)
-    z = np.column_stack([scores[name] for name in names])
-    return ranks.tail(z, above[chosen], confidence, view.design.has_interval("index"))._asdict()
-
-
-def _of_design(view: View, load: Sample, logarithm: bool, confidence: float) -> tuple[list[str], Parts, float, float]:
-    """Names of groups, their Sobol' indices, variance and tail level from a pick-freeze design."""
-    path, groups = str(view.path), view.study.groups
-    if not view.store.whole:
-        raise StoreError(str(Fault(path, "holds a slice of a design", "merge all slices first: tolstat merge")))
-    values = load.values
-    if logarithm:
-        _check_positive(load.name, values[load.is_valid])
-        values = np.log(values)
-    points = values.reshape(-1, len(groups) + 2)
-    try:
-        found = pick_freeze.indices(points[:, 0], points[:, 1], points[:, 2:], confidence)
-    except ValueError as error:
-        remedy = f"run {pick_freeze.FEWEST} points or more; decompose the logarithm of a load with a long tail"
-        raise StoreError(str(Fault(path, str(error), remedy))) from error
-    parts = {"first": found.first, "total": found.total}
-    return [group.label for group in groups], parts, float(found.variance), _tail_level(load)
-
-
-def _check_positive(name: str, values: FloatArray) -> None:
-    if values.min(initial=np.inf) <= 0:
-        remedy = "decompose the variance of the load itself, not of its logarithm"
-        raise InputError([Fault(name, "is not positive in all joints", remedy)])
-
-
-def _tail_level(load: Sample) -> float:
-    return load.quantile(TAIL_STARTS_AT).estimate if load.limit is None else load.limit
-
-
-def _rows(names: list[str], parts: Parts) -> list[Row]:
-    """Rows of `indices`, from the estimates by name of the key."""
+    valid, level = load.valid, _tail_level(load)
+    facts = {"load": load.name, "unit": load.unit, "logarithm": logarithm, "joints": valid.size}
+    facts |= {"used": min(valid.size, MAX_JOINTS) if ranks else valid.size, "without_load": sum(load.unresolved)}
+    facts |= {"level": level, "above": int((valid > level).sum()), "std": math.sqrt(variance)}
+    facts |= {"additive": float(first.estimate.sum()), "r2": ranks.r2 if ranks else math.nan}
     columns: dict[str, Any] = {"error": names}
     for kind in KINDS:
         found = parts[kind]._asdict() if kind in parts else {}
@@ -185,4 +135,80 @@ def _rows(names: list[str], parts: Parts) -> list[Row]:
         for end, key in keys.items():
             columns[f"{kind}{end}"] = np.broadcast_to(found.get(key, np.nan), len(names)).tolist()
     rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
-    return sorted(rows, key=lambda row: -row["first"])
+    return Indices(facts, sorted(rows, key=lambda row: -row["first"]))
+
+
+def check_sample(view: View, statistic: Claim) -> None:
+    """Refuse joints that are not drawn from tolerances, do not support a statistic, or form a pick-freeze design.
+
+    Raises
+    ------
+    StoreError
+        The hint names what can be used.
+    """
+    view.check_drawn()
+    view.check(statistic)
+    if view.study.groups:
+        remedy = 'give the file of a study with sampling.method "random", "sobol" or "lhs"'
+        raise store_error(view.path, "holds a pick-freeze design", remedy)
+
+
+def scattering(components: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+    """Those of the components (`sampling.components`) that vary over the joints."""
+    return {name: own for name, own in components.items() if np.ptp(own) > 0}
+
+
+def _of_samples(view: View, load: Sample, logarithm: bool, confidence: float) -> tuple[list[str], Parts, float]:
+    """Names, estimates and variance from joints that are all drawn from the same tolerances."""
+    study, independent = view.study, view.design.has_interval("index")
+    samples = np.flatnonzero(load.is_valid)
+    values = load.values[samples]
+    needed = max(MIN_JOINTS, len(sampling.streams(study)) + 2 * ranks.GROUPS)
+    if values.size < needed:
+        what = "load on all limits" if load.name == ANY_LIMIT else load.name
+        raise store_error(view.path, f"has {values.size} joints with a valid {what}", f"run {needed} joints or more")
+    if np.ptp(values) == 0:
+        found = f"has the same {load.name} in all joints: no error causes it"
+        raise store_error(view.path, found, "name another load with --by")
+    columns = sampling.columns(study)
+    components = scattering(sampling.components(study, view.errors(samples[:MAX_JOINTS], columns)))
+    names, x = list(components), np.column_stack(list(components.values()))
+    response = (_logarithm(load.name, values) if logarithm else values)[:MAX_JOINTS]
+    parts: dict[str, NamedTuple] = {"srrc": ranks.regression(x, values[:MAX_JOINTS], confidence, independent)}
+    if study.copula.names or study.sampling.is_matched:
+        first = sensitivity.first_order(x, response, confidence, independent)
+    else:
+        first, parts["total"] = sensitivity.first_and_total(x, response, confidence, independent)
+    above = values > _tail_level(load)
+    if ranks.FEWEST <= above.sum() <= above.size - ranks.FEWEST:
+        chosen = np.sort(np.concatenate([np.flatnonzero(side)[:MAX_JOINTS] for side in (above, ~above)]))
+        scores = sampling.normal_scores(study, view.errors(samples[chosen], columns))
+        z = np.column_stack([scores[name] for name in names])
+        parts |= ranks.tail(z, above[chosen], confidence, independent)._asdict()
+    return names, parts | {"first": first}, float(first.variance)
+
+
+def _of_design(view: View, load: Sample, logarithm: bool, confidence: float) -> tuple[list[str], Parts, float]:
+    """Names of groups, their Sobol' indices and variance from a pick-freeze design."""
+    groups = view.study.groups
+    if not view.store.whole:
+        raise store_error(view.path, "holds a slice of a design", "merge all slices first: tolstat merge")
+    values = _logarithm(load.name, load.values) if logarithm else load.values
+    points = values.reshape(-1, len(groups) + 2)
+    try:
+        found = pick_freeze.indices(points[:, 0], points[:, 1], points[:, 2:], confidence)
+    except ValueError as error:
+        remedy = f"run {pick_freeze.FEWEST} points or more; decompose the logarithm of a load with a long tail"
+        raise store_error(view.path, str(error), remedy) from error
+    return [group.label for group in groups], {"first": found.first, "total": found.total}, float(found.variance)
+
+
+def _logarithm(name: str, values: FloatArray) -> FloatArray:
+    if np.nanmin(values, initial=np.inf) <= 0:
+        remedy = "decompose the variance of the load itself, not of its logarithm"
+        raise InputError([Fault(name, "is not positive in all joints", remedy)])
+    return np.asarray(np.log(values))
+
+
+def _tail_level(load: Sample) -> float:
+    return load.quantile(TAIL_STARTS_AT).estimate if load.limit is None else load.limit

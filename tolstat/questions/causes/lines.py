@@ -4,25 +4,30 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from functools import partial
 from shlex import quote
-from typing import Annotated
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from tolstat.common.errors import Fault, NotApplicable
 from tolstat.common.loads import ANY_LIMIT
 from tolstat.common.tables import VALID
-from tolstat.display import text
+from tolstat.display import drawing, style, text
 from tolstat.display.answer import Answer, Part, Sentence, Table
 from tolstat.display.asked import Asked
-from tolstat.display.blocks import Panels
-from tolstat.display.options import Accepted, Opt
+from tolstat.display.blocks import Panel, Panels
+from tolstat.display.mpl import markers, patches
+from tolstat.display.options import Accepted, Costs, Load
 from tolstat.display.table import Column, Row, has
-from tolstat.questions.causes import lines_figure, lines_shares
-from tolstat.questions.causes.lines_shares import INDICES, Lines
+from tolstat.questions.causes import shares
+from tolstat.questions.causes.indices import estimated
+from tolstat.questions.causes.shares import INDICES, Lines
 from tolstat.store.view import View
 from tolstat.study.widths import COARSER, EXACT, FINER, HALF, STEPS
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
 
 TITLE = "Which line of the drawing to change"
 ON_PAGE = (
@@ -31,43 +36,72 @@ ON_PAGE = (
     "intervals of the table (upper whisker: half as wide; lower: coarser; band: first line). An arrow at the edge of a "
     "picture: a share or the end of an interval is smaller than what its axis shows."
 )
+FITS_ON_PAGE = (
+    "Another fit has the next fundamental deviation or grade of ISO 286; none with which a pin may be larger than its "
+    "hole."
+)
+COSTS_ON_PAGE = "tolstat causes FILE --costs TABLE prints what each change costs."
 _KINDS = {"offset", "tilt", "diameter", "clearance", "position"}
 """Errors whose lines have a name in words."""
-_SHARES = ("factor", *(f"{name}{end}" for name in ("share", "change") for end in lines_shares.ENDS))
+_SHARES = ("factor", *(f"{name}{end}" for name in ("share", "change") for end in shares.ENDS))
 
 
-def _interval(row: Row, name: str, form: str = ".1f") -> str:
-    """Estimate in per cent with the ends of its interval; a dash where there is none."""
-    value = 100 * row.get(name, np.nan)
-    if np.isnan(value):
-        return "-"
-    return f"{value:{form}} ({text.ends(100 * row[f'{name}_lower'], 100 * row[f'{name}_upper'], form)})"
+CURVES = 4
+"""Number of lines whose curve has a colour; the others are grey."""
+_ACCEPTED: dict[str, Any] = {"color": style.COLOURS[2], "lw": 1.4, "ls": (0.0, (6.0, 2.0))}
+"""Style of the accepted share."""
+_BARS = {
+    COARSER: ("one step coarser", style.COLOURS[1], 0.3, -0.1),
+    HALF: ("half as wide", style.COLOURS[0], 0.56, 0.1),
+    "share": ("another fit", style.COLOURS[3], 0.4, 0.0),
+}
+"""Bars of the tornado: label, colour, height, and how far above the middle of the bar its whisker is."""
+_EXACT: dict[str, Any] = {"ls": "", "mfc": "white", "mec": style.INK, "ms": 5.5}
+"""Style of the mark of an exact line."""
 
 
-def _index(row: Row, name: str) -> str:
-    """Share of the variance: estimates may scatter beyond 0 and 1, where no share is."""
-    return _interval({**row, name: np.clip(row[name], 0.0, 1.0) + 0.0}, name)
+def _cost(head: str, name: str, rank: int = 0) -> Column:
+    """Column of what a change costs more than the drawing."""
+
+    def cell(row: Row) -> str:
+        return text.formed(row.get(name, np.nan) + 0.0, "+.4g")  # no -0
+
+    return Column(head, cell, shown=has(name), rank=rank)
 
 
+LINE = Column("line", lambda row: str(row["line"]), words=True)
 COLUMNS = (
-    Column("line", lambda row: str(row["line"]), words=True),
+    LINE,
     Column("tolerance", lambda row: row["size"] or "-", rank=3),
-    Column("half as wide, %", partial(_interval, name=HALF), shown=has(HALF)),
-    Column("exact, %", partial(_interval, name=EXACT), shown=has(EXACT), rank=1),
-    Column("finer, %", partial(_interval, name=FINER), shown=has(FINER), rank=5),
-    Column("coarser, %", partial(_interval, name=COARSER), shown=has(COARSER), rank=2),
+    estimated("half as wide, %", HALF),
+    estimated("exact, %", EXACT, 1),
+    estimated("finer, %", FINER, 5),
+    estimated("coarser, %", COARSER, 2),
     Column("finer, coarser", lambda row: ", ".join(row["by"]) or "-", words=True, rank=4),
-    Column("half: change, %", partial(_interval, name=f"{HALF}_change", form="+.1f"), shown=has(HALF), rank=6),
+    estimated("half: change, %", f"{HALF}_change", 6, "+.1f"),
+    _cost("half: extra cost", f"{HALF}_cost"),
+    _cost("finer: extra cost", f"{FINER}_cost", 5),
+    _cost("coarser: extra cost", f"{COARSER}_cost", 2),
 )
 """Columns of `Lines.by_line`: a line, its tolerance, and the share above the level after each step."""
+FITS = (
+    Column("fit", lambda row: str(row["step"])),
+    Column("in place of", lambda row: str(row["size"]), words=True),
+    estimated("share, %", "share"),
+    estimated("change, %", "change", 0, "+.1f"),
+    _cost("extra cost", "extra_cost"),
+    Column("what changes", lambda row: str(row["words"]), words=True, rank=1),
+)
+"""Columns of `Lines.other_fits`."""
 
 
-def lines(view: View, by: Annotated[str | None, Opt("LOAD")] = None, accepted: Accepted = math.nan) -> Answer:
+def lines(view: View, by: Load = None, accepted: Accepted = math.nan, costs: Costs = None) -> Answer:
     """List what each line of the drawing would change.
 
     Gives for each line of the drawing, an entry of [tolerances], the share of the joints above the limit if it were
-    half as wide, exact, finer or coarser by one class (else by the factors 0.63 and 1.6), and Sobol' indices of the
-    lines. The joints have the seeds of the campaign; tolstat causes FILE --run simulates them.
+    half as wide, exact, finer or coarser by one class (else by the factors 0.63 and 1.6), of a fit with the next
+    fundamental deviations and grades; and Sobol' indices of the lines. The joints have the seeds of the campaign;
+    tolstat causes FILE --run simulates them.
 
     Example: tolstat causes iso2768_f.h5 --run
 
@@ -79,23 +113,25 @@ def lines(view: View, by: Annotated[str | None, Opt("LOAD")] = None, accepted: A
         Load, such as cross1.F or psi, or "any limit"; by default all limits, or the only one.
     accepted : float
         Accepted share of the joints above the limit.
+    costs : Path, optional
+        Cost of each tolerance, TOML or CSV (see tolstat docs allocate).
 
     Returns
     -------
     Answer
-        Tables ``lines`` and ``line_indices``, and facts, see `lines_shares.Lines`; also a fact is ``sentence``, see
-        `sentence`.
+        Tables ``lines`` (all rows), ``other_fits`` (those of a fit) and ``line_indices``, and facts, see
+        `shares.Lines`; also a fact is ``sentence``, see `sentence`.
 
     Raises
     ------
     NotApplicable
-        When the file holds no joints with other widths.
+        When the file holds no joints with a line changed.
     InputError
-        When there is no such load, or the study does not keep it.
+        When there is no such load, or the study does not keep it; with every fault of the costs.
     StoreError
         When the joints are not drawn from tolerances, or differ in weight.
     """
-    found = lines_shares.evaluate(view, by or view.decisive)
+    found = shares.evaluate(view, by or view.decisive, costs)
     if found is None:
         remedy = f"simulate them: tolstat causes {quote(str(view.path))} --run"
         raise NotApplicable(str(Fault(str(view.path), "holds no joints with other widths of a line", remedy)))
@@ -107,9 +143,10 @@ def lines_on_page(view: View, asked: Asked) -> Answer:
     applies = view.sampled and view.limits and view.store.whole and view.count(*VALID)
     if not applies or view.design.refuses("difference"):
         raise NotApplicable
-    found = lines_shares.evaluate(view, view.decisive)
+    found = shares.evaluate(view, view.decisive)
     if found is not None:
-        return Answer("lines", TITLE, [*_parts(found, asked.accepted), Sentence(ON_PAGE)])
+        explained = " ".join([ON_PAGE, *([FITS_ON_PAGE] if found.other_fits else []), COSTS_ON_PAGE])
+        return Answer("lines", TITLE, [*_parts(found, asked.accepted), Sentence(explained)])
     file = quote(asked.path.name)
     steps = "To simulate the same joints with each tolerance half as wide, exact, finer and coarser:"
     again = f"then this page again: tolstat report {file} --out PAGE.html"
@@ -118,13 +155,13 @@ def lines_on_page(view: View, asked: Asked) -> Answer:
 
 
 def advice(view: View, load: str, accepted: float) -> str:
-    """Return the `sentence` of a load for the verdict; empty where the file holds no joints with other widths."""
-    found = lines_shares.evaluate(view, load) if view.altered else None
+    """Return the `sentence` of a load for the verdict; empty where the file holds no joints with lines changed."""
+    found = shares.evaluate(view, load) if view.altered else None
     return "" if found is None else sentence(found, accepted)
 
 
 def sentence(found: Lines, accepted: float = math.nan) -> str:
-    """Sentence on the line that lowers the share most if half as wide; empty if none surely does.
+    """Sentence on the line that lowers the share most, half as wide or with another fit; empty if none surely does.
 
     ``Halve the tilt tolerance of the holes (±0.5 deg) and 2.1 % (1.4 to 3 %) exceed the limit``, without full stop.
     Where that is more than the accepted share, it says that no line suffices, and what the exact line gives.
@@ -132,31 +169,36 @@ def sentence(found: Lines, accepted: float = math.nan) -> str:
     row = found.best
     if row is None:
         return ""
+    is_half, other = row["step"] == HALF, f"{row['step']} in place of {row['size']}"
     line = f"{_phrase(row)} ({row['size']})" if row["size"] else _phrase(row)
     low, high = 100.0 * row["share_lower"], text.percent(row["share_upper"])
     share = f"{text.percent(row['share'])} ({low:.3g} to {high})"
     if not row["share"] > accepted:
-        return f"Halve the {line} and {share} exceed {found.limit}"
+        return f"{f'Halve the {line}' if is_half else f'Write {other}'} and {share} exceed {found.limit}"
     exact = {own["line"]: own for own in found.rows if own["step"] == EXACT}
     least = min(exact.values(), key=lambda own: float(own["share"]), default=None)
-    halved = f"halving the {line} gives {share}"
+    tried = f"{f'halving the {line}' if is_half else other} gives {share}"
     if least is not None and least["share"] <= accepted:
         which = "" if least["line"] == row["line"] else f" the {_phrase(least)}"
-        return f"Halving a single line is not enough: {halved}, exact{which} {text.percent(least['share'])}"
+        what = "Halving a single line" if is_half else "Another fit"
+        return f"{what} is not enough: {tried}, exact{which} {text.percent(least['share'])}"
     same = exact.get(row["line"])
-    return f"No single line is enough: {halved}" + ("" if same is None else f", exact {text.percent(same['share'])}")
+    return f"No single line is enough: {tried}" + ("" if same is None else f", exact {text.percent(same['share'])}")
 
 
 def _parts(found: Lines, accepted: float) -> list[Part]:
     n, share, lower, upper = (found.facts[name] for name in ("n", "share", "lower", "upper"))
     drawn = f"{found.event} in {text.percent(share)} ({text.span(lower, upper)}) of {n} joints as drawn"
-    best = sentence(found, accepted) or "No line that is made half as wide surely lowers it"
-    title = f"Share of the joints with {found.event}, with one line changed"
+    others = found.other_fits
+    none = f"No line that is made half as wide{', and no other fit,' if others else ''} surely lowers it"
+    title, units = f"Share of the joints with {found.event}, with", dict.fromkeys(_SHARES, "1")
     made: list[Part] = [
-        Sentence(f"{text.sentence(drawn)} {best}.", "lead"),
-        Panels([lines_figure.tornado(found, accepted), lines_figure.curves(found, accepted)]),
-        Table("lines", title, COLUMNS, found.rows, dict.fromkeys(_SHARES, "1"), found.by_line),
+        Sentence(f"{text.sentence(drawn)} {sentence(found, accepted) or none}.", "lead"),
+        Panels([_tornado(found, accepted), *_curves(found, accepted)]),
+        Table("lines", f"{title} one line changed", COLUMNS if found.by_line else (), found.rows, units, found.by_line),
     ]
+    if others:
+        made.append(Table("other_fits", f"{title} another fit", FITS, others, units))
     if found.indices:
         title = f"Part of each line in the scatter of the load, and in whether it is above {found.limit}"
         made.append(Table("line_indices", title, _indices(found), found.indices, dict.fromkeys(INDICES, "1")))
@@ -164,32 +206,30 @@ def _parts(found: Lines, accepted: float) -> list[Part]:
 
 
 def _indices(found: Lines) -> list[Column]:
-    """Columns of `Lines.indices`: of the load and of the event, with intervals."""
+    """Columns of `Lines.indices`: of the load and of the event, with intervals; no share is beyond 0 and 1."""
     load = "largest load over its limit" if found.facts["load"] == ANY_LIMIT else found.facts["load"]
     load = f"log {load}" if found.facts["logarithmic"] else load
-    return [
-        COLUMNS[0],
-        Column(f"{load}: alone, %", partial(_index, name="alone"), rank=3),
-        Column(f"{load}: in all, %", partial(_index, name="in_all"), rank=2),
-        Column("above: alone, %", partial(_index, name="above_alone"), rank=1),
-        Column("above: in all, %", partial(_index, name="above_in_all")),
-    ]
+    names = {f"{load}: alone, %": "alone", f"{load}: in all, %": "in_all"}
+    names |= {"above: alone, %": "above_alone", "above: in all, %": "above_in_all"}
+    return [LINE, *(estimated(head, name, 3 - i, ends=(0.0, 1.0)) for i, (head, name) in enumerate(names.items()))]
 
 
 def _notes(found: Lines) -> Iterator[str]:
     """Definitions, and what the table lacks: joints, steps, lines without joints, lines that are not changed."""
     least: dict[str, int] = {}
     for row in found.rows:
-        least[row["step"]] = min(row["n"], least.get(row["step"], row["n"]))
-    said = "95 % intervals without the numerical error; joints with the same seeds"
+        step = row["step"] if row["step"] in STEPS else "another fit"
+        least[step] = min(row["n"], least.get(step, row["n"]))
+    said = "95 % intervals without the numerical error; joints with the same seeds, as drawn but for the line"
     yield f"share of the joints above {found.limit}, {said}"
     if len({row["n"] for row in found.rows}) > 1:
-        yield f"joints compared: {', '.join(f'{step} {least[step]}' for step in STEPS if step in least)}"
+        order = [step for step in (*STEPS, "another fit") if step in least]
+        yield f"joints compared: {', '.join(f'{step} {least[step]}' for step in order)}"
     if fewer := [step for step in (EXACT, FINER) if least.get(step, np.inf) < least.get(HALF, 0)]:
         yield f"{', '.join(fewer)}: the share half as wide, plus the difference on the joints that both have"
     if not found.facts["settled"]:
         yield "the order of neighbouring lines is not settled: --run with a longer --budget or a larger --most goes on"
-    if any(step not in line for line in found.by_line for step in least):
+    if any(step not in line for line in found.by_line for step in STEPS if step in least):
         yield "-: not simulated yet; the same command with --run goes on"
     if missing := found.facts["missing"]:
         yield f"not in the file: {', '.join(missing)}; --run simulates them"
@@ -209,3 +249,106 @@ def _phrase(row: Row) -> str:
     if len(kinds) > 1 or not kinds <= _KINDS or not bodies <= {"pin", "hole"} or len(features) % 4:
         return f'tolerance "{row["line"]}"' if "." in row["line"] else f"tolerances of {row['line']}"
     return f"{kinds.pop()} tolerance of the {' and '.join(sorted(f'{body}s' for body in bodies)[::-1])}"
+
+
+def _tornado(found: Lines, accepted: float) -> Panel:
+    """Share above the level with each line half as wide, exact, and coarser; and with each other fit."""
+    halves = "; ".join(f"{row['line']} {text.percent(row.get(HALF, np.nan))}" for row in found.by_line)
+    others = "; ".join(f"{row['step']} {text.percent(row['share'])}" for row in found.other_fits)
+    told = ". ".join(words for words in (f"Half as wide: {halves}" if halves else "", others) if words)
+    labels = [f"{row['line']}\n{row['size']}" if row["size"] else str(row["line"]) for row in found.by_line]
+    labels += [f"{row['step']}\nin place of {row['size']}" for row in found.other_fits]
+    bars = [*([HALF, COARSER] if halves else []), *(["share"] if others else [])]
+    keys = [*(_BARS[name][0] for name in bars), *(["exact"] if halves else [])]
+    left = drawing.rows_left([part for label in labels for part in label.split("\n")])
+    top = drawing.legend_room(keys, left)
+    floor, drawn, lower, upper = _floor(found, accepted), *(found.facts[name] for name in ("share", "lower", "upper"))
+
+    def whisker(ax: Axes, y: float, low: float, high: float) -> None:
+        ax.plot([max(low, floor), max(high, floor)], [y, y], color=style.INK, lw=1.2, zorder=3)
+        if low < floor:  # an arrow at the left edge stands for an end that is smaller than what the axis shows
+            ax.plot(floor, y, marker=markers.CARETLEFT, color=style.INK, ms=5.0, zorder=4, clip_on=False)
+
+    def draw(ax: Axes) -> None:
+        drawing.rows(ax, labels)
+        ax.set_ylim(len(labels) + 0.6, -1.2)  # a row above and one below, for what the vertical lines are
+        ax.tick_params(axis="y", labelsize=7.6)
+        style.share_axis(ax, floor, "x")
+        ax.set_xlim(floor, min(1.0, 1.4 * float(np.nanmax([upper, *(row["share_upper"] for row in found.rows)]))))
+        ax.axvspan(max(lower, floor), upper, color=drawing.GREY, alpha=0.3, lw=0)
+        ax.axvline(drawn, color=style.INK, lw=1.2)
+        for place, row in enumerate([*found.by_line, *found.other_fits]):
+            for name, (_, colour, height, above) in _BARS.items():
+                if name in row:
+                    ax.barh(place, max(row[name], floor) - drawn, height, left=drawn, color=colour, zorder=2)
+                    whisker(ax, place - above, row[f"{name}_lower"], row[f"{name}_upper"])
+            if EXACT in row:
+                marker = "o" if row[EXACT] >= floor else markers.CARETLEFT
+                ax.plot(max(row[EXACT], floor), place, marker=marker, zorder=4, clip_on=False, **_EXACT)
+        words: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 8.0, "backgroundcolor": "white"}
+        ax.text(drawn, -0.9, f"as drawn {text.percent(drawn)}", **words)
+        if accepted > 0.0:
+            ax.axvline(accepted, **_ACCEPTED)
+            ax.text(accepted, len(labels) + 0.1, f"accepted {text.percent(accepted)}", **words)
+        handles: list[Artist] = [patches.Patch(color=_BARS[name][1]) for name in bars]
+        handles += ax.plot([], [], marker="o", **_EXACT) if halves else []
+        drawing.legend_above(ax, handles, keys)
+        ax.set_xlabel(f"share of the joints above {found.limit}")
+
+    title, told = (
+        f"Share of the joints with {found.event}, if one line is changed",
+        f"As drawn {text.percent(drawn)}. {told}",
+    )
+    size = drawing.WIDTH, 0.34 * (len(labels) + 2.2) + drawing.BOTTOM + top
+    return Panel(f"lines-{found.facts['load']}", title, told, draw, size, left, top)
+
+
+def _curves(found: Lines, accepted: float) -> Iterator[Panel]:
+    """Share above the level against the width of each line; none without a line whose width is changed."""
+    by_line: dict[str, list[Row]] = {}
+    for row in found.rows:
+        if np.isfinite(row["factor"]):
+            by_line.setdefault(row["line"], []).append(row)
+    if not by_line:
+        return
+    labels = [*list(by_line)[:CURVES], *(["the other lines"] if len(by_line) > CURVES else [])]
+    labels += [f"accepted {text.percent(accepted)}"] if accepted > 0.0 else []
+    floor, facts = _floor(found, accepted), found.facts
+    drawn = {"factor": 1.0, "share": facts["share"], "share_lower": facts["lower"], "share_upper": facts["upper"]}
+
+    def draw(ax: Axes) -> None:
+        style.share_axis(ax, floor)
+        top = floor
+        handles: list[Artist] = []
+        for place, rows in enumerate(by_line.values()):
+            ordered = sorted([*rows, drawn], key=lambda row: row["factor"])
+            x, y, low, high = (np.array([row[name] for row in ordered]) for name in drawn)
+            top, grey = max(top, float(y.max())), place >= CURVES
+            colour, dash = (drawing.GREY, "-") if grey else (style.COLOURS[place], style.DASHES[place])
+            look: dict[str, Any] = {"color": colour, "ls": dash, "lw": 1.0 if grey else 1.6}
+            (curve,) = ax.plot(x, np.maximum(y, floor), marker="o", ms=3.0, **look)
+            at_edge = np.full(int((y < floor).sum()), floor)
+            ax.plot(x[y < floor], at_edge, marker=markers.CARETDOWN, ls="", color=colour, ms=5.0, clip_on=False)
+            handles += [curve] if place <= CURVES else []
+            if place == 0:
+                ax.fill_between(x, np.maximum(low, floor), np.maximum(high, floor), color=colour, alpha=0.18, lw=0)
+        ax.plot(1.0, facts["share"], "D", color=style.INK, ms=6.0, zorder=5)
+        ax.set_ylim(floor, min(1.0, 2.0 * top))
+        if accepted > 0.0:
+            handles.append(ax.axhline(accepted, **_ACCEPTED))
+        ax.set(xlabel="width of the line, relative to the drawing", ylabel=f"share above {found.limit}")
+        drawing.legend_above(ax, handles, labels)
+
+    told = {
+        line: ", ".join(f"{row['factor']:.3g} {text.percent(row['share'])}" for row in rows)
+        for line, rows in by_line.items()
+    }
+    title, words = "The share against the width of each line", "; ".join(f"{line}: {own}" for line, own in told.items())
+    size = drawing.WIDTH, 3.4 + (room := drawing.legend_room(labels))
+    yield Panel(f"widths-{facts['load']}", title, words, draw, size, top=room)
+
+
+def _floor(found: Lines, accepted: float) -> float:
+    """Lower end of an axis of shares: below all shares that are not zero, and below the accepted share."""
+    least = [value for value in [*(row["share"] for row in found.rows), found.facts["share"], accepted] if value > 0.0]
+    return float(0.6 * max(min(least, default=1.0), 0.5 / max(found.facts["n"], 1)))

@@ -10,14 +10,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.analysis.ranks import ranks
-from tolstat.common.errors import Fault, NotApplicable, StoreError
+from tolstat.common.errors import NotApplicable
 from tolstat.common.load_kinds import PINS
 from tolstat.common.loads import FloatArray, unit_text
 from tolstat.display import style, text
@@ -28,6 +27,7 @@ from tolstat.display.options import Load
 from tolstat.display.table import Column
 from tolstat.joint import HOLE_OF_PIN, perturb
 from tolstat.store import points
+from tolstat.store.hdf5 import store_error
 from tolstat.store.view import View
 
 if TYPE_CHECKING:
@@ -98,24 +98,16 @@ def pairs(view: View, by: Load = None) -> Answer:
     samples = np.flatnonzero(load.is_valid)[:MOST]
     if samples.size < FEWEST or np.ptp(load.values[samples]) == 0.0:
         found = f"has {samples.size} joints with a valid {load.name} that scatters"
-        raise StoreError(str(Fault(str(view.path), found, f"run {FEWEST} joints or more")))
-    errors, values = view.errors(samples), load.values[samples]
-    point = points.point_of(view, load.name)
+        raise store_error(view.path, found, f"run {FEWEST} joints or more")
+    errors, values, point = view.errors(samples), load.values[samples], points.point_of(view, load.name)
     # what is taken of the parameters, clearances and stations, is the same at every operating point
     used = combinations(errors, perturb(view.study.joint, view.at(point).store.operation, errors))
     rank = sorted(used, key=lambda name: -_spearman(used[name][CHOSEN], values[CHOSEN]))
-    shown = values[SHOWN]
+    use, shown = used[rank[0]][SHOWN], values[SHOWN]
     rows: list[dict[str, Any]] = [{"name": name, "correlation": _spearman(used[name][SHOWN], shown)} for name in rank]
-    facts = {
-        "load": load.name,
-        "unit": load.unit,
-        "limit": math.nan if load.limit is None else load.limit,
-        "points": list(view.narrowed(load.name)[0].points),
-        "worst": point,
-        **rows[0],
-        "single": _largest_single(errors, values),
-    }
-    use = used[rank[0]][SHOWN]
+    facts = {"load": load.name, "unit": load.unit, "limit": math.nan if load.limit is None else load.limit}
+    facts |= {"points": list(view.narrowed(load.name)[0].points), "worst": point, **rows[0]}
+    facts["single"] = _largest_single(errors, values)
     joints = [{"use": u, "value": v, "unit": load.unit} for u, v in zip(use.tolist(), shown.tolist(), strict=True)]
     listed = sorted(rows[:LISTED], key=lambda row: -row["correlation"])
     parts: list[Part] = [
@@ -196,54 +188,46 @@ def _spearman(x: FloatArray, y: FloatArray) -> float:
 
 def _finding(facts: Mapping[str, Any], use: FloatArray, values: FloatArray) -> str:
     """What the best combination is, and what it tells of joints above the limit."""
-    load, name = facts["load"], facts["name"]
+    load, name, limit = facts["load"], facts["name"], facts["limit"]
+    most = f"{load} comes of errors of pins against their holes: a joint binds where they use up its clearance. "
+    most += f"What tells most is {name}"
     if facts["correlation"] < facts["single"]:
         most = f"A single error tells more of {load} than any combination; of these, {name} tells most"
-    else:
-        most = f"{load} comes of errors of pins against their holes: a joint binds where they use up its clearance. "
-        most += f"What tells most is {name}"
     sentences = (
         f"{most}, as a share of the clearance: rank correlation with the load {facts['correlation']:.2f}, where that "
         f"of the best single error is {facts['single']:.2f}."
     )
-    if not math.isnan(facts["limit"]):
-        order, first = np.argsort(-use), max(1, round(MOST_USED * use.size))
-        above = values[order] > facts["limit"]
+    if not math.isnan(limit):
+        above, first = values[np.argsort(-use)] > limit, max(1, round(MOST_USED * use.size))
         sentences += (
             f" Of the tenth of the joints that use most of the clearance {text.percent(above[:first].mean())} exceed "
             f"the limit, of the others {text.percent(above[first:].mean())}."
         )
     if len(facts["points"]) > 1:
-        over = ", ".join(facts["points"])
-        sentences += f" {load} is the largest over {over}; it is most severe at {facts['worst']}."
+        sentences += f" {load} is the largest over {', '.join(facts['points'])}; it is most severe at {facts['worst']}."
     return sentences
 
 
 def _panel(facts: Mapping[str, Any], use: FloatArray, values: FloatArray) -> Panel:
-    return Panel(
-        f"pairs-{facts['load']}",
-        f"{facts['load']} against the share of the clearance used",
-        f"{facts['name']}: rank correlation {facts['correlation']:.2f} over {use.size} joints",
-        partial(_draw, facts=facts, use=use, values=values),
-        (4.9, 3.6),
-    )
+    load, limit = facts["load"], facts["limit"]
 
+    def draw(ax: Axes) -> None:
+        above = values > limit  # nowhere without a limit
+        for here, colour, label in ((~above, style.COLOURS[0], "within the limit"), (above, style.COLOURS[1], "above")):
+            ax.plot(use[here], values[here], "o", color=colour, ms=3.4, alpha=0.6, mew=0, label=label)
+        if values.min() > 0.0 and values.max() > 3.0 * np.median(values):
+            ax.set_yscale("log")
+            low, high = 0.9 * values.min(), 1.9 * values.max()
+            ticks = [level * 10.0**power for power in range(-6, 9) for level in (1, 2, 5)]
+            ax.set_yticks([tick for tick in ticks if low <= tick <= high], minor=False)
+            ax.set_yticks([], minor=True)
+            ax.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
+            ax.set_ylim(low, high)
+        ax.set_xlim(0.0, None)
+        ax.set(xlabel=f"clearance used by {facts['name']}", ylabel=f"{load} [{unit_text(facts['unit'])}]")
+        if not math.isnan(limit):
+            ax.axhline(limit, color=style.INK, lw=1.2, ls=(0.0, (8.0, 3.0)), label="limit")
+            ax.legend(loc="upper left", ncols=3, columnspacing=1.2, handlelength=1.8)
 
-def _draw(ax: Axes, facts: Mapping[str, Any], use: FloatArray, values: FloatArray) -> None:
-    limit = facts["limit"]
-    above = values > limit  # nowhere without a limit
-    for here, colour, label in ((~above, style.COLOURS[0], "within the limit"), (above, style.COLOURS[1], "above")):
-        ax.plot(use[here], values[here], "o", color=colour, ms=3.4, alpha=0.6, mew=0, label=label)
-    if values.min() > 0.0 and values.max() > 3.0 * np.median(values):
-        ax.set_yscale("log")
-        ticks = [level * 10.0**power for power in range(-6, 9) for level in (1, 2, 5)]
-        low, high = 0.9 * values.min(), 1.9 * values.max()
-        ax.set_yticks([tick for tick in ticks if low <= tick <= high], minor=False)
-        ax.set_yticks([], minor=True)
-        ax.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
-        ax.set_ylim(low, high)
-    ax.set_xlim(0.0, None)
-    ax.set(xlabel=f"clearance used by {facts['name']}", ylabel=f"{facts['load']} [{unit_text(facts['unit'])}]")
-    if not math.isnan(limit):
-        ax.axhline(limit, color=style.INK, lw=1.2, ls=(0.0, (8.0, 3.0)), label="limit")
-        ax.legend(loc="upper left", ncols=3, columnspacing=1.2, handlelength=1.8)
+    told = f"{facts['name']}: rank correlation {facts['correlation']:.2f} over {use.size} joints"
+    return Panel(f"pairs-{load}", f"{load} against the share of the clearance used", told, draw, (4.9, 3.6))

@@ -5,13 +5,13 @@ from __future__ import annotations
 from contextlib import suppress
 from functools import partial
 from shlex import quote
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tolstat import sampling
-from tolstat.common.channels import CHANNELS
+from tolstat.common.channels import CHANNELS, histories_of
 from tolstat.common.columns import RESULT_COLUMNS
 from tolstat.common.errors import Fault, InputError, NotApplicable, TolstatError
 from tolstat.common.loads import LOADS, FloatArray, unit_text
@@ -23,7 +23,7 @@ from tolstat.display.asked import Asked
 from tolstat.display.blocks import Panel, Panels
 from tolstat.display.options import Load, Top
 from tolstat.display.table import Column, Row, Rows
-from tolstat.questions.causes import angles, revolution
+from tolstat.questions.causes import angles
 from tolstat.store import revolutions
 from tolstat.store.view import View
 
@@ -44,6 +44,12 @@ ERRORS_ON_PAGE = 4
 """Number of errors of each joint on the page."""
 KEYS = ("load", "unit", "row", "value", "point", "status")
 """Keys of a row that are no errors."""
+ROW = Column("row", lambda row: str(row["row"]))
+WHERE = (
+    Column("at", lambda row: str(row["point"]), words=True, shown=lambda rows: any(row["point"] for row in rows)),
+    Column("status", lambda row: str(row["status"]), words=True),
+)
+"""Operating point and status of a joint."""
 
 
 def worst(view: View, by: Load = None, top: Top = 10) -> Answer:
@@ -79,10 +85,9 @@ def worst(view: View, by: Load = None, top: Top = 10) -> Answer:
     rows = joint_rows(view, load, top)
     unit = rows[0]["unit"] if rows else "1"
     columns = [
-        Column("row", lambda row: str(row["row"])),
+        ROW,
         Column(f"{load} [{unit}]" if unit != "1" else load, lambda row: f"{row['value']:.6g}"),
-        Column("at", lambda row: str(row["point"]), words=True, shown=_has_points),
-        Column("status", lambda row: str(row["status"]), words=True),
+        *WHERE,
         *(Column(head, partial(_error, place=i), True, rank=i) for i, head in enumerate(ERRORS)),
     ]
     parts: list[Part] = [Table("joints", f"Joints with the largest {load}", columns, rows)]
@@ -99,14 +104,17 @@ def worst_on_page(view: View, asked: Asked) -> Answer:
     if view.method == "sweep" or not view.count(*VALID) or not view.leading:
         raise NotApplicable
     rows = [row for load in view.leading for row in joint_rows(view, load, ON_PAGE)]
-    panels = _panels(view, rows, asked.replay) if asked.replay and len(view.points) == 1 else []
+    followed = [load for load in view.leading if load in CHANNELS and asked.replay and len(view.points) == 1]
+    spreads: dict[str, tuple[FloatArray, FloatArray]] = {}
+    with suppress(TolstatError):  # which `angles` notes
+        spreads = angles.spreads(view, followed, asked.replay) if followed else {}
+    panels = [_panel(view, [row for row in rows if row["load"] == load], spreads.get(load)) for load in followed]
     columns = [
         Column("load", lambda row: str(row["load"])),
-        Column("row", lambda row: str(row["row"])),
+        ROW,
         Column("largest", lambda row: text.value(row["value"], row["unit"])),
-        Column("at", lambda row: str(row["point"]), words=True, shown=_has_points),
-        Column("status", lambda row: str(row["status"]), words=True),
-        Column("largest errors, in standard deviations", _errors_on_page, words=True),
+        *WHERE,
+        Column("largest errors, in standard deviations", _errors, words=True),
     ]
     at = " --point POINT" if len(view.points) > 1 else ""
     command = f"tolstat replay {quote(view.path.name)} --row ROW{at} --out trace.csv"
@@ -145,12 +153,30 @@ def joint_rows(view: View, by: str, n: int = 10) -> Rows:
         When the study is not that of the file.
     """
     samples, values, unit = _largest(view, by, n)
-    status = [Status(one).label for one in view.status[samples]]
-    own = zip(view.rows(samples).tolist(), values.tolist(), _points(view, by, samples), status, strict=True)
+    part, name = view.narrowed(by)
+    points = [part.points[0]] * len(samples)
+    if len(part.parts) > 1:  # a load, whose largest value is at one of them
+        each = np.stack([LOADS[name].of(own.results)[samples] for own in part.parts])
+        points = [part.points[k] for k in np.argmax(each, axis=0)]
+    about = zip(view.rows(samples).tolist(), values.tolist(), points, view.status[samples], strict=True)
     return [
-        dict(zip(KEYS, (by, unit, *joint), strict=True)) | scores
-        for joint, scores in zip(own, _scores(view, samples), strict=True)
+        {"load": by, "unit": unit, "row": row, "value": value, "point": point, "status": Status(status).label} | scores
+        for (row, value, point, status), scores in zip(about, _scores(view, samples), strict=True)
     ]
+
+
+def begin_replay(view: View, asked: Asked) -> None:
+    """Begin to simulate again the joints whose loads over the revolution the page shows; see `revolutions.ahead`."""
+    if not asked.replay or len(view.points) > 1 or view.method == "sweep":
+        return
+    with suppress(TolstatError):  # the questions say what is wrong
+        followed = [load for load in view.leading if load in CHANNELS]
+        slots = [view.slots(np.sort(drawn(view, load))) for load in followed]
+        if slots and not revolutions.held(view.store, histories_of(followed)):
+            with suppress(TolstatError):
+                nominal, samples = angles.evaluated(view, asked.replay)
+                slots += [nominal, view.slots(samples)]
+            revolutions.ahead(view.store, np.unique(np.concatenate(slots)), asked.processes)
 
 
 def drawn(view: View, load: str) -> NDArray[np.intp]:
@@ -166,41 +192,21 @@ def largest_errors(row: Row) -> list[tuple[str, float]]:
 def _largest(view: View, by: str, n: int) -> tuple[NDArray[np.intp], FloatArray, str]:
     """Samples of the `n` joints with the largest values, the largest first; these values, and their unit."""
     view, name = view.narrowed(by)
+    columns = {column.name: column for column in view.columns}
     if name in view.kept_loads:
         values, unit = LOADS[name].of(view.results), LOADS[name].unit
-    else:
-        column = _column(view, name)
+    elif name in columns:
+        column = columns[name]
         values, unit = column.of(view.read_results([column.field])).astype(np.float64), str(column.unit)
+    else:
+        known = [*view.kept_loads, *columns]
+        if name in LOADS or name in [column.name for column in RESULT_COLUMNS]:
+            found, remedy = f"is not kept in {view.path}, see [output] results of its study", ", ".join(known)
+            raise InputError([Fault(name, found, f"give one of: {remedy}")])
+        raise InputError([Fault(name, "is neither a load nor a column of the results", did_you_mean(name, known))])
     samples = np.flatnonzero(np.isin(view.status, SIMULATED) & np.isfinite(values))
     samples = samples[np.argsort(-values[samples], kind="stable")][:n]
     return samples, values[samples], unit
-
-
-def _column(view: View, by: str) -> Any:
-    """Column of the results.
-
-    Raises
-    ------
-    InputError
-        When there is none of this name.
-    """
-    columns = {column.name: column for column in view.columns}
-    if by in columns:
-        return columns[by]
-    if by in LOADS or by in [column.name for column in RESULT_COLUMNS]:
-        found = f"is not kept in {view.path}, see [output] results of its study"
-        raise InputError([Fault(by, found, f"give one of: {', '.join([*view.kept_loads, *columns])}")])
-    remedy = did_you_mean(by, [*view.kept_loads, *columns])
-    raise InputError([Fault(by, "is neither a load nor a column of the results", remedy)])
-
-
-def _points(view: View, by: str, samples: NDArray[np.intp]) -> list[str]:
-    """Operating point with the largest value in each joint; a load, unless there is one point only."""
-    view, name = view.narrowed(by)
-    if len(view.parts) == 1:
-        return [view.points[0]] * len(samples)
-    each = np.stack([LOADS[name].of(part.results)[samples] for part in view.parts])
-    return [view.points[k] for k in np.argmax(each, axis=0)]
 
 
 def _scores(view: View, samples: NDArray[np.intp]) -> list[dict[str, float]]:
@@ -211,26 +217,13 @@ def _scores(view: View, samples: NDArray[np.intp]) -> list[dict[str, float]]:
     return [{name: float(z[i]) for name, z in scores.items()} for i in range(len(samples))]
 
 
-def _has_points(rows: Rows) -> bool:
-    return any(row["point"] for row in rows)
-
-
 def _error(row: Row, place: int) -> str:
     errors = largest_errors(row)
     return f"{errors[place][0]} {errors[place][1]:+.2f}" if place < len(errors) else "-"
 
 
-def _errors_on_page(row: Row) -> str:
+def _errors(row: Row) -> str:
     return ",  ".join(f"{name} {z:+.1f} σ" for name, z in largest_errors(row)[:ERRORS_ON_PAGE])
-
-
-def _panels(view: View, rows: Rows, joints: int) -> list[Panel]:
-    """Loads of the worst joints over the revolution, with those of all joints where they are known."""
-    followed = [load for load in view.leading if load in CHANNELS]
-    spreads: dict[str, tuple[FloatArray, FloatArray]] = {}
-    with suppress(TolstatError):  # which `angles` notes
-        spreads = revolution.spreads(view, followed, joints)
-    return [_panel(view, [row for row in rows if row["load"] == load], spreads.get(load)) for load in followed]
 
 
 def _panel(view: View, rows: Rows, spread: tuple[FloatArray, FloatArray] | None) -> Panel:
@@ -239,39 +232,21 @@ def _panel(view: View, rows: Rows, spread: tuple[FloatArray, FloatArray] | None)
     found = revolutions.read(view.store, view.slots(ascending), [load], ANGLES)
     lines = {f"row {row['row']}": line for row, line in zip(rows, found.loads[load][place], strict=True)}
     highest = ", ".join(f"row {row['row']} up to {text.value(row['value'], row['unit'])}" for row in rows)
-    return Panel(
-        f"worst-{load}",
-        f"{load} of the worst joints over the revolution",
-        f"Histories of the worst joints: {highest}",
-        partial(
-            _draw,
-            name=f"|{load}| [{unit_text(rows[0]['unit'])}]",
-            theta=found.angles,
-            lines=lines,
-            spread=spread,
-            limit=view.limits.get(load),
-        ),
-        (4.9, 3.3),
-        top=drawing.legend_room([*lines, SPREAD, "limit"]),
-    )
+    limit = view.limits.get(load)
 
+    def draw(ax: Axes) -> None:
+        degrees = angles.theta_axis(ax, found.angles)
+        for i, (label, line) in enumerate(lines.items()):
+            ax.plot(degrees, angles.closed(line), color=style.COLOURS[i], ls=style.DASHES[i], lw=1.3, label=label)
+        if spread is not None:
+            low, _, high = angles.closed(spread[1])
+            around = angles.theta_axis(ax, spread[0])
+            ax.fill_between(around, low, high, color=style.FAINT, alpha=0.25, lw=0, label=SPREAD)
+        if limit is not None:
+            ax.axhline(limit, color=style.INK, lw=1.2, ls=(0.0, (8.0, 3.0)), label="limit")
+        top = 1.05 * np.nanmax([*(line.max() for line in lines.values()), limit or 0.0])
+        ax.set(ylabel=f"|{load}| [{unit_text(rows[0]['unit'])}]", ylim=(0.0, top))
+        drawing.legend_above(ax, *ax.get_legend_handles_labels())
 
-def _draw(
-    ax: Axes,
-    name: str,
-    theta: FloatArray,
-    lines: dict[str, FloatArray],
-    spread: tuple[FloatArray, FloatArray] | None,
-    limit: float | None,
-) -> None:
-    degrees = angles.theta_axis(ax, theta)
-    for i, (label, load) in enumerate(lines.items()):
-        ax.plot(degrees, angles.closed(load), color=style.COLOURS[i], ls=style.DASHES[i], lw=1.3, label=label)
-    if spread is not None:
-        low, _, high = angles.closed(spread[1])
-        around = angles.theta_axis(ax, spread[0])
-        ax.fill_between(around, low, high, color=style.FAINT, alpha=0.25, lw=0, label=SPREAD)
-    if limit is not None:
-        ax.axhline(limit, color=style.INK, lw=1.2, ls=(0.0, (8.0, 3.0)), label="limit")
-    ax.set(ylabel=name, ylim=(0.0, 1.05 * np.nanmax([*(line.max() for line in lines.values()), limit or 0.0])))
-    drawing.legend_above(ax, *ax.get_legend_handles_labels())
+    title, room = f"{load} of the worst joints over the revolution", drawing.legend_room([*lines, SPREAD, "limit"])
+    return Panel(f"worst-{load}", title, f"Histories of the worst joints: {highest}", draw, (4.9, 3.3), top=room)

@@ -84,9 +84,14 @@ class FitEntry(Strict):
         return value
 
     @property
+    def size(self) -> float:
+        """Basic size, mm."""
+        return round(1e3 * self.basic, 9)
+
+    @property
     def zones(self) -> iso286.Zones:
         """Tolerance zones of hole and pin, um."""
-        return iso286.zones(iso286.parse(self.code), round(1e3 * self.basic, 9))
+        return iso286.zones(iso286.parse(self.code), self.size)
 
     def scatter(self, zone: iso286.Zone) -> dict[str, Any]:
         """Return the entry of a diameter: half of its zone on both sides of the nominal diameter."""

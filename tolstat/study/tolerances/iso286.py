@@ -13,6 +13,8 @@ GRADES, DEVIATIONS = "iso286_grades.csv", "iso286_deviations.csv"
 """Files of the data folder."""
 CLEARANCE, TRANSITION = ("c", "d", "e", "f", "g", "h"), ("js", "k", "m", "n", "p", "r", "s")
 """Letters of shafts that lie at or below the basic size, and of shafts that reach above it."""
+SHAFTS = (*CLEARANCE, *TRANSITION)
+"""Letters of shafts, from the loosest to the tightest."""
 HOLES = (*(letter.upper() for letter in CLEARANCE), "JS")
 """Letters of holes: those whose deviations are the shaft's with the opposite sign at every size and grade."""
 GRADE_NAMES = ("01", *map(str, range(19)))
@@ -69,6 +71,9 @@ class Code(NamedTuple):
     shaft: str
     shaft_grade: str
 
+    def __str__(self) -> str:
+        return f"{self.hole}{self.hole_grade}/{self.shaft}{self.shaft_grade}"
+
 
 def parse(code: str) -> Code:
     """Read the code of a fit, ``"H7/f7"``: class of the hole, then of the shaft.
@@ -82,7 +87,7 @@ def parse(code: str) -> Code:
     if found is None:
         raise ValueError(f"{code!r} is not the class of a hole, a slash and the class of a shaft")
     read = Code(*found.groups())
-    for kind, letter, letters in (("hole", read.hole, HOLES), ("shaft", read.shaft, CLEARANCE + TRANSITION)):
+    for kind, letter, letters in (("hole", read.hole, HOLES), ("shaft", read.shaft, SHAFTS)):
         if letter not in letters:
             raise ValueError(f"the tables have no {kind} {letter}, only {', '.join(letters)}")
     for grade in (read.hole_grade, read.shaft_grade):

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 from shlex import quote
 from typing import Annotated, Any, NamedTuple
@@ -10,13 +12,14 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tolstat import sampling
 from tolstat.analysis import allocation, prediction, reweight
 from tolstat.analysis.prediction import DELIVERY
 from tolstat.analysis.reweight import Ratios
 from tolstat.analysis.sample import CONFIDENCE, Sample
 from tolstat.common import selected_results
-from tolstat.common.errors import Fault, InputError, StoreError, gather
-from tolstat.common.loads import ANY_LIMIT, unit_text
+from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.loads import ANY_LIMIT, FloatArray, unit_text
 from tolstat.common.tables import Status
 from tolstat.common.units import DISPLAY_UNITS
 from tolstat.display import text
@@ -24,15 +27,17 @@ from tolstat.display.answer import Answer, Document, Part, Sentence, Table
 from tolstat.display.blocks import Listing
 from tolstat.display.options import Costs, Delivery, Opt
 from tolstat.display.table import Column, Row, Rows
-from tolstat.questions.allocate.ratios import DensityRatios, Entries
 from tolstat.store import error_budget
+from tolstat.store.hdf5 import store_error
 from tolstat.store.view import View
-from tolstat.study import axes, rule, scaling, selection
+from tolstat.study import Study, axes, rule, scaling, selection
 from tolstat.study import costs as prices
 from tolstat.study.costs import Cost
 from tolstat.study.rule import Statement
 from tolstat.study.scaling import Tolerance
-from tolstat.study.tolerances.density_ratio import Exact
+from tolstat.study.tolerances.density_ratio import Exact, of_error
+from tolstat.study.tolerances.distributions import Distribution, Normal
+from tolstat.study.tolerances.radial import Rayleigh
 
 EXAMPLE = 'write --target "P(cross1.F > 700 N) < 0.001"'
 DIGITS = 3
@@ -74,6 +79,12 @@ LIMITS = (
 """Columns of the table ``limits``."""
 
 
+Entries = dict[str, dict[str, Any]]
+"""Keys of entries of ``[tolerances]`` by pattern."""
+_Judged = tuple[str, float, Sequence[NDArray[np.bool_]]]
+"""A statement or `ANY_LIMIT`, its target, and which joints are above, see `_above`."""
+
+
 class _Request(NamedTuple):
     """What is asked for: statements to be kept; tolerances that may change, and their costs."""
 
@@ -85,9 +96,6 @@ class _Request(NamedTuple):
     def columns(self) -> list[str]:
         """Columns of the errors that the tolerances are for."""
         return [column for t in self.tolerances for name in t.names for column in axes.columns_of(name)]
-
-    def cost(self, factors: NDArray[np.float64]) -> float:
-        return sum(cost.at(float(f)) for cost, f in zip(self.costs, factors, strict=True))
 
 
 def allocate(
@@ -154,32 +162,96 @@ def allocate(
     >>> {row["tolerance"]: round(row["factor"], 1) for row in answer.tables["tolerances"].rows}
     {'pin4.tilt_t': 1.0, 'pin[12].offset_t': 0.8}
     """
-    _check_joints(view)
+    view.check_drawn()
+    view.check("mean")
+    if view.study.groups:
+        remedy = 'give the file of a study with sampling.method = "random"'
+        found = "holds joints that share errors with others, so that one half of them is no check of the other"
+        raise store_error(view.path, found, remedy)
     request = _read_request(view, targets, costs, keep or ())
     done = np.flatnonzero(view.status != Status.PENDING)
-    above = np.column_stack([_above(view, statement) for statement in request.statements])[done]
+    events = [_above(view, statement, done) for statement in request.statements]
     searched, checked = allocation.halves(view.design.units(view.n)[done], MAX_SEARCHED)
     if len(checked) < 4 * reweight.LEAST_ESS:
-        found = f"has {len(done)} joints simulated"
-        raise StoreError(str(Fault(str(view.path), found, f"run {8 * reweight.LEAST_ESS} joints or more")))
-    choice = _search(view, request, above[searched], done[searched])
+        remedy = f"run {8 * reweight.LEAST_ESS} joints or more"
+        raise store_error(view.path, f"has {len(done)} joints simulated", remedy)
+    choice = _search(view, request, np.column_stack([own[0][searched] for own in events]), done[searched])
     entries = {
         t.pattern: t.scaled(float(f), DIGITS)
         for t, f in zip(request.tolerances, choice.factors, strict=True)
         if abs(f - 1) > MIN_CHANGE
     }
-    ratios = _check_ratios(view, request, entries, done[checked])
-    ends = [_ends_above(view, statement, done[checked]) for statement in request.statements]
-    limits = _limits(view, request.statements, above, above[checked], ends, ratios, delivery)
-    own = limits[: len(request.statements)]
-    needed = ratios.effective * max(
-        allocation.joints_needed(row["estimate"], row["ess"], row["target"], CONFIDENCE) for row in own
-    )
+    blocks = [
+        DensityRatios(view.study, request.tolerances, errors).of_entries(entries)
+        for errors in view.error_blocks(request.columns)
+    ]
+    ratios = _ratios(np.concatenate([logs for logs, _ in blocks])[done[checked]], blocks[-1][1])
+    judged: list[_Judged] = [(one.text, one.bound, own) for one, own in zip(request.statements, events, strict=True)]
+    if len(events) > 1:  # with both ends of the numerical error where it is known of all
+        judged.append((ANY_LIMIT, np.nan, [np.any(own, axis=0) for own in zip(*events, strict=False)]))
+    limits = [_limit(view, one, checked, ratios, delivery) for one in judged]
+    each = [(row["estimate"], row["ess"], row["target"]) for row in limits[: len(events)]]
+    needed = ratios.effective * max(allocation.joints_needed(*own, CONFIDENCE) for own in each)
     limits = [row if row["usable"] else row | dict.fromkeys(WITHHELD, np.nan) for row in limits]
-    holds, verdict = _verdict(limits[: len(own)], ratios, needed)
+    holds, verdict = _verdict(limits[: len(events)], ratios, needed)
     facts = {"holds": holds, "verdict": verdict, "aim": choice.aim, "effective": ratios.effective}
     facts |= {"joints_needed": needed, "entries": entries}
     return Answer("allocate", "Tolerances proposed", _parts(view, _tolerances(request, entries), limits, facts), facts)
+
+
+class DensityRatios:
+    """Logarithms of new over old density of joints; terms of the factors used last are kept.
+
+    Parameters
+    ----------
+    study : Study
+        Study that the joints were drawn for.
+    tolerances : sequence of Tolerance
+        Tolerances that the factors scale.
+    errors : ndarray, shape (n,)
+        Errors of the joints, a table with the columns that the tolerances are for.
+    """
+
+    def __init__(self, study: Study, tolerances: Sequence[Tolerance], errors: NDArray[np.void]) -> None:
+        self._tolerances = tolerances
+        self._values = [[sampling.values(study, errors, name) for name in t.names] for t in tolerances]
+        self._old = [t.distribution(t.entry) for t in tolerances]
+        self._old_density = [self._log_density(i, old) for i, old in enumerate(self._old)]
+        keep = lru_cache(maxsize=4 * len(tolerances))
+        self._log_ratio = keep(lambda i, f: self._log_density(i, self._scaled(i, f)) - self._old_density[i])
+        self._exact = keep(lambda i, f: of_error(self._scaled(i, f), self._old[i]))
+
+    def log_ratios(self, factors: FloatArray) -> FloatArray:
+        """Logarithms of the ratios for tolerances scaled by factors, (n,)."""
+        return np.asarray(sum(self._log_ratio(i, float(f)) for i, f in enumerate(factors)))
+
+    def exact(self, factors: FloatArray) -> Exact:
+        """Exact numbers of the ratio for tolerances scaled by factors."""
+        return self._sum(self._exact(i, float(f)) for i, f in enumerate(factors))
+
+    def of_entries(self, entries: Entries) -> tuple[FloatArray, Exact]:
+        """Logarithms of the ratios for changed entries, (n,), and their exact numbers."""
+        new = [t.distribution(entries.get(t.pattern, t.entry)) for t in self._tolerances]
+        logs = np.asarray(sum(self._log_density(i, own) for i, own in enumerate(new)) - sum(self._old_density))
+        return logs, self._sum(of_error(*pair) for pair in zip(new, self._old, strict=True))
+
+    def _sum(self, each: Iterable[Exact]) -> Exact:
+        """Sum over errors, of which a tolerance may have several."""
+        found = np.array([len(t.names) * np.array(own) for t, own in zip(self._tolerances, each, strict=True)])
+        return Exact(*found.sum(axis=0).tolist())
+
+    def _scaled(self, i: int, factor: float) -> Distribution:
+        old, t = self._old[i], self._tolerances[i]
+        # as the scaled entry gives it, but without parsing
+        if isinstance(old, Normal):
+            mean = old.mean if t.fixed is None else t.fixed + factor * (old.mean - t.fixed)
+            return replace(old, mean=mean, sigma=factor * old.sigma)
+        if isinstance(old, Rayleigh) and old.upper is None:
+            return replace(old, sigma=factor * old.sigma)
+        return t.distribution(t.scaled(factor))
+
+    def _log_density(self, i: int, distribution: Distribution) -> FloatArray:
+        return np.asarray(sum(distribution.logpdf(values) for values in self._values[i]))
 
 
 def _parts(view: View, tolerances: Rows, limits: Rows, facts: Row) -> list[Part]:
@@ -187,12 +259,7 @@ def _parts(view: View, tolerances: Rows, limits: Rows, facts: Row) -> list[Part]
     entries = facts["entries"]
     parts: list[Part] = [
         Table("tolerances", "Tolerances and their costs", TOLERANCES, tolerances),
-        Table(
-            "limits",
-            "Shares of the joints above the levels, before and as proposed",
-            LIMITS,
-            limits,
-        ),
+        Table("limits", "Shares of the joints above the levels, before and as proposed", LIMITS, limits),
     ]
     if entries:
         parts.append(Listing("[tolerances]", "\n".join(scaling.line(*item) for item in entries.items())))
@@ -222,27 +289,8 @@ def _verdict(limits: Rows, ratios: Ratios, needed: float) -> tuple[bool, str]:
     return False, f"needs new runs: {step} ({figures})"
 
 
-def _check_ratios(view: View, request: _Request, entries: Entries, samples: NDArray[np.intp]) -> Ratios:
-    """Density ratios of the joints of the check, for changed entries."""
-    logs = []
-    for errors in view.error_blocks(request.columns):
-        block = DensityRatios(view.study, request.tolerances, errors)
-        logs.append(block.of_entries(entries))
-    return _ratios(np.concatenate(logs)[samples], block.exact_of_entries(entries))
-
-
 def _ratios(logs: NDArray[np.float64], exact: Exact) -> Ratios:
     return Ratios(np.exp(logs), exact.mean_square, exact.unbounded, float(np.exp(exact.largest)))
-
-
-def _check_joints(view: View) -> None:
-    """Refuse joints that are not drawn from tolerances, all with the same weight and independently of each other."""
-    view.check_drawn()
-    view.check("mean")
-    if view.study.groups:
-        remedy = 'give the file of a study with sampling.method = "random"'
-        found = "holds joints that share errors with others, so that one half of them is no check of the other"
-        raise StoreError(str(Fault(str(view.path), found, remedy)))
 
 
 def _read_request(view: View, targets: Sequence[str], costs: Path | None, keep: Sequence[str]) -> _Request:
@@ -269,27 +317,22 @@ def _read_request(view: View, targets: Sequence[str], costs: Path | None, keep: 
         own_costs = prices.of(every, costs)
     if faults:
         raise InputError(faults)
-    free = [
-        (t, cost)
-        for t, cost in zip(every, own_costs, strict=True)
-        if not kept_names & set(t.names) and cost.reach[0] < cost.reach[1]
-    ]
+    free = [pair for pair in zip(every, own_costs, strict=True) if pair[1].reach[0] < pair[1].reach[1]]
+    free = [(t, cost) for t, cost in free if not kept_names & set(t.names)]
     if not free:
         remedy = "name some in --costs, or leave --keep out; measured, lognormal and correlated errors stay as they are"
         raise InputError([Fault("--costs", "leaves no tolerance that may change", remedy)])
     return _Request(statements, [t for t, _ in free], [cost for _, cost in free])
 
 
-def _above(view: View, statement: Statement) -> NDArray[np.bool_]:
-    """Which joints are above the level in any load of a statement, or have no valid load, (n,)."""
-    load = view.load_of(statement.limit)
-    return np.asarray(~load.is_valid | (load.values > statement.limit.level))
+def _above(view: View, statement: Statement, done: NDArray[np.intp]) -> list[NDArray[np.bool_]]:
+    """Which joints are above the level in any load of a statement, or have no valid load, (n,).
 
-
-def _ends_above(view: View, statement: Statement, samples: NDArray[np.intp]) -> list[NDArray[np.bool_]]:
-    """As `_above` with both ends of the numerical error near the limit, for some samples; empty if it is not known."""
-    ends = error_budget.near(view, view.load_of(statement.limit)) or ()
-    return [(~load.is_valid | (load.values > statement.limit.level))[samples] for load in ends]
+    Where the numerical error near the limit is known, also with both of its ends.
+    """
+    load, level = view.load_of(statement.limit), statement.limit.level
+    loads = (load, *(error_budget.near(view, load) or ()))
+    return [(~own.is_valid | (own.values > level))[done] for own in loads]
 
 
 def _search(view: View, request: _Request, above: NDArray[np.bool_], samples: NDArray[np.intp]) -> allocation.Choice:
@@ -298,11 +341,11 @@ def _search(view: View, request: _Request, above: NDArray[np.bool_], samples: ND
     reach = np.array([cost.reach for cost in request.costs])
     problem = allocation.Problem(
         log_ratios=ratios.log_ratios,
-        log_spread=ratios.log_mean_square,
+        log_spread=lambda factors: ratios.exact(factors).mean_square,
         usable=lambda factors: _ratios(ratios.log_ratios(factors), ratios.exact(factors)).usable,
         above=above,
         targets=np.array([statement.bound for statement in request.statements]),
-        cost=request.cost,
+        cost=lambda factors: sum(cost.at(float(f)) for cost, f in zip(request.costs, factors, strict=True)),
         lower=reach[:, 0],
         upper=np.where([t.widens for t in request.tolerances], reach[:, 1], 1.0),
         iid=view.design.has_interval("reweighting"),
@@ -311,54 +354,20 @@ def _search(view: View, request: _Request, above: NDArray[np.bool_], samples: ND
     return allocation.search(problem)
 
 
-def _limits(
-    view: View,
-    statements: Sequence[Statement],
-    above: NDArray[np.bool_],
-    above_checked: NDArray[np.bool_],
-    ends: Sequence[Sequence[NDArray[np.bool_]]],
-    ratios: Ratios,
-    delivery: int,
-) -> list[dict[str, Any]]:
-    """Rows of the table ``limits``.
+def _limit(view: View, judged: _Judged, checked: NDArray[np.intp], ratios: Ratios, delivery: int) -> dict[str, Any]:
+    """One row of the table ``limits``; `checked` are the joints of the check."""
+    name, target, above = judged
+    samples = [Sample.of(own[checked], np.full(checked.size, Status.OK), view.design) for own in above]
 
-    `above`, `above_checked` and `ends` tell which joints are above each limit: all of them, those of the check, and
-    these with both ends of the numerical error.
-    """
-    rows = [
-        _limit(view, (s.text, s.bound), above[:, i], [above_checked[:, i], *ends[i]], ratios, delivery)
-        for i, s in enumerate(statements)
-    ]
-    if len(statements) > 1:
-        worst = [np.any(parts, axis=0) for parts in zip(*ends, strict=True)] if all(ends) else []
-        checked = [np.any(above_checked, axis=1), *worst]
-        rows.append(_limit(view, (ANY_LIMIT, np.nan), np.any(above, axis=1), checked, ratios, delivery))
-    return rows
+    def estimated(confidence: float) -> tuple[reweight.Share, float, float]:
+        shares = [reweight.share_above(sample, ratios, 0.5, confidence) for sample in samples]
+        return shares[0], min(share.lower for share in shares), max(share.upper for share in shares)
 
-
-def _limit(
-    view: View,
-    target: tuple[str, float],
-    above: NDArray[np.bool_],
-    checked: Sequence[NDArray[np.bool_]],
-    ratios: Ratios,
-    delivery: int,
-) -> dict[str, Any]:
-    """One row of the table ``limits``."""
-
-    def shares(confidence: float) -> list[reweight.Share]:
-        samples = [Sample.of(own, np.full(own.size, Status.OK), view.design) for own in checked]
-        return [reweight.share_above(sample, ratios, 0.5, confidence) for sample in samples]
-
-    def widest(shares: Sequence[reweight.Share]) -> tuple[float, float]:
-        return min(share.lower for share in shares), max(share.upper for share in shares)
-
-    found = shares(CONFIDENCE)
-    row = {"limit": target[0], "target": target[1], "before": float(above.mean()), "estimate": found[0].estimate}
-    row["lower"], row["upper"] = widest(found)
-    following = prediction.of_share(*widest(shares(prediction.half(CONFIDENCE))), delivery, CONFIDENCE)
-    row |= prediction.columns(following, delivery)
-    return row | {"ess": found[0].ess, "usable": found[0].support.usable, "numerical": len(checked) > 1}
+    share, lower, upper = estimated(CONFIDENCE)
+    row = {"limit": name, "target": target, "before": float(above[0].mean()), "estimate": share.estimate}
+    following = prediction.of_share(*estimated(prediction.half(CONFIDENCE))[1:], delivery, CONFIDENCE)
+    row |= {"lower": lower, "upper": upper} | prediction.columns(following, delivery)
+    return row | {"ess": share.ess, "usable": share.support.usable, "numerical": len(above) > 1}
 
 
 def _tolerances(request: _Request, entries: Entries) -> list[dict[str, Any]]:

@@ -1,10 +1,11 @@
-"""Share of the joints above a limit if a line of the drawing had another width, from joints with the same seeds."""
+"""Share of the joints above a limit if a line of the drawing were changed, from joints with the same seeds."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from itertools import pairwise
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,22 +13,23 @@ import numpy as np
 from tolstat.analysis import difference, pick_freeze
 from tolstat.analysis.sample import Sample
 from tolstat.campaign import what_if as sets
-from tolstat.common.errors import Fault, StoreError
 from tolstat.common.loads import ANY_LIMIT, FloatArray
 from tolstat.common.tables import Status
 from tolstat.display import text
 from tolstat.display.table import Row, Rows
+from tolstat.questions.causes.indices import TAIL_STARTS_AT, check_sample
 from tolstat.store import what_if as kept
+from tolstat.store.hdf5 import store_error
 from tolstat.store.view import View
 from tolstat.store.what_if import Altered
-from tolstat.study import widths
+from tolstat.study import Study, scaling, widths
+from tolstat.study.costs import Cost
+from tolstat.study.costs import of as prices_of
 from tolstat.study.points import at
 from tolstat.study.widths import COARSER, EXACT, FINER, HALF, STEPS, Line
 
 NEGLIGIBLE = 0.1
 """Difference of two lines that does not matter for their order, relative to the share of the joints as drawn."""
-TAIL_STARTS_AT = 0.9
-"""Quantile of the load that takes the place of a limit where the study sets none."""
 ENDS = ("", "_lower", "_upper")
 """Ends of the keys of an estimate and its interval."""
 INDICES = tuple(f"{name}{word}{end}" for name in ("", "above_") for word in ("alone", "in_all") for end in ENDS)
@@ -50,9 +52,11 @@ class Lines(NamedTuple):
         whose width is not changed; ``settled``, whether the order of the lines is: neighbours differ, or by less than
         `NEGLIGIBLE` of the share.
     rows : sequence of mapping
-        One row per line and step, lines in the order of their share if half as wide: ``line``, ``names``, ``size``,
-        ``step``, ``words``, ``factor`` (NaN if it differs within the line), ``n``, ``share`` with ``_lower`` and
-        ``_upper``, and ``change`` from the joints as drawn, with ends; see `Joints.estimates`.
+        One row per line and step, lines in the order of their share if half as wide or with the best other fit:
+        ``line``, ``names``, ``size``, ``step`` (of a fit the other code), ``words``, ``factor`` (NaN if it differs
+        within the line, and of a fit), ``n``, ``share`` with ``_lower`` and ``_upper``, and ``change`` from the joints
+        as drawn, with ends; see `Joints.estimates`. Where costs are given, ``cost`` of the line after the step and
+        ``extra_cost``, how much more that is than as drawn; NaN where it has none.
     indices : sequence of mapping
         One row per line that can be exchanged: ``line``, ``pairs``; ``alone`` and ``in_all`` with ends, the closed and
         total Sobol' index of the load, or of its logarithm; ``above_alone`` and ``above_in_all``, those of the event
@@ -65,20 +69,25 @@ class Lines(NamedTuple):
 
     @property
     def by_line(self) -> Rows:
-        """One row per line, with the numbers of each step behind its name: ``half``, ``half_lower``, ``half_change``.
+        """One row per line that is no fit, with the numbers of each step behind its name.
 
-        ``by`` has the words of the steps that follow classes; keys of steps that are not simulated are missing.
+        ``half``, ``half_lower``, ``half_change``, ``half_cost``; ``by`` has the words of the steps that follow
+        classes. Keys of steps that are not simulated are missing.
         """
         found: dict[str, dict[str, Any]] = {}
         for row in self.rows:
-            step, line = (
-                row["step"],
-                found.setdefault(row["line"], {"line": row["line"], "size": row["size"], "by": []}),
-            )
-            line |= {f"{step}{end}": row[f"share{end}"] for end in ENDS}
-            line |= {f"{step}_change{end}": row[f"change{end}"] for end in ENDS}
-            line["by"] += [row["words"]] if step in (FINER, COARSER) else []
+            if (step := row["step"]) in STEPS:
+                line = found.setdefault(row["line"], {"line": row["line"], "size": row["size"], "by": []})
+                line |= {f"{step}{end}": row[f"share{end}"] for end in ENDS}
+                line |= {f"{step}_change{end}": row[f"change{end}"] for end in ENDS}
+                line |= {f"{step}_cost": row.get("extra_cost", np.nan)}
+                line["by"] += [row["words"]] if step in (FINER, COARSER) else []
         return list(found.values())
+
+    @property
+    def other_fits(self) -> Rows:
+        """Those of `rows` that have another fit."""
+        return [row for row in self.rows if row["step"] not in STEPS]
 
     @property
     def event(self) -> str:
@@ -92,12 +101,17 @@ class Lines(NamedTuple):
 
     @property
     def best(self) -> Row | None:
-        """Row of the line that lowers the share most if half as wide; None if none surely lowers it."""
-        rows = [row for row in self.rows if row["step"] == HALF and row["change_upper"] < 0.0]
+        """Row of the line half as wide, or of the other fit, that lowers the share most; None if none surely does."""
+        rows = [row for row in self.rows if is_decisive(row["step"]) and row["change_upper"] < 0.0]
         return min(rows, key=lambda row: float(row["share"]), default=None)
 
 
-def evaluate(view: View, by: str) -> Lines | None:
+def is_decisive(step: str) -> bool:
+    """Whether a line has its place in the order by this step: half as wide, or another fit."""
+    return step == HALF or step not in STEPS
+
+
+def evaluate(view: View, by: str, costs: Path | None = None) -> Lines | None:
     """Evaluate the joints with other widths that a file holds.
 
     Parameters
@@ -106,33 +120,35 @@ def evaluate(view: View, by: str) -> Lines | None:
         A campaign whose joints are drawn from tolerances.
     by : str
         A load that can have a limit (``cross1.F``, ``pin2.contact``, ``psi``), or ``"any limit"`` of the study.
+    costs : Path, optional
+        Table of the costs of tolerances, see `study.costs.of`.
 
     Returns
     -------
     Lines or None
-        None where the file holds no such joints (`lines_run.simulate` adds them). All intervals are 95 %.
+        None where the file holds no such joints (`simulation.simulate` adds them). All intervals are 95 %.
 
     Raises
     ------
     InputError
-        When there is no such load, or the study does not keep it.
+        When there is no such load, or the study does not keep it; with every fault of the costs.
     StoreError
         When the joints are not drawn from tolerances, or differ in weight.
     """
     check(view)
     joints = Joints(view, by, view.altered)
     rows = joints.rows() if np.isfinite(joints.base).any() else []
+    rows = rows if costs is None else _with_costs(view.study, rows, costs)
     if not rows:
         return None
     lines, entries = list(dict.fromkeys(row["line"] for row in rows)), widths.lines(view.study)
+    decisive = {row["line"] for row in rows if is_decisive(row["step"])}
     facts = {"load": by, "unit": joints.load.unit, "level": joints.level, "n": len(joints.base)}
     facts |= dict(zip(("share", "lower", "upper"), joints.share(joints.base), strict=True))
-    halves = {row["line"] for row in rows if row["step"] == HALF}
-    settled = joints.settled([line for line in entries if line.label in halves])
-    facts |= {"logarithmic": joints.load.long_tailed, "settled": settled}
-    missing = [line.label for line in entries if line.label not in lines]
-    facts |= {"missing": missing, "left_out": widths.left_out(view.study)}
-    return Lines(facts, rows, joints.indices(lines))
+    facts |= {"logarithmic": joints.load.long_tailed}
+    facts |= {"settled": joints.settled([line for line in entries if line.label in decisive])}
+    facts |= {"missing": [line.label for line in entries if line.label not in lines]}
+    return Lines(facts | {"left_out": widths.left_out(view.study)}, rows, joints.indices(lines))
 
 
 def check(view: View) -> None:
@@ -143,14 +159,10 @@ def check(view: View) -> None:
     StoreError
         The hint names what can be used.
     """
-    view.check_drawn()
-    view.check("difference")
-    if view.study.groups:
-        remedy = 'give the file of a study with sampling.method "random", "sobol" or "lhs"'
-        raise StoreError(str(Fault(str(view.path), "holds a pick-freeze design", remedy)))
+    check_sample(view, "difference")
     if not view.store.whole:
         remedy = "merge all slices first: tolstat merge SLICE... --out FILE"
-        raise StoreError(str(Fault(str(view.path), "holds a part of the campaign only", remedy)))
+        raise store_error(view.path, "holds a part of the campaign only", remedy)
 
 
 def own_joints(view: View) -> int:
@@ -178,7 +190,7 @@ class Joints:
     load : Sample
         The load in the campaign.
     level : float
-        Its limit; without one, its quantile `TAIL_STARTS_AT`.
+        Its limit; without one, its quantile `indices.TAIL_STARTS_AT`.
     base : ndarray, shape (n,)
         Load of the joints as drawn, from sample 0 on, NaN without a valid one: the campaign's, then fresh ones.
     """
@@ -203,11 +215,25 @@ class Joints:
         return np.asarray(np.maximum.reduce([one.valid(names) / level for names, level in self._parts]))
 
     def settled(self, lines: Sequence[Line], confidence: float = 0.95) -> bool:
-        """Whether the file has all these lines half as wide, and their order is settled, see `is_settled`."""
-        halves = {about["label"]: self.of(one) for about, one in self._changes(sets.WIDTH) if about["step"] == HALF}
-        if any(line.label not in halves for line in lines):
-            return False
-        return is_settled([halves[line.label] for line in lines], self.base, self.level, confidence)
+        """Whether the file has all these lines half as wide, or with other fits, and their order `is_settled`."""
+        loads = [self.decisive(line) for line in lines]
+        known = [values for _, values in loads if values is not None]
+        return len(known) == len(loads) and is_settled(known, self.base, self.level, confidence)
+
+    def decisive(self, line: Line) -> tuple[str, FloatArray | None]:
+        """Step that a line has its place in the order by, and the load of the joints with it; None without these.
+
+        Of a fit it is the other fit that lowers the share most.
+        """
+        found = {
+            about["step"]: self.of(one)
+            for about, one in self._changes(sets.WIDTH, sets.FIT)
+            if about["label"] == line.label and is_decisive(about["step"])
+        }
+        if not found:
+            return widths.steps(self._study, line)[0], None
+        step = min(found, key=lambda own: self._difference(self.base, found[own][: len(self.base)])[0])
+        return step, found[step]
 
     def share(self, values: FloatArray) -> Estimate:
         """Share of joints above the level."""
@@ -231,25 +257,30 @@ class Joints:
         return _sum(share, further, 0.0), _sum(change, further, -1.0)
 
     def rows(self) -> list[dict[str, Any]]:
-        """Rows of `Lines.rows`: lines by their share if half as wide, then if exact, those without these behind."""
+        """Rows of `Lines.rows`: lines by their decisive share, then by that if exact, those without these behind."""
         held: dict[Line, dict[str, Any]] = {}
-        for about, one in self._changes(sets.WIDTH):
+        for about, one in self._changes(sets.WIDTH, sets.FIT):
             values = self.of(one)[: len(self.base)]
             if np.isfinite(values + self.base[: len(values)]).any():
                 held.setdefault(Line(about["label"], tuple(about["tolerances"])), {})[about["step"]] = about, values
         rows, places = [], dict[str, tuple[int, float]]()
         for line, steps in held.items():
-            size = widths.size(self._study, line)
+            about_line = {"line": line.label, "names": line.names, "size": widths.size(self._study, line)}
             for step, (about, values) in steps.items():
                 half = steps[HALF][1] if step in (EXACT, FINER) and HALF in steps else None
                 share, change = self.estimates(values, half)
-                factors = {own["factor"] for own in about["tolerances"].values()}
-                row = {"line": line.label, "names": line.names, "size": size, "step": step, "words": about["words"]}
+                factors = {own.get("factor", np.nan) for own in about["tolerances"].values()}
+                row = {**about_line, "step": step, "words": about["words"]}
                 row |= {"factor": factors.pop() if len(factors) == 1 else np.nan, "n": len(values)}
                 rows.append(row | _named("share", share) | _named("change", change))
-                place = {HALF: 0, EXACT: 1}.get(step, 2), share[0]
+                place = 0 if is_decisive(step) else 1 if step == EXACT else 2, share[0]
                 places[line.label] = min(places.get(line.label, place), place)
-        return sorted(rows, key=lambda row: (*places[row["line"]], row["line"], STEPS.index(row["step"])))
+        orders = {step: (place, 0.0) for place, step in enumerate(STEPS)}
+
+        def order(row: Row) -> Any:
+            return *places[row["line"]], row["line"], orders.get(row["step"], (0, row["share"]))
+
+        return sorted(rows, key=order)
 
     def indices(self, lines: Sequence[str]) -> list[dict[str, Any]]:
         """Rows of `Lines.indices`, in the order of these lines."""
@@ -271,15 +302,33 @@ class Joints:
             rows.append(row)
         return sorted(rows, key=lambda row: lines.index(row["line"]))
 
-    def _changes(self, kind: str) -> list[tuple[Mapping[str, Any], Altered]]:
-        """Changes of a kind that have the load from the first joint on."""
+    def _changes(self, *kinds: str) -> list[tuple[Mapping[str, Any], Altered]]:
+        """Changes of some kinds that have the load from the first joint on."""
         every = self._held.values()
-        return [(one.about, one) for one in every if one.about["kind"] == kind and not one.first and self.holds(one)]
+        return [(one.about, one) for one in every if one.about["kind"] in kinds and not one.first and self.holds(one)]
 
     def _difference(self, a: FloatArray, b: FloatArray) -> Estimate:
         """Share of B above the level less that of A, joint by joint; A may have more joints."""
         found = difference.shares(_sample(a[: len(b)]), _sample(b), [self.level], paired=True)
         return float(found.estimate[0]), float(found.outer_lower[0]), float(found.outer_upper[0])
+
+
+def _with_costs(study: Study, rows: list[dict[str, Any]], table: Path) -> list[dict[str, Any]]:
+    """Rows with the cost of the line after the step, and what that is more than as drawn."""
+    tolerances = scaling.tolerances(study)
+    prices = {
+        name: Cost(cost.width, (entry,))
+        for tolerance, cost in zip(tolerances, prices_of(tolerances, table), strict=True)
+        for name, entry in zip(tolerance.names, cost.entries, strict=True)
+        if not entry.keep
+    }
+    for row in rows:
+        factors = widths.factors(study, Line(row["line"], row["names"]), row["step"])
+        known = all(name in prices and factor > 0.0 for name, factor in factors.items())
+        cost = sum(prices[name].at(factor) for name, factor in factors.items()) if known else np.nan
+        before = sum(prices[name].at(1.0) for name in factors) if known else np.nan
+        row |= {"cost": cost, "extra_cost": cost - before}
+    return rows
 
 
 def names_at_points(view: View, load: str) -> tuple[str, ...]:

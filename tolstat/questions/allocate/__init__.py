@@ -1,1 +1,0 @@
-"""Cheapest tolerances with which limits are kept."""

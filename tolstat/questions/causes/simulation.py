@@ -1,0 +1,201 @@
+"""Simulate the joints that the lines of the drawing are compared on, until the order of the lines is settled."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from tolstat.campaign import what_if as sets
+from tolstat.campaign.pool import kept_workers
+from tolstat.campaign.what_if import Asked, Change
+from tolstat.campaign.work import Work
+from tolstat.common.cores import available_cores
+from tolstat.common.loads import ANY_LIMIT, split
+from tolstat.display.progress import clock
+from tolstat.questions.causes import shares
+from tolstat.solver.compilation import warm_up
+from tolstat.store import Writer, what_if
+from tolstat.store.hdf5 import store_error
+from tolstat.store.provenance import versions
+from tolstat.store.view import View
+from tolstat.study import widths
+from tolstat.study.points import names_of
+from tolstat.study.widths import STEPS, Line
+
+FIRST, LEAST, MOST = 1024, 128, 16_384
+"""Number of joints of each change at the first look, the smallest if time is short, and by default the largest."""
+PILOT = 64
+"""Number of joints whose time is measured."""
+RELIABLE = 2000
+"""Number of simulated joints whose time, with the start of the workers, says more than the pilot's."""
+BUDGET_S = 300.0
+"""Default time limit, s."""
+
+Each = Literal["entry", "feature", "error"]
+"""What a line is."""
+LINES = {"entry": widths.lines, "feature": widths.features, "error": widths.errors}
+"""Lines of a study by what they are."""
+
+
+def simulate(
+    path: Path,
+    work: Work,
+    by: str | None = None,
+    each: Each = "entry",
+    group: Sequence[str] = (),
+    budget: float = BUDGET_S,
+    most: int = MOST,
+) -> list[Path]:
+    """Simulate joints with each line changed, and keep their loads in the file.
+
+    Of several operating points those that `by` or a limit of the study is about. Ends when the order of the lines is
+    settled, the time is up, or each change has `most` joints. What is done by then stays in the file; the same call
+    goes on.
+
+    Parameters
+    ----------
+    path : Path
+        Result file of a campaign whose joints are drawn from tolerances.
+    work : Work
+        Workers, progress and messages.
+    by : str, optional
+        Load whose limit orders the lines; by default all limits together, or the only one.
+    each : {"entry", "feature", "error"}
+        A line is an entry of [tolerances], a pin with its hole, or an error.
+    group : sequence of str
+        Errors that are changed together, too: ``"tilts = pin*.tilt_*, hole*.tilt_*"``.
+    budget : float
+        Time limit, s.
+    most : int
+        Largest number of joints of each change.
+
+    Returns
+    -------
+    list of Path
+        The file.
+
+    Raises
+    ------
+    InputError
+        With every fault of `group`, or when there is no such load.
+    StoreError
+        When the file cannot be used, or was made by other code.
+    """
+    with Writer.open(path) as store, kept_workers():
+        view = View(store)
+        shares.check(view)
+        load = by or view.decisive
+        view.load(load)  # which refuses what is none
+        if any(store.versions.get(name) != versions()[name] for name in ("tolstat", "sources")):
+            remedy = "use that version, or run the campaign again: tolstat run STUDY --out OTHER.h5"
+            raise store_error(path, "was made by another version of the code", remedy)
+        lines = [*LINES[each](view.study), *widths.named(view.study, group)]
+        if not lines:
+            remedy = 'name what a study can change: --group "tilts = pin*.tilt_*, hole*.tilt_*"'
+            raise store_error(path, "has no line that can be changed", remedy)
+        warm_up()
+        work.tell("each change is one line of the drawing; all else of the joint stays as drawn")
+        work.tell(_Looks(store, view, lines, load, work, budget, most).run())
+    return [path]
+
+
+def points_of(view: View, by: str) -> tuple[str, ...]:
+    """Operating points that a load, a limit or joints in the file are about; all of them if there is no limit."""
+    every = tuple(view.store.points)
+    asked = () if by == ANY_LIMIT else (by,)
+    names = [*asked, *(view.limits or ("",)), *(name for one in view.altered.values() for name in one.names)]
+    chosen = {point for name in names for point in names_of(split(name)[1], every, name)}
+    return tuple(point for point in every if point in chosen)
+
+
+class _Looks:
+    """Looks at the order of the lines, each with more joints of the changes than the one before."""
+
+    def __init__(
+        self, store: Writer, view: View, lines: Sequence[Line], load: str, work: Work, budget: float, most: int
+    ) -> None:
+        self._budget, self._end, self._most = budget, time.monotonic() + budget, most
+        self._store, self._view, self._lines, self._load, self._work = store, view, lines, load, work
+        self._workers = work.workers or available_cores()
+        self._held, self._asked = what_if.read(store), Asked(view.kept_loads, points_of(view, load))
+        options = sets.options_of(view.study, store)
+        self._seconds = sets.seconds_per_joint(view.study, options, PILOT, self._asked.points) / self._workers
+        self._own = shares.own_joints(view)
+        self._looks, self._simulated, self._cut = 0, 0, False
+
+    @property
+    def _left(self) -> float:
+        return self._end - time.monotonic()
+
+    def run(self) -> str:
+        """Look until the order is settled, then bring the other steps to as many joints; returns what was done."""
+        # those of the campaign at first, fewer if half of the budget does not suffice for them
+        changes = sum(len(widths.steps(self._view.study, line)) + 0.5 for line in self._lines) + 1.0
+        affordable = int(0.5 * self._budget / (self._seconds * changes))
+        n = max(LEAST, min(self._own if LEAST < self._own < FIRST else FIRST, affordable, self._most))
+        confidence = 1.0 - 0.05 / (1 + math.ceil(math.log2(max(self._most / n, 1.0))))
+        settled = self._look(n, confidence)
+        while not settled:
+            affordable = n + int(0.9 * self._left / (self._seconds * (len(self._lines) + 1.0)))
+            more = min(2 * n, affordable, self._most)
+            if more <= 1.1 * n:
+                break
+            n, settled = more, self._look(more, confidence, decisive=True)
+        if self._simulated and self._left > 0.0:
+            settled = self._look(n, confidence)
+        more_of = "a larger --most" if n >= self._most else "a longer --budget"
+        order = "settled" if settled else f"not settled: {more_of} goes on"
+        done = f"simulated {self._simulated} joints in {self._budget - self._left:.0f} s"
+        return f"{done}, {'up to ' if self._cut else ''}{n} of each change; order of lines {order}"
+
+    def _look(self, n: int, confidence: float, decisive: bool = False) -> bool:
+        """Simulate what is missing of `n` joints of each line after all its steps, or after its `decisive` one.
+
+        Returns
+        -------
+        bool
+            Whether the order of the lines is settled then.
+        """
+        wanted, left = self._wanted(n, decisive), self._left
+        self._looks += 1
+        if lacking := self._lacking(wanted):
+            needed, points = self._seconds * lacking, self._asked.points
+            where = f" at {', '.join(points)}" if all(points) else ""
+            cost = f"about {clock(needed)} on {self._workers} processes"
+            cost += f", of which {clock(max(left, 0.0))} are left" if needed > left else ""
+            lines = f"{len(self._lines)} lines, {n} joints of each change"
+            self._work.tell(f"{lines}: {lacking} joints to simulate{where}, {cost}")
+            self._work.display.stage(f"look {self._looks}", left)
+            stop, shown = (lambda: self._left <= 0.0), self._work.display
+            self._held = sets.simulate(self._view.study, self._store, wanted, self._asked, self._workers, stop, shown)
+            done = lacking - (still := self._lacking(wanted))
+            self._cut = still > 0
+            if done > RELIABLE:
+                self._seconds = (left - self._left) / done
+            self._simulated += done
+        return shares.Joints(self._view, self._load, self._held).settled(self._lines, confidence)
+
+    def _lacking(self, wanted: Sequence[Change]) -> int:
+        names = self._asked.names(self._view.study)
+        return sum(len(sets.missing(self._held, one, names)) for one in wanted)
+
+    def _wanted(self, n: int, decisive: bool) -> list[Change]:
+        """Sets of a look, what the order needs first."""
+        study, lines = self._view.study, self._lines
+        found = [sets.as_drawn(study, range(self._own, n))] if n > self._own else []
+        if decisive:
+            joints = shares.Joints(self._view, self._load, self._held)
+            return found + [sets.stepped(study, line, joints.decisive(line)[0], range(n)) for line in lines]
+        each = [(line, step) for line in lines for step in widths.steps(study, line)]
+        each.sort(key=lambda own: STEPS.index(own[1]) if own[1] in STEPS else 0)
+        found += [sets.stepped(study, line, step, range(n)) for line, step in each]
+        for line in lines:
+            inside = np.array([name in line.names for name in study.copula.names], bool)
+            if not study.copula.matrix[inside][:, ~inside].any():  # else an exchange would break the correlation
+                found.append(sets.exchanged(study, line, range(n // 2)))
+        return found

@@ -1,4 +1,4 @@
-"""The command line: commands of questions are made by `_questions`, the others are one file each."""
+"""The command line: functions of questions come from `_questions`, the others are one file each."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from importlib import import_module
 from typing import Any
 
 from tolstat.cli._app import LISTED, Listed, app, main
+from tolstat.cli._shortage import check_memory
 from tolstat.questions import QUESTIONS, Question
 
 __all__ = ["LISTED", "PLAIN", "app", "main"]
@@ -41,19 +42,21 @@ and the first line of its docstring."""
 
 
 def _plain(name: str) -> Callable[..., None]:
+    if name in ("run", "extend"):
+        check_memory()  # before libraries are loaded
     function: Callable[..., None] = getattr(import_module(f"tolstat.cli.{name}"), name)
     return function
 
 
 def _of_question(question: Question) -> Callable[..., None]:
-    made: Any = import_module("tolstat.cli._questions")
-    function: Callable[..., None] = made.command_of(question)
+    questions: Any = import_module("tolstat.cli._questions")
+    function: Callable[..., None] = questions.function_of(question)
     return function
 
 
 for heading, commands in PLAIN.items():
     for name, summary in commands.items():
-        LISTED[name.replace("_", "-")] = Listed(heading, summary, partial(_plain, name))
+        LISTED[name] = Listed(heading, summary, partial(_plain, name))
     for question in QUESTIONS:
         if question.heading == heading:
             made = partial(_of_question, question)

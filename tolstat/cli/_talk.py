@@ -9,28 +9,18 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext, redirect_stdout
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TextIO
-
-import typer
+from typing import Annotated, Any, TextIO
 
 from tolstat import __version__
 from tolstat.common.errors import Fault, InputError
+from tolstat.display.options import Opt
+from tolstat.display.progress import Display, display
 from tolstat.display.unseen import visible
-
-if TYPE_CHECKING:
-    from tolstat.display.progress import Display
 
 WIDTH = 80
 """Maximum length of a line of prose, characters."""
 LOG = logging.getLogger("tolstat")
 LOG.propagate = False
-
-Quiet = Annotated[bool, typer.Option("--quiet", help="Print warnings and errors only on standard error.")]
-Verbose = Annotated[bool, typer.Option("--verbose", help="Print each stage and its time on standard error.")]
-LogFile = Annotated[
-    Path | None,
-    typer.Option("--log", metavar="FILE", help="Append messages with times to FILE, created if missing."),
-]
 
 
 class _Stderr(logging.Handler):
@@ -87,8 +77,19 @@ def fail(text: str) -> None:
 
 
 @contextmanager
-def session(quiet: bool, verbose: bool, log: Path | None) -> Iterator[None]:
-    """Tell messages as the options of one command ask.
+def session(
+    *, quiet: bool = False, verbose: bool = False, log: Annotated[Path | None, Opt("FILE")] = None
+) -> Iterator[None]:
+    """Tell messages as the options of a command ask; every command has these options.
+
+    Parameters
+    ----------
+    quiet : bool
+        Print warnings and errors only on standard error.
+    verbose : bool
+        Print each stage and its time on standard error.
+    log : Path, optional
+        Append messages with times to FILE, created if missing.
 
     Raises
     ------
@@ -131,14 +132,8 @@ def _log_file(path: Path) -> logging.Handler:
 @contextmanager
 def progress(first: str = "") -> Iterator[Display]:
     """Show progress on standard error, with the stage `first` to begin with; see `display.progress.Display`."""
-    from tolstat.display.progress import display
-
     quiet = bool(LOG.handlers) and LOG.handlers[0].level > logging.INFO
-    with display(say, _detail, quiet) as shown:
+    with display(say, LOG.debug, quiet) as shown:
         if first:
             shown.stage(first)
         yield shown
-
-
-def _detail(text: str) -> None:
-    LOG.debug("%s", text)

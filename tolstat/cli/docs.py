@@ -14,6 +14,8 @@ import typer
 from tolstat.cli._talk import WIDTH, say
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.files import docs_dir
+from tolstat.common.strict import did_you_mean
+from tolstat.display.options import Opt
 
 BUILT = Path("build", "docs", "docs", "index.html")
 """First page of the built site, from the root of a clone."""
@@ -25,12 +27,7 @@ BUILD = (
 )
 
 
-def docs(
-    page: Annotated[
-        str | None,
-        typer.Argument(metavar="PAGE", help="Page to read in the terminal, such as study; without it: the browser."),
-    ] = None,
-) -> None:
+def docs(page: Annotated[str | None, Opt("PAGE")] = None) -> None:
     """Print a page of the documents, or open their site.
 
     With PAGE, prints this page: study (all keys of study and joint files), tolerances, tutorial, model, report, or the
@@ -41,6 +38,11 @@ def docs(
     clone, prints the names of the pages.
 
     Example: tolstat docs study
+
+    Parameters
+    ----------
+    page : str, optional
+        Page to read in the terminal, such as study; without it: the browser.
     """
     if page is not None:
         _print_page(page)
@@ -76,8 +78,6 @@ def page_name(file: str) -> str:
 
 
 def _print_page(name: str) -> None:
-    from tolstat.common.strict import did_you_mean
-
     known = pages()
     file = known.get(page_name(name))
     if file is None:

@@ -4,20 +4,19 @@ from __future__ import annotations
 
 from typing import Annotated
 
-import typer
-
+from tolstat.campaign import extend as campaign
 from tolstat.cli import run
-from tolstat.cli._app import ResultPath, StudyOption, Wide, Workers
-from tolstat.cli._shortage import check_memory
 from tolstat.cli._talk import progress, say
+from tolstat.display.options import Opt, OtherStudy, Report, ResultPath, Wide, Workers
 
 
 def extend(
     file: ResultPath,
-    n: Annotated[int, typer.Option("--n", metavar="N", min=1, help="New number of joints, without the nominal joint.")],
-    study_file: StudyOption = None,
+    *,
+    n: Annotated[int, Opt("N", least=1)],
+    study_file: OtherStudy = None,
     workers: Workers = None,
-    report: Annotated[bool, typer.Option(help="Print the report at the end and write its files.")] = True,
+    report: Report = True,
     wide: Wide = False,
 ) -> None:
     """Add joints to a campaign and simulate them.
@@ -29,12 +28,14 @@ def extend(
     To resume after an interruption: tolstat run STUDY --n N --out FILE
 
     Example: tolstat extend iso2768_f.h5 --n 2000
-    """
-    check_memory()
-    from tolstat.campaign import extend as combine
 
+    Parameters
+    ----------
+    n : int
+        New number of joints, without the nominal joint.
+    """
     with progress("drawing the errors"):
-        plan = combine.extend(file, n, study_file)
+        plan = campaign.extend(file, n, study_file)
     say(f"{file}: extended to {n} joints")
     run.simulate(plan, file, workers=workers)
     run.conclude(file, report, wide)

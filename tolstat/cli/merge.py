@@ -6,17 +6,12 @@ from pathlib import Path
 from shlex import quote
 from typing import Annotated
 
-import typer
-
+from tolstat.campaign import extend as campaign
 from tolstat.cli._talk import progress, say
+from tolstat.display.options import Opt
 
 
-def merge(
-    files: Annotated[
-        list[Path], typer.Argument(metavar="SLICE", help="Result files (HDF5) of the slices, in any order.")
-    ],
-    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="Result file to create; must not exist.")],
-) -> None:
+def merge(files: Annotated[list[Path], Opt("SLICE")], *, out: Annotated[Path, Opt("FILE")]) -> None:
     """Merge the slices of a campaign into one result file.
 
     Slices are made by tolstat run --rows. They must have the same study and version of the code, and together hold all
@@ -26,11 +21,16 @@ def merge(
     Prints the number of joints by outcome on standard error.
 
     Example: tolstat merge part1.h5 part2.h5 --out whole.h5
-    """
-    from tolstat.campaign import extend
 
+    Parameters
+    ----------
+    files : list of Path
+        Result files (HDF5) of the slices, in any order.
+    out : Path
+        Result file to create; must not exist.
+    """
     with progress("merging"):
-        merged = extend.merge(files, out)
+        merged = campaign.merge(files, out)
     counts = merged.counts
     pending = counts.total - counts.done
     lines = [f"{out}: {counts.done} {counts.counted}, {counts.shortfall}"]

@@ -2,28 +2,34 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Iterator
+from dataclasses import asdict
 from shlex import quote
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from tolstat.cli._app import AsJson, Workers, announce_compilation, as_text, print_study_notes
+from tolstat import study
+from tolstat.campaign import plan as plans
+from tolstat.campaign.plan import Plan
+from tolstat.cli._output import print_json
 from tolstat.cli._talk import progress, say, wrapped
+from tolstat.cli._work import print_study_notes
+from tolstat.display import table
+from tolstat.display.options import AsJson, Joints, Opt, StudyPath, Workers
+from tolstat.questions.joints import CORRELATED, ENTRIES
+from tolstat.solver import compilation
 
-if TYPE_CHECKING:
-    from tolstat.campaign.plan import Plan
+TIMES = (("d", 86400.0), ("h", 3600.0), ("min", 60.0), ("s", 0.5))
+SIZES = (("TB", 1e12), ("GB", 1e9), ("MB", 1e6), ("kB", 0.0))
 
 
 def plan(
-    study_file: Annotated[Path, typer.Argument(metavar="STUDY", help="Study file (TOML).")],
-    n: Annotated[
-        int | None, typer.Option("--n", metavar="N", min=1, help="Number of joints; default: that of the study.")
-    ] = None,
+    study_file: StudyPath,
+    *,
+    n: Joints = None,
     workers: Workers = None,
-    pilot: Annotated[
-        int, typer.Option("--pilot", metavar="K", min=1, help="Number of joints simulated for the prediction.")
-    ] = 128,
+    pilot: Annotated[int, Opt("K", least=1)] = plans.PILOT,
     as_json: AsJson = False,
 ) -> None:
     """Predict time, memory and precision of a campaign.
@@ -34,81 +40,62 @@ def plan(
     means: half width, radius or diameter, standard deviation of the error, share of the parts outside.
 
     Example: tolstat plan studies/iso2768_f.toml
+
+    Parameters
+    ----------
+    pilot : int
+        Number of joints simulated for the prediction.
     """
-    from dataclasses import asdict
-
-    from tolstat import study
-    from tolstat.campaign import plan as plans
-
     loaded = study.load(study_file, n=n)
     print_study_notes(study_file, loaded)
-    announce_compilation()
+    compilation.announce()
     with progress() as shown:
         made = plans.plan(loaded, workers, pilot, shown.stage)
-    typer.echo(as_text(asdict(made) | {"seconds": made.seconds}) if as_json else _lines(made))
+    if as_json:
+        print_json(asdict(made) | {"seconds": made.seconds})
+    else:
+        typer.echo(wrapped("\n".join(_lines(made))))
+        for columns, rows in ((ENTRIES, made.tolerances), (CORRELATED, made.correlations)):
+            if rows:
+                typer.echo(f"\n{table.as_text(columns, rows)}")
     say(f"next: tolstat run {quote(str(study_file))}" + ("" if n is None else f" --n {n}"))
 
 
-def _lines(made: Plan) -> str:
-    lines = [
-        f"joints: {made.rows}" + (f", each at {', '.join(made.points)}" if all(made.points) else ""),
-        f"random numbers a joint: {made.dimensions}",
-        f"pilot: {made.pilot} joints, {made.failed} failed, {made.unsettled} not settled",
-        *([made.fidelity] if made.fidelity else []),
-        *_rattle_warning(made),
-        *_misfit_warning(made),
-        f"time a joint: {1e3 * made.seconds_per_joint:.3g} ms",
-        f"time: about {_duration(made.seconds)} on {made.workers} cores, of which",
-        *(f"  {stage}: {_duration(seconds)}" for stage, seconds in made.stages.items()),
-        f"memory: {made.process_bytes / 1e6:.0f} MB a process, {made.workers + 1} processes",
-        f"file: {_size(made.file_bytes)}",
-        *made.fit,
-        *made.sweep,
-        *([f"no tolerance, taken as exact: {', '.join(made.exact)}"] if made.exact else []),
-    ]
-    lines += [
-        f"95 % interval of a share of {100 * share:g} %: {100 * width:.2g} points wide"
-        for share, width in made.widths.items()
-    ]
-    lines += [
-        f"limit {limit.load}: {limit.above} of {limit.of} above in the pilot; "
-        f"interval at most {100 * limit.width:.2g} points wide"
-        for limit in made.limits
-    ]
-    lines += [
-        f"joints for a load that {100 * q:g} % stay below, with 95 % confidence: {n}" for q, n in made.wilks.items()
-    ]
-    return wrapped("\n".join(lines)) + "\n".join(["", *_meanings(made)])
-
-
-def _meanings(made: Plan) -> list[str]:
-    """Tables of what each entry of [tolerances] and [[correlation]] means."""
-    from tolstat.display import table
-    from tolstat.questions.joints import CORRELATED, ENTRIES
-
-    tables = ((ENTRIES, made.tolerances), (CORRELATED, made.correlations))
-    return [line for columns, rows in tables if rows for line in ("", table.as_text(columns, rows))]
-
-
-def _rattle_warning(made: Plan) -> list[str]:
-    """Warning about joints that rattle, if there are any."""
-    found = made.reversals
-    if not found.joints:
-        return []
-    reason = f"warning: the torque reverses in {found.joints} of {made.pilot} joints: inertia torque up to"
-    return [f"{reason} {found.torque:.3g} N m; these joints rattle and cost {found.cost:.2g} times as much as others"]
-
-
-def _misfit_warning(made: Plan) -> list[str]:
-    """Warning about joints that do not go together, if there are any."""
-    found = made.assembly
-    if not found.misfits:
-        return []
-    reason = "have a pin larger than its hole and cannot be simulated"
-    share = ""
-    if found.interval is not None:
-        share = "; 95 % interval of their share {:.2g} to {:.2g} %".format(*(100.0 * end for end in found.interval))
-    return [f"warning: {found.misfits} of {found.of} joints {reason}{share}"]
+def _lines(made: Plan) -> Iterator[str]:
+    yield f"joints: {made.rows}" + (f", each at {', '.join(made.points)}" if all(made.points) else "")
+    yield f"random numbers a joint: {made.dimensions}"
+    yield f"pilot: {made.pilot} joints, {made.failed} failed, {made.unsettled} not settled"
+    if made.fidelity:
+        yield made.fidelity
+    if made.reversals.joints:
+        yield (
+            f"warning: the torque reverses in {made.reversals.joints} of {made.pilot} joints: inertia torque up to "
+            f"{made.reversals.torque:.3g} N m; these joints rattle and cost {made.reversals.cost:.2g} times as much as "
+            "others"
+        )
+    if made.assembly.misfits:
+        share = ""
+        if made.assembly.interval is not None:
+            low, high = made.assembly.interval
+            share = f"; 95 % interval of their share {100 * low:.2g} to {100 * high:.2g} %"
+        joints = f"{made.assembly.misfits} of {made.assembly.of} joints"
+        yield f"warning: {joints} have a pin larger than its hole and cannot be simulated{share}"
+    yield f"time a joint: {1e3 * made.seconds_per_joint:.3g} ms"
+    yield f"time: about {_duration(made.seconds)} on {made.workers} cores, of which"
+    for stage, seconds in made.stages.items():
+        yield f"  {stage}: {_duration(seconds)}"
+    yield f"memory: {made.process_bytes / 1e6:.0f} MB a process, {made.workers + 1} processes"
+    yield f"file: {_size(made.file_bytes)}"
+    yield from (*made.fit, *made.sweep)
+    if made.exact:
+        yield f"no tolerance, taken as exact: {', '.join(made.exact)}"
+    for share_above, width in made.widths.items():
+        yield f"95 % interval of a share of {100 * share_above:g} %: {100 * width:.2g} points wide"
+    for limit in made.limits:
+        interval = f"interval at most {100 * limit.width:.2g} points wide"
+        yield f"limit {limit.load}: {limit.above} of {limit.of} above in the pilot; {interval}"
+    for q, n in made.wilks.items():
+        yield f"joints for a load that {100 * q:g} % stay below, with 95 % confidence: {n}"
 
 
 def _duration(seconds: float) -> str:

@@ -2,27 +2,26 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from tolstat.cli._app import AsJson, AtPoint, ResultPath, announce_compilation, as_text
+from tolstat.campaign import replay as replays
+from tolstat.campaign.replay import Replay
 from tolstat.cli._talk import progress, say
-from tolstat.cli.simulate import case_text, warn_unless_ok, write_trace
-
-if TYPE_CHECKING:
-    from tolstat.campaign.replay import Replay
+from tolstat.cli.simulate import deliver
+from tolstat.common.files import check_target
+from tolstat.display.options import AsJson, Opt, Point, ResultPath, Trace
+from tolstat.solver import compilation
+from tolstat.store import ResultFile
 
 
 def replay(
     file: ResultPath,
-    row: Annotated[int, typer.Option("--row", metavar="I", min=0, help="Row of the joint in the campaign, from 0.")],
-    out: Annotated[
-        Path | None,
-        typer.Option("--out", metavar="CSV", help="Write the load histories of the last revolution as CSV."),
-    ] = None,
-    point: AtPoint = None,
+    *,
+    row: Annotated[int, Opt("I", least=0)],
+    out: Trace = None,
+    point: Point = None,
     as_json: AsJson = False,
 ) -> None:
     """Simulate one joint again and compare with the file.
@@ -32,22 +31,21 @@ def replay(
     differ, prints the versions that differ and ends with exit code 1.
 
     Example: tolstat replay iso2768_f.h5 --row 17 --out trace.csv
-    """
-    from tolstat.campaign import replay as replays
-    from tolstat.common.files import check_target
-    from tolstat.store import ResultFile
 
+    Parameters
+    ----------
+    row : int
+        Row of the joint in the campaign, from 0.
+    point : str, optional
+        Operating point, such as cruise; needed if FILE has several.
+    """
     if out is not None:
         check_target(out, file)
-    announce_compilation()
+    compilation.announce()
     with progress("simulation"), ResultFile.open(file) as store:
         again = replays.replay(store.at(point) if point else store, row)
-    summary = {"row": row, "equal": not again.differences, "differing": [d.name for d in again.differences]}
-    summary |= again.result.summary()
-    typer.echo(as_text(summary) if as_json else case_text(summary))
-    warn_unless_ok(summary, again.result.remedy())
-    if out is not None:
-        write_trace(again.result, out)
+    facts = {"row": row, "equal": not again.differences, "differing": [d.name for d in again.differences]}
+    deliver(again.result, facts, out, as_json)
     say(_verdict(again))
     if again.differences:
         raise typer.Exit(1)

@@ -6,20 +6,22 @@ from enum import StrEnum
 from functools import partial
 from pathlib import Path
 from shlex import quote
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
-import typer
-
-from tolstat.cli._app import Wide, Workers, announce_compilation, print_study_notes
-from tolstat.cli._shortage import check_memory
+from tolstat import study
+from tolstat.campaign import run as campaign
+from tolstat.campaign import stop_rule
+from tolstat.campaign.remedy import parse_retry, reasons
+from tolstat.cli._output import show
 from tolstat.cli._talk import progress, say
-from tolstat.cli._work import exit_codes
+from tolstat.cli._work import print_study_notes, work
+from tolstat.common import strict
 from tolstat.common.errors import Fault, InputError, gather
-
-if TYPE_CHECKING:
-    from tolstat.common.counts import Counts
-    from tolstat.store import Reader
-    from tolstat.study import Study
+from tolstat.common.files import check_target
+from tolstat.display.options import Joints, Opt, Report, StudyPath, Wide, Workers
+from tolstat.report import answer as reports
+from tolstat.store import Reader, ResultFile
+from tolstat.study import Study, rewriting
 
 
 class Executor(StrEnum):
@@ -30,60 +32,19 @@ class Executor(StrEnum):
 
 
 def run(
-    study_file: Annotated[Path, typer.Argument(metavar="STUDY", help="Study file (TOML).")],
-    out: Annotated[
-        Path | None,
-        typer.Option("--out", metavar="FILE", help="Result file; default: STUDY.h5 in the current folder."),
-    ] = None,
-    n: Annotated[
-        int | None, typer.Option("--n", metavar="N", min=1, help="Number of joints; default: that of the study.")
-    ] = None,
+    study_file: StudyPath,
+    *,
+    out: Annotated[Path | None, Opt("FILE")] = None,
+    n: Joints = None,
     workers: Workers = None,
-    executor: Annotated[
-        Executor,
-        typer.Option("--executor", metavar="WHERE", help="processes (of this machine), or dask (a cluster)."),
-    ] = Executor.PROCESSES,
-    scheduler: Annotated[
-        str | None,
-        typer.Option(
-            "--scheduler",
-            metavar="URL",
-            help="Address of a Dask scheduler, tcp://HOST:PORT; default: start a cluster on this machine.",
-        ),
-    ] = None,
-    retry: Annotated[
-        str | None,
-        typer.Option(
-            "--retry", metavar="STATES", help="Statuses of joints to simulate again, such as newton_failed,crashed."
-        ),
-    ] = None,
-    settings: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="KEY=VALUE",
-            help="Key in place of that of the study, joint.shaft.axial=free; with --retry also of the solver for the "
-            "joints simulated again, solver.steps_per_rev=360; repeatable.",
-        ),
-    ] = None,
-    rows: Annotated[
-        str | None,
-        typer.Option(
-            "--rows", metavar="A:B", help="Simulate rows A to B-1 only; FILE is then a slice for tolstat merge."
-        ),
-    ] = None,
-    until: Annotated[
-        str | None,
-        typer.Option(
-            "--until",
-            metavar="RULE",
-            help='Stop when a 95 % interval is narrow enough: "P(cross*.F > 700 N) width < 0.01", "P(any limit) ...".',
-        ),
-    ] = None,
-    verify: Annotated[
-        bool, typer.Option(help="Check the numerical error on one joint in 400 (1 to 16) at the end.")
-    ] = True,
-    report: Annotated[bool, typer.Option(help="Print the report at the end and write its files.")] = True,
+    executor: Annotated[Executor, Opt("WHERE")] = Executor.PROCESSES,
+    scheduler: Annotated[str | None, Opt("URL")] = None,
+    retry: Annotated[str | None, Opt("STATES")] = None,
+    settings: Annotated[list[str] | None, Opt("KEY=VALUE", name="set")] = None,
+    rows: Annotated[str | None, Opt("A:B")] = None,
+    until: Annotated[str | None, Opt("RULE")] = None,
+    verify: bool = True,
+    report: Report = True,
     wide: Wide = False,
 ) -> None:
     """Simulate the joints of a study and print a report.
@@ -98,26 +59,38 @@ def run(
     no valid load, and the next command. Writes the result file, and beside it the curves as PNG, SVG and CSV.
 
     Example: tolstat run studies/iso2768_f.toml --n 512 --out first.h5
-    """
-    check_memory()
-    from tolstat.common.files import check_target
 
-    part, again = None, None
-    retried = [own for own in settings or () if own.startswith("solver.")]
-    changes = [own for own in settings or () if own not in retried]
+    Parameters
+    ----------
+    out : Path, optional
+        Result file; default: STUDY.h5 in the current folder.
+    executor : str
+        processes (of this machine), or dask (a cluster).
+    scheduler : str, optional
+        Address of a Dask scheduler, tcp://HOST:PORT; default: start a cluster on this machine.
+    retry : str, optional
+        Statuses of joints to simulate again, such as newton_failed,crashed.
+    settings : list of str, optional
+        Key in place of that of the study, joint.shaft.axial=free; with --retry also of the solver for the joints
+        simulated again, solver.steps_per_rev=360; repeatable.
+    rows : str, optional
+        Simulate rows A to B-1 only; FILE is then a slice for tolstat merge.
+    until : str, optional
+        Stop when a 95 % interval is narrow enough: "P(cross*.F > 700 N) width < 0.01", "P(any limit) ...".
+    verify : bool
+        Check the numerical error on one joint in 400 (1 to 16) at the end.
+    """
+    retried = [text for text in settings or () if text.startswith("solver.")]
+    changes = [text for text in settings or () if text not in retried]
     faults = _cannot_be_combined(rows, until, retry, retried)
     if scheduler is not None and executor is not Executor.DASK:
         faults.append(Fault("--scheduler", "is used with --executor dask only", "add --executor dask"))
+    part, again = None, None
     with gather(faults):
         part = None if rows is None else parse_rows(rows)
     path = out if out is not None else Path(f"{study_file.stem}.h5")
     with gather(faults):
         check_target(path)  # now, not when the pictures of the report are written
-    from tolstat import study
-    from tolstat.campaign.remedy import parse_retry
-    from tolstat.common import strict
-    from tolstat.study import rewriting
-
     with gather(faults):
         text = rewriting.with_settings(strict.read_text(study_file), changes) if changes else None
         plan = study.load(study_file, n=n, text=text)
@@ -127,7 +100,7 @@ def run(
     print_study_notes(study_file, plan)
     where = {"workers": workers, "executor": executor.value, "scheduler": scheduler}
     simulate(plan, path, until=until, check=verify, rows=part, retry=again, **where)
-    conclude(path, report, wide, " ".join([str(study_file), *(f"--set {quote(own)}" for own in changes)]))
+    conclude(path, report, wide, " ".join([str(study_file), *(f"--set {quote(text)}" for text in changes)]))
 
 
 def _cannot_be_combined(rows: str | None, until: str | None, retry: str | None, settings: list[str]) -> list[Fault]:
@@ -158,38 +131,50 @@ def parse_rows(text: str) -> range:
 
 def simulate(plan: Study, path: Path, until: str | None = None, **choices: Any) -> None:
     """Simulate a campaign with progress on standard error; `choices` go to `campaign.run`."""
-    announce_compilation()
-    with exit_codes():
-        counts = _campaign_until(until, plan, path, **choices) if until else _campaign(plan, path, **choices)
+    outcome = None
+    with work() as running:
+        shown = running.display
+        run = partial(campaign.run, plan, path, progress=shown, tell=say, stage=shown.stage, **choices)
+        if until is None:
+            counts = run()
+        else:
+            rule = stop_rule.parse(until, plan.limits)
+            outcome = stop_rule.run_until(plan, path, rule, lambda row: run(until_row=row))
+    if outcome is not None:
+        look, end = outcome.look, "reached" if outcome.reached else "not reached"
+        biased = f", {stop_rule.BIASED}: go by the interval" if outcome.reached else ""
+        say(
+            f"{rule.text}: {end} with {look.joints} joints, {look.above} above, "
+            f"{look.n_unresolved} failed or not settled\n"
+            f"{100 * stop_rule.CONFIDENCE:.0f} % interval {look.lower:.5f} to {look.upper:.5f}, valid after any number "
+            "of looks (failed and unsettled joints: below at its lower end, above at its upper end)\n"
+            f"share above {look.estimate:.5f}{biased}; "
+            "shares and intervals in the report are not corrected for the stop"
+        )
+        with ResultFile.open(path) as store:
+            counts = store.counts()
     say(f"{path}: {counts.done} {counts.counted}, {counts.shortfall}")
 
 
-def conclude(path: Path, report: bool, wide: bool, study: str = "STUDY") -> None:
+def conclude(path: Path, report: bool, wide: bool, study_file: str = "STUDY") -> None:
     """Print the report of a campaign if asked for, why joints have no valid load, and the next command.
 
-    `study` is the study file as the user gave it, with its settings.
+    `study_file` is the study file as the user gave it, with its settings.
     """
-    from tolstat.campaign.remedy import reasons
-    from tolstat.cli._questions import show
-    from tolstat.report.answer import report as answer
-    from tolstat.report.answer import write
-    from tolstat.store import ResultFile
-
     with ResultFile.open(path) as store:
         if report:
             with progress("report") as shown:
-                view = store.view()
-                made = answer(view)
+                answer = reports.report(store.view())
                 shown.stage("files")
-                files = write(made, path)
-            show(made, wide)
+                files = reports.write(answer, path)
+            show(answer, wide)
             for file in files:
                 say(f"wrote {file}")
-        found = reasons(store, {one.point or "": one.status() for one in store.each()})
-        for reason in found:
+        without_load = reasons(store, {one.point or "": one.status() for one in store.each()})
+        for reason in without_load:
             say(reason.text)
-        for retry in dict.fromkeys(reason.retry for reason in found if reason.retry):
-            say(f"again: tolstat run {study} --out {path} {retry}")
+        for options in dict.fromkeys(reason.retry for reason in without_load if reason.retry):
+            say(f"again: tolstat run {study_file} --out {path} {options}")
         say(f"next: {_next(store, path)}")
 
 
@@ -201,32 +186,3 @@ def _next(store: Reader, path: Path) -> str:
     if store.case_names:
         return f"tolstat export {file} --csv {csv}"
     return f"tolstat report {file} --out {page}"
-
-
-def _campaign(plan: Study, path: Path, **choices: Any) -> Counts:
-    from tolstat.campaign import run as campaign
-
-    with progress() as shown:
-        return campaign.run(plan, path, progress=shown, tell=shown.note, stage=shown.stage, **choices)
-
-
-def _campaign_until(text: str, plan: Study, path: Path, **choices: Any) -> Counts:
-    from tolstat.campaign import run as campaign
-    from tolstat.campaign import stop_rule
-    from tolstat.store import ResultFile
-
-    rule = stop_rule.parse(text, plan.limits)
-    with progress() as shown:
-        run = partial(campaign.run, plan, path, progress=shown, tell=shown.note, stage=shown.stage, **choices)
-        outcome = stop_rule.run_until(plan, path, rule, lambda row: run(until_row=row))
-    look = outcome.look
-    say(
-        f"{rule.text}: {'reached' if outcome.reached else 'not reached'} with {look.joints} joints, "
-        f"{look.above} above, {look.n_unresolved} failed or not settled\n"
-        f"{100 * stop_rule.CONFIDENCE:.0f} % interval {look.lower:.5f} to {look.upper:.5f}, valid after any number of "
-        "looks (failed and unsettled joints: below at its lower end, above at its upper end)\n"
-        f"share above {look.estimate:.5f}{f', {stop_rule.BIASED}: go by the interval' if outcome.reached else ''}; "
-        "shares and intervals in the report are not corrected for the stop"
-    )
-    with ResultFile.open(path) as store:
-        return store.counts()

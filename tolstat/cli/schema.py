@@ -7,35 +7,37 @@ from typing import Annotated
 
 import typer
 
-from tolstat.cli._app import as_text, output_file
+from tolstat.cli._output import as_json
 from tolstat.cli._talk import say
+from tolstat.common.errors import Fault, InputError
+from tolstat.common.files import check_target
+from tolstat.common.strict import did_you_mean
+from tolstat.display import text
+from tolstat.display.options import Opt
+from tolstat.study import schema as schemas
 
 
-def schema(
-    kind: Annotated[str, typer.Argument(metavar="study|joint|case", help="File that the schema is for.")],
-    out: Annotated[
-        Path | None,
-        typer.Option("--out", metavar="JSON", help="Write the schema to a file instead of standard output."),
-    ] = None,
-) -> None:
+def schema(kind: Annotated[str, Opt("study|joint|case")], *, out: Annotated[Path | None, Opt("JSON")] = None) -> None:
     """Print the JSON schema of a file, for editors.
 
     Editors with Taplo or Tombi complete and check keys by the schema that a TOML file names in its first line:
     #:schema ./study.schema.json
 
     Example: tolstat schema study --out study.schema.json
-    """
-    from tolstat.common.errors import Fault, InputError
-    from tolstat.common.strict import did_you_mean
-    from tolstat.study import schema as schemas
 
+    Parameters
+    ----------
+    kind : str
+        File that the schema is for.
+    out : Path, optional
+        Write the schema to a file instead of standard output.
+    """
     if kind not in schemas.KINDS:
         remedy = did_you_mean(kind, list(schemas.KINDS))
         raise InputError([Fault("tolstat schema", f"no file is called {kind!r}", remedy)])
-    text = as_text(schemas.schema(kind))
+    content = as_json(schemas.schema(kind))
     if out is None:
-        typer.echo(text)
+        typer.echo(content)
         return
-    with output_file(out) as temporary:
-        temporary.write_text(text + "\n", encoding="utf-8")
-    say(f"wrote {out}")
+    check_target(out)
+    say(f"wrote {text.write(content + chr(10), out)}")

@@ -3,40 +3,28 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
-import typer
-
-from tolstat.cli._app import AsJson, Wide, Workers, announce_compilation, as_text, output_file, print_table
+from tolstat.analysis.accuracy import LEAST_NEAR
+from tolstat.campaign.verify import check, check_near
+from tolstat.cli._output import print_json, print_table
 from tolstat.cli._talk import progress, say
-
-if TYPE_CHECKING:
-    from tolstat.store.verification import Verification
+from tolstat.common.cores import available_cores
+from tolstat.common.files import atomic_write, check_target
+from tolstat.display.answer import plain
+from tolstat.display.options import AsJson, Opt, Wide, Workers
+from tolstat.questions import accuracy
+from tolstat.solver import compilation
+from tolstat.store.verification import Verification
 
 
 def verify(
-    what: Annotated[Path, typer.Argument(metavar="STUDY|FILE", help="Study file (TOML) or result file (HDF5).")],
-    joints: Annotated[
-        str | None,
-        typer.Option(
-            "--joints", metavar="N|all", help="Number of joints to check, or all; default: 24, near a limit 50."
-        ),
-    ] = None,
-    near: Annotated[
-        str | None,
-        typer.Option(
-            "--near",
-            metavar="LIMIT",
-            help='Check the joints nearest to a limit: "cross1.F > 700 N", "cross*.F > 700 N" or "any limit".',
-        ),
-    ] = None,
-    seed: Annotated[
-        int | None,
-        typer.Option("--seed", metavar="S", min=0, help="Seed of the choice of joints; default: that of the study."),
-    ] = None,
-    out: Annotated[
-        Path | None, typer.Option("--out", metavar="CSV", help="Write the errors of each joint, check and load as CSV.")
-    ] = None,
+    what: Annotated[Path, Opt("STUDY|FILE")],
+    *,
+    joints: Annotated[str | None, Opt("N|all")] = None,
+    near: Annotated[str | None, Opt("LIMIT")] = None,
+    seed: Annotated[int | None, Opt("S", least=0)] = None,
+    out: Annotated[Path | None, Opt("CSV")] = None,
     workers: Workers = None,
     wide: Wide = False,
     as_json: AsJson = False,
@@ -52,40 +40,43 @@ def verify(
     and to which side, tells how far the share above the limit moves. Intervals of all commands use it from then on.
 
     Example: tolstat verify iso2768_f.h5 --joints 2 --out errors.csv
-    """
-    from tolstat.analysis.accuracy import LEAST_NEAR
-    from tolstat.campaign import verify as verification
-    from tolstat.campaign.verify import check_near
-    from tolstat.common.cores import available_cores
-    from tolstat.common.files import check_target
-    from tolstat.questions import accuracy
 
+    Parameters
+    ----------
+    what : Path
+        Study file (TOML) or result file (HDF5).
+    joints : str, optional
+        Number of joints to check, or all; default: 24, near a limit 50.
+    near : str, optional
+        Check the joints nearest to a limit: "cross1.F > 700 N", "cross*.F > 700 N" or "any limit".
+    seed : int, optional
+        Seed of the choice of joints; default: that of the study.
+    out : Path, optional
+        Write the errors of each joint, check and load as CSV.
+    """
     if out is not None:
         check_target(out, what)
     with progress("checks, then tight references") as shown:
         count = workers or available_cores()
         if near is None:
-            found = verification.check(what, joints or 24, seed, announce_compilation, count, progress=shown)
+            found = check(what, joints or 24, seed, compilation.announce, count, progress=shown)
         else:
-            found = check_near(what, near, joints or LEAST_NEAR, announce_compilation, count, shown)
+            found = check_near(what, near, joints or LEAST_NEAR, compilation.announce, count, shown)
     if as_json:
-        typer.echo(as_text(_summary(found)))
+        print_json(_summary(found))
     else:
         print_table(accuracy.ERRORS, accuracy.error_rows(found), wide)
     say(accuracy.note(found))
     if out is not None:
         import pandas as pd
 
-        with output_file(out) as temporary:
+        with atomic_write(out) as temporary:
             pd.DataFrame(accuracy.joint_rows(found)).to_csv(temporary, index=False, lineterminator="\n")
         say(f"wrote {out}")
 
 
 def _summary(found: Verification) -> dict[str, Any]:
     """Return the distributions of errors as plain values, by kind of load and by load; None for unknown values."""
-    from tolstat.display.answer import plain
-    from tolstat.questions import accuracy
-
     facts: dict[str, Any] = {"rows": found.rows.tolist(), "seed": found.seed}
     facts["checks"] = {name: check.description for name, check in found.checks.items()}
     for key, by_kind in (("kinds", True), ("loads", False)):

@@ -12,15 +12,6 @@ from tolstat import __version__
 from tolstat.cli._command import command_of, exit_codes
 from tolstat.common.cores import limit_threads
 
-ABOUT = """Monte Carlo tolerance analysis of Cardan joints: which share of the joints exceeds a load.
-
-\b
-For the first time:
-  tolstat new shaft                         a study to edit
-  tolstat plan shaft.toml                   its time, memory and precision
-  tolstat run shaft.toml                    simulate it, and print the report
-  tolstat report shaft.h5 --out shaft.html  the page
-"""
 CONTEXT = {"help_option_names": ["-h", "--help"]}
 EPILOG = (
     "Exit codes: 0 success, 1 internal error (replay: results differ), 2 input that cannot be used, "
@@ -84,7 +75,6 @@ class _Commands(TyperGroup):
 app = typer.Typer(
     name="tolstat",
     cls=_Commands,
-    help=ABOUT,
     epilog=EPILOG,
     no_args_is_help=True,
     rich_markup_mode=None,
@@ -111,4 +101,12 @@ def _options(
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and exit.")
     ] = False,
 ) -> None:
-    pass
+    """Monte Carlo tolerance analysis of Cardan joints: which share of the joints exceeds a load.
+
+    \b
+    For the first time:
+      tolstat new shaft                         a study to edit
+      tolstat plan shaft.toml                   its time, memory and precision
+      tolstat run shaft.toml                    simulate it, and print the report
+      tolstat report shaft.h5 --out shaft.html  the page
+    """  # noqa: D301

@@ -32,14 +32,11 @@ def exit_codes() -> Iterator[None]:
     """Turn errors that a user can mend into a message and an exit code."""
     try:
         yield
-    except TolstatError as error:
-        fail(f"error: {error}")
-        raise typer.Exit(2) from error
-    except (MemoryError, OSError, ImportError) as error:
-        fault = shortage(error)
-        if fault is None:
+    except (TolstatError, MemoryError, OSError, ImportError) as error:
+        reason = error if isinstance(error, TolstatError) else shortage(error)
+        if reason is None:
             raise
-        fail(f"error: {fault}")
+        fail(f"error: {reason}")
         raise typer.Exit(2) from error
     except KeyboardInterrupt as error:
         fail("interrupted")
@@ -148,8 +145,8 @@ def _values(parameters: Mapping[str, Parameter], given: dict[str, Any]) -> dict[
     for name, parameter in parameters.items():
         opt = opt_of(parameter)[1]
         if opt.unit is not None:
-            text, given[name] = given[name], parameter.default
             with gather(faults):
+                text = given[name]
                 given[name] = parameter.default if text is None else quantity(text, opt, flag_of(parameter))
     if faults:
         raise InputError(faults)

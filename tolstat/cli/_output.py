@@ -1,21 +1,27 @@
-"""What commands print on standard output, and the folders that they write to."""
+"""What commands print on standard output."""
 
 from __future__ import annotations
 
 import json
 import textwrap
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import typer
 
 from tolstat.cli._talk import WIDTH, say, warn, wrapped
-from tolstat.common.errors import Fault, InputError
 from tolstat.display import table
 from tolstat.display.answer import Answer, Sentence, Table
 from tolstat.display.blocks import Listing
 from tolstat.display.table import Column, Rows
+
+
+def deliver(answer: Answer, wide: bool, as_json: bool) -> None:
+    """Print an answer as text or as JSON."""
+    if as_json:
+        print_json(answer.values())
+    else:
+        show(answer, wide)
 
 
 def show(answer: Answer, wide: bool) -> None:
@@ -46,26 +52,11 @@ def print_table(columns: Sequence[Column], rows: Rows, wide: bool) -> None:
         say(missing)
 
 
-def as_json(values: Any) -> str:
+def json_of(values: Any) -> str:
     """Format plain values as JSON."""
     return json.dumps(values, indent=2, allow_nan=False)
 
 
 def print_json(values: Any) -> None:
     """Print plain values as JSON on standard output."""
-    typer.echo(as_json(values))
-
-
-def make_folder(path: Path) -> None:
-    """Create a folder if it does not exist.
-
-    Raises
-    ------
-    InputError
-        When it cannot be created.
-    """
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        found = f"cannot be created as a folder: {error.strerror or error}"
-        raise InputError([Fault(str(path), found, "give another folder, for example: --out results")]) from error
+    typer.echo(json_of(values))

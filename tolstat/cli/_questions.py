@@ -16,37 +16,37 @@ from typing import Annotated, Any
 
 from tolstat import study
 from tolstat.cli._command import entries, flag_of, opt_of, prose
-from tolstat.cli._output import make_folder, print_json, show
+from tolstat.cli._output import deliver
 from tolstat.cli._talk import progress, say
 from tolstat.common.errors import Fault, InputError
-from tolstat.display.answer import Answer
-from tolstat.display.options import AsJson, Folder, Opt, OtherStudy, Point, ResultPath, Wide, Workers
+from tolstat.common.files import check_target
+from tolstat.display.options import (
+    AsJson,
+    EitherPath,
+    FirstPath,
+    Folder,
+    OtherStudy,
+    Point,
+    PointPaths,
+    ResultPath,
+    Results,
+    Run,
+    SecondPath,
+    SimulatedPath,
+    Wide,
+    Workers,
+)
 from tolstat.questions import Question
 from tolstat.store import ResultFile, View
 from tolstat.study import Study
 from tolstat.study.points import names_of
 
-Results = Annotated[
-    Path | None,
-    Opt(
-        "DIR",
-        help="Folder of result files, created if missing; tables as CSV and pictures are written to it, too; "
-        "default: result files only, to the current one.",
-    ),
-]
-Run = Annotated[bool, Opt(help="Simulate what the answer needs, and keep it in FILE.")]
-FILES = "Result file (HDF5) of all operating points, or several of one each."
 READS: dict[str, dict[str, Any]] = {
     "view": {"file": ResultPath},
-    "views": {"files": Annotated[list[Path], Opt("FILE", help=FILES)]},
-    "pair": {
-        "a": Annotated[Path, Opt("A", help="Result file (HDF5) of the first campaign.")],
-        "b": Annotated[Path, Opt("B", help="Result file (HDF5) of the second campaign.")],
-    },
-    "study": {"source": Annotated[Path, Opt("STUDY", help="Study file (TOML) to simulate.")]},
-    "either": {
-        "source": Annotated[Path, Opt("STUDY|FILE", help="Study file (TOML) to simulate, or a result file (HDF5).")]
-    },
+    "views": {"files": PointPaths},
+    "pair": {"a": FirstPath, "b": SecondPath},
+    "study": {"source": SimulatedPath},
+    "either": {"source": EitherPath},
 }
 """Arguments of a command by what its question reads."""
 
@@ -117,7 +117,10 @@ def function_of(question: Question) -> Callable[..., None]:
     def run(**given: Any) -> None:
         named = [given[name] for name in READS[asked.reads]]
         sources: list[Path] = named[0] if asked.reads == "views" else named
-        stem, point, is_study = "_".join(path.stem for path in sources[:2]), given.get("point") or "", False
+        stem = f"{'_'.join(path.stem for path in sources[:2])}_{question.name}"
+        point, is_study = given.get("point") or "", False
+        if given["out"] is not None:
+            check_target(given["out"] / stem)
         if asked.simulate is not None:
             is_study = sources[0].suffix == ".toml"
             sources = _simulated(asked, sources[0], given)
@@ -127,25 +130,17 @@ def function_of(question: Question) -> Callable[..., None]:
             views = [store.view(given.get("study_file")).at(point) for store in opened]
             with progress(question.name):
                 answer = asked.answer(*views, **{p.name: given[p.name] for p in asked.options})
-            _deliver(answer, f"{stem}_{question.name}", given)
+            deliver(answer, given["wide"], given["as_json"])
+            if given["out"] is not None:
+                with progress("files"):
+                    files = answer.write(given["out"] / stem)
+                for path in files:
+                    say(f"wrote {path}")
 
     made: Any = run
     made.__name__, made.__doc__ = question.name, prose(inspect.getdoc(asked.answer) or "")
     made.__signature__ = inspect.Signature(asked.parameters())
     return run
-
-
-def _deliver(answer: Answer, stem: str, given: dict[str, Any]) -> None:
-    if given["as_json"]:
-        print_json(answer.values())
-    else:
-        show(answer, given["wide"])
-    if given["out"] is not None:
-        make_folder(given["out"])
-        with progress("files"):
-            files = answer.write(given["out"] / stem)
-        for path in files:
-            say(f"wrote {path}")
 
 
 def _simulated(asked: _Asked, source: Path, given: dict[str, Any]) -> list[Path]:
@@ -159,7 +154,6 @@ def _simulated(asked: _Asked, source: Path, given: dict[str, Any]) -> list[Path]
     point, folder = given.get("point") or "", given["out"] or Path()
     what: Any = source
     if is_study:
-        make_folder(folder)
         what = study.load(source)
         names_of(point, [own.name for own in what.points], str(source))
     settings = {"workers": given["workers"], "folder": folder, "study_file": given.get("study_file"), "point": point}

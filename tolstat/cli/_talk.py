@@ -13,6 +13,7 @@ from typing import Annotated, Any, TextIO
 
 from tolstat import __version__
 from tolstat.common.errors import Fault, InputError
+from tolstat.common.files import make_parent
 from tolstat.display.options import Opt
 from tolstat.display.progress import Display, display
 from tolstat.display.unseen import visible
@@ -94,7 +95,9 @@ def session(
     Raises
     ------
     InputError
-        When the log cannot be written, or is to be quiet and verbose.
+        When it is to be quiet and verbose.
+    OSError
+        When the log cannot be written.
     """
     own = _Stderr()
     LOG.handlers = [own]
@@ -115,14 +118,8 @@ def session(
 
 
 def _log_file(path: Path) -> logging.Handler:
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handler = logging.FileHandler(path, encoding="utf-8")
-    except OSError as error:
-        found = f"cannot be written: {error.strerror or error}"
-        raise InputError(
-            [Fault(f"--log {path}", found, "give the path of a file, for example: --log run.log")]
-        ) from error
+    make_parent(path)
+    handler = logging.FileHandler(path, encoding="utf-8")
     form = logging.Formatter("%(asctime)s %(levelname)s %(message)s", "%Y-%m-%dT%H:%M:%SZ")
     form.converter = time.gmtime
     handler.setFormatter(form)

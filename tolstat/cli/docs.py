@@ -47,7 +47,9 @@ def docs(page: Annotated[str | None, Opt("PAGE")] = None) -> None:
     if page is not None:
         _print_page(page)
         return
-    clone = find_clone([Path(__file__).parents[2], Path.cwd(), *Path.cwd().parents])
+    folders = [Path(__file__).parents[2], Path.cwd(), *Path.cwd().parents]
+    marks = (Path("docs", "conf.py"), Path("tolstat", "cli", "docs.py"))
+    clone = next((folder for folder in folders if all((folder / mark).is_file() for mark in marks)), None)
     if clone is None:
         say("pages of the installed package; the site with all pages and pictures is built from a clone")
         typer.echo(_titled())
@@ -113,22 +115,3 @@ def _titled() -> str:
         textwrap.fill(title[2:], WIDTH, initial_indent=f"{name:{width}}  ", subsequent_indent=" " * (width + 2))
         for name, title in found.items()
     )
-
-
-def find_clone(folders: list[Path]) -> Path | None:
-    """Return the first folder that is a clone of the repository.
-
-    Parameters
-    ----------
-    folders : list of Path
-        Folders to look at.
-
-    Returns
-    -------
-    Path or None
-    """
-    return next((folder for folder in folders if _is_clone(folder)), None)
-
-
-def _is_clone(folder: Path) -> bool:
-    return (folder / "docs" / "conf.py").is_file() and (folder / "tolstat" / "cli" / "docs.py").is_file()

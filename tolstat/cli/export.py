@@ -6,13 +6,14 @@ import csv
 import math
 import sys
 from collections.abc import Callable
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated, TextIO
 
 import typer
 
-from tolstat.cli._output import as_json
+from tolstat.cli._output import json_of
 from tolstat.cli._talk import progress, say
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.files import atomic_write, check_target
@@ -80,59 +81,51 @@ def export(
     """
     given = {"--csv": joints, "--pylife": cycles, "--parquet": parquet, "--xlsx": xlsx, "--statistics": statistics}
     targets = {option: target for option, target in given.items() if target is not None}
-    _check_options(targets, bool(by), not math.isnan(accepted), nominal)
+    _check_options(targets, {"--by": bool(by), "--accept": not math.isnan(accepted)}, nominal)
     for target in targets.values():
         if target != "-":
             check_target(Path(target), file)
     with progress("export"), ResultFile.open(file) as opened:
         view = opened.view().at(point or "")
         store = view.store
+        number = f"{store.n - (0 if nominal else store.first_sample)} joints"
         if xlsx is not None:
             workbook.check(store, "--xlsx")
         if cycles is not None:
             table = pylife.table(view, nominal=nominal)
-            number = table["joint"].nunique()
-            _write(
-                cycles, lambda out: table.to_csv(out, index=False, lineterminator="\n"), f"cycles of {number} joints"
-            )
+            write = partial(table.to_csv, index=False, lineterminator="\n")
+            _write(cycles, write, f"cycles of {table['joint'].nunique()} joints")
         if statistics is not None:
             values = summary.statistics(view, accepted=accepted)
             values["causes"] = {load: causes(view, load).values() for load in by or ()}
-            _write(statistics, lambda out: out.write(as_json(values) + "\n"), "all statistics")
-        number = store.n - (0 if nominal else store.first_sample)
-        if joints == "-":
-            for _ in in_blocks(store, nominal):
-                pass  # damage is told before anything is printed
+            _write(statistics, lambda out: out.write(json_of(values) + "\n"), "all statistics")
         if joints is not None:
-            _write(joints, lambda out: _write_csv(store, nominal, out), f"{number} joints")
+            _write(joints, partial(_write_csv, store, nominal, joints == "-"), number)
         if parquet is None and xlsx is None:
             return
         frame = to_pandas(store, nominal)
-        if xlsx is not None:
-            with atomic_write(Path(xlsx)) as temporary:
-                workbook.write(store, frame, temporary)
-            say(f"wrote {xlsx}: {number} joints")
-        if parquet is not None:
-            with atomic_write(Path(parquet)) as temporary:
-                frame.to_parquet(temporary, engine="pyarrow")
-            say(f"wrote {parquet}: {number} joints")
+        writers = {xlsx: partial(workbook.write, store, frame), parquet: partial(frame.to_parquet, engine="pyarrow")}
+        for name, write in writers.items():
+            if name is not None:
+                with atomic_write(Path(name)) as temporary:
+                    write(temporary)
+                say(f"wrote {name}: {number}")
 
 
-def _check_options(targets: dict[str, str], by: bool, accept: bool, nominal: bool) -> None:
+def _check_options(targets: dict[str, str], of_statistics: dict[str, bool], nominal: bool) -> None:
     """Refuse options that do not go together; `targets` are the files to write, by option."""
     if not targets or len(set(targets.values())) < len(targets):
         raise typer.BadParameter(
             "give one or more of --csv, --parquet, --xlsx, --statistics and --pylife, each with its own file OUT"
         )
-    for option, used in (("--by", by), ("--accept", accept)):
-        if used and "--statistics" not in targets:
+    for option, is_used in of_statistics.items():
+        if is_used and "--statistics" not in targets:
             raise typer.BadParameter(f"{option} is used with --statistics only: add --statistics OUT")
     if nominal and targets.keys() == {"--statistics"}:
         raise typer.BadParameter("--nominal is used with --csv, --parquet, --xlsx and --pylife: add one of them")
     if "--parquet" in targets and find_spec("pyarrow") is None:
-        raise InputError(
-            [Fault("--parquet", "pyarrow is not installed", "install it with: pip install pyarrow, or use --csv OUT")]
-        )
+        remedy = "install it with: pip install pyarrow, or use --csv OUT"
+        raise InputError([Fault("--parquet", "pyarrow is not installed", remedy)])
 
 
 def _write(target: str, write: Callable[[TextIO], object], content: str) -> None:
@@ -144,8 +137,10 @@ def _write(target: str, write: Callable[[TextIO], object], content: str) -> None
     say(f"wrote {target}: {content}")
 
 
-def _write_csv(store: Reader, nominal: bool, stream: TextIO) -> None:
-    """Write errors and results block by block."""
+def _write_csv(store: Reader, nominal: bool, is_printed: bool, stream: TextIO) -> None:
+    """Write errors and results block by block; damage is found before anything is printed."""
+    for _ in in_blocks(store, nominal) if is_printed else ():
+        pass
     out = csv.writer(stream, lineterminator="\n")
     for k, frame in enumerate(in_blocks(store, nominal)):
         if k == 0:

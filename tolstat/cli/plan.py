@@ -67,19 +67,17 @@ def _lines(made: Plan) -> Iterator[str]:
     yield f"pilot: {made.pilot} joints, {made.failed} failed, {made.unsettled} not settled"
     if made.fidelity:
         yield made.fidelity
-    if made.reversals.joints:
+    if rattle := made.reversals.joints:
         yield (
-            f"warning: the torque reverses in {made.reversals.joints} of {made.pilot} joints: inertia torque up to "
+            f"warning: the torque reverses in {rattle} of {made.pilot} joints: inertia torque up to "
             f"{made.reversals.torque:.3g} N m; these joints rattle and cost {made.reversals.cost:.2g} times as much as "
             "others"
         )
-    if made.assembly.misfits:
-        share = ""
-        if made.assembly.interval is not None:
-            low, high = made.assembly.interval
-            share = f"; 95 % interval of their share {100 * low:.2g} to {100 * high:.2g} %"
-        joints = f"{made.assembly.misfits} of {made.assembly.of} joints"
-        yield f"warning: {joints} have a pin larger than its hole and cannot be simulated{share}"
+    if misfits := made.assembly.misfits:
+        ends = [f"{100 * end:.2g}" for end in made.assembly.interval or ()]
+        interval = f"; 95 % interval of their share {' to '.join(ends)} %" if ends else ""
+        joints = f"{misfits} of {made.assembly.of} joints"
+        yield f"warning: {joints} have a pin larger than its hole and cannot be simulated{interval}"
     yield f"time a joint: {1e3 * made.seconds_per_joint:.3g} ms"
     yield f"time: about {_duration(made.seconds)} on {made.workers} cores, of which"
     for stage, seconds in made.stages.items():
@@ -89,8 +87,8 @@ def _lines(made: Plan) -> Iterator[str]:
     yield from (*made.fit, *made.sweep)
     if made.exact:
         yield f"no tolerance, taken as exact: {', '.join(made.exact)}"
-    for share_above, width in made.widths.items():
-        yield f"95 % interval of a share of {100 * share_above:g} %: {100 * width:.2g} points wide"
+    for share, width in made.widths.items():
+        yield f"95 % interval of a share of {100 * share:g} %: {100 * width:.2g} points wide"
     for limit in made.limits:
         interval = f"interval at most {100 * limit.width:.2g} points wide"
         yield f"limit {limit.load}: {limit.above} of {limit.of} above in the pilot; {interval}"
@@ -99,16 +97,11 @@ def _lines(made: Plan) -> Iterator[str]:
 
 
 def _duration(seconds: float) -> str:
-    if seconds < 1:
-        return "less than 1 s"
-    for unit, size in (("d", 86400.0), ("h", 3600.0), ("min", 60.0)):
-        if seconds >= 2 * size:
-            return f"{seconds / size:.3g} {unit}"
-    return f"{seconds:.2g} s"
+    units = (("d", 86400.0), ("h", 3600.0), ("min", 60.0))
+    long = next((f"{seconds / size:.3g} {unit}" for unit, size in units if seconds >= 2 * size), f"{seconds:.2g} s")
+    return "less than 1 s" if seconds < 1 else long
 
 
 def _size(size: int) -> str:
-    for unit, factor in (("TB", 1e12), ("GB", 1e9), ("MB", 1e6)):
-        if size >= factor:
-            return f"{size / factor:.3g} {unit}"
-    return f"{size / 1e3:.3g} kB"
+    units = (("TB", 1e12), ("GB", 1e9), ("MB", 1e6))
+    return next((f"{size / factor:.3g} {unit}" for unit, factor in units if size >= factor), f"{size / 1e3:.3g} kB")

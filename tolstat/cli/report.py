@@ -6,7 +6,7 @@ import math
 from pathlib import Path
 from typing import Annotated
 
-from tolstat.cli._output import make_folder, print_json, show
+from tolstat.cli._output import print_json, show
 from tolstat.cli._talk import progress, say
 from tolstat.common.cores import available_cores
 from tolstat.common.draw_records import DRAWN
@@ -59,7 +59,7 @@ def report(
         return
     with viewed(file) as view:
         if out is not None:
-            make_folder(out)
+            check_target(out / file.stem)
         with progress("report"):
             answer = reports.report(view.at(point or ""), accepted)
         if as_json:

@@ -1,14 +1,14 @@
-"""``tolstat run``: run a campaign."""
+"""``tolstat run``, ``extend`` and ``merge``: the joints of a campaign, in one file."""
 
 from __future__ import annotations
 
-from enum import StrEnum
 from functools import partial
 from pathlib import Path
 from shlex import quote
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from tolstat import study
+from tolstat.campaign import extend as growth
 from tolstat.campaign import run as campaign
 from tolstat.campaign import stop_rule
 from tolstat.campaign.remedy import parse_retry, reasons
@@ -18,17 +18,10 @@ from tolstat.cli._work import print_study_notes, work
 from tolstat.common import strict
 from tolstat.common.errors import Fault, InputError, gather
 from tolstat.common.files import check_target
-from tolstat.display.options import Joints, Opt, Report, StudyPath, Wide, Workers
+from tolstat.display.options import Joints, Opt, OtherStudy, Report, ResultPath, StudyPath, Wide, Workers
 from tolstat.report import answer as reports
 from tolstat.store import Reader, ResultFile
 from tolstat.study import Study, rewriting
-
-
-class Executor(StrEnum):
-    """Where joints are simulated, see `campaign.run`."""
-
-    PROCESSES = "processes"
-    DASK = "dask"
 
 
 def run(
@@ -37,7 +30,7 @@ def run(
     out: Annotated[Path | None, Opt("FILE")] = None,
     n: Joints = None,
     workers: Workers = None,
-    executor: Annotated[Executor, Opt("WHERE")] = Executor.PROCESSES,
+    executor: Annotated[Literal["processes", "dask"], Opt("WHERE")] = "processes",
     scheduler: Annotated[str | None, Opt("URL")] = None,
     retry: Annotated[str | None, Opt("STATES")] = None,
     settings: Annotated[list[str] | None, Opt("KEY=VALUE", name="set")] = None,
@@ -82,10 +75,16 @@ def run(
     """
     retried = [text for text in settings or () if text.startswith("solver.")]
     changes = [text for text in settings or () if text not in retried]
-    faults = _cannot_be_combined(rows, until, retry, retried)
-    if scheduler is not None and executor is not Executor.DASK:
-        faults.append(Fault("--scheduler", "is used with --executor dask only", "add --executor dask"))
-    part, again = None, None
+    wrong = (
+        (rows and until, "--until", "cannot be combined with --rows", "remove --until or --rows"),
+        (until and retry, "--until", "cannot be combined with --retry", "remove --until or --retry"),
+        (
+            *(retried and not retry, f"--set {next(iter(retried), '')!r}", "sets the solver, which --retry alone can"),
+            "add --retry newton_failed, or edit the study",
+        ),
+        (scheduler and executor != "dask", "--scheduler", "is used with --executor dask only", "add --executor dask"),
+    )
+    faults = [Fault(*words) for applies, *words in wrong if applies]
     with gather(faults):
         part = None if rows is None else parse_rows(rows)
     path = out if out is not None else Path(f"{study_file.stem}.h5")
@@ -98,21 +97,73 @@ def run(
     if faults:
         raise InputError(faults)
     print_study_notes(study_file, plan)
-    where = {"workers": workers, "executor": executor.value, "scheduler": scheduler}
+    where = {"workers": workers, "executor": executor, "scheduler": scheduler}
     simulate(plan, path, until=until, check=verify, rows=part, retry=again, **where)
     conclude(path, report, wide, " ".join([str(study_file), *(f"--set {quote(text)}" for text in changes)]))
 
 
-def _cannot_be_combined(rows: str | None, until: str | None, retry: str | None, settings: list[str]) -> list[Fault]:
-    faults = []
-    if rows is not None and until is not None:
-        faults.append(Fault("--until", "cannot be combined with --rows", "remove --until or --rows"))
-    if until is not None and retry is not None:
-        faults.append(Fault("--until", "cannot be combined with --retry", "remove --until or --retry"))
-    if settings and retry is None:
-        remedy = "add --retry newton_failed, or edit the study"
-        faults.append(Fault(f"--set {settings[0]!r}", "sets the solver, which --retry alone can", remedy))
-    return faults
+def extend(
+    file: ResultPath,
+    *,
+    n: Annotated[int, Opt("N", least=1)],
+    study_file: OtherStudy = None,
+    workers: Workers = None,
+    report: Report = True,
+    wide: Wide = False,
+) -> None:
+    """Add joints to a campaign and simulate them.
+
+    Draws the next joints of the sampling sequence and simulates them; the joints already in FILE do not change. FILE
+    then equals that of a campaign with N joints from the start. Latin hypercubes, sweeps and listed joints cannot be
+    extended. Prints the report and writes its files as tolstat run does.
+
+    To resume after an interruption: tolstat run STUDY --n N --out FILE
+
+    Example: tolstat extend iso2768_f.h5 --n 2000
+
+    Parameters
+    ----------
+    n : int
+        New number of joints, without the nominal joint.
+    """
+    with progress("drawing the errors"):
+        plan = growth.extend(file, n, study_file)
+    say(f"{file}: extended to {n} joints")
+    simulate(plan, file, workers=workers)
+    conclude(file, report, wide)
+
+
+def merge(files: Annotated[list[Path], Opt("SLICE")], *, out: Annotated[Path, Opt("FILE")]) -> None:
+    """Merge the slices of a campaign into one result file.
+
+    Slices are made by tolstat run --rows. They must have the same study and version of the code, and together hold all
+    rows of the campaign; a row in several slices must have identical results. FILE then equals that of a single run.
+    Joints with other tolerances (what_if) are kept, unless the slices hold different results of them.
+
+    Prints the number of joints by outcome on standard error.
+
+    Example: tolstat merge part1.h5 part2.h5 --out whole.h5
+
+    Parameters
+    ----------
+    files : list of Path
+        Result files (HDF5) of the slices, in any order.
+    out : Path
+        Result file to create; must not exist.
+    """
+    with progress("merging"):
+        merged = growth.merge(files, out)
+    counts = merged.counts
+    pending = counts.total - counts.done
+    say(f"{out}: {counts.done} {counts.counted}, {counts.shortfall}")
+    if merged.twice:
+        say(f"{merged.twice} surplus copies of rows, with identical results")
+    if merged.dropped:
+        say(f"left out: joints of {merged.dropped} changes of what_if, of which the slices hold different results")
+    if pending:
+        say(f"{pending} {counts.counted} are pending; to simulate them: tolstat run STUDY --out {out}")
+    else:
+        say(f"next: tolstat report {quote(str(out))} --out {quote(str(out.with_suffix('.html')))}")
 
 
 def parse_rows(text: str) -> range:

@@ -7,9 +7,9 @@ from typing import Annotated
 
 import typer
 
-from tolstat.cli._output import make_folder
 from tolstat.cli._talk import say
-from tolstat.common.errors import Fault, InputError
+from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.files import check_target
 from tolstat.display import style
 from tolstat.display.options import Opt
 from tolstat.display.table import as_text, plain
@@ -55,6 +55,8 @@ def show(
         faults.append(Fault("--errors", "cannot be used together with --row", "give one of them"))
     if target.suffix.lower() not in FORMATS:
         faults.append(Fault(f"--out {target}", "is not a picture", f"end its name in {', '.join(FORMATS)}"))
+    with gather(faults):
+        check_target(target)
     if faults:
         raise InputError(faults)
     joint, own_alpha, title, own_errors = joints.read(source, row, alpha)
@@ -64,7 +66,6 @@ def show(
         figure, rows = joints.draw_row(joint, own_errors, title), joints.numbers(joint, own_errors)
     else:
         figure, rows = joints.draw_joint(joint, own_alpha, title, columns), joints.lengths(joint, own_alpha)
-    make_folder(target.parent)
     (path,) = style.save(figure, target.with_suffix(""), (target.suffix.lower(),))
     typer.echo(as_text(plain(rows), rows))
     say(f"wrote {path}")

@@ -1,4 +1,4 @@
-"""``tolstat simulate``: simulate one joint."""
+"""``tolstat simulate`` and ``tolstat replay``: one joint, of a case file or of a campaign."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import Annotated, Any
 import typer
 
 from tolstat import study
-from tolstat.campaign import replay
-from tolstat.campaign.replay import CaseResult
+from tolstat.campaign import replay as replays
+from tolstat.campaign.replay import CaseResult, Replay
 from tolstat.cli._output import print_json
 from tolstat.cli._talk import progress, say, warn
 from tolstat.cli._work import print_warnings
@@ -17,10 +17,11 @@ from tolstat.common.files import atomic_write, check_target
 from tolstat.common.loads import unit_text
 from tolstat.common.tables import STATUS_TEXT, Status
 from tolstat.display import table
-from tolstat.display.options import AsJson, Opt, Trace
+from tolstat.display.options import AsJson, Opt, Point, ResultPath, Trace
 from tolstat.display.table import Column, has
 from tolstat.joint.mounting import in_words
 from tolstat.solver import compilation
+from tolstat.store import ResultFile
 
 LARGEST = (
     Column("load", lambda row: str(row["load"])),
@@ -53,11 +54,46 @@ def simulate(case: Annotated[Path, Opt("CASE")], *, out: Trace = None, as_json: 
     say(f"{loaded.name}: {in_words([loaded.joint.shaft.axial], [loaded.joint.contact.law])}")
     compilation.announce()
     with progress("simulation"):
-        result = replay.simulate_case(loaded)
-    deliver(result, {}, out, as_json)
+        result = replays.simulate_case(loaded)
+    _deliver(result, {}, out, as_json)
 
 
-def deliver(result: CaseResult, facts: dict[str, Any], out: Path | None, as_json: bool) -> None:
+def replay(
+    file: ResultPath,
+    *,
+    row: Annotated[int, Opt("I", least=0)],
+    out: Trace = None,
+    point: Point = None,
+    as_json: AsJson = False,
+) -> None:
+    """Simulate one joint again and compare with the file.
+
+    Uses the joint, errors and settings stored in FILE. Prints the largest value of each load, and whether all stored
+    values are identical to the last bit, as they must be on the same machine with the same versions. If they
+    differ, prints the versions that differ and ends with exit code 1.
+
+    Example: tolstat replay iso2768_f.h5 --row 17 --out trace.csv
+
+    Parameters
+    ----------
+    row : int
+        Row of the joint in the campaign, from 0.
+    point : str, optional
+        Operating point, such as cruise; needed if FILE has several.
+    """
+    if out is not None:
+        check_target(out, file)
+    compilation.announce()
+    with progress("simulation"), ResultFile.open(file) as store:
+        again = replays.replay(store.at(point) if point else store, row)
+    facts = {"row": row, "equal": not again.differences, "differing": [d.name for d in again.differences]}
+    _deliver(again.result, facts, out, as_json)
+    say(_verdict(again))
+    if again.differences:
+        raise typer.Exit(1)
+
+
+def _deliver(result: CaseResult, facts: dict[str, Any], out: Path | None, as_json: bool) -> None:
     """Print `facts` and the summary of a joint, a warning if its status is not ok, and write its histories."""
     summary = facts | result.summary()
     if as_json:
@@ -83,3 +119,19 @@ def _per_cent(change: float | None) -> str:
     if change is None:
         return "-"
     return "0.0 %" if abs(change) < 5e-4 else f"{100 * change:+.1f} %"
+
+
+def _verdict(again: Replay) -> str:
+    if not again.differences:
+        return f"row {again.row}: identical to the stored results, bit for bit"
+    now = again.result.summary()["status"]
+    if again.stored.label != now:
+        line = f"row {again.row}: status {again.stored.label} in the campaign, {now} now"
+    else:
+        d = max(again.differences, key=lambda d: d.relative)
+        line = (
+            f"row {again.row}: {len(again.differences)} values differ, largest relative difference {d.relative:.2g}: "
+        )
+        line += f"{d.name} {d.stored!r} stored, {d.now!r} now"
+    reason = "all versions are those that made the file: the machine is of another type, or the file is damaged"
+    return "\n  ".join([line, *(again.code or [reason])])

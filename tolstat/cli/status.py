@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import math
 import time
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -14,14 +14,13 @@ from tolstat.campaign.remedy import reasons
 from tolstat.cli._output import print_json, print_table
 from tolstat.cli._talk import progress, wrapped
 from tolstat.common.errors import Fault, StoreError
-from tolstat.common.loads import load_of
 from tolstat.common.tables import Status, worst_status
 from tolstat.display import text
 from tolstat.display.answer import plain
 from tolstat.display.options import AsJson, ResultPath, Wide
 from tolstat.display.progress import clock
 from tolstat.display.table import Column
-from tolstat.store import ResultFile, verification, what_if
+from tolstat.store import ResultFile, View, verification, what_if
 
 SHARES = (
     Column("load > limit", lambda row: text.limit({**row, "level": row["limit"]})),
@@ -52,21 +51,16 @@ def status(file: ResultPath, *, check: bool = False, wide: Wide = False, as_json
     """
     with progress("reading the file"), ResultFile.open(file) as store:
         states = {one.point or "": one.status() for one in store.each()}
-        facts, shares = _facts(store, states), _shares(store)
+        facts, shares = _facts(store, states), _shares(store.view())
         if check:
             facts["checked"] = _checked(store)
         why = reasons(store, states)
     if as_json:
-        causes = {
-            f"{r.status.label} at {r.point}" if r.point else r.status.label: {"row": r.row, "remedy": r.remedy}
-            for r in why
-        }
-        checked = {"checked": facts.pop("checked")} if check else {}
-        print_json(plain(facts | {"exceedance": shares} | checked | {"causes": causes}))
+        causes = {f"{r.status.label} at {r.point}" if r.point else r.status.label: r for r in why}
+        remedies = {name: {"row": r.row, "remedy": r.remedy} for name, r in causes.items()}
+        print_json(plain(facts | {"exceedance": shares, "causes": remedies}))
         return
-    typer.echo(_text(facts))
-    for reason in why:
-        typer.echo(wrapped(reason.text))
+    typer.echo("\n".join([*_lines(facts), *(wrapped(reason.text) for reason in why)]))
     if shares:
         typer.echo()
         print_table(SHARES, shares, wide)
@@ -74,14 +68,18 @@ def status(file: ResultPath, *, check: bool = False, wide: Wide = False, as_json
 
 def _facts(store: ResultFile, states: dict[str, NDArray[np.uint8]]) -> dict[str, Any]:
     """Study, counts by status, in all and by point, and the pace of the run under way; `states` by point."""
-    counts = {point: _counts(own) for point, own in states.items()}
     facts: dict[str, Any] = {"study": store.study_name, "joints": store.n}
     facts |= _counts(worst_status(list(states.values())))
     if len(states) > 1:
-        facts["points"] = {point: {label: n for label, n in own.items() if n} for point, own in counts.items()}
-    pending = sum(own[Status.PENDING.label] for own in counts.values())
-    written = sum(int((one.column("results", "status", slice(None)) == Status.PENDING).sum()) for one in store.each())
-    again = sum(int((one.attempt() > 0).sum()) for one in store.each())
+        facts["points"] = {point: {k: n for k, n in _counts(own).items() if n} for point, own in states.items()}
+    pending, written, again = (
+        sum(int(np.count_nonzero(rows)) for rows in tables)
+        for tables in (
+            [own == Status.PENDING for own in states.values()],
+            [one.column("results", "status", slice(None)) == Status.PENDING for one in store.each()],
+            [one.attempt() for one in store.each()],
+        )
+    )
     condition = {"damaged": pending - written, "simulated_again": again}
     facts |= {name: number for name, number in condition.items() if number}
     session = store.session()
@@ -93,42 +91,35 @@ def _facts(store: ResultFile, states: dict[str, NDArray[np.uint8]]) -> dict[str,
 
 
 def _counts(states: NDArray[np.uint8]) -> dict[str, int]:
-    numbers = np.bincount(states, minlength=max(Status) + 1)
-    return {state.label: int(numbers[state]) for state in Status}
+    return {state.label: int(np.count_nonzero(states == state)) for state in Status}
 
 
-def _shares(store: ResultFile) -> list[dict[str, Any]]:
+def _shares(view: View) -> list[dict[str, Any]]:
     """Share of the joints above each limit so far; joints of a subset simulation are no sample."""
-    view = store.view()
     rows: list[dict[str, Any]] = []
-    for name, limit in view.limits.items() if view.method != "subset" else ():
-        load = view.load(name)
-        share = load.above(limit)
+    for load in view.loads([] if view.method == "subset" else list(view.limits)):
+        share = load.above(view.limits[load.name])
         if share.n:
             above = {"above": share.count, "of": share.n - share.n_failed - share.n_unsettled}
-            numbers = {key: _rounded(getattr(share, key)) for key in ("estimate", "lower", "upper")}
-            rows.append({"load": name, "limit": limit, "unit": load_of(name).unit} | above | numbers)
+            numbers = {key: float(f"{getattr(share, key):.3g}") for key in ("estimate", "lower", "upper")}
+            rows.append({"load": load.name, "limit": load.limit, "unit": load.unit} | above | numbers)
     return rows
 
 
-def _rounded(share: float) -> float:
-    return share if math.isnan(share) else float(f"{share:.3g}")
-
-
-def _text(facts: dict[str, Any]) -> str:
-    """Counts and pace as lines; statuses without joints are left out."""
-    lines = [f"study: {facts['study']}", f"joints: {facts['joints']}"]
-    lines += [f"{state.label}: {facts[state.label]}" for state in Status if facts[state.label]]
-    for point, counts in facts.get("points", {}).items():
-        lines.append(f"at {point}: {', '.join(f'{count} {label}' for label, count in counts.items())}")
-    lines += [f"{name}: {facts[name]}" for name in ("damaged", "simulated_again") if name in facts]
-    if "checked" in facts:
-        unchecked = "errors match; results have none while a run is under way, or after one that was killed"
-        lines.append(f"checksums: {'all match' if facts['checked'] else unchecked}")
-    pace = ""
-    if "joints_per_s" in facts:
-        pace = f", {facts['joints_per_s']:g} joints/s, {clock(facts['s_to_go'])} left"
-    return "\n".join([*lines, f"running: {'yes' if facts['running'] else 'no'}{pace}"])
+def _lines(facts: dict[str, Any]) -> Iterator[str]:
+    """Counts and pace; statuses without joints are left out."""
+    unchecked = "errors match; results have none while a run is under way, or after one that was killed"
+    pace = f", {facts['joints_per_s']:g} joints/s, {clock(facts['s_to_go'])} left" if "s_to_go" in facts else ""
+    for name, value in facts.items():
+        if name == "points":
+            for point, counts in value.items():
+                yield f"at {point}: {', '.join(f'{count} {label}' for label, count in counts.items())}"
+        elif name == "running":
+            yield f"running: {'yes' if value else 'no'}{pace}"
+        elif name == "checked":
+            yield f"checksums: {'all match' if value else unchecked}"
+        elif value and name not in ("joints_per_s", "s_to_go"):
+            yield f"{name}: {value}"
 
 
 def _checked(store: ResultFile) -> bool:
@@ -139,9 +130,8 @@ def _checked(store: ResultFile) -> bool:
     StoreError
         With everything that does not match its checksum.
     """
-    integrity = store.check()
+    integrity, altered = store.check(), what_if.damaged(store)
     faults = [f"{path} of rows {', '.join(rows)}" for path, rows in integrity.damaged.items()]
-    altered = what_if.damaged(store)
     faults += [f"what_if: {altered} {'change' if altered == 1 else 'changes'}"] * bool(altered)
     if faults:
         remedy = "simulate joints with damaged results again: tolstat run STUDY; for damaged errors restore a copy"

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from tolstat.analysis.accuracy import LEAST_NEAR
 from tolstat.campaign.verify import check, check_near
-from tolstat.cli._output import print_json, print_table
+from tolstat.cli._output import deliver
 from tolstat.cli._talk import progress, say
 from tolstat.common.cores import available_cores
 from tolstat.common.files import atomic_write, check_target
-from tolstat.display.answer import plain
+from tolstat.display.answer import Answer, Sentence, Table
 from tolstat.display.options import AsJson, Opt, Wide, Workers
 from tolstat.questions import accuracy
 from tolstat.solver import compilation
-from tolstat.store.verification import Verification
 
 
 def verify(
@@ -62,26 +61,15 @@ def verify(
             found = check(what, joints or 24, seed, compilation.announce, count, progress=shown)
         else:
             found = check_near(what, near, joints or LEAST_NEAR, compilation.announce, count, shown)
-    if as_json:
-        print_json(_summary(found))
-    else:
-        print_table(accuracy.ERRORS, accuracy.error_rows(found), wide)
-    say(accuracy.note(found))
+    units = dict.fromkeys(("median", "usual", "worst"), "1")
+    kinds = Table("kinds", "By kind of load", accuracy.ERRORS, accuracy.error_rows(found), units)
+    loads = Table("loads", "By load", (), accuracy.error_rows(found, by_kind=False), units)
+    checks = {name: check.description for name, check in found.checks.items()}
+    facts = {"rows": found.rows, "seed": found.seed, "checks": checks}
+    deliver(Answer("verify", "Numerical error", [kinds, loads, Sentence(accuracy.note(found))], facts), wide, as_json)
     if out is not None:
         import pandas as pd
 
         with atomic_write(out) as temporary:
             pd.DataFrame(accuracy.joint_rows(found)).to_csv(temporary, index=False, lineterminator="\n")
         say(f"wrote {out}")
-
-
-def _summary(found: Verification) -> dict[str, Any]:
-    """Return the distributions of errors as plain values, by kind of load and by load; None for unknown values."""
-    facts: dict[str, Any] = {"rows": found.rows.tolist(), "seed": found.seed}
-    facts["checks"] = {name: check.description for name, check in found.checks.items()}
-    for key, by_kind in (("kinds", True), ("loads", False)):
-        errors: dict[str, Any] = {}
-        for row in plain(accuracy.error_rows(found, by_kind)):
-            errors.setdefault(row.pop("error"), {})[row.pop("load")] = row
-        facts[key] = errors
-    return facts

@@ -35,6 +35,13 @@ class Opt(NamedTuple):
 
 
 ResultPath = Annotated[Path, Opt("FILE", help="Result file (HDF5) of a campaign.")]
+PointPaths = Annotated[
+    list[Path], Opt("FILE", help="Result file (HDF5) of all operating points, or several of one each.")
+]
+FirstPath = Annotated[Path, Opt("A", help="Result file (HDF5) of the first campaign.")]
+SecondPath = Annotated[Path, Opt("B", help="Result file (HDF5) of the second campaign.")]
+SimulatedPath = Annotated[Path, Opt("STUDY", help="Study file (TOML) to simulate.")]
+EitherPath = Annotated[Path, Opt("STUDY|FILE", help="Study file (TOML) to simulate, or a result file (HDF5).")]
 StudyPath = Annotated[Path, Opt("STUDY", help="Study file (TOML).")]
 Load = Annotated[str | None, Opt("LOAD")]
 Loads = Annotated[list[str] | None, Opt("LOAD")]
@@ -60,6 +67,15 @@ OtherStudy = Annotated[
 Workers = Annotated[int | None, Opt("W", least=1, help="Number of worker processes; default: one per core.")]
 Report = Annotated[bool, Opt(help="Print the report at the end and write its files.")]
 Folder = Annotated[Path | None, Opt("DIR", help="Write tables as CSV and pictures to this folder, created if missing.")]
+Results = Annotated[
+    Path | None,
+    Opt(
+        "DIR",
+        help="Folder of result files, created if missing; tables as CSV and pictures are written to it, too; "
+        "default: result files only, to the current one.",
+    ),
+]
+Run = Annotated[bool, Opt(help="Simulate what the answer needs, and keep it in FILE.")]
 Trace = Annotated[Path | None, Opt("CSV", help="Write the load histories of the last revolution as CSV.")]
 Wide = Annotated[bool, Opt(help="Print all columns; default: those that fit 80 characters.")]
 AsJson = Annotated[bool, Opt(name="json", help="Print JSON instead of text.")]

@@ -38,7 +38,7 @@ PLAIN = {
     },
 }
 """Commands that are no question, by heading of the help: functions of this package, and their first lines."""
-FILES = {"schema": "new", "extend": "run", "merge": "run", "replay": "simulate"}
+FILES = {"schema": "new", "plan": "run", "extend": "run", "merge": "run", "replay": "simulate"}
 """Files of commands that have none of their own name."""
 
 

@@ -14,6 +14,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from inspect import Parameter, Signature
+from pathlib import Path
 from typing import Annotated, Any, get_args, get_origin
 
 import typer
@@ -21,6 +22,7 @@ import typer
 from tolstat.cli._shortage import shortage
 from tolstat.cli._talk import fail, session
 from tolstat.common.errors import Fault, InputError, TolstatError, gather
+from tolstat.common.files import check_target
 from tolstat.display.options import Opt
 
 WHAT = {"1": "a share between 0 and 1", "s": "a time above zero"}
@@ -139,15 +141,18 @@ def _values(parameters: Mapping[str, Parameter], given: dict[str, Any]) -> dict[
     Raises
     ------
     InputError
-        With each value that cannot be used.
+        With each value that cannot be used, and each file that cannot be written.
     """
     faults: list[Fault] = []
+    inputs = [given[name] for name, p in parameters.items() if p.kind is not Parameter.KEYWORD_ONLY]
+    paths = [Path(value) for value in inputs if isinstance(value, str | Path)]
     for name, parameter in parameters.items():
-        opt = opt_of(parameter)[1]
-        if opt.unit is not None:
-            with gather(faults):
-                text = given[name]
-                given[name] = parameter.default if text is None else quantity(text, opt, flag_of(parameter))
+        opt, value = opt_of(parameter)[1], given[name]
+        with gather(faults):
+            if opt.writes and value not in (None, "-"):
+                check_target(Path(value), *paths)
+            elif opt.unit is not None:
+                given[name] = parameter.default if value is None else quantity(value, opt, flag_of(parameter))
     if faults:
         raise InputError(faults)
     return given

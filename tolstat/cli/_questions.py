@@ -20,33 +20,18 @@ from tolstat.cli._output import deliver
 from tolstat.cli._talk import progress, say
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.files import check_target
-from tolstat.display.options import (
-    AsJson,
-    EitherPath,
-    FirstPath,
-    Folder,
-    OtherStudy,
-    Point,
-    PointPaths,
-    ResultPath,
-    Results,
-    Run,
-    SecondPath,
-    SimulatedPath,
-    Wide,
-    Workers,
-)
+from tolstat.display import options
 from tolstat.questions import Question
 from tolstat.store import ResultFile, View
 from tolstat.study import Study
 from tolstat.study.points import names_of
 
 READS: dict[str, dict[str, Any]] = {
-    "view": {"file": ResultPath},
-    "views": {"files": PointPaths},
-    "pair": {"a": FirstPath, "b": SecondPath},
-    "study": {"source": SimulatedPath},
-    "either": {"source": EitherPath},
+    "view": {"file": options.ResultPath},
+    "views": {"files": options.PointPaths},
+    "pair": {"a": options.FirstPath, "b": options.SecondPath},
+    "study": {"source": options.SimulatedPath},
+    "either": {"source": options.EitherPath},
 }
 """Arguments of a command by what its question reads."""
 
@@ -93,15 +78,15 @@ class _Asked:
             base, opt = opt_of(p)
             made.append(_parameter(p.name, Annotated[base, opt._replace(help=texts[p.name])], p.default))
         if self.reads != "pair":
-            made.append(_parameter("point", Point, None))
+            made.append(_parameter("point", options.Point, None))
         if self.reads not in ("pair", "study"):
-            made.append(_parameter("study_file", OtherStudy, None))
+            made.append(_parameter("study_file", options.OtherStudy, None))
         if self.into_file:
-            made.append(_parameter("run", Run, False))
+            made.append(_parameter("run", options.Run, False))
         if self.simulate is not None:
-            made.append(_parameter("workers", Workers, None))
-        made.append(_parameter("out", Results if self.reads in ("study", "either") else Folder, None))
-        return [*made, _parameter("wide", Wide, False), _parameter("as_json", AsJson, False)]
+            made.append(_parameter("workers", options.Workers, None))
+        made.append(_parameter("out", options.Results if self.reads in ("study", "either") else options.Folder, None))
+        return [*made, _parameter("wide", options.Wide, False), _parameter("as_json", options.AsJson, False)]
 
 
 def _parameter(name: str, annotation: Any, default: Any) -> Parameter:

@@ -22,6 +22,8 @@ WIDTH = 80
 """Maximum length of a line of prose, characters."""
 LOG = logging.getLogger("tolstat")
 LOG.propagate = False
+say, warn, fail = LOG.info, LOG.warning, LOG.error
+"""Tell a message; a warning; why the command ends early. The last two are told with --quiet, too."""
 
 
 class _Stderr(logging.Handler):
@@ -60,21 +62,6 @@ def _broken(line: str) -> str:
         return line
     indent = " " * (len(line) - len(line.lstrip()) + 4)
     return textwrap.fill(line, WIDTH, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
-
-
-def say(text: str) -> None:
-    """Tell a message."""
-    LOG.info("%s", text)
-
-
-def warn(text: str) -> None:
-    """Tell a warning, also with --quiet."""
-    LOG.warning("%s", text)
-
-
-def fail(text: str) -> None:
-    """Tell why the command ends early, also with --quiet."""
-    LOG.error("%s", text)
 
 
 @contextmanager

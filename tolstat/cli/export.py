@@ -16,7 +16,7 @@ import typer
 from tolstat.cli._output import json_of
 from tolstat.cli._talk import progress, say
 from tolstat.common.errors import Fault, InputError
-from tolstat.common.files import atomic_write, check_target
+from tolstat.common.files import atomic_write
 from tolstat.display.options import Accepted, Opt, Point, ResultPath
 from tolstat.display.text import csv_rows
 from tolstat.questions.causes.errors import causes
@@ -25,14 +25,14 @@ from tolstat.report import summary, workbook
 from tolstat.store import Reader, ResultFile
 from tolstat.store.result_file import in_blocks, to_pandas
 
-Target = Annotated[str | None, Opt("OUT")]
+Target = Annotated[str | None, Opt("OUT", writes=True)]
 
 
 def export(
     file: ResultPath,
     *,
-    joints: Annotated[str | None, Opt("OUT", name="csv")] = None,
-    cycles: Annotated[str | None, Opt("OUT", name="pylife")] = None,
+    joints: Annotated[str | None, Opt("OUT", name="csv", writes=True)] = None,
+    cycles: Annotated[str | None, Opt("OUT", name="pylife", writes=True)] = None,
     parquet: Target = None,
     xlsx: Target = None,
     statistics: Target = None,
@@ -81,10 +81,20 @@ def export(
     """
     given = {"--csv": joints, "--pylife": cycles, "--parquet": parquet, "--xlsx": xlsx, "--statistics": statistics}
     targets = {option: target for option, target in given.items() if target is not None}
-    _check_options(targets, {"--by": bool(by), "--accept": not math.isnan(accepted)}, nominal)
-    for target in targets.values():
-        if target != "-":
-            check_target(Path(target), file)
+    every = "--csv, --parquet, --xlsx, --statistics and --pylife, each with its own file OUT"
+    wrong = {
+        f"give one or more of {every}": not targets or len(set(targets.values())) < len(targets),
+        "--by is used with --statistics only: add --statistics OUT": by and statistics is None,
+        "--accept is used with --statistics only: add --statistics OUT": accepted == accepted and statistics is None,
+        "--nominal is used with --csv, --parquet, --xlsx and --pylife: add one of them": nominal
+        and targets.keys() == {"--statistics"},
+    }
+    for message, applies in wrong.items():
+        if applies:
+            raise typer.BadParameter(message)
+    if parquet is not None and find_spec("pyarrow") is None:
+        remedy = "install it with: pip install pyarrow, or use --csv OUT"
+        raise InputError([Fault("--parquet", "pyarrow is not installed", remedy)])
     with progress("export"), ResultFile.open(file) as opened:
         view = opened.view().at(point or "")
         store = view.store
@@ -110,22 +120,6 @@ def export(
                 with atomic_write(Path(name)) as temporary:
                     write(temporary)
                 say(f"wrote {name}: {number}")
-
-
-def _check_options(targets: dict[str, str], of_statistics: dict[str, bool], nominal: bool) -> None:
-    """Refuse options that do not go together; `targets` are the files to write, by option."""
-    if not targets or len(set(targets.values())) < len(targets):
-        raise typer.BadParameter(
-            "give one or more of --csv, --parquet, --xlsx, --statistics and --pylife, each with its own file OUT"
-        )
-    for option, is_used in of_statistics.items():
-        if is_used and "--statistics" not in targets:
-            raise typer.BadParameter(f"{option} is used with --statistics only: add --statistics OUT")
-    if nominal and targets.keys() == {"--statistics"}:
-        raise typer.BadParameter("--nominal is used with --csv, --parquet, --xlsx and --pylife: add one of them")
-    if "--parquet" in targets and find_spec("pyarrow") is None:
-        remedy = "install it with: pip install pyarrow, or use --csv OUT"
-        raise InputError([Fault("--parquet", "pyarrow is not installed", remedy)])
 
 
 def _write(target: str, write: Callable[[TextIO], object], content: str) -> None:

@@ -11,7 +11,6 @@ import typer
 from tolstat.cli._output import json_of
 from tolstat.cli._talk import say
 from tolstat.common.errors import Fault, InputError
-from tolstat.common.files import check_target
 from tolstat.common.strict import did_you_mean
 from tolstat.display import text
 from tolstat.display.options import Opt
@@ -41,7 +40,9 @@ def new(
     say(f"next: tolstat plan {quote(str(path))}")
 
 
-def schema(kind: Annotated[str, Opt("study|joint|case")], *, out: Annotated[Path | None, Opt("JSON")] = None) -> None:
+def schema(
+    kind: Annotated[str, Opt("study|joint|case")], *, out: Annotated[Path | None, Opt("JSON", writes=True)] = None
+) -> None:
     """Print the JSON schema of a file, for editors.
 
     Editors with Taplo or Tombi complete and check keys by the schema that a TOML file names in its first line:
@@ -63,5 +64,4 @@ def schema(kind: Annotated[str, Opt("study|joint|case")], *, out: Annotated[Path
     if out is None:
         typer.echo(content)
         return
-    check_target(out)
     say(f"wrote {text.write(content + chr(10), out)}")

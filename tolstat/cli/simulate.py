@@ -13,7 +13,7 @@ from tolstat.campaign.replay import CaseResult, Replay
 from tolstat.cli._output import print_json
 from tolstat.cli._talk import progress, say, warn
 from tolstat.cli._work import print_warnings
-from tolstat.common.files import atomic_write, check_target
+from tolstat.common.files import atomic_write
 from tolstat.common.loads import unit_text
 from tolstat.common.tables import STATUS_TEXT, Status
 from tolstat.display import table
@@ -47,8 +47,6 @@ def simulate(case: Annotated[Path, Opt("CASE")], *, out: Trace = None, as_json: 
     case : Path
         Case file (TOML): one joint with its errors.
     """
-    if out is not None:
-        check_target(out, case)
     loaded = study.load_case(case)
     print_warnings(case, [loaded.joint])
     say(f"{loaded.name}: {in_words([loaded.joint.shaft.axial], [loaded.joint.contact.law])}")
@@ -81,8 +79,6 @@ def replay(
     point : str, optional
         Operating point, such as cruise; needed if FILE has several.
     """
-    if out is not None:
-        check_target(out, file)
     compilation.announce()
     with progress("simulation"), ResultFile.open(file) as store:
         again = replays.replay(store.at(point) if point else store, row)
@@ -129,9 +125,7 @@ def _verdict(again: Replay) -> str:
         line = f"row {again.row}: status {again.stored.label} in the campaign, {now} now"
     else:
         d = max(again.differences, key=lambda d: d.relative)
-        line = (
-            f"row {again.row}: {len(again.differences)} values differ, largest relative difference {d.relative:.2g}: "
-        )
-        line += f"{d.name} {d.stored!r} stored, {d.now!r} now"
+        differ = f"{len(again.differences)} values differ, largest relative difference {d.relative:.2g}"
+        line = f"row {again.row}: {differ}: {d.name} {d.stored!r} stored, {d.now!r} now"
     reason = "all versions are those that made the file: the machine is of another type, or the file is damaged"
     return "\n  ".join([line, *(again.code or [reason])])

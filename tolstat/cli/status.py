@@ -72,14 +72,10 @@ def _facts(store: ResultFile, states: dict[str, NDArray[np.uint8]]) -> dict[str,
     facts |= _counts(worst_status(list(states.values())))
     if len(states) > 1:
         facts["points"] = {point: {k: n for k, n in _counts(own).items() if n} for point, own in states.items()}
-    pending, written, again = (
-        sum(int(np.count_nonzero(rows)) for rows in tables)
-        for tables in (
-            [own == Status.PENDING for own in states.values()],
-            [one.column("results", "status", slice(None)) == Status.PENDING for one in store.each()],
-            [one.attempt() for one in store.each()],
-        )
-    )
+    each = store.each()
+    pending = sum(np.count_nonzero(own == Status.PENDING) for own in states.values())
+    written = sum(np.count_nonzero(one.column("results", "status", slice(None)) == Status.PENDING) for one in each)
+    again = sum(np.count_nonzero(one.attempt()) for one in each)
     condition = {"damaged": pending - written, "simulated_again": again}
     facts |= {name: number for name, number in condition.items() if number}
     session = store.session()

@@ -10,7 +10,7 @@ from tolstat.campaign.verify import check, check_near
 from tolstat.cli._output import deliver
 from tolstat.cli._talk import progress, say
 from tolstat.common.cores import available_cores
-from tolstat.common.files import atomic_write, check_target
+from tolstat.common.files import atomic_write
 from tolstat.display.answer import Answer, Sentence, Table
 from tolstat.display.options import AsJson, Opt, Wide, Workers
 from tolstat.questions import accuracy
@@ -23,7 +23,7 @@ def verify(
     joints: Annotated[str | None, Opt("N|all")] = None,
     near: Annotated[str | None, Opt("LIMIT")] = None,
     seed: Annotated[int | None, Opt("S", least=0)] = None,
-    out: Annotated[Path | None, Opt("CSV")] = None,
+    out: Annotated[Path | None, Opt("CSV", writes=True)] = None,
     workers: Workers = None,
     wide: Wide = False,
     as_json: AsJson = False,
@@ -53,8 +53,6 @@ def verify(
     out : Path, optional
         Write the errors of each joint, check and load as CSV.
     """
-    if out is not None:
-        check_target(out, what)
     with progress("checks, then tight references") as shown:
         count = workers or available_cores()
         if near is None:

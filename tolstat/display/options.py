@@ -24,6 +24,9 @@ class Opt(NamedTuple):
         Name of the option if it is not that of the argument.
     help : str
         Its help, where the docstring of the function says nothing of it.
+    writes : bool
+        Whether it names a file to write, which is refused where it is an input or cannot be written; ``-`` is
+        standard output.
     """
 
     metavar: str = ""
@@ -32,6 +35,7 @@ class Opt(NamedTuple):
     unit: str | None = None
     name: str = ""
     help: str = ""
+    writes: bool = False
 
 
 ResultPath = Annotated[Path, Opt("FILE", help="Result file (HDF5) of a campaign.")]
@@ -76,6 +80,6 @@ Results = Annotated[
     ),
 ]
 Run = Annotated[bool, Opt(help="Simulate what the answer needs, and keep it in FILE.")]
-Trace = Annotated[Path | None, Opt("CSV", help="Write the load histories of the last revolution as CSV.")]
+Trace = Annotated[Path | None, Opt("CSV", help="Write the load histories of the last revolution as CSV.", writes=True)]
 Wide = Annotated[bool, Opt(help="Print all columns; default: those that fit 80 characters.")]
 AsJson = Annotated[bool, Opt(name="json", help="Print JSON instead of text.")]

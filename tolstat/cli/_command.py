@@ -27,6 +27,8 @@ from tolstat.display.options import Opt
 
 WHAT = {"1": "a share between 0 and 1", "s": "a time above zero"}
 """What a value with a unit is, by its unit."""
+SHARES = '"0.1 %", "1000 ppm" or 0.001'
+"""How a share is written."""
 
 
 @contextmanager
@@ -108,7 +110,7 @@ def quantity(text: str, opt: Opt, flag: str) -> float:
         value = float("nan")
     low, high = 0.0 if opt.least is None else opt.least, float("inf") if opt.most is None else opt.most
     if not low < value < high:
-        remedy = f'write {flag} "{EXAMPLES[unit]}"'
+        remedy = f"write {flag} " + (SHARES if unit == "1" else f'"{EXAMPLES[unit]}"')
         raise InputError([Fault(flag, f"{text!r} is not {WHAT.get(unit, f'a value in {unit}')}", remedy)])
     return value
 

@@ -279,16 +279,18 @@ def test_command_checks_the_joints_of_a_file(tmp_path):
     done = call("verify", path, "--joints", 2, "--seed", 5, "--json", "--out", out)
     assert done.exit_code == 0, done.stderr
     found = json.loads(done.stdout)
-    assert len(found["rows"]) == 2
-    assert list(found["checks"]) == list(checks.ALL_CHECKS)
-    assert found["kinds"]["reference"]["F"]["joints"] == 2
-    assert found["loads"]["half_step"]["cross1.T"]["worst"] > 0
+    facts, tables = found["facts"], found["tables"]
+    assert len(facts["rows"]) == 2
+    assert list(facts["checks"]) == list(checks.ALL_CHECKS)
+    errors = {(row["load"], row["error"]): row for name in tables for row in tables[name]["rows"]}
+    assert errors["F", "reference"]["joints"] == 2
+    assert errors["cross1.T", "half_step"]["worst"] > 0
     table = pd.read_csv(out)
     assert len(table) == 2 * len(checks.ALL_CHECKS) * len(accuracy.OBSERVABLES)
     with ResultFile.open(path) as store:
         kept = verification.read(store)
         assert kept is not None
-        assert (kept.seed, kept.rows.tolist()) == (5, found["rows"])
+        assert (kept.seed, kept.rows.tolist()) == (5, facts["rows"])
         part = table[(table["check"] == "reference") & (table["load"] == "fork2.T")]
         assert part["campaign"].tolist() == store.results()["T_max"][kept.rows, 5].tolist()
         assert part["value"].tolist() == kept.checks["reference"].results["T_max"][:, 5].tolist()

@@ -273,7 +273,7 @@ def test_report_creates_its_output_folder(tmp_path):
     done = call("report", synthetic.store(tmp_path), "--out", folder)
     assert done.exit_code == 0, done.stderr
     assert (folder / "small_exceedance.csv").is_file()
-    for file, target, word in (("none.h5", "other", "does not exist"), ("small.h5", "small.toml", "cannot be created")):
+    for file, target, word in (("none.h5", "other", "does not exist"), ("small.h5", "small.toml", "is no folder")):
         done = call("report", tmp_path / file, "--out", tmp_path / target)
         assert done.exit_code == 2
         assert word in done.stderr

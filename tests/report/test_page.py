@@ -397,7 +397,7 @@ def test_command_asks_for_a_page(path, tmp_path, monkeypatch, arguments, asked):
     calls = []
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(page, "write_page", lambda *given: calls.append(given) or tmp_path / "written")
-    monkeypatch.setattr("tolstat.cli.report.announce_compilation", lambda: None)
+    monkeypatch.setattr("tolstat.solver.compilation.announce", lambda: None)
     done = CliRunner().invoke(app, ["report", str(path), *arguments])
     assert (done.exit_code, done.stdout) == (0, "")
     assert "wrote" in done.stderr

@@ -1,4 +1,4 @@
-"""The command line: commands of questions are made by `_questions`, the others are one file each."""
+"""The command line: functions of questions come from `_questions`, the others are one file each."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from importlib import import_module
 from typing import Any
 
 from tolstat.cli._app import LISTED, Listed, app, main
+from tolstat.cli._shortage import check_memory
 from tolstat.questions import QUESTIONS, Question
 
 __all__ = ["LISTED", "PLAIN", "app", "main"]
@@ -36,25 +37,23 @@ PLAIN = {
         "cache": "Show where compiled kernels are kept, or remove them.",
     },
 }
-"""Commands that are no question, by heading of the help: files of this package, each with a function of the same name,
-and the first line of its docstring."""
+"""Commands that are no question, by heading of the help: functions of this package, and their first lines."""
+FILES = {"schema": "new", "plan": "run", "extend": "run", "merge": "run", "replay": "simulate"}
+"""Files of commands that have none of their own name."""
 
 
-def _plain(name: str) -> Callable[..., None]:
-    function: Callable[..., None] = getattr(import_module(f"tolstat.cli.{name}"), name)
-    return function
-
-
-def _of_question(question: Question) -> Callable[..., None]:
-    made: Any = import_module("tolstat.cli._questions")
-    function: Callable[..., None] = made.command_of(question)
+def _function(name: str, question: Question | None = None) -> Callable[..., None]:
+    if name in ("run", "extend"):
+        check_memory()  # before libraries are loaded
+    file: Any = import_module(f"tolstat.cli.{FILES.get(name, name) if question is None else '_questions'}")
+    function: Callable[..., None] = getattr(file, name) if question is None else file.function_of(question)
     return function
 
 
 for heading, commands in PLAIN.items():
     for name, summary in commands.items():
-        LISTED[name.replace("_", "-")] = Listed(heading, summary, partial(_plain, name))
+        LISTED[name] = Listed(heading, summary, partial(_function, name))
     for question in QUESTIONS:
         if question.heading == heading:
-            made = partial(_of_question, question)
-            LISTED[question.name.replace("_", "-")] = Listed(heading, question.summary, made)
+            name = question.name.replace("_", "-")
+            LISTED[name] = Listed(heading, question.summary, partial(_function, name, question))

@@ -12,7 +12,10 @@ try:
 except ImportError:  # Windows
     resource = None  # type: ignore[assignment]
 
-DISK = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES, errno.EPERM}
+DISK = {
+    *(errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES, errno.EPERM),
+    *(errno.EISDIR, errno.ENOTDIR, errno.ENAMETOOLONG),
+}
 """Numbers of the errors that say that a file cannot be written here."""
 LIBRARIES_MB = 700
 """Address space that a process takes before it has any joints, MB: libraries and kernels."""

@@ -9,28 +9,21 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext, redirect_stdout
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TextIO
-
-import typer
+from typing import Annotated, Any, TextIO
 
 from tolstat import __version__
 from tolstat.common.errors import Fault, InputError
+from tolstat.common.files import make_parent
+from tolstat.display.options import Opt
+from tolstat.display.progress import Display, display
 from tolstat.display.unseen import visible
-
-if TYPE_CHECKING:
-    from tolstat.display.progress import Display
 
 WIDTH = 80
 """Maximum length of a line of prose, characters."""
 LOG = logging.getLogger("tolstat")
 LOG.propagate = False
-
-Quiet = Annotated[bool, typer.Option("--quiet", help="Print warnings and errors only on standard error.")]
-Verbose = Annotated[bool, typer.Option("--verbose", help="Print each stage and its time on standard error.")]
-LogFile = Annotated[
-    Path | None,
-    typer.Option("--log", metavar="FILE", help="Append messages with times to FILE, created if missing."),
-]
+say, warn, fail = LOG.info, LOG.warning, LOG.error
+"""Tell a message; a warning; why the command ends early. The last two are told with --quiet, too."""
 
 
 class _Stderr(logging.Handler):
@@ -71,29 +64,27 @@ def _broken(line: str) -> str:
     return textwrap.fill(line, WIDTH, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
 
 
-def say(text: str) -> None:
-    """Tell a message."""
-    LOG.info("%s", text)
-
-
-def warn(text: str) -> None:
-    """Tell a warning, also with --quiet."""
-    LOG.warning("%s", text)
-
-
-def fail(text: str) -> None:
-    """Tell why the command ends early, also with --quiet."""
-    LOG.error("%s", text)
-
-
 @contextmanager
-def session(quiet: bool, verbose: bool, log: Path | None) -> Iterator[None]:
-    """Tell messages as the options of one command ask.
+def session(
+    *, quiet: bool = False, verbose: bool = False, log: Annotated[Path | None, Opt("FILE")] = None
+) -> Iterator[None]:
+    """Tell messages as the options of a command ask; every command has these options.
+
+    Parameters
+    ----------
+    quiet : bool
+        Print warnings and errors only on standard error.
+    verbose : bool
+        Print each stage and its time on standard error.
+    log : Path, optional
+        Append messages with times to FILE, created if missing.
 
     Raises
     ------
     InputError
-        When the log cannot be written, or is to be quiet and verbose.
+        When it is to be quiet and verbose.
+    OSError
+        When the log cannot be written.
     """
     own = _Stderr()
     LOG.handlers = [own]
@@ -114,14 +105,8 @@ def session(quiet: bool, verbose: bool, log: Path | None) -> Iterator[None]:
 
 
 def _log_file(path: Path) -> logging.Handler:
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handler = logging.FileHandler(path, encoding="utf-8")
-    except OSError as error:
-        found = f"cannot be written: {error.strerror or error}"
-        raise InputError(
-            [Fault(f"--log {path}", found, "give the path of a file, for example: --log run.log")]
-        ) from error
+    make_parent(path)
+    handler = logging.FileHandler(path, encoding="utf-8")
     form = logging.Formatter("%(asctime)s %(levelname)s %(message)s", "%Y-%m-%dT%H:%M:%SZ")
     form.converter = time.gmtime
     handler.setFormatter(form)
@@ -131,14 +116,8 @@ def _log_file(path: Path) -> logging.Handler:
 @contextmanager
 def progress(first: str = "") -> Iterator[Display]:
     """Show progress on standard error, with the stage `first` to begin with; see `display.progress.Display`."""
-    from tolstat.display.progress import display
-
     quiet = bool(LOG.handlers) and LOG.handlers[0].level > logging.INFO
-    with display(say, _detail, quiet) as shown:
+    with display(say, LOG.debug, quiet) as shown:
         if first:
             shown.stage(first)
         yield shown
-
-
-def _detail(text: str) -> None:
-    LOG.debug("%s", text)

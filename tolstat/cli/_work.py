@@ -1,28 +1,38 @@
-"""Work of a command that simulates: progress on standard error, stop signals and dead workers as exit codes."""
+"""Simulations of a command: progress and notes on standard error, stop signals and dead workers as exit codes."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import typer
 
-from tolstat.cli._app import announce_compilation
-from tolstat.cli._talk import fail, progress, say
-
-if TYPE_CHECKING:
-    from tolstat.campaign.work import Work
+from tolstat.analysis.listed import without_interval
+from tolstat.campaign import run as campaign
+from tolstat.campaign.pool import WorkerDied
+from tolstat.campaign.work import Work
+from tolstat.cli._talk import fail, progress, say, warn
+from tolstat.common.errors import Fault
+from tolstat.common.tables import Variant
+from tolstat.joint import Joint
+from tolstat.solver import compilation
+from tolstat.study import Study, mounting
+from tolstat.study.tolerances import zones
 
 
 @contextmanager
-def exit_codes() -> Iterator[None]:
-    """Say how far a simulation came that was stopped, or lost its workers, and end with the exit code of that."""
-    from tolstat.campaign import run as campaign
-    from tolstat.campaign.pool import WorkerDied
+def work(**settings: Any) -> Iterator[Work]:
+    """Work of one command with progress on standard error; `settings` are fields of `Work`.
 
+    A simulation that is stopped, or loses its workers, says how far it came and ends with the exit code of that.
+    """
+    compilation.announce()
     try:
-        yield
+        with progress() as shown:
+            yield Work(display=shown, tell=say, **settings)
     except campaign.Interrupted as stop:
         fail(str(stop))
         raise typer.Exit(stop.exit_code) from stop
@@ -31,11 +41,33 @@ def exit_codes() -> Iterator[None]:
         raise typer.Exit(1) from error
 
 
-@contextmanager
-def work(**settings: Any) -> Iterator[Work]:
-    """Work of one command with progress on standard error; `settings` are fields of `Work`."""
-    from tolstat.campaign.work import Work
+def print_warnings(path: Path, joints: Iterable[Joint], variants: Iterable[Variant] = ()) -> None:
+    """Print the warnings of the joint of a case or study, or of the joints of its `variants`; see `Joint.warnings`.
 
-    announce_compilation()
-    with exit_codes(), progress() as shown:
-        yield Work(display=shown, tell=say, **settings)
+    Of several joints with a warning about the same key the first is printed, and how many others there are.
+    """
+    places = [f"variant {variant.family!r}: joint" for variant in variants] or ["joint"]
+    found: dict[str, list[Fault]] = {}
+    for place, joint in zip(places, joints, strict=True):
+        for fault in joint.warnings():
+            found.setdefault(fault.place, []).append(replace(fault, place=f"{place}.{fault.place}"))
+    for first, *others in found.values():
+        more = f" (and {len(others)} more joints)" if others else ""
+        warn(f"warning: {path}: {replace(first, found=first.found + more)}")
+
+
+def print_study_notes(path: Path, study: Study) -> None:
+    """Print what a study stands on, and its warnings.
+
+    These are mounting and contact law; warnings of its joints, common axes that are too short, shares without an
+    interval, and a note where rigid shafts meet errors along them.
+    """
+    say(f"{study.name}: {study.joint_in_words}")
+    axial = [joint.shaft.axial for joint in study.joints]
+    if note := mounting.note(study.tolerances, axial, mounting.command(str(path), path.stem, study.joint)):
+        say(f"note: {note}")
+    print_warnings(path, study.joints, study.variants)
+    for key, found, remedy in zones.short_axes(study.entries, study.joint.contact.z):
+        warn(f"warning: {study.fault(key, found, remedy)}")
+    if not study.sampling.has_replicates and (reason := without_interval(study.sampling.method)):
+        warn(f"warning: {reason}")

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
 import typer
 
 from tolstat.cli._talk import say
+from tolstat.kernel.simd import cache_folder
 
 
-def cache(
-    clear: Annotated[bool, typer.Option("--clear", help="Remove the compiled kernels of all versions.")] = False,
-) -> None:
+def cache(*, clear: bool = False) -> None:
     """Show where compiled kernels are kept, or remove them.
 
     Prints the folders with compiled kernels, one for each version of tolstat and Numba that was used, and their sizes.
@@ -19,9 +16,12 @@ def cache(
     environment variable NUMBA_CACHE_DIR names another folder for them.
 
     Example: tolstat cache
-    """
-    from tolstat.kernel.simd import cache_folder
 
+    Parameters
+    ----------
+    clear : bool
+        Remove the compiled kernels of all versions.
+    """
     if clear:
         say(f"removed {cache_folder.clear() / 1e6:.1f} MB of compiled kernels")
         return

@@ -14,6 +14,8 @@ import typer
 from tolstat.cli._talk import WIDTH, say
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.files import docs_dir
+from tolstat.common.strict import did_you_mean
+from tolstat.display.options import Opt
 
 BUILT = Path("build", "docs", "docs", "index.html")
 """First page of the built site, from the root of a clone."""
@@ -25,12 +27,7 @@ BUILD = (
 )
 
 
-def docs(
-    page: Annotated[
-        str | None,
-        typer.Argument(metavar="PAGE", help="Page to read in the terminal, such as study; without it: the browser."),
-    ] = None,
-) -> None:
+def docs(page: Annotated[str | None, Opt("PAGE")] = None) -> None:
     """Print a page of the documents, or open their site.
 
     With PAGE, prints this page: study (all keys of study and joint files), tolerances, tutorial, model, report, or the
@@ -41,11 +38,18 @@ def docs(
     clone, prints the names of the pages.
 
     Example: tolstat docs study
+
+    Parameters
+    ----------
+    page : str, optional
+        Page to read in the terminal, such as study; without it: the browser.
     """
     if page is not None:
         _print_page(page)
         return
-    clone = find_clone([Path(__file__).parents[2], Path.cwd(), *Path.cwd().parents])
+    folders = [Path(__file__).parents[2], Path.cwd(), *Path.cwd().parents]
+    marks = (Path("docs", "conf.py"), Path("tolstat", "cli", "docs.py"))
+    clone = next((folder for folder in folders if all((folder / mark).is_file() for mark in marks)), None)
     if clone is None:
         say("pages of the installed package; the site with all pages and pictures is built from a clone")
         typer.echo(_titled())
@@ -76,8 +80,6 @@ def page_name(file: str) -> str:
 
 
 def _print_page(name: str) -> None:
-    from tolstat.common.strict import did_you_mean
-
     known = pages()
     file = known.get(page_name(name))
     if file is None:
@@ -113,22 +115,3 @@ def _titled() -> str:
         textwrap.fill(title[2:], WIDTH, initial_indent=f"{name:{width}}  ", subsequent_indent=" " * (width + 2))
         for name, title in found.items()
     )
-
-
-def find_clone(folders: list[Path]) -> Path | None:
-    """Return the first folder that is a clone of the repository.
-
-    Parameters
-    ----------
-    folders : list of Path
-        Folders to look at.
-
-    Returns
-    -------
-    Path or None
-    """
-    return next((folder for folder in folders if _is_clone(folder)), None)
-
-
-def _is_clone(folder: Path) -> bool:
-    return (folder / "docs" / "conf.py").is_file() and (folder / "tolstat" / "cli" / "docs.py").is_file()

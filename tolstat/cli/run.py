@@ -1,89 +1,88 @@
-"""``tolstat run``: run a campaign."""
+"""``tolstat plan``, ``run``, ``extend`` and ``merge``: a campaign, and the one file that holds its joints."""
 
 from __future__ import annotations
 
-from enum import StrEnum
+from collections.abc import Iterator
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from shlex import quote
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any, Literal
 
 import typer
 
-from tolstat.cli._app import Wide, Workers, announce_compilation, print_study_notes
-from tolstat.cli._shortage import check_memory
-from tolstat.cli._talk import progress, say
-from tolstat.cli._work import exit_codes
+from tolstat import study
+from tolstat.campaign import extend as growth
+from tolstat.campaign import plan as plans
+from tolstat.campaign import run as campaign
+from tolstat.campaign import stop_rule
+from tolstat.campaign.remedy import parse_retry, reasons
+from tolstat.cli._output import print_json, show
+from tolstat.cli._talk import progress, say, wrapped
+from tolstat.cli._work import print_study_notes, work
+from tolstat.common import strict
 from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.files import check_target
+from tolstat.display import table
+from tolstat.display.options import AsJson, Joints, Opt, OtherStudy, Report, ResultPath, StudyPath, Wide, Workers
+from tolstat.questions.joints import CORRELATED, ENTRIES
+from tolstat.report import answer as reports
+from tolstat.solver import compilation
+from tolstat.store import ResultFile
+from tolstat.study import Study, rewriting
 
-if TYPE_CHECKING:
-    from tolstat.common.counts import Counts
-    from tolstat.store import Reader
-    from tolstat.study import Study
 
+def plan(
+    study_file: StudyPath,
+    *,
+    n: Joints = None,
+    workers: Workers = None,
+    pilot: Annotated[int, Opt("K", least=1)] = plans.PILOT,
+    as_json: AsJson = False,
+) -> None:
+    """Predict time, memory and precision of a campaign.
 
-class Executor(StrEnum):
-    """Where joints are simulated, see `campaign.run`."""
+    Simulates a few joints (pilot) and writes nothing. Prints the time of the whole command tolstat run (start, joints,
+    check, report), memory and file size of the campaign, the width of the 95 % interval of exceedances and of each
+    limit's exceedance, the number of joints that a 95 % bound of a quantile needs, and what each entry of [tolerances]
+    means: half width, radius or diameter, standard deviation of the error, share of the parts outside.
 
-    PROCESSES = "processes"
-    DASK = "dask"
+    Example: tolstat plan studies/iso2768_f.toml
+
+    Parameters
+    ----------
+    pilot : int
+        Number of joints simulated for the prediction.
+    """
+    loaded = study.load(study_file, n=n)
+    print_study_notes(study_file, loaded)
+    compilation.announce()
+    with progress() as shown:
+        made = plans.plan(loaded, workers, pilot, shown.stage)
+    if as_json:
+        print_json(asdict(made) | {"seconds": made.seconds})
+    else:
+        typer.echo(wrapped("\n".join(_lines(made))))
+        for columns, rows in ((ENTRIES, made.tolerances), (CORRELATED, made.correlations)):
+            if rows:
+                typer.echo(f"\n{table.as_text(columns, rows)}")
+    say(f"next: tolstat run {quote(str(study_file))}" + ("" if n is None else f" --n {n}"))
 
 
 def run(
-    study_file: Annotated[Path, typer.Argument(metavar="STUDY", help="Study file (TOML).")],
-    out: Annotated[
-        Path | None,
-        typer.Option("--out", metavar="FILE", help="Result file; default: STUDY.h5 in the current folder."),
-    ] = None,
-    n: Annotated[
-        int | None, typer.Option("--n", metavar="N", min=1, help="Number of joints; default: that of the study.")
-    ] = None,
+    study_file: StudyPath,
+    *,
+    out: Annotated[Path | None, Opt("FILE")] = None,
+    n: Joints = None,
     workers: Workers = None,
-    executor: Annotated[
-        Executor,
-        typer.Option("--executor", metavar="WHERE", help="processes (of this machine), or dask (a cluster)."),
-    ] = Executor.PROCESSES,
-    scheduler: Annotated[
-        str | None,
-        typer.Option(
-            "--scheduler",
-            metavar="URL",
-            help="Address of a Dask scheduler, tcp://HOST:PORT; default: start a cluster on this machine.",
-        ),
-    ] = None,
-    retry: Annotated[
-        str | None,
-        typer.Option(
-            "--retry", metavar="STATES", help="Statuses of joints to simulate again, such as newton_failed,crashed."
-        ),
-    ] = None,
-    settings: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="KEY=VALUE",
-            help="Key in place of that of the study, joint.shaft.axial=free; with --retry also of the solver for the "
-            "joints simulated again, solver.steps_per_rev=360; repeatable.",
-        ),
-    ] = None,
-    rows: Annotated[
-        str | None,
-        typer.Option(
-            "--rows", metavar="A:B", help="Simulate rows A to B-1 only; FILE is then a slice for tolstat merge."
-        ),
-    ] = None,
-    until: Annotated[
-        str | None,
-        typer.Option(
-            "--until",
-            metavar="RULE",
-            help='Stop when a 95 % interval is narrow enough: "P(cross*.F > 700 N) width < 0.01", "P(any limit) ...".',
-        ),
-    ] = None,
-    verify: Annotated[
-        bool, typer.Option(help="Check the numerical error on one joint in 400 (1 to 16) at the end.")
-    ] = True,
-    report: Annotated[bool, typer.Option(help="Print the report at the end and write its files.")] = True,
+    executor: Annotated[Literal["processes", "dask"], Opt("WHERE")] = "processes",
+    scheduler: Annotated[str | None, Opt("URL")] = None,
+    retry: Annotated[str | None, Opt("STATES")] = None,
+    settings: Annotated[list[str] | None, Opt("KEY=VALUE", name="set")] = None,
+    rows: Annotated[str | None, Opt("A:B")] = None,
+    until: Annotated[str | None, Opt("RULE")] = None,
+    verify: bool = True,
+    report: Report = True,
     wide: Wide = False,
 ) -> None:
     """Simulate the joints of a study and print a report.
@@ -98,26 +97,44 @@ def run(
     no valid load, and the next command. Writes the result file, and beside it the curves as PNG, SVG and CSV.
 
     Example: tolstat run studies/iso2768_f.toml --n 512 --out first.h5
-    """
-    check_memory()
-    from tolstat.common.files import check_target
 
-    part, again = None, None
-    retried = [own for own in settings or () if own.startswith("solver.")]
-    changes = [own for own in settings or () if own not in retried]
-    faults = _cannot_be_combined(rows, until, retry, retried)
-    if scheduler is not None and executor is not Executor.DASK:
-        faults.append(Fault("--scheduler", "is used with --executor dask only", "add --executor dask"))
+    Parameters
+    ----------
+    out : Path, optional
+        Result file; default: STUDY.h5 in the current folder.
+    executor : str
+        processes (of this machine), or dask (a cluster).
+    scheduler : str, optional
+        Address of a Dask scheduler, tcp://HOST:PORT; default: start a cluster on this machine.
+    retry : str, optional
+        Statuses of joints to simulate again, such as newton_failed,crashed.
+    settings : list of str, optional
+        Key in place of that of the study, joint.shaft.axial=free; with --retry also of the solver for the joints
+        simulated again, solver.steps_per_rev=360; repeatable.
+    rows : str, optional
+        Simulate rows A to B-1 only; FILE is then a slice for tolstat merge.
+    until : str, optional
+        Stop when a 95 % interval is narrow enough: "P(cross*.F > 700 N) width < 0.01", "P(any limit) ...".
+    verify : bool
+        Check the numerical error on one joint in 400 (1 to 16) at the end.
+    """
+    retried = [text for text in settings or () if text.startswith("solver.")]
+    changes = [text for text in settings or () if text not in retried]
+    wrong = (
+        (rows and until, "--until", "cannot be combined with --rows", "remove --until or --rows"),
+        (until and retry, "--until", "cannot be combined with --retry", "remove --until or --retry"),
+        (
+            *(retried and not retry, f"--set {next(iter(retried), '')!r}", "sets the solver, which --retry alone can"),
+            "add --retry newton_failed, or edit the study",
+        ),
+        (scheduler and executor != "dask", "--scheduler", "is used with --executor dask only", "add --executor dask"),
+    )
+    faults = [Fault(*words) for applies, *words in wrong if applies]
     with gather(faults):
         part = None if rows is None else parse_rows(rows)
     path = out if out is not None else Path(f"{study_file.stem}.h5")
     with gather(faults):
         check_target(path)  # now, not when the pictures of the report are written
-    from tolstat import study
-    from tolstat.campaign.remedy import parse_retry
-    from tolstat.common import strict
-    from tolstat.study import rewriting
-
     with gather(faults):
         text = rewriting.with_settings(strict.read_text(study_file), changes) if changes else None
         plan = study.load(study_file, n=n, text=text)
@@ -125,21 +142,73 @@ def run(
     if faults:
         raise InputError(faults)
     print_study_notes(study_file, plan)
-    where = {"workers": workers, "executor": executor.value, "scheduler": scheduler}
+    where = {"workers": workers, "executor": executor, "scheduler": scheduler}
     simulate(plan, path, until=until, check=verify, rows=part, retry=again, **where)
-    conclude(path, report, wide, " ".join([str(study_file), *(f"--set {quote(own)}" for own in changes)]))
+    conclude(path, report, wide, " ".join([str(study_file), *(f"--set {quote(text)}" for text in changes)]))
 
 
-def _cannot_be_combined(rows: str | None, until: str | None, retry: str | None, settings: list[str]) -> list[Fault]:
-    faults = []
-    if rows is not None and until is not None:
-        faults.append(Fault("--until", "cannot be combined with --rows", "remove --until or --rows"))
-    if until is not None and retry is not None:
-        faults.append(Fault("--until", "cannot be combined with --retry", "remove --until or --retry"))
-    if settings and retry is None:
-        remedy = "add --retry newton_failed, or edit the study"
-        faults.append(Fault(f"--set {settings[0]!r}", "sets the solver, which --retry alone can", remedy))
-    return faults
+def extend(
+    file: ResultPath,
+    *,
+    n: Annotated[int, Opt("N", least=1)],
+    study_file: OtherStudy = None,
+    workers: Workers = None,
+    report: Report = True,
+    wide: Wide = False,
+) -> None:
+    """Add joints to a campaign and simulate them.
+
+    Draws the next joints of the sampling sequence and simulates them; the joints already in FILE do not change. FILE
+    then equals that of a campaign with N joints from the start. Latin hypercubes, sweeps and listed joints cannot be
+    extended. Prints the report and writes its files as tolstat run does.
+
+    To resume after an interruption: tolstat run STUDY --n N --out FILE
+
+    Example: tolstat extend iso2768_f.h5 --n 2000
+
+    Parameters
+    ----------
+    n : int
+        New number of joints, without the nominal joint.
+    """
+    with progress("drawing the errors"):
+        plan = growth.extend(file, n, study_file)
+    say(f"{file}: extended to {n} joints")
+    simulate(plan, file, workers=workers)
+    conclude(file, report, wide)
+
+
+def merge(files: Annotated[list[Path], Opt("SLICE")], *, out: Annotated[Path, Opt("FILE")]) -> None:
+    """Merge the slices of a campaign into one result file.
+
+    Slices are made by tolstat run --rows. They must have the same study and version of the code, and together hold all
+    rows of the campaign; a row in several slices must have identical results. FILE then equals that of a single run.
+    Joints with other tolerances (what_if) are kept, unless the slices hold different results of them.
+
+    Prints the number of joints by outcome on standard error.
+
+    Example: tolstat merge part1.h5 part2.h5 --out whole.h5
+
+    Parameters
+    ----------
+    files : list of Path
+        Result files (HDF5) of the slices, in any order.
+    out : Path
+        Result file to create; must not exist.
+    """
+    with progress("merging"):
+        merged = growth.merge(files, out)
+    counts = merged.counts
+    pending = counts.total - counts.done
+    say(f"{out}: {counts.done} {counts.counted}, {counts.shortfall}")
+    if merged.twice:
+        say(f"{merged.twice} surplus copies of rows, with identical results")
+    if merged.dropped:
+        say(f"left out: joints of {merged.dropped} changes of what_if, of which the slices hold different results")
+    if pending:
+        say(f"{pending} {counts.counted} are pending; to simulate them: tolstat run STUDY --out {out}")
+    else:
+        say(f"next: tolstat report {quote(str(out))} --out {quote(str(out.with_suffix('.html')))}")
 
 
 def parse_rows(text: str) -> range:
@@ -158,75 +227,96 @@ def parse_rows(text: str) -> range:
 
 def simulate(plan: Study, path: Path, until: str | None = None, **choices: Any) -> None:
     """Simulate a campaign with progress on standard error; `choices` go to `campaign.run`."""
-    announce_compilation()
-    with exit_codes():
-        counts = _campaign_until(until, plan, path, **choices) if until else _campaign(plan, path, **choices)
+    outcome = None
+    with work() as running:
+        shown = running.display
+        run = partial(campaign.run, plan, path, progress=shown, tell=say, stage=shown.stage, **choices)
+        if until is None:
+            counts = run()
+        else:
+            rule = stop_rule.parse(until, plan.limits)
+            outcome = stop_rule.run_until(plan, path, rule, lambda row: run(until_row=row))
+    if outcome is not None:
+        look, end = outcome.look, "reached" if outcome.reached else "not reached"
+        biased = f", {stop_rule.BIASED}: go by the interval" if outcome.reached else ""
+        say(
+            f"{rule.text}: {end} with {look.joints} joints, {look.above} above, "
+            f"{look.n_unresolved} failed or not settled\n"
+            f"{100 * stop_rule.CONFIDENCE:.0f} % interval {look.lower:.5f} to {look.upper:.5f}, valid after any number "
+            "of looks (failed and unsettled joints: below at its lower end, above at its upper end)\n"
+            f"share above {look.estimate:.5f}{biased}; "
+            "shares and intervals in the report are not corrected for the stop"
+        )
+        with ResultFile.open(path) as store:
+            counts = store.counts()
     say(f"{path}: {counts.done} {counts.counted}, {counts.shortfall}")
 
 
-def conclude(path: Path, report: bool, wide: bool, study: str = "STUDY") -> None:
+def conclude(path: Path, report: bool, wide: bool, study_file: str = "STUDY") -> None:
     """Print the report of a campaign if asked for, why joints have no valid load, and the next command.
 
-    `study` is the study file as the user gave it, with its settings.
+    `study_file` is the study file as the user gave it, with its settings.
     """
-    from tolstat.campaign.remedy import reasons
-    from tolstat.cli._questions import show
-    from tolstat.report.answer import report as answer
-    from tolstat.report.answer import write
-    from tolstat.store import ResultFile
-
     with ResultFile.open(path) as store:
         if report:
             with progress("report") as shown:
-                view = store.view()
-                made = answer(view)
+                answer = reports.report(store.view())
                 shown.stage("files")
-                files = write(made, path)
-            show(made, wide)
+                files = reports.write(answer, path)
+            show(answer, wide)
             for file in files:
                 say(f"wrote {file}")
-        found = reasons(store, {one.point or "": one.status() for one in store.each()})
-        for reason in found:
+        without_load = reasons(store, {one.point or "": one.status() for one in store.each()})
+        for reason in without_load:
             say(reason.text)
-        for retry in dict.fromkeys(reason.retry for reason in found if reason.retry):
-            say(f"again: tolstat run {study} --out {path} {retry}")
-        say(f"next: {_next(store, path)}")
+        for options in dict.fromkeys(reason.retry for reason in without_load if reason.retry):
+            say(f"again: tolstat run {study_file} --out {path} {options}")
+        source, csv, page = (quote(str(name)) for name in (path, path.with_suffix(".csv"), path.with_suffix(".html")))
+        following = f"export {source} --csv {csv}" if store.case_names else f"report {source} --out {page}"
+        say(f"next: tolstat {following if store.whole else f'merge {source} OTHER_SLICES --out WHOLE.h5'}")
 
 
-def _next(store: Reader, path: Path) -> str:
-    """Command that follows the run of a campaign."""
-    file, csv, page = (quote(str(name)) for name in (path, path.with_suffix(".csv"), path.with_suffix(".html")))
-    if not store.whole:
-        return f"tolstat merge {file} OTHER_SLICES --out WHOLE.h5"
-    if store.case_names:
-        return f"tolstat export {file} --csv {csv}"
-    return f"tolstat report {file} --out {page}"
+def _lines(made: plans.Plan) -> Iterator[str]:
+    yield f"joints: {made.rows}" + (f", each at {', '.join(made.points)}" if all(made.points) else "")
+    yield f"random numbers a joint: {made.dimensions}"
+    yield f"pilot: {made.pilot} joints, {made.failed} failed, {made.unsettled} not settled"
+    if made.fidelity:
+        yield made.fidelity
+    if rattle := made.reversals.joints:
+        yield (
+            f"warning: the torque reverses in {rattle} of {made.pilot} joints: inertia torque up to "
+            f"{made.reversals.torque:.3g} N m; these joints rattle and cost {made.reversals.cost:.2g} times as much as "
+            "others"
+        )
+    if misfits := made.assembly.misfits:
+        ends = [f"{100 * end:.2g}" for end in made.assembly.interval or ()]
+        interval = f"; 95 % interval of their share {' to '.join(ends)} %" if ends else ""
+        joints = f"{misfits} of {made.assembly.of} joints"
+        yield f"warning: {joints} have a pin larger than its hole and cannot be simulated{interval}"
+    yield f"time a joint: {1e3 * made.seconds_per_joint:.3g} ms"
+    yield f"time: about {_duration(made.seconds)} on {made.workers} cores, of which"
+    for stage, seconds in made.stages.items():
+        yield f"  {stage}: {_duration(seconds)}"
+    yield f"memory: {made.process_bytes / 1e6:.0f} MB a process, {made.workers + 1} processes"
+    yield f"file: {_size(made.file_bytes)}"
+    yield from (*made.fit, *made.sweep)
+    if made.exact:
+        yield f"no tolerance, taken as exact: {', '.join(made.exact)}"
+    for share, width in made.widths.items():
+        yield f"95 % interval of a share of {100 * share:g} %: {100 * width:.2g} points wide"
+    for limit in made.limits:
+        interval = f"interval at most {100 * limit.width:.2g} points wide"
+        yield f"limit {limit.load}: {limit.above} of {limit.of} above in the pilot; {interval}"
+    for q, n in made.wilks.items():
+        yield f"joints for a load that {100 * q:g} % stay below, with 95 % confidence: {n}"
 
 
-def _campaign(plan: Study, path: Path, **choices: Any) -> Counts:
-    from tolstat.campaign import run as campaign
+def _duration(seconds: float) -> str:
+    units = (("d", 86400.0), ("h", 3600.0), ("min", 60.0))
+    long = next((f"{seconds / size:.3g} {unit}" for unit, size in units if seconds >= 2 * size), f"{seconds:.2g} s")
+    return "less than 1 s" if seconds < 1 else long
 
-    with progress() as shown:
-        return campaign.run(plan, path, progress=shown, tell=shown.note, stage=shown.stage, **choices)
 
-
-def _campaign_until(text: str, plan: Study, path: Path, **choices: Any) -> Counts:
-    from tolstat.campaign import run as campaign
-    from tolstat.campaign import stop_rule
-    from tolstat.store import ResultFile
-
-    rule = stop_rule.parse(text, plan.limits)
-    with progress() as shown:
-        run = partial(campaign.run, plan, path, progress=shown, tell=shown.note, stage=shown.stage, **choices)
-        outcome = stop_rule.run_until(plan, path, rule, lambda row: run(until_row=row))
-    look = outcome.look
-    say(
-        f"{rule.text}: {'reached' if outcome.reached else 'not reached'} with {look.joints} joints, "
-        f"{look.above} above, {look.n_unresolved} failed or not settled\n"
-        f"{100 * stop_rule.CONFIDENCE:.0f} % interval {look.lower:.5f} to {look.upper:.5f}, valid after any number of "
-        "looks (failed and unsettled joints: below at its lower end, above at its upper end)\n"
-        f"share above {look.estimate:.5f}{f', {stop_rule.BIASED}: go by the interval' if outcome.reached else ''}; "
-        "shares and intervals in the report are not corrected for the stop"
-    )
-    with ResultFile.open(path) as store:
-        return store.counts()
+def _size(size: int) -> str:
+    units = (("TB", 1e12), ("GB", 1e9), ("MB", 1e6))
+    return next((f"{size / factor:.3g} {unit}" for unit, factor in units if size >= factor), f"{size / 1e3:.3g} kB")

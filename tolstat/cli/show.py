@@ -7,39 +7,24 @@ from typing import Annotated
 
 import typer
 
-from tolstat.cli._app import make_folder, output_folder
 from tolstat.cli._talk import say
-from tolstat.common.errors import Fault, InputError
+from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.files import check_target
+from tolstat.display import style
+from tolstat.display.options import Opt
+from tolstat.display.table import as_text, plain
 
 FORMATS = (".svg", ".png", ".pdf")
 
 
 def show(
-    source: Annotated[
-        str,
-        typer.Argument(
-            metavar="SOURCE",
-            help="Joint file, study or case (TOML), result file (HDF5), or name of a joint: cirelli2021.",
-        ),
-    ],
-    errors: Annotated[
-        bool, typer.Option("--errors", help="Draw what a positive error of each kind means instead of the joint.")
-    ] = False,
-    row: Annotated[
-        int | None,
-        typer.Option("--row", metavar="I", min=0, help="Draw the errors of this row of a result file, enlarged."),
-    ] = None,
-    alpha: Annotated[
-        str | None,
-        typer.Option("--alpha", metavar="ANGLE", help='Misalignment in place of the source\'s; "15 deg".'),
-    ] = None,
-    columns: Annotated[
-        int, typer.Option("--columns", metavar="N", min=1, max=2, help="Drawings of the joint side by side: 1 or 2.")
-    ] = 2,
-    out: Annotated[
-        Path | None,
-        typer.Option("--out", metavar="PICTURE", help="File to write: .svg, .png or .pdf; default: joint.svg."),
-    ] = None,
+    source: Annotated[str, Opt("SOURCE")],
+    *,
+    errors: bool = False,
+    row: Annotated[int | None, Opt("I", least=0)] = None,
+    alpha: Annotated[str | None, Opt("ANGLE")] = None,
+    columns: Annotated[int, Opt("N", least=1, most=2)] = 2,
+    out: Annotated[Path | None, Opt("PICTURE")] = None,
 ) -> None:
     """Draw a joint, its errors, or one joint of a campaign.
 
@@ -47,28 +32,39 @@ def show(
     dimensions; with --errors the kinds of errors (to errors.svg), with --row the errors of that joint (to rowI.svg).
 
     Example: tolstat show studies/iso2768_f.toml --out joint.svg
-    """
-    from tolstat.display import style
-    from tolstat.display.table import as_text, plain
-    from tolstat.questions.drawings import answer, views
 
+    Parameters
+    ----------
+    source : str
+        Joint file, study or case (TOML), result file (HDF5), or name of a joint: cirelli2021.
+    errors : bool
+        Draw what a positive error of each kind means instead of the joint.
+    row : int, optional
+        Draw the errors of this row of a result file, enlarged.
+    alpha : str, optional
+        Misalignment in place of the source's; "15 deg".
+    columns : int
+        Drawings of the joint side by side: 1 or 2.
+    out : Path, optional
+        File to write: .svg, .png or .pdf; default: joint.svg.
+    """
     target = out or Path("errors.svg" if errors else "joint.svg" if row is None else f"row{row}.svg")
     faults = []
     if errors and row is not None:
         faults.append(Fault("--errors", "cannot be used together with --row", "give one of them"))
     if target.suffix.lower() not in FORMATS:
         faults.append(Fault(f"--out {target}", "is not a picture", f"end its name in {', '.join(FORMATS)}"))
+    with gather(faults):
+        check_target(target)
     if faults:
         raise InputError(faults)
     joint, own_alpha, title, own_errors = answer.read(source, row, alpha)
     if errors:
-        figure, table = answer.draw_errors(joint), answer.meanings()
+        figure, rows = answer.draw_errors(joint), answer.meanings()
     elif own_errors is not None:
-        figure, table = answer.draw_row(joint, own_errors, title), views.numbers(joint, own_errors)
+        figure, rows = answer.draw_row(joint, own_errors, title), views.numbers(joint, own_errors)
     else:
-        figure, table = answer.draw_joint(joint, own_alpha, title, columns), answer.lengths(joint, own_alpha)
-    make_folder(target.parent)
-    with output_folder(target.parent):
-        (path,) = style.save(figure, target.with_suffix(""), (target.suffix.lower(),))
-    typer.echo(as_text(plain(table), table))
+        figure, rows = answer.draw_joint(joint, own_alpha, title, columns), answer.lengths(joint, own_alpha)
+    (path,) = style.save(figure, target.with_suffix(""), (target.suffix.lower(),))
+    typer.echo(as_text(plain(rows), rows))
     say(f"wrote {path}")

@@ -1,27 +1,39 @@
-"""``tolstat simulate``: simulate one joint."""
+"""``tolstat simulate`` and ``tolstat replay``: one joint, of a case file or of a campaign."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
-from tolstat.cli._app import AsJson, announce_compilation, as_text, output_file, print_warnings
+from tolstat import study
+from tolstat.campaign import replay as replays
+from tolstat.campaign.replay import CaseResult, Replay
+from tolstat.cli._output import print_json
 from tolstat.cli._talk import progress, say, warn
+from tolstat.cli._work import print_warnings
+from tolstat.common.files import atomic_write
+from tolstat.common.loads import unit_text
+from tolstat.common.tables import STATUS_TEXT, Status
+from tolstat.display import table
+from tolstat.display.options import AsJson, Opt, Point, ResultPath, Trace
+from tolstat.display.table import Column, has
+from tolstat.joint.mounting import in_words
+from tolstat.solver import compilation
+from tolstat.store import ResultFile
 
-if TYPE_CHECKING:
-    from tolstat.campaign.replay import CaseResult
+LARGEST = (
+    Column("load", lambda row: str(row["load"])),
+    Column("unit", lambda row: unit_text(row["unit"])),
+    Column("this joint", lambda row: _number(row["joint"])),
+    Column("without errors", lambda row: _number(row["without_errors"]), shown=has("without_errors")),
+    Column("change", lambda row: _per_cent(row["change"]), shown=has("without_errors")),
+)
+"""Columns of the largest loads of a joint, beside those of the joint without errors."""
 
 
-def simulate(
-    case: Annotated[Path, typer.Argument(metavar="CASE", help="Case file (TOML): one joint with its errors.")],
-    out: Annotated[
-        Path | None,
-        typer.Option("--out", metavar="CSV", help="Write the load histories of the last revolution as CSV."),
-    ] = None,
-    as_json: AsJson = False,
-) -> None:
+def simulate(case: Annotated[Path, Opt("CASE")], *, out: Trace = None, as_json: AsJson = False) -> None:
     """Simulate one joint, with and without its errors.
 
     Prints status and course of the simulation, and the largest value of each load in the last revolution beside that of
@@ -29,43 +41,74 @@ def simulate(
     the pins, and psi.
 
     Example: tolstat simulate studies/tilted_pin.toml --out loads.csv
-    """
-    from tolstat import study
-    from tolstat.campaign import replay
-    from tolstat.common.files import check_target
-    from tolstat.joint.mounting import in_words
 
-    if out is not None:
-        check_target(out, case)
+    Parameters
+    ----------
+    case : Path
+        Case file (TOML): one joint with its errors.
+    """
     loaded = study.load_case(case)
     print_warnings(case, [loaded.joint])
     say(f"{loaded.name}: {in_words([loaded.joint.shaft.axial], [loaded.joint.contact.law])}")
-    announce_compilation()
+    compilation.announce()
     with progress("simulation"):
-        result = replay.simulate_case(loaded)
-    summary = result.summary()
-    typer.echo(as_text(summary) if as_json else case_text(summary))
-    warn_unless_ok(summary, result.remedy())
+        result = replays.simulate_case(loaded)
+    _deliver(result, {}, out, as_json)
+
+
+def replay(
+    file: ResultPath,
+    *,
+    row: Annotated[int, Opt("I", least=0)],
+    out: Trace = None,
+    point: Point = None,
+    as_json: AsJson = False,
+) -> None:
+    """Simulate one joint again and compare with the file.
+
+    Uses the joint, errors and settings stored in FILE. Prints the largest value of each load, and whether all stored
+    values are identical to the last bit, as they must be on the same machine with the same versions. If they
+    differ, prints the versions that differ and ends with exit code 1.
+
+    Example: tolstat replay iso2768_f.h5 --row 17 --out trace.csv
+
+    Parameters
+    ----------
+    row : int
+        Row of the joint in the campaign, from 0.
+    point : str, optional
+        Operating point, such as cruise; needed if FILE has several.
+    """
+    compilation.announce()
+    with progress("simulation"), ResultFile.open(file) as store:
+        again = replays.replay(store.at(point) if point else store, row)
+    facts = {"row": row, "equal": not again.differences, "differing": [d.name for d in again.differences]}
+    _deliver(again.result, facts, out, as_json)
+    say(_verdict(again))
+    if again.differences:
+        raise typer.Exit(1)
+
+
+def _deliver(result: CaseResult, facts: dict[str, Any], out: Path | None, as_json: bool) -> None:
+    """Print `facts` and the summary of a joint, a warning if its status is not ok, and write its histories."""
+    summary = facts | result.summary()
+    if as_json:
+        print_json(summary)
+    else:
+        rows = [{"load": name} | load for name, load in summary["max"].items()]
+        lines = [f"{name}: {value}" for name, value in summary.items() if name != "max"]
+        typer.echo("\n".join([*lines, table.as_text(LARGEST, rows, None)]))
+    state = Status[str(summary["status"]).upper()]
+    if state != Status.OK:
+        warn(f"warning: {state.label}: {STATUS_TEXT[state]}\n  hint: {result.remedy()}")
     if out is not None:
-        write_trace(result, out)
+        with atomic_write(out) as temporary:
+            result.to_pandas().to_csv(temporary, index=False, lineterminator="\n")
+        say(f"wrote {out}")
 
 
-def case_text(summary: dict[str, Any]) -> str:
-    """Format `CaseResult.summary` as text."""
-    from tolstat.display.text import align
-
-    def value(load: float | None) -> str:
-        return "-" if load is None else f"{load:.5g}"
-
-    beside = "status_without_errors" in summary
-    rows = [["load", "unit", "this joint", *(["without errors", "change"] if beside else [])]]
-    for name, load in summary["max"].items():
-        unit = "" if load["unit"] == "1" else load["unit"].replace("*", " ")
-        rows.append([name, unit, value(load["joint"])])
-        if beside:
-            rows[-1] += [value(load["without_errors"]), _per_cent(load["change"])]
-    facts = "\n".join(f"{name}: {value}" for name, value in summary.items() if name != "max")
-    return f"{facts}\n{align(rows)}"
+def _number(load: float | None) -> str:
+    return "-" if load is None else f"{load:.5g}"
 
 
 def _per_cent(change: float | None) -> str:
@@ -74,17 +117,15 @@ def _per_cent(change: float | None) -> str:
     return "0.0 %" if abs(change) < 5e-4 else f"{100 * change:+.1f} %"
 
 
-def warn_unless_ok(summary: dict[str, Any], remedy: str) -> None:
-    """Print the meaning of a status other than ok, and the remedy."""
-    from tolstat.common.tables import STATUS_TEXT, Status
-
-    state = Status[str(summary["status"]).upper()]
-    if state != Status.OK:
-        warn(f"warning: {state.label}: {STATUS_TEXT[state]}\n  hint: {remedy}")
-
-
-def write_trace(result: CaseResult, out: Path) -> None:
-    """Write the load histories of the last revolution as CSV."""
-    with output_file(out) as temporary:
-        result.to_pandas().to_csv(temporary, index=False, lineterminator="\n")
-    say(f"wrote {out}")
+def _verdict(again: Replay) -> str:
+    if not again.differences:
+        return f"row {again.row}: identical to the stored results, bit for bit"
+    now = again.result.summary()["status"]
+    if again.stored.label != now:
+        line = f"row {again.row}: status {again.stored.label} in the campaign, {now} now"
+    else:
+        d = max(again.differences, key=lambda d: d.relative)
+        differ = f"{len(again.differences)} values differ, largest relative difference {d.relative:.2g}"
+        line = f"row {again.row}: {differ}: {d.name} {d.stored!r} stored, {d.now!r} now"
+    reason = "all versions are those that made the file: the machine is of another type, or the file is damaged"
+    return "\n  ".join([line, *(again.code or [reason])])

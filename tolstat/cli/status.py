@@ -3,29 +3,35 @@
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING, Annotated, Any
+from collections.abc import Iterator
+from typing import Any
 
+import numpy as np
 import typer
+from numpy.typing import NDArray
 
-from tolstat.cli._app import AsJson, ResultPath, Wide, as_text, print_table
+from tolstat.campaign.remedy import reasons
+from tolstat.cli._output import print_json, print_table
 from tolstat.cli._talk import progress, wrapped
+from tolstat.common.errors import Fault, StoreError
+from tolstat.common.tables import Status, worst_status
+from tolstat.display import text
+from tolstat.display.answer import plain
+from tolstat.display.options import AsJson, ResultPath, Wide
+from tolstat.display.progress import clock
+from tolstat.display.table import Column
+from tolstat.store import ResultFile, View, verification, what_if
 
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
+SHARES = (
+    Column("load > limit", lambda row: text.limit({**row, "level": row["limit"]})),
+    Column("above", lambda row: f"{row['above']} of {row['of']}"),
+    Column("share", lambda row: text.percent(row["estimate"])),
+    Column("95 % interval", lambda row: text.span(row["lower"], row["upper"])),
+)
+"""Columns of the shares above the limits so far."""
 
-    from tolstat.store import Reader
 
-
-def status(
-    file: ResultPath,
-    check: Annotated[
-        bool,
-        typer.Option("--check", help="Compare all that is in the file with its checksums; exit code 2 if damaged."),
-    ] = False,
-    wide: Wide = False,
-    as_json: AsJson = False,
-) -> None:
+def status(file: ResultPath, *, check: bool = False, wide: Wide = False, as_json: AsJson = False) -> None:
     """Print the number of joints by status.
 
     Prints the number of joints, why joints have no valid load and what to do, and the share of joints above each limit
@@ -37,50 +43,82 @@ def status(
     unchecked because a run is under way or was killed.
 
     Example: tolstat status iso2768_f.h5
-    """
-    from tolstat.campaign.remedy import reasons
-    from tolstat.store import ResultFile
 
+    Parameters
+    ----------
+    check : bool
+        Compare all that is in the file with its checksums; exit code 2 if damaged.
+    """
     with progress("reading the file"), ResultFile.open(file) as store:
-        summary, states = _summary(store)
+        states = {one.point or "": one.status() for one in store.each()}
+        facts, shares = _facts(store, states), _shares(store.view())
         if check:
-            summary["checked"] = _checked(store)
+            facts["checked"] = _checked(store)
         why = reasons(store, states)
     if as_json:
-        causes = {
-            f"{r.status.label} at {r.point}" if r.point else r.status.label: {"row": r.row, "remedy": r.remedy}
-            for r in why
-        }
-        typer.echo(as_text(summary | {"causes": causes}))
+        causes = {f"{r.status.label} at {r.point}" if r.point else r.status.label: r for r in why}
+        remedies = {name: {"row": r.row, "remedy": r.remedy} for name, r in causes.items()}
+        print_json(plain(facts | {"exceedance": shares, "causes": remedies}))
         return
-    typer.echo(_text(summary))
-    for reason in why:
-        typer.echo(wrapped(reason.text))
-    if summary["exceedance"]:
-        _print_shares(summary["exceedance"], wide)
+    typer.echo("\n".join([*_lines(facts), *(wrapped(reason.text) for reason in why)]))
+    if shares:
+        typer.echo()
+        print_table(SHARES, shares, wide)
 
 
-def _text(summary: dict[str, Any]) -> str:
-    """Counts and pace as lines; statuses without joints are left out."""
-    from tolstat.common.tables import Status
-    from tolstat.display.progress import clock
+def _facts(store: ResultFile, states: dict[str, NDArray[np.uint8]]) -> dict[str, Any]:
+    """Study, counts by status, in all and by point, and the pace of the run under way; `states` by point."""
+    facts: dict[str, Any] = {"study": store.study_name, "joints": store.n}
+    facts |= _counts(worst_status(list(states.values())))
+    if len(states) > 1:
+        facts["points"] = {point: {k: n for k, n in _counts(own).items() if n} for point, own in states.items()}
+    each = store.each()
+    pending = sum(np.count_nonzero(own == Status.PENDING) for own in states.values())
+    written = sum(np.count_nonzero(one.column("results", "status", slice(None)) == Status.PENDING) for one in each)
+    again = sum(np.count_nonzero(one.attempt()) for one in each)
+    condition = {"damaged": pending - written, "simulated_again": again}
+    facts |= {name: number for name, number in condition.items() if number}
+    session = store.session()
+    facts["running"] = session is not None
+    if session is not None and (done := len(states) * store.n - pending - session.done) > 0:
+        rate = done / max(time.time() - session.started, 1e-3)
+        facts |= {"joints_per_s": float(f"{rate:.3g}"), "s_to_go": round(pending / rate)}
+    return facts
 
-    found = {state.label: summary[state.label] for state in Status if summary[state.label]}
-    lines = [f"study: {summary['study']}", f"joints: {summary['joints']}"]
-    lines += [f"{name}: {count}" for name, count in found.items()]
-    for point, numbers in summary.get("points", {}).items():
-        lines.append(f"at {point}: {', '.join(f'{count} {name}' for name, count in numbers.items())}")
-    lines += [f"{name}: {summary[name]}" for name in ("damaged", "simulated_again") if name in summary]
-    if "checked" in summary:
-        unchecked = "errors match; results have none while a run is under way, or after one that was killed"
-        lines.append(f"checksums: {'all match' if summary['checked'] else unchecked}")
-    pace = ""
-    if "joints_per_s" in summary:
-        pace = f", {summary['joints_per_s']:g} joints/s, {clock(summary['s_to_go'])} left"
-    return "\n".join([*lines, f"running: {'yes' if summary['running'] else 'no'}{pace}"])
+
+def _counts(states: NDArray[np.uint8]) -> dict[str, int]:
+    return {state.label: int(np.count_nonzero(states == state)) for state in Status}
 
 
-def _checked(store: Reader) -> bool:
+def _shares(view: View) -> list[dict[str, Any]]:
+    """Share of the joints above each limit so far; joints of a subset simulation are no sample."""
+    rows: list[dict[str, Any]] = []
+    for load in view.loads([] if view.method == "subset" else list(view.limits)):
+        share = load.above(view.limits[load.name])
+        if share.n:
+            above = {"above": share.count, "of": share.n - share.n_failed - share.n_unsettled}
+            numbers = {key: float(f"{getattr(share, key):.3g}") for key in ("estimate", "lower", "upper")}
+            rows.append({"load": load.name, "limit": load.limit, "unit": load.unit} | above | numbers)
+    return rows
+
+
+def _lines(facts: dict[str, Any]) -> Iterator[str]:
+    """Counts and pace; statuses without joints are left out."""
+    unchecked = "errors match; results have none while a run is under way, or after one that was killed"
+    pace = f", {facts['joints_per_s']:g} joints/s, {clock(facts['s_to_go'])} left" if "s_to_go" in facts else ""
+    for name, value in facts.items():
+        if name == "points":
+            for point, counts in value.items():
+                yield f"at {point}: {', '.join(f'{count} {label}' for label, count in counts.items())}"
+        elif name == "running":
+            yield f"running: {'yes' if value else 'no'}{pace}"
+        elif name == "checked":
+            yield f"checksums: {'all match' if value else unchecked}"
+        elif value and name not in ("joints_per_s", "s_to_go"):
+            yield f"{name}: {value}"
+
+
+def _checked(store: ResultFile) -> bool:
     """Whether all results have checksums, which match.
 
     Raises
@@ -88,12 +126,8 @@ def _checked(store: Reader) -> bool:
     StoreError
         With everything that does not match its checksum.
     """
-    from tolstat.common.errors import Fault, StoreError
-    from tolstat.store import verification, what_if
-
-    found = store.check()
-    faults = [f"{path} of rows {', '.join(rows)}" for path, rows in found.damaged.items()]
-    altered = what_if.damaged(store)
+    integrity, altered = store.check(), what_if.damaged(store)
+    faults = [f"{path} of rows {', '.join(rows)}" for path, rows in integrity.damaged.items()]
     faults += [f"what_if: {altered} {'change' if altered == 1 else 'changes'}"] * bool(altered)
     if faults:
         remedy = "simulate joints with damaged results again: tolstat run STUDY; for damaged errors restore a copy"
@@ -101,97 +135,4 @@ def _checked(store: Reader) -> bool:
     for one in store.each():
         for name in (verification.VERIFY, verification.NEAR):
             verification.read(one, name)
-    return found.checked
-
-
-def _print_shares(shares: list[dict[str, Any]], wide: bool) -> None:
-    from tolstat.display import text
-    from tolstat.display.table import Column
-
-    unknown = float("nan")
-    rows = [{key: unknown if value is None else value for key, value in row.items()} for row in shares]
-    columns = (
-        Column("load > limit", lambda row: text.limit({**row, "level": row["limit"]})),
-        Column("above", lambda row: f"{row['above']} of {row['of']}"),
-        Column("share", lambda row: text.percent(row["estimate"])),
-        Column("95 % interval", lambda row: text.span(row["lower"], row["upper"])),
-    )
-    typer.echo()
-    print_table(columns, rows, wide)
-
-
-def _summary(store: Reader) -> tuple[dict[str, Any], dict[str, NDArray[np.uint8]]]:
-    """Collect counts and shares, some rows at a time; blocks of pending rows are skipped. Also the states by point."""
-    import numpy as np
-
-    from tolstat.common.loads import load_of, split
-    from tolstat.common.tables import Status, worst_status
-    from tolstat.store import worst
-    from tolstat.store.hdf5 import BLOCK
-    from tolstat.study.points import names_of
-
-    each = {one.point or "": one for one in store.each()}
-    states, damaged = {point: np.full(store.n, Status.PENDING, np.uint8) for point in each}, 0
-    limits = {} if store.sampling["method"] == "subset" else store.limits  # whose joints are no sample
-    loads = {name: np.full((3, store.n), np.nan) for name in limits}
-    worst_states = {name: np.full(store.n, Status.PENDING, np.uint8) for name in limits}
-    at = {name: names_of(split(name)[1], list(each), str(store.path)) for name in limits}
-    for first in range(0, store.n, BLOCK):
-        slots = slice(first, first + BLOCK)
-        results = {}
-        for point, one in each.items():
-            written = one.column("results", "status", slots)
-            if (written != Status.PENDING).any():
-                results[point] = one.results(slots)
-                states[point][slots] = results[point]["status"]
-                damaged += int(((written != Status.PENDING) & (states[point][slots] == Status.PENDING)).sum())
-        for name, values in loads.items():
-            if all(point in results for point in at[name]):
-                own, state, inexact = worst.load_of([results[point] for point in at[name]], load_of(name))
-                values[:, slots] = own.values, *inexact.of(np.arange(len(state)), own.values)
-                worst_states[name][slots] = state
-    found = np.bincount(worst_status(list(states.values())), minlength=max(Status) + 1)
-    summary: dict[str, Any] = {"study": store.study_name, "joints": store.n}
-    summary |= {state.label: int(found[state]) for state in Status}
-    if len(each) > 1:
-        counts = {point: np.bincount(own, minlength=max(Status) + 1) for point, own in states.items()}
-        summary["points"] = {p: {s.label: int(own[s]) for s in Status if own[s]} for p, own in counts.items()}
-    again = sum(int((one.attempt() > 0).sum()) for one in each.values())
-    condition = {"damaged": damaged, "simulated_again": again}
-    pending = sum(int((own == Status.PENDING).sum()) for own in states.values())
-    summary |= {name: count for name, count in condition.items() if count} | _pace(store, len(each), pending)
-    known = [name for name in loads if (worst_states[name] != Status.PENDING).any()]
-    summary["exceedance"] = [_exceedance(store, worst_states[name], name, loads[name]) for name in known]
-    return summary, states
-
-
-def _pace(store: Reader, points: int, pending: int) -> dict[str, Any]:
-    """Return rate and remaining time of the run in progress, once it has finished joints at any point."""
-    session = store.session()
-    if session is None:
-        return {"running": False}
-    done = points * store.n - pending - session.done
-    if done <= 0:
-        return {"running": True}
-    rate = done / max(time.time() - session.started, 1e-3)
-    return {"running": True, "joints_per_s": float(f"{rate:.3g}"), "s_to_go": round(pending / rate)}
-
-
-def _exceedance(store: Reader, states: NDArray[np.uint8], name: str, values: NDArray[np.float64]) -> dict[str, Any]:
-    """Share of the joints above a limit so far, from loads and their ends, (3, n); None without an estimate."""
-    from tolstat.analysis.sample import Sample
-    from tolstat.common.loads import load_of
-    from tolstat.common.tables import Status
-    from tolstat.store.view import design_of
-
-    samples = slice(store.first_sample, None)
-    weights = store.origin()["weight"][samples] if store.sampling["method"] == "importance" else None
-    limit, unit = store.limits[name], load_of(name).unit
-    own, *ends = values[:, samples]
-    design = design_of(store, weights, Status.PENDING in states[samples])
-    load = Sample.of(own, states[samples], design, (ends[0], ends[1]))
-    share = load.above(limit)
-    numbers = {key: getattr(share, key) for key in ("estimate", "lower", "upper")}
-    rounded = {key: float(f"{value:.3g}") if value == value else None for key, value in numbers.items()}
-    joints = {"above": share.count, "of": share.n - share.n_failed - share.n_unsettled}
-    return {"load": name, "limit": limit, "unit": unit, **joints, **rounded}
+    return integrity.checked

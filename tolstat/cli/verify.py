@@ -3,40 +3,26 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
-import typer
-
-from tolstat.cli._app import AsJson, Wide, Workers, as_text, output_file, print_table
+from tolstat.analysis.accuracy import LEAST_NEAR
+from tolstat.campaign.verify import check, check_near
+from tolstat.cli._output import deliver
 from tolstat.cli._talk import progress, say
-
-if TYPE_CHECKING:
-    from tolstat.store.verification import Verification
+from tolstat.common.cores import available_cores
+from tolstat.common.files import atomic_write
+from tolstat.display.answer import Answer, Sentence, Table
+from tolstat.display.options import AsJson, Opt, Wide, Workers
+from tolstat.questions import accuracy
 
 
 def verify(
-    what: Annotated[Path, typer.Argument(metavar="STUDY|FILE", help="Study file (TOML) or result file (HDF5).")],
-    joints: Annotated[
-        str | None,
-        typer.Option(
-            "--joints", metavar="N|all", help="Number of joints to check, or all; default: 24, near a limit 50."
-        ),
-    ] = None,
-    near: Annotated[
-        str | None,
-        typer.Option(
-            "--near",
-            metavar="LIMIT",
-            help='Check the joints nearest to a limit: "cross1.F > 700 N", "cross*.F > 700 N" or "any limit".',
-        ),
-    ] = None,
-    seed: Annotated[
-        int | None,
-        typer.Option("--seed", metavar="S", min=0, help="Seed of the choice of joints; default: that of the study."),
-    ] = None,
-    out: Annotated[
-        Path | None, typer.Option("--out", metavar="CSV", help="Write the errors of each joint, check and load as CSV.")
-    ] = None,
+    what: Annotated[Path, Opt("STUDY|FILE")],
+    *,
+    joints: Annotated[str | None, Opt("N|all")] = None,
+    near: Annotated[str | None, Opt("LIMIT")] = None,
+    seed: Annotated[int | None, Opt("S", least=0)] = None,
+    out: Annotated[Path | None, Opt("CSV", writes=True)] = None,
     workers: Workers = None,
     wide: Wide = False,
     as_json: AsJson = False,
@@ -52,45 +38,35 @@ def verify(
     and to which side, tells how far the share above the limit moves. Intervals of all commands use it from then on.
 
     Example: tolstat verify iso2768_f.h5 --joints 2 --out errors.csv
-    """
-    from tolstat.analysis.accuracy import LEAST_NEAR
-    from tolstat.campaign import verify as verification
-    from tolstat.campaign.verify import check_near
-    from tolstat.common.cores import available_cores
-    from tolstat.common.files import check_target
-    from tolstat.questions import accuracy
 
-    if out is not None:
-        check_target(out, what)
+    Parameters
+    ----------
+    what : Path
+        Study file (TOML) or result file (HDF5).
+    joints : str, optional
+        Number of joints to check, or all; default: 24, near a limit 50.
+    near : str, optional
+        Check the joints nearest to a limit: "cross1.F > 700 N", "cross*.F > 700 N" or "any limit".
+    seed : int, optional
+        Seed of the choice of joints; default: that of the study.
+    out : Path, optional
+        Write the errors of each joint, check and load as CSV.
+    """
     with progress("checks, then tight references") as shown:
         count = workers or available_cores()
         if near is None:
-            found = verification.check(what, joints or 24, seed, count, progress=shown)
+            found = check(what, joints or 24, seed, count, progress=shown)
         else:
             found = check_near(what, near, joints or LEAST_NEAR, count, shown)
-    if as_json:
-        typer.echo(as_text(_summary(found)))
-    else:
-        print_table(accuracy.ERRORS, accuracy.error_rows(found), wide)
-    say(accuracy.note(found))
+    units = dict.fromkeys(("median", "usual", "worst"), "1")
+    kinds = Table("kinds", "By kind of load", accuracy.ERRORS, accuracy.error_rows(found), units)
+    loads = Table("loads", "By load", (), accuracy.error_rows(found, by_kind=False), units)
+    checks = {name: check.description for name, check in found.checks.items()}
+    facts = {"rows": found.rows, "seed": found.seed, "checks": checks}
+    deliver(Answer("verify", "Numerical error", [kinds, loads, Sentence(accuracy.note(found))], facts), wide, as_json)
     if out is not None:
         import pandas as pd
 
-        with output_file(out) as temporary:
+        with atomic_write(out) as temporary:
             pd.DataFrame(accuracy.joint_rows(found)).to_csv(temporary, index=False, lineterminator="\n")
         say(f"wrote {out}")
-
-
-def _summary(found: Verification) -> dict[str, Any]:
-    """Return the distributions of errors as plain values, by kind of load and by load; None for unknown values."""
-    from tolstat.display.text import plain
-    from tolstat.questions import accuracy
-
-    facts: dict[str, Any] = {"rows": found.rows.tolist(), "seed": found.seed}
-    facts["checks"] = {name: check.description for name, check in found.checks.items()}
-    for key, by_kind in (("kinds", True), ("loads", False)):
-        errors: dict[str, Any] = {}
-        for row in plain(accuracy.error_rows(found, by_kind)):
-            errors.setdefault(row.pop("error"), {})[row.pop("load")] = row
-        facts[key] = errors
-    return facts

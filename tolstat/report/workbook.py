@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
 from importlib.util import find_spec
 from io import BytesIO
 from pathlib import Path
@@ -20,7 +19,6 @@ from tolstat.store.view import View
 if TYPE_CHECKING:
     import pandas as pd
 
-
 MAX_ROWS = 1_048_575
 """Number of joints that a sheet of Excel can hold below its heading."""
 LIMITS = ("load", "limit", "unit", "above", "joints", "share", "lower", "upper", "confidence", "nominal")
@@ -36,9 +34,8 @@ def check(store: Reader, option: str) -> None:
         When openpyxl is not installed, or the campaign has more joints than a sheet has rows.
     """
     if find_spec("openpyxl") is None:
-        raise InputError(
-            [Fault(option, "openpyxl is not installed", "install it with: pip install openpyxl, or use --csv OUT")]
-        )
+        remedy = "install it with: pip install openpyxl, or use --csv OUT"
+        raise InputError([Fault(option, "openpyxl is not installed", remedy)])
     if store.n > MAX_ROWS:
         found = f"{store.path} has {store.n} joints, a sheet of Excel has {MAX_ROWS} rows"
         raise InputError([Fault(option, found, "use --parquet OUT or --csv OUT")])
@@ -59,40 +56,33 @@ def write(store: Reader, frame: pd.DataFrame, path: Path) -> None:
     """
     from openpyxl import Workbook
 
-    book, columns = Workbook(write_only=True), described(store)
-    joints = zip(frame.index.tolist(), *(frame[name].tolist() for name in frame), strict=True)
-    _sheet(book, "joints", ["row", *map(str, frame.columns)], joints)
-    _sheet(book, "limits", LIMITS, _limits(View(store)))
+    columns = described(store)
     meanings = {name: column.description for name, column in columns.items()}
-    units = ((name, unit, meanings.get(name, "")) for name, unit in frame.attrs["units"].items())
-    _sheet(book, "units", ("column", "unit", "meaning"), units)
+    units = [(name, unit, meanings.get(name, "")) for name, unit in frame.attrs["units"].items()]
+    sheets = {
+        "joints": (("row", *frame.columns), frame.itertuples(name=None)),
+        "limits": (LIMITS, _limits(View(store))),
+        "units": (("column", "unit", "meaning"), units),
+    }
+    book = Workbook(write_only=True)  # a row at a time
+    for name, (heads, rows) in sheets.items():
+        sheet = book.create_sheet(name)
+        sheet.freeze_panes = "B2"
+        sheet.append(heads)
+        for row in rows:
+            sheet.append([_finite(value) for value in row])
     whole = BytesIO()  # openpyxl does not recover from a full disk
     book.save(whole)
     path.write_bytes(whole.getvalue())
 
 
-def _limits(view: View) -> Iterable[Sequence[object]]:
+def _limits(view: View) -> list[tuple[object, ...]]:
     if not view.sampled:  # joints of a sweep or a list are no sample, whose shares would mean something
         return [(name, limit, load_of(name).unit) for name, limit in view.limits.items()]
     names = ("load", "level", "unit", "count", "valid", "estimate", "lower", "upper", "confidence", "nominal")
     rows = [{**row, "valid": row["n"] - row["n_failed"] - row["n_unsettled"]} for row in limit_rows(view)]
-    return [[row[name] for name in names] for row in rows]
+    return [tuple(row[name] for name in names) for row in rows]
 
 
-def _sheet(book: Any, name: str, heads: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-    """Append a sheet with a heading in bold that stays in view."""
-    from openpyxl.cell import WriteOnlyCell
-    from openpyxl.styles import Font
-    from openpyxl.utils import get_column_letter
-
-    sheet = book.create_sheet(name)
-    sheet.freeze_panes = "B2"
-    for k, head in enumerate(heads, 1):
-        sheet.column_dimensions[get_column_letter(k)].width = max(10, min(len(head) + 2, 40))
-    bold = []
-    for head in heads:
-        bold.append(WriteOnlyCell(sheet, value=head))
-        bold[-1].font = Font(bold=True)
-    sheet.append(bold)
-    for row in rows:
-        sheet.append([None if isinstance(value, float) and not math.isfinite(value) else cell(value) for value in row])
+def _finite(value: Any) -> Any:
+    return None if isinstance(value, float) and not math.isfinite(value) else cell(value)

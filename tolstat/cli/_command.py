@@ -1,0 +1,160 @@
+"""The one place that makes commands of functions: arguments and options from a signature, help from its docstring.
+
+Parameters that can be given by position are arguments, keyword-only ones are options; what a type does not say of them
+is their `Opt`. A parameter that is true by default can be switched off: ``--report / --no-report``.
+
+Exit codes: 0 success (failed and unsettled joints are results); 1 internal error, dead worker processes, or results
+that `replay` does not reproduce; 2 input that cannot be used; 128 + N stopped by signal N (130 after Ctrl-C).
+"""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from inspect import Parameter, Signature
+from pathlib import Path
+from typing import Annotated, Any, get_args, get_origin
+
+import typer
+
+from tolstat.cli._shortage import shortage
+from tolstat.cli._talk import fail, session
+from tolstat.common.errors import Fault, InputError, TolstatError, gather
+from tolstat.common.files import check_target
+from tolstat.display.options import Opt
+
+WHAT = {"1": "a share between 0 and 1", "s": "a time above zero"}
+"""What a value with a unit is, by its unit."""
+SHARES = '"0.1 %", "1000 ppm" or 0.001'
+"""How a share is written."""
+
+
+@contextmanager
+def exit_codes() -> Iterator[None]:
+    """Turn errors that a user can mend into a message and an exit code."""
+    try:
+        yield
+    except (TolstatError, MemoryError, OSError, ImportError) as error:
+        reason = error if isinstance(error, TolstatError) else shortage(error)
+        if reason is None:
+            raise
+        fail(f"error: {reason}")
+        raise typer.Exit(2) from error
+    except KeyboardInterrupt as error:
+        fail("interrupted")
+        raise typer.Exit(130) from error
+
+
+def command_of(function: Callable[..., None]) -> Callable[..., None]:
+    """Make the function of a command: with the options of `_talk.session`, and values with a unit as text."""
+    own, common = _parameters(function), _parameters(session)
+
+    def run(**given: Any) -> None:
+        shared = {name: given.pop(name) for name in common}
+        with exit_codes(), session(**shared), exit_codes():  # those inside are written to the log, too
+            function(**_values(own, given))
+
+    made: Any = run
+    made.__name__, made.__doc__ = function.__name__, prose(inspect.getdoc(function) or "")
+    texts = entries(inspect.getdoc(session) or "") | entries(inspect.getdoc(function) or "")
+    parameters = [*own.values(), *common.values()]
+    made.__signature__ = Signature([_typed(p, texts.get(p.name)) for p in parameters])
+    made.__annotations__ = {p.name: p.annotation for p in made.__signature__.parameters.values()}
+    return run
+
+
+def prose(docstring: str) -> str:
+    """Text of a docstring before its first section."""
+    return re.split(r"^[A-Z][a-z]+\n---+$", docstring, maxsplit=1, flags=re.MULTILINE)[0].strip()
+
+
+def entries(docstring: str) -> dict[str, str]:
+    """Texts of the entries under ``Parameters`` of a docstring, by name."""
+    section = re.search(r"^Parameters\n---+\n(.*?)(?=^[A-Z][a-z]+\n---+$|\Z)", docstring, re.DOTALL | re.MULTILINE)
+    parts = re.split(r"^\*?(\w+) : .*\n", section[1] if section else "", flags=re.MULTILINE)
+    return {name: " ".join(text.split()) for name, text in zip(parts[1::2], parts[2::2], strict=True)}
+
+
+def flag_of(parameter: Parameter) -> str:
+    """Option of a parameter, such as ``--one-in``."""
+    return f"--{(opt_of(parameter)[1].name or parameter.name).replace('_', '-')}"
+
+
+def opt_of(parameter: Parameter) -> tuple[Any, Opt]:
+    """Type and `Opt` of a parameter."""
+    annotation = parameter.annotation
+    if get_origin(annotation) is not Annotated:
+        return annotation, Opt()
+    base, *extra = get_args(annotation)
+    return base, next((opt for opt in extra if isinstance(opt, Opt)), Opt())
+
+
+def quantity(text: str, opt: Opt, flag: str) -> float:
+    """Parse the value of an option that has a unit, such as ``"0.1 %"`` or ``"5 min"``; returns SI.
+
+    Raises
+    ------
+    InputError
+        When the text is no such value, or not between the limits of the option.
+    """
+    from pydantic_core import PydanticCustomError
+
+    from tolstat.common.units import EXAMPLES, to_si
+
+    unit = opt.unit or "1"
+    try:
+        value = to_si(text, unit)
+    except PydanticCustomError:
+        value = float("nan")
+    low, high = 0.0 if opt.least is None else opt.least, float("inf") if opt.most is None else opt.most
+    if not low < value < high:
+        remedy = f"write {flag} " + (SHARES if unit == "1" else f'"{EXAMPLES[unit]}"')
+        raise InputError([Fault(flag, f"{text!r} is not {WHAT.get(unit, f'a value in {unit}')}", remedy)])
+    return value
+
+
+def _parameters(function: Callable[..., Any]) -> Mapping[str, Parameter]:
+    return inspect.signature(function, eval_str=True).parameters
+
+
+def _typed(parameter: Parameter, text: str | None) -> Parameter:
+    """Parameter of a command as typer reads it; `text` is its entry in a docstring."""
+    base, opt = opt_of(parameter)
+    shown: Any = {"metavar": opt.metavar or None, "help": text or opt.help}
+    default = parameter.default
+    if opt.unit is None:
+        shown |= {"min": opt.least, "max": opt.most}
+    elif default is Parameter.empty:
+        base = str
+    else:
+        base, default = str | None, None
+    if parameter.kind is not Parameter.KEYWORD_ONLY:
+        made: Any = typer.Argument(**shown)
+    else:
+        made = typer.Option(*(() if default is True else (flag_of(parameter),)), **shown)
+    return parameter.replace(kind=Parameter.KEYWORD_ONLY, annotation=Annotated[base, made], default=default)
+
+
+def _values(parameters: Mapping[str, Parameter], given: dict[str, Any]) -> dict[str, Any]:
+    """Arguments of the function: in SI where they have a unit.
+
+    Raises
+    ------
+    InputError
+        With each value that cannot be used, and each file that cannot be written.
+    """
+    faults: list[Fault] = []
+    inputs = [given[name] for name, p in parameters.items() if p.kind is not Parameter.KEYWORD_ONLY]
+    paths = [Path(value) for value in inputs if isinstance(value, str | Path)]
+    for name, parameter in parameters.items():
+        opt, value = opt_of(parameter)[1], given[name]
+        with gather(faults):
+            if opt.writes and value not in (None, "-"):
+                check_target(Path(value), *paths)
+            elif opt.unit is not None:
+                given[name] = parameter.default if value is None else quantity(value, opt, flag_of(parameter))
+    if faults:
+        raise InputError(faults)
+    return given

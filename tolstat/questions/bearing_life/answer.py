@@ -4,40 +4,39 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import asdict
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tolstat.analysis.binomial import unresolved_matter
-from tolstat.analysis.rating_life import A1
-from tolstat.analysis.sample import Sample, total_interval
+from tolstat.analysis.binomial import needed, unresolved_matter
+from tolstat.analysis.rating_life import A1, FRETTING
 from tolstat.common.errors import NotApplicable
-from tolstat.common.load_kinds import PINS
-from tolstat.common.tables import LIFE_EXPONENT, VALID, Mode
+from tolstat.common.tables import VALID
 from tolstat.display import style, text
 from tolstat.display.answer import Answer, Part, Sentence, Table
 from tolstat.display.asked import Asked
 from tolstat.display.blocks import Panel, Panels
 from tolstat.display.mpl import ticker
 from tolstat.display.table import Column, Row, Rows, has, has_unresolved
-from tolstat.questions.bearing_life.lives import JOINT, PLACES, Lives, lives_of
-from tolstat.store import points
+from tolstat.display.verdict import Verdict, on_share
+from tolstat.questions.bearing_life.lives import (
+    ANY,
+    JOINT,
+    SHARES,
+    Lives,
+    bearing_of,
+    below_rows,
+    contact_rows,
+    life_rows,
+    lives_of,
+    load_rows,
+)
 from tolstat.store.view import View
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-SHARES = (0.5, 0.9, 0.99)
-"""Shares of the joints that reach a life."""
-CONFIDENCE = 0.95
-ANY = "any"
-"""At least one of the four bearings."""
-MOSTLY = 0.5
-"""Share of a revolution above which a bearing counts as loaded in a mode."""
-LOADED = {"one_end": Mode.ONE_POINT, "opposite_ends": Mode.TWO_POINT, "along": Mode.UNIFORM}
-"""Contact mode of each way to load a bearing."""
 FEW = "needs more joints"
 PLACE_NAMES = {JOINT: "all four", ANY: "at least one"}
 LIFE_UNITS = dict.fromkeys(("nominal", "estimate", "lower", "upper", "bound_lower", "bound_upper"), "h")
@@ -132,8 +131,9 @@ def bearing_life(view: View) -> Answer:
     -------
     Answer
         Tables ``lives`` (see `life_rows`), ``below_required`` (see `below_rows`), ``loads`` (see `load_rows`) and
-        ``contacts`` (see `contact_rows`), the first two only if a joint has a rating. Facts ``symbol`` of the life,
-        ``critical_amplitude`` (rad), ``unrated`` and ``load_error``, see `lives.Lives`. Lives are in hours.
+        ``contacts`` (see `contact_rows`), the first two only if a joint has a rating. Lives are in hours. Facts
+        ``symbol`` of the life, ``critical_amplitude`` (rad), ``unrated``, ``short``, ``fretting`` and ``load_error``,
+        see `lives.Lives`.
 
     Raises
     ------
@@ -159,8 +159,14 @@ def bearing_life(view: View) -> Answer:
         title = "Joints in which a bearing is loaded so for more than half of a revolution"
         parts.append(Table("contacts", title, CONTACTS, contacts, dict.fromkeys(list(contacts[0])[1:], "1")))
     facts = {"symbol": lives.bearing.symbol, "critical_amplitude": lives.bearing.critical_amplitude}
-    facts |= {"unrated": lives.unrated, "load_error": lives.load_error}
-    return Answer("bearing_life", "Bearing life", [*parts, *map(Sentence, _notes(lives, contacts))], facts)
+    facts |= {
+        "unrated": lives.unrated,
+        "short": lives.short,
+        "fretting": lives.fretting,
+        "load_error": lives.load_error,
+    }
+    notes = [*_notes(lives, contacts), *_selected(view)]
+    return Answer("bearing_life", "Bearing life", [*parts, *map(Sentence, notes)], facts)
 
 
 def bearing_life_on_page(view: View, asked: Asked) -> Answer:
@@ -168,95 +174,6 @@ def bearing_life_on_page(view: View, asked: Asked) -> Answer:
     if not (view.sampled and view.count(*VALID)):
         raise NotApplicable
     return bearing_life(view)
-
-
-def life_rows(lives: Lives) -> Rows:
-    """Life that a share of the joints reaches.
-
-    Returns
-    -------
-    sequence of mapping
-        One row per place of `PLACES` and share: ``place``, ``share``; lives in h: ``nominal``, ``estimate``, ``lower``,
-        ``upper``, ``bound_lower``, ``bound_upper`` (joints without a life among the shortest, the longest); ``rating``
-        (N, load rating C with which the share reaches the required life) with ``_lower`` and ``_upper``; ``n``,
-        ``n_failed`` (those without a rating included), ``n_unsettled``, ``confidence``. Ends are 0 or infinite where
-        the joints are too few.
-    """
-    rows = []
-    for rate in map(lives.rate, PLACES):
-        for share in SHARES:
-            q = rate.quantile(share, CONFIDENCE)
-            row = {"place": rate.name, "share": share, "nominal": _life(rate.nominal), "estimate": _life(q.estimate)}
-            row |= {"lower": _life(q.upper), "upper": _life(q.lower)}
-            row |= {"bound_lower": _life(q.bound_upper), "bound_upper": _life(q.bound_lower)}
-            rates = {"rating": q.estimate, "rating_lower": q.lower, "rating_upper": q.upper}
-            row |= {name: _rating(value, lives) for name, value in rates.items()}
-            row |= {"n": q.n, "n_failed": q.n_failed, "n_unsettled": q.n_unsettled, "confidence": CONFIDENCE}
-            rows.append(row)
-    return rows
-
-
-def load_rows(lives: Lives) -> Rows:
-    """Dynamic equivalent load that a share of the joints stays at or below.
-
-    Returns
-    -------
-    sequence of mapping
-        One row per bearing and share: ``place``, ``share``, ``nominal_load`` and ``load``, N.
-    """
-    return [
-        {"place": pin, "share": share, "nominal_load": load.nominal, "load": load.quantile(share).estimate}
-        for pin, load in zip(PINS, map(lives.load, PINS), strict=True)
-        for share in SHARES
-    ]
-
-
-def below_rows(lives: Lives) -> Rows:
-    """Share of the joints whose life is below the required one.
-
-    Returns
-    -------
-    sequence of mapping
-        One row per place of `PLACES`: ``place``, ``required`` (h), the fields of `analysis.estimates.Exceedance` but
-        its level (``count`` are the joints below the required life; bounds have joints without a life above and
-        below), ``total_lower`` and ``total_upper`` (cover sampling, joints without a life and, if known, the numerical
-        error), ``confidence``. No rows without a required life.
-    """
-    rows = []
-    for place in PLACES if np.isfinite(lives.required) else ():
-        rate, level = lives.rate(place), 1.0 / lives.required
-        row = {"place": place, "required": lives.required} | asdict(rate.above(level, CONFIDENCE))
-        del row["level"]
-        low, high = total_interval(_with_error(rate, lives.load_error), level, CONFIDENCE)
-        rows.append(row | {"total_lower": low, "total_upper": high, "confidence": CONFIDENCE})
-    return rows
-
-
-def contact_rows(view: View) -> Rows:
-    """Share of the joints in which a bearing is mostly loaded at one end, at opposite ends, or along its length.
-
-    Of several operating points each counts by its share of the revolutions.
-
-    Returns
-    -------
-    sequence of mapping
-        One row per pin, and one for `ANY` of them: ``place``; ``one_end``, ``opposite_ends`` and ``along``, shares of
-        the joints in which this holds for more than `MOSTLY` of a revolution, with ``_lower`` and ``_upper``.
-        No rows if the study does not keep the contact modes.
-    """
-    if sum(column.field == "mode_share" for column in view.columns) < len(PINS) * len(Mode):
-        return []
-    modes = [part.read_results(("mode_share",))["mode_share"] for part in view.parts]
-    spent = np.tensordot(points.shares_of_revolutions(view), np.stack(modes), 1)
-    rows = []
-    for place in (*PINS, ANY):
-        own = spent[:, [PINS.index(place)]] if place in PINS else spent
-        row: dict[str, Any] = {"place": place}
-        for name, mode in LOADED.items():
-            found = Sample.of(own[:, :, mode].max(axis=1), view.status, view.design).above(MOSTLY, CONFIDENCE)
-            row |= {name: found.estimate, f"{name}_lower": found.lower, f"{name}_upper": found.upper}
-        rows.append(row)
-    return rows
 
 
 def _by_place(rows: Rows) -> Rows:
@@ -267,40 +184,65 @@ def _by_place(rows: Rows) -> Rows:
     return list(found.values())
 
 
-def _rating(rate: float, lives: Lives) -> float:
-    """Load rating, N, of bearings with which a life of so many 1/h becomes the required one."""
-    return float(lives.bearing.C * (max(rate, 0.0) * lives.required) ** (1.0 / LIFE_EXPONENT))
-
-
-def _life(rate: float) -> float:
-    """Reciprocal, h; a rate of zero or of no joint (-inf) is an infinite life."""
-    return np.inf if rate <= 0.0 else 1.0 / rate
-
-
-def _with_error(rate: Sample, error: float) -> tuple[Sample, ...]:
-    """Rates, and those with equivalent loads reduced and increased by their numerical error if it is known."""
-    if np.isnan(error):
-        return (rate,)
-    factors = (max(0.0, 1.0 - error) ** LIFE_EXPONENT, (1.0 + error) ** LIFE_EXPONENT)
-    return rate, *(rate.shifted((factor - 1.0) * rate.values) for factor in factors)
-
-
 def _verdict(lives: Lives, below: Rows, found: Rows) -> list[str]:
     """Sentences on the required life, or on why there is none to judge; the first is the answer."""
     if lives.valid and lives.unrated == lives.valid:
         return [f"no rating: {_why_unrated(lives, 'every joint')}"]
     if not below:
         return ["no required life is given: bearing.required_life"]
-    row = below[-1]
-    without, required = row["n_failed"] + row["n_unsettled"], f"the required {_hours(lives.required)}"
-    bounds = f"{text.span(row['bound_lower'], row['bound_upper'])} with joints without a life counted above, then below"
+    row, required = below[-1], f"the required {_hours(lives.required)}"
     if _undecided(row):
-        return [f"no verdict: {without} of {row['n']} joints have no life; below {required} are {bounds}"]
+        return [f"no verdict: {_without(row)}; below {required} are {_bounds(row)}"]
     low, high = row["total_lower"], row["total_upper"]
     interval = "" if math.isnan(low) else f" (total interval {text.span(low, high)})"
     said = [f"{text.percent(row['estimate'])} of the joints{interval} do not reach {required}"]
-    said += [f"{without} of {row['n']} joints have no life: {bounds}"] if without else []
+    said += [f"{_without(row)}: {_bounds(row)}"] if row["n_failed"] + row["n_unsettled"] else []
     return [*said, *_better_bearings(found[-1])]
+
+
+def _without(row: Row) -> str:
+    return f"{row['n_failed'] + row['n_unsettled']} of {row['n']} joints have no life"
+
+
+def _bounds(row: Row) -> str:
+    return f"{text.span(row['bound_lower'], row['bound_upper'])} with joints without a life counted above, then below"
+
+
+def life_verdicts(view: View, accepted: float = math.nan) -> list[Verdict]:
+    """Verdict on the required life of the bearings; none if no life is required.
+
+    Parameters
+    ----------
+    view : View
+        As in `bearing_life`.
+    accepted : float
+        Accepted share: share of the joints that may have a shorter life; NaN if none is given.
+
+    Raises
+    ------
+    NotApplicable, StoreError, InputError
+        See `lives.lives_of`.
+    """
+    bearing = bearing_of(view)
+    if bearing is None or bearing.required_life is None:
+        return []
+    lives = lives_of(view)
+    row = below_rows(lives)[-1]
+    share, reason = row["estimate"], ""
+    if lives.valid and lives.unrated == lives.valid:
+        share, reason = math.nan, f"no bearing has a rating: {_why_unrated(lives, 'every joint')}"
+    elif _undecided(row):
+        share, reason = math.nan, f"{_without(row)}; shorter than required are {_bounds(row)}"
+    elif not lives.design.has_interval("share"):
+        reason = lives.design.without_interval("share")
+
+    def deciding() -> float:
+        low, high = row["bound_lower"], row["bound_upper"]
+        return math.inf if low <= accepted <= high else needed(high if high < accepted else low, accepted)
+
+    what, ends = f"have a bearing life below {_hours(lives.required)}", (row["total_lower"], row["total_upper"])
+    found = on_share("bearing life", what, share, ends, accepted, deciding, reason)
+    return [found._replace(notes=(*_small_swings(lives), *_selected(view)))]
 
 
 def _better_bearings(row: Row) -> list[str]:
@@ -314,11 +256,38 @@ def _better_bearings(row: Row) -> list[str]:
 
 
 def _why_unrated(lives: Lives, joints: str) -> str:
-    angle = f"{math.degrees(lives.bearing.critical_amplitude):.3g} deg"
+    each = " at each of its operating points" if len(lives.duty) > 1 else ""
     return (
-        f"{joints} swings by less than {angle} to either side, so that the tracks of neighbouring needles do not "
-        "overlap; the rating life does not hold there, since the lubricant between needles and raceways is not renewed"
+        f"{joints} swings by less than {_angle(lives, FRETTING)} to either side{each}, half of the angle from which on "
+        "the tracks of neighbouring needles overlap; the lubricant between needles and raceways is not renewed there, "
+        "and fretting, which no rating covers, is to be expected"
     )
+
+
+def _angle(lives: Lives, part: float = 1.0) -> str:
+    return f"{math.degrees(part * lives.bearing.critical_amplitude):.3g} deg"
+
+
+def _small_swings(lives: Lives) -> Iterator[str]:
+    """Sentences on the operating points at which joints swing by less than the critical amplitude."""
+    for point, number in lives.short.items() if lives.unrated < lives.valid else ():
+        time = f", {text.percent(lives.duty[point])} of the time," if len(lives.duty) > 1 else ""
+        where = f"at {point}{time} " if point else ""
+        swinging = "every joint swings" if number == lives.valid else f"{number} of {lives.valid} joints swing"
+        words = (
+            f"{where}{swinging} by less than {_angle(lives)} to either side: the tracks of neighbouring needles do not "
+            "overlap, and the life is that of the smaller volume that they stress"
+        )
+        if fretting := lives.fretting.get(point, 0):
+            joints = "they swing" if fretting == number else f"{fretting} of them swing"
+            words += f". As {joints} by less than half of this, fretting, which no rating covers, may end it earlier"
+        yield words
+
+
+def _selected(view: View) -> list[str]:
+    """Sentence on a selection of the operating points of a file; none if all count."""
+    some = len(view.points) < len(view.store.points)
+    return [f"as though all of the service were at {' and '.join(view.points)}"] if some else []
 
 
 def _notes(lives: Lives, contacts: Rows) -> Iterator[str]:
@@ -345,6 +314,7 @@ def _notes(lives: Lives, contacts: Rows) -> Iterator[str]:
         )
     else:
         yield f"{edge}; the study keeps no contact modes, which tell how many bearings have it"
+    yield from _small_swings(lives)
     if 0 < lives.unrated < lives.valid:
         yield f"{lives.unrated} of {lives.valid} joints have no rating: {_why_unrated(lives, 'each of them')}"
     if lives.load_error > 0.0:

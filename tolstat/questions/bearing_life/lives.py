@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.analysis import accuracy
 from tolstat.analysis.design import Design
-from tolstat.analysis.rating_life import basic_life, system_life, turns_per_revolution
-from tolstat.analysis.sample import Sample
+from tolstat.analysis.rating_life import FRETTING, basic_life, system_life, turns_per_revolution
+from tolstat.analysis.sample import Sample, total_interval
 from tolstat.common.errors import Fault, NotApplicable, StoreError
 from tolstat.common.load_kinds import PINS
 from tolstat.common.loads import FloatArray
-from tolstat.common.tables import LIFE_EXPONENT, VALID
+from tolstat.common.tables import LIFE_EXPONENT, VALID, Mode
+from tolstat.display.table import Rows
 from tolstat.joint import Bearing, operating
 from tolstat.joint.bearing import FOR_LIFE
 from tolstat.store import points
@@ -25,6 +28,15 @@ from tolstat.store.view import View
 JOINT = "joint"
 PLACES = (*PINS, JOINT)
 """Bearings, named by their pins, and the joint: it lasts until the first of its four bearings fails."""
+ANY = "any"
+"""At least one of the four bearings."""
+SHARES = (0.5, 0.9, 0.99)
+"""Shares of the joints that reach a life."""
+CONFIDENCE = 0.95
+MOSTLY = 0.5
+"""Share of a revolution above which a bearing counts as loaded in a mode."""
+LOADED = {"one_end": Mode.ONE_POINT, "opposite_ends": Mode.TWO_POINT, "along": Mode.UNIFORM}
+"""Contact mode of each way to load a bearing."""
 HOUR = 3600.0
 OPERATION = ("operation.alpha", "operation.speed", "operation.torque")
 
@@ -45,8 +57,11 @@ class Lives:
         Life of each bearing and of the joint, as in `PLACES`, h; NaN without a result or without a rating.
     nominal_loads, nominal_hours : ndarray, shape (4,) and (5,)
         The same of the nominal joint; NaN if there is none.
+    short, fretting : dict of str to int
+        Valid joints by operating point that swing by less than ``bearing.critical_amplitude`` there, and by less than
+        `rating_life.FRETTING` times this; only points that have any.
     unrated : int
-        Valid joints without a rating: their misalignment is below ``bearing.critical_amplitude``.
+        Valid joints without a rating: fretting is to be expected at each of their operating points.
     load_error : float
         Relative numerical error of an equivalent load that 95 % of the checked joints stay below; NaN if unknown.
     status : ndarray, shape (n,)
@@ -61,6 +76,8 @@ class Lives:
     hours: FloatArray
     nominal_loads: FloatArray
     nominal_hours: FloatArray
+    short: Mapping[str, int]
+    fretting: Mapping[str, int]
     unrated: int
     load_error: float
     status: NDArray[np.uint8]
@@ -102,7 +119,7 @@ def lives_of(view: View) -> Lives:
     Raises
     ------
     NotApplicable
-        When the joint has no such section.
+        When the joint has no such section, in the file or in the study that the view reads in its place.
     StoreError
         When the section lacks a key, the equivalent loads are not kept, or the joints are no sample.
     InputError
@@ -116,6 +133,11 @@ def lives_of(view: View) -> Lives:
     results = [part.read_results(("equivalent_load",)) for part in view.parts]
     loads, hours = _lives(duty, results, operation, bearing)
     nominal_loads, nominal_hours = np.full(len(PINS), np.nan), np.full(len(PLACES), np.nan)
+    swings, valid = _swings(operation), np.isin(view.status, VALID)
+    small = [_below(swings, bearing, part) & valid for part in (1.0, FRETTING)]
+    short, fretting = (
+        {name: int(own.sum()) for name, own in zip(view.points, which, strict=True) if own.any()} for which in small
+    )
     if len(view.nominal):
         ideal = [operating(part.store.operation, part.store.errors(slice(0, 1))) for part in view.parts]
         found = _lives(duty, [part.nominal for part in view.parts], ideal, bearing)
@@ -127,16 +149,23 @@ def lives_of(view: View) -> Lives:
         hours=hours,
         nominal_loads=nominal_loads,
         nominal_hours=nominal_hours,
-        unrated=int((np.isin(view.status, VALID) & _unrated(operation, bearing)).sum()),
+        short=short,
+        fretting=fretting,
+        unrated=int(small[1].all(axis=0).sum()),
         load_error=_load_error(view),
         status=view.status,
         design=view.design,
     )
 
 
+def bearing_of(view: View) -> Bearing | None:
+    """Section ``[bearing]`` of the joint of a file, or of the study that is read in place of the one in it."""
+    return (view.study.joint if view.study_path else joint_of(view.store, 0)).bearing
+
+
 def _bearing(view: View) -> Bearing:
     """Section ``[bearing]`` of the joint of a file, with all that a life needs."""
-    bearing, place = joint_of(view.store, 0).bearing, str(view.path)
+    bearing, place = bearing_of(view), str(view.path)
     again = "then repeat tolstat run: no joint is simulated again"
     if bearing is None:
         remedy = f"add the section [bearing] to the joint file or [joint.bearing] to the study, {again}"
@@ -150,10 +179,14 @@ def _bearing(view: View) -> Bearing:
     return bearing
 
 
-def _unrated(operation: Sequence[Mapping[str, FloatArray]], bearing: Bearing) -> NDArray[np.bool_]:
-    """Whether a joint swings too little for a rating, at one operating point at least, (m,)."""
-    least = np.min([np.abs(own["alpha"]) for own in operation], axis=0)
-    return np.asarray(least < bearing.critical_amplitude * (1.0 - 1e-9))
+def _swings(operation: Sequence[Mapping[str, FloatArray]]) -> FloatArray:
+    """Amplitude by which the pins of each joint swing at each operating point, (points, m), rad."""
+    return np.abs(np.stack([own["alpha"] for own in operation]))
+
+
+def _below(swings: FloatArray, bearing: Bearing, part: float) -> NDArray[np.bool_]:
+    """Which swings are below a part of the critical amplitude, (points, m)."""
+    return np.asarray(swings < part * bearing.critical_amplitude * (1.0 - 1e-9))
 
 
 def _lives(
@@ -178,9 +211,10 @@ def _lives(
         The bearings.
     """
     loads = np.stack([table["equivalent_load"] for table in results])
+    turns_of = partial(turns_per_revolution, critical=bearing.critical_amplitude)
     hourly = np.stack(
         [
-            share * np.abs(own["speed"]) / (2.0 * np.pi) * turns_per_revolution(own["alpha"]) * HOUR
+            share * np.abs(own["speed"]) / (2.0 * np.pi) * turns_of(own["alpha"]) * HOUR
             for share, own in zip(duty, operation, strict=True)
         ]
     )
@@ -192,7 +226,7 @@ def _lives(
         load = largest * (weights * relative**LIFE_EXPONENT).sum(axis=0) ** (1.0 / LIFE_EXPONENT)
         pins = bearing.factor * basic_life(load, bearing.C) / turns[:, None]
     hours = np.column_stack([pins, system_life(pins)])
-    hours[_unrated(operation, bearing)] = np.nan
+    hours[_below(_swings(operation), bearing, FRETTING).all(axis=0)] = np.nan
     return load, hours
 
 
@@ -210,3 +244,110 @@ def _load_error(view: View) -> float:
         for name, check in view.verification.checks.items()
     }
     return accuracy.spread(accuracy.estimate(changes).max(axis=1)).usual
+
+
+def life_rows(lives: Lives) -> Rows:
+    """Life that a share of the joints reaches.
+
+    Returns
+    -------
+    sequence of mapping
+        One row per place of `PLACES` and share: ``place``, ``share``; lives in h: ``nominal``, ``estimate``, ``lower``,
+        ``upper``, ``bound_lower``, ``bound_upper`` (joints without a life among the shortest, the longest); ``rating``
+        (N, load rating C with which the share reaches the required life) with ``_lower`` and ``_upper``; ``n``,
+        ``n_failed`` (those without a rating included), ``n_unsettled``, ``confidence``. Ends are 0 or infinite where
+        the joints are too few.
+    """
+    rows = []
+    for rate in map(lives.rate, PLACES):
+        for share in SHARES:
+            q = rate.quantile(share, CONFIDENCE)
+            row = {"place": rate.name, "share": share, "nominal": _life(rate.nominal), "estimate": _life(q.estimate)}
+            row |= {"lower": _life(q.upper), "upper": _life(q.lower)}
+            row |= {"bound_lower": _life(q.bound_upper), "bound_upper": _life(q.bound_lower)}
+            rates = {"rating": q.estimate, "rating_lower": q.lower, "rating_upper": q.upper}
+            row |= {name: _rating(value, lives) for name, value in rates.items()}
+            row |= {"n": q.n, "n_failed": q.n_failed, "n_unsettled": q.n_unsettled, "confidence": CONFIDENCE}
+            rows.append(row)
+    return rows
+
+
+def load_rows(lives: Lives) -> Rows:
+    """Dynamic equivalent load that a share of the joints stays at or below.
+
+    Returns
+    -------
+    sequence of mapping
+        One row per bearing and share: ``place``, ``share``, ``nominal_load`` and ``load``, N.
+    """
+    return [
+        {"place": pin, "share": share, "nominal_load": load.nominal, "load": load.quantile(share).estimate}
+        for pin, load in zip(PINS, map(lives.load, PINS), strict=True)
+        for share in SHARES
+    ]
+
+
+def below_rows(lives: Lives) -> Rows:
+    """Share of the joints whose life is below the required one.
+
+    Returns
+    -------
+    sequence of mapping
+        One row per place of `PLACES`: ``place``, ``required`` (h), the fields of `analysis.estimates.Exceedance` but
+        its level (``count`` are the joints below the required life; bounds have joints without a life above and
+        below), ``total_lower`` and ``total_upper`` (cover sampling, joints without a life and, if known, the numerical
+        error), ``confidence``. No rows without a required life.
+    """
+    rows = []
+    for place in PLACES if np.isfinite(lives.required) else ():
+        rate, level = lives.rate(place), 1.0 / lives.required
+        row = {"place": place, "required": lives.required} | asdict(rate.above(level, CONFIDENCE))
+        del row["level"]
+        low, high = total_interval(_with_error(rate, lives.load_error), level, CONFIDENCE)
+        rows.append(row | {"total_lower": low, "total_upper": high, "confidence": CONFIDENCE})
+    return rows
+
+
+def contact_rows(view: View) -> Rows:
+    """Share of the joints in which a bearing is mostly loaded at one end, at opposite ends, or along its length.
+
+    Of several operating points each counts by its share of the revolutions.
+
+    Returns
+    -------
+    sequence of mapping
+        One row per pin, and one for `ANY` of them: ``place``; ``one_end``, ``opposite_ends`` and ``along``, shares of
+        the joints in which this holds for more than `MOSTLY` of a revolution, with ``_lower`` and ``_upper``.
+        No rows if the study does not keep the contact modes.
+    """
+    if sum(column.field == "mode_share" for column in view.columns) < len(PINS) * len(Mode):
+        return []
+    modes = [part.read_results(("mode_share",))["mode_share"] for part in view.parts]
+    spent = np.tensordot(points.shares_of_revolutions(view), np.stack(modes), 1)
+    rows = []
+    for place in (*PINS, ANY):
+        own = spent[:, [PINS.index(place)]] if place in PINS else spent
+        row: dict[str, Any] = {"place": place}
+        for name, mode in LOADED.items():
+            found = Sample.of(own[:, :, mode].max(axis=1), view.status, view.design).above(MOSTLY, CONFIDENCE)
+            row |= {name: found.estimate, f"{name}_lower": found.lower, f"{name}_upper": found.upper}
+        rows.append(row)
+    return rows
+
+
+def _rating(rate: float, lives: Lives) -> float:
+    """Load rating, N, of bearings with which a life of so many 1/h becomes the required one."""
+    return float(lives.bearing.C * (max(rate, 0.0) * lives.required) ** (1.0 / LIFE_EXPONENT))
+
+
+def _life(rate: float) -> float:
+    """Reciprocal, h; a rate of zero or of no joint (-inf) is an infinite life."""
+    return np.inf if rate <= 0.0 else 1.0 / rate
+
+
+def _with_error(rate: Sample, error: float) -> tuple[Sample, ...]:
+    """Rates, and those with equivalent loads reduced and increased by their numerical error if it is known."""
+    if np.isnan(error):
+        return (rate,)
+    factors = (max(0.0, 1.0 - error) ** LIFE_EXPONENT, (1.0 + error) ** LIFE_EXPONENT)
+    return rate, *(rate.shifted((factor - 1.0) * rate.values) for factor in factors)

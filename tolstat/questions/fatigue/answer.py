@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
+from tolstat.analysis.binomial import needed
 from tolstat.analysis.prediction import DELIVERY
 from tolstat.analysis.strength import Line
 from tolstat.common.channels import CHANNELS
@@ -23,13 +24,14 @@ from tolstat.display.mpl import lines as mpl_lines
 from tolstat.display.mpl import ticker
 from tolstat.display.options import Delivery, Loads, Opt
 from tolstat.display.table import Column, Row, Rows
+from tolstat.display.verdict import Verdict, on_share
 from tolstat.questions.fatigue import loads, parts
 from tolstat.questions.fatigue.counting import channels
+from tolstat.questions.fatigue.duty import Joints, members, section, settings_of
 from tolstat.questions.fatigue.loads import SHARES, Loading, load_cycles
 from tolstat.questions.fatigue.stress import Stressed, load_stresses
 from tolstat.store.revolutions import held
 from tolstat.store.view import View
-from tolstat.study.fatigue import of_text
 from tolstat.study.stress_point import StressPoint
 
 if TYPE_CHECKING:
@@ -159,7 +161,7 @@ def fatigue(
     StoreError
         When a file holds no histories and its study no points, or its joints are no sample of a production.
     """
-    has_points = bool(of_text(views[0].store.study_text, str(views[0].path)).points)
+    has_points = bool(section(views[0]).points)
     has_cycles = all(part.store.history_specs for view in views for part in view.parts)
     found: list[Part] = []
     duty: Sequence[tuple[str, float]] = ()
@@ -181,7 +183,7 @@ def fatigue_on_page(view: View, asked: Asked) -> Answer:
     if view.method != "sweep" and view.count(Status.OK):
         with asked.noting("load cycles are left out"):
             joints = JOINTS if held(view.store) else min(asked.replay, JOINTS)
-            if of_text(view.store.study_text, str(view.path)).points and joints:
+            if section(view).points and joints:
                 found += _of_parts(load_stresses([view], samples=joints), DELIVERY)
             if view.store.history_specs:
                 loading = load_cycles([view], samples=JOINTS)
@@ -192,6 +194,66 @@ def fatigue_on_page(view: View, asked: Asked) -> Answer:
     if not found:
         raise NotApplicable
     return Answer("fatigue", "Fatigue", found)
+
+
+def life_verdicts(view: View, accepted: float = math.nan, samples: int = JOINTS) -> list[Verdict]:
+    """Verdict on failures of the parts in the service life, and on damage sums of loads; none if no life is required.
+
+    Parameters
+    ----------
+    view : View
+        A campaign, whose operating points are the duty cycle.
+    accepted : float
+        Accepted share: share of the joints that may fail; NaN if none is given.
+    samples : int
+        Number of joints evaluated, the first ones, where they have to be simulated again: of a file without histories.
+
+    Raises
+    ------
+    InputError
+        When the shares of the operating points are not known.
+    StoreError
+        When a file holds joints that are no sample of a production.
+    """
+    own, store = section(view), view.store
+    has_points, has_lines = bool(own.points), bool(own.lines and store.history_specs)
+    if not (has_points or has_lines) or not settings_of(*members([view], None)).required:
+        return []
+    found = []
+    if has_points and (held(store) or samples):
+        stressed = load_stresses([view], samples=JOINTS if held(store) else min(samples, JOINTS))
+        row, what = parts.service_failures(stressed)._asdict(), "have a failed part within"
+        found.append(_verdict("failures of parts", what, row, stressed, accepted))
+    if has_lines:
+        loading = load_cycles([view], names=tuple(own.lines), samples=JOINTS)
+        what = "have a damage sum above 1 within"
+        found.append(_verdict("damage by loads", what, loads.damages(loading)[-1], loading, accepted))
+    return found
+
+
+def _verdict(about: str, what: str, row: Row, joints: Joints, accepted: float) -> Verdict:
+    """Verdict from the share in a row: `analysis.strength.Failures`, or `analysis.estimates.Exceedance`."""
+    share, without = row["estimate"], row["n_failed"] + row["n_unsettled"]
+    lost = without / max(row["n"], 1)
+    low, high = share * (1.0 - lost), share * (1.0 - lost) + lost
+
+    def deciding() -> float:
+        if low <= accepted <= high:
+            return math.inf
+        end = high if high < accepted else low
+        if "count" in row:
+            return needed(end, accepted)
+        # an interval of a mean narrows with the root of the number of joints, and faster where the share is small
+        distance = row["upper"] - share if share < accepted else share - row["lower"]
+        return float(np.ceil(row["n"] * (distance / (accepted - end)) ** 2))
+
+    reason = joints.design.without_interval("mean")
+    if math.isnan(share) or (without and lost >= 0.5 * (row["upper"] - row["lower"])):
+        share, reason = math.nan, f"{without} of {row['n']} joints have no load that repeats"
+    ends = row["outer_lower"], row["outer_upper"]
+    found = on_share(about, f"{what} {joints.settings.service_life}", share, ends, accepted, deciding, reason)
+    first = f"{about}: of the first {row['n']} of {joints.total} joints"
+    return found._replace(notes=(first,) if joints.total > joints.status.size else ())
 
 
 def _of_parts(stressed: Stressed, delivery: int) -> list[Part]:
@@ -232,7 +294,7 @@ def _notes_on_parts(stressed: Stressed, rows: Rows) -> Iterator[str]:
     settings, n = stressed.settings, stressed.status.size
     starts = f" with {settings.starts:g} starts" if settings.starts else ""
     first = f" (the first {n} of {stressed.total})" if stressed.total > n else ""
-    yield f"{stressed.settled}{first}; service life {settings.revolutions:g} revolutions{starts}"
+    yield f"{stressed.settled}{first}; service life {settings.service_life}{starts}"
     yield from _duty(stressed.duty)
     life = "B10 life: revolutions after which 10 % have failed; damage: at the median strength"
     yield f"{life}; intervals count joints without a valid load as failing and as surviving"
@@ -249,7 +311,7 @@ def _notes_on_loads(loading: Loading, rows: Rows) -> Iterator[str]:
     """Number of joints, definition of the loads, restrictions."""
     settings = loading.settings
     cycles = f"loads are ranges: {settings.reference_cycles:g} cycles of them do the damage of "
-    yield f"{loading.settled}; {cycles}{settings.revolutions:g} revolutions"
+    yield f"{loading.settled}; {cycles}{settings.service_life}"
     yield from _duty(loading.duty)
     if not loading.design.has_interval("quantile"):
         yield "no intervals: order statistics hold for independent samples only"

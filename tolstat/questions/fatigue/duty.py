@@ -12,8 +12,11 @@ from tolstat.analysis.design import Design
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.tables import ERROR_FIELDS, Status, worst_status
 from tolstat.store import points
+from tolstat.store.recorded import joint_of
 from tolstat.store.view import View
 from tolstat.study.fatigue import Fatigue, of_text
+
+HOUR = 3600.0
 
 
 @dataclass(frozen=True)
@@ -27,7 +30,7 @@ class Joints:
     design : Design
         How the joints were drawn.
     settings : Fatigue
-        Section ``[fatigue]`` of the study; of the first study if there are several.
+        Section ``[fatigue]`` of the study; of the first study if there are several. See `settings_of`.
     total : int
         Number of samples of the campaign, those not evaluated included.
     duty : tuple of (str, float)
@@ -90,11 +93,28 @@ def joints_of(views: Sequence[View], shares: Sequence[float], samples: int | Non
     return Joints(
         status=worst_status([view.status[:samples] for view in views]),
         design=first.design if samples is None else first.design.only(np.arange(min(samples, first.n))),
-        # the section alone, like limits: it is at hand even where the study refers to files that are not
-        settings=of_text(first.store.study_text, str(first.path)),
+        settings=settings_of(views, shares),
         total=first.n,
         duty=tuple((view.points[0] or view.path.name, share) for view, share in zip(views, shares, strict=True)),
     )
+
+
+def settings_of(views: Sequence[View], shares: Sequence[float]) -> Fatigue:
+    """Section ``[fatigue]`` of the first of the `members`, with the service life in revolutions over the duty cycle."""
+    first = views[0]
+    bearing = (first.study.joint if first.study_path else joint_of(first.store, 0)).bearing
+    hours = np.nan if bearing is None or bearing.required_life is None else bearing.required_life / HOUR
+    turn = sum(share * 2.0 * np.pi / abs(view.store.operation.speed) for view, share in zip(views, shares, strict=True))
+    return section(first).within(hours, HOUR / turn, str(first.path))
+
+
+def section(view: View) -> Fatigue:
+    """Section ``[fatigue]`` of the study in a file, or of the one that is read in its place.
+
+    Of the text in the file the section alone is read, like limits: it is at hand even where the study refers to files
+    that are not.
+    """
+    return view.study.fatigue if view.study_path else of_text(view.store.study_text, str(view.path))
 
 
 def _of_points(views: Sequence[View], shares: Sequence[float] | None) -> tuple[list[View], list[float]]:

@@ -109,6 +109,11 @@ def part_failures(stressed: Stressed, delivery: int = DELIVERY) -> Rows:
     return rows
 
 
+def service_failures(stressed: Stressed) -> Failures:
+    """Share of the joints with a failed part at any point in the service life."""
+    return course_of(stressed, evaluated(stressed.own, stressed.settings)).failures()
+
+
 def failures_over_life(stressed: Stressed, revolutions: Sequence[float]) -> list[Failures]:
     """Share of the joints with a failed part at any point after numbers of revolutions."""
     course = course_of(stressed, evaluated(stressed.own, stressed.settings))
@@ -118,24 +123,34 @@ def failures_over_life(stressed: Stressed, revolutions: Sequence[float]) -> list
 def evaluated(stresses: Stresses, settings: Fatigue) -> list[Evaluated]:
     """Cycles in the service life at each point, each at the stress ratio of the point's S–N line.
 
+    Of several places around a section each joint has those of the one at which it fails first.
+    """
+    found, first = [], 0
+    for point in settings.points:
+        last = first + len(point.per_load)
+        places = [_in_service(stresses, place, point.line, settings) for place in range(first, last)]
+        found.append(Evaluated(strength.weakest(places, point.line), point.line))
+        first = last
+    return found
+
+
+def _in_service(stresses: Stresses, place: int, line: Line, settings: Fatigue) -> Collective:
+    """Cycles of the joints at one place in the service life.
+
     A start goes from the unstressed joint to the extremes of the revolution and back; its cycle, between the extremes
     and zero, takes the place of the largest cycle of one revolution.
     """
-    found = []
-    for p, point in enumerate(settings.points):
-        line, cycles = point.line, stresses.cycles
-        ranges, means = cycles.ranges[:, p], cycles.means[:, p]
-        numbers = np.broadcast_to(cycles.repeats * settings.revolutions, ranges.shape).copy()
-        if settings.starts:
-            joints = np.arange(len(ranges))
-            numbers[joints, np.argmax(np.nan_to_num(ranges), axis=1)] -= settings.starts
-            numbers = np.maximum(numbers, 0.0)
-            low, high = np.minimum(stresses.low[:, p], 0.0), np.maximum(stresses.high[:, p], 0.0)
-            ranges, means = np.column_stack([ranges, high - low]), np.column_stack([means, 0.5 * (high + low)])
-            numbers = np.column_stack([numbers, np.full(len(ranges), settings.starts)])
-        at_line = strength.at_ratio(ranges, means, line.M, line.R)
-        found.append(Evaluated(strength.sort_out(at_line, numbers, line), line))
-    return found
+    cycles = stresses.cycles
+    ranges, means = cycles.ranges[:, place], cycles.means[:, place]
+    numbers = np.broadcast_to(cycles.repeats * settings.revolutions, ranges.shape).copy()
+    if settings.starts:
+        joints = np.arange(len(ranges))
+        numbers[joints, np.argmax(np.nan_to_num(ranges), axis=1)] -= settings.starts
+        numbers = np.maximum(numbers, 0.0)
+        low, high = np.minimum(stresses.low[:, place], 0.0), np.maximum(stresses.high[:, place], 0.0)
+        ranges, means = np.column_stack([ranges, high - low]), np.column_stack([means, 0.5 * (high + low)])
+        numbers = np.column_stack([numbers, np.full(len(ranges), settings.starts)])
+    return strength.sort_out(strength.at_ratio(ranges, means, line.M, line.R), numbers, line)
 
 
 def course_of(stressed: Stressed, points: Sequence[Evaluated]) -> Course:

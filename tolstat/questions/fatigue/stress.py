@@ -25,12 +25,12 @@ if TYPE_CHECKING:
 
 
 class Stresses(NamedTuple):
-    """Stresses of joints at p points over a revolution, or over a mixture of revolutions.
+    """Stresses of joints at the p places of all points over a revolution, or over a mixture of revolutions.
 
     Attributes
     ----------
     cycles : Cycles
-        Rainflow cycles, Pa; its channels are the names of the points. NaN for a joint that has not settled.
+        Rainflow cycles, Pa; its channels are the name of the point of each place. NaN for a joint that has not settled.
     low, high : ndarray, shape (n, p)
         Smallest and largest stress, Pa, at all operating points together.
     """
@@ -117,27 +117,28 @@ def stresses_of(store: Reader, slots: NDArray[np.intp], points: Sequence[StressP
     points : sequence of StressPoint
         Points of the parts.
     """
-    low, high = np.zeros((2, len(slots), len(points)))
+    places = [(point, np.array(factors)) for point in points for factors in point.per_load]
+    low, high = np.zeros((2, len(slots), len(places)))
     counted: list[tuple[FloatArray, FloatArray]] = []
     apart = 0.0
     for part, found, difference in revolutions.of_components(store, slots, [BUSHING_LOADS]):
         apart, loads = max(apart, difference), found[BUSHING_LOADS.name]
-        signals, noise = zip(*(_signal(loads, point) for point in points), strict=True)
+        signals, noise = zip(*(_signal(loads, *place) for place in places), strict=True)
         low[part], high[part] = (np.stack([end(s, axis=1) for s in signals], axis=1) for end in (np.min, np.max))
         for joint in range(len(loads)):
             counted += [rainflow.periodic(s[joint], gate[joint]) for s, gate in zip(signals, noise, strict=True)]
     number = np.array([len(ranges) for ranges, _ in counted], float).reshape(low.shape)
     table = np.zeros((len(counted), max(1, int(number.max(initial=0.0))), 2))
-    for place, (ranges, means) in enumerate(counted):
-        table[place, : len(ranges), 0], table[place, : len(ranges), 1] = ranges, means
+    for i, (ranges, means) in enumerate(counted):
+        table[i, : len(ranges), 0], table[i, : len(ranges), 1] = ranges, means
     table = table.reshape(*low.shape, *table.shape[1:])
-    names = tuple(point.name for point in points)
+    names = tuple(point.name for point, _ in places)
     return Stresses(Cycles.of_revolution(names, table[..., 0], table[..., 1], number), low, high), apart
 
 
-def _signal(loads: NDArray[np.floating], point: StressPoint) -> tuple[FloatArray, FloatArray]:
+def _signal(loads: NDArray[np.floating], point: StressPoint, factors: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Stress over the revolution, (m, samples), and the range up to which cycles may be numerical noise, (m,), Pa."""
-    own, factors = loads[:, :, BUSHING_LOADS.places.index(point.bushing)].astype(float), np.array(point.per_load)
+    own = loads[:, :, BUSHING_LOADS.places.index(point.bushing)].astype(float)
     return own @ factors, rainflow.GATE * np.max(np.abs(own) @ np.abs(factors), axis=1)
 
 

@@ -23,7 +23,7 @@ from tolstat.display.blocks import Panels, Table, Text
 from tolstat.questions.fatigue import loads as fatigue
 from tolstat.questions.fatigue import pylife
 from tolstat.questions.fatigue.answer import fatigue_on_page, life_verdicts
-from tolstat.questions.fatigue.counting import channels, cycles_of
+from tolstat.questions.fatigue.loads import channels, cycles_of
 from tolstat.questions.fatigue.pylife import pylife_series
 from tolstat.solver import rainflow
 from tolstat.store import ResultFile

@@ -24,10 +24,10 @@ from tolstat.common.tables import Status
 from tolstat.display import text
 from tolstat.display.asked import Asked
 from tolstat.display.blocks import Panels, Table
-from tolstat.questions.fatigue import parts, stress
+from tolstat.questions.fatigue import parts
 from tolstat.questions.fatigue.answer import _notes_on_parts, _verdict, fatigue_on_page, life_verdicts
-from tolstat.questions.fatigue.duty import Joints, members, settings_of
-from tolstat.questions.fatigue.stress import Stressed, Stresses, load_stresses
+from tolstat.questions.fatigue.duty import ANY, Joints, members, settings_of
+from tolstat.questions.fatigue.parts import Stressed, Stresses, load_stresses
 from tolstat.solver import rainflow
 from tolstat.store import ResultFile
 from tolstat.study.fatigue import Fatigue, of_text
@@ -198,13 +198,13 @@ def test_failures_and_lives_of_one_cycle_in_closed_form():
     factor = size / line.S_D  # N_D cycles: the critical strength is the range itself
     chances = strength.probability(factor, line.T_S)
     np.testing.assert_allclose(table["estimate"][["a", "b"]], chances.mean(axis=0))
-    assert table["estimate"][parts.ANY] == pytest.approx((1 - (1 - chances).prod(axis=1)).mean())
+    assert table["estimate"][ANY] == pytest.approx((1 - (1 - chances).prod(axis=1)).mean())
     assert table["median"]["a"] == pytest.approx(
         np.sort(factor[:, 0])[199] ** (9 if np.sort(factor[:, 0])[199] < 1 else 5)
     )
     assert np.isnan(table["nominal"]["a"])
-    assert np.isnan(table["median"][parts.ANY])
-    for name, group in (("a", [0]), ("b", [1]), (parts.ANY, [0, 1])):
+    assert np.isnan(table["median"][ANY])
+    for name, group in (("a", [0]), ("b", [1]), (ANY, [0, 1])):
         lives = table["life"][name] / 1e6
         slope = np.where(factor * lives ** (1 / 9) < 1, 9, 5)  # the part that fails just now, by the slope of its cycle
         critical = np.where(lives > 1, factor * lives ** (1 / 9), factor * lives ** (1 / 5))
@@ -252,10 +252,10 @@ def bent(monkeypatch, moments, force=0.0, number=0):
     """Damage in a revolution of a point of `ROUND`, at moments about t and z over it, N m, and a force along e, N."""
     loads = np.zeros((1, len(moments[0]), len(BUSHINGS), 6))
     loads[0, :, 0, 0], loads[0, :, 0, 4], loads[0, :, 0, 5] = force, *moments
-    monkeypatch.setattr(stress.revolutions, "of_components", lambda *_: [(slice(0, 1), {"loads": loads}, 0.0)])
+    monkeypatch.setattr(parts.revolutions, "of_components", lambda *_: [(slice(0, 1), {"loads": loads}, 0.0)])
     settings = of_text(ROUND, "a.toml")
     settings = replace(settings, points=settings.points[number : number + 1], revolutions=1.0)
-    found, _ = stress.stresses_of(None, np.arange(1), settings.points)
+    found, _ = parts.stresses_of(None, np.arange(1), settings.points)
     return strength.damage_at(*parts.evaluated(found, settings)[0])[0]
 
 
@@ -286,8 +286,8 @@ def test_a_pin_that_is_pulled_fails_on_the_side_that_bending_pulls_too(monkeypat
 
 def judged(accepted, **kwargs):
     stressed, *_ = synthetic(**kwargs)
-    row = parts.service_failures(stressed)._asdict()
-    return _verdict("failures of parts", "have a failed part within", row, stressed, accepted), row
+    row = parts.failures_over_life(stressed, [1e6])[0]._asdict()
+    return _verdict("failures of parts", "have a failed part", row, stressed, accepted), row
 
 
 def test_verdicts_on_failures_in_the_service_life():
@@ -329,7 +329,7 @@ def test_no_verdict_where_joints_without_a_load_decide():
 def test_a_verdict_is_on_points_whose_service_life_is_given(campaign):
     with ResultFile.open(campaign("none")) as store:
         (found,) = life_verdicts(store.view(), 0.99, samples=8)
-        row = parts.service_failures(load_stresses([store.view()], samples=8))
+        row = parts.failures_over_life(load_stresses([store.view()], samples=8), [1e9])[0]
         assert (found.lower, found.upper) == (row.outer_lower, row.outer_upper)
         assert found.sentence.startswith(
             "Kept: at most 99 % of the joints have a failed part within 1e+09 revolutions ("
@@ -403,7 +403,7 @@ def test_the_command_prints_a_row_a_point(campaign):
     done = call("fatigue", campaign("none"))
     assert done.exit_code == 0, done.stderr
     lines = done.stdout.splitlines()
-    assert [line.split("  ")[0] for line in lines] == ["point", *NAMES, parts.ANY]
+    assert [line.split("  ")[0] for line in lines] == ["point", *NAMES, ANY]
     assert max(map(len, lines)) <= 80
     assert "with 10000 starts" in done.stderr
     assert "amage-equivalent" not in done.stdout
@@ -441,7 +441,7 @@ def test_the_page_shows_parts_before_loads(campaign, tmp_path):
     panels, table, *notes = found.blocks()
     assert isinstance(panels, Panels)
     assert isinstance(table, Table)
-    assert [row[0] for row in table.rows] == [*NAMES, parts.ANY]
+    assert [row[0] for row in table.rows] == [*NAMES, ANY]
     assert notes[0].text.startswith(f"{stresses([campaign('none')]).valid.sum()} of 12 joints settled")
     ax = Figure().add_subplot()
     panels.panels[0].draw(ax)

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from tolstat.display import text
+from tolstat.display.table import Row
 
 WORDS = {"yes": "Kept", "no": "Not kept", "open": "Open", "none": "No verdict"}
 """Answers in words."""
@@ -50,7 +51,8 @@ class Verdict(NamedTuple):
 
     def values(self) -> dict[str, Any]:
         """JSON values: the answer in words, null without one, the sentence, and the other attributes."""
-        numbers = {name: _known(getattr(self, name)) for name in ("share", "lower", "upper")}
+        known = {"share": self.share, "lower": self.lower, "upper": self.upper}
+        numbers = {name: None if math.isnan(value) else float(value) for name, value in known.items()}
         answer = WORDS[self.answer].lower() if self.answer else None
         return (
             {"about": self.about, "answer": answer, "sentence": self.sentence} | numbers | {"notes": list(self.notes)}
@@ -60,11 +62,12 @@ class Verdict(NamedTuple):
 def on_share(
     about: str,
     what: str,
-    share: float,
+    row: Row,
     ends: tuple[float, float],
     accepted: float,
-    deciding: Callable[[], float],
+    needed: Callable[[float], float],
     reason: str = "",
+    undecided: str = "",
 ) -> Verdict:
     """Verdict on whether at most an accepted share of the joints does not last.
 
@@ -72,17 +75,21 @@ def on_share(
     ----------
     about, what : str
         What it is on, and what joints do that do not last: ``have a bearing life below 8000 h``.
-    share : float
-        Share of these joints; NaN where joints without a result make it so uncertain that the interval stands alone.
+    row : mapping
+        Their share ``estimate``, the numbers ``n``, ``n_failed`` and ``n_unsettled`` of joints and, unless they follow
+        from these, its bounds ``bound_lower`` and ``bound_upper``.
     ends : tuple of float
-        Ends of its interval; NaN if it has none.
+        Ends of the interval of the share; NaN if it has none.
     accepted : float
         Accepted share; NaN if none is given.
-    deciding : callable
-        Gives the number of joints that would decide an open verdict if the share stayed the same; infinite if none.
+    needed : callable
+        Gives the number of joints whose interval excludes the accepted share if theirs stayed at the share given.
     reason : str
-        Why there is no verdict unless the whole interval is on one side of the accepted share; empty if there is one.
+        Why the share has no interval; empty if it has one.
+    undecided : str
+        Which joints without a result make the share so uncertain that its interval stands alone; empty if none do.
     """
+    share = math.nan if undecided else row["estimate"]
     interval, most, judges = text.span(*ends), text.percent(accepted), not math.isnan(accepted)
     numbers = [text.percent(share)] * (not math.isnan(share)) + [interval] * (not math.isnan(ends[0]))
     rest = f"of the joints {what}{''.join(f' ({other})' for other in numbers[1:])}"
@@ -91,16 +98,15 @@ def on_share(
         answer, words = "yes", f"at most {most} of the joints {what} ({', '.join(numbers)})"
     elif judges and ends[0] > accepted:
         answer, words = "no", f"{told}; {most} is accepted"
-    elif reason and (judges or math.isnan(share)):
-        answer, words = "none", reason
+    elif (undecided or reason) and (judges or math.isnan(share)):
+        answer, words = "none", undecided or reason
     elif judges:
-        joints = deciding()
+        lost = (row["n_failed"] + row["n_unsettled"]) / row["n"]
+        low = row.get("bound_lower", share * (1.0 - lost))
+        high = row.get("bound_upper", share * (1.0 - lost) + lost)
+        joints = math.inf if low <= accepted <= high else needed(high if high < accepted else low)
         number = "more joints do not" if math.isinf(joints) else f"{text.number(joints)} joints would"
         answer, words = "open", f"{told}; {most} is accepted; {number} decide it"
     else:
         answer, words = "", rest
     return Verdict(about, answer, words, share, *ends)
-
-
-def _known(value: float) -> float | None:
-    return None if math.isnan(value) else float(value)

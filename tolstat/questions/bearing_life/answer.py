@@ -18,7 +18,7 @@ from tolstat.display.answer import Answer, Part, Sentence, Table
 from tolstat.display.asked import Asked
 from tolstat.display.blocks import Panel, Panels
 from tolstat.display.mpl import ticker
-from tolstat.display.table import Column, Row, Rows, has, has_unresolved
+from tolstat.display.table import Column, Row, Rows, by_share, has, has_unresolved, of_shares
 from tolstat.display.verdict import Verdict, on_share
 from tolstat.questions.bearing_life.lives import (
     ANY,
@@ -62,29 +62,20 @@ def _undecided(row: Row) -> bool:
     return bool(without == row["n"] or unresolved_matter(row["count"], row["n"], without))
 
 
-def _life_of(share: float) -> Column:
-    head, rank = f"{100.0 * share:g} % reach", 0 if share == SHARES[-1] else 1
-    return Column(head, lambda row: _hours(row[share]["estimate"]), rank=rank)
-
-
-def _load_of(share: float) -> Column:
-    return Column(f"{100.0 * share:g} % up to", lambda row: text.value(row[share]["load"], "N"))
-
-
 BEARING = Column("bearing", lambda row: PLACE_NAMES.get(row["place"], str(row["place"])))
 LIVES = (
     BEARING,
     Column("nominal", lambda row: _hours(row[SHARES[-1]]["nominal"]), rank=2),
-    *map(_life_of, SHARES),
+    *of_shares(SHARES, "reach", lambda row: _hours(row["estimate"]), rank=1),
     Column(f"95 % interval of {100.0 * SHARES[-1]:g} %", lambda row: _span(row[SHARES[-1]])),
 )
-"""Columns of the table ``lives``, arranged by `_by_place`."""
+"""Columns of the table ``lives``, arranged by place."""
 LOADS = (
     BEARING,
     Column("nominal", lambda row: text.value(row[SHARES[-1]]["nominal_load"], "N")),
-    *map(_load_of, SHARES),
+    *of_shares(SHARES, "up to", lambda row: text.value(row["load"], "N")),
 )
-"""Columns of the table ``loads``, arranged by `_by_place`."""
+"""Columns of the table ``loads``, arranged by place."""
 BELOW = (
     BEARING,
     Column("below", lambda row: f"{row['count']} of {row['n'] - row['n_failed'] - row['n_unsettled']}"),
@@ -150,11 +141,13 @@ def bearing_life(view: View) -> Answer:
         parts.append(Panels([Panel("lives", "Life of the joints", said, partial(_draw, lives=lives), (6.4, 3.5))]))
     if lives.unrated < lives.valid:
         title = f"Life {lives.bearing.symbol} that a share of the joints reaches"
-        parts.append(Table("lives", title, LIVES, found, LIFE_UNITS, _by_place(found)))
+        parts.append(Table("lives", title, LIVES, found, LIFE_UNITS, by_share(found, "place")))
         title = f"Joints that do not reach the required {_hours(lives.required)}"
         parts += [Table("below_required", title, BELOW, below, {"required": "h"})] if below else []
     loads, title = load_rows(lives), "Dynamic equivalent load P of a bearing, which a share of the joints stays below"
-    parts.append(Table("loads", title, LOADS, loads, dict.fromkeys(("nominal_load", "load"), "N"), _by_place(loads)))
+    parts.append(
+        Table("loads", title, LOADS, loads, dict.fromkeys(("nominal_load", "load"), "N"), by_share(loads, "place"))
+    )
     if contacts:
         title = "Joints in which a bearing is loaded so for more than half of a revolution"
         parts.append(Table("contacts", title, CONTACTS, contacts, dict.fromkeys(list(contacts[0])[1:], "1")))
@@ -174,14 +167,6 @@ def bearing_life_on_page(view: View, asked: Asked) -> Answer:
     if not (view.sampled and view.count(*VALID)):
         raise NotApplicable
     return bearing_life(view)
-
-
-def _by_place(rows: Rows) -> Rows:
-    """One row per place: for each share its row."""
-    found: dict[str, dict[Any, Any]] = {}
-    for row in rows:
-        found.setdefault(row["place"], {"place": row["place"]})[row["share"]] = row
-    return list(found.values())
 
 
 def _verdict(lives: Lives, below: Rows, found: Rows) -> list[str]:
@@ -227,21 +212,14 @@ def life_verdicts(view: View, accepted: float = math.nan) -> list[Verdict]:
     if bearing is None or bearing.required_life is None:
         return []
     lives = lives_of(view)
-    row = below_rows(lives)[-1]
-    share, reason = row["estimate"], ""
+    row, undecided = below_rows(lives)[-1], ""
     if lives.valid and lives.unrated == lives.valid:
-        share, reason = math.nan, f"no bearing has a rating: {_why_unrated(lives, 'every joint')}"
+        undecided = f"no bearing has a rating: {_why_unrated(lives, 'every joint')}"
     elif _undecided(row):
-        share, reason = math.nan, f"{_without(row)}; shorter than required are {_bounds(row)}"
-    elif not lives.design.has_interval("share"):
-        reason = lives.design.without_interval("share")
-
-    def deciding() -> float:
-        low, high = row["bound_lower"], row["bound_upper"]
-        return math.inf if low <= accepted <= high else needed(high if high < accepted else low, accepted)
-
+        undecided = f"{_without(row)}; shorter than required are {_bounds(row)}"
     what, ends = f"have a bearing life below {_hours(lives.required)}", (row["total_lower"], row["total_upper"])
-    found = on_share("bearing life", what, share, ends, accepted, deciding, reason)
+    reason = lives.design.without_interval("share")
+    found = on_share("bearing life", what, row, ends, accepted, lambda end: needed(end, accepted), reason, undecided)
     return [found._replace(notes=(*_small_swings(lives), *_selected(view)))]
 
 

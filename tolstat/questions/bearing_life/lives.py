@@ -258,15 +258,21 @@ def life_rows(lives: Lives) -> Rows:
         ``n_failed`` (those without a rating included), ``n_unsettled``, ``confidence``. Ends are 0 or infinite where
         the joints are too few.
     """
+
+    def life(rate: float) -> float:
+        return np.inf if rate <= 0.0 else 1.0 / rate  # no joint: -inf
+
+    def rating(rate: float) -> float:
+        return float(lives.bearing.C * (max(rate, 0.0) * lives.required) ** (1.0 / LIFE_EXPONENT))
+
     rows = []
     for rate in map(lives.rate, PLACES):
         for share in SHARES:
             q = rate.quantile(share, CONFIDENCE)
-            row = {"place": rate.name, "share": share, "nominal": _life(rate.nominal), "estimate": _life(q.estimate)}
-            row |= {"lower": _life(q.upper), "upper": _life(q.lower)}
-            row |= {"bound_lower": _life(q.bound_upper), "bound_upper": _life(q.bound_lower)}
-            rates = {"rating": q.estimate, "rating_lower": q.lower, "rating_upper": q.upper}
-            row |= {name: _rating(value, lives) for name, value in rates.items()}
+            row = {"place": rate.name, "share": share, "nominal": life(rate.nominal), "estimate": life(q.estimate)}
+            row |= {"lower": life(q.upper), "upper": life(q.lower)}
+            row |= {"bound_lower": life(q.bound_upper), "bound_upper": life(q.bound_lower)}
+            row |= {"rating": rating(q.estimate), "rating_lower": rating(q.lower), "rating_upper": rating(q.upper)}
             row |= {"n": q.n, "n_failed": q.n_failed, "n_unsettled": q.n_unsettled, "confidence": CONFIDENCE}
             rows.append(row)
     return rows
@@ -298,12 +304,14 @@ def below_rows(lives: Lives) -> Rows:
         below), ``total_lower`` and ``total_upper`` (cover sampling, joints without a life and, if known, the numerical
         error), ``confidence``. No rows without a required life.
     """
+    known = () if np.isnan(lives.load_error) else (max(0.0, 1.0 - lives.load_error), 1.0 + lives.load_error)
     rows = []
     for place in PLACES if np.isfinite(lives.required) else ():
         rate, level = lives.rate(place), 1.0 / lives.required
         row = {"place": place, "required": lives.required} | asdict(rate.above(level, CONFIDENCE))
         del row["level"]
-        low, high = total_interval(_with_error(rate, lives.load_error), level, CONFIDENCE)
+        off = [rate.shifted((factor**LIFE_EXPONENT - 1.0) * rate.values) for factor in known]
+        low, high = total_interval([rate, *off], level, CONFIDENCE)
         rows.append(row | {"total_lower": low, "total_upper": high, "confidence": CONFIDENCE})
     return rows
 
@@ -333,21 +341,3 @@ def contact_rows(view: View) -> Rows:
             row |= {name: found.estimate, f"{name}_lower": found.lower, f"{name}_upper": found.upper}
         rows.append(row)
     return rows
-
-
-def _rating(rate: float, lives: Lives) -> float:
-    """Load rating, N, of bearings with which a life of so many 1/h becomes the required one."""
-    return float(lives.bearing.C * (max(rate, 0.0) * lives.required) ** (1.0 / LIFE_EXPONENT))
-
-
-def _life(rate: float) -> float:
-    """Reciprocal, h; a rate of zero or of no joint (-inf) is an infinite life."""
-    return np.inf if rate <= 0.0 else 1.0 / rate
-
-
-def _with_error(rate: Sample, error: float) -> tuple[Sample, ...]:
-    """Rates, and those with equivalent loads reduced and increased by their numerical error if it is known."""
-    if np.isnan(error):
-        return (rate,)
-    factors = (max(0.0, 1.0 - error) ** LIFE_EXPONENT, (1.0 + error) ** LIFE_EXPONENT)
-    return rate, *(rate.shifted((factor - 1.0) * rate.values) for factor in factors)

@@ -23,13 +23,12 @@ from tolstat.display.blocks import Panel, Panels
 from tolstat.display.mpl import lines as mpl_lines
 from tolstat.display.mpl import ticker
 from tolstat.display.options import Delivery, Loads, Opt
-from tolstat.display.table import Column, Row, Rows
+from tolstat.display.table import Column, Row, Rows, by_share, of_shares
 from tolstat.display.verdict import Verdict, on_share
 from tolstat.questions.fatigue import loads, parts
-from tolstat.questions.fatigue.counting import channels
-from tolstat.questions.fatigue.duty import Joints, members, section, settings_of
-from tolstat.questions.fatigue.loads import SHARES, Loading, load_cycles
-from tolstat.questions.fatigue.stress import Stressed, load_stresses
+from tolstat.questions.fatigue.duty import ANY, Joints, members, section, settings_of
+from tolstat.questions.fatigue.loads import SHARES, Loading, channels, load_cycles
+from tolstat.questions.fatigue.parts import Stressed, load_stresses
 from tolstat.store.revolutions import held
 from tolstat.store.view import View
 from tolstat.study.stress_point import StressPoint
@@ -63,21 +62,13 @@ def _life_span(row: Row) -> str:
     return "-" if math.isnan(low) else f"{_life(low)} .. {_life(high)}"
 
 
-def _quantile(share: float) -> Column:
-    head, rank = f"{100 * share:g} % below", 0 if share == SHARES[-1] else 1
-    return Column(head, lambda row: text.value(row[share]["estimate"], row["unit"]), rank=rank)
-
-
-def _interval(row: Row) -> str:
-    return text.span_of(row[SHARES[-1]]["lower"], row[SHARES[-1]]["upper"], row["unit"])
-
-
 def _line_of_load(row: Row) -> str:
-    if row["channel"] == loads.ANY:
+    if row["channel"] == ANY:
         return "-"
     return f"{text.value(row['S0'], CHANNELS[row['channel']].unit)} at {row['N0']:g} cycles, m = {row['m']:g}"
 
 
+_LAST = SHARES[-1]
 PARTS = (
     Column("point", lambda row: str(row["point"])),
     Column("failures", lambda row: text.percent(row["estimate"])),
@@ -94,11 +85,14 @@ PARTS = (
 """Columns of the table ``points``."""
 LOADS = (
     Column("channel and exponent", lambda row: f"{row['channel']}, m = {row['m']:g}"),
-    Column("nominal", lambda row: text.value(row["nominal"], row["unit"]), rank=2),
-    *map(_quantile, SHARES),
-    Column(f"95 % interval of {100 * SHARES[-1]:g} %", _interval),
+    Column("nominal", lambda row: text.value(row[_LAST]["nominal"], row[_LAST]["unit"]), rank=2),
+    *of_shares(SHARES, "below", lambda row: text.value(row["estimate"], row["unit"]), rank=1),
+    Column(
+        f"95 % interval of {100 * _LAST:g} %",
+        lambda row: text.span_of(row[_LAST]["lower"], row[_LAST]["upper"], row[_LAST]["unit"]),
+    ),
 )
-"""Columns of the table ``loads``, arranged by `_by_channel`."""
+"""Columns of the table ``loads``, arranged by channel and exponent."""
 DAMAGES = (
     Column("channel", lambda row: str(row["channel"])),
     Column("S–N line", _line_of_load, words=True, rank=3),
@@ -222,36 +216,31 @@ def life_verdicts(view: View, accepted: float = math.nan, samples: int = JOINTS)
     found = []
     if has_points and (held(store) or samples):
         stressed = load_stresses([view], samples=JOINTS if held(store) else min(samples, JOINTS))
-        row, what = parts.service_failures(stressed)._asdict(), "have a failed part within"
-        found.append(_verdict("failures of parts", what, row, stressed, accepted))
+        row = parts.failures_over_life(stressed, [stressed.settings.revolutions])[0]._asdict()
+        found.append(_verdict("failures of parts", "have a failed part", row, stressed, accepted))
     if has_lines:
         loading = load_cycles([view], names=tuple(own.lines), samples=JOINTS)
-        what = "have a damage sum above 1 within"
-        found.append(_verdict("damage by loads", what, loads.damages(loading)[-1], loading, accepted))
+        sums = loads.damages(loading)[-1]
+        found.append(_verdict("damage by loads", "have a damage sum above 1", sums, loading, accepted))
     return found
 
 
 def _verdict(about: str, what: str, row: Row, joints: Joints, accepted: float) -> Verdict:
     """Verdict from the share in a row: `analysis.strength.Failures`, or `analysis.estimates.Exceedance`."""
     share, without = row["estimate"], row["n_failed"] + row["n_unsettled"]
-    lost = without / max(row["n"], 1)
-    low, high = share * (1.0 - lost), share * (1.0 - lost) + lost
 
-    def deciding() -> float:
-        if low <= accepted <= high:
-            return math.inf
-        end = high if high < accepted else low
+    def joints_needed(end: float) -> float:
         if "count" in row:
             return needed(end, accepted)
         # an interval of a mean narrows with the root of the number of joints, and faster where the share is small
         distance = row["upper"] - share if share < accepted else share - row["lower"]
         return float(np.ceil(row["n"] * (distance / (accepted - end)) ** 2))
 
+    lost = math.isnan(share) or (without and without / row["n"] >= 0.5 * (row["upper"] - row["lower"]))
+    undecided = f"{without} of {row['n']} joints have no load that repeats" if lost else ""
+    what, ends = f"{what} within {joints.settings.service_life}", (row["outer_lower"], row["outer_upper"])
     reason = joints.design.without_interval("mean")
-    if math.isnan(share) or (without and lost >= 0.5 * (row["upper"] - row["lower"])):
-        share, reason = math.nan, f"{without} of {row['n']} joints have no load that repeats"
-    ends = row["outer_lower"], row["outer_upper"]
-    found = on_share(about, f"{what} {joints.settings.service_life}", share, ends, accepted, deciding, reason)
+    found = on_share(about, what, row, ends, accepted, joints_needed, reason, undecided)
     first = f"{about}: of the first {row['n']} of {joints.total} joints"
     return found._replace(notes=(first,) if joints.total > joints.status.size else ())
 
@@ -271,22 +260,23 @@ def _of_parts(stressed: Stressed, delivery: int) -> list[Part]:
 
 
 def _of_loads(loading: Loading, rows: Rows, seen: Rows, delivery: int) -> list[Part]:
-    panels = [_spectrum_panel(loading, channel) for channel in loads.leading(rows)]
+    panels = [
+        Panel(
+            f"spectrum-{channel}",
+            f"{channel}: load spectrum",
+            f"Ranges of {channel} that so many cycles a revolution reach, for half, 90 and 99 % of the joints",
+            partial(_draw_spectrum, loading=loading, channel=channel),
+            (4.9, 3.5),
+            top=drawing.legend_room(LABELS),
+        )
+        for channel in loads.leading(rows)
+    ]
     found: list[Part] = [Panels(panels)] if panels else []
-    found.append(Table("loads", "Damage-equivalent loads", LOADS, rows, seen=_by_channel(seen)))
+    found.append(Table("loads", "Damage-equivalent loads", LOADS, rows, seen=by_share(seen, "channel", "m")))
     if damages := loads.damages(loading, delivery):
         title = "Damage sum of the service life, and share of the joints where it exceeds 1"
         found.append(Table("damages", title, DAMAGES, damages, {"S0": "N or N*m"}))
     return [*found, *map(Sentence, _notes_on_loads(loading, rows))]
-
-
-def _by_channel(rows: Rows) -> Rows:
-    """One row per channel and exponent: for each share its row."""
-    found: dict[Any, dict[Any, Any]] = {}
-    for row in rows:
-        head = {key: row[key] for key in ("channel", "m", "unit", "nominal")}
-        found.setdefault((row["channel"], row["m"]), head)[row["share"]] = row
-    return list(found.values())
 
 
 def _notes_on_parts(stressed: Stressed, rows: Rows) -> Iterator[str]:
@@ -295,12 +285,12 @@ def _notes_on_parts(stressed: Stressed, rows: Rows) -> Iterator[str]:
     starts = f" with {settings.starts:g} starts" if settings.starts else ""
     first = f" (the first {n} of {stressed.total})" if stressed.total > n else ""
     yield f"{stressed.settled}{first}; service life {settings.service_life}{starts}"
-    yield from _duty(stressed.duty)
+    yield from stressed.duty_in_words
     life = "B10 life: revolutions after which 10 % have failed; damage: at the median strength"
     yield f"{life}; intervals count joints without a valid load as failing and as surviving"
     yield from _lines(settings.points)
-    if rows[-1]["point"] == parts.ANY:
-        yield f"{parts.ANY}: the joint fails with its first part; strengths of two points are independent"
+    if rows[-1]["point"] == ANY:
+        yield f"{ANY}: the joint fails with its first part; strengths of two points are independent"
     if not stressed.design.has_interval("mean"):
         yield "no intervals: they hold for independent samples only"
     if stressed.apart > MAX_APART:
@@ -312,7 +302,7 @@ def _notes_on_loads(loading: Loading, rows: Rows) -> Iterator[str]:
     settings = loading.settings
     cycles = f"loads are ranges: {settings.reference_cycles:g} cycles of them do the damage of "
     yield f"{loading.settled}; {cycles}{settings.service_life}"
-    yield from _duty(loading.duty)
+    yield from loading.duty_in_words
     if not loading.design.has_interval("quantile"):
         yield "no intervals: order statistics hold for independent samples only"
     lacking = max((row["lacking"] for row in rows), default=0.0)
@@ -320,27 +310,17 @@ def _notes_on_loads(loading: Loading, rows: Rows) -> Iterator[str]:
         yield f"cycles that the file does not hold may add {lacking:.2g} of a sum of S^m"
 
 
-def _duty(cycle: Sequence[tuple[str, float]]) -> list[str]:
-    """Sentence on the shares of a duty cycle; none for a single operating point."""
-    shares = ", ".join(f"{text.percent(share)} at {name}" for name, share in cycle)
-    return [f"over a duty cycle: {shares}, shares of the revolutions"] if len(cycle) > 1 else []
-
-
-def _lines(points: Sequence[StressPoint]) -> list[str]:
+def _lines(points: Sequence[StressPoint]) -> Iterator[str]:
     """One sentence for each S–N line, with the names of its points."""
     names: dict[Line, list[str]] = {}
     for point in points:
         names.setdefault(point.line, []).append(point.name)
-    if len(names) == 1:
-        return [f"S–N line: {_line(points[0].line)}"]
-    return [f"S–N line of {'; '.join(own)}: {_line(line)}" for line, own in names.items()]
-
-
-def _line(line: Line) -> str:
-    scatter = f", T_S = {line.T_S:.3g}" if line.T_S > 1 else ""
-    mean = f", M = {line.M:g} (R = {line.R:g})" if line.M > 0 else ""
-    knee = f"range of {line.S_D / 1e6:.4g} MPa at {line.N_D:g} cycles"
-    return f"{knee}, k = {line.k:g}, {line.k_2:g} below{scatter}{mean}, damage sum {line.D_c:g}"
+    for line, own in names.items():
+        where = f" of {'; '.join(own)}" if len(names) > 1 else ""
+        scatter = f", T_S = {line.T_S:.3g}" if line.T_S > 1 else ""
+        mean = f", M = {line.M:g} (R = {line.R:g})" if line.M > 0 else ""
+        knee = f"range of {line.S_D / 1e6:.4g} MPa at {line.N_D:g} cycles, k = {line.k:g}, {line.k_2:g} below"
+        yield f"S–N line{where}: {knee}{scatter}{mean}, damage sum {line.D_c:g}"
 
 
 def _draw_failures(ax: Axes, stressed: Stressed, life: float) -> None:
@@ -348,32 +328,19 @@ def _draw_failures(ax: Axes, stressed: Stressed, life: float) -> None:
     service = stressed.settings.revolutions
     first, last = sorted([service, life if math.isfinite(life) and life > 0 else service])
     numbers = np.geomspace(first / 10**DECADES, last * 10**DECADES, POINTS)
-    curve = parts.failures_over_life(stressed, numbers.tolist())
+    curve, has_band = parts.failures_over_life(stressed, numbers.tolist()), stressed.design.has_interval("mean")
     lower, share, upper = np.array([(own.outer_lower, own.estimate, own.outer_upper) for own in curve]).T
-    if stressed.design.has_interval("mean"):
+    if has_band:
         ax.fill_between(numbers, lower, upper, color=style.COLOURS[0], alpha=0.2, lw=0)
     ax.plot(numbers, share, color=style.COLOURS[0])
     ax.axvline(service, color=style.INK, lw=1, ls="--")
-    place: Any = {"xycoords": ("data", "axes fraction"), "textcoords": "offset points", "va": "top"}
-    ax.annotate("service life", (service, 1.0), (4, -2), **place)
+    at = ("data", "axes fraction")
+    ax.annotate("service life", (service, 1.0), (4, -2), xycoords=at, textcoords="offset points", va="top")
     ax.set(xscale="log", xlim=(numbers[0], numbers[-1]))
-    ends = upper if stressed.design.has_interval("mean") else share
-    ax.set_ylim(0.0, min(1.0, 1.1 * float(np.nanmax(ends, initial=0.0))) or 1.0)
+    ax.set_ylim(0.0, min(1.0, 1.1 * float(np.nanmax(upper if has_band else share, initial=0.0))) or 1.0)
     ax.xaxis.set_major_formatter(ticker.FuncFormatter(lambda x, _: f"{x:.0e}".replace("e+0", "e").replace("e+", "e")))
     ax.yaxis.set_major_formatter(ticker.FuncFormatter(lambda value, _: f"{100 * value:g} %"))
-    ax.set_xlabel("revolutions of the input shaft")
-    ax.set_ylabel("joints with a failed part")
-
-
-def _spectrum_panel(loading: Loading, channel: str) -> Panel:
-    return Panel(
-        f"spectrum-{channel}",
-        f"{channel}: load spectrum",
-        f"Ranges of {channel} that so many cycles a revolution reach, for half, 90 and 99 % of the joints",
-        partial(_draw_spectrum, loading=loading, channel=channel),
-        (4.9, 3.5),
-        top=drawing.legend_room(LABELS),
-    )
+    ax.set(xlabel="revolutions of the input shaft", ylabel="joints with a failed part")
 
 
 def _draw_spectrum(ax: Axes, loading: Loading, channel: str) -> None:
@@ -402,8 +369,8 @@ def _draw_spectrum(ax: Axes, loading: Loading, channel: str) -> None:
         axis.set_major_formatter(ticker.FuncFormatter(lambda value, _: f"{value:g}"))
         axis.set_minor_formatter(ticker.NullFormatter())
     ax.set_xticks([t for t in (0.01, 0.03, 0.1, 0.3, 1, 2, 3, 4, 6, 8, 12, 16) if x[0] <= t <= ax.get_xlim()[1]])
-    ax.set_xlabel("cycles a revolution with at least this range")
-    ax.set_ylabel(f"range of {channel} [{unit_text(CHANNELS[channel].unit)}]")
+    unit = unit_text(CHANNELS[channel].unit)
+    ax.set(xlabel="cycles a revolution with at least this range", ylabel=f"range of {channel} [{unit}]")
     drawing.legend_above(ax, handles, LABELS)
 
 

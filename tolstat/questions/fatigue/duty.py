@@ -10,12 +10,17 @@ from numpy.typing import NDArray
 
 from tolstat.analysis.design import Design
 from tolstat.common.errors import Fault, InputError
+from tolstat.common.loads import FloatArray
 from tolstat.common.tables import ERROR_FIELDS, Status, worst_status
+from tolstat.display.text import percent
 from tolstat.store import points
 from tolstat.store.recorded import joint_of
 from tolstat.store.view import View
 from tolstat.study.fatigue import Fatigue, of_text
 
+ANY = "any of them"
+"""Name of the row for all points or channels together."""
+CONFIDENCE = 0.95
 HOUR = 3600.0
 
 
@@ -54,6 +59,12 @@ class Joints:
         """Words on the number of these joints."""
         return f"{int(self.valid.sum())} of {self.status.size} joints settled"
 
+    @property
+    def duty_in_words(self) -> list[str]:
+        """Sentence on the shares of a duty cycle; none for a single operating point."""
+        shares = ", ".join(f"{percent(share)} at {name}" for name, share in self.duty)
+        return [f"over a duty cycle: {shares}, shares of the revolutions"] if len(self.duty) > 1 else []
+
 
 def members(views: Sequence[View], shares: Sequence[float] | None) -> tuple[Sequence[View], list[float]]:
     """Views of a duty cycle at one operating point each, and their shares of the revolutions with the exact sum 1.
@@ -74,7 +85,13 @@ def members(views: Sequence[View], shares: Sequence[float] | None) -> tuple[Sequ
         When a file holds joints that are no sample of a production.
     """
     if any(len(view.parts) > 1 for view in views):
-        views, shares = _of_points(views, shares)
+        for wrong, remedy in (
+            (len(views) > 1, "give this file alone, or files with one operating point each"),
+            (shares is not None, "leave --share out: the study gives share in [[operation]]"),
+        ):
+            if wrong:
+                raise InputError([Fault(str(views[0].path), "has several operating points", remedy)])
+        views, shares = views[0].parts, points.shares_of_revolutions(views[0]).tolist()
     shares = [1.0] if shares is None else shares
     if len(shares) != len(views) or min(shares, default=0.0) <= 0 or abs(sum(shares) - 1) > 1e-6:
         found = f"{list(shares)} for {len(views)} files"
@@ -117,18 +134,6 @@ def section(view: View) -> Fatigue:
     return view.study.fatigue if view.study_path else of_text(view.store.study_text, str(view.path))
 
 
-def _of_points(views: Sequence[View], shares: Sequence[float] | None) -> tuple[list[View], list[float]]:
-    """Views of a campaign at each of its operating points, and their shares of the revolutions."""
-    view, place = views[0], str(views[0].path)
-    if len(views) > 1:
-        remedy = "give this file alone, or files with one operating point each"
-        raise InputError([Fault(place, "has several operating points", remedy)])
-    if shares is not None:
-        remedy = "leave --share out: the study gives share in [[operation]]"
-        raise InputError([Fault(place, "has several operating points", remedy)])
-    return view.parts, points.shares_of_revolutions(view).tolist()
-
-
 def _check_same_joints(view: View, first: View) -> None:
     names = [f.name for f in ERROR_FIELDS]
     if view.n == first.n and all(
@@ -139,3 +144,8 @@ def _check_same_joints(view: View, first: View) -> None:
         return
     remedy = "run both studies with the same tolerances, sampling.n and sampling.seed"
     raise InputError([Fault(str(view.path), f"does not hold the joints of {first.path}", remedy)])
+
+
+def only(values: FloatArray) -> float:
+    """Value of the nominal joint; NaN if there is none."""
+    return float(values[0]) if values.size else np.nan

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tolstat.common.channels import CHANNELS
-from tolstat.questions.fatigue.counting import cycles_of
+from tolstat.questions.fatigue.loads import cycles_of
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -445,7 +445,7 @@ def test_bearings_may_be_edited_after_the_run(tmp_path):
     with tolstat.open(target) as store:
         first, created = lives_of(store.view()), store.created
         torque = operating_points(store)["torque"][1:]
-    assert (first.status == Status.OK).all()
+    assert (first.view.status == Status.OK).all()
     # without inertia to speak of, forces and equivalent loads are in proportion to the torque
     np.testing.assert_allclose(
         first.loads / torque[:, None], (first.loads / torque[:, None])[:1].repeat(40, 0), rtol=0.02

@@ -39,8 +39,8 @@ if TYPE_CHECKING:
 
 FEW = "needs more joints"
 PLACE_NAMES = {JOINT: "all four", ANY: "at least one"}
-LIFE_UNITS = dict.fromkeys(("nominal", "estimate", "lower", "upper", "bound_lower", "bound_upper"), "h")
-LIFE_UNITS |= dict.fromkeys(("rating", "rating_lower", "rating_upper"), "N")
+UNITS = dict.fromkeys(("nominal", "estimate", "lower", "upper", "bound_lower", "bound_upper"), "h")
+UNITS |= dict.fromkeys(("rating", "rating_lower", "rating_upper"), "N")
 
 
 def _hours(life: float) -> str:
@@ -141,25 +141,18 @@ def bearing_life(view: View) -> Answer:
         parts.append(Panels([Panel("lives", "Life of the joints", said, partial(_draw, lives=lives), (6.4, 3.5))]))
     if lives.unrated < lives.valid:
         title = f"Life {lives.bearing.symbol} that a share of the joints reaches"
-        parts.append(Table("lives", title, LIVES, found, LIFE_UNITS, by_share(found, "place")))
+        parts.append(Table("lives", title, LIVES, found, UNITS, by_share(found, "place")))
         title = f"Joints that do not reach the required {_hours(lives.required)}"
         parts += [Table("below_required", title, BELOW, below, {"required": "h"})] if below else []
     loads, title = load_rows(lives), "Dynamic equivalent load P of a bearing, which a share of the joints stays below"
-    parts.append(
-        Table("loads", title, LOADS, loads, dict.fromkeys(("nominal_load", "load"), "N"), by_share(loads, "place"))
-    )
+    units = {"nominal_load": "N", "load": "N"}
+    parts.append(Table("loads", title, LOADS, loads, units, by_share(loads, "place")))
     if contacts:
         title = "Joints in which a bearing is loaded so for more than half of a revolution"
         parts.append(Table("contacts", title, CONTACTS, contacts, dict.fromkeys(list(contacts[0])[1:], "1")))
-    facts = {"symbol": lives.bearing.symbol, "critical_amplitude": lives.bearing.critical_amplitude}
-    facts |= {
-        "unrated": lives.unrated,
-        "short": lives.short,
-        "fretting": lives.fretting,
-        "load_error": lives.load_error,
-    }
-    notes = [*_notes(lives, contacts), *_selected(view)]
-    return Answer("bearing_life", "Bearing life", [*parts, *map(Sentence, notes)], facts)
+    facts: dict[str, Any] = {name: getattr(lives.bearing, name) for name in ("symbol", "critical_amplitude")}
+    facts |= {name: getattr(lives, name) for name in ("unrated", "short", "fretting", "load_error")}
+    return Answer("bearing_life", "Bearing life", [*parts, *map(Sentence, _notes(lives, contacts))], facts)
 
 
 def bearing_life_on_page(view: View, asked: Asked) -> Answer:
@@ -182,7 +175,13 @@ def _verdict(lives: Lives, below: Rows, found: Rows) -> list[str]:
     interval = "" if math.isnan(low) else f" (total interval {text.span(low, high)})"
     said = [f"{text.percent(row['estimate'])} of the joints{interval} do not reach {required}"]
     said += [f"{_without(row)}: {_bounds(row)}"] if row["n_failed"] + row["n_unsettled"] else []
-    return [*said, *_better_bearings(found[-1])]
+    best = found[-1]  # all four bearings, the largest share
+    low, high = (best[f"rating_{end}"] / 1e3 for end in ("lower", "upper"))
+    ends = f" (95 % interval {text.number(low)} .. {FEW if math.isinf(high) else f'{text.number(high)} kN'})"
+    if best["rating"] > 0.0:
+        rating = f"C = {text.number(best['rating'] / 1e3)} kN{'' if math.isnan(low) else ends}"
+        said.append(f"{100.0 * best['share']:g} % of the joints reach it with {rating}")
+    return said
 
 
 def _without(row: Row) -> str:
@@ -218,19 +217,9 @@ def life_verdicts(view: View, accepted: float = math.nan) -> list[Verdict]:
     elif _undecided(row):
         undecided = f"{_without(row)}; shorter than required are {_bounds(row)}"
     what, ends = f"have a bearing life below {_hours(lives.required)}", (row["total_lower"], row["total_upper"])
-    reason = lives.design.without_interval("share")
+    reason = lives.view.design.without_interval("share")
     found = on_share("bearing life", what, row, ends, accepted, lambda end: needed(end, accepted), reason, undecided)
-    return [found._replace(notes=(*_small_swings(lives), *_selected(view)))]
-
-
-def _better_bearings(row: Row) -> list[str]:
-    """Sentence on the load rating with which the share of a row of `life_rows` reaches the required life."""
-    if not row["rating"] > 0.0:
-        return []
-    low, high = row["rating_lower"], row["rating_upper"]
-    top = FEW if math.isinf(high) else f"{text.number(high / 1e3)} kN"
-    ends = "" if math.isnan(low) else f" (95 % interval {text.number(low / 1e3)} .. {top})"
-    return [f"{100.0 * row['share']:g} % of the joints reach it with C = {text.number(row['rating'] / 1e3)} kN{ends}"]
+    return [found._replace(notes=tuple(_at_points(lives)))]
 
 
 def _why_unrated(lives: Lives, joints: str) -> str:
@@ -246,8 +235,8 @@ def _angle(lives: Lives, part: float = 1.0) -> str:
     return f"{math.degrees(part * lives.bearing.critical_amplitude):.3g} deg"
 
 
-def _small_swings(lives: Lives) -> Iterator[str]:
-    """Sentences on the operating points at which joints swing by less than the critical amplitude."""
+def _at_points(lives: Lives) -> Iterator[str]:
+    """Sentences on points at which joints swing by less than the critical amplitude, and on a selection of points."""
     for point, number in lives.short.items() if lives.unrated < lives.valid else ():
         time = f", {text.percent(lives.duty[point])} of the time," if len(lives.duty) > 1 else ""
         where = f"at {point}{time} " if point else ""
@@ -260,12 +249,8 @@ def _small_swings(lives: Lives) -> Iterator[str]:
             joints = "they swing" if fretting == number else f"{fretting} of them swing"
             words += f". As {joints} by less than half of this, fretting, which no rating covers, may end it earlier"
         yield words
-
-
-def _selected(view: View) -> list[str]:
-    """Sentence on a selection of the operating points of a file; none if all count."""
-    some = len(view.points) < len(view.store.points)
-    return [f"as though all of the service were at {' and '.join(view.points)}"] if some else []
+    if len(lives.duty) < len(lives.view.store.points):
+        yield f"as though all of the service were at {' and '.join(lives.duty)}"
 
 
 def _notes(lives: Lives, contacts: Rows) -> Iterator[str]:
@@ -292,12 +277,12 @@ def _notes(lives: Lives, contacts: Rows) -> Iterator[str]:
         )
     else:
         yield f"{edge}; the study keeps no contact modes, which tell how many bearings have it"
-    yield from _small_swings(lives)
+    yield from _at_points(lives)
     if 0 < lives.unrated < lives.valid:
         yield f"{lives.unrated} of {lives.valid} joints have no rating: {_why_unrated(lives, 'each of them')}"
     if lives.load_error > 0.0:
         yield f"numerical error of an equivalent load: {text.percent(lives.load_error)}, in the total interval"
-    if not lives.design.has_interval("quantile"):
+    if not lives.view.design.has_interval("quantile"):
         yield "no intervals: they hold for independent samples only"
 
 
@@ -307,7 +292,7 @@ def _draw(ax: Axes, lives: Lives) -> None:
     table = rate.curve(np.unique(rate.valid))[::-1]
     x, floor = 1.0 / table["level"], 0.5 / float(table["n"][0])
     shares = {name: table[name].clip(floor, 1.0) for name in ("outer_lower", "estimate", "outer_upper")}
-    if lives.design.has_interval("quantile"):
+    if lives.view.design.has_interval("quantile"):
         band = shares["outer_lower"], shares["outer_upper"]
         ax.fill_between(x, *band, step="pre", color=style.COLOURS[0], alpha=0.2, lw=0, label="95 % band")
     ax.step(x, shares["estimate"], where="pre", color=style.COLOURS[0])

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tolstat.analysis import accuracy
-from tolstat.analysis.design import Design
 from tolstat.analysis.rating_life import FRETTING, basic_life, system_life, turns_per_revolution
 from tolstat.analysis.sample import Sample, total_interval
 from tolstat.common.errors import Fault, NotApplicable, StoreError
@@ -19,7 +16,7 @@ from tolstat.common.load_kinds import PINS
 from tolstat.common.loads import FloatArray
 from tolstat.common.tables import LIFE_EXPONENT, VALID, Mode
 from tolstat.display.table import Rows
-from tolstat.joint import Bearing, operating
+from tolstat.joint import Bearing, Operation, operating
 from tolstat.joint.bearing import FOR_LIFE
 from tolstat.store import points
 from tolstat.store.recorded import joint_of
@@ -38,15 +35,17 @@ MOSTLY = 0.5
 LOADED = {"one_end": Mode.ONE_POINT, "opposite_ends": Mode.TWO_POINT, "along": Mode.UNIFORM}
 """Contact mode of each way to load a bearing."""
 HOUR = 3600.0
-OPERATION = ("operation.alpha", "operation.speed", "operation.torque")
+OPERATION = tuple(f"operation.{name}" for name in Operation.model_fields)
 
 
 @dataclass(frozen=True, eq=False)
 class Lives:
-    """Rating lives of n joints.
+    """Rating lives of the n joints of a view.
 
     Attributes
     ----------
+    view : View
+        The campaign.
     bearing : Bearing
         Section ``[bearing]`` of the joint.
     duty : dict of str to float
@@ -64,12 +63,9 @@ class Lives:
         Valid joints without a rating: fretting is to be expected at each of their operating points.
     load_error : float
         Relative numerical error of an equivalent load that 95 % of the checked joints stay below; NaN if unknown.
-    status : ndarray, shape (n,)
-        `tables.Status` of each joint.
-    design : Design
-        How the joints were drawn.
     """
 
+    view: View
     bearing: Bearing
     duty: Mapping[str, float]
     loads: FloatArray
@@ -80,13 +76,11 @@ class Lives:
     fretting: Mapping[str, int]
     unrated: int
     load_error: float
-    status: NDArray[np.uint8]
-    design: Design
 
     @property
     def valid(self) -> int:
         """Number of joints with a valid result."""
-        return int(np.isin(self.status, VALID).sum())
+        return self.view.count(*VALID)
 
     @property
     def required(self) -> float:
@@ -98,17 +92,19 @@ class Lives:
         k = PLACES.index(place)
         with np.errstate(divide="ignore"):
             nominal, values = 1.0 / self.nominal_hours[k], 1.0 / self.hours[:, k]
-        return Sample.of(values, self.status, self.design, name=place, unit="1/h", nominal=nominal)
+        return Sample.of(values, self.view.status, self.view.design, name=place, unit="1/h", nominal=nominal)
 
     def load(self, pin: str) -> Sample:
         """Dynamic equivalent load of a pin's bearing, N."""
         k = PINS.index(pin)
         nominal, values = float(self.nominal_loads[k]), self.loads[:, k]
-        return Sample.of(values, self.status, self.design, name=pin, unit="N", nominal=nominal)
+        return Sample.of(values, self.view.status, self.view.design, name=pin, unit="N", nominal=nominal)
 
 
 def lives_of(view: View) -> Lives:
     """Rating lives of the joints of a campaign.
+
+    Operating points count by the turns that the bearings make there (Palmgren 1924, Miner 1945; ISO 281).
 
     Parameters
     ----------
@@ -126,35 +122,40 @@ def lives_of(view: View) -> Lives:
         When the view has several operating points, and the study does not give their shares of the time.
     """
     view.check("quantile")
-    bearing = _bearing(view)
-    duty = points.shares_of_time(view).tolist()
-    samples = np.arange(view.n)
-    operation = [operating(part.store.operation, part.errors(samples, OPERATION)) for part in view.parts]
-    results = [part.read_results(("equivalent_load",)) for part in view.parts]
-    loads, hours = _lives(duty, results, operation, bearing)
-    nominal_loads, nominal_hours = np.full(len(PINS), np.nan), np.full(len(PLACES), np.nan)
-    swings, valid = _swings(operation), np.isin(view.status, VALID)
-    small = [_below(swings, bearing, part) & valid for part in (1.0, FRETTING)]
+    bearing, duty, stores = _bearing(view), points.shares_of_time(view), [part.store for part in view.parts]
+    loads = np.stack([store.results(slice(None), ("equivalent_load",))["equivalent_load"] for store in stores])
+    operation = [operating(store.operation, store.errors(slice(None), OPERATION)) for store in stores]
+    swings, speeds = (np.abs([own[name] for own in operation]) for name in ("alpha", "speed"))  # (points, rows)
+    critical = bearing.critical_amplitude
+    hourly = duty[:, None] * speeds / (2.0 * np.pi) * turns_per_revolution(swings, critical) * HOUR
+    turns = hourly.sum(axis=0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        weights = np.where(turns > 0.0, hourly / turns, duty[:, None])[:, :, None]
+        largest = loads.max(axis=0)
+        relative = np.where(largest > 0.0, loads / largest, 0.0 * loads)
+        load = largest * (weights * relative**LIFE_EXPONENT).sum(axis=0) ** (1.0 / LIFE_EXPONENT)
+        pins = bearing.factor * basic_life(load, bearing.C) / turns[:, None]
+    hours = np.column_stack([pins, system_life(pins)])
+    small = [swings < part * critical * (1.0 - 1e-9) for part in (1.0, FRETTING)]
+    unrated = np.asarray(small[1].all(axis=0))
+    hours[unrated] = np.nan
+    skip, valid, has_nominal = view.store.first_sample, np.isin(view.status, VALID), len(view.nominal) > 0
     short, fretting = (
-        {name: int(own.sum()) for name, own in zip(view.points, which, strict=True) if own.any()} for which in small
+        {name: int(n) for name, n in zip(view.points, (own[:, skip:] & valid).sum(axis=1), strict=True) if n}
+        for own in small
     )
-    if len(view.nominal):
-        ideal = [operating(part.store.operation, part.store.errors(slice(0, 1))) for part in view.parts]
-        found = _lives(duty, [part.nominal for part in view.parts], ideal, bearing)
-        nominal_loads, nominal_hours = found[0][0], found[1][0]
     return Lives(
+        view=view,
         bearing=bearing,
-        duty=dict(zip(view.points, duty, strict=True)),
-        loads=loads,
-        hours=hours,
-        nominal_loads=nominal_loads,
-        nominal_hours=nominal_hours,
+        duty=dict(zip(view.points, duty.tolist(), strict=True)),
+        loads=load[skip:],
+        hours=hours[skip:],
+        nominal_loads=load[0] if has_nominal else np.full(len(PINS), np.nan),
+        nominal_hours=hours[0] if has_nominal else np.full(len(PLACES), np.nan),
         short=short,
         fretting=fretting,
-        unrated=int(small[1].all(axis=0).sum()),
+        unrated=int((unrated[skip:] & valid).sum()),
         load_error=_load_error(view),
-        status=view.status,
-        design=view.design,
     )
 
 
@@ -177,57 +178,6 @@ def _bearing(view: View) -> Bearing:
         remedy = 'add "pin*.equivalent_load" to [output] results of the study'
         raise StoreError(str(Fault(place, "does not keep the equivalent loads of the bearings", remedy)))
     return bearing
-
-
-def _swings(operation: Sequence[Mapping[str, FloatArray]]) -> FloatArray:
-    """Amplitude by which the pins of each joint swing at each operating point, (points, m), rad."""
-    return np.abs(np.stack([own["alpha"] for own in operation]))
-
-
-def _below(swings: FloatArray, bearing: Bearing, part: float) -> NDArray[np.bool_]:
-    """Which swings are below a part of the critical amplitude, (points, m)."""
-    return np.asarray(swings < part * bearing.critical_amplitude * (1.0 - 1e-9))
-
-
-def _lives(
-    duty: Sequence[float],
-    results: Sequence[NDArray[np.void]],
-    operation: Sequence[Mapping[str, FloatArray]],
-    bearing: Bearing,
-) -> tuple[FloatArray, FloatArray]:
-    """Equivalent loads, (m, 4), N, and lives of bearings and joint, (m, 5), h, over a duty cycle.
-
-    Operating points count by the turns that the bearings make there (Palmgren 1924, Miner 1945; ISO 281).
-
-    Parameters
-    ----------
-    duty : sequence of float
-        Share of the time at each operating point; the sum is 1.
-    results : sequence of ndarray, shape (m,)
-        Tables with ``equivalent_load``, (m, 4), N, at each point.
-    operation : sequence of mapping
-        ``alpha`` (rad) and ``speed`` (rad/s) of the joints at each point, (m,).
-    bearing : Bearing
-        The bearings.
-    """
-    loads = np.stack([table["equivalent_load"] for table in results])
-    turns_of = partial(turns_per_revolution, critical=bearing.critical_amplitude)
-    hourly = np.stack(
-        [
-            share * np.abs(own["speed"]) / (2.0 * np.pi) * turns_of(own["alpha"]) * HOUR
-            for share, own in zip(duty, operation, strict=True)
-        ]
-    )
-    turns = hourly.sum(axis=0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        weights = np.where(turns > 0.0, hourly / turns, np.array(duty)[:, None])[:, :, None]
-        largest = loads.max(axis=0)
-        relative = np.where(largest > 0.0, loads / largest, 0.0 * loads)
-        load = largest * (weights * relative**LIFE_EXPONENT).sum(axis=0) ** (1.0 / LIFE_EXPONENT)
-        pins = bearing.factor * basic_life(load, bearing.C) / turns[:, None]
-    hours = np.column_stack([pins, system_life(pins)])
-    hours[_below(_swings(operation), bearing, FRETTING).all(axis=0)] = np.nan
-    return load, hours
 
 
 def _load_error(view: View) -> float:

@@ -365,6 +365,7 @@ def test_the_service_life_is_the_one_that_bearings_require(tmp_path):
         path = store_of(tmp_path, text.replace("revolutions = 1e9\n", given), f"a{len(given)}", 0)
         with ResultFile.open(path) as store:
             settings = settings_of(*members([store.view()], None))
+            assert settings_of(*members([store.view(path.with_suffix(".toml"))], None)) == settings
         assert (settings.revolutions, settings.required) == (pytest.approx(expected), True)
         assert settings.service_life == life
     with pytest.raises(InputError, match=r"fatigue\.starts: 10000 starts in 1000 revolutions"):

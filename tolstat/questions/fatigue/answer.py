@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
@@ -20,7 +20,6 @@ from tolstat.display import drawing, style, text
 from tolstat.display.answer import Answer, Part, Sentence, Table
 from tolstat.display.asked import Asked
 from tolstat.display.blocks import Panel, Panels
-from tolstat.display.mpl import lines as mpl_lines
 from tolstat.display.mpl import ticker
 from tolstat.display.options import Delivery, Loads, Opt
 from tolstat.display.table import Column, Row, Rows, by_share, of_shares
@@ -34,7 +33,6 @@ from tolstat.store.view import View
 from tolstat.study.stress_point import StressPoint
 
 if TYPE_CHECKING:
-    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
 
 JOINTS = 5000
@@ -53,13 +51,10 @@ LABELS = [*(f"{100 * share:g} % of the joints stay below" for share in SHARES), 
 """Legend of a load spectrum."""
 
 
-def _life(x: float) -> str:
-    return "-" if math.isnan(x) else "never" if math.isinf(x) else f"{x:.2e}".replace("e+", "e")
-
-
-def _life_span(row: Row) -> str:
-    low, high = row["life_lower"], row["life_upper"]
-    return "-" if math.isnan(low) else f"{_life(low)} .. {_life(high)}"
+def _life(*lives: float) -> str:
+    """Format a life, or the ends of its interval; NaN gives a dash."""
+    ends = ("never" if math.isinf(life) else f"{life:.2e}".replace("e+", "e") for life in lives)
+    return "-" if math.isnan(lives[0]) else " .. ".join(ends)
 
 
 def _line_of_load(row: Row) -> str:
@@ -76,7 +71,7 @@ PARTS = (
     Column("ppm", lambda row: text.ppm(row["estimate"]), rank=6),
     Column("failures in delivery", text.delivery, rank=7),
     Column("B10 life", lambda row: _life(row["life"])),
-    Column("its 95 % interval", _life_span, rank=5),
+    Column("its 95 % interval", lambda row: _life(row["life_lower"], row["life_upper"]), rank=5),
     Column("nominal damage", lambda row: text.formed(row["nominal"]), rank=3),
     Column("median damage", lambda row: text.formed(row["median"]), rank=2),
     Column("99 % damage", lambda row: text.formed(row["upper_99"]), rank=1),
@@ -350,18 +345,18 @@ def _draw_spectrum(ax: Axes, loading: Loading, channel: str) -> None:
     floor = MIN_RANGE * ceiling if ceiling > 0 else 1.0
     numbers = np.array([row["cycles"] for row in rows if row["share"] == SHARES[0]]) / loading.settings.revolutions
     x = np.concatenate([[0.7 * numbers[0]], numbers])
-    handles: list[Artist] = []
+    handles = []
     for share, colour, dash in zip(SHARES, style.COLOURS, style.DASHES, strict=False):
         own = [row for row in rows if row["share"] == share]
-        lower, estimate, upper, nominal = (_steps(own, key) for key in ("lower", "estimate", "upper", "nominal"))
+        lower, estimate, upper, nominal = (  # the first value twice, so that the curve begins at the left edge
+            np.array([row[key] for row in (own[0], *own)]) for key in ("lower", "estimate", "upper", "nominal")
+        )
         if np.isfinite(lower).any():
             top = np.where(np.isfinite(upper), upper, estimate)  # too few joints: the upper end is infinite
             low, high = (np.maximum(y, 0.1 * floor) for y in (lower, top))
             ax.fill_between(x, low, high, step="pre", color=colour, alpha=0.2, lw=0)
-        ax.step(x, estimate, where="pre", color=colour, ls=dash, zorder=3)
-        handles.append(mpl_lines.Line2D([], [], color=colour, ls=dash))
-    ax.step(x, nominal, where="pre", color=style.INK, lw=1, zorder=2)
-    handles.append(mpl_lines.Line2D([], [], color=style.INK, lw=1))
+        handles += ax.step(x, estimate, where="pre", color=colour, ls=dash, zorder=3)
+    handles += ax.step(x, nominal, where="pre", color=style.INK, lw=1, zorder=2)
     shown = max([row["cycles"] for row in rows if row["estimate"] > floor], default=0.0) / loading.settings.revolutions
     ax.set(xscale="log", yscale="log", ylim=(floor, 2.0 * max(ceiling, floor)))
     ax.set_xlim(x[0], 1.05 * max(shown if shown > x[0] else x[-1], 2.0 * x[0]))
@@ -372,9 +367,3 @@ def _draw_spectrum(ax: Axes, loading: Loading, channel: str) -> None:
     unit = unit_text(CHANNELS[channel].unit)
     ax.set(xlabel="cycles a revolution with at least this range", ylabel=f"range of {channel} [{unit}]")
     drawing.legend_above(ax, handles, LABELS)
-
-
-def _steps(rows: Rows, key: str) -> np.ndarray[Any, Any]:
-    """Values of a step curve, the first one twice, so that the curve begins at the left edge."""
-    values = np.array([row[key] for row in rows])
-    return np.concatenate([values[:1], values])

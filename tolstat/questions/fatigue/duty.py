@@ -96,10 +96,17 @@ def members(views: Sequence[View], shares: Sequence[float] | None) -> tuple[Sequ
     if len(shares) != len(views) or min(shares, default=0.0) <= 0 or abs(sum(shares) - 1) > 1e-6:
         found = f"{list(shares)} for {len(views)} files"
         raise InputError([Fault("shares", found, "give a positive share for each file; their sum is 1")])
+    names, first = [column.name for column in ERROR_FIELDS], views[0]
     for view in views:
         view.check("mean")
-        if view is not views[0]:
-            _check_same_joints(view, views[0])
+    for view in views[1:]:
+        if view.n != first.n or not all(
+            np.array_equal(own[name], other[name])
+            for own, other in zip(view.error_blocks(names), first.error_blocks(names), strict=True)
+            for name in names
+        ):
+            remedy = "run both studies with the same tolerances, sampling.n and sampling.seed"
+            raise InputError([Fault(str(view.path), f"does not hold the joints of {first.path}", remedy)])
     total = sum(shares)
     return views, [share / total for share in shares]
 
@@ -132,18 +139,6 @@ def section(view: View) -> Fatigue:
     that are not.
     """
     return view.study.fatigue if view.study_path else of_text(view.store.study_text, str(view.path))
-
-
-def _check_same_joints(view: View, first: View) -> None:
-    names = [f.name for f in ERROR_FIELDS]
-    if view.n == first.n and all(
-        np.array_equal(own[name], other[name])
-        for own, other in zip(view.error_blocks(names), first.error_blocks(names), strict=True)
-        for name in names
-    ):
-        return
-    remedy = "run both studies with the same tolerances, sampling.n and sampling.seed"
-    raise InputError([Fault(str(view.path), f"does not hold the joints of {first.path}", remedy)])
 
 
 def only(values: FloatArray) -> float:

@@ -229,31 +229,25 @@ def damages(loading: Loading, delivery: int = DELIVERY) -> Rows:
         joints), the fields of `analysis.estimates.Exceedance` for the level 1, ``next_lower`` and ``next_upper``
         (prediction interval for the joints above 1 in the next delivery), ``confidence``.
     """
-    rows, every = [], []
-    for channel, values in loading.settings.lines.items():
-        if channel in loading.cycles.channels:
-            line = cycles.Line(*values)
-            sums, nominal = (
-                cycles.damage(part.of(channel), line, loading.settings.revolutions)[:, 0]
-                for part in (loading.cycles, loading.nominal)
-            )
-            every.append((sums, nominal))
-            rows.append(_above_one(loading, {"channel": channel, **line._asdict()}, sums, nominal, delivery))
-    if len(every) > 1:
-        sums, nominal = (np.maximum.reduce(parts) for parts in zip(*every, strict=True))
-        head = {"channel": ANY, **dict.fromkeys(cycles.Line._fields, np.nan)}
-        rows.append(_above_one(loading, head, sums, nominal, delivery))
+    lines, life = loading.settings.lines, loading.settings.revolutions
+    sums = {
+        channel: [
+            cycles.damage(part.of(channel), cycles.Line(*line), life)[:, 0]
+            for part in (loading.cycles, loading.nominal)
+        ]
+        for channel, line in lines.items()
+        if channel in loading.cycles.channels
+    }
+    if len(sums) > 1:
+        sums[ANY] = [np.maximum.reduce(every) for every in zip(*sums.values(), strict=True)]
+    rows = []
+    for channel, (own, nominal) in sums.items():
+        sample = Sample.of(own, loading.status, loading.design)
+        row = {"channel": channel, **cycles.Line(*lines.get(channel, [np.nan] * 3))._asdict(), "nominal": only(nominal)}
+        row |= {"median": sample.quantile(0.5).estimate} | asdict(sample.above(1.0, CONFIDENCE))
+        row |= prediction.columns(sample.delivery(1.0, delivery, CONFIDENCE), delivery) | {"confidence": CONFIDENCE}
+        rows.append(row)
     return rows
-
-
-def _above_one(
-    loading: Loading, head: dict[str, Any], sums: FloatArray, nominal: FloatArray, delivery: int
-) -> dict[str, Any]:
-    """Row of `damages` from the damage sums of the joints."""
-    sample = Sample.of(sums, loading.status, loading.design)
-    head |= {"nominal": only(nominal), "median": sample.quantile(0.5).estimate} | asdict(sample.above(1.0, CONFIDENCE))
-    following = prediction.columns(sample.delivery(1.0, delivery, CONFIDENCE), delivery)
-    return head | following | {"confidence": CONFIDENCE}
 
 
 def spectrum(loading: Loading, channel: str) -> Rows:
@@ -286,14 +280,13 @@ def most_loaded(rows: Rows) -> list[str]:
     only if the table has nothing else. Empty if no joint has a valid result.
     """
     exponents = sorted({row["m"] for row in rows})
-    middle = [row for row in _highest(rows) if row["m"] == exponents[len(exponents) // 2]]
-    valid = [row for row in middle if not np.isnan(row["estimate"])]
+    last = [row for row in rows if row["share"] == SHARES[-1] and row["m"] == exponents[len(exponents) // 2]]
+    valid = [row for row in last if not np.isnan(row["estimate"])]
     found: dict[tuple[str, str], Row] = {}
     for row in [row for row in valid if not CHANNELS[row["channel"]].is_modulus] or valid:
-        channel = CHANNELS[row["channel"]]
-        best = found.setdefault((channel.place, channel.kind.key), row)
-        if row["estimate"] > best["estimate"]:
-            found[channel.place, channel.kind.key] = row
+        key = CHANNELS[row["channel"]].place, CHANNELS[row["channel"]].kind.key
+        if key not in found or row["estimate"] > found[key]["estimate"]:
+            found[key] = row
     return [row["channel"] for row in found.values()]
 
 
@@ -302,15 +295,10 @@ def leading(rows: Rows) -> list[str]:
 
     Candidates are the channels `most_loaded` of the table; all exponents count.
     """
-    names = most_loaded(rows)
-    candidates = [(row["estimate"], CHANNELS[row["channel"]]) for row in _highest(rows) if row["channel"] in names]
-    found = []
+    names, found = most_loaded(rows), []
+    candidates = [row for row in rows if row["share"] == SHARES[-1] and row["channel"] in names]
     for group, kind in PANELS:
-        here = [own for own in candidates if PLACES[own[1].place].group == group and own[1].kind == kind]
-        found += [max(here, key=lambda own: own[0])[1].name] if here else []
+        here = [row for row in candidates if CHANNELS[row["channel"]].kind == kind]
+        here = [row for row in here if PLACES[CHANNELS[row["channel"]].place].group == group]
+        found += [max(here, key=lambda row: float(row["estimate"]))["channel"]] if here else []
     return found
-
-
-def _highest(rows: Rows) -> Rows:
-    """Rows of the highest share of the joints."""
-    return [row for row in rows if row["share"] == SHARES[-1]]

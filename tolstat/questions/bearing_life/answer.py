@@ -20,25 +20,15 @@ from tolstat.display.blocks import Panel, Panels
 from tolstat.display.mpl import ticker
 from tolstat.display.table import Column, Row, Rows, by_share, has, has_unresolved, of_shares
 from tolstat.display.verdict import Verdict, on_share
-from tolstat.questions.bearing_life.lives import (
-    ANY,
-    JOINT,
-    SHARES,
-    Lives,
-    bearing_of,
-    below_rows,
-    contact_rows,
-    life_rows,
-    lives_of,
-    load_rows,
-)
+from tolstat.questions.bearing_life import lives as rating
+from tolstat.questions.bearing_life.lives import JOINT, SHARES, Lives
 from tolstat.store.view import View
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 FEW = "needs more joints"
-PLACE_NAMES = {JOINT: "all four", ANY: "at least one"}
+PLACE_NAMES = {JOINT: "all four", rating.ANY: "at least one"}
 UNITS = dict.fromkeys(("nominal", "estimate", "lower", "upper", "bound_lower", "bound_upper"), "h")
 UNITS |= dict.fromkeys(("rating", "rating_lower", "rating_upper"), "N")
 
@@ -131,8 +121,8 @@ def bearing_life(view: View) -> Answer:
     NotApplicable, StoreError, InputError
         See `lives.lives_of`.
     """
-    lives = lives_of(view)
-    found, below, contacts = life_rows(lives), below_rows(lives), contact_rows(view)
+    lives = rating.lives_of(view)
+    found, below, contacts = rating.life_rows(lives), rating.below_rows(lives), rating.contact_rows(view)
     first, *others = _verdict(lives, below, found)
     parts: list[Part] = [Sentence(text.sentence(first), "lead"), *map(Sentence, others)]
     rate = lives.rate(JOINT)
@@ -144,7 +134,10 @@ def bearing_life(view: View) -> Answer:
         parts.append(Table("lives", title, LIVES, found, UNITS, by_share(found, "place")))
         title = f"Joints that do not reach the required {_hours(lives.required)}"
         parts += [Table("below_required", title, BELOW, below, {"required": "h"})] if below else []
-    loads, title = load_rows(lives), "Dynamic equivalent load P of a bearing, which a share of the joints stays below"
+    loads, title = (
+        rating.load_rows(lives),
+        "Dynamic equivalent load P of a bearing, which a share of the joints stays below",
+    )
     units = {"nominal_load": "N", "load": "N"}
     parts.append(Table("loads", title, LOADS, loads, units, by_share(loads, "place")))
     if contacts:
@@ -179,8 +172,8 @@ def _verdict(lives: Lives, below: Rows, found: Rows) -> list[str]:
     low, high = (best[f"rating_{end}"] / 1e3 for end in ("lower", "upper"))
     ends = f" (95 % interval {text.number(low)} .. {FEW if math.isinf(high) else f'{text.number(high)} kN'})"
     if best["rating"] > 0.0:
-        rating = f"C = {text.number(best['rating'] / 1e3)} kN{'' if math.isnan(low) else ends}"
-        said.append(f"{100.0 * best['share']:g} % of the joints reach it with {rating}")
+        better = f"C = {text.number(best['rating'] / 1e3)} kN{'' if math.isnan(low) else ends}"
+        said.append(f"{100.0 * best['share']:g} % of the joints reach it with {better}")
     return said
 
 
@@ -207,11 +200,11 @@ def life_verdicts(view: View, accepted: float = math.nan) -> list[Verdict]:
     NotApplicable, StoreError, InputError
         See `lives.lives_of`.
     """
-    bearing = bearing_of(view)
+    bearing = rating.bearing_of(view)
     if bearing is None or bearing.required_life is None:
         return []
-    lives = lives_of(view)
-    row, undecided = below_rows(lives)[-1], ""
+    lives = rating.lives_of(view)
+    row, undecided = rating.below_rows(lives)[-1], ""
     if lives.valid and lives.unrated == lives.valid:
         undecided = f"no bearing has a rating: {_why_unrated(lives, 'every joint')}"
     elif _undecided(row):

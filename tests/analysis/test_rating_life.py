@@ -70,3 +70,30 @@ def test_tracks_of_neighbouring_needles_overlap_from_the_critical_amplitude_on(i
     critical = critical_amplitude(needles, needle, pitch)
     assert overlap(1.001 * critical)
     assert overlap(0.999 * critical) == inner  # the outer ring's tracks overlap last
+
+
+@pytest.mark.parametrize("part", [0.1, 0.5, 0.9, 1.0, 2.0, 3.0])
+def test_equivalent_revolutions_are_those_of_the_weakest_of_many_patches(part):
+    """Lundberg and Palmgren: ln(1/S) is the sum over patches of the outer raceway of their passes to the power e.
+
+    Needles roll over their tracks twice in a revolution of the shaft. In turns of the inner ring each patch is passed
+    by Z (1 - gamma)/2 needles. Multiples of the critical amplitude: all patches are alike beyond it.
+    """
+    needles, gamma, slope, patches = 28, 3.0 / 40.0, rating_life.WEIBULL_SLOPE, 28 * 1000
+    critical = critical_amplitude(needles, 3.0, 40.0)
+    track = round(part * critical * (1.0 - gamma) / (2.0 * np.pi) * patches)  # from end to end, in patches
+    passes = np.zeros(patches)
+    for needle in range(needles):
+        passes[(np.arange(track) + needle * patches // needles) % patches] += 2.0
+    rate = (passes**slope).mean() ** (1.0 / slope)  # of failure, in a revolution of the shaft
+    turn = needles * (1.0 - gamma) / 2.0
+    assert turns_per_revolution(part * critical, critical) == pytest.approx(rate / turn, rel=1e-3)
+
+
+def test_small_swings_count_as_in_the_capacity_of_oscillating_bearings():
+    """C_osc/C goes with the swing to the power -2/9 where a life goes with the load to the power -4 (NREL DG03)."""
+    swings = np.array([0.02, 0.05])
+    turns = turns_per_revolution(swings, 0.2)
+    capacities = (1.0 / turns) ** (1.0 / 4.0)  # revolutions of the shaft, as C_osc^4
+    assert capacities[0] / capacities[1] == pytest.approx((swings[0] / swings[1]) ** (-2.0 / 9.0))
+    assert turns_per_revolution([0.0, 0.2], 0.2).tolist() == [0.0, turns_per_revolution(0.2)]

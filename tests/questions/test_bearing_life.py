@@ -12,17 +12,18 @@ import pytest
 import tolstat
 from tests.support import synthetic, views
 from tolstat import joint
-from tolstat.analysis.binomial import clopper_pearson
+from tolstat.analysis.binomial import clopper_pearson, needed
 from tolstat.common.columns import RESULT_COLUMNS
 from tolstat.common.errors import InputError, NotApplicable, StoreError
 from tolstat.common.load_kinds import PINS
 from tolstat.common.tables import Mode, Status
+from tolstat.display import text
 from tolstat.display.answer import Sentence, Table
 from tolstat.display.asked import Asked
 from tolstat.display.blocks import Panels, Text
 from tolstat.joint import Operation
 from tolstat.questions.bearing_life import answer as question
-from tolstat.questions.bearing_life.lives import PLACES, lives_of
+from tolstat.questions.bearing_life.lives import LOADED, PLACES, below_rows, lives_of
 from tolstat.store.recorded import operating_points
 from tolstat.study.points import Point
 
@@ -46,7 +47,7 @@ def said(made, place=None):
 
 def below(lives):
     """Rows on the required life, as a frame."""
-    return pd.DataFrame(question.below_rows(lives))
+    return pd.DataFrame(below_rows(lives))
 
 
 def contacts(made):
@@ -104,20 +105,58 @@ def test_one_point_of_a_duty_cycle_alone():
     assert lives_of(made.at("climb")).duty == {"climb": 1.0}
 
 
+def test_a_selected_point_is_said_to_count_as_all_of_the_service():
+    words = "as though all of the service were at climb"
+    assert words in said(duty().at("climb"))
+    assert words in question.life_verdicts(duty().at("climb"))[0].notes
+    assert not any("as though" in note for note in said(duty()))
+
+
 def test_a_bearing_without_load_at_one_point_lasts_by_the_other():
     np.testing.assert_allclose(lives_of(duty(loads=(1000.0, 0.0))).hours[:, 0], 1e6 * 22 ** (10 / 3) / 6000 / 0.75)
     assert np.isinf(lives_of(duty(loads=(0.0, 0.0))).hours).all()
 
 
-def test_joints_that_hardly_swing_at_one_point_of_their_duty_cycle_have_no_rating():
-    """3 deg to either side is below the critical amplitude, some 12 deg; 30 deg at the other point is above it."""
+def swinging(**angles):
+    """Bearings at points with these angles, in deg, of the same speed and for the same time."""
     points = [
-        Point(name, Operation.model_construct(alpha=np.radians(angle), speed=50.0, torque=100.0), 0.5)
-        for name, angle in (("cruise", 3.0), ("climb", 30.0))
+        Point(name, Operation.model_construct(alpha=np.radians(angle), speed=50.0, torque=100.0), 1.0 / len(angles))
+        for name, angle in angles.items()
     ]
-    made = views.at_points({point.name: synthetic.results(4) for point in points}, joint=held(), points=points)
+    tables = {name: synthetic.results(4) for name in angles}
+    for table in tables.values():
+        table["equivalent_load"] = 1000.0
+    return views.at_points(tables, joint=held(), points=points)
+
+
+def test_a_point_with_a_small_swing_is_rated_and_named():
+    """10 deg to either side is below the critical amplitude of 12.43 deg: a ninth root shortens the life there."""
+    made, critical = swinging(cruise=10.0, climb=30.0), 360.0 / 32 / (1 - 4 / 42)
+    lives, hourly = lives_of(made), 50.0 / (2 * np.pi) * 3600
+    turns = 0.5 * hourly * (4 * 10 / 360 * (critical / 10.0) ** (1 / 9) + 4 * 30 / 360)
+    np.testing.assert_allclose(lives.hours[:, 0], 1e6 * 22 ** (10 / 3) / turns)
+    assert (lives.unrated, lives.short, lives.fretting) == (0, {"cruise": 3}, {})
+    notes = [note for note in said(made, "note") if "by less than" in note]
+    assert [note.split(":")[0] for note in notes] == [
+        "at cruise, 50 % of the time, every joint swings by less than 12.4 deg to either side"
+    ]
+
+
+def test_a_point_below_half_the_critical_amplitude_counts_and_is_told_to_fret():
+    made = swinging(cruise=3.0, climb=30.0)
+    lives = lives_of(made)
+    assert (lives.unrated, lives.fretting) == (0, {"cruise": 3})
+    assert np.all(lives.hours < lives_of(made.at("climb")).hours * 2.0)  # climb alone, for half of the time
+    (note,) = (note for note in said(made, "note") if "by less than 12.4" in note)
+    assert note.startswith("at cruise, 50 % of the time, every joint swings")
+    assert "As they swing by less than half of this, fretting, which no rating covers, may end it earlier" in note
+
+
+def test_without_a_point_above_half_the_critical_amplitude_there_is_no_rating():
+    made = swinging(cruise=3.0, climb=6.0)
     assert lives_of(made).unrated == 3
-    assert said(made)[0].startswith("No rating: every joint swings by less than 12.4 deg")
+    assert said(made)[0].startswith("No rating: every joint swings by less than 6.22 deg to either side at each of its")
+    assert not any("by less than 12.4" in note for note in said(made, "note"))
     assert lives_of(duty()).unrated == 0
 
 
@@ -140,7 +179,7 @@ def test_contact_modes_count_by_the_revolutions_of_a_point():
     """Revolutions are 0.75*600 to 0.25*100, so climb has a nineteenth of them."""
 
     def at_one_end(tables):
-        for table, mode in zip(tables.values(), (Mode.UNIFORM, question.LOADED["one_end"]), strict=True):
+        for table, mode in zip(tables.values(), (Mode.UNIFORM, LOADED["one_end"]), strict=True):
             table["mode_share"] = 0.0
             table["mode_share"][:, :, mode] = 1.0
 
@@ -193,12 +232,12 @@ def test_all_joints_failed_gives_no_verdict():
     assert said(view(failed=200))[0].startswith("No verdict: 200 of 200 joints have no life")
 
 
-@pytest.mark.parametrize("alpha", [0.0, np.radians(12.4), -np.radians(3)])
-def test_below_the_critical_amplitude_there_is_no_rating(alpha):
+@pytest.mark.parametrize("alpha", [0.0, np.radians(6.2), -np.radians(3)])
+def test_below_half_the_critical_amplitude_there_is_no_rating(alpha):
     made = view(alpha=alpha)
     lives = lives_of(made)
     assert (np.isnan(lives.hours).all(), lives.unrated) == (True, 200)
-    assert said(made)[0].startswith("No rating: every joint swings by less than 12.4 deg")
+    assert said(made)[0].startswith("No rating: every joint swings by less than 6.22 deg")
     titles = [part.title for part in tolstat.bearing_life(made).parts if isinstance(part, Table)]
     assert not any("L10" in title or "reach" in title for title in titles)
     assert any("equivalent load" in title for title in titles)
@@ -206,10 +245,61 @@ def test_below_the_critical_amplitude_there_is_no_rating(alpha):
 
 def test_some_joints_without_a_rating():
     alpha = np.full(201, np.radians(15))
-    alpha[1:5] = np.radians(12)
+    alpha[1:5], alpha[5:7] = np.radians(6), np.radians(12)
     found = tolstat.bearing_life(view(alpha=alpha))
     assert (found.facts["unrated"], int(found.frame("below_required")["n_failed"].iloc[-1])) == (4, 4)
-    assert any(note.startswith("4 of 200 joints have no rating") for note in said(view(alpha=alpha)))
+    notes = said(view(alpha=alpha))
+    assert any(
+        note.startswith("4 of 200 joints have no rating: each of them swings by less than 6.22") for note in notes
+    )
+    assert any(note.startswith("6 of 200 joints swing by less than 12.4 deg to either side") for note in notes)
+
+
+def lasting(hours, accepted, **kwargs):
+    """Verdict on a required life, given in h."""
+    (found,) = question.life_verdicts(view(joint=held(required_life=f"{hours} h"), **kwargs), accepted)
+    return found
+
+
+def test_verdicts_on_the_required_life():
+    hours = np.sort(lives_of(view()).hours[:, 4])
+    required = round(hours[10] + 1.0)  # eleven of 200 joints last shorter
+    low, high = (float(end) for end in clopper_pearson(11, 200))
+    interval = text.span(low, high)
+    kept = lasting(required, 0.1)
+    assert (kept.answer, kept.share, kept.lower, kept.upper) == ("yes", 11 / 200, low, high)
+    what = f"of the joints have a bearing life below {text.number(required)} h"
+    assert kept.sentence == f"Kept: at most 10 % {what} (5.5 %, {interval})"
+    assert lasting(required, 0.02).sentence == f"Not kept: 5.5 % {what} ({interval}); 2 % is accepted"
+    joints = text.number(needed(11 / 200, 0.05))
+    assert lasting(required, 0.05).sentence == (
+        f"Open: 5.5 % {what} ({interval}); 5 % is accepted; {joints} joints would decide it"
+    )
+    plain = lasting(required, np.nan)
+    assert (plain.answer, plain.sentence) == ("", f"5.5 % {what} ({interval})")
+    values = lasting(required, 0.1).values()
+    assert (values["about"], values["answer"], values["share"]) == ("bearing life", "kept", 11 / 200)
+
+
+def test_no_verdict_on_the_required_life():
+    found = lasting(8e6, 0.5, failed=100)
+    assert found.sentence.startswith("No verdict: 100 of 200 joints have no life; shorter than required are")
+    assert found.values()["share"] is None
+    assert lasting(1.0, 0.6, failed=100).answer == "yes"  # even if all joints without a life last shorter
+    assert lasting(8e6, 0.1, alpha=0.01).sentence.startswith("No verdict: no bearing has a rating: every joint swings")
+    assert lasting(8e6, 0.1, method="sobol").answer == "none"
+    assert lasting(8e6, np.nan, method="sobol").answer == ""
+    bearing = {key: value for key, value in BEARING.items() if key != "required_life"}
+    made = view(joint=joint.load("cirelli2021", {"bearing": bearing}, "x.toml").given("json"))
+    assert question.life_verdicts(made) == []
+    assert question.life_verdicts(views.view(joint=joint.load("cirelli2021", {}, "x.toml").given("json"))) == []
+
+
+def test_a_verdict_names_the_points_with_small_swings():
+    (found,) = question.life_verdicts(swinging(cruise=10.0, climb=30.0), 0.1)
+    assert [note.split(":")[0] for note in found.notes] == [
+        "at cruise, 50 % of the time, every joint swings by less than 12.4 deg to either side"
+    ]
 
 
 def test_reliability_and_lubrication_shorten_the_life():
@@ -265,8 +355,8 @@ def test_the_page_and_the_json():
 def test_the_command_writes_all_tables_and_the_picture(tmp_path):
     from tests.cli.test_cli import call
 
-    text = STUDY.replace("[sampling]", '[limits]\n"cross1.F" = "700 N"\n[sampling]')
-    path = synthetic.store(tmp_path, text)
+    study = STUDY.replace("[sampling]", '[limits]\n"cross1.F" = "700 N"\n[sampling]')
+    path = synthetic.store(tmp_path, study)
     done = call("bearing-life", path, "--out", tmp_path / "out")
     assert done.exit_code == 0, done.stderr
     assert done.stdout.count("\n\n") == 4
@@ -276,6 +366,18 @@ def test_the_command_writes_all_tables_and_the_picture(tmp_path):
     names += [f"{stem}_lives.{ending}" for ending in ("png", "svg")]
     assert {file.name for file in (tmp_path / "out").iterdir()} == set(names)
     assert len(pd.read_csv(tmp_path / "out" / names[0])) == 15
+
+
+def test_the_bearing_is_that_of_the_study_given_in_place_of_the_stored_one(tmp_path):
+    path, edited, other = synthetic.store(tmp_path, STUDY), tmp_path / "edited.toml", tmp_path / "other.toml"
+    edited.write_text(STUDY.replace("20000 h", "10000 h").replace("10 kN", "20 kN"), encoding="utf-8")
+    other.write_text(STUDY.replace("40 N*m", "30 N*m"), encoding="utf-8")
+    with tolstat.open(path) as store:
+        stored, given = lives_of(store.view()), lives_of(store.view(edited))
+        assert (stored.required, given.required) == (20000.0, 10000.0)
+        np.testing.assert_allclose(given.hours, 2 ** (10 / 3) * stored.hours)
+        with pytest.raises(StoreError, match="does not match the study"):
+            lives_of(store.view(other))
 
 
 def test_refused_files():
@@ -323,10 +425,10 @@ def test_needles_of_the_contact_law_belong_to_the_campaign(tmp_path, law, decide
     """Other keys of the bearing, and all of them with another law, may be edited after the run."""
     file = tmp_path / "study.toml"
     contact = f'[joint.contact]\nlaw = "{law}"\n[joint.bearing]\nneedle_length = "22 mm"'
-    text = STUDY.replace("[joint.bearing]", contact)
+    study = STUDY.replace("[joint.bearing]", contact)
 
     def identity(old, new):
-        file.write_text(text.replace(old, new), encoding="utf-8")
+        file.write_text(study.replace(old, new), encoding="utf-8")
         return tolstat.load(file).identity()
 
     first = identity("", "")
@@ -343,7 +445,7 @@ def test_bearings_may_be_edited_after_the_run(tmp_path):
     with tolstat.open(target) as store:
         first, created = lives_of(store.view()), store.created
         torque = operating_points(store)["torque"][1:]
-    assert (first.status == Status.OK).all()
+    assert (first.view.status == Status.OK).all()
     # without inertia to speak of, forces and equivalent loads are in proportion to the torque
     np.testing.assert_allclose(
         first.loads / torque[:, None], (first.loads / torque[:, None])[:1].repeat(40, 0), rtol=0.02

@@ -22,8 +22,8 @@ from tolstat.display.asked import Asked
 from tolstat.display.blocks import Panels, Table, Text
 from tolstat.questions.fatigue import loads as fatigue
 from tolstat.questions.fatigue import pylife
-from tolstat.questions.fatigue.answer import fatigue_on_page
-from tolstat.questions.fatigue.counting import channels, cycles_of
+from tolstat.questions.fatigue.answer import fatigue_on_page, life_verdicts
+from tolstat.questions.fatigue.loads import channels, cycles_of
 from tolstat.questions.fatigue.pylife import pylife_series
 from tolstat.solver import rainflow
 from tolstat.store import ResultFile
@@ -149,14 +149,24 @@ def test_a_duty_cycle_of_two_campaigns(campaign):
     assert both.status.tolist() == np.maximum(*(status[1:] for _, status in single)).tolist()
     assert both.cycles.ranges.shape[0] == 12
     assert both.nominal.ranges.shape[0] == 1
-    assert both.settings == Fatigue(
-        (4.0,), 1e7, 1e6, {f"cross{i}.F_{a}": tuple(LINE) for i in (1, 2, 3, 4) for a in "et"}
-    )
+    lines = {f"cross{i}.F_{a}": tuple(LINE) for i in (1, 2, 3, 4) for a in "et"}
+    assert both.settings == Fatigue((4.0,), 1e7, required=True, lines=lines)
     with pytest.raises(InputError, match=r"does not hold the joints of .*\n  hint: run both studies with the same"):
         load_cycles([files[0], campaign("cycles", seed=2)], [0.5, 0.5])
     for shares in ([1.0], [0.5, 0.6], [-1.0, 2.0]):
         with pytest.raises(InputError, match="their sum is 1"):
             load_cycles(files, shares)
+
+
+def test_the_verdict_on_loads_is_on_those_with_a_line(campaign):
+    with ResultFile.open(campaign()) as store:
+        view = store.view()
+        row = tolstat.fatigue(view, by=["cross*.F_[et]"]).tables["damages"].rows[-1]
+        (found,) = life_verdicts(view, 0.999)
+        assert (found.answer, found.lower, found.upper) == ("yes", row["outer_lower"], row["outer_upper"])
+        assert "of the joints have a damage sum above 1 within 1e+07 revolutions (" in found.sentence
+        store.study_text = store.study_text.replace("revolutions = 1e7", "")
+        assert life_verdicts(store.view(), 0.999) == []
 
 
 def test_a_file_without_histories_says_what_to_do(campaign):

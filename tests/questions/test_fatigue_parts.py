@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
@@ -13,18 +14,20 @@ import pytest
 from matplotlib.figure import Figure
 
 import tolstat
+from tests.support.synthetic import store as store_of
 from tolstat.analysis import strength
 from tolstat.analysis.cycles import Cycles
 from tolstat.analysis.independent import Independent
 from tolstat.common.errors import InputError, NotApplicable
 from tolstat.common.load_kinds import BUSHINGS
 from tolstat.common.tables import Status
+from tolstat.display import text
 from tolstat.display.asked import Asked
 from tolstat.display.blocks import Panels, Table
 from tolstat.questions.fatigue import parts
-from tolstat.questions.fatigue.answer import _notes_on_parts, fatigue_on_page
-from tolstat.questions.fatigue.duty import Joints
-from tolstat.questions.fatigue.stress import Stressed, Stresses, load_stresses
+from tolstat.questions.fatigue.answer import _notes_on_parts, _verdict, fatigue_on_page, life_verdicts
+from tolstat.questions.fatigue.duty import ANY, Joints, members, settings_of
+from tolstat.questions.fatigue.parts import Stressed, Stresses, load_stresses
 from tolstat.solver import rainflow
 from tolstat.store import ResultFile
 from tolstat.study.fatigue import Fatigue, of_text
@@ -103,7 +106,7 @@ def of_signals(signals, names=("a",)):
 
 
 def point(line, name="a"):
-    return StressPoint(name, "fork1", (0.0, 0.0, 1.0, 0.0, 0.0, 0.0), line)
+    return StressPoint(name, "fork1", ((0.0, 0.0, 1.0, 0.0, 0.0, 0.0),), line)
 
 
 def test_stress_is_formed_before_cycles_are_counted(campaign):
@@ -195,13 +198,13 @@ def test_failures_and_lives_of_one_cycle_in_closed_form():
     factor = size / line.S_D  # N_D cycles: the critical strength is the range itself
     chances = strength.probability(factor, line.T_S)
     np.testing.assert_allclose(table["estimate"][["a", "b"]], chances.mean(axis=0))
-    assert table["estimate"][parts.ANY] == pytest.approx((1 - (1 - chances).prod(axis=1)).mean())
+    assert table["estimate"][ANY] == pytest.approx((1 - (1 - chances).prod(axis=1)).mean())
     assert table["median"]["a"] == pytest.approx(
         np.sort(factor[:, 0])[199] ** (9 if np.sort(factor[:, 0])[199] < 1 else 5)
     )
     assert np.isnan(table["nominal"]["a"])
-    assert np.isnan(table["median"][parts.ANY])
-    for name, group in (("a", [0]), ("b", [1]), (parts.ANY, [0, 1])):
+    assert np.isnan(table["median"][ANY])
+    for name, group in (("a", [0]), ("b", [1]), (ANY, [0, 1])):
         lives = table["life"][name] / 1e6
         slope = np.where(factor * lives ** (1 / 9) < 1, 9, 5)  # the part that fails just now, by the slope of its cycle
         critical = np.where(lives > 1, factor * lives ** (1 / 9), factor * lives ** (1 / 5))
@@ -237,6 +240,138 @@ def test_joints_without_stresses_count_both_ways_and_pending_ones_not_at_all():
     assert (row["outer_lower"], row["outer_upper"]) == (0.0, 1.0)
 
 
+ROUND = """
+[fatigue]
+point.a = { bushing = "cross1", T_tz = "2 MPa/Nm", k = 5, N_D = 1e6, S_D = "200 MPa", T_S = 1 }
+point.b = { bushing = "cross1", T_tz = "2 MPa/Nm", F_e = "1 MPa/kN", M = 0.3, k = 5, N_D = 1e6, S_D = "9 MPa", T_S = 1 }
+"""
+"""A round pin that is bent about t and z, and one that is pulled, too."""
+
+
+def bent(monkeypatch, moments, force=0.0, number=0):
+    """Damage in a revolution of a point of `ROUND`, at moments about t and z over it, N m, and a force along e, N."""
+    loads = np.zeros((1, len(moments[0]), len(BUSHINGS), 6))
+    loads[0, :, 0, 0], loads[0, :, 0, 4], loads[0, :, 0, 5] = force, *moments
+    monkeypatch.setattr(parts.revolutions, "of_components", lambda *_: [(slice(0, 1), {"loads": loads}, 0.0)])
+    settings = of_text(ROUND, "a.toml")
+    settings = replace(settings, points=settings.points[number : number + 1], revolutions=1.0)
+    found, _ = parts.stresses_of(None, np.arange(1), settings.points)
+    return strength.damage_at(*parts.evaluated(found, settings)[0])[0]
+
+
+@pytest.mark.parametrize("degrees", [0.0, 15.0, 30.0, 22.5, 52.0, 97.0])
+def test_bending_of_a_round_pin_in_one_plane_is_the_root_of_the_squares(monkeypatch, degrees):
+    """A moment of 30 N m that keeps its direction, 60 MPa to and fro: one cycle of 120 MPa where it is largest."""
+    wave, direction = 30.0 * np.cos(2 * np.pi * np.arange(360) / 360), np.radians(degrees)
+    found = bent(monkeypatch, (wave * np.cos(direction), wave * np.sin(direction)))
+    expected = 1e-6 * (120.0 / 200.0) ** 9
+    assert found <= expected * (1.0 + 1e-9)
+    assert found == pytest.approx(expected, rel=1e-9 if degrees % 15 == 0 else 9 * (1 - np.cos(np.radians(7.5))))
+
+
+def test_a_moment_that_goes_round_a_pin_is_not_the_sum_of_its_components(monkeypatch):
+    """Each place goes from +60 to -60 MPa once; T_t and T_z in one point would have 120 MPa times the root of 2."""
+    angles = 2 * np.pi * np.arange(360) / 360
+    found = bent(monkeypatch, (30.0 * np.cos(angles), 30.0 * np.sin(angles)))
+    assert found == pytest.approx(1e-6 * (120.0 / 200.0) ** 9, rel=1e-9)
+
+
+def test_a_pin_that_is_pulled_fails_on_the_side_that_bending_pulls_too(monkeypatch):
+    """Bending swells from 0 to 20 N m about t: 40 MPa on one side, -40 on the other, and 10 MPa everywhere."""
+    wave = 10.0 * (1.0 + np.cos(2 * np.pi * np.arange(360) / 360))
+    found = bent(monkeypatch, (wave, 0.0 * wave), force=1e4, number=1)
+    assert strength.at_ratio([40.0], [30.0], 0.3) > strength.at_ratio([40.0], [-10.0], 0.3)
+    assert found == pytest.approx(1e-6 * (strength.at_ratio([40.0], [30.0], 0.3)[0] / 9.0) ** 5, rel=1e-6)
+
+
+def judged(accepted, **kwargs):
+    stressed, *_ = synthetic(**kwargs)
+    row = parts.failures_over_life(stressed, [1e6])[0]._asdict()
+    return _verdict("failures of parts", "have a failed part", row, stressed, accepted), row
+
+
+def test_verdicts_on_failures_in_the_service_life():
+    _, row = judged(np.nan)
+    share, low, high = row["estimate"], row["outer_lower"], row["outer_upper"]
+    what, interval = "of the joints have a failed part within 1e+06 revolutions", text.span(low, high)
+    kept, _ = judged(high)
+    assert kept.sentence == f"Kept: at most {text.percent(high)} {what} ({text.percent(share)}, {interval})"
+    assert (kept.share, kept.lower, kept.upper) == (share, low, high)
+    assert judged(0.01)[0].sentence == f"Not kept: {text.percent(share)} {what} ({interval}); 1 % is accepted"
+    accepted = 0.5 * (share + high)
+    joints = np.ceil(400 * ((row["upper"] - share) / (accepted - share)) ** 2)
+    assert judged(accepted)[0].sentence == (
+        f"Open: {text.percent(share)} {what} ({interval}); {text.percent(accepted)} is accepted; "
+        f"{text.number(joints)} joints would decide it"
+    )
+    assert judged(np.nan)[0].sentence == f"{text.percent(share)} {what} ({interval})"
+
+
+def test_an_open_verdict_is_decided_by_the_joints_that_it_asks_for():
+    """A campaign of that many joints has an interval that just excludes the accepted share, as far as its own share."""
+    _, row = judged(np.nan, n=400)
+    accepted = row["estimate"] + 0.4 * (row["upper"] - row["estimate"])
+    open_, _ = judged(accepted, n=400)
+    joints = int(float(re.search(r"; ([0-9.]+) joints would decide", open_.sentence)[1]))
+    shares = [judged(np.nan, n=number)[1] for number in (joints // 2, 2 * joints)]
+    widths = [own["outer_upper"] - own["estimate"] for own in shares]
+    assert widths[1] < accepted - row["estimate"] < widths[0]
+
+
+def test_no_verdict_where_joints_without_a_load_decide():
+    status = np.full(400, Status.OK)
+    status[:200] = Status.NEWTON_FAILED
+    found, _ = judged(0.4, status=status)
+    assert found.sentence == "No verdict: 200 of 400 joints have no load that repeats"
+    assert judged(0.99, status=status)[0].answer == "yes"
+
+
+def test_a_verdict_is_on_points_whose_service_life_is_given(campaign):
+    with ResultFile.open(campaign("none")) as store:
+        (found,) = life_verdicts(store.view(), 0.99, samples=8)
+        row = parts.failures_over_life(load_stresses([store.view()], samples=8), [1e9])[0]
+        assert (found.lower, found.upper) == (row.outer_lower, row.outer_upper)
+        assert found.sentence.startswith(
+            "Kept: at most 99 % of the joints have a failed part within 1e+09 revolutions ("
+        )
+        assert found.notes == ("failures of parts: of the first 8 of 12 joints",)
+        assert life_verdicts(store.view(), 0.5, samples=0) == []
+        store.study_text = store.study_text.replace("revolutions = 1e9", "")
+        assert life_verdicts(store.view(), 0.5) == []
+
+
+def test_settings_are_those_of_the_study_given_in_place_of_the_stored_one(campaign, tmp_path):
+    edited = tmp_path / "edited.toml"
+    edited.write_text(campaign("none").with_suffix(".toml").read_text("utf-8").replace("1e9", "2e9"), encoding="utf-8")
+    with ResultFile.open(campaign("none")) as store:
+        stored, given = (load_stresses([store.view(path)], samples=3) for path in (None, edited))
+    assert (stored.settings.revolutions, given.settings.revolutions) == (1e9, 2e9)
+    assert given.settings.points == stored.settings.points
+
+
+def test_the_service_life_is_the_one_that_bearings_require(tmp_path):
+    """20 000 h at 75 % of 1200 rpm and 25 % of 400 rpm are 20 000 * 60 * 1000 revolutions."""
+    points = "".join(
+        f'[[operation]]\nname = "{name}"\nshare = "{share} %"\nspeed = "{rpm} rpm"\nalpha = "9 deg"\ntorque = "9 N*m"\n'
+        for name, share, rpm in (("drive", 75, 1200), ("climb", 25, 400))
+    )
+    head, _, rest = STUDY.format(histories="none", alpha=15).partition("[operation]")
+    bearing = '[joint.bearing]\nneedles = 32\nrequired_life = "20000 h"\n'
+    text = head + bearing + points + "[tolerances]" + rest.partition("[tolerances]")[2]
+    for given, expected, life in (
+        ("revolutions = 1e9\n", 1e9, "1e+09 revolutions"),
+        ("", 1.2e9, "20000 h (1.2e+09 revolutions)"),
+    ):
+        path = store_of(tmp_path, text.replace("revolutions = 1e9\n", given), f"a{len(given)}", 0)
+        with ResultFile.open(path) as store:
+            settings = settings_of(*members([store.view()], None))
+            assert settings_of(*members([store.view(path.with_suffix(".toml"))], None)) == settings
+        assert (settings.revolutions, settings.required) == (pytest.approx(expected), True)
+        assert settings.service_life == life
+    with pytest.raises(InputError, match=r"fatigue\.starts: 10000 starts in 1000 revolutions"):
+        Fatigue(starts=1e4).within(1.0, 1000.0, "a.toml")
+
+
 def test_every_fault_of_the_points_is_told():
     text = """
     [fatigue]
@@ -269,7 +404,7 @@ def test_the_command_prints_a_row_a_point(campaign):
     done = call("fatigue", campaign("none"))
     assert done.exit_code == 0, done.stderr
     lines = done.stdout.splitlines()
-    assert [line.split("  ")[0] for line in lines] == ["point", *NAMES, parts.ANY]
+    assert [line.split("  ")[0] for line in lines] == ["point", *NAMES, ANY]
     assert max(map(len, lines)) <= 80
     assert "with 10000 starts" in done.stderr
     assert "amage-equivalent" not in done.stdout
@@ -307,7 +442,7 @@ def test_the_page_shows_parts_before_loads(campaign, tmp_path):
     panels, table, *notes = found.blocks()
     assert isinstance(panels, Panels)
     assert isinstance(table, Table)
-    assert [row[0] for row in table.rows] == [*NAMES, parts.ANY]
+    assert [row[0] for row in table.rows] == [*NAMES, ANY]
     assert notes[0].text.startswith(f"{stresses([campaign('none')]).valid.sum()} of 12 joints settled")
     ax = Figure().add_subplot()
     panels.panels[0].draw(ax)

@@ -2,7 +2,7 @@
 
 The life of a bearing is counted in equivalent revolutions: a swing counts for its travel over a whole turn. This is the
 oscillation factor of Harris, which takes no account of how the load moves over the rings (Houpert and Menck 2022, Menck
-and Stammler 2024).
+and Stammler 2024). Small swings count for more, since they stress parts of the rings only (Rumbarger and Jones 1968).
 """
 
 from __future__ import annotations
@@ -15,6 +15,8 @@ from tolstat.common.tables import LIFE_EXPONENT
 
 WEIBULL_SLOPE = 9 / 8
 """Slope e of the lives of bearings with line contact (Lundberg and Palmgren 1952): combines bearings of a joint."""
+FRETTING = 0.5
+"""Part of the critical amplitude below which fretting is to be expected (Harris, Rumbarger and Butterfield 2009)."""
 A1 = {
     0.9: 1.0,
     0.95: 0.64,
@@ -58,20 +60,32 @@ def basic_life(load: ArrayLike, rating: float) -> FloatArray:
         return np.asarray(1e6 * (rating / np.asarray(load, float)) ** LIFE_EXPONENT)
 
 
-def turns_per_revolution(alpha: ArrayLike) -> FloatArray:
+def turns_per_revolution(alpha: ArrayLike, critical: float = 0.0) -> FloatArray:
     """Equivalent revolutions of a pin's bearing in a revolution of the shaft.
+
+    Below the critical amplitude each needle stresses a part of the raceway of its own: the stressed volume V is in
+    proportion to the swing, and each point of it is passed twice a revolution of the shaft, however small the swing is.
+    With ln(1/S) in proportion to N^e V (Lundberg and Palmgren 1952) the life goes with the swing to the power -1/e, not
+    -1. At the critical amplitude both are equal.
 
     Parameters
     ----------
     alpha : array_like
         Misalignment, rad. Each pin swings from -alpha to alpha and back once a revolution.
+    critical : float
+        Critical amplitude, rad, see `critical_amplitude`.
 
     Examples
     --------
     >>> round(float(turns_per_revolution(np.deg2rad(90.0))), 12)
     1.0
+    >>> round(float(turns_per_revolution(0.1, 0.2) / turns_per_revolution(0.1)), 12) == round(2 ** (1 / 9), 12)
+    True
     """
-    return np.asarray(4.0 * np.abs(alpha) / (2.0 * np.pi))
+    swing = np.abs(np.asarray(alpha, float))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        part = np.where(swing < critical, critical / swing, 1.0)
+        return np.where(swing > 0.0, 4.0 * swing / (2.0 * np.pi) * part ** (1.0 - 1.0 / WEIBULL_SLOPE), 0.0)
 
 
 def system_life(lives: ArrayLike) -> FloatArray:

@@ -8,6 +8,7 @@ knee stays at N_D. A part fails when its damage sum (Palmgren 1924, Miner 1945) 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -189,6 +190,22 @@ def critical_factor(collective: Collective, line: Line, lives: float = 1.0) -> F
             total = first + second
             u = np.where(np.isfinite(u), u + np.log(total) * total / (line.k * first + line.k_2 * second), u)
     return np.exp(u)
+
+
+def weakest(places: Sequence[Collective], line: Line) -> Collective:
+    """Cycles of each joint at the place of a part at which it fails first, in the service life.
+
+    Parameters
+    ----------
+    places : sequence of Collective
+        Cycles of the same n joints at each place; the strength of a part is one at all of them.
+    line : Line
+        S–N line.
+    """
+    if len(places) == 1:
+        return places[0]
+    worst = np.argmax(np.nan_to_num([critical_factor(place, line) for place in places]), axis=0)
+    return Collective(*(np.stack(own)[worst, np.arange(len(worst))] for own in zip(*places, strict=True)))
 
 
 def probability(factor: FloatArray, T_S: float) -> FloatArray:

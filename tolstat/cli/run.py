@@ -183,7 +183,6 @@ def merge(files: Annotated[list[Path], Opt("SLICE")], *, out: Annotated[Path, Op
 
     Slices are made by tolstat run --rows. They must have the same study and version of the code, and together hold all
     rows of the campaign; a row in several slices must have identical results. FILE then equals that of a single run.
-    Joints with other tolerances (what_if) are kept, unless the slices hold different results of them.
 
     Prints the number of joints by outcome on standard error.
 
@@ -203,8 +202,6 @@ def merge(files: Annotated[list[Path], Opt("SLICE")], *, out: Annotated[Path, Op
     say(f"{out}: {counts.done} {counts.counted}, {counts.shortfall}")
     if merged.twice:
         say(f"{merged.twice} surplus copies of rows, with identical results")
-    if merged.dropped:
-        say(f"left out: joints of {merged.dropped} changes of what_if, of which the slices hold different results")
     if pending:
         say(f"{pending} {counts.counted} are pending; to simulate them: tolstat run STUDY --out {out}")
     else:

@@ -13,6 +13,7 @@ from tolstat.common.files import check_target
 from tolstat.display import style
 from tolstat.display.options import Opt
 from tolstat.display.table import as_text, plain
+from tolstat.questions.drawings import answer, views
 
 FORMATS = (".svg", ".png", ".pdf")
 

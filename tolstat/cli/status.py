@@ -16,10 +16,10 @@ from tolstat.cli._talk import progress, wrapped
 from tolstat.common.errors import Fault, StoreError
 from tolstat.common.tables import Status, worst_status
 from tolstat.display import text
-from tolstat.display.answer import plain
 from tolstat.display.options import AsJson, ResultPath, Wide
 from tolstat.display.progress import clock
 from tolstat.display.table import Column
+from tolstat.display.text import plain
 from tolstat.store import ResultFile, View, verification, what_if
 
 SHARES = (

@@ -55,6 +55,23 @@ class Column(NamedTuple):
     rank: int = 0
 
 
+def by_share(rows: Rows, *keys: str) -> Rows:
+    """Rows with the same values of `keys` as one: these values, and each row by its ``share``."""
+    found: dict[tuple[Any, ...], dict[Any, Any]] = {}
+    for row in rows:
+        found.setdefault(tuple(row[key] for key in keys), {key: row[key] for key in keys})[row["share"]] = row
+    return list(found.values())
+
+
+def of_shares(shares: Sequence[float], head: str, cell: Callable[[Row], str], rank: int = 0) -> list[Column]:
+    """Columns of the rows of `by_share`, one a share: ``99 % reach``; the last one is never left out, see `Column`."""
+
+    def column(share: float) -> Column:
+        return Column(f"{100.0 * share:g} % {head}", lambda row: cell(row[share]), rank=rank * (share != shares[-1]))
+
+    return list(map(column, shares))
+
+
 def cells(columns: Sequence[Column], rows: Rows) -> list[list[str]]:
     """Headings, then one row of cells for each row of a table."""
     return [[column.head for column in columns], *([column.cell(row) for column in columns] for row in rows)]

@@ -21,6 +21,7 @@ from tolstat.questions.exceedance import curves
 from tolstat.questions.exceedance.rows import curve_rows, not_kept
 from tolstat.questions.sweep import sweep
 from tolstat.report.headline import headline, tells_yield
+from tolstat.report.life import life_verdicts
 from tolstat.solver import fidelity
 from tolstat.store import Reader, recorded, viewed
 
@@ -43,9 +44,9 @@ def report(view: View, accepted: float = math.nan) -> Answer:
     Returns
     -------
     Answer
-        Verdict, mounting of the shafts and contact law. Tables ``limits`` and ``at_points``, where the study sets
-        limits, ``quantiles`` and, with at most `rows.MAX_LEVELS` levels of a load, ``exceedance``; for a sweep the
-        table ``sweep``, for listed joints ``cases``. Loads that the study does not keep are left out.
+        Verdict, those on required lives, mounting of the shafts and contact law. Tables ``limits`` and ``at_points``,
+        where the study sets limits, ``quantiles`` and, with at most `rows.MAX_LEVELS` levels of a load, ``exceedance``;
+        for a sweep the table ``sweep``, for listed joints ``cases``. Loads that the study does not keep are left out.
     """
     store = view.store
     stands_on = [Sentence(text.sentence(in_words(*recorded.mountings(store))), "lead")]
@@ -57,6 +58,10 @@ def report(view: View, accepted: float = math.nan) -> Answer:
     lead = [Sentence(text.sentence(verdict.sentence), "lead")] if verdict else []
     causes = [Sentence(note) for note in verdict.notes] if verdict else []
     facts: dict[str, Any] = {"verdict": verdict.values()} if verdict else {}
+    if lives := life_verdicts(view, accepted):
+        facts["lives"] = [own.values() for own in lives]
+        lead += [Sentence(text.sentence(own.sentence), "lead") for own in lives]
+        causes += [Sentence(text.sentence(note)) for own in lives for note in own.notes]
     parts = [*lead, *stands_on, *_tables(view, accepted), *_yield(view, bool(verdict and verdict.answer))]
     return Answer("report", view.name, [*parts, *causes, *_notes(view), *_run(view)], facts)
 

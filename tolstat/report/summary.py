@@ -10,6 +10,7 @@ from tolstat.common.errors import Fault, StoreError
 from tolstat.common.tables import Status
 from tolstat.joint.mounting import in_words
 from tolstat.report.headline import headline
+from tolstat.report.life import life_verdicts
 from tolstat.solver.fidelity import sentence
 from tolstat.store import recorded
 
@@ -32,7 +33,8 @@ def statistics(view: View, accepted: float = math.nan) -> dict[str, Any]:
     dict
         JSON values in SI units, null if unknown: ``study``, ``method``, ``confidence``; ``verdict``, with ``answer``
         (null without an accepted share), ``sentence`` and ``notes``, null without limits; ``joints``, numbers by
-        status; the answers ``exceedance``, ``lots``, ``bearing_life``, ``capability`` and ``accuracy``, each with
+        status; ``lives``, verdicts on required lives, only where the study requires one that is known without
+        simulation; the answers ``exceedance``, ``lots``, ``bearing_life``, ``capability`` and ``accuracy``, each with
         ``facts``, ``sentences`` and ``tables``, null where the file cannot give it;
         ``joint``, mounting of the shafts and contact law in words; ``fidelity``, a sentence on the fidelity of the
         results; ``provenance``.
@@ -61,6 +63,8 @@ def statistics(view: View, accepted: float = math.nan) -> dict[str, Any]:
         "verdict": None if verdict is None else verdict.values(),
         "joints": {status.label: count for status in Status if (count := view.count(status))},
     }
+    if lives := life_verdicts(view, accepted, samples=0):
+        head["lives"] = [own.values() for own in lives]
     provenance = {
         "created": store.created,
         "git_commit": store.git_commit,

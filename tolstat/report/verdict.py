@@ -13,12 +13,14 @@ from tolstat.display import text
 from tolstat.display.asked import Asked
 from tolstat.display.blocks import Card, Decision, Section, Table, Text
 from tolstat.display.table import Column, as_block, has
+from tolstat.display.verdict import Verdict
 from tolstat.questions import accuracy, shares
 from tolstat.questions.drawings.answer import place_of
 from tolstat.questions.exceedance import rows as exceedance
 from tolstat.questions.exceedance.answer import above
 from tolstat.questions.exceedance.verdicts import WORDS, ends, share_of
 from tolstat.report.headline import Headline, headline, tells_yield
+from tolstat.report.life import life_verdicts
 from tolstat.store.view import View
 
 
@@ -26,9 +28,10 @@ def section(view: View, asked: Asked) -> Section:
     """Decide on the limits: question, verdict, drawing with the worst bushing marked, numbers behind the verdict."""
     found = headline(view, asked.accepted)
     load = found.load if found else next(iter(view.leading), "")
-    head = Decision(
-        question_of(view.store.study_text), _answer(view, found), _cards(view, found), place_of(view, load, asked)
-    )
+    lives = [_life(own) for own in life_verdicts(view, asked.accepted, asked.replay)]
+    first, *others = lives if found is None and lives else [_answer(view, found), *lives]
+    cards = [*others, *_cards(view, found)]
+    head = Decision(question_of(view.store.study_text), first, cards, place_of(view, load, asked))
     notes = (Text(f"{note[0].upper()}{note[1:]}.", small=True) for note in asked.notes)
     return Section("verdict", "Verdict", [head, *_points(view), *notes])
 
@@ -74,6 +77,11 @@ def _answer(view: View, found: Headline | None) -> Card:
         return Card("", f"{why}, so there is no verdict.", "")
     note = " ".join(text.sentence(note) for note in found.notes)
     return Card(found.value, found.words, note, "open" if found.answer in ("none", "searched") else found.answer)
+
+
+def _life(found: Verdict) -> Card:
+    note = " ".join(text.sentence(note) for note in found.notes)
+    return Card(found.value, found.words, note, "open" if found.answer == "none" else found.answer)
 
 
 def _cards(view: View, found: Headline | None) -> list[Card]:

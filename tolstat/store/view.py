@@ -66,6 +66,8 @@ class View:
         Columns of the results that the study keeps; the others are NaN.
     n : int
         Number of samples.
+    study_path : Path, optional
+        Study file that is read in place of the text in the result file.
     """
 
     def __init__(self, store: Reader, study_path: Path | None = None, parts: Sequence[View] = ()) -> None:
@@ -80,7 +82,7 @@ class View:
         self.limits = limits_at(store.limits, self.points, list(store.points))
         self.columns = store.columns
         self.n = store.n - store.first_sample
-        self._study_path = study_path
+        self.study_path = study_path
         self._loads: dict[str, Sample] = {}
         self._kept: dict[Hashable, Any] = {}
         self._at: dict[tuple[str, ...], View] = {self.points: self}
@@ -97,7 +99,7 @@ class View:
         chosen = names_of(selection, self.points, str(self.path))
         if chosen not in self._at:
             parts = [self.parts[self.points.index(name)] for name in chosen]
-            self._at[chosen] = parts[0] if len(parts) == 1 else View(self.store, self._study_path, parts)
+            self._at[chosen] = parts[0] if len(parts) == 1 else View(self.store, self.study_path, parts)
         return self._at[chosen]
 
     def narrowed(self, name: str) -> tuple[View, str]:
@@ -108,7 +110,7 @@ class View:
     @cached_property
     def study(self) -> Study:
         """The study that the file was made from, with its distributions; see `recall` for exceptions."""
-        return recall(self.store, path=self._study_path)
+        return recall(self.store, path=self.study_path)
 
     @cached_property
     def verification(self) -> Verification | None:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -28,8 +29,13 @@ class Settings(Strict):
         examples=[[5.0]],
     )
     revolutions: Annotated[
-        Positive, Field(description="service life in revolutions of the input shaft", examples=[2e7])
-    ] = 1e6
+        Positive | None,
+        Field(
+            description="service life in revolutions of the input shaft; left out: the `required_life` of the bearings "
+            "at the speeds of the study, without it 1e6",
+            examples=[2e7],
+        ),
+    ] = None
     reference_cycles: Annotated[
         Positive, Field(description="number of cycles that the damage-equivalent loads refer to", examples=[2e6])
     ] = 1e6
@@ -55,7 +61,7 @@ class Settings(Strict):
 
     @model_validator(mode="after")
     def _starts_take_revolutions(self) -> Settings:
-        if self.starts > self.revolutions:
+        if self.revolutions is not None and self.starts > self.revolutions:
             raise refuse(
                 "{starts} starts in {revolutions} revolutions", "give at most one for each", "starts", "revolutions"
             )
@@ -87,6 +93,10 @@ class Fatigue:
         Wöhler exponents of the damage-equivalent loads.
     revolutions : float
         Service life, in revolutions of the input shaft.
+    required : bool
+        Whether a service life is required: by the section or, see `within`, by the bearings.
+    hours : float
+        Required life of the bearings that `revolutions` follow from, h; NaN where the section gives them.
     reference_cycles : float
         Number of cycles that the damage-equivalent loads refer to.
     lines : dict
@@ -99,10 +109,46 @@ class Fatigue:
 
     exponents: tuple[float, ...] = (3.0, 5.0, 10.0)
     revolutions: float = 1e6
+    required: bool = False
+    hours: float = math.nan
     reference_cycles: float = 1e6
     lines: dict[str, tuple[float, float, float]] = field(default_factory=dict)
     starts: float = 0.0
     points: tuple[StressPoint, ...] = ()
+
+    def within(self, hours: float, hourly: float, place: str) -> Fatigue:
+        """Settings with the service life that bearings require, unless the section gives one.
+
+        Parameters
+        ----------
+        hours : float
+            Required life of the bearings, h; NaN if there is none.
+        hourly : float
+            Revolutions of the input shaft in an hour, over the duty cycle.
+        place : str
+            File name shown in faults.
+
+        Raises
+        ------
+        InputError
+            When the service life has more starts than revolutions.
+        """
+        found = self
+        if not (self.required or math.isnan(hours)):
+            found = replace(self, revolutions=hours * hourly, required=True, hours=hours)
+        if found.starts > found.revolutions:
+            what = f"{found.starts:g} starts in {found.revolutions:g} revolutions"
+            raise InputError(
+                [Fault(f"{place}: fatigue.starts", what, "give at most one for each, or more revolutions")]
+            )
+        return found
+
+    @property
+    def service_life(self) -> str:
+        """The service life in words."""
+        if math.isnan(self.hours):
+            return f"{self.revolutions:g} revolutions"
+        return f"{self.hours:g} h ({self.revolutions:.4g} revolutions)"
 
 
 def read(table: object, place: str) -> Fatigue:
@@ -135,8 +181,14 @@ def read(table: object, place: str) -> Fatigue:
         points = stress_point.read(_inner(table, "point"), place)
     if faults:
         raise InputError(faults)
+    revolutions = {} if settings.revolutions is None else {"revolutions": settings.revolutions, "required": True}
     return Fatigue(
-        tuple(settings.exponents), settings.revolutions, settings.reference_cycles, lines, settings.starts, points
+        tuple(settings.exponents),
+        reference_cycles=settings.reference_cycles,
+        lines=lines,
+        starts=settings.starts,
+        points=points,
+        **revolutions,  # type: ignore[arg-type]
     )
 
 

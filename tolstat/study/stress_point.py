@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any, NamedTuple
 
+import numpy as np
 from pydantic import AfterValidator, Field, model_validator
 
 from tolstat.analysis.strength import Line
@@ -20,6 +21,10 @@ PerForce = Annotated[float, units.Quantity("1/m^2")]
 PerTorque = Annotated[float, units.Quantity("1/m^3")]
 PositiveStress = Annotated[units.Stress, AfterValidator(units.positive)]
 COMPONENTS = ("F_e", "F_t", "F_z", "T_e", "T_t", "T_z")
+ROUND = {"T_et": ("T_e", "T_t"), "T_tz": ("T_t", "T_z")}
+"""Moments that bend a round section, by the key that gives their stress at its surface: of an arm and of a pin."""
+PLACES = 24
+"""Places around a round section: the stress between two of them is at most 1 - cos(7.5 deg), 0.9 %, above theirs."""
 
 
 def _per(what: str) -> str:
@@ -31,7 +36,10 @@ def _found(name: str, other: str, value: float | None) -> str:
 
 
 class StressPointEntry(Strict):
-    """Point of a part: its stress is a sum of the bushing's load components, each times a factor."""
+    """Point of a part: its stress is a sum of the bushing's load components, each times a factor.
+
+    A round section has no one point where bending about two axes is largest: it is evaluated all around.
+    """
 
     bushing: Annotated[
         str, Field(description="bushing whose load stresses the point, or pattern of several", examples=["fork*"])
@@ -42,6 +50,14 @@ class StressPointEntry(Strict):
     T_e: Annotated[PerTorque, Field(description=_per("torque about e"), examples=["0.2 MPa/(N*m)"])] = 0.0
     T_t: Annotated[PerTorque, Field(description=_per("torque about t"), examples=["-0.2 MPa/(N*m)"])] = 0.0
     T_z: Annotated[PerTorque, Field(description=_per("torque about z"), examples=["0.1 MPa/(N*m)"])] = 0.0
+    T_et: Annotated[
+        PerTorque,
+        Field(description="bending of a round arm: as T_e and T_t, all around it", examples=["0.2 MPa/(N*m)"]),
+    ] = 0.0
+    T_tz: Annotated[
+        PerTorque,
+        Field(description="bending of a round pin: as T_t and T_z, all around it", examples=["0.2 MPa/(N*m)"]),
+    ] = 0.0
     k: Annotated[Exponent, Field(description="exponent of the S–N line above the knee", examples=[3])]
     k_2: Annotated[
         units.Number | None,
@@ -76,7 +92,7 @@ class StressPointEntry(Strict):
 
     @model_validator(mode="after")
     def _complete(self) -> StressPointEntry:
-        if not any(self.per_load):
+        if not any(map(any, self.per_load)):
             raise refuse("no load stresses the point", 'give a stress per load, for example T_e = "0.2 MPa/(N*m)"')
         if (self.S_D is None) == (self.S_aD is None):
             raise refuse(_found("S_D", "S_aD", self.S_D), "give one of them: S_D is a range, S_aD an amplitude")
@@ -87,9 +103,18 @@ class StressPointEntry(Strict):
         return self
 
     @property
-    def per_load(self) -> tuple[float, ...]:
-        """Stress per load component, in the order of `COMPONENTS`, 1/m^2 and 1/m^3."""
-        return tuple(float(getattr(self, name)) for name in COMPONENTS)
+    def per_load(self) -> tuple[tuple[float, ...], ...]:
+        """Stress per load component at each place, in the order of `COMPONENTS`, 1/m^2 and 1/m^3."""
+        factors = np.array([float(getattr(self, name)) for name in COMPONENTS])
+        bent = {pair: value for name, pair in ROUND.items() if (value := float(getattr(self, name)))}
+        places = []
+        for angle in 2.0 * np.pi * np.arange(PLACES if bent else 1) / PLACES:
+            own = factors.copy()
+            for (first, second), value in bent.items():
+                own[COMPONENTS.index(first)] += value * np.cos(angle)
+                own[COMPONENTS.index(second)] += value * np.sin(angle)
+            places.append(tuple(own.tolist()))
+        return tuple(places)
 
     @property
     def line(self) -> Line:
@@ -111,15 +136,16 @@ class StressPoint(NamedTuple):
         Name in the study; with the bushing where the study names several.
     bushing : str
         One of `load_kinds.BUSHINGS`.
-    per_load : tuple of float
-        Stress per load component along e, t, z: three forces, 1/m^2, and three torques, 1/m^3.
+    per_load : tuple of tuple of float
+        Stress per load component along e, t, z, three forces, 1/m^2, and three torques, 1/m^3: at one place or, of a
+        round section, at several around it, of which the part fails at the worst.
     line : Line
         S–N line.
     """
 
     name: str
     bushing: str
-    per_load: tuple[float, ...]
+    per_load: tuple[tuple[float, ...], ...]
     line: Line
 
 

@@ -4,44 +4,33 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import asdict
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tolstat.analysis.binomial import unresolved_matter
-from tolstat.analysis.rating_life import A1
-from tolstat.analysis.sample import Sample, total_interval
+from tolstat.analysis.binomial import needed, unresolved_matter
+from tolstat.analysis.rating_life import A1, FRETTING
 from tolstat.common.errors import NotApplicable
-from tolstat.common.load_kinds import PINS
-from tolstat.common.tables import LIFE_EXPONENT, VALID, Mode
+from tolstat.common.tables import VALID
 from tolstat.display import style, text
 from tolstat.display.answer import Answer, Part, Sentence, Table
 from tolstat.display.asked import Asked
 from tolstat.display.blocks import Panel, Panels
 from tolstat.display.mpl import ticker
-from tolstat.display.table import Column, Row, Rows, has, has_unresolved
-from tolstat.questions.bearing_life.lives import JOINT, PLACES, Lives, lives_of
-from tolstat.store import points
+from tolstat.display.table import Column, Row, Rows, by_share, has, has_unresolved, of_shares
+from tolstat.display.verdict import Verdict, on_share
+from tolstat.questions.bearing_life import lives as rating
+from tolstat.questions.bearing_life.lives import JOINT, SHARES, Lives
 from tolstat.store.view import View
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-SHARES = (0.5, 0.9, 0.99)
-"""Shares of the joints that reach a life."""
-CONFIDENCE = 0.95
-ANY = "any"
-"""At least one of the four bearings."""
-MOSTLY = 0.5
-"""Share of a revolution above which a bearing counts as loaded in a mode."""
-LOADED = {"one_end": Mode.ONE_POINT, "opposite_ends": Mode.TWO_POINT, "along": Mode.UNIFORM}
-"""Contact mode of each way to load a bearing."""
 FEW = "needs more joints"
-PLACE_NAMES = {JOINT: "all four", ANY: "at least one"}
-LIFE_UNITS = dict.fromkeys(("nominal", "estimate", "lower", "upper", "bound_lower", "bound_upper"), "h")
-LIFE_UNITS |= dict.fromkeys(("rating", "rating_lower", "rating_upper"), "N")
+PLACE_NAMES = {JOINT: "all four", rating.ANY: "at least one"}
+UNITS = dict.fromkeys(("nominal", "estimate", "lower", "upper", "bound_lower", "bound_upper"), "h")
+UNITS |= dict.fromkeys(("rating", "rating_lower", "rating_upper"), "N")
 
 
 def _hours(life: float) -> str:
@@ -63,29 +52,20 @@ def _undecided(row: Row) -> bool:
     return bool(without == row["n"] or unresolved_matter(row["count"], row["n"], without))
 
 
-def _life_of(share: float) -> Column:
-    head, rank = f"{100.0 * share:g} % reach", 0 if share == SHARES[-1] else 1
-    return Column(head, lambda row: _hours(row[share]["estimate"]), rank=rank)
-
-
-def _load_of(share: float) -> Column:
-    return Column(f"{100.0 * share:g} % up to", lambda row: text.value(row[share]["load"], "N"))
-
-
 BEARING = Column("bearing", lambda row: PLACE_NAMES.get(row["place"], str(row["place"])))
 LIVES = (
     BEARING,
     Column("nominal", lambda row: _hours(row[SHARES[-1]]["nominal"]), rank=2),
-    *map(_life_of, SHARES),
+    *of_shares(SHARES, "reach", lambda row: _hours(row["estimate"]), rank=1),
     Column(f"95 % interval of {100.0 * SHARES[-1]:g} %", lambda row: _span(row[SHARES[-1]])),
 )
-"""Columns of the table ``lives``, arranged by `_by_place`."""
+"""Columns of the table ``lives``, arranged by place."""
 LOADS = (
     BEARING,
     Column("nominal", lambda row: text.value(row[SHARES[-1]]["nominal_load"], "N")),
-    *map(_load_of, SHARES),
+    *of_shares(SHARES, "up to", lambda row: text.value(row["load"], "N")),
 )
-"""Columns of the table ``loads``, arranged by `_by_place`."""
+"""Columns of the table ``loads``, arranged by place."""
 BELOW = (
     BEARING,
     Column("below", lambda row: f"{row['count']} of {row['n'] - row['n_failed'] - row['n_unsettled']}"),
@@ -132,16 +112,17 @@ def bearing_life(view: View) -> Answer:
     -------
     Answer
         Tables ``lives`` (see `life_rows`), ``below_required`` (see `below_rows`), ``loads`` (see `load_rows`) and
-        ``contacts`` (see `contact_rows`), the first two only if a joint has a rating. Facts ``symbol`` of the life,
-        ``critical_amplitude`` (rad), ``unrated`` and ``load_error``, see `lives.Lives`. Lives are in hours.
+        ``contacts`` (see `contact_rows`), the first two only if a joint has a rating. Lives are in hours. Facts
+        ``symbol`` of the life, ``critical_amplitude`` (rad), ``unrated``, ``short``, ``fretting`` and ``load_error``,
+        see `lives.Lives`.
 
     Raises
     ------
     NotApplicable, StoreError, InputError
         See `lives.lives_of`.
     """
-    lives = lives_of(view)
-    found, below, contacts = life_rows(lives), below_rows(lives), contact_rows(view)
+    lives = rating.lives_of(view)
+    found, below, contacts = rating.life_rows(lives), rating.below_rows(lives), rating.contact_rows(view)
     first, *others = _verdict(lives, below, found)
     parts: list[Part] = [Sentence(text.sentence(first), "lead"), *map(Sentence, others)]
     rate = lives.rate(JOINT)
@@ -150,16 +131,20 @@ def bearing_life(view: View) -> Answer:
         parts.append(Panels([Panel("lives", "Life of the joints", said, partial(_draw, lives=lives), (6.4, 3.5))]))
     if lives.unrated < lives.valid:
         title = f"Life {lives.bearing.symbol} that a share of the joints reaches"
-        parts.append(Table("lives", title, LIVES, found, LIFE_UNITS, _by_place(found)))
+        parts.append(Table("lives", title, LIVES, found, UNITS, by_share(found, "place")))
         title = f"Joints that do not reach the required {_hours(lives.required)}"
         parts += [Table("below_required", title, BELOW, below, {"required": "h"})] if below else []
-    loads, title = load_rows(lives), "Dynamic equivalent load P of a bearing, which a share of the joints stays below"
-    parts.append(Table("loads", title, LOADS, loads, dict.fromkeys(("nominal_load", "load"), "N"), _by_place(loads)))
+    loads, title = (
+        rating.load_rows(lives),
+        "Dynamic equivalent load P of a bearing, which a share of the joints stays below",
+    )
+    units = {"nominal_load": "N", "load": "N"}
+    parts.append(Table("loads", title, LOADS, loads, units, by_share(loads, "place")))
     if contacts:
         title = "Joints in which a bearing is loaded so for more than half of a revolution"
         parts.append(Table("contacts", title, CONTACTS, contacts, dict.fromkeys(list(contacts[0])[1:], "1")))
-    facts = {"symbol": lives.bearing.symbol, "critical_amplitude": lives.bearing.critical_amplitude}
-    facts |= {"unrated": lives.unrated, "load_error": lives.load_error}
+    facts: dict[str, Any] = {name: getattr(lives.bearing, name) for name in ("symbol", "critical_amplitude")}
+    facts |= {name: getattr(lives, name) for name in ("unrated", "short", "fretting", "load_error")}
     return Answer("bearing_life", "Bearing life", [*parts, *map(Sentence, _notes(lives, contacts))], facts)
 
 
@@ -170,155 +155,95 @@ def bearing_life_on_page(view: View, asked: Asked) -> Answer:
     return bearing_life(view)
 
 
-def life_rows(lives: Lives) -> Rows:
-    """Life that a share of the joints reaches.
-
-    Returns
-    -------
-    sequence of mapping
-        One row per place of `PLACES` and share: ``place``, ``share``; lives in h: ``nominal``, ``estimate``, ``lower``,
-        ``upper``, ``bound_lower``, ``bound_upper`` (joints without a life among the shortest, the longest); ``rating``
-        (N, load rating C with which the share reaches the required life) with ``_lower`` and ``_upper``; ``n``,
-        ``n_failed`` (those without a rating included), ``n_unsettled``, ``confidence``. Ends are 0 or infinite where
-        the joints are too few.
-    """
-    rows = []
-    for rate in map(lives.rate, PLACES):
-        for share in SHARES:
-            q = rate.quantile(share, CONFIDENCE)
-            row = {"place": rate.name, "share": share, "nominal": _life(rate.nominal), "estimate": _life(q.estimate)}
-            row |= {"lower": _life(q.upper), "upper": _life(q.lower)}
-            row |= {"bound_lower": _life(q.bound_upper), "bound_upper": _life(q.bound_lower)}
-            rates = {"rating": q.estimate, "rating_lower": q.lower, "rating_upper": q.upper}
-            row |= {name: _rating(value, lives) for name, value in rates.items()}
-            row |= {"n": q.n, "n_failed": q.n_failed, "n_unsettled": q.n_unsettled, "confidence": CONFIDENCE}
-            rows.append(row)
-    return rows
-
-
-def load_rows(lives: Lives) -> Rows:
-    """Dynamic equivalent load that a share of the joints stays at or below.
-
-    Returns
-    -------
-    sequence of mapping
-        One row per bearing and share: ``place``, ``share``, ``nominal_load`` and ``load``, N.
-    """
-    return [
-        {"place": pin, "share": share, "nominal_load": load.nominal, "load": load.quantile(share).estimate}
-        for pin, load in zip(PINS, map(lives.load, PINS), strict=True)
-        for share in SHARES
-    ]
-
-
-def below_rows(lives: Lives) -> Rows:
-    """Share of the joints whose life is below the required one.
-
-    Returns
-    -------
-    sequence of mapping
-        One row per place of `PLACES`: ``place``, ``required`` (h), the fields of `analysis.estimates.Exceedance` but
-        its level (``count`` are the joints below the required life; bounds have joints without a life above and
-        below), ``total_lower`` and ``total_upper`` (cover sampling, joints without a life and, if known, the numerical
-        error), ``confidence``. No rows without a required life.
-    """
-    rows = []
-    for place in PLACES if np.isfinite(lives.required) else ():
-        rate, level = lives.rate(place), 1.0 / lives.required
-        row = {"place": place, "required": lives.required} | asdict(rate.above(level, CONFIDENCE))
-        del row["level"]
-        low, high = total_interval(_with_error(rate, lives.load_error), level, CONFIDENCE)
-        rows.append(row | {"total_lower": low, "total_upper": high, "confidence": CONFIDENCE})
-    return rows
-
-
-def contact_rows(view: View) -> Rows:
-    """Share of the joints in which a bearing is mostly loaded at one end, at opposite ends, or along its length.
-
-    Of several operating points each counts by its share of the revolutions.
-
-    Returns
-    -------
-    sequence of mapping
-        One row per pin, and one for `ANY` of them: ``place``; ``one_end``, ``opposite_ends`` and ``along``, shares of
-        the joints in which this holds for more than `MOSTLY` of a revolution, with ``_lower`` and ``_upper``.
-        No rows if the study does not keep the contact modes.
-    """
-    if sum(column.field == "mode_share" for column in view.columns) < len(PINS) * len(Mode):
-        return []
-    modes = [part.read_results(("mode_share",))["mode_share"] for part in view.parts]
-    spent = np.tensordot(points.shares_of_revolutions(view), np.stack(modes), 1)
-    rows = []
-    for place in (*PINS, ANY):
-        own = spent[:, [PINS.index(place)]] if place in PINS else spent
-        row: dict[str, Any] = {"place": place}
-        for name, mode in LOADED.items():
-            found = Sample.of(own[:, :, mode].max(axis=1), view.status, view.design).above(MOSTLY, CONFIDENCE)
-            row |= {name: found.estimate, f"{name}_lower": found.lower, f"{name}_upper": found.upper}
-        rows.append(row)
-    return rows
-
-
-def _by_place(rows: Rows) -> Rows:
-    """One row per place: for each share its row."""
-    found: dict[str, dict[Any, Any]] = {}
-    for row in rows:
-        found.setdefault(row["place"], {"place": row["place"]})[row["share"]] = row
-    return list(found.values())
-
-
-def _rating(rate: float, lives: Lives) -> float:
-    """Load rating, N, of bearings with which a life of so many 1/h becomes the required one."""
-    return float(lives.bearing.C * (max(rate, 0.0) * lives.required) ** (1.0 / LIFE_EXPONENT))
-
-
-def _life(rate: float) -> float:
-    """Reciprocal, h; a rate of zero or of no joint (-inf) is an infinite life."""
-    return np.inf if rate <= 0.0 else 1.0 / rate
-
-
-def _with_error(rate: Sample, error: float) -> tuple[Sample, ...]:
-    """Rates, and those with equivalent loads reduced and increased by their numerical error if it is known."""
-    if np.isnan(error):
-        return (rate,)
-    factors = (max(0.0, 1.0 - error) ** LIFE_EXPONENT, (1.0 + error) ** LIFE_EXPONENT)
-    return rate, *(rate.shifted((factor - 1.0) * rate.values) for factor in factors)
-
-
 def _verdict(lives: Lives, below: Rows, found: Rows) -> list[str]:
     """Sentences on the required life, or on why there is none to judge; the first is the answer."""
     if lives.valid and lives.unrated == lives.valid:
         return [f"no rating: {_why_unrated(lives, 'every joint')}"]
     if not below:
         return ["no required life is given: bearing.required_life"]
-    row = below[-1]
-    without, required = row["n_failed"] + row["n_unsettled"], f"the required {_hours(lives.required)}"
-    bounds = f"{text.span(row['bound_lower'], row['bound_upper'])} with joints without a life counted above, then below"
+    row, required = below[-1], f"the required {_hours(lives.required)}"
     if _undecided(row):
-        return [f"no verdict: {without} of {row['n']} joints have no life; below {required} are {bounds}"]
+        return [f"no verdict: {_without(row)}; below {required} are {_bounds(row)}"]
     low, high = row["total_lower"], row["total_upper"]
     interval = "" if math.isnan(low) else f" (total interval {text.span(low, high)})"
     said = [f"{text.percent(row['estimate'])} of the joints{interval} do not reach {required}"]
-    said += [f"{without} of {row['n']} joints have no life: {bounds}"] if without else []
-    return [*said, *_better_bearings(found[-1])]
+    said += [f"{_without(row)}: {_bounds(row)}"] if row["n_failed"] + row["n_unsettled"] else []
+    best = found[-1]  # all four bearings, the largest share
+    low, high = (best[f"rating_{end}"] / 1e3 for end in ("lower", "upper"))
+    ends = f" (95 % interval {text.number(low)} .. {FEW if math.isinf(high) else f'{text.number(high)} kN'})"
+    if best["rating"] > 0.0:
+        better = f"C = {text.number(best['rating'] / 1e3)} kN{'' if math.isnan(low) else ends}"
+        said.append(f"{100.0 * best['share']:g} % of the joints reach it with {better}")
+    return said
 
 
-def _better_bearings(row: Row) -> list[str]:
-    """Sentence on the load rating with which the share of a row of `life_rows` reaches the required life."""
-    if not row["rating"] > 0.0:
+def _without(row: Row) -> str:
+    return f"{row['n_failed'] + row['n_unsettled']} of {row['n']} joints have no life"
+
+
+def _bounds(row: Row) -> str:
+    return f"{text.span(row['bound_lower'], row['bound_upper'])} with joints without a life counted above, then below"
+
+
+def life_verdicts(view: View, accepted: float = math.nan) -> list[Verdict]:
+    """Verdict on the required life of the bearings; none if no life is required.
+
+    Parameters
+    ----------
+    view : View
+        As in `bearing_life`.
+    accepted : float
+        Accepted share: share of the joints that may have a shorter life; NaN if none is given.
+
+    Raises
+    ------
+    NotApplicable, StoreError, InputError
+        See `lives.lives_of`.
+    """
+    bearing = rating.bearing_of(view)
+    if bearing is None or bearing.required_life is None:
         return []
-    low, high = row["rating_lower"], row["rating_upper"]
-    top = FEW if math.isinf(high) else f"{text.number(high / 1e3)} kN"
-    ends = "" if math.isnan(low) else f" (95 % interval {text.number(low / 1e3)} .. {top})"
-    return [f"{100.0 * row['share']:g} % of the joints reach it with C = {text.number(row['rating'] / 1e3)} kN{ends}"]
+    lives = rating.lives_of(view)
+    row, undecided = rating.below_rows(lives)[-1], ""
+    if lives.valid and lives.unrated == lives.valid:
+        undecided = f"no bearing has a rating: {_why_unrated(lives, 'every joint')}"
+    elif _undecided(row):
+        undecided = f"{_without(row)}; shorter than required are {_bounds(row)}"
+    what, ends = f"have a bearing life below {_hours(lives.required)}", (row["total_lower"], row["total_upper"])
+    reason = lives.view.design.without_interval("share")
+    found = on_share("bearing life", what, row, ends, accepted, lambda end: needed(end, accepted), reason, undecided)
+    return [found._replace(notes=tuple(_at_points(lives)))]
 
 
 def _why_unrated(lives: Lives, joints: str) -> str:
-    angle = f"{math.degrees(lives.bearing.critical_amplitude):.3g} deg"
+    each = " at each of its operating points" if len(lives.duty) > 1 else ""
     return (
-        f"{joints} swings by less than {angle} to either side, so that the tracks of neighbouring needles do not "
-        "overlap; the rating life does not hold there, since the lubricant between needles and raceways is not renewed"
+        f"{joints} swings by less than {_angle(lives, FRETTING)} to either side{each}, half of the angle from which on "
+        "the tracks of neighbouring needles overlap; the lubricant between needles and raceways is not renewed there, "
+        "and fretting, which no rating covers, is to be expected"
     )
+
+
+def _angle(lives: Lives, part: float = 1.0) -> str:
+    return f"{math.degrees(part * lives.bearing.critical_amplitude):.3g} deg"
+
+
+def _at_points(lives: Lives) -> Iterator[str]:
+    """Sentences on points at which joints swing by less than the critical amplitude, and on a selection of points."""
+    for point, number in lives.short.items() if lives.unrated < lives.valid else ():
+        time = f", {text.percent(lives.duty[point])} of the time," if len(lives.duty) > 1 else ""
+        where = f"at {point}{time} " if point else ""
+        swinging = "every joint swings" if number == lives.valid else f"{number} of {lives.valid} joints swing"
+        words = (
+            f"{where}{swinging} by less than {_angle(lives)} to either side: the tracks of neighbouring needles do not "
+            "overlap, and the life is that of the smaller volume that they stress"
+        )
+        if fretting := lives.fretting.get(point, 0):
+            joints = "they swing" if fretting == number else f"{fretting} of them swing"
+            words += f". As {joints} by less than half of this, fretting, which no rating covers, may end it earlier"
+        yield words
+    if len(lives.duty) < len(lives.view.store.points):
+        yield f"as though all of the service were at {' and '.join(lives.duty)}"
 
 
 def _notes(lives: Lives, contacts: Rows) -> Iterator[str]:
@@ -345,11 +270,12 @@ def _notes(lives: Lives, contacts: Rows) -> Iterator[str]:
         )
     else:
         yield f"{edge}; the study keeps no contact modes, which tell how many bearings have it"
+    yield from _at_points(lives)
     if 0 < lives.unrated < lives.valid:
         yield f"{lives.unrated} of {lives.valid} joints have no rating: {_why_unrated(lives, 'each of them')}"
     if lives.load_error > 0.0:
         yield f"numerical error of an equivalent load: {text.percent(lives.load_error)}, in the total interval"
-    if not lives.design.has_interval("quantile"):
+    if not lives.view.design.has_interval("quantile"):
         yield "no intervals: they hold for independent samples only"
 
 
@@ -359,7 +285,7 @@ def _draw(ax: Axes, lives: Lives) -> None:
     table = rate.curve(np.unique(rate.valid))[::-1]
     x, floor = 1.0 / table["level"], 0.5 / float(table["n"][0])
     shares = {name: table[name].clip(floor, 1.0) for name in ("outer_lower", "estimate", "outer_upper")}
-    if lives.design.has_interval("quantile"):
+    if lives.view.design.has_interval("quantile"):
         band = shares["outer_lower"], shares["outer_upper"]
         ax.fill_between(x, *band, step="pre", color=style.COLOURS[0], alpha=0.2, lw=0, label="95 % band")
     ax.step(x, shares["estimate"], where="pre", color=style.COLOURS[0])

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tolstat.analysis import accuracy
-from tolstat.analysis.design import Design
-from tolstat.analysis.rating_life import basic_life, system_life, turns_per_revolution
-from tolstat.analysis.sample import Sample
+from tolstat.analysis.rating_life import FRETTING, basic_life, system_life, turns_per_revolution
+from tolstat.analysis.sample import Sample, total_interval
 from tolstat.common.errors import Fault, NotApplicable, StoreError
 from tolstat.common.load_kinds import PINS
 from tolstat.common.loads import FloatArray
-from tolstat.common.tables import LIFE_EXPONENT, VALID
-from tolstat.joint import Bearing, operating
+from tolstat.common.tables import LIFE_EXPONENT, VALID, Mode
+from tolstat.display.table import Rows
+from tolstat.joint import Bearing, Operation, operating
 from tolstat.joint.bearing import FOR_LIFE
 from tolstat.store import points
 from tolstat.store.recorded import joint_of
@@ -25,16 +25,27 @@ from tolstat.store.view import View
 JOINT = "joint"
 PLACES = (*PINS, JOINT)
 """Bearings, named by their pins, and the joint: it lasts until the first of its four bearings fails."""
+ANY = "any"
+"""At least one of the four bearings."""
+SHARES = (0.5, 0.9, 0.99)
+"""Shares of the joints that reach a life."""
+CONFIDENCE = 0.95
+MOSTLY = 0.5
+"""Share of a revolution above which a bearing counts as loaded in a mode."""
+LOADED = {"one_end": Mode.ONE_POINT, "opposite_ends": Mode.TWO_POINT, "along": Mode.UNIFORM}
+"""Contact mode of each way to load a bearing."""
 HOUR = 3600.0
-OPERATION = ("operation.alpha", "operation.speed", "operation.torque")
+OPERATION = tuple(f"operation.{name}" for name in Operation.model_fields)
 
 
 @dataclass(frozen=True, eq=False)
 class Lives:
-    """Rating lives of n joints.
+    """Rating lives of the n joints of a view.
 
     Attributes
     ----------
+    view : View
+        The campaign.
     bearing : Bearing
         Section ``[bearing]`` of the joint.
     duty : dict of str to float
@@ -45,31 +56,31 @@ class Lives:
         Life of each bearing and of the joint, as in `PLACES`, h; NaN without a result or without a rating.
     nominal_loads, nominal_hours : ndarray, shape (4,) and (5,)
         The same of the nominal joint; NaN if there is none.
+    short, fretting : dict of str to int
+        Valid joints by operating point that swing by less than ``bearing.critical_amplitude`` there, and by less than
+        `rating_life.FRETTING` times this; only points that have any.
     unrated : int
-        Valid joints without a rating: their misalignment is below ``bearing.critical_amplitude``.
+        Valid joints without a rating: fretting is to be expected at each of their operating points.
     load_error : float
         Relative numerical error of an equivalent load that 95 % of the checked joints stay below; NaN if unknown.
-    status : ndarray, shape (n,)
-        `tables.Status` of each joint.
-    design : Design
-        How the joints were drawn.
     """
 
+    view: View
     bearing: Bearing
     duty: Mapping[str, float]
     loads: FloatArray
     hours: FloatArray
     nominal_loads: FloatArray
     nominal_hours: FloatArray
+    short: Mapping[str, int]
+    fretting: Mapping[str, int]
     unrated: int
     load_error: float
-    status: NDArray[np.uint8]
-    design: Design
 
     @property
     def valid(self) -> int:
         """Number of joints with a valid result."""
-        return int(np.isin(self.status, VALID).sum())
+        return self.view.count(*VALID)
 
     @property
     def required(self) -> float:
@@ -81,17 +92,19 @@ class Lives:
         k = PLACES.index(place)
         with np.errstate(divide="ignore"):
             nominal, values = 1.0 / self.nominal_hours[k], 1.0 / self.hours[:, k]
-        return Sample.of(values, self.status, self.design, name=place, unit="1/h", nominal=nominal)
+        return Sample.of(values, self.view.status, self.view.design, name=place, unit="1/h", nominal=nominal)
 
     def load(self, pin: str) -> Sample:
         """Dynamic equivalent load of a pin's bearing, N."""
         k = PINS.index(pin)
         nominal, values = float(self.nominal_loads[k]), self.loads[:, k]
-        return Sample.of(values, self.status, self.design, name=pin, unit="N", nominal=nominal)
+        return Sample.of(values, self.view.status, self.view.design, name=pin, unit="N", nominal=nominal)
 
 
 def lives_of(view: View) -> Lives:
     """Rating lives of the joints of a campaign.
+
+    Operating points count by the turns that the bearings make there (Palmgren 1924, Miner 1945; ISO 281).
 
     Parameters
     ----------
@@ -102,41 +115,58 @@ def lives_of(view: View) -> Lives:
     Raises
     ------
     NotApplicable
-        When the joint has no such section.
+        When the joint has no such section, in the file or in the study that the view reads in its place.
     StoreError
         When the section lacks a key, the equivalent loads are not kept, or the joints are no sample.
     InputError
         When the view has several operating points, and the study does not give their shares of the time.
     """
     view.check("quantile")
-    bearing = _bearing(view)
-    duty = points.shares_of_time(view).tolist()
-    samples = np.arange(view.n)
-    operation = [operating(part.store.operation, part.errors(samples, OPERATION)) for part in view.parts]
-    results = [part.read_results(("equivalent_load",)) for part in view.parts]
-    loads, hours = _lives(duty, results, operation, bearing)
-    nominal_loads, nominal_hours = np.full(len(PINS), np.nan), np.full(len(PLACES), np.nan)
-    if len(view.nominal):
-        ideal = [operating(part.store.operation, part.store.errors(slice(0, 1))) for part in view.parts]
-        found = _lives(duty, [part.nominal for part in view.parts], ideal, bearing)
-        nominal_loads, nominal_hours = found[0][0], found[1][0]
-    return Lives(
-        bearing=bearing,
-        duty=dict(zip(view.points, duty, strict=True)),
-        loads=loads,
-        hours=hours,
-        nominal_loads=nominal_loads,
-        nominal_hours=nominal_hours,
-        unrated=int((np.isin(view.status, VALID) & _unrated(operation, bearing)).sum()),
-        load_error=_load_error(view),
-        status=view.status,
-        design=view.design,
+    bearing, duty, stores = _bearing(view), points.shares_of_time(view), [part.store for part in view.parts]
+    loads = np.stack([store.results(slice(None), ("equivalent_load",))["equivalent_load"] for store in stores])
+    operation = [operating(store.operation, store.errors(slice(None), OPERATION)) for store in stores]
+    swings, speeds = (np.abs([own[name] for own in operation]) for name in ("alpha", "speed"))  # (points, rows)
+    critical = bearing.critical_amplitude
+    hourly = duty[:, None] * speeds / (2.0 * np.pi) * turns_per_revolution(swings, critical) * HOUR
+    turns = hourly.sum(axis=0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        weights = np.where(turns > 0.0, hourly / turns, duty[:, None])[:, :, None]
+        largest = loads.max(axis=0)
+        relative = np.where(largest > 0.0, loads / largest, 0.0 * loads)
+        load = largest * (weights * relative**LIFE_EXPONENT).sum(axis=0) ** (1.0 / LIFE_EXPONENT)
+        pins = bearing.factor * basic_life(load, bearing.C) / turns[:, None]
+    hours = np.column_stack([pins, system_life(pins)])
+    small = [swings < part * critical * (1.0 - 1e-9) for part in (1.0, FRETTING)]
+    unrated = np.asarray(small[1].all(axis=0))
+    hours[unrated] = np.nan
+    skip, valid, has_nominal = view.store.first_sample, np.isin(view.status, VALID), len(view.nominal) > 0
+    short, fretting = (
+        {name: int(n) for name, n in zip(view.points, (own[:, skip:] & valid).sum(axis=1), strict=True) if n}
+        for own in small
     )
+    return Lives(
+        view=view,
+        bearing=bearing,
+        duty=dict(zip(view.points, duty.tolist(), strict=True)),
+        loads=load[skip:],
+        hours=hours[skip:],
+        nominal_loads=load[0] if has_nominal else np.full(len(PINS), np.nan),
+        nominal_hours=hours[0] if has_nominal else np.full(len(PLACES), np.nan),
+        short=short,
+        fretting=fretting,
+        unrated=int((unrated[skip:] & valid).sum()),
+        load_error=_load_error(view),
+    )
+
+
+def bearing_of(view: View) -> Bearing | None:
+    """Section ``[bearing]`` of the joint of a file, or of the study that is read in place of the one in it."""
+    return (view.study.joint if view.study_path else joint_of(view.store, 0)).bearing
 
 
 def _bearing(view: View) -> Bearing:
     """Section ``[bearing]`` of the joint of a file, with all that a life needs."""
-    bearing, place = joint_of(view.store, 0).bearing, str(view.path)
+    bearing, place = bearing_of(view), str(view.path)
     again = "then repeat tolstat run: no joint is simulated again"
     if bearing is None:
         remedy = f"add the section [bearing] to the joint file or [joint.bearing] to the study, {again}"
@@ -148,52 +178,6 @@ def _bearing(view: View) -> Bearing:
         remedy = 'add "pin*.equivalent_load" to [output] results of the study'
         raise StoreError(str(Fault(place, "does not keep the equivalent loads of the bearings", remedy)))
     return bearing
-
-
-def _unrated(operation: Sequence[Mapping[str, FloatArray]], bearing: Bearing) -> NDArray[np.bool_]:
-    """Whether a joint swings too little for a rating, at one operating point at least, (m,)."""
-    least = np.min([np.abs(own["alpha"]) for own in operation], axis=0)
-    return np.asarray(least < bearing.critical_amplitude * (1.0 - 1e-9))
-
-
-def _lives(
-    duty: Sequence[float],
-    results: Sequence[NDArray[np.void]],
-    operation: Sequence[Mapping[str, FloatArray]],
-    bearing: Bearing,
-) -> tuple[FloatArray, FloatArray]:
-    """Equivalent loads, (m, 4), N, and lives of bearings and joint, (m, 5), h, over a duty cycle.
-
-    Operating points count by the turns that the bearings make there (Palmgren 1924, Miner 1945; ISO 281).
-
-    Parameters
-    ----------
-    duty : sequence of float
-        Share of the time at each operating point; the sum is 1.
-    results : sequence of ndarray, shape (m,)
-        Tables with ``equivalent_load``, (m, 4), N, at each point.
-    operation : sequence of mapping
-        ``alpha`` (rad) and ``speed`` (rad/s) of the joints at each point, (m,).
-    bearing : Bearing
-        The bearings.
-    """
-    loads = np.stack([table["equivalent_load"] for table in results])
-    hourly = np.stack(
-        [
-            share * np.abs(own["speed"]) / (2.0 * np.pi) * turns_per_revolution(own["alpha"]) * HOUR
-            for share, own in zip(duty, operation, strict=True)
-        ]
-    )
-    turns = hourly.sum(axis=0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        weights = np.where(turns > 0.0, hourly / turns, np.array(duty)[:, None])[:, :, None]
-        largest = loads.max(axis=0)
-        relative = np.where(largest > 0.0, loads / largest, 0.0 * loads)
-        load = largest * (weights * relative**LIFE_EXPONENT).sum(axis=0) ** (1.0 / LIFE_EXPONENT)
-        pins = bearing.factor * basic_life(load, bearing.C) / turns[:, None]
-    hours = np.column_stack([pins, system_life(pins)])
-    hours[_unrated(operation, bearing)] = np.nan
-    return load, hours
 
 
 def _load_error(view: View) -> float:
@@ -210,3 +194,100 @@ def _load_error(view: View) -> float:
         for name, check in view.verification.checks.items()
     }
     return accuracy.spread(accuracy.estimate(changes).max(axis=1)).usual
+
+
+def life_rows(lives: Lives) -> Rows:
+    """Life that a share of the joints reaches.
+
+    Returns
+    -------
+    sequence of mapping
+        One row per place of `PLACES` and share: ``place``, ``share``; lives in h: ``nominal``, ``estimate``, ``lower``,
+        ``upper``, ``bound_lower``, ``bound_upper`` (joints without a life among the shortest, the longest); ``rating``
+        (N, load rating C with which the share reaches the required life) with ``_lower`` and ``_upper``; ``n``,
+        ``n_failed`` (those without a rating included), ``n_unsettled``, ``confidence``. Ends are 0 or infinite where
+        the joints are too few.
+    """
+
+    def life(rate: float) -> float:
+        return np.inf if rate <= 0.0 else 1.0 / rate  # no joint: -inf
+
+    def rating(rate: float) -> float:
+        return float(lives.bearing.C * (max(rate, 0.0) * lives.required) ** (1.0 / LIFE_EXPONENT))
+
+    rows = []
+    for rate in map(lives.rate, PLACES):
+        for share in SHARES:
+            q = rate.quantile(share, CONFIDENCE)
+            row = {"place": rate.name, "share": share, "nominal": life(rate.nominal), "estimate": life(q.estimate)}
+            row |= {"lower": life(q.upper), "upper": life(q.lower)}
+            row |= {"bound_lower": life(q.bound_upper), "bound_upper": life(q.bound_lower)}
+            row |= {"rating": rating(q.estimate), "rating_lower": rating(q.lower), "rating_upper": rating(q.upper)}
+            row |= {"n": q.n, "n_failed": q.n_failed, "n_unsettled": q.n_unsettled, "confidence": CONFIDENCE}
+            rows.append(row)
+    return rows
+
+
+def load_rows(lives: Lives) -> Rows:
+    """Dynamic equivalent load that a share of the joints stays at or below.
+
+    Returns
+    -------
+    sequence of mapping
+        One row per bearing and share: ``place``, ``share``, ``nominal_load`` and ``load``, N.
+    """
+    return [
+        {"place": pin, "share": share, "nominal_load": load.nominal, "load": load.quantile(share).estimate}
+        for pin, load in zip(PINS, map(lives.load, PINS), strict=True)
+        for share in SHARES
+    ]
+
+
+def below_rows(lives: Lives) -> Rows:
+    """Share of the joints whose life is below the required one.
+
+    Returns
+    -------
+    sequence of mapping
+        One row per place of `PLACES`: ``place``, ``required`` (h), the fields of `analysis.estimates.Exceedance` but
+        its level (``count`` are the joints below the required life; bounds have joints without a life above and
+        below), ``total_lower`` and ``total_upper`` (cover sampling, joints without a life and, if known, the numerical
+        error), ``confidence``. No rows without a required life.
+    """
+    known = () if np.isnan(lives.load_error) else (max(0.0, 1.0 - lives.load_error), 1.0 + lives.load_error)
+    rows = []
+    for place in PLACES if np.isfinite(lives.required) else ():
+        rate, level = lives.rate(place), 1.0 / lives.required
+        row = {"place": place, "required": lives.required} | asdict(rate.above(level, CONFIDENCE))
+        del row["level"]
+        off = [rate.shifted((factor**LIFE_EXPONENT - 1.0) * rate.values) for factor in known]
+        low, high = total_interval([rate, *off], level, CONFIDENCE)
+        rows.append(row | {"total_lower": low, "total_upper": high, "confidence": CONFIDENCE})
+    return rows
+
+
+def contact_rows(view: View) -> Rows:
+    """Share of the joints in which a bearing is mostly loaded at one end, at opposite ends, or along its length.
+
+    Of several operating points each counts by its share of the revolutions.
+
+    Returns
+    -------
+    sequence of mapping
+        One row per pin, and one for `ANY` of them: ``place``; ``one_end``, ``opposite_ends`` and ``along``, shares of
+        the joints in which this holds for more than `MOSTLY` of a revolution, with ``_lower`` and ``_upper``.
+        No rows if the study does not keep the contact modes.
+    """
+    if sum(column.field == "mode_share" for column in view.columns) < len(PINS) * len(Mode):
+        return []
+    modes = [part.read_results(("mode_share",))["mode_share"] for part in view.parts]
+    spent = np.tensordot(points.shares_of_revolutions(view), np.stack(modes), 1)
+    rows = []
+    for place in (*PINS, ANY):
+        own = spent[:, [PINS.index(place)]] if place in PINS else spent
+        row: dict[str, Any] = {"place": place}
+        for name, mode in LOADED.items():
+            found = Sample.of(own[:, :, mode].max(axis=1), view.status, view.design).above(MOSTLY, CONFIDENCE)
+            row |= {name: found.estimate, f"{name}_lower": found.lower, f"{name}_upper": found.upper}
+        rows.append(row)
+    return rows

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
+from tolstat.analysis.binomial import needed
 from tolstat.analysis.prediction import DELIVERY
 from tolstat.analysis.strength import Line
 from tolstat.common.channels import CHANNELS
@@ -19,21 +20,19 @@ from tolstat.display import drawing, style, text
 from tolstat.display.answer import Answer, Part, Sentence, Table
 from tolstat.display.asked import Asked
 from tolstat.display.blocks import Panel, Panels
-from tolstat.display.mpl import lines as mpl_lines
 from tolstat.display.mpl import ticker
 from tolstat.display.options import Delivery, Loads, Opt
-from tolstat.display.table import Column, Row, Rows
+from tolstat.display.table import Column, Row, Rows, by_share, of_shares
+from tolstat.display.verdict import Verdict, on_share
 from tolstat.questions.fatigue import loads, parts
-from tolstat.questions.fatigue.counting import channels
-from tolstat.questions.fatigue.loads import SHARES, Loading, load_cycles
-from tolstat.questions.fatigue.stress import Stressed, load_stresses
+from tolstat.questions.fatigue.duty import ANY, Joints, members, section, settings_of
+from tolstat.questions.fatigue.loads import SHARES, Loading, channels, load_cycles
+from tolstat.questions.fatigue.parts import Stressed, load_stresses
 from tolstat.store.revolutions import held
 from tolstat.store.view import View
-from tolstat.study.fatigue import of_text
 from tolstat.study.stress_point import StressPoint
 
 if TYPE_CHECKING:
-    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
 
 JOINTS = 5000
@@ -52,30 +51,19 @@ LABELS = [*(f"{100 * share:g} % of the joints stay below" for share in SHARES), 
 """Legend of a load spectrum."""
 
 
-def _life(x: float) -> str:
-    return "-" if math.isnan(x) else "never" if math.isinf(x) else f"{x:.2e}".replace("e+", "e")
-
-
-def _life_span(row: Row) -> str:
-    low, high = row["life_lower"], row["life_upper"]
-    return "-" if math.isnan(low) else f"{_life(low)} .. {_life(high)}"
-
-
-def _quantile(share: float) -> Column:
-    head, rank = f"{100 * share:g} % below", 0 if share == SHARES[-1] else 1
-    return Column(head, lambda row: text.value(row[share]["estimate"], row["unit"]), rank=rank)
-
-
-def _interval(row: Row) -> str:
-    return text.span_of(row[SHARES[-1]]["lower"], row[SHARES[-1]]["upper"], row["unit"])
+def _life(*lives: float) -> str:
+    """Format a life, or the ends of its interval; NaN gives a dash."""
+    ends = ("never" if math.isinf(life) else f"{life:.2e}".replace("e+", "e") for life in lives)
+    return "-" if math.isnan(lives[0]) else " .. ".join(ends)
 
 
 def _line_of_load(row: Row) -> str:
-    if row["channel"] == loads.ANY:
+    if row["channel"] == ANY:
         return "-"
     return f"{text.value(row['S0'], CHANNELS[row['channel']].unit)} at {row['N0']:g} cycles, m = {row['m']:g}"
 
 
+_LAST = SHARES[-1]
 PARTS = (
     Column("point", lambda row: str(row["point"])),
     Column("failures", lambda row: text.percent(row["estimate"])),
@@ -83,7 +71,7 @@ PARTS = (
     Column("ppm", lambda row: text.ppm(row["estimate"]), rank=6),
     Column("failures in delivery", text.delivery, rank=7),
     Column("B10 life", lambda row: _life(row["life"])),
-    Column("its 95 % interval", _life_span, rank=5),
+    Column("its 95 % interval", lambda row: _life(row["life_lower"], row["life_upper"]), rank=5),
     Column("nominal damage", lambda row: text.formed(row["nominal"]), rank=3),
     Column("median damage", lambda row: text.formed(row["median"]), rank=2),
     Column("99 % damage", lambda row: text.formed(row["upper_99"]), rank=1),
@@ -92,11 +80,14 @@ PARTS = (
 """Columns of the table ``points``."""
 LOADS = (
     Column("channel and exponent", lambda row: f"{row['channel']}, m = {row['m']:g}"),
-    Column("nominal", lambda row: text.value(row["nominal"], row["unit"]), rank=2),
-    *map(_quantile, SHARES),
-    Column(f"95 % interval of {100 * SHARES[-1]:g} %", _interval),
+    Column("nominal", lambda row: text.value(row[_LAST]["nominal"], row[_LAST]["unit"]), rank=2),
+    *of_shares(SHARES, "below", lambda row: text.value(row["estimate"], row["unit"]), rank=1),
+    Column(
+        f"95 % interval of {100 * _LAST:g} %",
+        lambda row: text.span_of(row[_LAST]["lower"], row[_LAST]["upper"], row[_LAST]["unit"]),
+    ),
 )
-"""Columns of the table ``loads``, arranged by `_by_channel`."""
+"""Columns of the table ``loads``, arranged by channel and exponent."""
 DAMAGES = (
     Column("channel", lambda row: str(row["channel"])),
     Column("S–N line", _line_of_load, words=True, rank=3),
@@ -159,7 +150,7 @@ def fatigue(
     StoreError
         When a file holds no histories and its study no points, or its joints are no sample of a production.
     """
-    has_points = bool(of_text(views[0].store.study_text, str(views[0].path)).points)
+    has_points = bool(section(views[0]).points)
     has_cycles = all(part.store.history_specs for view in views for part in view.parts)
     found: list[Part] = []
     duty: Sequence[tuple[str, float]] = ()
@@ -181,7 +172,7 @@ def fatigue_on_page(view: View, asked: Asked) -> Answer:
     if view.method != "sweep" and view.count(Status.OK):
         with asked.noting("load cycles are left out"):
             joints = JOINTS if held(view.store) else min(asked.replay, JOINTS)
-            if of_text(view.store.study_text, str(view.path)).points and joints:
+            if section(view).points and joints:
                 found += _of_parts(load_stresses([view], samples=joints), DELIVERY)
             if view.store.history_specs:
                 loading = load_cycles([view], samples=JOINTS)
@@ -192,6 +183,61 @@ def fatigue_on_page(view: View, asked: Asked) -> Answer:
     if not found:
         raise NotApplicable
     return Answer("fatigue", "Fatigue", found)
+
+
+def life_verdicts(view: View, accepted: float = math.nan, samples: int = JOINTS) -> list[Verdict]:
+    """Verdict on failures of the parts in the service life, and on damage sums of loads; none if no life is required.
+
+    Parameters
+    ----------
+    view : View
+        A campaign, whose operating points are the duty cycle.
+    accepted : float
+        Accepted share: share of the joints that may fail; NaN if none is given.
+    samples : int
+        Number of joints evaluated, the first ones, where they have to be simulated again: of a file without histories.
+
+    Raises
+    ------
+    InputError
+        When the shares of the operating points are not known.
+    StoreError
+        When a file holds joints that are no sample of a production.
+    """
+    own, store = section(view), view.store
+    has_points, has_lines = bool(own.points), bool(own.lines and store.history_specs)
+    if not (has_points or has_lines) or not settings_of(*members([view], None)).required:
+        return []
+    found = []
+    if has_points and (held(store) or samples):
+        stressed = load_stresses([view], samples=JOINTS if held(store) else min(samples, JOINTS))
+        row = parts.failures_over_life(stressed, [stressed.settings.revolutions])[0]._asdict()
+        found.append(_verdict("failures of parts", "have a failed part", row, stressed, accepted))
+    if has_lines:
+        loading = load_cycles([view], names=tuple(own.lines), samples=JOINTS)
+        sums = loads.damages(loading)[-1]
+        found.append(_verdict("damage by loads", "have a damage sum above 1", sums, loading, accepted))
+    return found
+
+
+def _verdict(about: str, what: str, row: Row, joints: Joints, accepted: float) -> Verdict:
+    """Verdict from the share in a row: `analysis.strength.Failures`, or `analysis.estimates.Exceedance`."""
+    share, without = row["estimate"], row["n_failed"] + row["n_unsettled"]
+
+    def joints_needed(end: float) -> float:
+        if "count" in row:
+            return needed(end, accepted)
+        # an interval of a mean narrows with the root of the number of joints, and faster where the share is small
+        distance = row["upper"] - share if share < accepted else share - row["lower"]
+        return float(np.ceil(row["n"] * (distance / (accepted - end)) ** 2))
+
+    lost = math.isnan(share) or (without and without / row["n"] >= 0.5 * (row["upper"] - row["lower"]))
+    undecided = f"{without} of {row['n']} joints have no load that repeats" if lost else ""
+    what, ends = f"{what} within {joints.settings.service_life}", (row["outer_lower"], row["outer_upper"])
+    reason = joints.design.without_interval("mean")
+    found = on_share(about, what, row, ends, accepted, joints_needed, reason, undecided)
+    first = f"{about}: of the first {row['n']} of {joints.total} joints"
+    return found._replace(notes=(first,) if joints.total > joints.status.size else ())
 
 
 def _of_parts(stressed: Stressed, delivery: int) -> list[Part]:
@@ -209,22 +255,23 @@ def _of_parts(stressed: Stressed, delivery: int) -> list[Part]:
 
 
 def _of_loads(loading: Loading, rows: Rows, seen: Rows, delivery: int) -> list[Part]:
-    panels = [_spectrum_panel(loading, channel) for channel in loads.leading(rows)]
+    panels = [
+        Panel(
+            f"spectrum-{channel}",
+            f"{channel}: load spectrum",
+            f"Ranges of {channel} that so many cycles a revolution reach, for half, 90 and 99 % of the joints",
+            partial(_draw_spectrum, loading=loading, channel=channel),
+            (4.9, 3.5),
+            top=drawing.legend_room(LABELS),
+        )
+        for channel in loads.leading(rows)
+    ]
     found: list[Part] = [Panels(panels)] if panels else []
-    found.append(Table("loads", "Damage-equivalent loads", LOADS, rows, seen=_by_channel(seen)))
+    found.append(Table("loads", "Damage-equivalent loads", LOADS, rows, seen=by_share(seen, "channel", "m")))
     if damages := loads.damages(loading, delivery):
         title = "Damage sum of the service life, and share of the joints where it exceeds 1"
         found.append(Table("damages", title, DAMAGES, damages, {"S0": "N or N*m"}))
     return [*found, *map(Sentence, _notes_on_loads(loading, rows))]
-
-
-def _by_channel(rows: Rows) -> Rows:
-    """One row per channel and exponent: for each share its row."""
-    found: dict[Any, dict[Any, Any]] = {}
-    for row in rows:
-        head = {key: row[key] for key in ("channel", "m", "unit", "nominal")}
-        found.setdefault((row["channel"], row["m"]), head)[row["share"]] = row
-    return list(found.values())
 
 
 def _notes_on_parts(stressed: Stressed, rows: Rows) -> Iterator[str]:
@@ -232,13 +279,13 @@ def _notes_on_parts(stressed: Stressed, rows: Rows) -> Iterator[str]:
     settings, n = stressed.settings, stressed.status.size
     starts = f" with {settings.starts:g} starts" if settings.starts else ""
     first = f" (the first {n} of {stressed.total})" if stressed.total > n else ""
-    yield f"{stressed.settled}{first}; service life {settings.revolutions:g} revolutions{starts}"
-    yield from _duty(stressed.duty)
+    yield f"{stressed.settled}{first}; service life {settings.service_life}{starts}"
+    yield from stressed.duty_in_words
     life = "B10 life: revolutions after which 10 % have failed; damage: at the median strength"
     yield f"{life}; intervals count joints without a valid load as failing and as surviving"
     yield from _lines(settings.points)
-    if rows[-1]["point"] == parts.ANY:
-        yield f"{parts.ANY}: the joint fails with its first part; strengths of two points are independent"
+    if rows[-1]["point"] == ANY:
+        yield f"{ANY}: the joint fails with its first part; strengths of two points are independent"
     if not stressed.design.has_interval("mean"):
         yield "no intervals: they hold for independent samples only"
     if stressed.apart > MAX_APART:
@@ -249,8 +296,8 @@ def _notes_on_loads(loading: Loading, rows: Rows) -> Iterator[str]:
     """Number of joints, definition of the loads, restrictions."""
     settings = loading.settings
     cycles = f"loads are ranges: {settings.reference_cycles:g} cycles of them do the damage of "
-    yield f"{loading.settled}; {cycles}{settings.revolutions:g} revolutions"
-    yield from _duty(loading.duty)
+    yield f"{loading.settled}; {cycles}{settings.service_life}"
+    yield from loading.duty_in_words
     if not loading.design.has_interval("quantile"):
         yield "no intervals: order statistics hold for independent samples only"
     lacking = max((row["lacking"] for row in rows), default=0.0)
@@ -258,27 +305,17 @@ def _notes_on_loads(loading: Loading, rows: Rows) -> Iterator[str]:
         yield f"cycles that the file does not hold may add {lacking:.2g} of a sum of S^m"
 
 
-def _duty(cycle: Sequence[tuple[str, float]]) -> list[str]:
-    """Sentence on the shares of a duty cycle; none for a single operating point."""
-    shares = ", ".join(f"{text.percent(share)} at {name}" for name, share in cycle)
-    return [f"over a duty cycle: {shares}, shares of the revolutions"] if len(cycle) > 1 else []
-
-
-def _lines(points: Sequence[StressPoint]) -> list[str]:
+def _lines(points: Sequence[StressPoint]) -> Iterator[str]:
     """One sentence for each S–N line, with the names of its points."""
     names: dict[Line, list[str]] = {}
     for point in points:
         names.setdefault(point.line, []).append(point.name)
-    if len(names) == 1:
-        return [f"S–N line: {_line(points[0].line)}"]
-    return [f"S–N line of {'; '.join(own)}: {_line(line)}" for line, own in names.items()]
-
-
-def _line(line: Line) -> str:
-    scatter = f", T_S = {line.T_S:.3g}" if line.T_S > 1 else ""
-    mean = f", M = {line.M:g} (R = {line.R:g})" if line.M > 0 else ""
-    knee = f"range of {line.S_D / 1e6:.4g} MPa at {line.N_D:g} cycles"
-    return f"{knee}, k = {line.k:g}, {line.k_2:g} below{scatter}{mean}, damage sum {line.D_c:g}"
+    for line, own in names.items():
+        where = f" of {'; '.join(own)}" if len(names) > 1 else ""
+        scatter = f", T_S = {line.T_S:.3g}" if line.T_S > 1 else ""
+        mean = f", M = {line.M:g} (R = {line.R:g})" if line.M > 0 else ""
+        knee = f"range of {line.S_D / 1e6:.4g} MPa at {line.N_D:g} cycles, k = {line.k:g}, {line.k_2:g} below"
+        yield f"S–N line{where}: {knee}{scatter}{mean}, damage sum {line.D_c:g}"
 
 
 def _draw_failures(ax: Axes, stressed: Stressed, life: float) -> None:
@@ -286,32 +323,19 @@ def _draw_failures(ax: Axes, stressed: Stressed, life: float) -> None:
     service = stressed.settings.revolutions
     first, last = sorted([service, life if math.isfinite(life) and life > 0 else service])
     numbers = np.geomspace(first / 10**DECADES, last * 10**DECADES, POINTS)
-    curve = parts.failures_over_life(stressed, numbers.tolist())
+    curve, has_band = parts.failures_over_life(stressed, numbers.tolist()), stressed.design.has_interval("mean")
     lower, share, upper = np.array([(own.outer_lower, own.estimate, own.outer_upper) for own in curve]).T
-    if stressed.design.has_interval("mean"):
+    if has_band:
         ax.fill_between(numbers, lower, upper, color=style.COLOURS[0], alpha=0.2, lw=0)
     ax.plot(numbers, share, color=style.COLOURS[0])
     ax.axvline(service, color=style.INK, lw=1, ls="--")
-    place: Any = {"xycoords": ("data", "axes fraction"), "textcoords": "offset points", "va": "top"}
-    ax.annotate("service life", (service, 1.0), (4, -2), **place)
+    at = ("data", "axes fraction")
+    ax.annotate("service life", (service, 1.0), (4, -2), xycoords=at, textcoords="offset points", va="top")
     ax.set(xscale="log", xlim=(numbers[0], numbers[-1]))
-    ends = upper if stressed.design.has_interval("mean") else share
-    ax.set_ylim(0.0, min(1.0, 1.1 * float(np.nanmax(ends, initial=0.0))) or 1.0)
+    ax.set_ylim(0.0, min(1.0, 1.1 * float(np.nanmax(upper if has_band else share, initial=0.0))) or 1.0)
     ax.xaxis.set_major_formatter(ticker.FuncFormatter(lambda x, _: f"{x:.0e}".replace("e+0", "e").replace("e+", "e")))
     ax.yaxis.set_major_formatter(ticker.FuncFormatter(lambda value, _: f"{100 * value:g} %"))
-    ax.set_xlabel("revolutions of the input shaft")
-    ax.set_ylabel("joints with a failed part")
-
-
-def _spectrum_panel(loading: Loading, channel: str) -> Panel:
-    return Panel(
-        f"spectrum-{channel}",
-        f"{channel}: load spectrum",
-        f"Ranges of {channel} that so many cycles a revolution reach, for half, 90 and 99 % of the joints",
-        partial(_draw_spectrum, loading=loading, channel=channel),
-        (4.9, 3.5),
-        top=drawing.legend_room(LABELS),
-    )
+    ax.set(xlabel="revolutions of the input shaft", ylabel="joints with a failed part")
 
 
 def _draw_spectrum(ax: Axes, loading: Loading, channel: str) -> None:
@@ -321,18 +345,18 @@ def _draw_spectrum(ax: Axes, loading: Loading, channel: str) -> None:
     floor = MIN_RANGE * ceiling if ceiling > 0 else 1.0
     numbers = np.array([row["cycles"] for row in rows if row["share"] == SHARES[0]]) / loading.settings.revolutions
     x = np.concatenate([[0.7 * numbers[0]], numbers])
-    handles: list[Artist] = []
+    handles = []
     for share, colour, dash in zip(SHARES, style.COLOURS, style.DASHES, strict=False):
         own = [row for row in rows if row["share"] == share]
-        lower, estimate, upper, nominal = (_steps(own, key) for key in ("lower", "estimate", "upper", "nominal"))
+        lower, estimate, upper, nominal = (  # the first value twice, so that the curve begins at the left edge
+            np.array([row[key] for row in (own[0], *own)]) for key in ("lower", "estimate", "upper", "nominal")
+        )
         if np.isfinite(lower).any():
             top = np.where(np.isfinite(upper), upper, estimate)  # too few joints: the upper end is infinite
             low, high = (np.maximum(y, 0.1 * floor) for y in (lower, top))
             ax.fill_between(x, low, high, step="pre", color=colour, alpha=0.2, lw=0)
-        ax.step(x, estimate, where="pre", color=colour, ls=dash, zorder=3)
-        handles.append(mpl_lines.Line2D([], [], color=colour, ls=dash))
-    ax.step(x, nominal, where="pre", color=style.INK, lw=1, zorder=2)
-    handles.append(mpl_lines.Line2D([], [], color=style.INK, lw=1))
+        handles += ax.step(x, estimate, where="pre", color=colour, ls=dash, zorder=3)
+    handles += ax.step(x, nominal, where="pre", color=style.INK, lw=1, zorder=2)
     shown = max([row["cycles"] for row in rows if row["estimate"] > floor], default=0.0) / loading.settings.revolutions
     ax.set(xscale="log", yscale="log", ylim=(floor, 2.0 * max(ceiling, floor)))
     ax.set_xlim(x[0], 1.05 * max(shown if shown > x[0] else x[-1], 2.0 * x[0]))
@@ -340,12 +364,6 @@ def _draw_spectrum(ax: Axes, loading: Loading, channel: str) -> None:
         axis.set_major_formatter(ticker.FuncFormatter(lambda value, _: f"{value:g}"))
         axis.set_minor_formatter(ticker.NullFormatter())
     ax.set_xticks([t for t in (0.01, 0.03, 0.1, 0.3, 1, 2, 3, 4, 6, 8, 12, 16) if x[0] <= t <= ax.get_xlim()[1]])
-    ax.set_xlabel("cycles a revolution with at least this range")
-    ax.set_ylabel(f"range of {channel} [{unit_text(CHANNELS[channel].unit)}]")
+    unit = unit_text(CHANNELS[channel].unit)
+    ax.set(xlabel="cycles a revolution with at least this range", ylabel=f"range of {channel} [{unit}]")
     drawing.legend_above(ax, handles, LABELS)
-
-
-def _steps(rows: Rows, key: str) -> np.ndarray[Any, Any]:
-    """Values of a step curve, the first one twice, so that the curve begins at the left edge."""
-    values = np.array([row[key] for row in rows])
-    return np.concatenate([values[:1], values])

@@ -10,10 +10,18 @@ from numpy.typing import NDArray
 
 from tolstat.analysis.design import Design
 from tolstat.common.errors import Fault, InputError
+from tolstat.common.loads import FloatArray
 from tolstat.common.tables import ERROR_FIELDS, Status, worst_status
+from tolstat.display.text import percent
 from tolstat.store import points
+from tolstat.store.recorded import joint_of
 from tolstat.store.view import View
 from tolstat.study.fatigue import Fatigue, of_text
+
+ANY = "any of them"
+"""Name of the row for all points or channels together."""
+CONFIDENCE = 0.95
+HOUR = 3600.0
 
 
 @dataclass(frozen=True)
@@ -27,7 +35,7 @@ class Joints:
     design : Design
         How the joints were drawn.
     settings : Fatigue
-        Section ``[fatigue]`` of the study; of the first study if there are several.
+        Section ``[fatigue]`` of the study; of the first study if there are several. See `settings_of`.
     total : int
         Number of samples of the campaign, those not evaluated included.
     duty : tuple of (str, float)
@@ -51,6 +59,12 @@ class Joints:
         """Words on the number of these joints."""
         return f"{int(self.valid.sum())} of {self.status.size} joints settled"
 
+    @property
+    def duty_in_words(self) -> list[str]:
+        """Sentence on the shares of a duty cycle; none for a single operating point."""
+        shares = ", ".join(f"{percent(share)} at {name}" for name, share in self.duty)
+        return [f"over a duty cycle: {shares}, shares of the revolutions"] if len(self.duty) > 1 else []
+
 
 def members(views: Sequence[View], shares: Sequence[float] | None) -> tuple[Sequence[View], list[float]]:
     """Views of a duty cycle at one operating point each, and their shares of the revolutions with the exact sum 1.
@@ -71,15 +85,28 @@ def members(views: Sequence[View], shares: Sequence[float] | None) -> tuple[Sequ
         When a file holds joints that are no sample of a production.
     """
     if any(len(view.parts) > 1 for view in views):
-        views, shares = _of_points(views, shares)
+        for wrong, remedy in (
+            (len(views) > 1, "give this file alone, or files with one operating point each"),
+            (shares is not None, "leave --share out: the study gives share in [[operation]]"),
+        ):
+            if wrong:
+                raise InputError([Fault(str(views[0].path), "has several operating points", remedy)])
+        views, shares = views[0].parts, points.shares_of_revolutions(views[0]).tolist()
     shares = [1.0] if shares is None else shares
     if len(shares) != len(views) or min(shares, default=0.0) <= 0 or abs(sum(shares) - 1) > 1e-6:
         found = f"{list(shares)} for {len(views)} files"
         raise InputError([Fault("shares", found, "give a positive share for each file; their sum is 1")])
+    names, first = [column.name for column in ERROR_FIELDS], views[0]
     for view in views:
         view.check("mean")
-        if view is not views[0]:
-            _check_same_joints(view, views[0])
+    for view in views[1:]:
+        if view.n != first.n or not all(
+            np.array_equal(own[name], other[name])
+            for own, other in zip(view.error_blocks(names), first.error_blocks(names), strict=True)
+            for name in names
+        ):
+            remedy = "run both studies with the same tolerances, sampling.n and sampling.seed"
+            raise InputError([Fault(str(view.path), f"does not hold the joints of {first.path}", remedy)])
     total = sum(shares)
     return views, [share / total for share in shares]
 
@@ -90,32 +117,30 @@ def joints_of(views: Sequence[View], shares: Sequence[float], samples: int | Non
     return Joints(
         status=worst_status([view.status[:samples] for view in views]),
         design=first.design if samples is None else first.design.only(np.arange(min(samples, first.n))),
-        # the section alone, like limits: it is at hand even where the study refers to files that are not
-        settings=of_text(first.store.study_text, str(first.path)),
+        settings=settings_of(views, shares),
         total=first.n,
         duty=tuple((view.points[0] or view.path.name, share) for view, share in zip(views, shares, strict=True)),
     )
 
 
-def _of_points(views: Sequence[View], shares: Sequence[float] | None) -> tuple[list[View], list[float]]:
-    """Views of a campaign at each of its operating points, and their shares of the revolutions."""
-    view, place = views[0], str(views[0].path)
-    if len(views) > 1:
-        remedy = "give this file alone, or files with one operating point each"
-        raise InputError([Fault(place, "has several operating points", remedy)])
-    if shares is not None:
-        remedy = "leave --share out: the study gives share in [[operation]]"
-        raise InputError([Fault(place, "has several operating points", remedy)])
-    return view.parts, points.shares_of_revolutions(view).tolist()
+def settings_of(views: Sequence[View], shares: Sequence[float]) -> Fatigue:
+    """Section ``[fatigue]`` of the first of the `members`, with the service life in revolutions over the duty cycle."""
+    first = views[0]
+    bearing = (first.study.joint if first.study_path else joint_of(first.store, 0)).bearing
+    hours = np.nan if bearing is None or bearing.required_life is None else bearing.required_life / HOUR
+    turn = sum(share * 2.0 * np.pi / abs(view.store.operation.speed) for view, share in zip(views, shares, strict=True))
+    return section(first).within(hours, HOUR / turn, str(first.path))
 
 
-def _check_same_joints(view: View, first: View) -> None:
-    names = [f.name for f in ERROR_FIELDS]
-    if view.n == first.n and all(
-        np.array_equal(own[name], other[name])
-        for own, other in zip(view.error_blocks(names), first.error_blocks(names), strict=True)
-        for name in names
-    ):
-        return
-    remedy = "run both studies with the same tolerances, sampling.n and sampling.seed"
-    raise InputError([Fault(str(view.path), f"does not hold the joints of {first.path}", remedy)])
+def section(view: View) -> Fatigue:
+    """Section ``[fatigue]`` of the study in a file, or of the one that is read in its place.
+
+    Of the text in the file the section alone is read, like limits: it is at hand even where the study refers to files
+    that are not.
+    """
+    return view.study.fatigue if view.study_path else of_text(view.store.study_text, str(view.path))
+
+
+def only(values: FloatArray) -> float:
+    """Value of the nominal joint; NaN if there is none."""
+    return float(values[0]) if values.size else np.nan

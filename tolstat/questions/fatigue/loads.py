@@ -1,4 +1,4 @@
-"""Fatigue of a campaign or of a duty cycle: load cycles, damage-equivalent loads, damage sums and load spectra."""
+"""Fatigue by loads: rainflow cycles of the joints, damage-equivalent loads, damage sums and load spectra."""
 
 from __future__ import annotations
 
@@ -7,28 +7,116 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tolstat.analysis import cycles, prediction
 from tolstat.analysis.cycles import Cycles, FloatArray
 from tolstat.analysis.prediction import DELIVERY
 from tolstat.analysis.sample import Sample
-from tolstat.common.channels import CHANNELS
+from tolstat.common.channels import BUSHING_LOADS, CHANNELS, LoadHistory, channels_of, histories_of
+from tolstat.common.errors import Fault, InputError, StoreError
 from tolstat.common.load_kinds import PLACES
 from tolstat.common.loads import PANELS
-from tolstat.common.tables import Status
+from tolstat.common.strict import did_you_mean
+from tolstat.common.tables import SIMULATED, Status
 from tolstat.display.table import Row, Rows
 from tolstat.questions.fatigue import duty
-from tolstat.questions.fatigue.counting import SHOWN, cycles_of
-from tolstat.questions.fatigue.duty import Joints
+from tolstat.questions.fatigue.duty import ANY, CONFIDENCE, Joints, only
+from tolstat.solver import rainflow
+from tolstat.store import revolutions
+from tolstat.store.hdf5 import RUN_AGAIN
+from tolstat.store.reader import Reader
 from tolstat.store.view import View
+from tolstat.study.selection import select
 
-ANY = "any of them"
-"""Name of the row for all channels together."""
 SHARES = (0.5, 0.9, 0.99)
 """Shares of the joints at which quantiles are given."""
-CONFIDENCE = 0.95
 MAX_NUMBERS = 40
 """Maximum number of points of a spectrum."""
+SHOWN = tuple(channel.name for channel in CHANNELS.values() if channel.kind.shown)
+"""Channels that are evaluated unless others are asked for: those of the loads that every report shows."""
+
+
+def channels(patterns: Sequence[str]) -> tuple[str, ...]:
+    """Names of the channels that any of the patterns selects, in the order of `channels.CHANNELS`.
+
+    Raises
+    ------
+    InputError
+        With every pattern that selects nothing.
+    """
+    found = {pattern: select(pattern, CHANNELS) for pattern in patterns}
+    faults = [
+        Fault(f"channel {pattern!r}", "selects nothing", did_you_mean(pattern, list(CHANNELS)[:8]))
+        for pattern, names in found.items()
+        if not names
+    ]
+    if faults:
+        raise InputError(faults)
+    return tuple(name for name in CHANNELS if any(name in names for names in found.values()))
+
+
+def cycles_of(store: Reader, slots: NDArray[np.intp], names: Sequence[str] | None = None) -> Cycles:
+    """Rainflow cycles of joints over one revolution.
+
+    Cycles stored by the workers (``histories = "cycles"``) are read. Otherwise they are counted now, from the load
+    histories or from the loads restored from harmonics.
+
+    Parameters
+    ----------
+    store : ResultFile
+        The campaign.
+    slots : ndarray of int, shape (m,)
+        File slots, ascending.
+    names : sequence of str, optional
+        Channels to keep; by default those `SHOWN`, 64 of bushings: some 8 kB per joint.
+
+    Returns
+    -------
+    Cycles
+        Row i is the joint ``slots[i]``; NaN for joints without results.
+
+    Raises
+    ------
+    StoreError
+        When the file holds no histories.
+    """
+    if not store.history_specs:
+        remedy = 'set histories = "cycles" in [output] of the study: tolstat run STUDY --out OTHER.h5'
+        raise StoreError(str(Fault(str(store.path), "holds neither cycles nor load histories", remedy)))
+    names = SHOWN if names is None else tuple(names)
+    histories = histories_of(names)
+    order = [channel.name for history in histories for channel in channels_of(history)]
+    place = [order.index(name) for name in names]
+    lacking = [name for h in histories if (name := f"{h.prefix}cycles") not in store.history_specs]
+    if lacking and "cycles" in store.history_specs and not revolutions.held(store, histories):
+        raise StoreError(str(Fault(str(store.path), f"holds no {', '.join(lacking)}", RUN_AGAIN)))
+    table = np.empty((len(slots), len(names), rainflow.KEPT, 2), np.float32)
+    number = np.empty((len(slots), len(names)))
+    for part in revolutions.blocks(len(slots)):
+        counted, counts = _count(store, slots[part], histories)
+        table[part], number[part] = counted[:, place], counts[:, place]
+    status = store.status(slice(int(slots.max(initial=-1)) + 1))[slots]
+    without = ~np.isin(status, SIMULATED)
+    table[without], number[without] = np.nan, np.nan
+    used = max(1, int(np.max(number, initial=0.0, where=np.isfinite(number))))
+    table = table[..., :used, :]
+    return Cycles.of_revolution(names, table[..., 0], table[..., 1], number)
+
+
+def _count(
+    store: Reader, slots: NDArray[np.intp], histories: Sequence[LoadHistory]
+) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Cycles of a few joints, and their numbers, as `rainflow.count` gives them; history after history."""
+    names = [[f"{history.prefix}{name}" for history in histories] for name in ("cycles", "cycle_count")]
+    if set(names[0]) <= set(store.history_specs):
+        counted = {name: store.histories(name, slots) for own in names for name in own}
+    else:
+        found = revolutions.loads(store, slots, [BUSHING_LOADS, *(h for h in histories if h != BUSHING_LOADS)])
+        joints = [rainflow.count({name: own[i] for name, own in found.items()}) for i in range(len(slots))]
+        counted = {name: np.stack([joint[name] for joint in joints]) for own in names for name in own}
+    cycles, counts = (np.concatenate([counted[name] for name in own], axis=1) for own in names)
+    return cycles, counts
 
 
 @dataclass(frozen=True)
@@ -80,21 +168,18 @@ def load_cycles(
     joints = duty.joints_of(views, shares, samples)
     if names is None:
         names = tuple(name for name in CHANNELS if name in SHOWN or name in joints.settings.lines)
-    parts = [_cycles_of(view, names, joints.status.size) for view in views]
+    parts = []
+    for view in views:
+        first, end = map(int, view.slots([0, joints.status.size]))
+        whole = cycles_of(view.store, np.arange(end), names)  # a nominal joint is before the samples
+        settled = int((view.nominal["status"] == Status.OK).sum())
+        parts.append((whole.rows(slice(first, None)), whole.rows(slice(settled))))
     # the nominal joint of a duty cycle has settled at all operating points, or it has no row
     rows = slice(min(len(nominal.number) for _, nominal in parts))
     own = cycles.duty_cycle([own for own, _ in parts], shares)
     return Loading(
         **vars(joints), cycles=own, nominal=cycles.duty_cycle([nominal.rows(rows) for _, nominal in parts], shares)
     )
-
-
-def _cycles_of(view: View, names: Sequence[str], n: int) -> tuple[Cycles, Cycles]:
-    """Cycles of the first n samples, and of the nominal joint (no rows if there is none that settled)."""
-    first, end = map(int, view.slots([0, n]))
-    whole = cycles_of(view.store, np.arange(end), names)  # the nominal joint, if the file has it, is before the samples
-    settled = int((view.nominal["status"] == Status.OK).sum())
-    return whole.rows(slice(first, None)), whole.rows(slice(settled))
 
 
 def equivalent_loads(loading: Loading) -> Rows:
@@ -112,7 +197,7 @@ def equivalent_loads(loading: Loading) -> Rows:
         (upper bound of the relative increase of the sum of S^m by cycles that the file does not hold, maximum over the
         joints), the fields of `analysis.estimates.Quantile`, ``confidence``. Loads are ranges in SI units.
     """
-    settings, rows = loading.settings, []
+    settings, rows = loading.settings, list[Row]()
     for m in settings.exponents:
         values, nominal = (
             cycles.equivalent_load(own, m, settings.revolutions, settings.reference_cycles)
@@ -120,13 +205,17 @@ def equivalent_loads(loading: Loading) -> Rows:
         )
         lacking = cycles.truncation_bound(loading.cycles, m)
         for c, channel in enumerate(loading.cycles.channels):
-            head = {"channel": channel, "unit": CHANNELS[channel].unit, "m": m, "nominal": _only(nominal[:, c])}
+            head = {"channel": channel, "unit": CHANNELS[channel].unit, "m": m, "nominal": only(nominal[:, c])}
             head["lacking"] = float(lacking[:, c].max(initial=0.0))
-            sample = Sample.of(values[:, c], loading.status, loading.design)
-            for share in SHARES:
-                found = sample.quantile(share, CONFIDENCE)
-                rows.append({**head, **found._asdict(), "confidence": CONFIDENCE})
+            rows += _quantiles(head, values[:, c], loading)
     return rows
+
+
+def _quantiles(head: Row, values: FloatArray, loading: Loading) -> Rows:
+    """A row for each of `SHARES` of the joints: the head, and the quantile of their values."""
+    sample = Sample.of(values, loading.status, loading.design)
+    found = [sample.quantile(share, CONFIDENCE)._asdict() for share in SHARES]
+    return [{**head, **own, "confidence": CONFIDENCE} for own in found]
 
 
 def damages(loading: Loading, delivery: int = DELIVERY) -> Rows:
@@ -140,31 +229,25 @@ def damages(loading: Loading, delivery: int = DELIVERY) -> Rows:
         joints), the fields of `analysis.estimates.Exceedance` for the level 1, ``next_lower`` and ``next_upper``
         (prediction interval for the joints above 1 in the next delivery), ``confidence``.
     """
-    rows, every = [], []
-    for channel, values in loading.settings.lines.items():
-        if channel in loading.cycles.channels:
-            line = cycles.Line(*values)
-            sums, nominal = (
-                cycles.damage(part.of(channel), line, loading.settings.revolutions)[:, 0]
-                for part in (loading.cycles, loading.nominal)
-            )
-            every.append((sums, nominal))
-            rows.append(_above_one(loading, {"channel": channel, **line._asdict()}, sums, nominal, delivery))
-    if len(every) > 1:
-        sums, nominal = (np.maximum.reduce(parts) for parts in zip(*every, strict=True))
-        head = {"channel": ANY, **dict.fromkeys(cycles.Line._fields, np.nan)}
-        rows.append(_above_one(loading, head, sums, nominal, delivery))
+    lines, life = loading.settings.lines, loading.settings.revolutions
+    sums = {
+        channel: [
+            cycles.damage(part.of(channel), cycles.Line(*line), life)[:, 0]
+            for part in (loading.cycles, loading.nominal)
+        ]
+        for channel, line in lines.items()
+        if channel in loading.cycles.channels
+    }
+    if len(sums) > 1:
+        sums[ANY] = [np.maximum.reduce(every) for every in zip(*sums.values(), strict=True)]
+    rows = []
+    for channel, (own, nominal) in sums.items():
+        sample = Sample.of(own, loading.status, loading.design)
+        row = {"channel": channel, **cycles.Line(*lines.get(channel, [np.nan] * 3))._asdict(), "nominal": only(nominal)}
+        row |= {"median": sample.quantile(0.5).estimate} | asdict(sample.above(1.0, CONFIDENCE))
+        row |= prediction.columns(sample.delivery(1.0, delivery, CONFIDENCE), delivery) | {"confidence": CONFIDENCE}
+        rows.append(row)
     return rows
-
-
-def _above_one(
-    loading: Loading, head: dict[str, Any], sums: FloatArray, nominal: FloatArray, delivery: int
-) -> dict[str, Any]:
-    """Row of `damages` from the damage sums of the joints."""
-    sample = Sample.of(sums, loading.status, loading.design)
-    head |= {"nominal": _only(nominal), "median": sample.quantile(0.5).estimate} | asdict(sample.above(1.0, CONFIDENCE))
-    following = prediction.columns(sample.delivery(1.0, delivery, CONFIDENCE), delivery)
-    return head | following | {"confidence": CONFIDENCE}
 
 
 def spectrum(loading: Loading, channel: str) -> Rows:
@@ -173,19 +256,20 @@ def spectrum(loading: Loading, channel: str) -> Rows:
     Returns
     -------
     sequence of mapping
-        One row per share of `SHARES` and number: ``channel``, ``unit``, ``cycles`` (in the service life), ``nominal``,
+        One row per number and share of `SHARES`: ``channel``, ``unit``, ``cycles`` (in the service life), ``nominal``,
         the fields of `analysis.estimates.Quantile` (intervals are pointwise), ``confidence``. Ranges in SI units,
         ascending numbers.
     """
-    numbers = _numbers(loading.cycles.of(channel))
+    part = loading.cycles.of(channel)
+    order = np.argsort(-part.ranges[:, 0], axis=1)
+    steps = np.cumsum(part.repeats[order], axis=1)[np.take_along_axis(part.ranges[:, 0], order, axis=1) > 0]
+    numbers = np.unique(np.append(steps.round(9), 1.0))  # at which the spectra of the joints have steps
+    numbers = numbers[np.linspace(0, numbers.size - 1, min(numbers.size, MAX_NUMBERS)).round().astype(int)]
     values, nominal = (cycles.spectrum(own.of(channel), numbers)[:, 0] for own in (loading.cycles, loading.nominal))
-    samples = [Sample.of(own, loading.status, loading.design) for own in values.T]
-    rows: list[Row] = []
-    for share in SHARES:
-        for number, sample, own in zip(numbers, samples, nominal.T, strict=True):
-            head = {"channel": channel, "unit": CHANNELS[channel].unit, "nominal": _only(own)}
-            head["cycles"] = number * loading.settings.revolutions
-            rows.append({**head, **sample.quantile(share, CONFIDENCE)._asdict(), "confidence": CONFIDENCE})
+    head, rows = {"channel": channel, "unit": CHANNELS[channel].unit}, list[Row]()
+    for number, own, ideal in zip(numbers, values.T, nominal.T, strict=True):
+        count = {"nominal": only(ideal), "cycles": number * loading.settings.revolutions}
+        rows += _quantiles(head | count, own, loading)
     return rows
 
 
@@ -196,14 +280,13 @@ def most_loaded(rows: Rows) -> list[str]:
     only if the table has nothing else. Empty if no joint has a valid result.
     """
     exponents = sorted({row["m"] for row in rows})
-    middle = [row for row in _highest(rows) if row["m"] == exponents[len(exponents) // 2]]
-    valid = [row for row in middle if not np.isnan(row["estimate"])]
+    last = [row for row in rows if row["share"] == SHARES[-1] and row["m"] == exponents[len(exponents) // 2]]
+    valid = [row for row in last if not np.isnan(row["estimate"])]
     found: dict[tuple[str, str], Row] = {}
     for row in [row for row in valid if not CHANNELS[row["channel"]].is_modulus] or valid:
-        channel = CHANNELS[row["channel"]]
-        best = found.setdefault((channel.place, channel.kind.key), row)
-        if row["estimate"] > best["estimate"]:
-            found[channel.place, channel.kind.key] = row
+        key = CHANNELS[row["channel"]].place, CHANNELS[row["channel"]].kind.key
+        if key not in found or row["estimate"] > found[key]["estimate"]:
+            found[key] = row
     return [row["channel"] for row in found.values()]
 
 
@@ -212,28 +295,10 @@ def leading(rows: Rows) -> list[str]:
 
     Candidates are the channels `most_loaded` of the table; all exponents count.
     """
-    names = most_loaded(rows)
-    candidates = [(row["estimate"], CHANNELS[row["channel"]]) for row in _highest(rows) if row["channel"] in names]
-    found = []
+    names, found = most_loaded(rows), []
+    candidates = [row for row in rows if row["share"] == SHARES[-1] and row["channel"] in names]
     for group, kind in PANELS:
-        here = [own for own in candidates if PLACES[own[1].place].group == group and own[1].kind == kind]
-        found += [max(here, key=lambda own: own[0])[1].name] if here else []
+        here = [row for row in candidates if CHANNELS[row["channel"]].kind == kind]
+        here = [row for row in here if PLACES[CHANNELS[row["channel"]].place].group == group]
+        found += [max(here, key=lambda row: float(row["estimate"]))["channel"]] if here else []
     return found
-
-
-def _highest(rows: Rows) -> Rows:
-    """Rows of the highest share of the joints."""
-    return [row for row in rows if row["share"] == SHARES[-1]]
-
-
-def _numbers(part: Cycles) -> FloatArray:
-    """Cycles per revolution at which the spectra of the joints have steps, thinned to `MAX_NUMBERS`."""
-    order = np.argsort(-part.ranges[:, 0], axis=1)
-    steps = np.cumsum(part.repeats[order], axis=1)[np.take_along_axis(part.ranges[:, 0], order, axis=1) > 0]
-    numbers = np.unique(np.append(steps.round(9), 1.0))
-    thinned = np.linspace(0, numbers.size - 1, min(numbers.size, MAX_NUMBERS)).round().astype(int)
-    return np.asarray(numbers[thinned])
-
-
-def _only(values: FloatArray) -> float:
-    return float(values[0]) if values.size else np.nan

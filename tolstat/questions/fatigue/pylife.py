@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tolstat.common.channels import CHANNELS
-from tolstat.questions.fatigue.counting import cycles_of
+from tolstat.questions.fatigue.loads import cycles_of
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from tolstat.analysis.cycles import FloatArray
     from tolstat.store.view import View
 
 INTERVALS = ("range", "mean")
@@ -79,9 +78,11 @@ def table(
         ends = np.zeros((2, len(joint)))
         for kind in (units != "N", units == "N"):
             own = values[joint, channel, place][kind].astype(float)
-            edges = _edges(own, bins, from_zero=name == "range")
-            here = np.searchsorted(edges, own, side="right") - 1
-            ends[:, kind] = edges[here], edges[here + 1]
+            low, high = 0.0 if name == "range" else own.min(initial=np.inf), own.max(initial=-np.inf)
+            if low <= high:  # the last edge is above the largest value
+                edges = np.linspace(low, high + 1e-6 * max(high - low, abs(high), 1e-300), bins + 1)
+                here = np.searchsorted(edges, own, side="right") - 1
+                ends[:, kind] = edges[here], edges[here + 1]
         columns |= dict(zip((f"{name}_left", f"{name}_right"), ends, strict=True))
     keys = ["joint", "channel", *(f"{name}_{side}" for name in INTERVALS for side in ("left", "right"))]
     frame = pd.DataFrame(columns | {"cycles": cycles.repeats[place] * revolutions})
@@ -100,12 +101,3 @@ def from_table(table: pd.DataFrame) -> pd.Series[float]:
     names = [*INTERVALS, "joint", "channel"]
     index = pd.MultiIndex.from_arrays([*levels, table["joint"], table["channel"]], names=names)
     return pd.Series(table["cycles"].to_numpy(float), index, name="cycles")
-
-
-def _edges(values: FloatArray, bins: int, from_zero: bool) -> FloatArray:
-    """Edges of classes of equal width that contain all values; the last edge is above the largest value."""
-    low, high = (0.0 if from_zero else values.min(initial=np.inf), values.max(initial=-np.inf))
-    if not low <= high:
-        return np.array([0.0, 1.0])
-    above = high + 1e-6 * max(high - low, abs(high), 1e-300)
-    return np.linspace(low, above, bins + 1)

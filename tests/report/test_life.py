@@ -1,0 +1,50 @@
+"""Verdicts on required lives: the same in text, JSON and on the page, beside the one on limits or in its place."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+import tolstat
+from tests.cli.test_cli import call
+from tests.questions.test_bearing_life import STUDY
+from tests.support import synthetic, views
+from tolstat.display import text
+from tolstat.display.asked import Asked
+from tolstat.display.blocks import Decision
+from tolstat.questions.bearing_life import answer as bearing_life
+from tolstat.report import verdict
+from tolstat.report.life import life_verdicts
+from tolstat.store import ResultFile
+
+LIMITED = STUDY.replace("[sampling]", '[limits]\n"cross1.F" = "700 N"\n[sampling]')
+
+
+@pytest.mark.parametrize(("study", "place"), [(STUDY, 0), (LIMITED, 1)])
+def test_report_json_and_page_give_the_same_verdict(tmp_path, study, place):
+    path = synthetic.store(tmp_path, study)
+    with ResultFile.open(path) as store:
+        (found,) = life_verdicts(store.view(), 0.1)
+        assert (found,) == tuple(bearing_life.life_verdicts(store.view(), 0.1))
+        section = verdict.section(store.view(), Asked(path, 0.1))
+        assert tolstat.statistics(store.view(), 0.1)["lives"] == [found.values()]
+    done = call("report", path, "--accept", "10 %")
+    assert text.sentence(found.sentence) in " ".join(done.stdout.split())
+    assert json.loads(call("report", path, "--accept", "10 %", "--json").stdout)["facts"]["lives"] == [found.values()]
+    (head,) = (block for block in section.blocks if isinstance(block, Decision))
+    card = [head.verdict, *head.cards][place]
+    assert (f"{card.value}: {card.label}", card.verdict) == (found.sentence, found.answer)
+
+
+def test_a_life_that_cannot_be_rated_is_told_with_the_reason(tmp_path):
+    with ResultFile.open(synthetic.store(tmp_path, STUDY.replace('C = "10 kN"\n', ""))) as store:
+        (found,) = life_verdicts(store.view(), 0.1)
+    assert found.sentence == "No verdict: bearing life: small.h5: holds bearings without C, which a rating life needs"
+
+
+def test_no_verdict_on_what_is_not_required_or_no_sample(tmp_path):
+    with ResultFile.open(synthetic.store(tmp_path, STUDY.replace('required_life = "20000 h"\n', ""))) as store:
+        assert life_verdicts(store.view(), 0.1) == []
+        assert "lives" not in tolstat.statistics(store.view(), 0.1)
+    assert life_verdicts(views.swept(), 0.1) == []

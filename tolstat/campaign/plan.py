@@ -28,7 +28,7 @@ from tolstat.solver.compilation import stage_name, warm_up
 from tolstat.solver.simulation import history_specs, simulate_rows
 from tolstat.store import layout, metadata, worst
 from tolstat.store.recorded import perturbed, settings, variants
-from tolstat.study import Study, swept
+from tolstat.study import Study, assumptions, swept
 from tolstat.study.points import names_of
 from tolstat.study.tolerances import meaning
 
@@ -158,7 +158,7 @@ class Plan:
     tolerances : list of dict
         What each entry of ``[tolerances]`` means: rows of `study.tolerances.meaning.table`.
     exact : list of str
-        Patterns of the offsets and tilts that nothing sets in a study with tolerances; see `meaning.exact`.
+        Errors of pins and holes that nothing sets in a study with tolerances, in words; see `assumptions.unselected`.
     correlations : list of dict
         What correlations mean for the errors themselves: rows of `study.tolerances.meaning.correlations`.
     wilks : dict of float to int
@@ -256,7 +256,7 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT, stage: Te
         fit=fit_in_words(study),
         sweep=swept.meaning(study.sweep, study.joint),
         tolerances=text.records(meaning.table(study.entries)),
-        exact=meaning.exact(study.entries, study.errors),
+        exact=list(assumptions.unselected(study)),
         correlations=text.records(meaning.correlations(study.copula, study.tolerances)),
     )
 

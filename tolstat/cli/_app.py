@@ -242,12 +242,11 @@ def print_warnings(path: Path, joints: Iterable[Joint], variants: Iterable[Varia
 def print_study_notes(path: Path, study: Study) -> None:
     """Print what a study stands on, and its warnings.
 
-    These are mounting and contact law; warnings of its joints, common axes that are too short, shares without an
+    These are mounting and contact law; warnings of its joints, of values that are probably not meant, shares without an
     interval, and a note where rigid shafts meet errors along them.
     """
     from tolstat.analysis.listed import without_interval
-    from tolstat.study import mounting
-    from tolstat.study.tolerances import zones
+    from tolstat.study import mounting, plausible
 
     say(f"{study.name}: {study.joint_in_words}")
     axial = [joint.shaft.axial for joint in study.joints]
@@ -255,8 +254,8 @@ def print_study_notes(path: Path, study: Study) -> None:
         say(f"note: {said}")
 
     print_warnings(path, study.joints, study.variants)
-    for key, found, remedy in zones.short_axes(study.entries, study.joint.contact.z):
-        warn(f"warning: {study.fault(key, found, remedy)}")
+    for fault in plausible.warnings(study):
+        warn(f"warning: {fault}")
     if not study.sampling.has_replicates and (said := without_interval(study.sampling.method)):
         warn(f"warning: {said}")
 

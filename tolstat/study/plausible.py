@@ -57,4 +57,4 @@ def _fast_points(study: Study) -> Iterator[Fault]:
                 f"{FAST:g} that makers of joint shafts allow"
             )
             key = f"operation[{number}].speed" if point.name else "operation.speed"
-            yield study.fault(key, found, "check its unit: rpm, rad/s, Hz")
+            yield study.fault(key, found, "check it and alpha, and their units")

@@ -62,7 +62,8 @@ class Section(NamedTuple):
 @cache
 def joint() -> Schema:
     """JSON schema of a joint file, with the values of the default joint as examples."""
-    values = strict.read_toml(data_dir() / "joints" / f"{DEFAULT_JOINT}.toml") | {"assumed": None}
+    values = strict.read_toml(data_dir() / "joints" / f"{DEFAULT_JOINT}.toml")
+    del values["assumed"], values["shaft"]["axial"]  # their fields have shorter and more telling examples
     made = with_examples(of_model(Joint), values)
     return {"title": "Joint of tolstat"} | made | {"description": "Nominal joint."}
 

@@ -17,7 +17,7 @@ from tolstat.joint.assumed import Assumed
 from tolstat.joint.reading import DEFAULT_JOINT
 from tolstat.study.axes import is_zone, vectors_of
 from tolstat.study.fatigue import LineEntry, Settings
-from tolstat.study.listed import CaseEntry, Range, VariantEntry
+from tolstat.study.listing import CaseEntry, Range, VariantEntry
 from tolstat.study.model import Output, Sampling, Solver, SweepEntry
 from tolstat.study.points import PointEntry
 from tolstat.study.proposal import MAX_SHIFT, MAX_WIDEN, ProposalEntry

@@ -13,14 +13,14 @@ from tolstat import joint
 from tolstat.common import strict, units
 from tolstat.common.errors import Fault, InputError, gather
 from tolstat.common.notation import DIAMETER
-from tolstat.common.strict import Strict, refuse
+from tolstat.common.strict import Strict, described, refuse, whole
 from tolstat.common.tables import Variant
 from tolstat.joint import Joint, Operation
 from tolstat.joint.model import TOLD
 from tolstat.joint.overrides import laid_over
 from tolstat.study import selection
 from tolstat.study.design import IDEAL, Design, cube, flat, nested, table
-from tolstat.study.model import MAX_ROWS, Solver, described, whole
+from tolstat.study.model import MAX_ROWS, Solver
 from tolstat.study.selection import UNITS, Assignments, Entry
 
 Section = tuple[int | str, ...]

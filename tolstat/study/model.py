@@ -12,7 +12,7 @@ from tolstat.common import selected_results, units
 from tolstat.common.columns import Column
 from tolstat.common.loads import Limit
 from tolstat.common.solver_options import from_names
-from tolstat.common.strict import Strict, refuse
+from tolstat.common.strict import Strict, described, refuse, whole
 from tolstat.common.tables import Options
 from tolstat.study import selection
 from tolstat.study.selective import SelectiveEntry
@@ -26,16 +26,6 @@ MAX_SAMPLES = 1_000_000_000
 """Maximum number of joints of a campaign that is drawn in parts: 30-bit Sobol' sequences end soon after."""
 
 Number = units.Number
-
-
-def described(meaning: str, example: Any, **bounds: Any) -> Any:
-    """Field of a key: its meaning, an example, and bounds as `pydantic.Field` has them."""
-    return Field(description=meaning, examples=[example], **bounds)
-
-
-def whole(least: int, most: int, meaning: str, example: int) -> Any:
-    """Field of a key whose value is a whole number from `least` to `most`."""
-    return described(meaning, example, strict=True, ge=least, le=most)
 
 
 Flag = Annotated[bool, Field(strict=True)]
@@ -166,13 +156,13 @@ class Sampling(Strict):
 
     replicates: Annotated[
         int,
-        Field(
+        described(
+            "number of independent randomisations that `n` is divided into, with `sobol` or `lhs`: shares "
+            "and quantiles then have intervals",
+            8,
             strict=True,
             ge=1,
             le=1000,
-            description="number of independent randomisations that `n` is divided into, with `sobol` or `lhs`: shares "
-            "and quantiles then have intervals",
-            examples=[8],
         ),
     ] = 1
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ from tests.support.environment import ROOT
 from tolstat import joint as joints
 from tolstat.campaign import pool
 from tolstat.common.tables import PARAM
+from tolstat.joint import orders
 
 REFERENCE = Path(__file__).parent / "reference"
 REFERENCE_CASES = sorted(path.stem for path in REFERENCE.glob("*.toml"))
@@ -31,7 +32,23 @@ steps_per_rev = 15
 UNIFORM = 'upper = "0.030 mm", distribution = "uniform"'
 
 Params = Callable[..., np.recarray]
+Wave = tuple[int, float, float]
+"""Number, amplitude and phase of an order."""
 IN_WORKERS = pool.map_blocks
+
+
+def with_orders(
+    par: np.recarray[Any, Any], speed: Sequence[Wave] = (), torque: Sequence[Wave] = ()
+) -> np.recarray[Any, Any]:
+    """The joints `par` with orders (n, amplitude in rad or N m, phase in rad)."""
+    waves = [
+        [model.model_construct(n=n, amplitude=amplitude, phase=phase) for n, amplitude, phase in given]
+        for model, given in ((orders.SpeedOrder, speed), (orders.TorqueOrder, torque))
+    ]
+    ones = np.ones(len(par))
+    for name, value in orders.parameters(*waves, ones, ones).items():
+        par[name] = value
+    return par
 
 
 def with_law(par: np.recarray, law: str) -> np.recarray:

@@ -13,6 +13,8 @@ from tolstat.common.selected_results import OPTIONAL_FIELDS
 from tolstat.common.tables import ERROR_FIELDS
 from tolstat.joint import Operation
 from tolstat.joint.contact import Station
+from tolstat.joint.orders import SpeedOrder, TorqueOrder
+from tolstat.joint.partner import Partner
 from tolstat.study.costs import CostEntry
 from tolstat.study.fatigue import LineEntry
 from tolstat.study.listing import Range
@@ -63,6 +65,8 @@ def kind(own: Mapping[str, Any]) -> str:
         return ", ".join(f'`"{word}"`' for word in own["enum"])
     if "x-unit" in own and "anyOf" in own:
         words, written = own["anyOf"]
+        if written.get("type") == "object":
+            return f"{kind(words | {'x-unit': own['x-unit']})}, table"
         return f"{kind(words)}, {kind(written | {key: own[key] for key in own if key != 'anyOf'})}"
     bounds = "".join(f", {sign} {own[bound]:g}" for bound, sign in BOUNDS.items() if own.get(bound, 1e10) < 1e10)
     if "x-table" in own:
@@ -208,6 +212,9 @@ def tables() -> dict[str, str]:
         "line": LineEntry,
         "point": StressPointEntry,
         "cost": CostEntry,
+        "torque order": TorqueOrder,
+        "speed order": SpeedOrder,
+        "partner": Partner,
         "fit": FitEntry,
     }
     return (

@@ -20,7 +20,7 @@ from tolstat.analysis import process
 from tolstat.common import draw_records
 from tolstat.common.errors import InputError
 from tolstat.common.tables import ERROR_FIELDS
-from tolstat.joint import Operation, nominal_errors
+from tolstat.joint import MEANS, Operation, nominal_errors
 from tolstat.study import Study, axes
 from tolstat.study.design import Design, sobol
 from tolstat.study.proposal import component, weights
@@ -233,7 +233,7 @@ def _fill_grid(samples: Table, study: Study, numbers: range) -> None:
 def _nominal(operation: Operation, name: str) -> float:
     """Value that an error is a deviation from, where a file gives the value itself: that of the operating point."""
     section, _, key = name.partition(".")
-    return float(getattr(operation, key)) if section == "operation" else 0.0
+    return float(getattr(operation, key)) if section == "operation" and key in MEANS else 0.0
 
 
 def _fill_listed(samples: Table, design: Design, numbers: range) -> None:

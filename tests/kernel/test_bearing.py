@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tests.conftest import with_orders
+from tests.support import naive
 from tolstat.common.load_kinds import CONTACTS, RESULTANT, SPAN
 from tolstat.common.tables import KERNEL_RESULT, Fidelity, Method, Options
 from tolstat.kernel.revolution.bearing import write_equivalent_loads
@@ -15,19 +17,20 @@ P = 10 / 3
 ALPHA = np.radians(20)
 
 
-def kernel(forces, alpha=ALPHA):
-    """Equivalent loads of resultant contact forces, (samples, 4)."""
+def kernel(forces, par):
+    """Equivalent loads of resultant contact forces, (samples, 4), of the joint `par`."""
     samples = make_samples(1, len(forces))[0]
     for pin in range(4):
         samples.loads[:, SPAN["contact"].start + len(CONTACTS) * pin + RESULTANT] = forces[:, pin]
     out = np.zeros(1, KERNEL_RESULT).view(np.recarray)[0]
-    write_equivalent_loads(alpha, samples, out)
+    write_equivalent_loads(par[0], samples, out)
     return out.equivalent_load.copy()
 
 
-def integral(forces, alpha):
+def integral(forces, alpha, par=None):
     """The same by trapezoids over the angles of the swing, from the frames' definitions."""
     theta = np.linspace(0, 2 * np.pi, len(forces) + 1)
+    theta = theta if par is None else naive.input_angle(theta, par)
     beta, gamma = np.arctan(np.tan(alpha) * np.sin(theta)), np.arcsin(np.sin(alpha) * np.cos(theta))
     powers = np.vstack([forces, forces[:1]]) ** P
     found = []
@@ -38,39 +41,42 @@ def integral(forces, alpha):
 
 
 @pytest.mark.parametrize("alpha", [0.0, 1e-9, ALPHA, -ALPHA, np.radians(89)])
-def test_a_constant_force_is_its_own_equivalent(alpha):
-    np.testing.assert_allclose(kernel(np.full((180, 4), 700.0), alpha), 700.0, rtol=1e-13)
+def test_a_constant_force_is_its_own_equivalent(params, alpha):
+    par = with_orders(params(alpha=alpha), speed=[(1, 0.3, 0.4)])
+    np.testing.assert_allclose(kernel(np.full((180, 4), 700.0), par), 700.0, rtol=1e-13)
 
 
-def test_two_forces_over_half_of_the_swing_each():
+def test_two_forces_over_half_of_the_swing_each(params):
     """Pins 3 and 4 are at beta > 0 in the first half of a revolution, pins 1 and 2 at gamma > 0 around theta = 0."""
     theta = 2 * np.pi * (np.arange(3600)) / 3600
     forces = np.where(np.column_stack([np.cos(theta)] * 2 + [np.sin(theta)] * 2) > 0, 1000.0, 400.0)
     expected = (0.5 * (1000.0**P + 400.0**P)) ** (1 / P)
-    np.testing.assert_allclose(kernel(forces), expected, rtol=2e-4)
+    np.testing.assert_allclose(kernel(forces, params(alpha=ALPHA)), expected, rtol=2e-4)
 
 
-def test_a_force_where_the_pin_stands_still_counts_little():
+def test_a_force_where_the_pin_stands_still_counts_little(params):
     """beta turns back at theta = 90 deg, gamma at 0: the same peaks weigh differently on the two pairs."""
     forces = np.full((360, 4), 100.0)
     forces[88:93] = forces[268:273] = 1000.0
-    output, _, input_, _ = kernel(forces)
+    output, _, input_, _ = kernel(forces, params(alpha=ALPHA))
     assert output > 2.5 * input_
 
 
-def test_any_history_against_trapezoids():
+@pytest.mark.parametrize("speed", [[], [(2, 0.2, 1.0)]])
+def test_any_history_against_trapezoids(params, speed):
     rng, theta = np.random.default_rng(3), 2 * np.pi * np.arange(720) / 720
     for alpha in (0.05, 0.3, 1.0):
+        par = with_orders(params(alpha=alpha), speed=speed)
         waves = sum(rng.uniform(-1, 1, 4) * np.cos(h * theta[:, None] + rng.uniform(0, 6, 4)) for h in range(1, 9))
         forces = 1000 * np.abs(waves)
-        np.testing.assert_allclose(kernel(forces, alpha), integral(forces, alpha), rtol=1e-4)
+        np.testing.assert_allclose(kernel(forces, par), integral(forces, alpha, par[0]), rtol=1e-4)
 
 
-def test_no_force_and_no_result():
-    assert (kernel(np.zeros((180, 4))) == 0).all()
+def test_no_force_and_no_result(params):
+    assert (kernel(np.zeros((180, 4)), params(alpha=ALPHA)) == 0).all()
     forces = np.ones((180, 4))
     forces[7, 2] = np.nan
-    assert np.isnan(kernel(forces)).tolist() == [False, False, True, False]
+    assert np.isnan(kernel(forces, params(alpha=ALPHA))).tolist() == [False, False, True, False]
 
 
 METHODS = {

@@ -1,13 +1,16 @@
 """Operating points of a study: ``[operation]``, ``[[operation]]``, limits and errors at them."""
 
+import json
 import math
 
 import numpy as np
 import pytest
 
-from tolstat import sampling, study
+from tolstat import joint, sampling, study
+from tolstat.common import strict
 from tolstat.common.errors import InputError
 from tolstat.joint import operating
+from tolstat.study import points
 
 HEAD = '[joint]\nbase = "cirelli2021"\n'
 ONE = '[operation]\nalpha = "15 deg"\nspeed = "500 rpm"\ntorque = "100 N*m"\n'
@@ -132,3 +135,85 @@ def test_values_where_deviations_are_meant(tmp_path, entry):
     said = faults(tmp_path, rest=REST.replace('plus_minus = "5 N*m", distribution = "uniform"', entry))
     assert "leave out the operating point itself" in said
     assert "give deviations from [operation]" in said
+
+
+def operation(**given):
+    point = {"alpha": "15 deg", "speed": "500 rpm", "torque": "100 N*m"} | given
+    return strict.validate(joint.Operation, point, "study.toml", prefix=("operation",))
+
+
+def test_orders_of_speed_and_torque_are_read_and_kept():
+    waves = [{"n": 2, "amplitude": "2 %", "phase": "30 deg"}, {"n": 4, "amplitude": "1 deg"}]
+    read = operation(speed={"mean": "500 rpm", "orders": waves})
+    assert [(order.n, order.amplitude) for order in read.speed_orders] == [(2, 0.01), (4, pytest.approx(np.pi / 180))]
+    point = points.Point("", read)
+    assert points.Point.of("", json.loads(json.dumps(point.values()))).operation == read
+    assert point.in_words == "15 deg, 500 rpm, 100 N m, orders 2 and 4 of speed"
+
+
+@pytest.mark.parametrize(
+    ("given", "place", "found"),
+    [
+        (
+            {"torque": {"mean": "1 N*m", "orders": [{"n": 0.5, "amplitude": "1 N*m"}]}},
+            "torque.orders[0].n",
+            "does not repeat",
+        ),
+        (
+            {"torque": {"mean": "1 N*m", "orders": [{"n": 1, "amplitude": "-1 N*m"}]}},
+            "torque.orders[0].amplitude",
+            "positive",
+        ),
+        ({"torque": {"mean": "1 N*m", "orders": [{"n": 1, "amplitude": "1 N*m"}] * 2}}, "torque.orders", "given twice"),
+        ({"torque": {"orders": []}}, "operation", "has no mean"),
+        ({"torque": {"mean": "1 N*m", "order": []}}, "operation", "unknown key 'order'"),
+        ({"torque": {"mean": "1 mm"}}, "torque", "cannot be a value in N*m"),
+        (
+            {"speed": {"mean": "1 rpm", "orders": [{"n": 3, "amplitude": "110 %"}]}},
+            "speed.orders",
+            "swings by up to 110 %",
+        ),
+        ({"partner": {"position": "after", "alpha": "95 deg", "inertia": "1 kg*m^2"}}, "partner.alpha", "cannot turn"),
+        (
+            {"partner": {"position": "after", "alpha": "9 deg", "inertia": "1 kg*m^2", "stiffness": "1e4 N*m/rad"}},
+            "operation",
+            "torsional resonance of the intermediate shaft at 954.9 rpm",
+        ),
+    ],
+)
+def test_faults_of_orders_and_partner(given, place, found):
+    with pytest.raises(InputError) as error:
+        operation(**given)
+    (fault,) = error.value.faults
+    assert fault.place.endswith(place)
+    assert found in fault.found
+    assert fault.remedy
+
+
+def test_partner_is_kept_and_told():
+    partner = {"position": "after", "alpha": "12 deg", "inertia": "0.02 kg*m^2", "stiffness": "2e4 N*m/rad"}
+    point = points.Point("first", operation(partner=partner))
+    assert points.Point.of("first", json.loads(json.dumps(point.values()))).operation == point.operation
+    assert point.in_words.startswith("15 deg, 500 rpm, 100 N m, before a joint of 12 deg")
+    assert point.operation.partner.torsion(point.operation.speed, 2) == pytest.approx(0.0110874, rel=1e-4)
+
+
+ORDERED = ONE.replace('torque = "100 N*m"', 'torque = { mean = "100 N*m", orders = [{ n = 2, amplitude = "40 N*m" }] }')
+SWING = REST.replace(
+    "[sampling]", 'operation.torque_swing = { plus_minus = "10 %", distribution = "normal" }\n[sampling]'
+)
+
+
+def test_a_swing_scales_the_orders_of_each_joint(tmp_path):
+    s = load(tmp_path, ORDERED, SWING)
+    errors = sampling.draw(s)
+    assert errors["operation.torque_swing"][0] == 1.0
+    assert 0.01 < np.std(errors["operation.torque_swing"][1:]) < 0.1
+    params = joint.perturb(s.joint, s.operation, errors)
+    np.testing.assert_allclose(params["torque_order"][:, 0, 0], 40 * errors["operation.torque_swing"])
+
+
+def test_a_swing_without_orders_has_no_effect(tmp_path):
+    with pytest.raises(InputError) as error:
+        load(tmp_path, ONE, SWING)
+    assert "tolerances.operation.torque_swing: has no effect: the torque has no orders" in str(error.value)

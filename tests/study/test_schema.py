@@ -220,6 +220,8 @@ def models(base: type[Strict] = Strict) -> list[type[Strict]]:
 def test_each_key_has_a_meaning_and_an_example_that_is_read(model: type[Strict]) -> None:
     made = parts.of_model(model)["properties"]
     for name, field in model.model_fields.items():
+        if (field.alias or name).endswith(".orders"):  # part of another key
+            continue
         own = made[field.alias or name]
         if "const" not in own:
             assert own["description"]

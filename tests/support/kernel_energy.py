@@ -125,8 +125,8 @@ def measure(t, q, v, rows, options, work, out):
     par = rows[0]
     forces(t, q, v, par, work)
     out.kinetic = kinetic_energy(v, par, work)
-    out.input = -work.force[INPUT_SHAFT, 5] * par.omega
-    out.load = resisting_torque(t, par, options.start == RAMP) * (work.shaft[0] + v[PSI])
+    out.input = -work.force[INPUT_SHAFT, 5] * work.drive[0]
+    out.load = resisting_torque(t, par, work, options.start == RAMP) * (work.shaft[0] + v[PSI])
     out.support, out.axial = 0.5 * par.slides * par.k_a * q[S] ** 2, par.slides * par.F_a * v[S]
     out.support_damping = par.slides * par.c_a * v[S] ** 2
     out.bushings = out.contacts = 0.0

@@ -29,6 +29,18 @@ def frames(theta, alpha):
     return i, c, c @ turn((0, 1, 0), gamma)
 
 
+def input_angle(phase, par):
+    """Input angle theta at the mean input angle; its orders are sums of cosines and sines."""
+    waves = [(par.order[i] * phase, par.speed_order[i]) for i in range(par.n_orders)]
+    return phase + sum(cosine * np.cos(x) + sine * np.sin(x) for x, (cosine, sine) in waves)
+
+
+def resisting_torque(phase, par):
+    """Resisting torque T_r, N m."""
+    waves = [(par.order[i] * phase, par.torque_order[i]) for i in range(par.n_orders)]
+    return par.torque + sum(cosine * np.cos(x) + sine * np.sin(x) for x, (cosine, sine) in waves)
+
+
 def triad(axes):
     e = np.array([*axes, 0.0])
     return np.array([e, np.cross(Z, e), Z])
@@ -38,7 +50,7 @@ class Bodies:
     """World position of reference points and attitude of all bodies at one time."""
 
     def __init__(self, t, q, par):
-        i, c, f = frames(par.omega * t, par.alpha)
+        i, c, f = frames(input_angle(par.omega * t, par), par.alpha)
         self.position, self.attitude = {}, {}
         names = ["hub"] + [f"pin{k}" for k in (1, 2, 3, 4)] + [f"arm{k}" for k in (1, 2, 3, 4)]
         for k, name in enumerate(names):
@@ -165,7 +177,7 @@ def forces(t, q, v, par):
     return force, loads, modes
 
 
-def imbalance(t, q, v, a, par, resisting):
+def imbalance(t, q, v, a, par):
     """World momentum rates less forces and torques of every lump, and of the shaft about and along its axis."""
     force, _, _ = forces(t, q, v, par)
     h = 1e-6
@@ -196,7 +208,7 @@ def imbalance(t, q, v, a, par, resisting):
         )
     shaft = np.array([np.sin(par.alpha), 0, np.cos(par.alpha)])
     rate = (momentum[1][2]["out"] - momentum[0][2]["out"]) @ shaft / (2 * h)
-    off["out"] = par.Js * rate - force["out"][3:] @ shaft + resisting
+    off["out"] = par.Js * rate - force["out"][3:] @ shaft + resisting_torque(par.omega * t, par)
     if par.slides:
         place, speed = (np.array([of[k]["out"] @ shaft for of in momentum]) for k in (0, 1))
         support = par.k_a * place.mean() + par.c_a * speed.mean()

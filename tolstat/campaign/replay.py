@@ -37,8 +37,8 @@ class CaseResult(NamedTuple):
     ----------
     simulation : Simulation
         The joint: one row, with full histories.
-    alpha : float
-        Misalignment, rad.
+    params : ndarray, (1,), dtype PARAM
+        Its parameters.
     wall_s : float
         Time that both simulations took together, without compilation, s.
     options : Options
@@ -48,7 +48,7 @@ class CaseResult(NamedTuple):
     """
 
     simulation: Simulation
-    alpha: float
+    params: NDArray[np.void]
     wall_s: float
     options: Options
     nominal: NDArray[np.void] | None = None
@@ -94,22 +94,24 @@ class CaseResult(NamedTuple):
     def to_pandas(self) -> pd.DataFrame:
         """Trace of the last revolution, one row per input angle.
 
-        Columns: ``theta`` (rad), ``tau``, ``Psi``, then ``cross1.F_e`` … ``fork4.T_z`` (N and N m, on the lump, in
-        the base marker's axes), ``pin1.contact_outer``, ``pin1.contact_inner``, ``pin1.contact_resultant`` … (N),
+        Columns: ``theta`` (rad; with speed orders its mean, omega t), ``tau``, ``Psi``, then ``cross1.F_e`` …
+        ``fork4.T_z`` (N and N m, on the lump, in the base marker's axes), ``pin1.contact_outer``,
+        ``pin1.contact_inner``, ``pin1.contact_resultant`` … (N),
         ``input.f_x`` … ``output.m_z`` (force and moment about O on the shafts, N and N m, in axes that do not turn) and
         ``pin1.mode`` …
         """
         import pandas as pd
 
-        from tolstat.joint.ideal import speed_ratio
+        from tolstat.joint import ideal
 
         histories = {name: values[0] for name, values in self.simulation.histories.items()}
         tau = histories["tau"].astype(float)
         theta = 2 * math.pi * np.arange(len(tau)) / len(tau)
+        turned = ideal.input_motion(np.copysign(theta, self.params["omega"]), self.params)[0][0]
         columns: dict[str, NDArray[Any]] = {
             "theta": theta,
             "tau": tau,
-            "Psi": (tau - speed_ratio(theta, self.alpha)) / tau,
+            "Psi": (tau - ideal.speed_ratio(turned, self.params["alpha"][0])) / tau,
         }
         columns |= _components(BUSHING_LOADS, histories)
         for p, pin in enumerate(PINS):
@@ -155,7 +157,7 @@ def simulate_case(case: Case) -> CaseResult:
     both = simulate_rows(params, options, "full")
     wall_s = time.perf_counter() - begin
     own = Simulation(both.results[:1], {name: values[:1] for name, values in both.histories.items()})
-    return CaseResult(own, case.operation.alpha, wall_s, options, both.results[1:])
+    return CaseResult(own, params[:1], wall_s, options, both.results[1:])
 
 
 def _number(value: float) -> float | None:
@@ -243,7 +245,7 @@ def replay(store: Reader, row: int) -> Replay:
     warm_up()
     begin = time.perf_counter()
     simulation = simulate_rows(params, options, "full")
-    result = CaseResult(simulation, float(params["alpha"][0]), time.perf_counter() - begin, options)
+    result = CaseResult(simulation, params, time.perf_counter() - begin, options)
     differences = []
     for c in store.columns:
         before, now = (np.ascontiguousarray(c.of(table)) for table in (stored, simulation.results))

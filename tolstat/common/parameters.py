@@ -6,11 +6,17 @@ from tolstat.common.fields import Field
 
 MAX_STATIONS = 16
 """Maximum number of contact stations of a pin."""
+MAX_ORDERS = 48
+"""Maximum number of different orders of speed and torque: 16 of each, and those that come from a partner joint."""
 
 PARAM_FIELDS = (
     Field("alpha", "rad", "misalignment"),
-    Field("omega", "rad/s", "angular velocity of the input shaft"),
-    Field("torque", "N*m", "resisting torque T_r"),
+    Field("omega", "rad/s", "mean angular velocity of the input shaft"),
+    Field("torque", "N*m", "mean resisting torque T"),
+    Field("n_orders", "1", "number of orders", "i8"),
+    Field("order", "1", "cycles of each order in a revolution of the input", shape=(MAX_ORDERS,)),
+    Field("speed_order", "rad", "factors of cosine and sine of each order in theta", shape=(MAX_ORDERS, 2)),
+    Field("torque_order", "N*m", "factors of cosine and sine of each order in T_r", shape=(MAX_ORDERS, 2)),
     Field("Js", "kg*m^2", "inertia of the output shaft"),
     Field("slides", "1", "1 where the output shaft may move along its axis, 0 where it is held rigidly"),
     Field("m_s", "kg", "mass that moves along the axis of the output shaft"),

@@ -19,7 +19,7 @@ from tolstat.common.fields import Field, dtype_of
 from tolstat.common.load_kinds import JOINT, LOAD_KINDS, OVER, PINS
 from tolstat.common.parameters import PARAM_FIELDS
 
-SCHEMA_VERSION = 9
+SCHEMA_VERSION = 10
 """Version of the result file: raise it with every change of its layout, and so of the fields of errors and results."""
 HOLES = tuple(f"hole{i}" for i in (1, 2, 3, 4))
 STEPS_PER_ITERATION = 5
@@ -268,12 +268,17 @@ def _error_fields() -> tuple[Field, ...]:
         ),
         *(Field(f"{pin}.clearance", "m", "deviation of the pin's radial clearance in its hole") for pin in PINS),
         Field("operation.axial_force", "N", "deviation of the axial force on the output shaft"),
+        Field("operation.speed_swing", "1", "factor on the amplitudes of the orders of the input speed"),
+        Field("operation.torque_swing", "1", "factor on the amplitudes of the orders of the resisting torque"),
     ]
     return tuple(fields)
 
 
 ERROR_FIELDS = _error_fields()
 """Manufacturing errors and errors of the operating point: deviations from nominal, zero for the nominal joint."""
+
+FACTORS = ("material.E_factor", "operation.speed_swing", "operation.torque_swing")
+"""Errors that are factors, 1 for the nominal joint."""
 
 RESULT_FIELDS = (
     Field("status", "1", "see Status", "u1"),

@@ -22,25 +22,28 @@ NO_CLOSED_FORM = (
 """Fault of joints that have no closed form, and the remedy."""
 
 
-def speed_ratio(theta: ArrayLike, alpha: float) -> Array:
+def speed_ratio(theta: ArrayLike, alpha: ArrayLike) -> Array:
     """Speed ratio of output to input shaft (Cirelli et al. 2021, eq. 2).
 
     Parameters
     ----------
-    theta : array_like
-        Input angle, rad.
-    alpha : float
-        Misalignment, rad.
+    theta, alpha : array_like
+        Input angle and misalignment, rad; shapes that go together.
 
     Returns
     -------
     ndarray
-        Same shape as `theta`.
     """
     return np.asarray(np.cos(alpha) / (1 - (np.sin(alpha) * np.cos(theta)) ** 2))
 
 
-def output_angle(theta: ArrayLike, alpha: float) -> Array:
+def steepness(theta: ArrayLike, alpha: ArrayLike) -> Array:
+    """Derivative of `speed_ratio` with respect to the input angle."""
+    below = 1 - (np.sin(alpha) * np.cos(theta)) ** 2
+    return np.asarray(-np.cos(alpha) * np.sin(alpha) ** 2 * np.sin(2 * np.asarray(theta)) / below**2)
+
+
+def output_angle(theta: ArrayLike, alpha: ArrayLike) -> Array:
     """Angle of the output shaft, tan(theta_o) = tan(theta) / cos(alpha), continuous in theta.
 
     Parameters and returned value in rad, as in `speed_ratio`.
@@ -88,11 +91,11 @@ def pin_force(theta: ArrayLike, alpha: float, torque: float, radius: float) -> A
 
 
 def reversal_torque(params: NDArray[np.void]) -> Array:
-    """Torque below which the inertia of the output shaft reverses the load twice per revolution.
+    """Mean torque below which orders, or the inertia of the output shaft, reverse the load within a revolution.
 
     The shaft and the two arms on it, moment of inertia J, are accelerated by w^2 dr/dtheta, r being the speed ratio
     (eq. 2). Where J w^2 max|dr/dtheta| exceeds the resisting torque, the transmitted torque changes its sign: the pins
-    cross their clearances and impact.
+    cross their clearances and impact. With orders the least of T_r + J d2theta_o/dt2 over the revolution decides.
 
     Parameters
     ----------
@@ -105,11 +108,53 @@ def reversal_torque(params: NDArray[np.void]) -> Array:
         N m.
     """
     inertia = params["Js"] + 2 * (params["arm_mass"] * params["R"] ** 2 + params["arm_inertia"][:, 2])
+    if (params["n_orders"] > 0).any():
+        return _reversal_with_orders(params, inertia)
     theta = np.linspace(0, np.pi, 361)
     sine, cosine = np.sin(params["alpha"])[:, None], np.cos(params["alpha"])[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):  # an angle of 90 deg is outside the model
         steepest = np.abs(cosine * sine**2 * np.sin(2 * theta) / (1 - (sine * np.cos(theta)) ** 2) ** 2).max(axis=1)
     return np.asarray(inertia * params["omega"] ** 2 * steepest)
+
+
+def input_motion(phase: ArrayLike, params: NDArray[np.void]) -> tuple[Array, Array, Array, Array]:
+    """Input angle and resisting torque of joints with orders (docs/model.md, "Drive and load: orders").
+
+    Parameters
+    ----------
+    phase : array_like, shape (m,)
+        Mean input angle, rad.
+    params : ndarray of PARAM, shape (n,)
+        Joints.
+
+    Returns
+    -------
+    theta, slope, bend : ndarray, shape (n, m)
+        Input angle (rad), its first and second derivative with respect to the phase.
+    torque : ndarray, shape (n, m)
+        Resisting torque, N m.
+    """
+    phase = np.asarray(phase, float)
+    n = params["order"][:, :, None]
+    waves = np.stack([np.cos(n * phase), np.sin(n * phase)], axis=2)
+    slopes = np.stack([-n * waves[:, :, 1], n * waves[:, :, 0]], axis=2)
+    turned = np.einsum("nok,nokm->nm", params["speed_order"], waves)
+    slope = 1 + np.einsum("nok,nokm->nm", params["speed_order"], slopes)
+    bend = -np.einsum("nok,nokm->nm", params["speed_order"], n[:, :, None] ** 2 * waves)
+    torque = params["torque"][:, None] + np.einsum("nok,nokm->nm", params["torque_order"], waves)
+    return phase + turned, slope, bend, torque
+
+
+def _reversal_with_orders(params: NDArray[np.void], inertia: Array) -> Array:
+    """`reversal_torque` of joints with orders; `inertia` of the output shaft and its arms, kg m^2, (n,)."""
+    theta, slope, bend, torque = input_motion(np.linspace(0, 2 * np.pi, 721), params)
+    alpha = params["alpha"][:, None]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        bending = steepness(theta, alpha) * slope**2 + speed_ratio(theta, alpha) * bend
+        turning = params["omega"][:, None] ** 2 * bending
+    mean = params["torque"][:, None]
+    swing = torque - mean + inertia[:, None] * turning
+    return np.asarray(-(np.where(mean < 0, -1.0, 1.0) * swing).min(axis=1))
 
 
 def check(params: NDArray[np.void]) -> None:

@@ -6,16 +6,18 @@ from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, GetJsonSchemaHandler, model_validator
+from pydantic_core import CoreSchema
 
 from tolstat.common import units
 from tolstat.common.load_kinds import PINS
 from tolstat.common.parameters import MAX_STATIONS
-from tolstat.common.strict import Strict, refuse
-from tolstat.common.tables import ERROR, HOLES, PARAM
-from tolstat.joint import material
+from tolstat.common.strict import Strict
+from tolstat.common.tables import ERROR, FACTORS, HOLES, PARAM
+from tolstat.joint import material, orders
 from tolstat.joint.contact import Contact
 from tolstat.joint.model import Joint
+from tolstat.joint.partner import Partner, add_partner, check_misalignment
 from tolstat.joint.sections import Array
 from tolstat.kernel.mechanics.topology import ARM, ARM_OF_PIN, PIN, TRIAD
 
@@ -25,17 +27,11 @@ Table = NDArray[np.void]
 PIN_TRIADS: Array = TRIAD[PIN : PIN + 4]
 """Rows e, t, z of pins 1 to 4 in axes of the cross frame C; shape (4, 3, 3)."""
 
-HOLE_OF_PIN = {pin: HOLES[arm] for pin, arm in zip(PINS, ARM_OF_PIN, strict=True)}
+HOLE_OF_PIN: dict[str, str] = {pin: HOLES[arm] for pin, arm in zip(PINS, ARM_OF_PIN, strict=True)}
 """Hole in which each pin turns."""
 
 ARM_TRIADS: Array = TRIAD[ARM : ARM + 4]
 """Rows e, t, z of arms 1, 2 (input frame I) and 3, 4 (output frame F); shape (4, 3, 3)."""
-
-
-def _check_misalignment(alpha: float) -> float:
-    if not abs(alpha) < np.pi / 2:
-        raise refuse("a Cardan joint cannot turn at {alpha}", "give less than 90 deg", "alpha")
-    return alpha
 
 
 class Operation(Strict):
@@ -43,18 +39,23 @@ class Operation(Strict):
 
     alpha: Annotated[
         units.Angle,
-        AfterValidator(_check_misalignment),
+        AfterValidator(check_misalignment),
         Field(description="misalignment of the shafts, below 90 deg", examples=["15 deg"]),
     ]
     speed: Annotated[
         units.Speed,
         AfterValidator(units.not_zero),
-        Field(description="speed of the input shaft; negative: turns the other way", examples=["500 rpm"]),
+        Field(
+            description="speed of the input shaft, with orders { mean, orders }; negative: turns the other way",
+            examples=["500 rpm"],
+        ),
     ]
     torque: Annotated[
         units.Torque,
         Field(
-            description="resisting torque on the output shaft; negative: drives the output shaft", examples=["100 N*m"]
+            description="resisting torque on the output shaft, with orders { mean, orders }; negative: drives the "
+            "output shaft",
+            examples=["100 N*m"],
         ),
     ]
     axial_force: Annotated[
@@ -65,6 +66,35 @@ class Operation(Strict):
             examples=["500 N"],
         ),
     ] = 0.0
+    speed_orders: Annotated[orders.SpeedOrders, Field(alias="speed.orders")] = ()
+    torque_orders: Annotated[orders.TorqueOrders, Field(alias="torque.orders")] = ()
+    partner: Annotated[
+        Partner | None,
+        Field(
+            description="the other joint of a drive shaft; speed and torque are then those of the shaft's ends",
+            examples=[{"position": "after", "alpha": "12 deg", "inertia": "0.02 kg*m^2"}],
+        ),
+    ] = None
+
+    _split = model_validator(mode="before")(orders.split)
+
+    @model_validator(mode="after")
+    def _check_torsion(self) -> Operation:
+        if self.partner is not None:
+            numbers = (2, *(order.n for order in (*self.speed_orders, *self.torque_orders)))
+            self.partner.check_torsion(self.speed, max(numbers))
+        return self
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        """Return the JSON schema of the table as a file writes it."""
+        schema = super().__get_pydantic_json_schema__(core, handler)
+        orders.join_schemas(handler.resolve_ref_schema(schema)["properties"])
+        return schema
+
+
+MEANS = ("alpha", "speed", "torque", "axial_force")
+"""Numbers of an operating point; errors of it are deviations from them."""
 
 
 def nominal_errors(n: int) -> Table:
@@ -73,10 +103,11 @@ def nominal_errors(n: int) -> Table:
     Returns
     -------
     ndarray, shape (n,), dtype ERROR
-        Zero deviations, factor 1 on E.
+        Zero deviations, factors 1.
     """
     errors = np.zeros(n, ERROR)
-    errors["material.E_factor"] = 1.0
+    for name in FACTORS:
+        errors[name] = 1.0
     return errors
 
 
@@ -88,7 +119,7 @@ def operating(operation: Operation, errors: Table) -> dict[str, Array]:
     dict of str to ndarray, shape (n,)
         ``alpha`` (rad), ``speed`` (rad/s), ``torque`` (N m) and ``axial_force`` (N).
     """
-    return {name: getattr(operation, name) + errors[f"operation.{name}"] for name in Operation.model_fields}
+    return {name: getattr(operation, name) + errors[f"operation.{name}"] for name in MEANS}
 
 
 def perturb(joint: Joint, operation: Operation, errors: Table) -> Table:
@@ -119,6 +150,11 @@ def perturb(joint: Joint, operation: Operation, errors: Table) -> Table:
     params["alpha"], params["omega"], params["torque"] = point["alpha"], point["speed"], point["torque"]
     if joint.shaft.slides:
         params["F_a"] = point["axial_force"]
+    swings = [errors[f"operation.{name}_swing"] for name in ("speed", "torque")]
+    for name, value in orders.parameters(operation.speed_orders, operation.torque_orders, *swings).items():
+        params[name] = value
+    if operation.partner is not None:
+        add_partner(operation.partner, params)
     factor = errors["material.E_factor"]
     for name in ("k_cross", "k_fork", "station_k1", "station_k2", "station_k3"):
         params[name] *= factor[:, None]

@@ -84,6 +84,7 @@ QUESTIONS = (
     Question("selective", "Decide", "Compute yield and unmatched parts of selective assembly.", "open"),
     Question("lots", "Read", "Compute which share of a lot or of a delivery exceeds limits.", "open", counted=True),
     Question("orders", "Read", "Estimate the orders of the loads that the shafts carry.", "open"),
+    Question("shafts", "Read", "Estimate which share of drive shafts exceeds limits.", "open", counted=True),
     Question("bearing_life", "Read", "Compute the life of the pins' bearings.", "open", "bearing_life.answer", True),
     Question("fatigue", "Read", "Compute failures of parts, equivalent loads and damage.", "open", "fatigue.answer"),
     Question("tolerances", "", "Explain the entries of the tolerances and correlations.", "open", "joints"),

@@ -218,7 +218,7 @@ def simulate_together(
     blocks: NDArray[np.void] = NO_BLOCKS,
     steps: NDArray[np.int64] | None = None,
 ) -> Iterator[tuple[int, NDArray[np.void]]]:
-    """Simulate joints in lanes by number of contact stations; yield index and samples of each if `keep`.
+    """Simulate joints in lanes by numbers of contact stations and orders; yield index and samples of each if `keep`.
 
     `left` is as of `simulate_alone`. `steps`: number of explicit steps of the first revolution, (n,); without it joints
     are simulated in lock-step, and those in which a step fails are simulated again, alone.
@@ -232,7 +232,7 @@ def simulate_together(
     memory = make_samples(min(max_size, len(params)) if keep else 0, options.steps_per_rev)
     for here in _groups(params, max_size):
         part = np.ascontiguousarray(params[here])
-        batch.par.n_stations = part["n_stations"][0]
+        batch.par.n_stations, batch.par.n_orders = part["n_stations"][0], part["n_orders"][0]
         words = part.view(np.float64).reshape(len(part), -1)
         samples = memory[: len(part)]
         own = np.zeros((len(part) if len(blocks) else 0, blocks.shape[1]), KERNEL_RESULT).view(np.recarray)
@@ -327,9 +327,10 @@ def _resolved(
 
 
 def _groups(params: NDArray[np.void], max_size: int) -> Iterator[NDArray[np.intp]]:
-    """Yield the indices of joints with equal numbers of contact stations, at most `max_size` at a time."""
-    for stations in np.unique(params["n_stations"]):
-        rows = np.flatnonzero(params["n_stations"] == stations)
+    """Yield the indices of joints with equal numbers of contact stations and orders, at most `max_size` at a time."""
+    shared = params[["n_stations", "n_orders"]]
+    for numbers in np.unique(shared):
+        rows = np.flatnonzero(shared == numbers)
         for first in range(0, len(rows), max_size):
             yield rows[first : first + max_size]
 

@@ -65,7 +65,7 @@ class Metadata(BaseModel):
     study_name: str
     study: str
     limits: dict[str, float]
-    points: dict[str, dict[str, float | None]]
+    points: dict[str, dict[str, Any]]
     joint: dict[str, Any]
     identity: dict[str, Any]
     options: dict[str, Any]

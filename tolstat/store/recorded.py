@@ -14,7 +14,7 @@ from tolstat.common.errors import Fault, InputError
 from tolstat.common.solver_options import from_names
 from tolstat.common.strict import read_section, validate
 from tolstat.common.tables import PARAM, Options
-from tolstat.joint import Joint, Operation, operating, perturb, varied
+from tolstat.joint import MEANS, Joint, Operation, operating, perturb, varied
 from tolstat.joint.derived import get
 from tolstat.joint.sections import RIGID
 from tolstat.solver import fidelity
@@ -25,7 +25,7 @@ from tolstat.study.design import nested
 from tolstat.study.model import Solver
 from tolstat.study.swept import KEYS
 
-_OPERATION = tuple(f"operation.{name}" for name in Operation.model_fields)
+_OPERATION = tuple(f"operation.{name}" for name in MEANS)
 
 
 def joint_of(store: Reader, row: int) -> Joint:
@@ -54,7 +54,7 @@ def operating_points(store: Reader, slots: slice = slice(None)) -> dict[str, NDA
     first, last, _ = slots.indices(store.n)
     rows = (operating(operation_of(store, row), errors[row - first : row - first + 1]) for row in range(first, last))
     each = list(rows)
-    return {name: np.concatenate([one[name] for one in each]) for name in Operation.model_fields}
+    return {name: np.concatenate([one[name] for one in each]) for name in MEANS}
 
 
 def options_of(store: Reader, row: int) -> Options:

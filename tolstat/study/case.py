@@ -93,7 +93,7 @@ def load_case(path: str | Path) -> Case:
     assert operation is not None
     assert solver is not None
     case = Case(file.path, file.text, joint, operation, solver, errors)
-    found = mounting.refusals([Setting(("operation",), joint, operation, solver.fidelity)], ())
+    found = mounting.refusals([Setting(("operation",), joint, operation, solver.fidelity)], {})
     if faults := [case.fault(dotted(path), text, remedy) for path, text, remedy in found]:
         raise InputError(faults)
     return case

@@ -302,7 +302,7 @@ class Variants:
         faults: list[Fault] = []
         operation, solver = self._nominal.operation, self._nominal.solver
         with gather(faults):
-            keys = operation.model_dump(mode="json") | entry.operation
+            keys = operation.model_dump(mode="json", by_alias=True) | entry.operation
             operation = strict.validate(Operation, keys, self._place, prefix=(*at, "operation"))
         if entry.solver.get("fidelity") == "auto":
             where = f"{self._place}: {strict.dotted((*at, 'solver', 'fidelity'))}"

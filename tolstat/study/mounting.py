@@ -1,8 +1,8 @@
-"""What holds the output shaft along its axis: settings that go with it, and a note where rigid shafts decide."""
+"""Settings without effect: axial forces on a rigid shaft, swings without orders; a note where rigid shafts decide."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from shlex import quote
 from typing import NamedTuple
 
@@ -13,6 +13,7 @@ from tolstat.study.axes import columns_of
 
 FORCE = "operation.axial_force"
 Path = tuple[int | str, ...]
+Varied = Mapping[str, Collection[str]]
 
 
 class Setting(NamedTuple):
@@ -33,20 +34,20 @@ class Setting(NamedTuple):
     operation: Operation
     fidelity: str
 
-    def moved(self, varied: Collection[str]) -> bool:
+    def moved(self, varied: Varied) -> bool:
         """Whether an axial force moves the output shaft; `varied` as in `refusals`."""
-        return self.joint.shaft.slides and (bool(varied) or self.operation.axial_force != 0.0)
+        return self.joint.shaft.slides and (FORCE in varied or self.operation.axial_force != 0.0)
 
 
-def refusals(settings: Sequence[Setting], varied: Collection[str]) -> Iterator[tuple[Path, str, str]]:
-    """Refuse axial forces without effect, and closed forms where an axial force moves the output shaft.
+def refusals(settings: Sequence[Setting], varied: Varied) -> Iterator[tuple[Path, str, str]]:
+    """Refuse axial forces and swings without effect, and closed forms where an axial force moves the output shaft.
 
     Parameters
     ----------
     settings : sequence of Setting
         All joints of a study at all of their operating points.
-    varied : collection of str
-        Sections of the study in which the axial force scatters or is swept.
+    varied : mapping
+        Errors of the operating point that scatter or are swept, to the sections of the study in which they do.
 
     Yields
     ------
@@ -56,8 +57,13 @@ def refusals(settings: Sequence[Setting], varied: Collection[str]) -> Iterator[t
     if not any(own.joint.shaft.slides for own in settings):
         paths = [(*own.path, "axial_force") for own in settings if own.operation.axial_force]
         remedy = 'write shaft.axial = "free" or a stiffness under [joint], or remove it'
-        for path in dict.fromkeys([*paths, *((section, *FORCE.split(".")) for section in varied)]):
+        for path in dict.fromkeys([*paths, *((section, *FORCE.split(".")) for section in varied.get(FORCE, ()))]):
             yield path, "has no effect: the output shaft is rigid along its axis", remedy
+    for key in ("speed", "torque"):
+        if not any(getattr(own.operation, f"{key}_orders") for own in settings):
+            remedy = f"write operation.{key} = {{ mean = ..., orders = [...] }}, or remove it"
+            for section in varied.get(f"operation.{key}_swing", ()):
+                yield (section, "operation", f"{key}_swing"), f"has no effect: the {key} has no orders", remedy
     if any(own.fidelity == "ideal" and own.moved(varied) for own in settings):
         yield ("solver", "fidelity"), *NO_CLOSED_FORM
 

@@ -12,8 +12,11 @@ from pydantic import AfterValidator, Field
 from tolstat.common import loads, strict, units
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.strict import did_you_mean, refuse
-from tolstat.joint import Operation
+from tolstat.joint import Operation, orders
+from tolstat.joint.partner import Partner
 
+ORDERS = {"speed_orders": orders.SpeedOrder, "torque_orders": orders.TorqueOrder}
+"""Model of the orders in each field of an operating point."""
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
 
 
@@ -40,18 +43,31 @@ class Point(NamedTuple):
         own = self.operation
         said = f"{math.degrees(own.alpha):.4g} deg, {own.speed * 30 / math.pi:.4g} rpm, {own.torque:.4g} N m"
         said += f", axial force {own.axial_force:.4g} N" if own.axial_force else ""
+        for name, given in (("speed", own.speed_orders), ("torque", own.torque_orders)):
+            said += f", {orders.in_words(given)} of {name}" if given else ""
+        said += f", {own.partner.in_words}" if own.partner else ""
         return f"{said}, {self.share:.4g} of the time" if self.name and not math.isnan(self.share) else said
 
     @classmethod
-    def of(cls, name: str, values: Mapping[str, float | None]) -> Point:
+    def of(cls, name: str, values: Mapping[str, Any]) -> Point:
         """Return the point that has written these `values`."""
         own = dict(values)
         share = own.pop("share")
+        for key, order in ORDERS.items():
+            own[key] = tuple(order.model_construct(**wave) for wave in own.get(key, ()))
+        own["partner"] = Partner.model_construct(**own["partner"]) if "partner" in own else None
         return cls(name, Operation.model_construct(None, **own), math.nan if share is None else share)
 
     def values(self) -> dict[str, Any]:
-        """JSON values: ``alpha`` (rad), ``speed`` (rad/s), ``torque`` (N m), ``axial_force`` (N), ``share`` or null."""
-        return self.operation.model_dump() | {"share": None if math.isnan(self.share) else self.share}
+        """JSON values of the point.
+
+        ``alpha`` (rad), ``speed`` (rad/s), ``torque`` (N m), ``axial_force`` (N), ``share`` or null; if there are any,
+        ``speed_orders`` and ``torque_orders``, each with ``n``, ``amplitude`` (rad, N m) and ``phase`` (rad), and
+        ``partner`` with its keys in SI units.
+        """
+        values = self.operation.model_dump()
+        values = {key: value for key, value in values.items() if key not in (*ORDERS, "partner") or value}
+        return values | {"share": None if math.isnan(self.share) else self.share}
 
 
 def check_name(name: str) -> str:
@@ -101,7 +117,7 @@ def read(section: Any, place: str) -> tuple[Point, ...]:
         if entry.name in [point.name for point in found]:
             where = f"{place}: operation[{number}].name"
             faults.append(Fault(where, f"a point {entry.name!r} exists already", "give each point its own name"))
-        operation = Operation.model_construct(**entry.model_dump(include=set(Operation.model_fields)))
+        operation = Operation.model_construct(**{key: getattr(entry, key) for key in Operation.model_fields})
         found.append(Point(entry.name, operation, math.nan if entry.share is None else entry.share))
     if not section:
         faults.append(Fault(f"{place}: operation", "has no operating point", "add one: [operation]"))

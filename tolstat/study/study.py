@@ -112,7 +112,7 @@ class Study(Case):
     @property
     def has_axial_force(self) -> bool:
         """Whether an axial force moves the output shaft of some joint."""
-        return any(own.moved(self._force_varies) for own in self._settings)
+        return any(own.moved(self._varied) for own in self._settings)
 
     @property
     def joint_in_words(self) -> str:
@@ -121,8 +121,8 @@ class Study(Case):
         return in_words([own.shaft.axial for own in joints], [own.contact.law for own in joints])
 
     def faults_of_mounting(self) -> list[Fault]:
-        """Faults of settings that do not go with what holds the output shaft along its axis."""
-        found = mounting.refusals(self._settings, self._force_varies)
+        """Faults of settings without effect, see `mounting.refusals`."""
+        found = mounting.refusals(self._settings, self._varied)
         return [self.fault(dotted(path), text, remedy) for path, text, remedy in found]
 
     @property
@@ -139,11 +139,16 @@ class Study(Case):
         return [Setting(path, joint, point, self.solver.fidelity) for joint in self.joints for path, point in at]
 
     @property
-    def _force_varies(self) -> list[str]:
-        """Sections in which the axial force scatters or is swept."""
+    def _varied(self) -> dict[str, list[str]]:
+        """Errors of the operating point that scatter or are swept, to the sections in which they do."""
         grid = {name for point in self.listed.points for name in point} if self.listed else set()
         names = {"tolerances": self.tolerances, "sweep": [n for axis in self.sweep for n in axis.names], "grid": grid}
-        return [section for section, own in names.items() if mounting.FORCE in own]
+        sections: dict[str, list[str]] = {}
+        for section, of_section in names.items():
+            for name in of_section:
+                if name.startswith("operation."):
+                    sections.setdefault(name, []).append(section)
+        return sections
 
     @property
     def joints(self) -> tuple[Joint, ...]:

@@ -80,7 +80,7 @@ def place_shaft(body, turned, shifted, work):
 @njit
 def forces(t, q, v, par, work):
     """Evaluate all bushings and contacts at one state; write ``work.force`` and loads; arguments as in `residual`."""
-    ideal_motion(par.omega * t, par.alpha, par.omega, work)
+    ideal_motion(par.omega * t, par, work)
     set_bodies(q, v, par, work)
     for body in range(N_BODIES):
         for k in range(6):
@@ -92,11 +92,11 @@ def forces(t, q, v, par, work):
 
 
 @njit
-def resisting_torque(t, par, ramped):
+def resisting_torque(t, par, work, ramped):
     """Resisting torque T_r, N m; with `ramped` it rises by the cubic step over the first quarter revolution."""
     if not ramped:
-        return par.torque
-    return par.torque * smooth_step(t * abs(par.omega) / (0.5 * math.pi))
+        return work.drive[1]
+    return work.drive[1] * smooth_step(t * abs(par.omega) / (0.5 * math.pi))
 
 
 @njit
@@ -154,7 +154,7 @@ def residual(t, q, v, a, par, options, work, out):
         for k in range(3):
             out[i + k] = f[k] - work.force[body, k]
             out[i + 3 + k] = torque[k] - work.force[body, 3 + k]
-    resisting = resisting_torque(t, par, options.start == RAMP)
+    resisting = resisting_torque(t, par, work, options.start == RAMP)
     out[PSI] = par.Js * (work.shaft[1] + a[PSI]) - work.force[OUTPUT_SHAFT, 5] + resisting
     out[S] = par.slides * par.m_s * a[S] - axial_force(q, v, par, work)
 
@@ -176,6 +176,6 @@ def acceleration(t, q, v, par, options, work, out):
         for k in range(3):
             out[i + k] = (work.force[body, k] - f[k]) / mass
             out[i + 3 + k] = ddphi[k]
-    resisting = resisting_torque(t, par, options.start == RAMP)
+    resisting = resisting_torque(t, par, work, options.start == RAMP)
     out[PSI] = (work.force[OUTPUT_SHAFT, 5] - resisting) / par.Js - work.shaft[1]
     out[S] = axial_force(q, v, par, work) / where(par.slides > 0, par.m_s, 1.0)

@@ -46,14 +46,14 @@ def travel_to_contact(pin, side, across, par, work):
     across : float
         Displacement across the plane of the cross that remains, m.
     par, work : records of PARAM and WORK
-        The joint, and its stations as `locate` wrote them.
+        The joint; its stations as `locate` wrote them, and the resisting torque.
 
     Returns
     -------
     tuple of float
         Displacement and distance of the station from O, m.
     """
-    load = abs(par.torque) / (2 * par.R)
+    load = abs(work.drive[1]) / (2 * par.R)
     best, radius = 0.0, 0.0
     for j in (0, par.n_stations - 1):
         reach = par.clearance[pin] + par.delta_d + penetration(load, j, par.clearance[pin], par)
@@ -71,7 +71,7 @@ def rigid_guess(t, par, work, state):
     q = state.q0
     q[:] = 0.0
     state.v0[:] = 0.0
-    ideal_motion(par.omega * t, par.alpha, par.omega, work)
+    ideal_motion(par.omega * t, par, work)
     locate_all(q, state.v0, par, work)
     if par.slides > 0:
         q[S] = shift_along_axis(par, work)
@@ -83,7 +83,7 @@ def rigid_guess(t, par, work, state):
     up = -0.25 * (z0 + z1 + z2 + z3)
     across = 0.25 * abs(z0 + z1 - z2 - z3)
 
-    forward = math.copysign(1.0, par.torque)
+    forward = math.copysign(1.0, work.drive[1])
     want2, r2 = travel_to_contact(2, -forward, across, par, work)
     want3, r3 = travel_to_contact(3, -forward, across, par, work)
     turn_in = (want2 + want3) / (r2 + r3)

@@ -68,13 +68,13 @@ def moving_moments(par, work):
 
 
 @njit
-def ideal_loads(theta, par, state, work):
-    """Write loads of the bushings, contact forces and modes of the ideal joint at one input angle.
+def ideal_loads(phase, par, state, work):
+    """Write loads of the bushings, contact forces and modes of the ideal joint at one phase.
 
     Parameters
     ----------
-    theta : float
-        Input angle, rad.
+    phase : float
+        Mean input angle omega t, rad.
     par : record of PARAM
         The joint; its errors and clearances are not used.
     state : State
@@ -84,12 +84,12 @@ def ideal_loads(theta, par, state, work):
     """
     state.q0[:] = 0.0
     state.v0[:] = 0.0
-    ideal_motion(theta, par.alpha, par.omega, work)
+    ideal_motion(phase, par, work)
     set_bodies(state.q0, state.v0, par, work)
     radius = contact_radius(par)
     moment, torque = moving_moments(par, work)
     sin_gamma, cos_gamma = work.relative[FRAME_F, 2, 0], work.relative[FRAME_F, 2, 2]
-    output = (par.torque + torque + moment[0] * sin_gamma) / cos_gamma
+    output = (work.drive[1] + torque + moment[0] * sin_gamma) / cos_gamma
     for pin in range(4):
         e, t = row(TRIAD[PIN + pin], 0), row(TRIAD[PIN + pin], 1)
         # moments of the contact forces about O: output pins -output about z and M_x about x, input pins the rest

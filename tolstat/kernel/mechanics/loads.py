@@ -50,11 +50,11 @@ OTHERS = np.setdiff1d(np.arange(N_INSTANT), DECIDING)
 
 
 @njit
-def output_speed(lane, par, work, v):
+def output_speed(lane, work, v):
     """Speed ratio tau and its error Psi, eq. (13), from the velocities `v`, (56,)."""
-    omega, rate = pick(par.omega, lane), pick(v[PSI], lane)
-    tau = (pick(work.shaft[0], lane) + rate) / omega
-    return tau, rate / (omega * tau)
+    speed, rate = pick(work.drive[0], lane), pick(v[PSI], lane)
+    tau = (pick(work.shaft[0], lane) + rate) / speed
+    return tau, rate / (speed * tau)
 
 
 @njit

@@ -16,19 +16,53 @@ def speed_ratio(theta, alpha):
 
 
 @njit
-def ideal_motion(theta, alpha, omega, work):
+def drive_and_load(phase, par):
+    """Input angle, its derivatives and the resisting torque at a phase (docs/model.md, "Drive and load: orders").
+
+    Parameters
+    ----------
+    phase : float
+        Mean input angle omega t, rad.
+    par : record of PARAM
+        The joint.
+
+    Returns
+    -------
+    theta, slope, bend : float
+        Input angle (rad) and its first and second derivative with respect to the phase.
+    torque : float
+        Resisting torque T_r, N m, without the ramp at the start.
+    """
+    theta, slope, bend, torque = phase, 1.0 + 0.0 * phase, 0.0 * phase, par.torque + 0.0 * phase
+    for i in range(par.n_orders):
+        n = par.order[i]
+        s, c = sine_cosine(n * phase)
+        turned = par.speed_order[i, 0] * c + par.speed_order[i, 1] * s
+        theta += turned
+        slope += n * (par.speed_order[i, 1] * c - par.speed_order[i, 0] * s)
+        bend -= n * n * turned
+        torque += par.torque_order[i, 0] * c + par.torque_order[i, 1] * s
+    return theta, slope, bend, torque
+
+
+@njit
+def ideal_motion(phase, par, work):
     """Write the frames' angular velocities and accelerations, and the rotations between the frames, to `work`.
 
     Parameters
     ----------
-    theta, alpha : float
-        Input angle and misalignment, rad.
-    omega : float
-        Input speed, rad/s.
+    phase : float
+        Mean input angle omega t, rad.
+    par : record of PARAM
+        The joint.
     work : record of WORK
-        Its ``frame_w``, ``frame_dw``, ``relative``, ``relative_w``, ``shaft`` and ``turned`` are written.
+        Its ``frame_w``, ``frame_dw``, ``relative``, ``relative_w``, ``shaft``, ``turned`` and ``drive`` are
+        written.
     """
-    sa, ca = sine_cosine(alpha)
+    theta, slope, bend, torque = drive_and_load(phase, par)
+    omega, domega = par.omega * slope, par.omega * par.omega * bend
+    work.drive[0], work.drive[1] = omega, torque
+    sa, ca = sine_cosine(par.alpha)
     st, ct = sine_cosine(theta)
     # cross relative to input fork: tan(beta) = tan(alpha) sin(theta)
     ta = sa / ca
@@ -37,7 +71,7 @@ def ideal_motion(theta, alpha, omega, work):
     cb = 1 / math.sqrt(sec2)
     sb = tb * cb
     db = omega * ta * ct / sec2
-    ddb = -omega * omega * ta * st / sec2 - 2 * ta * st * db * db
+    ddb = -omega * omega * ta * st / sec2 - 2 * ta * st * db * db + domega * ta * ct / sec2
     # output fork relative to cross: sin(gamma) = sin(alpha) cos(theta)
     sg = sa * ct
     cg = math.sqrt(1 - sg * sg)
@@ -45,13 +79,14 @@ def ideal_motion(theta, alpha, omega, work):
     # output shaft, eq. (2) and its time derivative
     below = 1 - sg * sg
     dto = omega * ca / below
-    ddto = -omega * omega * ca * 2 * sa * sa * ct * st / (below * below)
+    ddto = -omega * omega * ca * 2 * sa * sa * ct * st / (below * below) + domega * ca / below
 
     w, dw = work.frame_w, work.frame_dw
     w[FRAME_I, 0], w[FRAME_I, 1], w[FRAME_I, 2] = 0.0, 0.0, omega
-    dw[FRAME_I, 0], dw[FRAME_I, 1], dw[FRAME_I, 2] = 0.0, 0.0, 0.0
+    dw[FRAME_I, 0], dw[FRAME_I, 1], dw[FRAME_I, 2] = 0.0, 0.0, domega
     w[FRAME_C, 0], w[FRAME_C, 1], w[FRAME_C, 2] = db, omega * sb, omega * cb
-    dw[FRAME_C, 0], dw[FRAME_C, 1], dw[FRAME_C, 2] = ddb, omega * cb * db, -omega * sb * db
+    dw[FRAME_C, 0] = ddb
+    dw[FRAME_C, 1], dw[FRAME_C, 2] = omega * cb * db + domega * sb, domega * cb - omega * sb * db
     w[FRAME_F, 0], w[FRAME_F, 1], w[FRAME_F, 2] = 0.0, 0.0, dto
     dw[FRAME_F, 0], dw[FRAME_F, 1], dw[FRAME_F, 2] = 0.0, 0.0, ddto
 

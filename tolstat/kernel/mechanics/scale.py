@@ -12,8 +12,11 @@ SMALLEST_FORCE = 1e-3
 
 @njit
 def typical_force(par):
-    """Larger one of the pins' tangential force T_r/(2R) and a pin's centrifugal force, N."""
-    return max(abs(par.torque) / (2 * par.R), par.pin_mass * par.omega**2 * par.R, SMALLEST_FORCE)
+    """Larger one of the pins' tangential force T_r/(2R) and a pin's centrifugal force, N; of T_r an upper bound."""
+    torque = abs(par.torque)
+    for i in range(par.n_orders):
+        torque += math.hypot(par.torque_order[i, 0], par.torque_order[i, 1])
+    return max(torque / (2 * par.R), par.pin_mass * par.omega**2 * par.R, SMALLEST_FORCE)
 
 
 @njit

@@ -12,7 +12,7 @@ import math
 
 from tolstat.kernel.integrators.state import AHEAD, HALVINGS, STEPS
 from tolstat.kernel.mechanics.loads import SPEED_ERROR
-from tolstat.kernel.mechanics.motion import speed_ratio
+from tolstat.kernel.mechanics.motion import drive_and_load, speed_ratio
 from tolstat.kernel.mechanics.topology import PSI
 from tolstat.kernel.simd.jit import njit, njit_inner
 from tolstat.kernel.simd.lane import where
@@ -77,18 +77,19 @@ def keep(solved, state):
 def speed_ratios(par, samples):
     """Write ``tau`` and its error Psi, eq. (13), of the samples.
 
-    Before, ``tau`` holds the output shaft's angular deviation. Its derivative with respect to the input angle is taken
-    by periodic central differences.
+    Before, ``tau`` holds the output shaft's angular deviation. Its derivative with respect to the phase is taken by
+    periodic central differences.
     """
     n = samples.size
     by_sample = n / (4 * math.pi) if par.omega > 0 else -n / (4 * math.pi)
     first, before = samples[0].tau, samples[n - 1].tau
     for s in range(n):
         here, ahead = samples[s].tau, samples[s + 1].tau if s + 1 < n else first
-        slope = (ahead - before) * by_sample
+        theta, slope, _, _ = drive_and_load(math.copysign(2 * math.pi * s / n, par.omega), par)
+        error = (ahead - before) * by_sample / slope
         before = here
-        samples[s].tau = speed_ratio(2 * math.pi * s / n, par.alpha) + slope
-        samples[s].psi = slope / samples[s].tau
+        samples[s].tau = speed_ratio(theta, par.alpha) + error
+        samples[s].psi = error / samples[s].tau
         samples[s].loads[SPEED_ERROR] = abs(samples[s].psi)
 
 

@@ -121,7 +121,7 @@ def record(k, lane, par, work, v, samples):
     """
     sample = samples[k % samples.size]
     fetch(samples[(k + 2) % samples.size])
-    sample.tau, sample.psi = output_speed(lane, par, work, v)
+    sample.tau, sample.psi = output_speed(lane, work, v)
     write_loads(lane, sample.psi, par, work)
     s = pick(work.pos[OUTPUT_SHAFT, 2], lane)
     shift = centring_stiffness(lane, par) * abs(s - sample.s)
@@ -292,5 +292,5 @@ def summarise(par, samples, out):
             for s in range(n):
                 count += samples[s].mode[pin] == mode
             out.mode_share[pin, mode] = count / n
-    write_equivalent_loads(par.alpha, samples, out)
+    write_equivalent_loads(par, samples, out)
     write_orders(samples, out)

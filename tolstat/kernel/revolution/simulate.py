@@ -90,6 +90,11 @@ reset = integrate.reset
 def inside_model(par):
     """Whether a joint lies within the scope of the model; written so that NaN does not."""
     good = abs(par.alpha) < 0.5 * math.pi and 0 < abs(par.omega) < 1e300 and abs(par.torque) < 1e300
+    swing = 0.0
+    for i in range(par.n_orders):
+        swing += par.order[i] * math.hypot(par.speed_order[i, 0], par.speed_order[i, 1])
+        good = good and math.hypot(par.torque_order[i, 0], par.torque_order[i, 1]) < 1e300
+    good = good and swing < 1
     good = good and par.k_cross[0] > 0 and par.k_fork[0] > 0
     good = good and par.needle_b >= 0
     bears = False

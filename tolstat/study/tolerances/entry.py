@@ -182,7 +182,7 @@ class SingleEntry(ToleranceEntry):
         found = self.build(site)
         if site.name.startswith("operation."):
             low, high = found.ppf(_NEARLY_ALL)
-            if not low <= 0.0 <= high:
+            if not low <= site.center <= high:
                 values = " to ".join(units.shown(float(end), site.unit) for end in (low, high))
                 remedy = "give deviations from [operation], and change a value there that is another on average"
                 raise refuse(f"deviations of {values} leave out the operating point itself", remedy)

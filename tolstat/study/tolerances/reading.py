@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from tolstat.common.errors import Fault, gather
+from tolstat.common.tables import FACTORS
 from tolstat.joint import Joint
 from tolstat.study.axes import ORIENTATIONS, Axis
 from tolstat.study.bonus import REJECT, Bonus
@@ -123,7 +124,7 @@ def site_of(name: str, nominal: Nominal) -> Site:
 
 def nominal_value(name: str) -> float:
     """Value of an error in the nominal joint (SI)."""
-    return 1.0 if name == "material.E_factor" else 0.0
+    return 1.0 if name in FACTORS else 0.0
 
 
 def _diameter(site: Site, model: ToleranceEntry) -> dict[str, Diameter]:

@@ -1,0 +1,77 @@
+"""Drive shafts of two joints: shares of pairs, their intervals, and how the output turns."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import tolstat
+from tests.conftest import ROOT
+from tolstat import study
+from tolstat.campaign.run import run
+from tolstat.common.errors import NotApplicable
+from tolstat.questions.shafts import interval
+from tolstat.store import ResultFile
+
+STUDY = ROOT / "studies" / "drive_shaft.toml"
+CHEAP = ("[sampling]\nn = 1024", '[solver]\nfidelity = "quasistatic"\nsteps_per_rev = 24\n[sampling]\nn = 40')
+
+
+@pytest.fixture(scope="module")
+def view(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("shafts")
+    text = STUDY.read_text().replace(*CHEAP)
+    (folder / "shaft.toml").write_text(text)
+    run(study.load(folder / "shaft.toml"), folder / "shaft.h5", workers=1, check=False)
+    with ResultFile.open(folder / "shaft.h5") as file:
+        yield file.view()
+
+
+def test_a_shaft_is_joint_i_first_and_the_next_joint_second(view):
+    first, second = (view.at(name).load("any limit").values > 1 for name in ("first", "second"))
+    rows = {row["load"]: row for row in tolstat.shafts(view).frame("shafts").to_dict("records")}
+    pairs = [first[i] or second[(i + 1) % 40] for i in range(40)]
+    row = rows["any limit"]
+    assert (row["n"], row["count"]) == (40, sum(pairs))
+    assert 0 < row["count"] < 40
+    assert row["first"] == first.mean()
+    assert row["second"] == second.mean()
+    assert row["lower"] < row["estimate"] < row["upper"]
+
+
+def test_output_of_the_shaft_against_differences_of_its_angle(view):
+    """The swing of 1 % at 2 per revolution passes two joints that cancel each other."""
+    rows = {row["quantity"]: row for row in tolstat.shafts(view).frame("output").to_dict("records")}
+    speed = rows["unevenness of the speed"]
+    assert speed["ideal"] == pytest.approx(0.02, rel=1e-3)
+    assert speed["ideal"] < speed["at_most_50"] < speed["at_most_95"]
+    assert rows["angular acceleration"]["ideal"] == pytest.approx(0.01 * 2 * (1500 * np.pi / 30) ** 2, rel=1e-3)
+
+
+def test_other_studies_hold_no_drive_shaft(tmp_path):
+    text = (ROOT / "studies" / "duty_cycle.toml").read_text().replace("n = 512", "n = 2")
+    (tmp_path / "a.toml").write_text(text.replace("[sampling]", '[solver]\nfidelity = "ideal"\n[sampling]'))
+    run(study.load(tmp_path / "a.toml"), tmp_path / "a.h5", workers=1, check=False)
+    with ResultFile.open(tmp_path / "a.h5") as file, pytest.raises(NotApplicable):
+        tolstat.shafts(file.view())
+
+
+@pytest.mark.parametrize(("alike", "width"), [(0.0, 1.45), (1.0, 1.05)])
+def test_intervals_contain_the_share_of_shafts(alike, width):
+    """Also of joints that exceed it at both places alike; n shafts counted as independent miss the share too often."""
+    rng, n, p, seeds = np.random.default_rng(4), 400, 0.05, 2000
+    first = rng.random((seeds, n)) < p
+    second = np.where(rng.random((seeds, n)) < alike, first, rng.random((seeds, n)) < p)
+    counts = (first | np.roll(second, -1, axis=1)).sum(axis=1)
+    truth = 1 - (1 - p) ** 2
+    ends = {k: interval(k, k, n) for k in np.unique(counts).tolist()}
+    inside = np.mean([ends[k][0] <= truth <= ends[k][1] for k in counts.tolist()])
+    assert inside > 0.95
+    spread = np.std(counts / n)
+    mean_width = np.mean([ends[k][1] - ends[k][0] for k in counts.tolist()])
+    assert mean_width < width * 1.15 * 2 * 1.96 * spread
+    if alike:
+        from tolstat.analysis.binomial import clopper_pearson
+
+        low, high = clopper_pearson(counts, n)
+        assert np.mean((low <= truth) & (truth <= high)) < 0.9

@@ -1,0 +1,183 @@
+"""Drive shafts of two joints: which share of them exceeds a limit, and how evenly their output turns."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tolstat.analysis import binomial
+from tolstat.analysis.independent import Independent
+from tolstat.common.errors import Fault, NotApplicable
+from tolstat.common.load_kinds import ORDERS
+from tolstat.common.loads import ANY_LIMIT
+from tolstat.display import text
+from tolstat.display.answer import Answer, Part, Sentence, Table
+from tolstat.display.table import Column, Row, Rows
+from tolstat.joint import nominal_errors, perturb
+from tolstat.joint.partner import output_motion
+from tolstat.store.recorded import joint_of
+from tolstat.store.view import View
+
+QUANTILES = (0.5, 0.95)
+"""Shares of the shafts below whose values the unevenness of the output is given."""
+
+LIMITS = (
+    Column("load", lambda row: str(row["load"])),
+    Column("limit", lambda row: "-" if row["load"] == ANY_LIMIT else text.value(row["limit"], row["unit"])),
+    Column("first joint", lambda row: text.percent(row["first"]), rank=2),
+    Column("second joint", lambda row: text.percent(row["second"]), rank=1),
+    Column("shafts above", lambda row: f"{row['count']} of {row['n']}"),
+    Column("share", lambda row: text.percent(row["estimate"])),
+    Column("95 % interval", lambda row: text.span(row["lower"], row["upper"])),
+)
+"""Columns of the table ``shafts``."""
+OUTPUT = (
+    Column("output of the shaft", lambda row: str(row["quantity"])),
+    Column("ideal joints", lambda row: _value(row, "ideal")),
+    Column("half of the shafts, at most", lambda row: _value(row, "at_most_50")),
+    Column("95 % of them, at most", lambda row: _value(row, "at_most_95")),
+)
+"""Columns of the table ``output``."""
+
+
+class Shafts(NamedTuple):
+    """The joints at both places of a drive shaft: joint i first and joint i + 1 second, the last with joint 0."""
+
+    first: View
+    second: View
+
+    def above(self, name: str) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Shafts with a joint surely above its limit on a load, and with one that may be above it, (n,) each."""
+        sure, possible = [], []
+        for view, shift in ((self.first, 0), (self.second, -1)):
+            if name != ANY_LIMIT and name not in view.limits:
+                continue
+            load = view.load(name)
+            assert load.limit is not None
+            sure.append(np.roll(load.lower.values > load.limit, shift))
+            possible.append(np.roll(load.upper.values > load.limit, shift))
+        return np.logical_or.reduce(sure), np.logical_or.reduce(possible)
+
+    def sum_of(self, name: str) -> NDArray[np.float64]:
+        """Sum of a load of both joints, of the shafts with two valid joints."""
+        total = self.first.load(name).values + np.roll(self.second.load(name).values, -1)
+        return total[~np.isnan(total)]
+
+
+def shafts(view: View) -> Answer:
+    """Estimate which share of drive shafts exceeds limits.
+
+    The study has two operating points for the joints of one drawing: the first joint of a drive shaft, with a partner
+    after it, and the second one, with a partner before it. A shaft is made of joint i as the first and joint i + 1 as
+    the second. Gives the share of shafts in which either joint exceeds a limit, and how unevenly the output turns.
+
+    Example: tolstat shafts drive_shaft.h5
+
+    Parameters
+    ----------
+    view : View
+        A campaign at the operating points of both joints.
+
+    Returns
+    -------
+    Answer
+        Table ``shafts``, one row per limit and one for all of them: ``load``, ``unit``, ``limit`` (of the first joint,
+        where it has one), ``first`` and ``second`` (share of the joints above it there), ``n``, ``count``,
+        ``estimate``, ``lower``, ``upper`` (95 %, shafts without a valid load counted both ways). A joint is in two
+        shafts: the interval counts n shafts as n/2 independent ones, which it is too wide for by at most 41 %. Table
+        ``output``: ``quantity``, ``unit``, ``ideal`` (two ideal joints), ``at_most_50`` and ``at_most_95`` (upper
+        bounds for shares of the shafts, from the speed errors of both joints): unevenness (largest less smallest
+        speed, relative to its mean) and largest angular acceleration.
+
+    Raises
+    ------
+    NotApplicable
+        When the study has no drive shaft.
+    StoreError
+        When joints differ in weight.
+    """
+    pair = _places(view)
+    view.check("index")
+    parts: list[Part] = []
+    if names := list(dict.fromkeys((*pair.first.limits, *pair.second.limits))):
+        rows = [_limit(pair, name) for name in (*names, ANY_LIMIT)]
+        parts.append(Table("shafts", "Drive shafts with a joint above a limit", LIMITS, rows))
+    parts.append(Table("output", "How unevenly the output of the shaft turns", OUTPUT, _output(pair)))
+    errors = pair.sum_of("psi")
+    speed_error = float(np.quantile(errors, QUANTILES[-1])) if errors.size else np.nan
+    partner = pair.first.store.operation.partner
+    torsion = partner.torsion(pair.first.store.operation.speed, 2) if partner else np.nan
+    change = "not known without partner.stiffness" if np.isnan(torsion) else text.percent(torsion)
+    parts += [
+        Sentence("a shaft: joint i first, joint i + 1 second; intervals count n shafts as n/2 independent ones"),
+        Sentence(
+            "each joint sees the other as ideal: speed errors Psi of both together, "
+            f"{text.percent(speed_error)} at 95 % of the shafts, are left out of the loads"
+        ),
+        Sentence(f"torsion of the intermediate shaft is left out: change of order 2 by it {change}"),
+        Sentence("the intermediate shaft carries output.* of the first and input.* of the second joint, not their sum"),
+    ]
+    return Answer("shafts", "The drive shaft", parts)
+
+
+def _places(view: View) -> Shafts:
+    """The views of the first and of the second joint."""
+    found: dict[str, View] = {}
+    for part in view.parts:
+        if partner := part.store.operation.partner:
+            found[partner.position] = part
+    if len(found) < 2 or not view.sampled:
+        remedy = 'give the file of a study with two operating points, with partner.position "after" and "before"'
+        raise NotApplicable(str(Fault(str(view.path), "holds no drive shaft of two joints", remedy)))
+    return Shafts(found["after"], found["before"])
+
+
+def _limit(pair: Shafts, name: str) -> Row:
+    sure, possible = pair.above(name)
+    at = {"first": pair.first, "second": pair.second}
+    loads = {place: view.load(name) for place, view in at.items() if name == ANY_LIMIT or name in view.limits}
+    done = [np.roll(~np.isnan(load.upper.values), -1 if place == "second" else 0) for place, load in loads.items()]
+    known = np.logical_and.reduce(done)
+    n, count, most = int(known.sum()), int(sure[known].sum()), int(possible[known].sum())
+    some = next(iter(loads.values()))
+    row = {"load": name, "unit": some.unit, "limit": some.limit}
+    row |= dict.fromkeys(at, np.nan)
+    row |= {place: load.above(load.limit or 0.0).estimate for place, load in loads.items()}
+    row |= {"n": n, "count": count, "estimate": count / n if n else np.nan}
+    lower = upper = np.nan
+    if isinstance(pair.first.design, Independent) and n:
+        lower, upper = interval(count, most, n)
+    return row | {"lower": lower, "upper": upper}
+
+
+def interval(count: int, most: int, n: int, confidence: float = 0.95) -> tuple[float, float]:
+    """Interval of the share of shafts above a limit, if `count` to `most` of n are: n/2 of them are independent."""
+    low, _ = binomial.clopper_pearson(count / 2, n / 2, confidence)
+    _, high = binomial.clopper_pearson(most / 2, n / 2, confidence)
+    return float(low), float(high)
+
+
+def _output(pair: Shafts) -> Rows:
+    store = pair.first.store
+    assert store.operation.partner is not None
+    alone = store.operation.model_copy(update={"partner": None})
+    ratio, acceleration = output_motion(store.operation.partner, perturb(joint_of(store, 0), alone, nominal_errors(1)))
+    bound = 2.0 * pair.sum_of("psi")
+    faster = [n * store.operation.speed**2 * pair.sum_of(f"psi_{n}x") for n in ORDERS]
+    unevenness, largest = float(np.ptp(ratio) / ratio.mean()), float(np.abs(acceleration).max())
+    return [
+        _bounded("unevenness of the speed", "1", unevenness, bound),
+        _bounded("angular acceleration", "rad/s^2", largest, np.sum(faster, axis=0)),
+    ]
+
+
+def _bounded(quantity: str, unit: str, ideal: float, added: NDArray[np.float64]) -> Row:
+    row = {"quantity": quantity, "unit": unit, "ideal": ideal}
+    quantiles = np.quantile(added, QUANTILES) if added.size else (np.nan,) * len(QUANTILES)
+    return row | {f"at_most_{100 * share:g}": ideal + float(q) for share, q in zip(QUANTILES, quantiles, strict=True)}
+
+
+def _value(row: Row, key: str) -> str:
+    return text.percent(row[key]) if row["unit"] == "1" else text.value(row[key], row["unit"])

@@ -17,7 +17,7 @@ from tolstat.joint.orders import SpeedOrder, TorqueOrder
 from tolstat.joint.partner import Partner
 from tolstat.study.costs import CostEntry
 from tolstat.study.fatigue import LineEntry
-from tolstat.study.listed import Range
+from tolstat.study.listing import Range
 from tolstat.study.model import SweepEntry
 from tolstat.study.points import PointEntry
 from tolstat.study.schema import files

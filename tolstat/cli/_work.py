@@ -19,8 +19,7 @@ from tolstat.common.errors import Fault
 from tolstat.common.tables import Variant
 from tolstat.joint import Joint
 from tolstat.solver import compilation
-from tolstat.study import Study, mounting
-from tolstat.study.tolerances import zones
+from tolstat.study import Study, mounting, plausible
 
 
 @contextmanager
@@ -59,7 +58,7 @@ def print_warnings(path: Path, joints: Iterable[Joint], variants: Iterable[Varia
 def print_study_notes(path: Path, study: Study) -> None:
     """Print what a study stands on, and its warnings.
 
-    These are mounting and contact law; warnings of its joints, common axes that are too short, shares without an
+    These are mounting and contact law; warnings of its joints, of values that are probably not meant, shares without an
     interval, and a note where rigid shafts meet errors along them.
     """
     say(f"{study.name}: {study.joint_in_words}")
@@ -67,7 +66,7 @@ def print_study_notes(path: Path, study: Study) -> None:
     if note := mounting.note(study.tolerances, axial, mounting.command(str(path), path.stem, study.joint)):
         say(f"note: {note}")
     print_warnings(path, study.joints, study.variants)
-    for key, found, remedy in zones.short_axes(study.entries, study.joint.contact.z):
-        warn(f"warning: {study.fault(key, found, remedy)}")
+    for fault in plausible.warnings(study):
+        warn(f"warning: {fault}")
     if not study.sampling.has_replicates and (reason := without_interval(study.sampling.method)):
         warn(f"warning: {reason}")

@@ -12,12 +12,12 @@ from pathlib import Path
 from types import NoneType
 from typing import Any, TypeVar, get_args
 
-from pydantic import BaseModel, ConfigDict, GetJsonSchemaHandler, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, GetJsonSchemaHandler, ValidationError
 from pydantic_core import CoreSchema, PydanticCustomError
 
 from tolstat.common import json_schema, toml_lines, units
 from tolstat.common.errors import Fault, InputError
-from tolstat.common.files import read_input
+from tolstat.common.files import about_encoding, read_input
 
 MAX_DEPTH = 32
 """Largest number of tables and lists inside each other in an input file."""
@@ -77,7 +77,7 @@ def read_text(path: Path) -> str:
             [Fault(str(path), f"cannot be read: {reason}", "check the path and its permissions")]
         ) from error
     except UnicodeDecodeError as error:
-        raise InputError([Fault(str(path), "is not UTF-8 text", "give a TOML file")]) from error
+        raise InputError([Fault(str(path), *about_encoding(error))]) from error
 
 
 def read_section(place: Path, text: str, name: str) -> dict[str, Any]:
@@ -306,6 +306,16 @@ def _example(model: type[BaseModel], location: Sequence[int | str], known: Mappi
     if example is None or isinstance(example, (Mapping, list)):
         return ""
     return f", for example {location[-1]} = {json.dumps(example, ensure_ascii=False)}"
+
+
+def described(meaning: str, example: Any, **bounds: Any) -> Any:
+    """Field of a key: its meaning, an example, and bounds as `pydantic.Field` has them."""
+    return Field(description=meaning, examples=[example], **bounds)
+
+
+def whole(least: int, most: int, meaning: str, example: int) -> Any:
+    """Field of a key whose value is a whole number from `least` to `most`."""
+    return described(meaning, example, strict=True, ge=least, le=most)
 
 
 def refuse(found: str, remedy: str, *keys: str) -> PydanticCustomError:

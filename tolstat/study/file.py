@@ -15,7 +15,10 @@ from tolstat.common.loads import UNIT_OF_LOAD, load_of, split
 from tolstat.common.strict import read_toml
 from tolstat.common.tables import FINEST_STEPS
 from tolstat.joint import Joint, Operation
-from tolstat.joint.overrides import merged
+from tolstat.joint.assumed import Assumed
+from tolstat.joint.derived import BEARING
+from tolstat.joint.overrides import leaves, merged
+from tolstat.joint.reading import faults_of_assumed, is_joint
 from tolstat.study import fatigue, known, listing, points, proposal, selection, selective, sorting, swept
 from tolstat.study.axes import is_zone, zone_of
 from tolstat.study.design import Design
@@ -62,13 +65,16 @@ class StudyFile:
     Raises
     ------
     InputError
-        When the file is not readable TOML.
+        When the file is not readable TOML, or a joint file.
     """
 
     def __init__(self, path: Path, sections: Iterable[str], text: str | None = None) -> None:
         self.path = path
         self.place = str(path)
         self.data = read_toml(path, text)
+        if is_joint(self.data):
+            remedy = f'name it in a study, base = "{path.name}" under [joint]; tolstat new writes one'
+            raise InputError([Fault(self.place, "is a joint file, not a study or case", remedy)])
         self.text = read_input(path) if text is None else text
         self._lined = text is None
         self._overridden: set[str] = set()
@@ -113,10 +119,11 @@ class StudyFile:
         return None
 
     def fit(self) -> Fit | None:
-        """``tolerances.fit``: the fit of all pins in their holes."""
+        """``tolerances.fit``: the fit of all pins in their holes; another one in place of a fit with faults."""
+        table = self.data.get("tolerances")
         with gather(self._faults):
-            return fits.read(self.data.get("tolerances"), self.place)
-        return None
+            return fits.read(table, self.place)
+        return fits.stand_in(table)
 
     def points(self) -> tuple[Point, ...]:
         """``[operation]``, or ``[[operation]]``: the operating points; empty if one could not be read."""
@@ -153,6 +160,22 @@ class StudyFile:
             self._fault(("joint", "contact", key), "is set by tolerances.fit already", "remove one of the two")
         others = {key: value for key, value in own.items() if key not in both}
         return {**overrides, "contact": merged(others, fit.diameters)}
+
+    def assumed(self, joint: Joint | None, fit: Fit | None) -> tuple[Assumed, ...]:
+        """``[[assumed]]``: assumptions that the study adds to those of its joint file."""
+        before = len(self._faults)
+        entries = self._list("assumed", Assumed)
+        if joint is None or len(self._faults) > before:
+            return ()
+        own = {key: value for key, value in self._table("joint").items() if key != "base"}
+        self._faults += faults_of_assumed(entries, joint.given("json"), own, self.place)
+        if fit is not None:
+            for number, entry in enumerate(entries):
+                both = [(n, key) for n, value in enumerate(entry.values) for key in leaves(value) if key in BEARING]
+                for n, key in both:
+                    path: tuple[int | str, ...] = ("assumed", number, "values", n, *key.split("."))
+                    self._fault(path, "is set by tolerances.fit already", "remove one of the two")
+        return tuple(entries)
 
     def errors(self) -> dict[str, float]:
         """``[errors]``: the errors that every joint has."""

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
+import re
 from collections.abc import Callable
 from functools import cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from tolstat.analysis.process import LEAST_PARTS, MOST_PARTS
 from tolstat.common import json_schema, loads, strict
@@ -13,10 +15,11 @@ from tolstat.common.files import data_dir
 from tolstat.common.loads import UNIT_OF_LOAD
 from tolstat.common.units import EXAMPLES
 from tolstat.joint import Joint, Operation
-from tolstat.joint.model import DEFAULT_JOINT
+from tolstat.joint.assumed import Assumed
+from tolstat.joint.reading import DEFAULT_JOINT
 from tolstat.study.axes import is_zone, vectors_of
 from tolstat.study.fatigue import LineEntry, Settings
-from tolstat.study.listed import CaseEntry, Range, VariantEntry
+from tolstat.study.listing import CaseEntry, Range, VariantEntry
 from tolstat.study.model import Output, Sampling, Solver, SweepEntry
 from tolstat.study.points import PointEntry
 from tolstat.study.proposal import MAX_SHIFT, MAX_WIDEN, ProposalEntry
@@ -62,8 +65,15 @@ class Section(NamedTuple):
 def joint() -> Schema:
     """JSON schema of a joint file, with the values of the default joint as examples."""
     values = strict.read_toml(data_dir() / "joints" / f"{DEFAULT_JOINT}.toml")
+    del values["assumed"], values["shaft"]["axial"]  # their fields have shorter and more telling examples
     made = with_examples(of_model(Joint), values)
     return {"title": "Joint of tolstat"} | made | {"description": "Nominal joint."}
+
+
+def keys() -> Schema:
+    """JSON schema of a table with some keys of a joint."""
+    made = {key: value for key, value in overriding(joint()).items() if key != "title"}
+    return made | {"properties": {key: value for key, value in made["properties"].items() if key != "assumed"}}
 
 
 def overrides() -> Schema:
@@ -73,7 +83,7 @@ def overrides() -> Schema:
         "description": "name of a joint that comes with tolstat, or path of a joint file from the folder of this file",
         "examples": [DEFAULT_JOINT],
     }
-    own = {key: value for key, value in overriding(joint()).items() if key != "title"}
+    own = keys()
     text = "Joint file, and keys that replace some of its own, such as contact.clearance."
     return own | {"description": text, "properties": {"base": base} | own["properties"]}
 
@@ -165,6 +175,7 @@ SECTIONS: dict[str, Section] = {
     "grid": Section(grid),
     "case": Section(lambda: of_model(CaseEntry), repeated=True),
     "variant": Section(lambda: of_model(VariantEntry), repeated=True),
+    "assumed": Section(lambda: of_model(Assumed), repeated=True),
     "reject": Section(reject),
     "limits": Section(limits),
     "fatigue": Section(lambda: of_model(Settings)),
@@ -179,6 +190,7 @@ def tables() -> dict[str, Schema]:
     found: dict[str, Schema] = {
         "errors": errors(),
         "overrides": overrides(),
+        "keys": keys(),
         "vary": ranges(joint(), {"x-table": "range"}),
         "range": of_model(Range),
         "operation": overriding(of_model(Operation)),
@@ -256,24 +268,9 @@ def schema(kind: str) -> Schema:
     """
     made: Schema = finished(KINDS[kind]())
     definitions = {name: finished(part) for name, part in tables().items()}
-    used: dict[str, Any] = {}
-    for name in _referred(made, definitions):
-        used[name] = definitions[name]
+    used: dict[str, Schema] = {}
+    referring: list[Schema] = [made]
+    while referring:
+        names = dict.fromkeys(re.findall(r'"#/definitions/([^"]+)"', json.dumps(referring)))
+        referring = [used.setdefault(name, definitions[name]) for name in names if name not in used]
     return {"$schema": DRAFT} | made | ({"definitions": used} if used else {})
-
-
-def _referred(part: Any, definitions: dict[str, Schema], known: tuple[str, ...] = ()) -> dict[str, None]:
-    """Names of the definitions that a schema refers to, itself or by others."""
-    found: dict[str, None] = {}
-    if isinstance(part, list):
-        for item in part:
-            found |= _referred(item, definitions, known)
-    elif isinstance(part, dict):
-        if isinstance(part.get("$ref"), str):
-            name = part["$ref"].rpartition("/")[2]
-            if name not in known:
-                found[name] = None
-                found |= _referred(definitions[name], definitions, (*known, name))
-        for value in part.values():
-            found |= _referred(value, definitions, known)
-    return found

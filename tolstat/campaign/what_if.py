@@ -1,4 +1,4 @@
-"""Simulate joints of a campaign's seed with other tolerances, and keep their loads in the result file."""
+"""Simulate joints of a campaign's seed with other tolerances or keys of the joint, and keep their loads in the file."""
 
 from __future__ import annotations
 
@@ -18,16 +18,17 @@ from tolstat.campaign.blocks import work_beside
 from tolstat.common.counts import Counts
 from tolstat.common.loads import LOADS
 from tolstat.common.tables import VALID, Options, Status, worst_status
-from tolstat.joint import perturb
+from tolstat.joint import Joint, perturb
 from tolstat.store import Writer, what_if
 from tolstat.store.recorded import settings
 from tolstat.store.what_if import Altered
 from tolstat.study import Study, axes, widths
+from tolstat.study.assumptions import with_value
 from tolstat.study.points import at
 from tolstat.study.widths import Line
 
-WIDTH, EXCHANGE, AS_DRAWN = "width", "exchange", "as drawn"
-"""Kinds of sets: a line with another width; a line's errors from another joint; no change."""
+WIDTH, EXCHANGE, JOINT, AS_DRAWN = "width", "exchange", "joint", "as drawn"
+"""Kinds of sets: a line with another width; a line's errors from another joint; other keys of the joint; no change."""
 BLOCK = 128
 """Number of joints that a worker takes at a time: enough to keep the lanes busy, and 0.2 s on the main job."""
 SLOW_S = 60.0
@@ -37,7 +38,7 @@ SAVE_S = 60.0
 
 
 class Change(NamedTuple):
-    """A change of the tolerances, and which joints are wanted of it.
+    """A change of the tolerances or of the joint, and which joints are wanted of it.
 
     Attributes
     ----------
@@ -47,11 +48,14 @@ class Change(NamedTuple):
         Range of consecutive joints -> their errors, table ERROR.
     numbers : range
         The joints; numbers are those of `Altered.first`.
+    joint : Joint, optional
+        Nominal joint in place of the study's.
     """
 
     about: Mapping[str, Any]
     draw: Callable[[range], NDArray[np.void]]
     numbers: range
+    joint: Joint | None = None
 
 
 def narrowed(study: Study, line: Line, step: str, numbers: range) -> Change:
@@ -72,6 +76,24 @@ def exchanged(study: Study, line: Line, numbers: range) -> Change:
     """Joint i is sample 2i of the campaign with the line's errors of sample 2i + 1."""
     about = {"kind": EXCHANGE, "label": line.label, "seed": study.sampling.seed, "names": list(line.names)}
     return Change(about, partial(_exchange, widths.applied(study, {}), line), numbers)
+
+
+def about_joint(study: Study, keys: Mapping[str, Any]) -> dict[str, Any]:
+    """Return `Altered.about` of samples of the campaign with `keys` of the joint."""
+    label = ", ".join(f"{key} = {value}" for key, value in keys.items())
+    return {"kind": JOINT, "label": label, "seed": study.sampling.seed, "keys": dict(keys)}
+
+
+def with_joint(study: Study, keys: Mapping[str, Any], numbers: range) -> Change:
+    """Joint i is sample i of the campaign with `keys` of the joint.
+
+    Raises
+    ------
+    InputError
+        When the keys make no valid joint.
+    """
+    other = with_value(study, keys)
+    return Change(about_joint(study, keys), partial(_draw, widths.applied(other, {})), numbers, other.joint)
 
 
 def as_drawn(study: Study, numbers: range) -> Change:
@@ -196,7 +218,7 @@ class _Table:
     def sets(self, held: Mapping[str, Altered]) -> dict[str, Altered]:
         """Sets that have grown: of each, the joints before the first that is not done, behind those held."""
         found, begin = {}, 0
-        for about, _, numbers in self.todo:
+        for about, _, numbers, _ in self.todo:
             here = slice(begin, begin + len(numbers))
             begin = here.stop
             waiting = np.flatnonzero((self.status[here] == Status.PENDING).any(axis=1))
@@ -214,12 +236,12 @@ class _Table:
 
 def _blocks(study: Study, options: Options, todo: Sequence[Change], points: Sequence[str]) -> Iterator[Block]:
     operations, begin = {point: study.at(point).operation for point in points}, 0
-    for _, draw, numbers in todo:
+    for _, draw, numbers, joint in todo:
         for first in range(0, len(numbers), BLOCK):
             own = numbers[first : first + BLOCK]
             slots, errors = np.arange(begin + first, begin + first + len(own)), draw(own)
             for point, operation in operations.items():
-                yield Block(point, slots, perturb(study.joint, operation, errors), options)
+                yield Block(point, slots, perturb(joint or study.joint, operation, errors), options)
         begin += len(numbers)
 
 

@@ -22,7 +22,9 @@ from tolstat.joint.sections import quantities
 from tolstat.study.design import nested
 
 FILE = files.data_dir() / "joints" / "cirelli2021.toml"
-GIVEN = leaves(tomllib.loads(FILE.read_text(encoding="utf-8")))
+GIVEN = {
+    key: value for key, value in leaves(tomllib.loads(FILE.read_text(encoding="utf-8"))).items() if key != "assumed"
+}
 UNITS = quantities(Joint)
 RECTANGLE = {"arm.width": "58 mm", "arm.depth": "21 mm"}
 ROUND = {"arm.d": "40 mm"}

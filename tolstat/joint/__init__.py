@@ -13,18 +13,19 @@ if TYPE_CHECKING:
     from tolstat.joint.model import Joint as Joint
     from tolstat.joint.model import affecting_results as affecting_results
     from tolstat.joint.model import affects_results as affects_results
-    from tolstat.joint.model import load as load
     from tolstat.joint.perturbation import HOLE_OF_PIN as HOLE_OF_PIN
     from tolstat.joint.perturbation import Operation as Operation
     from tolstat.joint.perturbation import nominal_errors as nominal_errors
     from tolstat.joint.perturbation import operating as operating
     from tolstat.joint.perturbation import perturb as perturb
+    from tolstat.joint.reading import load as load
     from tolstat.joint.variant import varied as varied
 
 _HOMES = {
     "bearing": ("Bearing",),
-    "model": ("affecting_results", "affects_results", "Joint", "load"),
+    "model": ("affecting_results", "affects_results", "Joint"),
     "perturbation": ("HOLE_OF_PIN", "Operation", "nominal_errors", "operating", "perturb"),
+    "reading": ("load",),
     "variant": ("varied",),
 }
 

@@ -1,31 +1,26 @@
-"""The nominal joint: what a joint file holds, and how it is read."""
+"""The nominal joint: what a joint file holds; `reading` reads it."""
 
 from __future__ import annotations
 
-import difflib
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from functools import cache
-from pathlib import Path
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import BaseModel, Field, ValidationInfo, field_validator
 
-from tolstat.common import strict, units
-from tolstat.common.errors import Fault, InputError
-from tolstat.common.files import data_dir
-from tolstat.common.notation import DIAMETER
+from tolstat.common.errors import Fault
 from tolstat.common.strict import Strict, refuse
 from tolstat.joint import derived
+from tolstat.joint.assumed import Assumed
 from tolstat.joint.bearing import Bearing
 from tolstat.joint.contact import COEFFICIENTS, LAWS, Contact
 from tolstat.joint.derived import DERIVED
-from tolstat.joint.overrides import leaves, overridden
+from tolstat.joint.overrides import leaves
 from tolstat.joint.sections import Arm, Array, Bushing, Cross, Hub, Material, Pin, Shaft
 
-DEFAULT_JOINT = "cirelli2021"
-"""Joint in ``data/joints`` whose values are the examples of the keys of a joint."""
+TOLD = ("description", "assumed")
+"""Keys of a joint file that are about the joint and no part of it."""
 NO_FIT = "the pin does not fit into the hole: D_P, by default pin.d, is not above zero and up to D_H", "give D_P <= D_H"
 
 
@@ -33,7 +28,7 @@ def affects_results(key: str, law: str | None = None) -> bool:
     """Whether a dotted key of a joint affects results of its simulation with a contact law; None: with any."""
     section, _, name = key.partition(".")
     laws = LAWS.values() if law is None else [LAWS[law]]
-    return section != "description" and (section != "bearing" or any(name in one.of_bearing for one in laws))
+    return section not in TOLD and (section != "bearing" or any(name in one.of_bearing for one in laws))
 
 
 def affecting_results(given: Mapping[str, Any]) -> dict[str, Any]:
@@ -67,6 +62,13 @@ class Joint(Strict):
             "and `needle_length` say how stiff it is; other keys are for its rating life and affect no load",
         ),
     ] = None
+    assumed: Annotated[
+        tuple[Assumed, ...],
+        Field(
+            description="values of the joint that nobody measured, a table `[[assumed]]` each",
+            examples=[[{"name": "H", "values": [{"contact": {"H": 3.0}}], "because": "no drawing gives it"}]],
+        ),
+    ] = ()
     _inherited: tuple[Fault, ...] = ()
     _replaced: Mapping[str, str] = {}
 
@@ -158,6 +160,10 @@ class Joint(Strict):
             overlap = [Fault("cross.r_b", found, "give pin.l, from the hub to the middle of the hole, or cross.r_b")]
         return [*self._inherited, *self._anisotropic(), *overlap, *stations]
 
+    def remember(self, inherited: Iterable[Fault], replaced: Mapping[str, str]) -> None:
+        """Keep the warnings about values that overrides leave, and the diameters that overrides replace."""
+        self._inherited, self._replaced = tuple(inherited), replaced
+
     def _anisotropic(self) -> Iterator[Fault]:
         steel, expected = self.material, DERIVED["material.G"].value(self)
         if not math.isclose(steel.G, expected, rel_tol=derived.ISOTROPIC):
@@ -220,127 +226,3 @@ def _left_out(way: tuple[str, ...], keys: list[str], section: BaseModel) -> list
     """Names of the keys of `way`, without `keys`, that a section has but that are not given."""
     names = [of.partition(".")[2] for of in way if of not in keys]
     return [name for name in names if name in type(section).model_fields and derived.get(section, name) is None]
-
-
-def load(
-    base: str | Path,
-    overrides: Mapping[str, Any],
-    place: str,
-    relative_to: Path | None = None,
-    section: str = "joint",
-) -> Joint:
-    """Read a joint file and merge a case's own keys over it.
-
-    Parameters
-    ----------
-    base : str or Path
-        Name of a file in ``data/joints`` without ``.toml``, or a path (it ends in ``.toml`` or has a folder).
-    overrides : mapping
-        Keys of the case's ``[joint]`` table other than `base`, nested as TOML nests them.
-    place : str
-        Name of the case file, under which faults of `base` and `overrides` are reported.
-    relative_to : Path, optional
-        Folder that a relative path is taken from; the working directory by default.
-    section : str
-        Key path of `base` and `overrides` in the case's file.
-
-    Returns
-    -------
-    Joint
-        The resolved joint.
-
-    Raises
-    ------
-    InputError
-        With every fault: those of the joint file under its name, those of `overrides` under `place`.
-    """
-    path = _find(base, f"{place}: {section}", relative_to)
-    data = strict.read_toml(path)
-    with strict.lines_of(path):
-        try:
-            joint = strict.validate(Joint, overridden(data, overrides), place, examples=examples())
-        except InputError as error:
-            raise InputError(_attributed(error.faults, data, path, place, section)) from error
-    merged = leaves(overridden(data, overrides))
-    joint._inherited = (*_inherited(joint, data, overrides, path), *_lowered(joint, merged.get("contact.fit_load")))
-    given, held = leaves(overrides), leaves(data)
-    gone = given.keys() | derived.replaced(given, held)
-    joint._replaced = {key: str(held[key]) for key in derived.BEARING if key in held and key in gone}
-    return joint
-
-
-@cache
-def examples() -> dict[str, Any]:
-    """Values of the default joint by dotted key, as its file writes them: the examples of a joint's keys."""
-    return leaves(strict.read_toml(data_dir() / "joints" / f"{DEFAULT_JOINT}.toml"))
-
-
-def _find(base: str | Path, place: str, relative_to: Path | None) -> Path:
-    path = Path(base)
-    if path.suffix == ".toml" or len(path.parts) > 1:
-        return (relative_to or Path()) / path
-    folder = data_dir() / "joints"
-    names = sorted(p.stem for p in folder.glob("*.toml"))
-    if str(base) in names:
-        return folder / f"{base}.toml"
-    close = difflib.get_close_matches(str(base), names, n=1)
-    known = f"did you mean {close[0]!r}?" if close else f"write one of {', '.join(names)}, or a path to a .toml file"
-    raise InputError([Fault(f"{place}.base", f"no joint is named {str(base)!r}", known)])
-
-
-def _attributed(
-    faults: tuple[Fault, ...], data: Mapping[str, Any], path: Path, place: str, section: str
-) -> list[Fault]:
-    """Report the faults that the joint file has without overrides under its name, the others under `place`."""
-    try:
-        strict.validate(Joint, data, str(path), examples=examples())
-        own = {}
-    except InputError as error:
-        own = {(f.place.removeprefix(f"{path}: "), f.found): f for f in error.faults}
-    attributed = []
-    for f in faults:
-        key = f.place.removeprefix(f"{place}: ")
-        attributed.append(own.get((key, f.found)) or Fault(f"{place}: {section}.{key}", f.found, f.remedy))
-    return attributed
-
-
-def _inherited(joint: Joint, data: Mapping[str, Any], over: Mapping[str, Any], path: Path) -> Iterator[Fault]:
-    """Warn of values of the joint file that an override leaves, although it gives keys that they follow from."""
-    given, held = leaves(over).keys(), leaves(data)
-    changed = derived.changed(given, held)
-    stay = held.keys() - changed - derived.replaced(given, held)
-    for key, (expected, reason, instead) in derived.expected(joint, given, changed, stay).items():
-        if key == "pin.d" and _as_before(held.get("contact.D_P"), joint.contact.D_P):
-            continue  # the joint file has pins of two diameters itself
-        text, unit = held[key], derived.UNITS[key]
-        words = [_written(one, unit, like) for one, like in zip(*map(_listed, (expected, text)), strict=True)]
-        new = _quoted(words if isinstance(text, list) else words[0])
-        remedy = f"give {instead}, from which it follows, or {key}" if instead else f"give {key}, this value or that"
-        yield Fault(key, f"{_quoted(text)} is inherited from {path.stem}; {reason} {new}", remedy)
-
-
-def _lowered(joint: Joint, written: object) -> Iterator[Fault]:
-    """Warn of a largest load of the fit that is smaller than the one `written`; see `Joint._stiffens`."""
-    used = joint.contact.fit_load
-    if written is None or used is None or math.isclose(used, units.to_si(written, "N"), rel_tol=1e-9):
-        return
-    text = str(units.written(used, "N", written))
-    found = f"up to {written} eq. (3) gives no stiffening contact, so that k1u and k2u are fitted up to {text}"
-    yield Fault("contact.fit_load", found, f'write fit_load = "{text}", or give k1u and k2u')
-
-
-def _as_before(held: object, diameter: float) -> bool:
-    """Whether a diameter is, but for a few per cent, that of the joint file."""
-    return held is not None and math.isclose(units.to_si(held, "m", DIAMETER), diameter, rel_tol=derived.WIDE)
-
-
-def _listed(value: Any) -> list[Any]:
-    return list(value) if isinstance(value, (list, tuple)) else [value]
-
-
-def _quoted(value: Any) -> str:
-    return f"[{', '.join(value)}]" if isinstance(value, list) else str(value)
-
-
-def _written(value: float, unit: str, like: object) -> str:
-    return str(units.written(value, unit, like, digits=3))

@@ -10,8 +10,9 @@ from tolstat.display import text
 from tolstat.display.blocks import Listing
 from tolstat.joint import Joint, load
 from tolstat.joint.derived import DERIVED, UNITS
-from tolstat.joint.model import DEFAULT_JOINT, examples
+from tolstat.joint.model import TOLD
 from tolstat.joint.overrides import leaves
+from tolstat.joint.reading import DEFAULT_JOINT, examples
 from tolstat.joint.sections import quantities
 from tolstat.store import Reader
 
@@ -42,7 +43,7 @@ def listing(store: Reader) -> Listing:
 
 def _values(joint: Joint) -> dict[str, str]:
     """Values by dotted key, in the unit in which a joint file has them."""
-    found = leaves(joint.model_dump(exclude={"description"}))
+    found = leaves(joint.model_dump(exclude=set(TOLD)))
     return {key: _written(key, value) for key, value in found.items() if value is not None}
 
 

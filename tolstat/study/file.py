@@ -15,7 +15,10 @@ from tolstat.common.loads import UNIT_OF_LOAD, load_of, split
 from tolstat.common.strict import read_toml
 from tolstat.common.tables import FINEST_STEPS
 from tolstat.joint import Joint, Operation
-from tolstat.joint.overrides import merged
+from tolstat.joint.assumed import Assumed
+from tolstat.joint.derived import BEARING
+from tolstat.joint.overrides import leaves, merged
+from tolstat.joint.reading import faults_of_assumed
 from tolstat.study import fatigue, known, listing, points, proposal, selection, selective, sorting, swept
 from tolstat.study.axes import is_zone, zone_of
 from tolstat.study.design import Design
@@ -153,6 +156,22 @@ class StudyFile:
             self._fault(("joint", "contact", key), "is set by tolerances.fit already", "remove one of the two")
         others = {key: value for key, value in own.items() if key not in both}
         return {**overrides, "contact": merged(others, fit.diameters)}
+
+    def assumed(self, joint: Joint | None, fit: Fit | None) -> tuple[Assumed, ...]:
+        """``[[assumed]]``: assumptions that the study adds to those of its joint file."""
+        before = len(self._faults)
+        entries = self._list("assumed", Assumed)
+        if joint is None or len(self._faults) > before:
+            return ()
+        own = {key: value for key, value in self._table("joint").items() if key != "base"}
+        self._faults += faults_of_assumed(entries, joint.given("json"), own, self.place)
+        if fit is not None:
+            for number, entry in enumerate(entries):
+                both = [(n, key) for n, value in enumerate(entry.values) for key in leaves(value) if key in BEARING]
+                for n, key in both:
+                    path: tuple[int | str, ...] = ("assumed", number, "values", n, *key.split("."))
+                    self._fault(path, "is set by tolerances.fit already", "remove one of the two")
+        return tuple(entries)
 
     def errors(self) -> dict[str, float]:
         """``[errors]``: the errors that every joint has."""

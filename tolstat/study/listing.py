@@ -13,6 +13,7 @@ from tolstat.common.errors import Fault, InputError, gather
 from tolstat.common.notation import DIAMETER
 from tolstat.common.tables import Variant
 from tolstat.joint import Joint, Operation
+from tolstat.joint.model import TOLD
 from tolstat.joint.overrides import laid_over
 from tolstat.study import selection
 from tolstat.study.design import IDEAL, Design, cube, flat, nested, table
@@ -272,7 +273,7 @@ class Variants:
     def values(self, made: Joint, written: list[str]) -> dict[str, Any]:
         """Return the keys `written` and all others in which a joint differs from the study's, see `Variant.values`."""
         nominal, values = (dict(flat(joint.given())) for joint in (self._nominal.joint, made))
-        keys = [key for key in nominal | values if key != "description"]
+        keys = [key for key in nominal | values if key not in TOLD]
         return {key: values.get(key) for key in keys if key in written or nominal.get(key) != values.get(key)}
 
 

@@ -98,9 +98,10 @@ def _made(path: Path) -> bool:
 
 
 def joint_text() -> str:
-    """Joint file with all keys, those that are optional as comments, and what each means."""
-    values = strict.read_toml(TEMPLATES / "joint.toml")
-    return "\n".join(_table(schema("joint"), values)) + "\n"
+    """Joint file with all keys, those that are optional as comments, and what each means; then what is assumed."""
+    template = TEMPLATES / "joint.toml"
+    keys, *assumed = strict.read_text(template).partition("# What is assumed")
+    return "\n".join(_table(schema("joint"), strict.read_toml(template, keys))) + "\n\n" + "".join(assumed)
 
 
 def _table(part: Mapping[str, Any], values: Mapping[str, Any], name: str = "") -> Iterator[str]:
@@ -111,6 +112,8 @@ def _table(part: Mapping[str, Any], values: Mapping[str, Any], name: str = "") -
         yield f"[{name}]" if values else f"# [{name}]"
     lines, inner = [], []
     for key, own in part["properties"].items():
+        if key == "assumed":
+            continue
         if own.get("type") == "object":
             inner.append(_table(own, values.get(key, {}), f"{name}.{key}" if name else key))
         elif key in values:

@@ -17,6 +17,7 @@ from tolstat.common.loads import UNIT_OF_LOAD, limits_in_words, split
 from tolstat.common.strict import dotted
 from tolstat.common.tables import DESIGN, Variant
 from tolstat.joint import Joint, Operation, affecting_results
+from tolstat.joint.assumed import Assumed
 from tolstat.joint.mounting import in_words
 from tolstat.study import listing, mounting
 from tolstat.study.axes import Axis
@@ -84,6 +85,8 @@ class Study(Case):
         Fit by ISO 286 that gives the diameters.
     rejects : tuple of Gauge
         Inspections at assembly; like limits they affect no joint.
+    assumed : tuple of Assumed
+        Assumptions that the study adds to those of its joint, see `assumptions`; they affect no joint.
     """
 
     sampling: Sampling
@@ -103,6 +106,7 @@ class Study(Case):
     groups: tuple[Group, ...] = ()
     fit: Fit | None = None
     rejects: tuple[Gauge, ...] = ()
+    assumed: tuple[Assumed, ...] = ()
 
     @property
     def has_axial_force(self) -> bool:
@@ -270,7 +274,7 @@ class Study(Case):
 
 SECTIONS = (
     *("joint", "operation", "solver", "errors", "tolerances", "correlation"),
-    *("sampling", "proposal", "sweep", "grid", "case", "variant", "reject", "limits", "fatigue", "output"),
+    *("sampling", "proposal", "sweep", "grid", "case", "variant", "assumed", "reject", "limits", "fatigue", "output"),
 )
 
 
@@ -303,6 +307,7 @@ def load(path: str | Path, n: int | None = None, text: str | None = None, joint:
         file.override("sampling", "n", n)
     fit = file.fit()
     joint = file.joint(fit) if joint is None else joint
+    assumed = file.assumed(joint, fit)
     points = file.points()
     operation = points[0].operation if points else None
     solver = file.model("solver", Solver)
@@ -362,6 +367,7 @@ def load(path: str | Path, n: int | None = None, text: str | None = None, joint:
         listed=listed,
         limits=limits,
         rejects=rejects,
+        assumed=assumed,
         fatigue=fatigue,
         groups=moved,
     )

@@ -13,7 +13,8 @@ from tolstat.common.files import data_dir
 from tolstat.common.loads import UNIT_OF_LOAD
 from tolstat.common.units import EXAMPLES
 from tolstat.joint import Joint, Operation
-from tolstat.joint.model import DEFAULT_JOINT
+from tolstat.joint.assumed import Assumed
+from tolstat.joint.reading import DEFAULT_JOINT
 from tolstat.study.axes import is_zone, vectors_of
 from tolstat.study.fatigue import LineEntry, Settings
 from tolstat.study.listed import CaseEntry, Range, VariantEntry
@@ -61,9 +62,15 @@ class Section(NamedTuple):
 @cache
 def joint() -> Schema:
     """JSON schema of a joint file, with the values of the default joint as examples."""
-    values = strict.read_toml(data_dir() / "joints" / f"{DEFAULT_JOINT}.toml")
+    values = strict.read_toml(data_dir() / "joints" / f"{DEFAULT_JOINT}.toml") | {"assumed": None}
     made = with_examples(of_model(Joint), values)
     return {"title": "Joint of tolstat"} | made | {"description": "Nominal joint."}
+
+
+def keys() -> Schema:
+    """JSON schema of a table with some keys of a joint."""
+    made = {key: value for key, value in overriding(joint()).items() if key != "title"}
+    return made | {"properties": {key: value for key, value in made["properties"].items() if key != "assumed"}}
 
 
 def overrides() -> Schema:
@@ -73,7 +80,7 @@ def overrides() -> Schema:
         "description": "name of a joint that comes with tolstat, or path of a joint file from the folder of this file",
         "examples": [DEFAULT_JOINT],
     }
-    own = {key: value for key, value in overriding(joint()).items() if key != "title"}
+    own = keys()
     text = "Joint file, and keys that replace some of its own, such as contact.clearance."
     return own | {"description": text, "properties": {"base": base} | own["properties"]}
 
@@ -165,6 +172,7 @@ SECTIONS: dict[str, Section] = {
     "grid": Section(grid),
     "case": Section(lambda: of_model(CaseEntry), repeated=True),
     "variant": Section(lambda: of_model(VariantEntry), repeated=True),
+    "assumed": Section(lambda: of_model(Assumed), repeated=True),
     "reject": Section(reject),
     "limits": Section(limits),
     "fatigue": Section(lambda: of_model(Settings)),
@@ -179,6 +187,7 @@ def tables() -> dict[str, Schema]:
     found: dict[str, Schema] = {
         "errors": errors(),
         "overrides": overrides(),
+        "keys": keys(),
         "vary": ranges(joint(), {"x-table": "range"}),
         "range": of_model(Range),
         "operation": overriding(of_model(Operation)),

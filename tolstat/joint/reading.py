@@ -1,0 +1,222 @@
+"""Joint files: reading them, with the keys that a case, study or assumption has in place of theirs."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cache, lru_cache
+from pathlib import Path
+from typing import Any
+
+from tolstat.common import strict, units
+from tolstat.common.errors import Fault, InputError
+from tolstat.common.files import data_dir
+from tolstat.common.notation import DIAMETER
+from tolstat.joint import derived
+from tolstat.joint.assumed import Assumed
+from tolstat.joint.model import Joint, affects_results
+from tolstat.joint.overrides import laid_over, leaves, overridden
+
+DEFAULT_JOINT = "cirelli2021"
+"""Joint in ``data/joints`` whose values are the examples of the keys of a joint."""
+
+
+def load(
+    base: str | Path,
+    overrides: Mapping[str, Any],
+    place: str,
+    relative_to: Path | None = None,
+    section: str = "joint",
+) -> Joint:
+    """Read a joint file and merge a case's own keys over it.
+
+    Parameters
+    ----------
+    base : str or Path
+        Name of a file in ``data/joints`` without ``.toml``, or a path (it ends in ``.toml`` or has a folder).
+    overrides : mapping
+        Keys of the case's ``[joint]`` table other than `base`, nested as TOML nests them.
+    place : str
+        Name of the case file, under which faults of `base` and `overrides` are reported.
+    relative_to : Path, optional
+        Folder that a relative path is taken from; the working directory by default.
+    section : str
+        Key path of `base` and `overrides` in the case's file.
+
+    Returns
+    -------
+    Joint
+        The resolved joint.
+
+    Raises
+    ------
+    InputError
+        With every fault: those of the joint file under its name, those of `overrides` under `place`.
+    """
+    path = _find(base, f"{place}: {section}", relative_to)
+    text = strict.read_text(path)
+    data = strict.read_toml(path, text)
+    with strict.lines_of(path):
+        faults = list(_faults_of_file(path, text))
+        if "assumed" in overrides:
+            remedy = "write [[assumed]] beside [joint]"
+            faults.append(Fault(f"{place}: {section}.assumed", "is no key that a study or case replaces", remedy))
+        try:
+            joint = strict.validate(Joint, overridden(data, _without_assumed(overrides)), place, examples=examples())
+        except InputError as error:
+            raise InputError([*_attributed(error.faults, data, path, place, section), *faults]) from error
+        if faults:
+            raise InputError(faults)
+    merged = leaves(overridden(data, overrides))
+    given, held = leaves(overrides), leaves(data)
+    gone = given.keys() | derived.replaced(given, held)
+    joint.remember(
+        [*_inherited(joint, data, overrides, path), *_lowered(joint, merged.get("contact.fit_load"))],
+        {key: str(held[key]) for key in derived.BEARING if key in held and key in gone},
+    )
+    return joint
+
+
+def _without_assumed(table: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in table.items() if key != "assumed"}
+
+
+@lru_cache(maxsize=8)
+def _faults_of_file(path: Path, text: str) -> tuple[Fault, ...]:
+    """Faults of ``[[assumed]]`` of a joint file that is valid but for them; a sweep reads the same file often."""
+    data = strict.read_toml(path, text)
+    try:
+        joint = strict.validate(Joint, data, str(path))
+    except InputError:
+        return ()
+    return tuple(faults_of_assumed(joint.assumed, _without_assumed(data), {}, str(path)))
+
+
+def faults_of_assumed(
+    entries: Sequence[Assumed], data: Mapping[str, Any], own: Mapping[str, Any], place: str
+) -> Iterator[Fault]:
+    """Faults of assumptions whose values make no joint.
+
+    Parameters
+    ----------
+    entries : sequence of Assumed
+        Tables ``[[assumed]]`` of one file.
+    data, own : mapping
+        Keys of the joint, and those that the study sets, see `with_keys`.
+    place : str
+        File name shown in faults.
+    """
+    names = [entry.name for entry in entries]
+    for number, entry in enumerate(entries):
+        where = f"{place}: assumed[{number}]"
+        if entry.name in names[:number]:
+            yield Fault(f"{where}.name", f"another one is named {entry.name!r}", "give each a name of its own")
+        for index, value in enumerate(entry.values):
+            at = f"{where}.values[{index}]"
+            for key in leaves(value):
+                if not affects_results(key):
+                    yield Fault(f"{at}.{key}", "affects no result", "remove it")
+            try:
+                with_keys(data, own, value, at)
+            except InputError as error:
+                for fault in error.faults:
+                    key = fault.place.removeprefix(f"{at}: ")
+                    yield Fault(f"{at}.{key}" if key != fault.place else at, fault.found, fault.remedy)
+
+
+def with_keys(data: Mapping[str, Any], own: Mapping[str, Any], keys: Mapping[str, Any], place: str) -> Joint:
+    """Joint with some keys set beside those that a study sets, and all that follows from them computed anew.
+
+    Parameters
+    ----------
+    data : mapping
+        Keys of the joint as `Joint.given` returns them in mode ``json``; those of the study among them.
+    own, keys : mapping
+        Keys that the study sets, which stay; and the keys to set; nested, as a file writes them.
+    place : str
+        What stands before the key path in faults.
+
+    Raises
+    ------
+    InputError
+        When the keys make no valid joint.
+    """
+    return strict.validate(Joint, overridden(data, laid_over(own, keys)), place, examples=examples())
+
+
+@cache
+def examples() -> dict[str, Any]:
+    """Values of the default joint by dotted key, as its file writes them: the examples of a joint's keys."""
+    return leaves(strict.read_toml(data_dir() / "joints" / f"{DEFAULT_JOINT}.toml"))
+
+
+def _find(base: str | Path, place: str, relative_to: Path | None) -> Path:
+    path = Path(base)
+    if path.suffix == ".toml" or len(path.parts) > 1:
+        return (relative_to or Path()) / path
+    folder = data_dir() / "joints"
+    names = sorted(p.stem for p in folder.glob("*.toml"))
+    if str(base) in names:
+        return folder / f"{base}.toml"
+    close = difflib.get_close_matches(str(base), names, n=1)
+    known = f"did you mean {close[0]!r}?" if close else f"write one of {', '.join(names)}, or a path to a .toml file"
+    raise InputError([Fault(f"{place}.base", f"no joint is named {str(base)!r}", known)])
+
+
+def _attributed(
+    faults: tuple[Fault, ...], data: Mapping[str, Any], path: Path, place: str, section: str
+) -> list[Fault]:
+    """Report the faults that the joint file has without overrides under its name, the others under `place`."""
+    try:
+        strict.validate(Joint, data, str(path), examples=examples())
+        own = {}
+    except InputError as error:
+        own = {(f.place.removeprefix(f"{path}: "), f.found): f for f in error.faults}
+    attributed = []
+    for f in faults:
+        key = f.place.removeprefix(f"{place}: ")
+        attributed.append(own.get((key, f.found)) or Fault(f"{place}: {section}.{key}", f.found, f.remedy))
+    return attributed
+
+
+def _inherited(joint: Joint, data: Mapping[str, Any], over: Mapping[str, Any], path: Path) -> Iterator[Fault]:
+    """Warn of values of the joint file that an override leaves, although it gives keys that they follow from."""
+    given, held = leaves(over).keys(), leaves(data)
+    changed = derived.changed(given, held)
+    stay = held.keys() - changed - derived.replaced(given, held)
+    for key, (expected, reason, instead) in derived.expected(joint, given, changed, stay).items():
+        if key == "pin.d" and _as_before(held.get("contact.D_P"), joint.contact.D_P):
+            continue  # the joint file has pins of two diameters itself
+        text, unit = held[key], derived.UNITS[key]
+        words = [_written(one, unit, like) for one, like in zip(*map(_listed, (expected, text)), strict=True)]
+        new = _quoted(words if isinstance(text, list) else words[0])
+        remedy = f"give {instead}, from which it follows, or {key}" if instead else f"give {key}, this value or that"
+        yield Fault(key, f"{_quoted(text)} is inherited from {path.stem}; {reason} {new}", remedy)
+
+
+def _lowered(joint: Joint, written: object) -> Iterator[Fault]:
+    """Warn of a largest load of the fit that is smaller than the one `written`; see `Joint._stiffens`."""
+    used = joint.contact.fit_load
+    if written is None or used is None or math.isclose(used, units.to_si(written, "N"), rel_tol=1e-9):
+        return
+    text = str(units.written(used, "N", written))
+    found = f"up to {written} eq. (3) gives no stiffening contact, so that k1u and k2u are fitted up to {text}"
+    yield Fault("contact.fit_load", found, f'write fit_load = "{text}", or give k1u and k2u')
+
+
+def _as_before(held: object, diameter: float) -> bool:
+    """Whether a diameter is, but for a few per cent, that of the joint file."""
+    return held is not None and math.isclose(units.to_si(held, "m", DIAMETER), diameter, rel_tol=derived.WIDE)
+
+
+def _listed(value: Any) -> list[Any]:
+    return list(value) if isinstance(value, (list, tuple)) else [value]
+
+
+def _quoted(value: Any) -> str:
+    return f"[{', '.join(value)}]" if isinstance(value, list) else str(value)
+
+
+def _written(value: float, unit: str, like: object) -> str:
+    return str(units.written(value, unit, like, digits=3))

@@ -1,0 +1,192 @@
+"""What a study assumes: values of the joint that nobody measured, the joint with others, errors taken as exact."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+from tolstat.common.errors import Fault, InputError
+from tolstat.common.load_kinds import PINS
+from tolstat.common.tables import HOLES
+from tolstat.joint import derived
+from tolstat.joint.contact import keys_valid_for
+from tolstat.joint.derived import get
+from tolstat.joint.overrides import leaves, merged
+from tolstat.joint.reading import with_keys
+from tolstat.study.axes import columns_of
+from tolstat.study.design import nested
+from tolstat.study.selection import EXCLUDES, UNITS
+from tolstat.study.study import Study
+
+_AXES = {"positions": ("offset_e", "offset_t", "offset_z"), "angles": ("tilt_t", "tilt_z"), "diameters": ("diameter",)}
+"""Errors of a pin or hole by what they are about."""
+
+
+class Assumption(NamedTuple):
+    """Values of the joint that are assumed, and others that they may have.
+
+    Attributes
+    ----------
+    name : str
+        What is assumed, such as ``contact law``.
+    values : tuple of mapping
+        Other values, each dotted keys of the joint with their values as written: ``{"contact.law": "sliced"}``.
+    because : str
+        Why the value is not known.
+    varied : bool
+        Whether it is varied unless it is asked for by name; False where it is said to move nothing.
+    """
+
+    name: str
+    values: tuple[Mapping[str, Any], ...]
+    because: str
+    varied: bool
+
+
+def assumptions(study: Study) -> tuple[Assumption, ...]:
+    """Assumptions that hold for the joint of a study: those of its joint file, then those that the study adds.
+
+    An assumption of the joint file is left out if it is `given`, and replaced by one of the study of the same name.
+    """
+    found = given(study)
+    own = {entry.name for entry in study.assumed}
+    of_joint = [entry for entry in study.joint.assumed if entry.name not in (*found, *own)]
+    return tuple(
+        Assumption(entry.name, tuple(leaves(value) for value in entry.values), entry.because, entry.varied)
+        for entry in (*of_joint, *study.assumed)
+    )
+
+
+def given(study: Study) -> tuple[str, ...]:
+    """Names of the assumptions of the joint file that the study gives: its ``[joint]`` or fit sets one of their keys.
+
+    A key that follows from one that the study sets is given, too: it no longer has the value of the joint file.
+    """
+    own = {entry.name for entry in study.assumed}
+    keys = _given_keys(study)
+    return tuple(
+        entry.name
+        for entry in study.joint.assumed
+        if entry.name not in own and any(keys.intersection(leaves(value)) for value in entry.values)
+    )
+
+
+def with_value(study: Study, keys: Mapping[str, Any]) -> Study:
+    """Study with some keys of its joint set, as if written in its ``[joint]``; what follows from them is computed anew.
+
+    Parameters
+    ----------
+    study : Study
+        The study, which is not modified.
+    keys : mapping
+        Dotted key of the joint to value as written, such as a value of an `Assumption`.
+
+    Returns
+    -------
+    Study
+        With the same tolerances, seed and sampling, so that row by row its errors are those of `study`. Its text stays.
+
+    Raises
+    ------
+    InputError
+        When the keys make no valid joint, or one that does not go with the study's settings; when the joints of the
+        study have dimensions of their own.
+    """
+    if study.listed or study.swept:
+        found = "has joints with dimensions of their own: they are no variations of one joint"
+        raise InputError([Fault(str(study.path), found, "vary the joint of a study with tolerances")])
+    place = f"{study.path}: joint"
+    data = study.joint.given("json")
+    joint = with_keys(data, _own_keys(study), nested(keys), place)
+    changed = replace(study, joint=joint)
+    if faults := changed.faults_of_mounting():
+        raise InputError(faults)
+    return changed
+
+
+def together(study: Study, values: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Keys of several values at once, for `with_value`.
+
+    A key that a value names only so that it stays gives way where it follows from a key of another value: a value of
+    the clearance that keeps the contact coefficients leaves those that follow from ``contact.H`` to a value of that.
+
+    Parameters
+    ----------
+    study : Study
+        The study.
+    values : sequence of mapping
+        Values of several assumptions; of a key that several change, the last counts.
+    """
+    present = study.joint
+    made = [with_value(study, value).joint for value in values]
+    held = leaves(study.joint.given("json"))
+    staying = [
+        {key for key in value if get(joint, key) == get(present, key)}
+        for value, joint in zip(values, made, strict=True)
+    ]
+    joined: dict[str, Any] = {}
+    for number, value in enumerate(values):
+        others = [(v.keys() - s) for n, (v, s) in enumerate(zip(values, staying, strict=True)) if n != number]
+        moved = derived.changed(set().union(*others), held)
+        joined |= {key: own for key, own in value.items() if key not in staying[number] or key not in moved}
+    return joined
+
+
+def unselected(study: Study) -> tuple[str, ...]:
+    """Errors of pins and holes that no entry of ``[tolerances]`` selects, nor any other section: taken as exact.
+
+    Returns
+    -------
+    tuple of str
+        Groups of errors in words, ``pin positions along the pin axes``; empty for a study without tolerances.
+    """
+    if not study.tolerances:
+        return ()
+    named = {column for name in study.tolerances for column in columns_of(name)} | study.errors.keys()
+    named |= {other for name in named for other in EXCLUDES.get(name, ()) if name.endswith(".clearance")}
+    return tuple(_groups([name for name in UNITS if name not in named]))
+
+
+def _groups(names: Sequence[str]) -> Iterator[str]:
+    """Describe errors of pins and holes, those of alike features together."""
+    for part, every in (("pin", PINS), ("hole", HOLES)):
+        for noun, keys in _AXES.items():
+            lacking = {one: tuple(key for key in keys if f"{one}.{key}" in names) for one in every}
+            for own in dict.fromkeys(lacking.values()):
+                features = [one for one in every if lacking[one] == own]
+                whole = len(features) == len(every)
+                listed = " and ".join(", ".join(features).rsplit(", ", 1))
+                what = f"{part} {noun}" if whole else f"{noun} of {listed}"
+                axes = f"the {part} axes" if whole else "their axes" if len(features) > 1 else "its axis"
+                if own:
+                    yield what if own == keys else f"{what} {_along(own, axes)}"
+
+
+def _along(keys: Sequence[str], axes: str) -> str:
+    """Direction of some of the errors of an axis, in words."""
+    across = f"across {axes}"
+    words = {("offset_e",): f"along {axes}", ("offset_t", "offset_z"): across}
+    direction = {"offset": "along", "tilt": "about"}[keys[0].partition("_")[0]]
+    return words.get(tuple(keys), f"{direction} {' and '.join(key[-1] for key in keys)}")
+
+
+def _own_keys(study: Study) -> dict[str, Any]:
+    """Keys of the joint that a study sets, nested, with the diameters of its fit."""
+    table = tomllib.loads(study.text)["joint"]
+    own = {key: value for key, value in table.items() if key != "base"}
+    return own if study.fit is None else merged(own, {"contact": study.fit.diameters})
+
+
+def _given_keys(study: Study) -> set[str]:
+    """Dotted keys of the joint that a study sets, that follow from these, or that its contact law removes."""
+    own = leaves(_own_keys(study))
+    keys = derived.changed(own.keys(), leaves(study.joint.given("json")))
+    if "contact.law" in own:
+        named = {
+            key.removeprefix("contact.") for entry in study.joint.assumed for v in entry.values for key in leaves(v)
+        }
+        removed = named - keys_valid_for(dict.fromkeys(named), own["contact.law"]).keys()
+        keys |= {f"contact.{key}" for key in removed if "." not in key}
+    return keys

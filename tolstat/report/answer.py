@@ -20,7 +20,7 @@ from tolstat.questions.exceedance import answer as exceedance
 from tolstat.questions.exceedance import curves
 from tolstat.questions.exceedance.rows import curve_rows, not_kept
 from tolstat.questions.sweep import sweep
-from tolstat.report.headline import headline, tells_yield
+from tolstat.report.headline import headlines, tells_yield
 from tolstat.solver import fidelity
 from tolstat.store import Reader, recorded, viewed
 
@@ -53,11 +53,11 @@ def report(view: View, accepted: float = math.nan) -> Answer:
         found = cases(view) if store.case_names else sweep(view)
         notes = [] if store.case_names else [*_notes(view)]
         return Answer("report", view.name, [*stands_on, *found.parts, *notes, *_run(view)])
-    verdict = headline(view, accepted)
-    lead = [Sentence(text.sentence(verdict.sentence), "lead")] if verdict else []
-    causes = [Sentence(note) for note in verdict.notes] if verdict else []
-    facts: dict[str, Any] = {"verdict": verdict.values()} if verdict else {}
-    parts = [*lead, *stands_on, *_tables(view, accepted), *_yield(view, bool(verdict and verdict.answer))]
+    verdicts = headlines(view, accepted)
+    lead = [Sentence(text.sentence(own.sentence), "lead") for own in verdicts]
+    causes = [Sentence(note) for own in verdicts for note in own.notes]
+    facts: dict[str, Any] = {"verdict": verdicts[0].values()} if verdicts else {}
+    parts = [*lead, *stands_on, *_tables(view, accepted), *_yield(view, bool(verdicts and verdicts[0].answer))]
     return Answer("report", view.name, [*parts, *causes, *_notes(view), *_run(view)], facts)
 
 

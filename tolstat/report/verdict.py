@@ -1,4 +1,4 @@
-"""The verdict on the page: the decision with which it begins."""
+"""The verdicts on the page: the decision with which it begins, and what it stands on."""
 
 from __future__ import annotations
 
@@ -14,20 +14,30 @@ from tolstat.display.asked import Asked
 from tolstat.display.blocks import Card, Decision, Section, Table, Text
 from tolstat.display.table import Column, as_block, has
 from tolstat.questions import accuracy, capability
+from tolstat.questions.assumptions import figure, sentences
+from tolstat.questions.assumptions.variations import applicable
 from tolstat.questions.drawings.answer import place_of
 from tolstat.questions.exceedance import rows as exceedance
 from tolstat.questions.exceedance.answer import above
 from tolstat.questions.exceedance.verdicts import WORDS, ends, share_of
-from tolstat.report.headline import Headline, headline, tells_yield
+from tolstat.report.headline import Headline, headlines, tells_yield
 from tolstat.store.view import View
 
 
 def section(view: View, asked: Asked) -> Section:
-    """Decide on the limits: question, verdict, drawing with the worst bushing marked, numbers behind the verdict."""
-    found = headline(view, asked.accepted)
-    load = found.load if found else next(iter(view.leading), "")
+    """Decide on the limits: question, verdicts, what they stand on, drawing with the worst bushing marked, numbers."""
+    found = headlines(view, asked.accepted)
+    first = found[0] if found else None
+    load = first.load if first else next(iter(view.leading), "")
+    standing = applicable(view, asked.accepted)
+    below = [sentences.still(standing), sentences.shop(view)] if standing and standing.rows else []
     head = Decision(
-        question_of(view.store.study_text), _answer(view, found), _cards(view, found), place_of(view, load, asked)
+        question_of(view.store.study_text),
+        [_answer(own) for own in found] or [_without_verdict(view)],
+        _cards(view, first),
+        place_of(view, load, asked),
+        figure.bars(standing) if standing and standing.rows else None,
+        [own for own in below if own],
     )
     notes = (Text(f"{note[0].upper()}{note[1:]}.", small=True) for note in asked.notes)
     return Section("verdict", "Verdict", [head, *_points(view), *notes])
@@ -68,12 +78,13 @@ def question_of(text: str) -> str:
     return " ".join(found[1].split()) if found else ""
 
 
-def _answer(view: View, found: Headline | None) -> Card:
-    if found is None:
-        why = "The study sets no limits" if view.sampled else f"Joints of a {METHODS[view.method]} are no sample"
-        return Card("", f"{why}, so there is no verdict.", "")
-    note = " ".join(text.sentence(note) for note in found.notes)
-    return Card(found.value, found.words, note, "open" if found.answer in ("none", "searched") else found.answer)
+def _answer(found: Headline) -> Card:
+    return Card(found.value, found.words, " ".join(map(text.sentence, found.notes)), found.shade)
+
+
+def _without_verdict(view: View) -> Card:
+    why = "The study sets no limits" if view.sampled else f"Joints of a {METHODS[view.method]} are no sample"
+    return Card("", f"{why}, so there is no verdict.", "")
 
 
 def _cards(view: View, found: Headline | None) -> list[Card]:

@@ -15,7 +15,7 @@ from tolstat.display.answer import Answer, Part, Sentence, Table
 from tolstat.display.asked import Asked
 from tolstat.display.blocks import Panels
 from tolstat.display.options import Accepted
-from tolstat.display.table import Column, Row, has
+from tolstat.display.table import Column, Row
 from tolstat.questions.assumptions import figure, sentences
 from tolstat.questions.assumptions.run import simulate as simulate
 from tolstat.questions.assumptions.variations import Standing, applicable, evaluate
@@ -36,7 +36,13 @@ COLUMNS = (
     Column("with", lambda row: str(row["label"]), words=True),
     Column("share, %", partial(_interval, name="share", form=".1f")),
     Column("change, %", partial(_interval, name="change", form="+.1f")),
-    Column("verdict", lambda row: sentences.KEPT.get(row["side"], row["side"]), shown=has("side"), words=True, rank=1),
+    Column(
+        "verdict",
+        lambda row: sentences.KEPT.get(row["side"]) or str(row["side"]),
+        shown=lambda rows: any(r["side"] for r in rows),
+        words=True,
+        rank=1,
+    ),
     Column("turns it", lambda row: "yes" if row["turns"] else "", shown=lambda rows: any(r["turns"] for r in rows)),
     Column("assumed, since", lambda row: str(row["because"]), words=True, rank=2),
     Column("keys of the joint", lambda row: str(row["keys"]), words=True, rank=3),

@@ -19,7 +19,7 @@ KEPT = {"yes": "kept", "no": "not kept"}
 """Sides of the accepted share in words."""
 _NAMED = 2
 """Largest number of assumptions, or variations, that a sentence names."""
-_MOST = 1e5
+_MOST = 20_000
 """Largest number of joints of a variation that is proposed."""
 
 

@@ -354,7 +354,7 @@ def _drawn(view: View) -> Estimate:
 
 
 def _row(own: Variation, joints: _Joints, loads: FloatArray, confidence: float) -> dict[str, Any]:
-    row = {"name": own.name, "label": own.label, "keys": words.keys(own.keys), "because": own.because}
+    row: dict[str, Any] = {"name": own.name, "label": own.label, "keys": words.keys(own.keys), "because": own.because}
     row |= {"n": len(loads), "n_failed": int(np.isnan(loads).sum())}
     found = _sample(loads).above(joints.level, confidence)
     share, change = (found.estimate, found.outer_lower, found.outer_upper), (np.nan,) * 3

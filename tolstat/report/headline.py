@@ -51,13 +51,17 @@ class Headline(NamedTuple):
     @property
     def sentence(self) -> str:
         """The whole sentence, without full stop."""
-        return f"{self.value}{':' if self.answer else ''} {self.words}"
+        return f"{self.value}{',' if self.is_turned else ':' if self.answer else ''} {self.words}"
+
+    @property
+    def is_turned(self) -> bool:
+        """Whether what is assumed decides the verdict."""
+        return bool(self.stands_on and self.stands_on["turned_by"])
 
     @property
     def shade(self) -> str:
         """``yes``, ``no`` or ``open`` of the page: also open where what is assumed, or was not searched, decides."""
-        turned = bool(self.stands_on and self.stands_on["turned_by"])
-        return "open" if turned or self.answer in ("none", "searched") else self.answer
+        return "open" if self.is_turned or self.answer in ("none", "searched") else self.answer
 
     def values(self) -> dict[str, Any]:
         """JSON values: ``answer`` of the joints as drawn in words or null, ``stands_on``, ``sentence``, ``notes``."""

@@ -99,9 +99,8 @@ def assumptions_on_page(view: View, asked: Asked) -> Answer:
 def _parts(view: View, found: Standing) -> list[Part]:
     share, lower, upper = found.drawn
     lead = f"As drawn {text.percent(share)} of the joints exceed a limit ({text.span(lower, upper)})."
-    verdict, remedy = sentences.turned(found)
-    if verdict:
-        lead += f" {text.sentence(f'{verdict}: {remedy}')}"
+    if any(verdict := sentences.turned(found)):
+        lead += f" {text.sentence(', '.join(verdict))}"
     title = f"Share of the joints above a limit, and its change, with other values; {found.n} joints of each"
     below = [sentences.still(found), sentences.shop(view)]
     return [

@@ -24,9 +24,9 @@ _MOST = 20_000
 
 
 def turned(found: Standing) -> tuple[str, str]:
-    """The verdict where what is assumed decides it, and what to do; empty where it does not.
+    """First words and rest of a verdict that what is assumed decides; empty where it does not.
 
-    ``not kept as drawn (15.8 %), kept if the shaft slides (7.4 %)`` and ``more joints do not decide it; find out how
+    ``not kept as drawn (15.8 %)``, and ``kept if the shaft slides (7.4 %): more joints do not decide it; find out how
     the shaft is held``.
     """
     rows = found.turning
@@ -38,10 +38,8 @@ def turned(found: Standing) -> tuple[str, str]:
     names = [row for row in rows if row["name"] != ALL] or found.moving
     about = {row["name"]: words.AXIAL in row["keys"] for row in names if row["name"] != ALL}
     first = dict(list(about.items())[:_NAMED])
-    return (
-        f"{side} as drawn ({text.percent(found.drawn[0])}), {other} {shown}",
-        f"more joints do not decide it; find out {words.to_find_out(first)}",
-    )
+    remedy = f"more joints do not decide it; find out {words.to_find_out(first)}"
+    return f"{side} as drawn ({text.percent(found.drawn[0])})", f"{other} {shown}: {remedy}"
 
 
 def more(found: Standing, file: str) -> str:

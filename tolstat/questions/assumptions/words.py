@@ -58,4 +58,4 @@ def _noun(name: str, is_mounting: bool) -> str:
 
 def _written(value: Any) -> str:
     text = f"{value:g}" if isinstance(value, float) else str(value)
-    return text.replace("*", " ")
+    return text.replace("*", " ").replace("^2", "²").replace("^3", "³")

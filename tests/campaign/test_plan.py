@@ -20,7 +20,7 @@ from tolstat.campaign import plan, stop_rule
 from tolstat.campaign import run as campaign
 from tolstat.common.errors import InputError
 from tolstat.common.loads import LOADS, Limit
-from tolstat.common.tables import Status
+from tolstat.common.tables import Options, Status
 from tolstat.store import ResultFile, Writer
 
 RULE = "P(cross1.F > 0.5 N) width < 0.4"
@@ -215,6 +215,20 @@ def test_a_plan_is_what_the_campaign_takes(tmp_path: Path, small: study.Study) -
     large = plan.plan(dataclasses.replace(small, sampling=small.sampling.model_copy(update={"n": 10**6})), pilot=2)
     assert large.rows == 10**6 + 1
     assert large.widths[0.1] == pytest.approx(2 * 1.96 * np.sqrt(0.09 / 1e6), rel=0.01)
+
+
+def test_the_default_pilot_takes_few_joints_that_are_slow(small: study.Study, monkeypatch: pytest.MonkeyPatch) -> None:
+    own, sizes = plan.simulate_timed, []
+
+    def slow(loaded: study.Study, params: np.ndarray, options: list[Options]) -> tuple[np.ndarray, float]:
+        sizes.append(len(params))
+        return own(loaded, params, options)[0], 2.0 * len(params)
+
+    monkeypatch.setattr(plan, "simulate_timed", slow)
+    monkeypatch.setattr(plan, "PILOT", 40)
+    assert plan.plan(small, pilot=40).pilot == 10
+    assert sizes == [8, 10]
+    assert plan.plan(small, pilot=12).pilot == 12  # as many as are asked for
 
 
 def test_a_plan_counts_joints_that_do_not_go_together(tmp_path: Path, small: study.Study) -> None:

@@ -12,6 +12,7 @@ from scipy import stats
 from tests.support.synthetic import HEAD
 from tolstat import study
 from tolstat.common.errors import InputError
+from tolstat.study.assumptions import unselected
 from tolstat.study.tolerances import distributions, iso2768, meaning, zones
 from tolstat.study.tolerances.correlation import Copula
 from tolstat.study.tolerances.distributions import Distribution
@@ -197,12 +198,14 @@ def test_a_common_axis_shorter_than_between_its_bearings_is_told():
     assert remedy.endswith("2 (R + z/2) = 168 mm")
 
 
-def test_position_errors_without_tolerance_are_listed():
+def test_errors_without_tolerance_are_listed():
     head = f'{HEAD}\n[sampling]\nmethod = "random"\nn = 8\nseed = 1\n[tolerances]\n'
+    diameters = ("pin diameters", "hole diameters")
+    along = ("pin positions along the pin axes", "positions of hole3 and hole4 along their axes")
     plan = study.load(Path("x.toml"), text=head + ZONES)
-    assert meaning.exact(plan.entries, plan.errors) == ["pin*.offset_e", "hole[34].offset_e"]
-    assert meaning.exact(plan.entries, ["hole4.offset_e"]) == ["pin*.offset_e", "hole3.offset_e"]
+    assert unselected(plan) == (along[0], diameters[0], along[1], diameters[1])
+    fixed = study.load(Path("x.toml"), text=f'[errors]\nhole4.offset_e = "0.1 mm"\n{head}{ZONES}')
+    assert "positions of hole3 along its axis" in unselected(fixed)
     plan = study.load(Path("x.toml"), text=head + '"pin*.tilt_t" = { plus_minus = "1 deg", distribution = "uniform" }')
-    expected = ["pin*.offset_*", "pin*.tilt_z", "hole*.offset_*", "hole*.tilt_*"]
-    assert meaning.exact(plan.entries, plan.errors) == expected
-    assert meaning.exact([], []) == []
+    holes = ("hole positions", "hole angles", "hole diameters")
+    assert unselected(plan) == ("pin positions", "pin angles about z", "pin diameters", *holes)

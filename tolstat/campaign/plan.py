@@ -28,12 +28,14 @@ from tolstat.solver.compilation import stage_name, warm_up
 from tolstat.solver.simulation import history_specs, simulate_rows
 from tolstat.store import layout, metadata, worst
 from tolstat.store.recorded import perturbed, settings, variants
-from tolstat.study import Study, swept
+from tolstat.study import Study, assumptions, swept
 from tolstat.study.points import names_of
 from tolstat.study.tolerances import meaning
 
 PILOT = 128
 """Default number of joints in the pilot: fewer would not fill the lanes as a campaign does."""
+PILOT_S, FIRST = 20.0, 8
+"""Processor time that the default pilot may take, s: joints at 85 deg take seconds each; joints that tell how long."""
 SHARES = (0.5, 0.1, 0.01)
 """Exceedances for which the width of the interval is predicted."""
 QUANTILES = (0.95, 0.99, 0.999)
@@ -158,7 +160,7 @@ class Plan:
     tolerances : list of dict
         What each entry of ``[tolerances]`` means: rows of `study.tolerances.meaning.table`.
     exact : list of str
-        Patterns of the offsets and tilts that nothing sets in a study with tolerances; see `meaning.exact`.
+        Errors of pins and holes that nothing sets in a study with tolerances, in words; see `assumptions.unselected`.
     correlations : list of dict
         What correlations mean for the errors themselves: rows of `study.tolerances.meaning.correlations`.
     wilks : dict of float to int
@@ -204,7 +206,8 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT, stage: Te
     workers : int, optional
         Number of processes of the campaign; without it the number of cores.
     pilot : int
-        Number of joints to simulate; at most all joints of the study.
+        Number of joints to simulate; at most all joints of the study. The default number is reduced to as many as take
+        `PILOT_S`.
     stage : callable
         Called with the name of each stage when it begins.
 
@@ -216,12 +219,11 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT, stage: Te
     stage(stage_name())
     warm_up()
     stage("pilot")
-    rows = np.unique(np.linspace(0, study.rows - 1, min(pilot, study.rows)).astype(np.intp))
-    errors = _errors(study, rows)
     choice = choose_fidelity(study) if study.solver.fidelity == "auto" else {}
-    own = [settings(solver, choice) for solver in study.solvers]
-    options = [own[number] for number in variants(study, rows)]
-    at = {point.name: perturbed(study.at(point.name), rows, errors) for point in study.points}
+    if pilot == PILOT < study.rows:
+        pilot = _affordable(study, choice)
+    rows = _spread(study, pilot)
+    at, options = _joints(study, rows, choice)
     timed = {name: simulate_timed(study, params, options) for name, params in at.items()}
     each = sum(seconds for _, seconds in timed.values()) / len(rows)
     stage("check of the numerical error")
@@ -256,9 +258,31 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT, stage: Te
         fit=fit_in_words(study),
         sweep=swept.meaning(study.sweep, study.joint),
         tolerances=text.records(meaning.table(study.entries)),
-        exact=meaning.exact(study.entries, study.errors),
+        exact=list(assumptions.unselected(study)),
         correlations=text.records(meaning.correlations(study.copula, study.tolerances)),
     )
+
+
+def _spread(study: Study, count: int) -> NDArray[np.intp]:
+    """Rows of a study at equal distances, `count` of them or all."""
+    return np.unique(np.linspace(0, study.rows - 1, min(count, study.rows)).astype(np.intp))
+
+
+def _joints(
+    study: Study, rows: NDArray[np.intp], choice: dict[str, Any]
+) -> tuple[dict[str, NDArray[np.void]], list[Options]]:
+    """Parameters of some joints at each operating point, table PARAM, and the solver options of each joint."""
+    errors = _errors(study, rows)
+    own = [settings(solver, choice) for solver in study.solvers]
+    at = {point.name: perturbed(study.at(point.name), rows, errors) for point in study.points}
+    return at, [own[number] for number in variants(study, rows)]
+
+
+def _affordable(study: Study, choice: dict[str, Any]) -> int:
+    """Size of the default pilot, or as many joints as take `PILOT_S`, by the time of the first ones."""
+    at, options = _joints(study, _spread(study, FIRST), choice)
+    spent = sum(simulate_timed(study, params, options)[1] for params in at.values())
+    return int(np.clip(FIRST * PILOT_S / max(spent, 1e-9), FIRST, PILOT))
 
 
 def _loop() -> float:

@@ -242,24 +242,20 @@ def print_warnings(path: Path, joints: Iterable[Joint], variants: Iterable[Varia
 def print_study_notes(path: Path, study: Study) -> None:
     """Print what a study stands on, and its warnings.
 
-    These are mounting and contact law; errors that no tolerance mentions; warnings of its joints, common axes that are
-    too short, shares without an interval, and a note where rigid shafts meet errors along them.
+    These are mounting and contact law; warnings of its joints, of values that are probably not meant, shares without an
+    interval, and a note where rigid shafts meet errors along them.
     """
     from tolstat.analysis.listed import without_interval
-    from tolstat.study import mounting
-    from tolstat.study.assumptions import unselected
-    from tolstat.study.tolerances import zones
+    from tolstat.study import mounting, plausible
 
     say(f"{study.name}: {study.joint_in_words}")
     axial = [joint.shaft.axial for joint in study.joints]
     if said := mounting.note(study.tolerances, axial, mounting.command(str(path), path.stem, study.joint)):
         say(f"note: {said}")
-    if exact := unselected(study):
-        say(f"note: taken as exact, since no tolerance mentions them: {', '.join(exact)}")
 
     print_warnings(path, study.joints, study.variants)
-    for key, found, remedy in zones.short_axes(study.entries, study.joint.contact.z):
-        warn(f"warning: {study.fault(key, found, remedy)}")
+    for fault in plausible.warnings(study):
+        warn(f"warning: {fault}")
     if not study.sampling.has_replicates and (said := without_interval(study.sampling.method)):
         warn(f"warning: {said}")
 

@@ -117,6 +117,7 @@ def run(
     from tolstat.campaign.remedy import parse_retry
     from tolstat.common import strict
     from tolstat.study import rewriting
+    from tolstat.study.assumptions import unselected
 
     with gather(faults):
         text = rewriting.with_settings(strict.read_text(study_file), changes) if changes else None
@@ -125,6 +126,8 @@ def run(
     if faults:
         raise InputError(faults)
     print_study_notes(study_file, plan)
+    if exact := unselected(plan):
+        say(f"no tolerance, taken as exact: {', '.join(exact)}")
     where = {"workers": workers, "executor": executor.value, "scheduler": scheduler}
     simulate(plan, path, until=until, check=verify, rows=part, retry=again, **where)
     conclude(path, report, wide, " ".join([str(study_file), *(f"--set {quote(own)}" for own in changes)]))

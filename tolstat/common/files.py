@@ -15,6 +15,10 @@ from tolstat.common.errors import Fault, InputError
 
 MAX_INPUT_BYTES = 64_000_000
 """Largest size of a text file that is read, bytes."""
+UTF_16 = (b"\xff\xfe", b"\xfe\xff")
+"""Marks before text in UTF-16."""
+WIDE = 64
+"""First bytes of a file, of which every second one is zero in UTF-16."""
 
 
 def data_dir() -> Path:
@@ -39,8 +43,8 @@ def reason(error: OSError) -> str:
     return own[1] if own else " ".join(str(error).split())
 
 
-def read_input(path: Path, encoding: str = "utf-8") -> str:
-    """Read a text file that a user names.
+def read_input(path: Path) -> str:
+    """Read a text file that a user names; the mark that some editors put before UTF-8 text is left out.
 
     Raises
     ------
@@ -48,7 +52,7 @@ def read_input(path: Path, encoding: str = "utf-8") -> str:
         When it is missing, not permitted, not a regular file (a pipe would wait for ever, a device may have no end),
         or larger than `MAX_INPUT_BYTES`.
     UnicodeDecodeError
-        When it is not text.
+        When it is not UTF-8 text, see `about_encoding`.
     """
     handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
     with open(handle, "rb") as file:
@@ -60,7 +64,25 @@ def read_input(path: Path, encoding: str = "utf-8") -> str:
         content = file.read(MAX_INPUT_BYTES + 1)
     if len(content) > MAX_INPUT_BYTES:
         raise OSError(errno.EFBIG, f"is larger than {MAX_INPUT_BYTES / 1e6:g} MB", str(path))
-    return content.decode(encoding)
+    if b"\0" in content:
+        at = content.index(b"\0")
+        raise UnicodeDecodeError("utf-8", content, at, at + 1, "zero byte")
+    return content.decode("utf-8-sig")
+
+
+def about_encoding(error: UnicodeDecodeError) -> tuple[str, str]:
+    """Say what a file is that is not UTF-8 text, and the remedy."""
+    content, remedy = error.object, "save it as UTF-8"
+    if content.startswith(UTF_16) or content[:WIDE].count(0) in (
+        len(content[:WIDE]) // 2,
+        (len(content[:WIDE]) + 1) // 2,
+    ):
+        return "is UTF-16 text, not UTF-8", remedy
+    if b"\0" in content:
+        return "is not UTF-8 text", "give a text file"
+    line = content.count(b"\n", 0, error.start) + 1
+    character = content[error.start : error.start + 1].decode("cp1252", "replace")
+    return f"is not UTF-8 text: line {line} has another encoding, {character!r} of Windows perhaps", remedy
 
 
 def check_target(path: Path, *inputs: Path) -> None:

@@ -17,7 +17,7 @@ from pydantic_core import CoreSchema, PydanticCustomError
 
 from tolstat.common import json_schema, toml_lines, units
 from tolstat.common.errors import Fault, InputError
-from tolstat.common.files import read_input
+from tolstat.common.files import about_encoding, read_input
 
 MAX_DEPTH = 32
 """Largest number of tables and lists inside each other in an input file."""
@@ -77,7 +77,7 @@ def read_text(path: Path) -> str:
             [Fault(str(path), f"cannot be read: {reason}", "check the path and its permissions")]
         ) from error
     except UnicodeDecodeError as error:
-        raise InputError([Fault(str(path), "is not UTF-8 text", "give a TOML file")]) from error
+        raise InputError([Fault(str(path), *about_encoding(error))]) from error
 
 
 def read_section(place: Path, text: str, name: str) -> dict[str, Any]:

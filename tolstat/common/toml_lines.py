@@ -27,16 +27,29 @@ def of_syntax(error: tomllib.TOMLDecodeError, text: str) -> tuple[int, str, str]
     if found is None or not found[1]:
         return len(lines), f"{said} (end of the file)", "close what is open, or correct the syntax"
     line = int(found[1])
-    return line, f"{said} (column {found[2]})", _remedy(said, lines[min(line, len(lines)) - 1])
+    return line, f"{said} (column {found[2]})", _remedy(said, lines[min(line, len(lines)) - 1], int(found[2]))
 
 
+_STRAIGHT = str.maketrans(dict.fromkeys("“”„‟«»", '"') | dict.fromkeys("‘’‚‛‹›", "'"))
+"""Typographic quotes, to those of TOML."""
+_DECIMAL_COMMA = re.compile(r"(=\s*[+-]?\d+),(\d+)(?=\s*(?:[,}#]|$))")
+_UNQUOTED_INSIDE = re.compile(r"""(=\s*)([+-]?\d[\d.,]*\s*[^\s\d"'{}\[\],#][^"'{}\[\],#]*?)(?=\s*[,}])""")
 _UNQUOTED_KEY = re.compile(r"""\s*(?P<key>[^\s"'#=]*[*?\[\]{}/°][^\s"'#=]*)\s*=\s*(?P<value>.+)""")
 _UNQUOTED_VALUE = re.compile(r"""\s*(?P<key>[^=#]+?)\s*=\s*(?P<value>[^\s"'\[{#,][^"'#,{}\[\]]*?)\s*(?:#.*)?""")
 
 
-def _remedy(said: str, line: str) -> str:
-    """Remedy for a line with a syntax error, from what the parser says of it; most often quotes lack."""
+def _remedy(said: str, line: str, at: int) -> str:
+    """Remedy for a line with a syntax error at a column, from what the parser says of it; most often quotes lack."""
     key, value = _UNQUOTED_KEY.fullmatch(line), _UNQUOTED_VALUE.fullmatch(line)
+    if line[at - 1 : at].translate(_STRAIGHT) != line[at - 1 : at]:
+        return f"write straight quotes, not typographic ones: {line.translate(_STRAIGHT).strip()}"
+    for what, changed in (
+        ("straight quotes, not typographic ones", line.translate(_STRAIGHT)),
+        ("a point for the decimal comma", _DECIMAL_COMMA.sub(r"\1.\2", line)),
+        ("the value in quotes", _UNQUOTED_INSIDE.sub(r'\1"\2"', line)),
+    ):
+        if changed != line and _is_toml(changed):
+            return f"write {what}: {changed.strip()}"
     if said.startswith("Cannot"):
         return "remove one of the two: the key or table is there already"
     if said.startswith("Illegal character '\\n'"):
@@ -48,6 +61,14 @@ def _remedy(said: str, line: str) -> str:
     if value is not None:
         return f'write the value in quotes: {value["key"]} = "{value["value"]}"'
     return "correct the syntax there"
+
+
+def _is_toml(line: str) -> bool:
+    try:
+        tomllib.loads(line)
+    except tomllib.TOMLDecodeError:
+        return False
+    return True
 
 
 def of_keys(text: str) -> dict[KeyPath, int]:

@@ -57,6 +57,9 @@ def load(
     path = _find(base, f"{place}: {section}", relative_to)
     text = strict.read_text(path)
     data = strict.read_toml(path, text)
+    if "material" not in data and data.keys() & {"joint", "operation", "sampling"}:
+        remedy = "give a joint file; tolstat new STUDY.toml --joint own writes one"
+        raise InputError([Fault(str(path), "is a study or case, not a joint file", remedy)])
     with strict.lines_of(path):
         faults = list(_faults_of_file(path, text))
         if "assumed" in overrides:
@@ -76,6 +79,11 @@ def load(
         {key: str(held[key]) for key in derived.BEARING if key in held and key in gone},
     )
     return joint
+
+
+def is_joint(data: Mapping[str, Any]) -> bool:
+    """Whether the tables of a file are those of a joint file."""
+    return "joint" not in data and len(data.keys() & {"material", "pin", "arm", "cross", "shaft", "contact"}) > 2
 
 
 def _without_assumed(table: Mapping[str, Any]) -> dict[str, Any]:

@@ -38,7 +38,7 @@ def exact(view: View) -> str:
     """Note on errors that no tolerance mentions; empty where there are none."""
     with suppress(TolstatError):
         if names := unselected(view.study):
-            return f"taken as exact, since no tolerance mentions them: {', '.join(names)}"
+            return f"no tolerance, taken as exact: {', '.join(names)}"
     return ""
 
 

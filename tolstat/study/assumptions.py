@@ -15,7 +15,6 @@ from tolstat.joint.contact import keys_valid_for
 from tolstat.joint.derived import get
 from tolstat.joint.overrides import leaves, merged
 from tolstat.joint.reading import with_keys
-from tolstat.study.axes import columns_of
 from tolstat.study.design import nested
 from tolstat.study.selection import EXCLUDES, UNITS
 from tolstat.study.study import Study
@@ -144,7 +143,8 @@ def unselected(study: Study) -> tuple[str, ...]:
     """
     if not study.tolerances:
         return ()
-    named = {column for name in study.tolerances for column in columns_of(name)} | study.errors.keys()
+    meanings = (meaning for entry in study.entries for site, model in entry.models for meaning in model.meaning(site))
+    named = {name for meaning in meanings for name in meaning.errors} | study.errors.keys()
     named |= {other for name in named for other in EXCLUDES.get(name, ()) if name.endswith(".clearance")}
     return tuple(_groups([name for name in UNITS if name not in named]))
 

@@ -14,6 +14,7 @@ from tolstat.study.file import StudyFile
 from tolstat.study.model import Solver
 from tolstat.study.mounting import Setting
 from tolstat.study.points import Point
+from tolstat.study.schema.files import SECTIONS
 
 
 @dataclass(frozen=True, repr=False)
@@ -76,7 +77,7 @@ def load_case(path: str | Path) -> Case:
     InputError
         With every fault of the file.
     """
-    file = StudyFile(Path(path), ("joint", "operation", "errors", "solver"))
+    file = StudyFile(Path(path), [name for name, section in SECTIONS.items() if section.in_case])
     if "sampling" in file.data:
         raise InputError(
             [Fault(file.place, "is a study, not a case of one joint", f"run it with: tolstat run {file.path}")]

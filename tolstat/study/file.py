@@ -18,7 +18,7 @@ from tolstat.joint import Joint, Operation
 from tolstat.joint.assumed import Assumed
 from tolstat.joint.derived import BEARING
 from tolstat.joint.overrides import leaves, merged
-from tolstat.joint.reading import faults_of_assumed
+from tolstat.joint.reading import faults_of_assumed, is_joint
 from tolstat.study import fatigue, known, listing, points, proposal, selection, selective, sorting, swept
 from tolstat.study.axes import is_zone, zone_of
 from tolstat.study.design import Design
@@ -65,13 +65,16 @@ class StudyFile:
     Raises
     ------
     InputError
-        When the file is not readable TOML.
+        When the file is not readable TOML, or a joint file.
     """
 
     def __init__(self, path: Path, sections: Iterable[str], text: str | None = None) -> None:
         self.path = path
         self.place = str(path)
         self.data = read_toml(path, text)
+        if is_joint(self.data):
+            remedy = f'name it in a study, base = "{path.name}" under [joint]; tolstat new writes one'
+            raise InputError([Fault(self.place, "is a joint file, not a study or case", remedy)])
         self.text = read_input(path) if text is None else text
         self._lined = text is None
         self._overridden: set[str] = set()
@@ -116,10 +119,11 @@ class StudyFile:
         return None
 
     def fit(self) -> Fit | None:
-        """``tolerances.fit``: the fit of all pins in their holes."""
+        """``tolerances.fit``: the fit of all pins in their holes; another one in place of a fit with faults."""
+        table = self.data.get("tolerances")
         with gather(self._faults):
-            return fits.read(self.data.get("tolerances"), self.place)
-        return None
+            return fits.read(table, self.place)
+        return fits.stand_in(table)
 
     def points(self) -> tuple[Point, ...]:
         """``[operation]``, or ``[[operation]]``: the operating points; empty if one could not be read."""

@@ -11,8 +11,9 @@ from tolstat.analysis.clustered import LEAST
 from tolstat.common import selected_results, units
 from tolstat.common.columns import Column
 from tolstat.common.loads import Limit
+from tolstat.common.solver_options import from_names
 from tolstat.common.strict import Strict, refuse
-from tolstat.common.tables import Fidelity, Method, Options, Start
+from tolstat.common.tables import Options
 from tolstat.study import selection
 from tolstat.study.selective import SelectiveEntry
 from tolstat.study.tolerances.entry import Value
@@ -116,10 +117,8 @@ class Solver(Strict):
 
     def options(self) -> Options:
         """Return the settings for the kernel; ``auto``, which a campaign resolves, becomes ``dynamic``."""
-        dynamic = Fidelity.DYNAMIC if self.fidelity == "auto" else Fidelity[self.fidelity.upper()]
-        codes = {"method": Method[self.method.upper()], "start": Start[self.start.upper()], "fidelity": dynamic}
-        numbers = self.model_dump(include=set(Options._fields) - set(codes))
-        return Options(**numbers, **{name: int(code) for name, code in codes.items()})
+        own = self.model_dump(include=set(Options._fields))
+        return from_names(own | ({"fidelity": "dynamic"} if self.fidelity == "auto" else {}))
 
 
 SamplingMethod = Literal["random", "sobol", "lhs", "sweep", "cases", "importance", "pick_freeze", "subset"]

@@ -30,6 +30,7 @@ from tolstat.study.model import Output, Sampling, Solver, SweepAxis
 from tolstat.study.mounting import Setting
 from tolstat.study.points import Point, limits_at, only_one
 from tolstat.study.proposal import Proposal
+from tolstat.study.schema.files import SECTIONS
 from tolstat.study.sorting import Gauge
 from tolstat.study.swept import Swept
 from tolstat.study.tolerances.correlation import Copula
@@ -270,12 +271,6 @@ class Study(Case):
     def _operation_identity(self) -> dict[str, Any]:
         named = {point.name: point.operation.model_dump() for point in self.points}
         return named.get("", named)
-
-
-SECTIONS = (
-    *("joint", "operation", "solver", "errors", "tolerances", "correlation"),
-    *("sampling", "proposal", "sweep", "grid", "case", "variant", "assumed", "reject", "limits", "fatigue", "output"),
-)
 
 
 def load(path: str | Path, n: int | None = None, text: str | None = None, joint: Joint | None = None) -> Study:

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 DRAWN = "as drawn"
+_LONGEST = 30
+"""Number of letters of a label from which on it has two lines."""
 _ACCEPTED: dict[str, Any] = {"color": style.COLOURS[2], "lw": 1.4, "ls": (0.0, (6.0, 2.0))}
 """Style of the accepted share."""
 
@@ -32,13 +34,14 @@ def bars(found: Standing) -> Panel:
         "Share of the joints above a limit, with other values of what is assumed",
         f"As drawn {text.percent(found.drawn[0])}. {said or 'Nothing that is assumed moves it'}",
         partial(_bars, found=found, rows=rows, labels=labels),
-        (drawing.WIDTH + 0.8, drawing.rows_height(len(labels) + 1)),
-        drawing.rows_left(labels),
+        (drawing.WIDTH, 0.27 * (len(labels) + 1) + drawing.BOTTOM + 0.3),
+        drawing.rows_left([part for label in labels for part in label.split("\n")]),
     )
 
 
 def _label(row: Any) -> str:
-    return f"{row['label']}: {KEPT[row['side']]}" if row["turns"] else str(row["label"])
+    words = f"{row['label']}: {KEPT[row['side']]}" if row["turns"] else str(row["label"])
+    return words.replace(" (", "\n(") if len(words) > _LONGEST else words
 
 
 def _bars(ax: Axes, found: Standing, rows: Rows, labels: list[str]) -> None:

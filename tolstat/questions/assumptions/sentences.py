@@ -136,7 +136,8 @@ def shop(view: View) -> str:
     for step, which in ((COARSER, max), (HALF, min)):
         if step in shares:
             label, share, said = which(shares[step], key=lambda own: own[1])
-            ends.append(f"{label} {said}{' as wide' if step == HALF else ''} {text.percent(share)}")
+            wide = " as wide" if said == HALF or said.startswith("×") else ""
+            ends.append(f"{label} {said}{wide}: {text.percent(share)}")
     return f"{head} Alone changed: {'; '.join(ends)}."
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
 
@@ -30,6 +31,7 @@ PATH = ("tolerances", KEY)
 HOLE, PIN = "hole*.diameter", "pin*.diameter"
 """Errors that a fit gives tolerances to."""
 PAIRS = len(PINS)
+STAND_IN = {"basic": "20 mm", "code": "H7/f7", "distribution": "normal"}
 EXAMPLE = 'fit = { basic = "76 mm", code = "H7/f7", distribution = "normal", cpk = 1.0 }'
 _KEYS_OF = {"cpk": "normal", "truncate": "normal", "a": "beta", "b": "beta"}
 """Keys of one distribution, which others do not have."""
@@ -172,6 +174,24 @@ def read(table: object, place: str) -> Fit | None:
     if zones.kind != "clearance":
         raise InputError([_refusal(entry, zones, share, f"{where}.code")])
     return Fit(entry, share)
+
+
+def stand_in(table: object) -> Fit | None:
+    """Fit in place of one with faults, so that other faults of the file are those of the file.
+
+    Without diameters those of the joint, correlations of diameters and bonuses would seem to lack them.
+
+    Parameters
+    ----------
+    table : object
+        ``[tolerances]`` as parsed from TOML.
+    """
+    data = table.get(KEY) if isinstance(table, Mapping) else None
+    sizes = [data.get("basic"), STAND_IN["basic"]] if isinstance(data, Mapping) else [STAND_IN["basic"]]
+    for basic in sizes:
+        with suppress(InputError):
+            return read({KEY: STAND_IN | {"basic": basic}}, "")
+    return None
 
 
 def _refusal(entry: FitEntry, zones: iso286.Zones, share: float, where: str) -> Fault:

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tolstat.common.load_kinds import PINS
-from tolstat.common.tables import HOLES
 from tolstat.study.tolerances.correlation import Copula
 from tolstat.study.tolerances.distributions import Array, Distribution, Normal
 from tolstat.study.tolerances.entry import Toleranced
@@ -50,47 +48,6 @@ def table(entries: Sequence[Toleranced]) -> pd.DataFrame:
     cells = [(*key[:4], float(key[4]), _pattern(list(keys))) for key, keys in rows.items()]
     made = pd.DataFrame(cells, columns=columns)
     return made[["entry", "number", "errors", "unit", "sigma", "outside"]]
-
-
-def exact(entries: Sequence[Toleranced], fixed: Iterable[str]) -> list[str]:
-    """Offsets and tilts of pins and holes that no entry and no fixed error sets, as patterns.
-
-    Parameters
-    ----------
-    entries : sequence of Toleranced
-        Entries of a study; without any nothing is said.
-    fixed : iterable of str
-        Names of the errors that every joint has.
-
-    Returns
-    -------
-    list of str
-        ``["pin*.offset_*", "hole[12].tilt_z"]``, those of the pins first.
-    """
-    named = set(fixed) | {
-        name for entry in entries for site, model in entry.models for m in model.meaning(site) for name in m.errors
-    }
-    found: dict[tuple[str, str, str], str] = {}
-    for kind, axes in (("offset", "etz"), ("tilt", "tz")) if entries else ():
-        for features in (PINS, HOLES):
-            for axis in axes:
-                missing = [name for name in features if f"{name}.{kind}_{axis}" not in named]
-                if missing:
-                    body = features[0].rstrip("1234")
-                    key = (body, _choice([name[-1] for name in missing], 4), kind)
-                    found[key] = found.get(key, "") + axis
-    patterns = [
-        f"{body}{which}.{kind}_{_choice(list(parts), 3 if kind == 'offset' else 2)}"
-        for (body, which, kind), parts in found.items()
-    ]
-    return sorted(patterns, key=lambda pattern: not pattern.startswith("pin"))
-
-
-def _choice(parts: Sequence[str], of: int) -> str:
-    """Characters of a name as a pattern: ``*`` for all `of` them, ``[12]`` for several, the one itself."""
-    if len(parts) == of:
-        return "*"
-    return f"[{''.join(parts)}]" if len(parts) > 1 else parts[0]
 
 
 def correlations(copula: Copula, tolerances: Mapping[str, Distribution]) -> pd.DataFrame:

@@ -14,7 +14,7 @@ from pydantic import Field
 
 from tolstat.analysis.process import LEAST_PARTS
 from tolstat.common import strict, units
-from tolstat.common.files import read_input
+from tolstat.common.files import about_encoding, read_input
 from tolstat.common.strict import refuse
 from tolstat.study.tolerances import distributions as tolerance
 from tolstat.study.tolerances.entry import SingleEntry, Site
@@ -107,11 +107,14 @@ def _fitted(law: str, values: tolerance.Array) -> tolerance.Normal | tolerance.L
 
 def _read(path: Path, column: str) -> list[float]:
     try:
-        lines = StringIO(read_input(path, "utf-8-sig"), newline="")
+        lines = StringIO(read_input(path), newline="")
         rows = csv.DictReader(line for line in lines if line.strip() and not line.startswith("#"))
         cells = [row.get(column) for row in rows]
         columns = rows.fieldnames or ()
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+    except UnicodeDecodeError as error:
+        found, remedy = about_encoding(error)
+        raise refuse(f"{path} {found}", remedy) from error
+    except (OSError, csv.Error) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise refuse(
             f"{path} cannot be read: {reason}", "give a CSV file; its path starts from the study's folder"

@@ -77,8 +77,9 @@ def least(found: Standing) -> str:
     n = len(found.rows)
     head = f"Least of {n} variations" if n > 1 else "In the one variation"
     own = f"{head}: {text.percent(row['share'])}, {row['label']}"
-    undecided = [row for row in found.rows if row["side"] == "open"]
-    return f"{own}; {_most('open', undecided)}" if undecided else own
+    own += " (open)" if row["side"] == "open" else ""
+    others = [other for other in found.rows if other["side"] == "open" and other is not row]
+    return f"{own}; {_most('open', others)}" if others else own
 
 
 def decided(found: Standing) -> str:

@@ -51,7 +51,7 @@ COLUMNS = (
 
 
 def assumptions(view: View, accepted: Accepted = math.nan) -> Answer:
-    """Compute what the verdict stands on: shares with other values of what is assumed.
+    """Compute what the verdict stands on.
 
     Gives the share of the joints above the limits with each other value that [[assumed]] of the joint file and of the
     study lists, all else equal, and with all assumptions together at their better and at their worse values: share,

@@ -64,7 +64,7 @@ seed = 3
 """
     + ASSUMED
 )
-PLACE = "place of the cross bushings (r_b 30 mm)"
+PLACE = "r_b 30 mm"
 NAMES = ["shaft slides", "arm length (l_f 30 mm)", "arm length (l_f 45 mm)", PLACE]
 
 
@@ -411,7 +411,7 @@ def test_the_command_prints_shares_changes_and_what_the_shop_holds(tmp_path, qui
         ("contact law", {"contact.law": "sliced"}, "law sliced", "with law sliced"),
         ("H", {"contact.H": 3.0}, "H 3", "with H 3"),
         ("clearance", {"contact.clearance": "0.05 mm", "contact.k1u": "1 N/m^2"}, "clearance 0.05 mm", None),
-        ("inertia", {"shaft.Js": "0.1 kg*m^2"}, "inertia (Js 0.1 kg m^2)", None),
+        ("inertia", {"shaft.Js": "0.1 kg*m^2"}, "inertia (Js 0.1 kg m²)", None),
     ],
 )
 def test_values_in_words(name, keys, label, condition):

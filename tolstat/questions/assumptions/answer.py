@@ -101,7 +101,7 @@ def _parts(view: View, found: Standing) -> list[Part]:
     lead = f"As drawn {text.percent(share)} of the joints exceed a limit ({text.span(lower, upper)})."
     if any(verdict := sentences.turned(found)):
         lead += f" {text.sentence(', '.join(verdict))}"
-    title = f"Share of the joints above a limit, and its change, with other values; {found.n} joints of each"
+    title = f"Share above a limit with other values, and its change; {found.n} joints of each"
     below = [sentences.still(found), sentences.shop(view)]
     return [
         Sentence(lead, "lead"),

@@ -54,7 +54,7 @@ def more(found: Standing, file: str) -> str:
     if most > _MOST:
         return f"{head}; too near to the accepted share"
     n = max(math.ceil(most / 100.0) * 100, found.n)
-    return f"{head}; for {row['label']}, if its share stays: tolstat assumptions {file} --run --joints {n}"
+    return f"{head}; if its share stays, this decides {row['label']}:\ntolstat assumptions {file} --run --joints {n}"
 
 
 def also(found: Standing) -> str:

@@ -31,7 +31,7 @@ JOINTS = 1000
 """Default number of joints of each variation: the first of the campaign, or all if it has fewer."""
 ALL = "all assumptions"
 """Name of the variations of all assumptions together."""
-BETTER, WORSE = "all at their better values", "all at their worse values"
+BETTER, WORSE = "all at better values", "all at worse values"
 """What the variations of all assumptions together are called."""
 
 Estimate = tuple[float, float, float]

@@ -8,10 +8,14 @@ from typing import Any
 AXIAL, LAW = "shaft.axial", "contact.law"
 _SHAFT = {"free": ("shaft slides", "if the shaft slides"), "rigid": ("shaft rigid", "if the shaft is held rigidly")}
 """Mounting of the shafts: as a label, and as a condition."""
+_LONGEST = 12
+"""Number of letters of a name up to which a label has it beside the key."""
 
 
 def label(name: str, values: Mapping[str, Any]) -> str:
-    """Label of a value of an assumption: ``shaft slides``, ``law sliced``, ``clearance 0.05 mm``, ``inertia (Js ...)``.
+    """Label of a value of an assumption: ``shaft slides``, ``law sliced``, ``clearance 0.05 mm``, ``fork (l_f 30 mm)``.
+
+    Where the name is long it is the key alone, ``r_b 30 mm``.
 
     Parameters
     ----------
@@ -26,7 +30,10 @@ def label(name: str, values: Mapping[str, Any]) -> str:
         return f"law {values[LAW]}"
     key, value = next(iter(values.items()))
     last = key.rpartition(".")[2]
-    return f"{name} {_written(value)}" if last in name.split() else f"{name} ({last} {_written(value)})"
+    if last in name.split():
+        return f"{name} {_written(value)}"
+    symbol = f"{last} {_written(value)}"
+    return symbol if len(name) > _LONGEST else f"{name} ({symbol})"
 
 
 def keys(values: Mapping[str, Any]) -> str:

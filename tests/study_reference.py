@@ -15,7 +15,7 @@ from tolstat.joint import Operation
 from tolstat.joint.contact import Station
 from tolstat.study.costs import CostEntry
 from tolstat.study.fatigue import LineEntry
-from tolstat.study.listed import Range
+from tolstat.study.listing import Range
 from tolstat.study.model import SweepEntry
 from tolstat.study.points import PointEntry
 from tolstat.study.schema import files

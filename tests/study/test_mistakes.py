@@ -6,9 +6,11 @@ import shutil
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
 from tests.support.environment import ROOT
 from tolstat import study
+from tolstat.cli import app
 from tolstat.common.errors import InputError
 from tolstat.common.files import data_dir
 from tolstat.study import plausible, starter
@@ -186,6 +188,12 @@ def test_a_speed_in_the_wrong_unit_is_told(folder: Path) -> None:
     )
     (message,) = told(folder, points, ("500 rpm", "800 rad/s"))
     assert message.startswith(":11: operation[1].speed: ")
+
+
+def test_commands_tell_such_warnings(folder: Path) -> None:
+    (folder / "fast.toml").write_text(STUDY.replace("500 rpm", "800 rad/s").replace("n = 64", "n = 2"), "utf-8")
+    done = CliRunner().invoke(app, ["plan", str(folder / "fast.toml"), "--pilot", "1"])
+    assert "fast.toml:5: operation.speed: 7639 rpm at 15 deg: speed times angle" in done.stderr
 
 
 @pytest.mark.parametrize("file", sorted((ROOT / "studies").glob("*.toml")), ids=lambda file: file.stem)

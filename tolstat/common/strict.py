@@ -12,7 +12,7 @@ from pathlib import Path
 from types import NoneType
 from typing import Any, TypeVar, get_args
 
-from pydantic import BaseModel, ConfigDict, GetJsonSchemaHandler, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, GetJsonSchemaHandler, ValidationError
 from pydantic_core import CoreSchema, PydanticCustomError
 
 from tolstat.common import json_schema, toml_lines, units
@@ -306,6 +306,16 @@ def _example(model: type[BaseModel], location: Sequence[int | str], known: Mappi
     if example is None or isinstance(example, (Mapping, list)):
         return ""
     return f", for example {location[-1]} = {json.dumps(example, ensure_ascii=False)}"
+
+
+def described(meaning: str, example: Any, **bounds: Any) -> Any:
+    """Field of a key: its meaning, an example, and bounds as `pydantic.Field` has them."""
+    return Field(description=meaning, examples=[example], **bounds)
+
+
+def whole(least: int, most: int, meaning: str, example: int) -> Any:
+    """Field of a key whose value is a whole number from `least` to `most`."""
+    return described(meaning, example, strict=True, ge=least, le=most)
 
 
 def refuse(found: str, remedy: str, *keys: str) -> PydanticCustomError:

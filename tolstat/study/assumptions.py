@@ -49,9 +49,8 @@ def assumptions(study: Study) -> tuple[Assumption, ...]:
 
     An assumption of the joint file is left out if it is `given`, and replaced by one of the study of the same name.
     """
-    found = given(study)
-    own = {entry.name for entry in study.assumed}
-    of_joint = [entry for entry in study.joint.assumed if entry.name not in (*found, *own)]
+    replaced = {entry.name for entry in study.assumed}
+    of_joint = [entry for entry in study.joint.assumed if entry.name not in (*given(study), *replaced)]
     return tuple(
         Assumption(entry.name, tuple(leaves(value) for value in entry.values), entry.because, entry.varied)
         for entry in (*of_joint, *study.assumed)
@@ -63,12 +62,12 @@ def given(study: Study) -> tuple[str, ...]:
 
     A key that follows from one that the study sets is given, too: it no longer has the value of the joint file.
     """
-    own = {entry.name for entry in study.assumed}
+    replaced = {entry.name for entry in study.assumed}
     keys = _given_keys(study)
     return tuple(
         entry.name
         for entry in study.joint.assumed
-        if entry.name not in own and any(keys.intersection(leaves(value)) for value in entry.values)
+        if entry.name not in replaced and any(keys.intersection(leaves(value)) for value in entry.values)
     )
 
 
@@ -96,9 +95,7 @@ def with_value(study: Study, keys: Mapping[str, Any]) -> Study:
     if study.listed or study.swept:
         found = "has joints with dimensions of their own: they are no variations of one joint"
         raise InputError([Fault(str(study.path), found, "vary the joint of a study with tolerances")])
-    place = f"{study.path}: joint"
-    data = study.joint.given("json")
-    joint = with_keys(data, _own_keys(study), nested(keys), place)
+    joint = with_keys(study.joint.given("json"), _keys_of_study(study), nested(keys), f"{study.path}: joint")
     changed = replace(study, joint=joint)
     if faults := changed.faults_of_mounting():
         raise InputError(faults)
@@ -118,18 +115,17 @@ def together(study: Study, values: Sequence[Mapping[str, Any]]) -> dict[str, Any
     values : sequence of mapping
         Values of several assumptions; of a key that several change, the last counts.
     """
-    present = study.joint
-    made = [with_value(study, value).joint for value in values]
-    held = leaves(study.joint.given("json"))
-    staying = [
-        {key for key in value if get(joint, key) == get(present, key)}
-        for value, joint in zip(values, made, strict=True)
+    joints = [with_value(study, value).joint for value in values]
+    changing = [
+        {key for key in value if get(joint, key) != get(study.joint, key)}
+        for value, joint in zip(values, joints, strict=True)
     ]
+    keys_of_joint = leaves(study.joint.given("json"))
     joined: dict[str, Any] = {}
     for number, value in enumerate(values):
-        others = [(v.keys() - s) for n, (v, s) in enumerate(zip(values, staying, strict=True)) if n != number]
-        moved = derived.changed(set().union(*others), held)
-        joined |= {key: own for key, own in value.items() if key not in staying[number] or key not in moved}
+        others = set().union(*changing[:number], *changing[number + 1 :])
+        following = derived.changed(others, keys_of_joint)
+        joined |= {key: text for key, text in value.items() if key in changing[number] or key not in following}
     return joined
 
 
@@ -153,15 +149,14 @@ def _groups(names: Sequence[str]) -> Iterator[str]:
     """Describe errors of pins and holes, those of alike features together."""
     for part, every in (("pin", PINS), ("hole", HOLES)):
         for noun, keys in _AXES.items():
-            lacking = {one: tuple(key for key in keys if f"{one}.{key}" in names) for one in every}
-            for own in dict.fromkeys(lacking.values()):
-                features = [one for one in every if lacking[one] == own]
+            lacking = {feature: tuple(key for key in keys if f"{feature}.{key}" in names) for feature in every}
+            for alike in filter(None, dict.fromkeys(lacking.values())):
+                features = [feature for feature in every if lacking[feature] == alike]
                 whole = len(features) == len(every)
                 listed = " and ".join(", ".join(features).rsplit(", ", 1))
                 what = f"{part} {noun}" if whole else f"{noun} of {listed}"
                 axes = f"the {part} axes" if whole else "their axes" if len(features) > 1 else "its axis"
-                if own:
-                    yield what if own == keys else f"{what} {_along(own, axes)}"
+                yield what if alike == keys else f"{what} {_along(alike, axes)}"
 
 
 def _along(keys: Sequence[str], axes: str) -> str:
@@ -172,21 +167,21 @@ def _along(keys: Sequence[str], axes: str) -> str:
     return words.get(tuple(keys), f"{direction} {' and '.join(key[-1] for key in keys)}")
 
 
-def _own_keys(study: Study) -> dict[str, Any]:
+def _keys_of_study(study: Study) -> dict[str, Any]:
     """Keys of the joint that a study sets, nested, with the diameters of its fit."""
     table = tomllib.loads(study.text)["joint"]
-    own = {key: value for key, value in table.items() if key != "base"}
-    return own if study.fit is None else merged(own, {"contact": study.fit.diameters})
+    keys = {key: value for key, value in table.items() if key != "base"}
+    return keys if study.fit is None else merged(keys, {"contact": study.fit.diameters})
 
 
 def _given_keys(study: Study) -> set[str]:
     """Dotted keys of the joint that a study sets, that follow from these, or that its contact law removes."""
-    own = leaves(_own_keys(study))
-    keys = derived.changed(own.keys(), leaves(study.joint.given("json")))
-    if "contact.law" in own:
+    values = leaves(_keys_of_study(study))
+    keys = derived.changed(values.keys(), leaves(study.joint.given("json")))
+    if "contact.law" in values:
         named = {
             key.removeprefix("contact.") for entry in study.joint.assumed for v in entry.values for key in leaves(v)
         }
-        removed = named - keys_valid_for(dict.fromkeys(named), own["contact.law"]).keys()
+        removed = named - keys_valid_for(dict.fromkeys(named), values["contact.law"]).keys()
         keys |= {f"contact.{key}" for key in removed if "." not in key}
     return keys

@@ -5,23 +5,104 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from itertools import product
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple, Self
+
+from pydantic import model_validator
 
 from tolstat import joint
 from tolstat.common import strict, units
 from tolstat.common.errors import Fault, InputError, gather
 from tolstat.common.notation import DIAMETER
+from tolstat.common.strict import Strict, described, refuse, whole
 from tolstat.common.tables import Variant
 from tolstat.joint import Joint, Operation
 from tolstat.joint.model import TOLD
 from tolstat.joint.overrides import laid_over
 from tolstat.study import selection
 from tolstat.study.design import IDEAL, Design, cube, flat, nested, table
-from tolstat.study.listed import CaseEntry, Range, VariantEntry
 from tolstat.study.model import MAX_ROWS, Solver
 from tolstat.study.selection import UNITS, Assignments, Entry
 
 Section = tuple[int | str, ...]
+
+
+class CaseEntry(Strict):
+    """A joint with these errors; the joint without errors is always run, too."""
+
+    name: Annotated[str, described("name of the case", "tilt", min_length=1)]
+    errors: Annotated[
+        dict[str, Any],
+        described(
+            "errors by name or pattern, as in [errors]",
+            {"pin1.tilt_z": "0.5 deg"},
+            min_length=1,
+            json_schema_extra={"x-table": "errors"},
+        ),
+    ]
+
+
+class Range(Strict):
+    """One entry of ``vary``: a key of the joint goes from `start` to `stop`, given as in the file."""
+
+    start: Annotated[Any, described("value of the first joint, a quantity of the key's unit", "76.0 mm", alias="from")]
+    stop: Annotated[Any, described("value of the last joint, a quantity of the key's unit", "75.6 mm", alias="to")]
+
+
+def _table(meaning: str, example: dict[str, Any], of: str) -> Any:
+    """Field of a table that may be left out; `of` is the name of its schema."""
+    return described(meaning, example, default_factory=dict, json_schema_extra={"x-table": of})
+
+
+class VariantEntry(Strict):
+    """Another joint, or a family of them."""
+
+    name: Annotated[
+        str, described("name of the family; entries of one name make one family", "clearance", min_length=1)
+    ]
+    joint: Annotated[
+        dict[str, Any],
+        _table(
+            "keys in place of those of [joint], which may name another `base`, too",
+            {"contact": {"law": "point"}},
+            "overrides",
+        ),
+    ]
+    points: Annotated[int | None, whole(2, 10_000, "number of joints of a family; needed with `vary`", 21)] = None
+    design: Annotated[
+        Literal["line", "sobol"],
+        described(
+            "`line`: all keys of `vary` go from one end to the other together; `sobol`: a scrambled Sobol' "
+            "sequence fills the box",
+            "sobol",
+        ),
+    ] = "line"
+    seed: Annotated[int, described("seed of the scrambling of `sobol`", 2021, strict=True, ge=0, lt=2**63)] = 0
+    vary: Annotated[
+        dict[str, Any],
+        _table(
+            "keys of the joint that the family varies, each with its range",
+            {"cross.R": {"from": "60 mm", "to": "90 mm"}},
+            "vary",
+        ),
+    ]
+    cases: Annotated[
+        list[str] | None,
+        described("names of the cases to run; all by default; the joint without errors is always run", ["tilt"]),
+    ] = None
+    operation: Annotated[
+        dict[str, Any], _table("keys in place of those of [operation]", {"torque": "0 N*m"}, "operation")
+    ]
+    solver: Annotated[dict[str, Any], _table("keys in place of those of [solver]", {"steps_per_rev": 720}, "solver")]
+    note: Annotated[str, described("note for the reader of the report", "long free flight")] = ""
+
+    @model_validator(mode="after")
+    def _family(self) -> Self:
+        if bool(self.vary) != (self.points is not None):
+            given, lacking = ("vary", "points") if self.vary else ("points", "vary")
+            raise refuse(f"{given} without {lacking}", f"add {lacking}")
+        if self.seed and self.design != "sobol":
+            raise refuse("seed without a random design", 'remove it, or write design = "sobol"')
+        return self
 
 
 class Axis(NamedTuple):

@@ -12,7 +12,7 @@ from tolstat.common import selected_results, units
 from tolstat.common.columns import Column
 from tolstat.common.loads import Limit
 from tolstat.common.solver_options import from_names
-from tolstat.common.strict import Strict, refuse
+from tolstat.common.strict import Strict, described, refuse, whole
 from tolstat.common.tables import Options
 from tolstat.study import selection
 from tolstat.study.selective import SelectiveEntry
@@ -28,16 +28,6 @@ MAX_SAMPLES = 1_000_000_000
 Number = units.Number
 
 
-def key(meaning: str, example: Any, **bounds: Any) -> Any:
-    """Field of a key: its meaning, an example, and bounds as `pydantic.Field` has them."""
-    return Field(description=meaning, examples=[example], **bounds)
-
-
-def whole(least: int, most: int, meaning: str, example: int) -> Any:
-    """Field of a key whose value is a whole number from `least` to `most`."""
-    return key(meaning, example, strict=True, ge=least, le=most)
-
-
 Flag = Annotated[bool, Field(strict=True)]
 
 
@@ -46,7 +36,7 @@ class Solver(Strict):
 
     fidelity: Annotated[
         Literal["dynamic", "quasistatic", "ideal", "auto"],
-        key(
+        described(
             "what is solved: `dynamic`, integration until settled; `quasistatic`, equilibrium at each angle; "
             "`ideal`, closed forms of the joint without errors; `auto`, the cheapest fidelity and steps per revolution "
             "that meet `error_budget`",
@@ -55,7 +45,7 @@ class Solver(Strict):
     ] = "dynamic"
     error_budget: Annotated[
         Number,
-        key(
+        described(
             "largest error of a load that `auto` allows, relative to the joint's largest load of the kind",
             0.01,
             ge=1e-6,
@@ -64,27 +54,27 @@ class Solver(Strict):
     ] = 0.005
     method: Annotated[
         Literal["bdf2", "generalized_alpha", "tr_bdf2"],
-        key("time integration; `bdf2` alone runs joints in SIMD lanes", "tr_bdf2"),
+        described("time integration; `bdf2` alone runs joints in SIMD lanes", "tr_bdf2"),
     ] = "bdf2"
     start: Annotated[
         Literal["static", "ramp"],
-        key("start from the equilibrium at theta = 0, or from the ideal pose with a torque that rises", "ramp"),
+        described("start from the equilibrium at theta = 0, or from the ideal pose with a torque that rises", "ramp"),
     ] = "static"
     steps_per_rev: Annotated[int, whole(12, 20_000, "equal steps per revolution", 360)] = _DEFAULTS.steps_per_rev
     max_revs: Annotated[int, whole(2, 1000, "most revolutions until a joint settles", 60)] = _DEFAULTS.max_revs
-    settle_tol: Annotated[Number, key("closure error below which a joint is settled", 1e-3, gt=0, lt=1)] = (
+    settle_tol: Annotated[Number, described("closure error below which a joint is settled", 1e-3, gt=0, lt=1)] = (
         _DEFAULTS.settle_tol
     )
     newton_tol: Annotated[
-        Number, key("residual that ends Newton's iteration, relative to torque / (2 R)", 1e-7, ge=1e-12, le=1e-2)
+        Number, described("residual that ends Newton's iteration, relative to torque / (2 R)", 1e-7, ge=1e-12, le=1e-2)
     ] = _DEFAULTS.newton_tol
     newton_max_iter: Annotated[int, whole(2, 100, "most Newton iterations of a step", 20)] = _DEFAULTS.newton_max_iter
     max_halvings: Annotated[int, whole(0, 20, "most halvings of a step that Newton's iteration fails on", 8)] = (
         _DEFAULTS.max_halvings
     )
-    rho_inf: Annotated[Number, key("spectral radius of `generalized_alpha` at infinite frequency", 0.9, ge=0, le=1)] = (
-        _DEFAULTS.rho_inf
-    )
+    rho_inf: Annotated[
+        Number, described("spectral radius of `generalized_alpha` at infinite frequency", 0.9, ge=0, le=1)
+    ] = _DEFAULTS.rho_inf
     peak_substeps: Annotated[
         int,
         whole(
@@ -134,7 +124,7 @@ class Sampling(Strict):
 
     method: Annotated[
         SamplingMethod,
-        key(
+        described(
             "`random`; `sobol`, scrambled Sobol' points; `lhs`, Latin hypercube; `importance`, random, from "
             "[tolerances] and [[proposal]]; `pick_freeze`, joints that share errors, for Sobol' indices; `sweep`, the "
             "grid of [sweep]; `cases`, the joints of [[case]], [[variant]] and [grid]",
@@ -152,24 +142,27 @@ class Sampling(Strict):
             1024,
         ),
     ] = None
-    seed: Annotated[int, key("seed of all draws", 2021, strict=True, ge=0, lt=2**63)] = 0
+    seed: Annotated[int, described("seed of all draws", 2021, strict=True, ge=0, lt=2**63)] = 0
     nominal_first: Annotated[
-        Flag, key("whether row 0 is the joint without errors, which statistics leave out; not with `cases`", False)
+        Flag,
+        described("whether row 0 is the joint without errors, which statistics leave out; not with `cases`", False),
     ] = True
     groups: Annotated[
         Literal["tolerance", "error"],
-        key("what `pick_freeze` exchanges together: all errors of an entry of [tolerances], or each alone", "error"),
+        described(
+            "what `pick_freeze` exchanges together: all errors of an entry of [tolerances], or each alone", "error"
+        ),
     ] = "tolerance"
 
     replicates: Annotated[
         int,
-        Field(
+        described(
+            "number of independent randomisations that `n` is divided into, with `sobol` or `lhs`: shares "
+            "and quantiles then have intervals",
+            8,
             strict=True,
             ge=1,
             le=1000,
-            description="number of independent randomisations that `n` is divided into, with `sobol` or `lhs`: shares "
-            "and quantiles then have intervals",
-            examples=[8],
         ),
     ] = 1
 
@@ -185,7 +178,7 @@ class Sampling(Strict):
 
     selective: Annotated[
         SelectiveEntry | None,
-        key("pins and holes are measured, sorted in classes, and matched class to class", {"classes": 3}),
+        described("pins and holes are measured, sorted in classes, and matched class to class", {"classes": 3}),
     ] = None
 
     @property
@@ -321,7 +314,7 @@ class Output(Strict):
 
     results: Annotated[
         list[Annotated[str, AfterValidator(_check_pattern)]] | None,
-        key(
+        described(
             "names or patterns of result columns to store beside status and course; all by default",
             ["cross*.[FT]_max"],
             min_length=1,
@@ -329,7 +322,7 @@ class Output(Strict):
     ] = None
     histories: Annotated[
         Literal["none", "full", "harmonics", "cycles", "harmonics+cycles"],
-        key(
+        described(
             "what is stored of the last revolution: all samples, Fourier coefficients, counted load cycles",
             "harmonics+cycles",
         ),
@@ -356,8 +349,8 @@ class Output(Strict):
 class SweepEntry(Strict):
     """The errors that a name or pattern selects go from one value to another together; several entries make a grid."""
 
-    start: Annotated[Value, key("first value", "0.14 mm", alias="from")]
-    stop: Annotated[Value, key("last value", "-0.60 mm", alias="to")]
+    start: Annotated[Value, described("first value", "0.14 mm", alias="from")]
+    stop: Annotated[Value, described("last value", "-0.60 mm", alias="to")]
     points: Annotated[int, whole(2, MAX_ROWS, "number of equally spaced values", 38)]
 
     @model_validator(mode="after")

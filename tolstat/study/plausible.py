@@ -20,7 +20,7 @@ FAST = 30_000.0
 
 def warnings(study: Study) -> Iterator[Fault]:
     """Warnings about a study: short common axes, errors far wider than the clearance, speeds far too high."""
-    yield from (study.fault(*found) for found in short_axes(study.entries, study.joint.contact.z))
+    yield from (study.fault(*warning) for warning in short_axes(study.entries, study.joint.contact.z))
     yield from _wide_bands(study)
     yield from _fast_points(study)
 

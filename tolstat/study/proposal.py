@@ -19,12 +19,11 @@ from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
 
 from tolstat.analysis import process
 from tolstat.analysis.process import LEAST_PARTS, MOST_PARTS, Known, Sums
 from tolstat.common.errors import Fault, InputError, gather
-from tolstat.common.strict import Strict, did_you_mean, dotted
+from tolstat.common.strict import Strict, described, did_you_mean, dotted
 from tolstat.common.units import Number
 from tolstat.study.axes import streams_of
 from tolstat.study.selection import entries, select
@@ -40,33 +39,33 @@ MAX_SHIFT, MAX_WIDEN = 10.0, 10.0
 class ProposalEntry(Strict):
     """A component of the mixture that importance sampling draws joints from."""
 
-    share: Annotated[Number, Field(gt=0, lt=1, description="share of the joints drawn from it", examples=[0.3])]
+    share: Annotated[Number, described("share of the joints drawn from it", 0.3, gt=0, lt=1)]
     widen: Annotated[
         float | dict[str, Any],
-        Field(
-            description="factor on the standard deviation of all scores, or of those by name or pattern of errors, "
+        described(
+            "factor on the standard deviation of all scores, or of those by name or pattern of errors, "
             f"from {1 / MAX_WIDEN:g} to {MAX_WIDEN:g}",
-            examples=[1.5],
+            1.5,
             json_schema_extra={"x-table": "widen"},
         ),
     ] = 1.0
     shift: Annotated[
         dict[str, Any],
-        Field(
-            default_factory=dict,
-            description="mean of the scores in standard deviations, by name or pattern of errors, "
+        described(
+            "mean of the scores in standard deviations, by name or pattern of errors, "
             f"from {-MAX_SHIFT:g} to {MAX_SHIFT:g}",
-            examples=[{"pin1.tilt_z": 2.0}],
+            {"pin1.tilt_z": 2.0},
+            default_factory=dict,
             json_schema_extra={"x-table": "shift"},
         ),
     ]
     parts: Annotated[
         dict[str, Any],
-        Field(
-            default_factory=dict,
-            description="draws mean and deviation of the scores for each joint anew, as so many parts leave them "
+        described(
+            "draws mean and deviation of the scores for each joint anew, as so many parts leave them "
             f"open, by name or pattern of errors, from {LEAST_PARTS} to {MOST_PARTS}; those of one entry share them",
-            examples=[{"pin*.tilt_[tz]": 30}],
+            {"pin*.tilt_[tz]": 30},
+            default_factory=dict,
             json_schema_extra={"x-table": "parts"},
         ),
     ]

@@ -13,12 +13,12 @@ from typing import Annotated, Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
 from tolstat.common import strict
 from tolstat.common.errors import Fault, gather
 from tolstat.common.load_kinds import PINS
-from tolstat.common.strict import Strict, refuse
+from tolstat.common.strict import Strict, described, refuse
 from tolstat.common.tables import HOLES
 from tolstat.joint import HOLE_OF_PIN, Joint
 from tolstat.study import selection
@@ -34,15 +34,11 @@ CROSS, INPUT, OUTPUT = PARTS = ("cross", "input fork", "output fork")
 class RejectEntry(Strict):
     """Joints that are rejected at assembly by a measured value."""
 
-    below: Annotated[Value | None, Field(description="smaller measured values are rejected", examples=["0.06 mm"])] = (
-        None
+    below: Annotated[Value | None, described("smaller measured values are rejected", "0.06 mm")] = None
+    above: Annotated[Value | None, described("larger measured values are rejected", "0.14 mm")] = None
+    gauge: Annotated[NotNegative, described("standard deviation of the measurement; exact by default", "0.005 mm")] = (
+        0.0
     )
-    above: Annotated[Value | None, Field(description="larger measured values are rejected", examples=["0.14 mm"])] = (
-        None
-    )
-    gauge: Annotated[
-        NotNegative, Field(description="standard deviation of the measurement; exact by default", examples=["0.005 mm"])
-    ] = 0.0
 
     @model_validator(mode="after")
     def _has_a_limit(self) -> Self:

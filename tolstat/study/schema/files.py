@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
+import re
 from collections.abc import Callable
 from functools import cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from tolstat.analysis.process import LEAST_PARTS, MOST_PARTS
 from tolstat.common import json_schema, loads, strict
@@ -17,7 +19,7 @@ from tolstat.joint.assumed import Assumed
 from tolstat.joint.reading import DEFAULT_JOINT
 from tolstat.study.axes import is_zone, vectors_of
 from tolstat.study.fatigue import LineEntry, Settings
-from tolstat.study.listed import CaseEntry, Range, VariantEntry
+from tolstat.study.listing import CaseEntry, Range, VariantEntry
 from tolstat.study.model import Output, Sampling, Solver, SweepEntry
 from tolstat.study.points import PointEntry
 from tolstat.study.proposal import MAX_SHIFT, MAX_WIDEN, ProposalEntry
@@ -62,7 +64,8 @@ class Section(NamedTuple):
 @cache
 def joint() -> Schema:
     """JSON schema of a joint file, with the values of the default joint as examples."""
-    values = strict.read_toml(data_dir() / "joints" / f"{DEFAULT_JOINT}.toml") | {"assumed": None}
+    values = strict.read_toml(data_dir() / "joints" / f"{DEFAULT_JOINT}.toml")
+    del values["assumed"], values["shaft"]["axial"]  # their fields have shorter and more telling examples
     made = with_examples(of_model(Joint), values)
     return {"title": "Joint of tolstat"} | made | {"description": "Nominal joint."}
 
@@ -265,24 +268,9 @@ def schema(kind: str) -> Schema:
     """
     made: Schema = finished(KINDS[kind]())
     definitions = {name: finished(part) for name, part in tables().items()}
-    used: dict[str, Any] = {}
-    for name in _referred(made, definitions):
-        used[name] = definitions[name]
+    used: dict[str, Schema] = {}
+    referring: list[Schema] = [made]
+    while referring:
+        names = dict.fromkeys(re.findall(r'"#/definitions/([^"]+)"', json.dumps(referring)))
+        referring = [used.setdefault(name, definitions[name]) for name in names if name not in used]
     return {"$schema": DRAFT} | made | ({"definitions": used} if used else {})
-
-
-def _referred(part: Any, definitions: dict[str, Schema], known: tuple[str, ...] = ()) -> dict[str, None]:
-    """Names of the definitions that a schema refers to, itself or by others."""
-    found: dict[str, None] = {}
-    if isinstance(part, list):
-        for item in part:
-            found |= _referred(item, definitions, known)
-    elif isinstance(part, dict):
-        if isinstance(part.get("$ref"), str):
-            name = part["$ref"].rpartition("/")[2]
-            if name not in known:
-                found[name] = None
-                found |= _referred(definitions[name], definitions, (*known, name))
-        for value in part.values():
-            found |= _referred(value, definitions, known)
-    return found

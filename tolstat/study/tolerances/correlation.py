@@ -8,10 +8,9 @@ from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
 
 from tolstat.common.errors import Fault, InputError, gather
-from tolstat.common.strict import Strict
+from tolstat.common.strict import Strict, described
 from tolstat.common.units import Number
 from tolstat.study.axes import is_zone
 from tolstat.study.selection import select
@@ -27,20 +26,19 @@ class Correlation(Strict):
 
     between: Annotated[
         list[str],
-        Field(
+        described(
+            "names or patterns of errors that have a tolerance; every pair of them has the correlation `rho`",
+            ["pin*.diameter"],
             min_length=1,
-            description="names or patterns of errors that have a tolerance; every pair of them has the "
-            "correlation `rho`",
-            examples=[["pin*.diameter"]],
         ),
     ]
     rho: Annotated[
         Number,
-        Field(
+        described(
+            "correlation of the normal scores (Gaussian copula), and of the errors themselves if normal",
+            0.6,
             gt=-1,
             lt=1,
-            description="correlation of the normal scores (Gaussian copula), and of the errors themselves if normal",
-            examples=[0.6],
         ),
     ]
 

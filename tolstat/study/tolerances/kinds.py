@@ -9,12 +9,10 @@ import json
 import math
 from typing import Annotated, Literal
 
-from pydantic import Field
-
 from tolstat.analysis.process import LEAST_PARTS, MOST_PARTS
 from tolstat.common import strict
 from tolstat.common.errors import Fault, InputError
-from tolstat.common.strict import refuse
+from tolstat.common.strict import described, refuse
 from tolstat.study.axes import ORIENTATIONS, columns_of
 from tolstat.study.tolerances import distributions as tolerance
 from tolstat.study.tolerances.entry import (
@@ -34,7 +32,7 @@ from tolstat.study.tolerances.radial import Rayleigh
 from tolstat.study.tolerances.zones import CoaxialityEntry, OrientationEntry, PositionEntry
 
 CPK = "capability index Cpk of the process: sigma is the distance from the mean to the nearer limit over 3 Cpk"
-Cpk = Annotated[PositiveNumber | None, Field(description=f"{CPK}; 1 unless given", examples=[1.33])]
+Cpk = Annotated[PositiveNumber | None, described(f"{CPK}; 1 unless given", 1.33)]
 
 
 class NormalEntry(Banded):
@@ -42,29 +40,24 @@ class NormalEntry(Banded):
 
     distribution: Literal["normal"]
     cpk: Cpk = None
-    mean: Annotated[
-        Value | None, Field(description="mean; the middle of the band unless given", examples=["0.01 mm"])
-    ] = None
-    std: Annotated[
-        Positive | None, Field(description="standard deviation, in place of `cpk`", examples=["0.05 mm"])
-    ] = None
+    mean: Annotated[Value | None, described("mean; the middle of the band unless given", "0.01 mm")] = None
+    std: Annotated[Positive | None, described("standard deviation, in place of `cpk`", "0.05 mm")] = None
     truncate: Truncate = False
     known_from: Annotated[
         int | None,
-        Field(
+        described(
+            "number of measured parts that mean and sigma were estimated from; affects no result",
+            50,
             strict=True,
             ge=LEAST_PARTS,
             le=MOST_PARTS,
-            description="number of measured parts that mean and sigma were estimated from; affects no result",
-            examples=[50],
         ),
     ] = None
 
     gauge: Annotated[
         NotNegative | None,
-        Field(
-            description="parts outside the band are scrapped, by a gauge of this standard deviation; affects no result",
-            examples=["0.01 mm"],
+        described(
+            "parts outside the band are scrapped, by a gauge of this standard deviation; affects no result", "0.01 mm"
         ),
     ] = None
 
@@ -128,9 +121,7 @@ class TriangularEntry(Banded):
     """Most likely at `peak`, none is outside the band."""
 
     distribution: Literal["triangular"]
-    peak: Annotated[
-        Value | None, Field(description="most likely value; the middle of the band unless given", examples=["0 mm"])
-    ] = None
+    peak: Annotated[Value | None, described("most likely value; the middle of the band unless given", "0 mm")] = None
 
     def build(self, site: Site) -> tolerance.Triangular:
         """See `ToleranceEntry.build`."""
@@ -145,14 +136,12 @@ class LogNormalEntry(Banded):
     """The logarithm of the value above `threshold` is normal: by band and Cpk of the logarithm, or by mean and std."""
 
     distribution: Literal["lognormal"]
-    threshold: Annotated[Value, Field(description="least possible value; 0 unless given", examples=["-0.01 mm"])] = 0.0
+    threshold: Annotated[Value, described("least possible value; 0 unless given", "-0.01 mm")] = 0.0
     cpk: Cpk = None
-    mean: Annotated[
-        Value | None, Field(description="mean of the value, with `std` in place of a band", examples=["0.02 mm"])
-    ] = None
+    mean: Annotated[Value | None, described("mean of the value, with `std` in place of a band", "0.02 mm")] = None
     std: Annotated[
         Positive | None,
-        Field(description="standard deviation of the value, with `mean` in place of a band", examples=["0.01 mm"]),
+        described("standard deviation of the value, with `mean` in place of a band", "0.01 mm"),
     ] = None
     truncate: Truncate = False
 
@@ -191,8 +180,8 @@ class BetaEntry(Banded):
     """Beta distribution with shapes `a`, `b`, stretched over the band."""
 
     distribution: Literal["beta"]
-    a: Annotated[PositiveNumber, Field(description="shape at the lower limit", examples=[2.0])]
-    b: Annotated[PositiveNumber, Field(description="shape at the upper limit", examples=[5.0])]
+    a: Annotated[PositiveNumber, described("shape at the lower limit", 2.0)]
+    b: Annotated[PositiveNumber, described("shape at the upper limit", 5.0)]
 
     def build(self, site: Site) -> tolerance.Beta:
         """See `ToleranceEntry.build`."""
@@ -206,7 +195,7 @@ class RayleighEntry(HalfBand):
     cpk: Cpk = None
     sigma: Annotated[
         Positive | None,
-        Field(description="standard deviation of each coordinate, in place of `cpk`", examples=["0.03 mm"]),
+        described("standard deviation of each coordinate, in place of `cpk`", "0.03 mm"),
     ] = None
     truncate: Truncate = False
 

@@ -11,10 +11,9 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import numpy as np
-from pydantic import Field
 
 from tolstat.common.errors import Fault, InputError
-from tolstat.common.strict import Strict, dotted
+from tolstat.common.strict import Strict, described, dotted
 from tolstat.common.units import Number
 from tolstat.study.tolerances.correlation import Copula
 
@@ -27,15 +26,15 @@ class LotEntry(Strict):
 
     share: Annotated[
         Number,
-        Field(gt=0, lt=1, description="share of the variance of the normal score that is between lots", examples=[0.3]),
+        described("share of the variance of the normal score that is between lots", 0.3, gt=0, lt=1),
     ]
     shared: Annotated[
         bool,
-        Field(
-            strict=True,
-            description="whether all errors that the pattern selects have one score of the lot, so that they are "
+        described(
+            "whether all errors that the pattern selects have one score of the lot, so that they are "
             "correlated in each joint; else each error has its own",
-            examples=[True],
+            True,
+            strict=True,
         ),
     ] = False
 

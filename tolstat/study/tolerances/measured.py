@@ -10,12 +10,11 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Field
 
 from tolstat.analysis.process import LEAST_PARTS
 from tolstat.common import strict, units
 from tolstat.common.files import about_encoding, read_input
-from tolstat.common.strict import refuse
+from tolstat.common.strict import described, refuse
 from tolstat.study.tolerances import distributions as tolerance
 from tolstat.study.tolerances.entry import SingleEntry, Site
 
@@ -30,25 +29,19 @@ class MeasuredEntry(SingleEntry):
     """
 
     distribution: Literal["measured"]
-    file: Annotated[
-        str | None, Field(description="path of the CSV file, from the study's folder", examples=["rattle.csv"])
-    ] = None
-    column: Annotated[str | None, Field(description="name of the column in the header row", examples=["speed_rpm"])] = (
-        None
-    )
+    file: Annotated[str | None, described("path of the CSV file, from the study's folder", "rattle.csv")] = None
+    column: Annotated[str | None, described("name of the column in the header row", "speed_rpm")] = None
     values: Annotated[
         list[float] | None,
-        Field(description="the measured values, in place of a file; needs `law`", examples=[[0.012, -0.004, 0.007]]),
+        described("the measured values, in place of a file; needs `law`", [0.012, -0.004, 0.007]),
     ] = None
-    unit: Annotated[
-        str | None, Field(description="unit of the values; needed unless the error is a pure number", examples=["rpm"])
-    ] = None
+    unit: Annotated[str | None, described("unit of the values; needed unless the error is a pure number", "rpm")] = None
     law: Annotated[
         Literal["normal", "lognormal"] | None,
-        Field(
-            description="law that the parts are a sample of, for shares far out; without it each joint has one of the "
+        described(
+            "law that the parts are a sample of, for shares far out; without it each joint has one of the "
             "measured values",
-            examples=["normal"],
+            "normal",
         ),
     ] = None
 

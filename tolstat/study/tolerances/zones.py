@@ -12,12 +12,12 @@ from abc import abstractmethod
 from collections.abc import Iterator, Sequence
 from typing import Annotated, Any, Literal, NamedTuple
 
-from pydantic import BeforeValidator, Field, ValidationInfo, WithJsonSchema
+from pydantic import BeforeValidator, ValidationInfo, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
 from tolstat.common import json_schema, notation, units
 from tolstat.common.errors import Fault, InputError
-from tolstat.common.strict import dotted, refuse
+from tolstat.common.strict import described, dotted, refuse
 from tolstat.study import axes
 from tolstat.study.axes import ORIENTATIONS, PAIRS, Axis
 from tolstat.study.bonus import REJECT, Bonus
@@ -76,32 +76,27 @@ class ZoneEntry(ToleranceEntry):
         Zone,
         BeforeValidator(_read),
         WithJsonSchema(json_schema.quantity("m", "⌀0.1 mm")),
-        Field(
-            description="size of the zone; ⌀ or dia before the number say that it is a diameter",
-            examples=["⌀0.1 mm"],
-        ),
+        described("size of the zone; ⌀ or dia before the number say that it is a diameter", "⌀0.1 mm"),
     ]
     over: Annotated[
         PositiveLength,
-        Field(
-            description="length over which the zone holds: of a pin or hole; of the common axis of a pair from face to "
+        described(
+            "length over which the zone holds: of a pin or hole; of the common axis of a pair from face to "
             "face, with the joint's centre in the middle, such as 2 (R + z/2) (coaxiality: of each pin or hole)",
-            examples=["22 mm"],
+            "22 mm",
         ),
     ]
     distribution: Annotated[
         Literal["normal", "uniform"],
-        Field(description="`uniform`: by area in a circle; `normal`: in a circle bivariate", examples=["normal"]),
+        described("`uniform`: by area in a circle; `normal`: in a circle bivariate", "normal"),
     ]
     cp: Annotated[
         PositiveNumber | None,
-        Field(description="for normal: sigma of a coordinate is zone / (6 Cp); 1 unless given", examples=[1.33]),
+        described("for normal: sigma of a coordinate is zone / (6 Cp); 1 unless given", 1.33),
     ] = None
     truncate: Annotated[
         Truncate | None,
-        Field(
-            description="for normal: whether parts outside the zone are sorted out; true unless given", examples=[False]
-        ),
+        described("for normal: whether parts outside the zone are sorted out; true unless given", False),
     ] = None
 
     @abstractmethod
@@ -166,10 +161,10 @@ class PositionEntry(ZoneEntry):
 
     material_condition: Annotated[
         Literal["reject", "fills"] | None,
-        Field(
-            description="bonus by maximum material: parts outside the grown zone are rejected (`reject`, also where "
+        described(
+            "bonus by maximum material: parts outside the grown zone are rejected (`reject`, also where "
             "`zone` ends in Ⓜ), or the process fills it (`fills`)",
-            examples=["fills"],
+            "fills",
         ),
     ] = None
 
@@ -236,7 +231,7 @@ class OrientationEntry(ZoneEntry):
 
     about: Annotated[
         Literal["t", "z"] | None,
-        Field(description="for two planes (`zone` without ⌀): axis of the rotation that they bound", examples=["z"]),
+        described("for two planes (`zone` without ⌀): axis of the rotation that they bound", "z"),
     ] = None
 
     @property

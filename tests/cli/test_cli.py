@@ -256,7 +256,8 @@ def test_report_prints_the_table_and_names_the_files_on_stderr(tmp_path):
     assert done.exit_code == 0
     sentence, table = done.stdout.split("\n\n", 1)
     assert re.fullmatch(
-        r"[\d.]+ % of the joints keep all 7 limits \(\d+ of 60; total interval [\d.]+ \.\. [\d.]+ %\)\. "
+        r"[\d.]+ % of the joints keep all 7 limits \(\d+ of 60; total interval [\d.]+ \.\. [\d.]+ %\); "
+        r"mounting and contact law not varied: tolstat assumptions small\.h5 --run\. "
         r"Shafts rigid along their axes; contact law mode\.",
         sentence.replace("\n", " "),
     )

@@ -13,6 +13,7 @@ FORMS = ("", " --wide", " --json")
 COMMANDS = (
     *("new", "schema", "show", "simulate", "plan", "run", "extend", "merge", "status", "verify", "replay", "report"),
     *(
+        "assumptions",
         "capability",
         "lots",
         "worst",

@@ -151,6 +151,12 @@ WHAT_IF = Campaign(
     {
         "causes": forms("causes selective.h5", "causes selective.h5 --by cross1.T"),
         "page": ["status selective.h5", "report selective.h5 --out page.html"],
+        "assumptions": [
+            "assumptions selective.h5",
+            "assumptions selective.h5 --run --accept '50 %'",
+            *forms("assumptions selective.h5 --accept '50 %'"),
+            "report selective.h5 --accept '50 %'",
+        ],
         "kept": ["extend selective.h5 --n 250 --no-report", "causes selective.h5"],
     },
 )

@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 from tests.support import fakes, reports, synthetic
 from tolstat.cli import app
 from tolstat.common.tables import Simulation
+from tolstat.display.text import capital
 from tolstat.report import page, summary
 from tolstat.store import ResultFile
 from tolstat.store.recorded import mountings, note_on_mounting, swept
@@ -59,7 +60,9 @@ def test_run_report_page_and_json_begin_with_it(tmp_path: Path, text: str, said:
     html = page.write_page("small.h5", "small.html", replay=0).read_text(encoding="utf-8")
     header = re.search(r"<header>.*?</header>", html, flags=re.DOTALL)
     assert header is not None
-    assert f"{mounted} 60 joints (random sampling), 0 failed, 0 not settled." in header[0]
+    shafts, law = (capital(part) for part in said.split("; "))
+    assert re.search(rf"<br>{shafts} \((given|assumed)\); {law.lower()} \(assumed\)\.</p>", header[0])
+    assert "60 joints (random sampling), 0 failed, 0 not settled." in html
     with ResultFile.open(Path("small.h5")) as store:
         assert json.loads(json.dumps(summary.statistics(store.view())))["joint"] == said
 

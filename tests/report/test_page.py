@@ -336,7 +336,7 @@ def words(path, accepted=np.nan):
     """Sections of a page, and its paragraphs and cells, without drawing it."""
     with ResultFile.open(path) as store:
         made = page.compose(store.view(), Asked(path, accepted))
-    found = [made.subtitle]
+    found = [*made.scene, made.provenance]
     for block in (block for section in made.sections for block in section.blocks):
         found += [block.text] if block.kind == "text" else []
         found += [cell for row in block.rows for cell in row] if block.kind == "table" else []

@@ -109,7 +109,7 @@ def test_the_verdict_names_the_point(tables, view):
     assert shares["two"] != shares["one"]
     most = max(shares, key=shares.__getitem__)
     assert point_of(view, "cross1.F") == most
-    assert f"of the joints exceed 700 N on cross1.F (most often at {most}) (" in headline(view, 0.01).sentence
+    assert f" exceed 700 N on cross1.F (most often at {most}) (" in headline(view, 0.01).sentence
     assert "most often" not in headline(views.at_points(tables, {"cross1.F at one": 700.0}), 0.01).sentence
     assert view.head() == "200 joints (random sampling), each at one and two, 0 failed, 0 not settled"
 

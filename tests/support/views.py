@@ -22,7 +22,8 @@ class FakeStore(Reader):
 
     def __init__(self, method, limits, errors, results, study_text="", columns=RESULT_COLUMNS, joint=None):
         self.path, self.study_name, self.study_text = Path("made_up.h5"), "made up", study_text
-        self.sampling, self.limits, self.columns = {"method": method, "nominal_first": True}, limits, columns
+        self.sampling = {"method": method, "nominal_first": True, "n": len(errors) - 1}
+        self.limits, self.columns = limits, columns
         self.variants, self.joint, self.identity = (), joint, {}
         self.options = Options()._asdict()
         self._errors, self._results = errors, results if isinstance(results, dict) else {"": results}

@@ -1,4 +1,4 @@
-"""Simulate joints of a campaign's seed with other tolerances, and keep their loads in the result file."""
+"""Simulate joints of a campaign's seed with other tolerances or keys of the joint, and keep their loads in the file."""
 
 from __future__ import annotations
 
@@ -23,11 +23,12 @@ from tolstat.store import Writer, what_if
 from tolstat.store.recorded import settings
 from tolstat.store.what_if import Altered
 from tolstat.study import Study, axes, widths
+from tolstat.study.assumptions import with_value
 from tolstat.study.points import at
 from tolstat.study.widths import Line
 
-WIDTH, FIT, EXCHANGE, AS_DRAWN = "width", "fit", "exchange", "as drawn"
-"""Kinds of sets: a line with another width; another fit; a line's errors from another joint; no change."""
+WIDTH, FIT, EXCHANGE, JOINT, AS_DRAWN = "width", "fit", "exchange", "joint", "as drawn"
+"""Kinds of sets: a line with another width, with another fit, with the errors of another joint; other keys; nothing."""
 BLOCK = 128
 """Number of joints that a worker takes at a time: enough to keep the lanes busy, and 0.2 s on the main job."""
 SLOW_S = 60.0
@@ -37,7 +38,7 @@ SAVE_S = 60.0
 
 
 class Change(NamedTuple):
-    """A change of the tolerances, and which joints are wanted of it.
+    """A change of the tolerances or of the joint, and which joints are wanted of it.
 
     Attributes
     ----------
@@ -78,6 +79,24 @@ def exchanged(study: Study, line: Line, numbers: range) -> Change:
     about = {"kind": EXCHANGE, "label": line.label, "seed": study.sampling.seed, "names": list(line.names)}
     own = widths.applied(study, {})
     return Change(about, own, partial(_exchange, own, line), numbers)
+
+
+def about_joint(study: Study, keys: Mapping[str, Any]) -> dict[str, Any]:
+    """Return `Altered.about` of samples of the campaign with `keys` of the joint."""
+    label = ", ".join(f"{key} = {value}" for key, value in keys.items())
+    return {"kind": JOINT, "label": label, "seed": study.sampling.seed, "keys": dict(keys)}
+
+
+def with_joint(study: Study, keys: Mapping[str, Any], numbers: range) -> Change:
+    """Joint i is sample i of the campaign with `keys` of the joint.
+
+    Raises
+    ------
+    InputError
+        When the keys make no valid joint.
+    """
+    own = widths.applied(with_value(study, keys), {})
+    return Change(about_joint(study, keys), own, partial(_draw, own), numbers)
 
 
 def as_drawn(study: Study, numbers: range) -> Change:

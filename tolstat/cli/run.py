@@ -30,6 +30,7 @@ from tolstat.report import answer as reports
 from tolstat.solver import compilation
 from tolstat.store import ResultFile
 from tolstat.study import Study, rewriting
+from tolstat.study.assumptions import unselected
 
 
 def plan(
@@ -142,6 +143,8 @@ def run(
     if faults:
         raise InputError(faults)
     print_study_notes(study_file, plan)
+    if exact := unselected(plan):
+        say(f"no tolerance, taken as exact: {', '.join(exact)}")
     where = {"workers": workers, "executor": executor, "scheduler": scheduler}
     simulate(plan, path, until=until, check=verify, rows=part, retry=again, **where)
     conclude(path, report, wide, " ".join([str(study_file), *(f"--set {quote(text)}" for text in changes)]))

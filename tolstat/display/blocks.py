@@ -42,25 +42,31 @@ class Card:
 
 @dataclass(frozen=True)
 class Decision:
-    """The head of the page: what was asked, the verdict, numbers that it stands on, and a drawing beside them.
+    """The head of the page: what was asked, the verdicts, what they stand on, and a drawing beside them.
 
     Attributes
     ----------
     question : str
         The question; empty if the study has none.
-    verdict : Card
-        The verdict in one sentence: its first words, the rest, causes and remedies.
+    verdicts : sequence of Card
+        The verdicts in one sentence each: its first words, the rest, causes and remedies.
     cards : sequence of Card
         Other numbers.
     picture : Panel, optional
         The drawing.
+    chart : Panel, optional
+        What the verdict stands on.
+    below : sequence of str
+        Paragraphs below the chart.
     """
 
     kind: ClassVar[str] = "decision"
     question: str
-    verdict: Card
+    verdicts: Sequence[Card]
     cards: Sequence[Card]
     picture: Panel | None = None
+    chart: Panel | None = None
+    below: Sequence[str] = ()
 
 
 @dataclass(frozen=True)
@@ -198,8 +204,10 @@ class Page:
 
     Attributes
     ----------
-    title, description, subtitle : str
-        Name of the study, text about its joint, and sentences on its mounting and contact law and the number of joints.
+    title, description : str
+        Name of the study, and text about its joint.
+    scene : sequence of str
+        Lines on the operating point and the joint.
     sections : sequence of Section
         In reading order, the verdict first; none is empty.
     provenance : str
@@ -212,7 +220,7 @@ class Page:
 
     title: str
     description: str
-    subtitle: str
+    scene: Sequence[str]
     sections: Sequence[Section]
     provenance: str = ""
     listings: Sequence[Facts | Listing] = ()

@@ -66,7 +66,7 @@ def bound(words: str) -> str:
 def _panels(block: Block) -> Sequence[Panel]:
     if isinstance(block, Panels):
         return block.panels
-    return [block.picture] if isinstance(block, Decision) and block.picture else []
+    return [own for own in (block.chart, block.picture) if own] if isinstance(block, Decision) else []
 
 
 def _data(value: Any) -> Markup:

@@ -120,6 +120,11 @@ def sentence(words: str) -> str:
     return words if words.endswith((".", "?", "!")) else f"{words}."
 
 
+def capital(words: str) -> str:
+    """Make the first letter a capital."""
+    return f"{words[:1].upper()}{words[1:]}"
+
+
 def formed(x: float, form: str = ".3g") -> str:
     """Format by a format specification; NaN gives a dash."""
     return "-" if math.isnan(x) else f"{x:{form}}"

@@ -45,6 +45,11 @@ class Verdict(NamedTuple):
         return WORDS.get(self.answer, share)
 
     @property
+    def shade(self) -> str:
+        """``yes``, ``no`` or ``open`` of the page."""
+        return "open" if self.answer == "none" else self.answer
+
+    @property
     def sentence(self) -> str:
         """The whole sentence, without full stop."""
         return f"{self.value}{':' if self.answer else ''} {self.words}"

@@ -89,6 +89,7 @@ QUESTIONS = (
     Question("fatigue", "Read", "Compute failures of parts, equivalent loads and damage.", "open", "fatigue.answer"),
     Question("tolerances", "", "Explain the entries of the tolerances and correlations.", "open", "joints"),
     Question("failed", "", "List joints without a valid load, and compare their errors.", "open", "joints"),
+    Question("assumptions", "Read", "Compute what the verdict stands on.", "folded", "assumptions.answer"),
     Question("quantiles", "", "Estimate quantiles and tolerance limits of each load.", "folded", "exceedance.answer"),
     Question("capability", "Read", "Compute yield and Cpk against each limit of the study.", "folded", counted=True),
     Question("causes", "Read", "Compute which tolerances and errors cause a load.", "folded", "causes.errors"),

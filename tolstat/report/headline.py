@@ -1,8 +1,8 @@
-"""The verdict of a campaign in one sentence, as page, text and JSON give it: no more than the file tells."""
+"""The verdicts of a campaign in a sentence each, as page, text and JSON give them: no more than the file tells."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,6 +13,8 @@ from tolstat.common.tables import FAILED, STATUS_TEXT, UNSETTLED, VALID
 from tolstat.display import text
 from tolstat.display.table import Row
 from tolstat.questions import joints, shares
+from tolstat.questions.assumptions import sentences
+from tolstat.questions.assumptions.variations import Standing, applicable
 from tolstat.questions.exceedance import rows as exceedance
 from tolstat.questions.exceedance.verdicts import WORDS, ends, share_of, unresolved_matter, verdict
 from tolstat.store import known_parts
@@ -34,6 +36,8 @@ class Headline(NamedTuple):
         Causes, remedies, and what else restricts the verdict.
     load : str
         The load whose limit it is about: of several, that most joints exceed. Empty if there is no verdict.
+    stands_on : mapping, optional
+        What it stands on, see `sentences.values`; None if that question does not apply.
     """
 
     answer: str
@@ -41,19 +45,31 @@ class Headline(NamedTuple):
     words: str
     notes: tuple[str, ...] = ()
     load: str = ""
+    stands_on: Mapping[str, Any] | None = None
 
     @property
     def sentence(self) -> str:
         """The whole sentence, without full stop."""
-        return f"{self.value}{':' if self.answer else ''} {self.words}"
+        return f"{self.value}{',' if self.is_turned else ':' if self.answer else ''} {self.words}"
+
+    @property
+    def is_turned(self) -> bool:
+        """Whether what is assumed decides the verdict."""
+        return bool(self.stands_on and self.stands_on["turned_by"])
+
+    @property
+    def shade(self) -> str:
+        """``yes``, ``no`` or ``open`` of the page: also open where what is assumed, or was not searched, decides."""
+        return "open" if self.is_turned or self.answer in ("none", "searched") else self.answer
 
     def values(self) -> dict[str, Any]:
-        """JSON values: ``answer`` in words or null, ``sentence``, ``notes``."""
-        return {"answer": WORDS.get(self.answer), "sentence": self.sentence, "notes": list(self.notes)}
+        """JSON values: ``answer`` of the joints as drawn in words or null, ``stands_on``, ``sentence``, ``notes``."""
+        found = {"answer": WORDS.get(self.answer), "stands_on": text.plain(self.stands_on)}
+        return found | {"sentence": self.sentence, "notes": list(self.notes)}
 
 
 def headline(view: View, accepted: float = np.nan) -> Headline | None:
-    """Verdict of a campaign.
+    """Verdict on the limits of a campaign.
 
     Parameters
     ----------
@@ -73,16 +89,20 @@ def headline(view: View, accepted: float = np.nan) -> Headline | None:
     if not counts.done:
         return Headline("none", WORDS["none"], "no joint has been simulated", _pending(view))
     records = exceedance.limit_rows(view)
-    found = _yield(view, records) if np.isnan(accepted) else _judged(view, records, accepted)
+    standing = applicable(view, accepted)
+    found = _yield(view, records, standing) if np.isnan(accepted) else _judged(view, records, accepted, standing)
+    if standing is not None and found.answer != "none":
+        more = sentences.more(standing, view.path.name)
+        found = found._replace(stands_on=sentences.values(standing), notes=(*found.notes, *([more] if more else [])))
     unresolved = _causes(view) if unresolved_matter(_decisive(view, records)) else ()
     return found._replace(notes=(*unresolved, *found.notes, *_pending(view)))
 
 
 def deciding(row: Row, accepted: float) -> str:
-    """Sentence on the number of simulated joints that would decide an open verdict; empty if it is not open."""
+    """Words on the number of simulated joints that would decide an open verdict; empty if it is not open."""
     if verdict(row, accepted) != "open" or "both_lower" in row:
         return ""
-    return f"Joints that would decide it if the share stayed the same: {_needed(row, accepted)}"
+    return f"{_needed(row, accepted)} would decide it"
 
 
 def _needed(row: Row, accepted: float) -> str:
@@ -93,55 +113,86 @@ def _needed(row: Row, accepted: float) -> str:
         low = min(low, row["numerical_lower"] * (1.0 - part))
         high = max(high, row["numerical_upper"] * (1.0 - part) + part)
     if low <= accepted <= high:
-        return "no number of them"
+        return "no number of joints"
     joints = binomial.needed(high if high < accepted else low, accepted)
-    return text.number(joints) if joints < 1e7 else "more than 1e7"
+    return f"{text.number(joints)} joints" if joints < 1e7 else "more than 1e7 joints"
 
 
-def _judged(view: View, records: Sequence[Row], accepted: float) -> Headline:
+def _judged(view: View, records: Sequence[Row], accepted: float, standing: Standing | None) -> Headline:
     row, worst = _decisive(view, records), exceedance.most_exceeded(view, records)
-    several, most = len(records) > 1, text.percent(accepted)
+    several = len(records) > 1
     answers = [verdict(own, accepted) for own in records]
     answer = verdict(row, accepted)
     alone = several and answer == "none" and "no" in answers  # the joints above one limit are too many already
     if alone:
         broken = [own for own, said in zip(records, answers, strict=True) if said == "no"]
-        answer, row = "no", exceedance.most_exceeded(view, broken)
+        answer, row, standing = "no", exceedance.most_exceeded(view, broken), None
         worst = row
     numbers = ", ".join(f"{answers.count(own)} {word}" for own, word in WORDS.items() if own in answers)
     notes: tuple[str, ...] = (f"of {len(records)} limits, each by itself: {numbers}",) if several else ()
-    decide = deciding(row, accepted) if view.design.has_interval("index") else ""
-    notes += (decide,) if decide else ()
     if answer == "open" and row.get("parts_lower", np.nan) <= accepted < row.get("parts_upper", np.nan):
         notes += (f"not decided by more joints: the parts leave shares of {_open(row)} open. Measure more parts",)
     if answer == "none":
         return Headline(answer, WORDS[answer], _reason(view, [row]), notes)
-    limit = _words(view, row)
-    interval = f"total interval {text.span(*ends(row))}"
-    if answer == "no":
-        share = share_of(row)
-        interval = "total interval" if unresolved_matter(row) else interval
-        said = f"{share} of the joints exceed {limit} ({interval}); {most} is accepted"
-    elif answer == "searched":
-        missed = text.percent(row["unsearched_upper"])
-        said = (
-            f"at most {most} of the joints exceed {limit} if the proposals reach every way to it ({interval}); "
-            f"whatever they miss, at most {missed}"
-        )
-    elif answer == "yes":
-        said = f"at most {most} of the joints exceed {limit} (share {share_of(row)}, {interval})"
-    else:
-        said = f"the joints that exceed {limit} may be more or fewer than {most} ({interval})"
+    value, words = _sentence(view, row, accepted, answer, standing)
+    if first := _without_errors(view):
+        words = f"{first}. {words}" if value == WORDS[answer] else f"{words}. {text.capital(first)}"
     if alone:
         notes += (_untold(view, records),)
     elif several and worst["count"] and not np.isnan(worst["estimate"]):
-        said += _most_often(view, records, worst)
-    if answer == "no":
+        words += _most_often(view, records, worst)
+    if value == WORDS["no"]:
         from tolstat.questions.causes import lines  # simulates, which other verdicts need not wait for
 
         better = lines.advice(view, row["load"], accepted)
-        said += f". {better}" if better else ""
-    return Headline(answer, WORDS[answer], said, notes, worst["load"])
+        words += f". {better}" if better else ""
+    return Headline(answer, value, words, notes, worst["load"])
+
+
+def _sentence(view: View, row: Row, accepted: float, answer: str, standing: Standing | None) -> tuple[str, str]:
+    """First words and rest of the sentence of a verdict, with what it stands on."""
+    most, share, limit = text.percent(accepted), share_of(row), _words(view, row)
+    exceed = "" if row["load"] == ANY_LIMIT else f" exceed {limit}"
+    interval = "total interval" if unresolved_matter(row) else text.span(*ends(row))
+    behind = ""
+    if standing is not None and (turned := sentences.turned(standing)) != ("", ""):
+        value, said = turned
+    elif answer == "no":
+        value, said = WORDS[answer], f"{share}{exceed} ({interval}); {most} is accepted"
+        behind = sentences.least(standing) if standing else ""
+    elif answer == "searched":
+        missed = text.percent(row["unsearched_upper"])
+        value, said = WORDS[answer], f"at most {most} exceed {limit} if the proposals reach every way to it "
+        said += f"({text.span(*ends(row))}); whatever they miss, at most {missed}"
+    elif answer == "yes":
+        own = f"{share}, {interval}"
+        value, said = (
+            WORDS[answer],
+            f"at most {most} exceed {limit} ({own}){sentences.also(standing) if standing else ''}",
+        )
+    else:
+        value, said = WORDS[answer], f"{share}{exceed} ({interval}); {most} is accepted"
+        decide = deciding(row, accepted) if view.design.has_interval("index") else ""
+        said += f"; {decide}" if decide else ""
+        behind = sentences.decided(standing) if standing else ""
+    said += f". {behind}" if behind else ""
+    return value, said + _not_varied(view, standing)
+
+
+def _not_varied(view: View, standing: Standing | None) -> str:
+    missing = sentences.not_varied(standing, view.path.name) if standing else ""
+    return f"; {missing}" if missing else ""
+
+
+def _without_errors(view: View) -> str:
+    """Words on limits that the joint without errors exceeds; empty if it keeps all."""
+    above = [load for name in view.limits if (load := view.load(name)).limit is not None and load.nominal > load.limit]
+    if not above:
+        return ""
+    first, *others = above
+    more = f", and {len(others)} other limit{'s' if len(others) > 1 else ''}" if others else ""
+    limit = text.value(first.limit or 0.0, first.unit)
+    return f"the joint without errors exceeds {limit} on {first.name} ({text.value(first.nominal, first.unit)}){more}"
 
 
 def tells_yield(view: View) -> bool:
@@ -182,7 +233,7 @@ def _most_often(view: View, records: Sequence[Row], worst: Row) -> str:
     return f". Most often {_limit(view, worst)}: {share_of(worst)}{others}"
 
 
-def _yield(view: View, records: Sequence[Row]) -> Headline:
+def _yield(view: View, records: Sequence[Row], standing: Standing | None) -> Headline:
     """Without an accepted share: share of the joints that keep all limits; of weighted joints, that exceed any."""
     without = view.design.without_interval("share")
     notes: tuple[str, ...] = (without,) if without else ()
@@ -207,7 +258,9 @@ def _yield(view: View, records: Sequence[Row]) -> Headline:
     found = shares.together(shares.good(view), len(view.limits))
     if not found.decides:
         return Headline("none", WORDS["none"], _reason(view, [_decisive(view, records)]), notes)
-    return Headline("", found.value, found.words, notes, exceedance.most_exceeded(view, records)["load"])
+    behind = [sentences.reach(standing) if standing else "", text.capital(_without_errors(view))]
+    words = ". ".join([found.words + _not_varied(view, standing), *filter(None, behind)])
+    return Headline("", found.value, words, notes, exceedance.most_exceeded(view, records)["load"])
 
 
 def _undecided(records: Sequence[Row]) -> bool:

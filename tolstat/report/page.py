@@ -16,10 +16,9 @@ from tolstat.display.asked import Asked
 from tolstat.display.blocks import Facts, Listing, Page, Panels, Section, Text
 from tolstat.display.progress import silent
 from tolstat.display.text import sentence
-from tolstat.joint.mounting import in_words
 from tolstat.questions.causes import worst
 from tolstat.questions.causes.lines import lines_on_page
-from tolstat.report import joint_values
+from tolstat.report import joint_values, scene
 from tolstat.solver import fidelity
 from tolstat.store import recorded, viewed
 from tolstat.store.points import point_of
@@ -136,14 +135,14 @@ def _page(
     view: View, sections: Sequence[Section], listings: Sequence[Facts | Listing] = (), full: bool = False
 ) -> Page:
     store = view.store
-    mounted = sentence(in_words(*recorded.mountings(store)))
     return Page(
         view.name,
         joint_of(store, 0).description,
-        f"{mounted} {sentence(view.head())}",
+        scene.lines(view),
         sections,
-        f"Sampling {store.sampling['method']}, seed {store.sampling['seed']}; begun {store.created}; "
-        f"tolstat {store.versions.get('tolstat', 'of unknown version')}; result file {view.path.name}.",
+        f"{sentence(view.head())} Sampling {store.sampling['method']}, seed {store.sampling['seed']}; "
+        f"begun {store.created}; tolstat {store.versions.get('tolstat', 'of unknown version')}; "
+        f"result file {view.path.name}.",
         listings,
         full,
     )
@@ -152,6 +151,7 @@ def _page(
 def _notes(view: View) -> Iterator[str]:
     """What restricts the numbers of the whole page."""
     for note in (
+        scene.exact(view),
         fidelity.sentence(view.store.options, view.store.fidelity),
         _stopped(view),
         recorded.note_on_mounting(view.store),

@@ -32,9 +32,10 @@ def statistics(view: View, accepted: float = math.nan) -> dict[str, Any]:
     -------
     dict
         JSON values in SI units, null if unknown: ``study``, ``method``, ``confidence``; ``verdict``, with ``answer``
-        (null without an accepted share), ``sentence`` and ``notes``, null without limits; ``joints``, numbers by
-        status; ``lives``, verdicts on required lives, only where the study requires one that is known without
-        simulation; the answers ``exceedance``, ``lots``, ``bearing_life``, ``capability`` and ``accuracy``, each with
+        of the joints as drawn (null without an accepted share), ``stands_on``, ``sentence`` and ``notes``, null without
+        limits; ``joints``, numbers by status; ``lives``, verdicts on required lives, only where the study requires one
+        that is known without simulation; the answers ``exceedance``, ``lots``, ``bearing_life``, ``capability`` and
+        ``accuracy``, each with
         ``facts``, ``sentences`` and ``tables``, null where the file cannot give it;
         ``joint``, mounting of the shafts and contact law in words; ``fidelity``, a sentence on the fidelity of the
         results; ``provenance``.

@@ -1,4 +1,4 @@
-"""The verdict on the page: the decision with which it begins."""
+"""The verdicts on the page: the decision with which it begins, and what it stands on."""
 
 from __future__ import annotations
 
@@ -15,6 +15,8 @@ from tolstat.display.blocks import Card, Decision, Section, Table, Text
 from tolstat.display.table import Column, as_block, has
 from tolstat.display.verdict import Verdict
 from tolstat.questions import accuracy, shares
+from tolstat.questions.assumptions import figure, sentences
+from tolstat.questions.assumptions.variations import applicable
 from tolstat.questions.drawings.answer import place_of
 from tolstat.questions.exceedance import rows as exceedance
 from tolstat.questions.exceedance.answer import above
@@ -25,13 +27,20 @@ from tolstat.store.view import View
 
 
 def section(view: View, asked: Asked) -> Section:
-    """Decide on the limits: question, verdict, drawing with the worst bushing marked, numbers behind the verdict."""
+    """Decide on the limits: question, verdicts, what they stand on, drawing with the worst bushing marked, numbers."""
     found = headline(view, asked.accepted)
     load = found.load if found else next(iter(view.leading), "")
-    lives = [_life(own) for own in life_verdicts(view, asked.accepted, asked.replay)]
-    first, *others = lives if found is None and lives else [_answer(view, found), *lives]
-    cards = [*others, *_cards(view, found)]
-    head = Decision(question_of(view.store.study_text), first, cards, place_of(view, load, asked))
+    lives = [_card(own) for own in life_verdicts(view, asked.accepted, asked.replay)]
+    standing = applicable(view, asked.accepted)
+    below = [sentences.still(standing), sentences.shop(view)] if standing and standing.rows else []
+    head = Decision(
+        question_of(view.store.study_text),
+        lives if found is None and lives else [_card(found) if found else _without_verdict(view), *lives],
+        _cards(view, found),
+        place_of(view, load, asked),
+        figure.bars(standing) if standing and standing.rows else None,
+        [own for own in below if own],
+    )
     notes = (Text(f"{note[0].upper()}{note[1:]}.", small=True) for note in asked.notes)
     return Section("verdict", "Verdict", [head, *_points(view), *notes])
 
@@ -71,17 +80,13 @@ def question_of(text: str) -> str:
     return " ".join(found[1].split()) if found else ""
 
 
-def _answer(view: View, found: Headline | None) -> Card:
-    if found is None:
-        why = "The study sets no limits" if view.sampled else f"Joints of a {METHODS[view.method]} are no sample"
-        return Card("", f"{why}, so there is no verdict.", "")
-    note = " ".join(text.sentence(note) for note in found.notes)
-    return Card(found.value, found.words, note, "open" if found.answer in ("none", "searched") else found.answer)
+def _card(found: Headline | Verdict) -> Card:
+    return Card(found.value, found.words, " ".join(map(text.sentence, found.notes)), found.shade)
 
 
-def _life(found: Verdict) -> Card:
-    note = " ".join(text.sentence(note) for note in found.notes)
-    return Card(found.value, found.words, note, "open" if found.answer == "none" else found.answer)
+def _without_verdict(view: View) -> Card:
+    why = "The study sets no limits" if view.sampled else f"Joints of a {METHODS[view.method]} are no sample"
+    return Card("", f"{why}, so there is no verdict.", "")
 
 
 def _cards(view: View, found: Headline | None) -> list[Card]:

@@ -1,4 +1,4 @@
-"""The group ``what_if`` of a result file: joints of the campaign's seed with other tolerances, and their loads."""
+"""The group ``what_if`` of a result file: joints of the campaign's seed with one change, and their loads."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ DATASETS = {
 
 
 class Altered(NamedTuple):
-    """Loads of consecutive joints with one change of the tolerances.
+    """Loads of consecutive joints with one change of the tolerances or of the joint.
 
     Attributes
     ----------
     about : dict
-        The change, as JSON values: ``kind`` (``width``, ``fit``, ``exchange`` or ``as drawn``), ``label``, ``seed``,
-        and what determines the errors.
+        The change, as JSON values: ``kind`` (``width``, ``fit``, ``exchange``, ``joint`` or ``as drawn``), ``label``,
+        ``seed``, and what determines the errors, or the ``keys`` of the joint.
     first : int
         Sample of the first joint; of an exchange, the number of the first pair.
     names : tuple of str
@@ -77,7 +77,7 @@ def read(store: Reader) -> dict[str, Altered]:
     found, lost = _read(store)
     if lost:
         place, sets = str(store.path), "1 change" if lost == 1 else f"{lost} changes"
-        remedy = f"simulate them again: tolstat causes {store.path} --run"
+        remedy = f"simulate them again: tolstat causes {store.path} --run, tolstat assumptions {store.path} --run"
         LOG.warning("warning: %s", Fault(place, f"the joints of {sets} of what_if are damaged and left out", remedy))
     return found
 

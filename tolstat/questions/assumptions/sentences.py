@@ -1,0 +1,173 @@
+"""Sentences on what a verdict stands on."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from tolstat.analysis import binomial
+from tolstat.display import text
+from tolstat.display.table import Row
+from tolstat.questions.assumptions import words
+from tolstat.questions.assumptions.variations import ALL, Standing, widths
+from tolstat.store.view import View
+from tolstat.study.widths import COARSER, HALF
+
+KEPT = {"yes": "kept", "no": "not kept"}
+"""Sides of the accepted share in words."""
+_NAMED = 2
+"""Largest number of assumptions, or variations, that a sentence names."""
+_MOST = 20_000
+"""Largest number of joints of a variation that is proposed."""
+
+
+def turned(found: Standing) -> tuple[str, str]:
+    """First words and rest of a verdict that what is assumed decides; empty where it does not.
+
+    ``not kept as drawn (15.8 %)``, and ``kept if the shaft slides (7.4 %): more joints do not decide it; find out how
+    the shaft is held``.
+    """
+    rows = found.turning
+    if not rows:
+        return "", ""
+    ways = [f"{words.condition(row['label'])} ({text.percent(row['share'])})" for row in rows]
+    shown = " or ".join(ways[:_NAMED]) + (f", and in {len(ways) - _NAMED} more" if len(ways) > _NAMED else "")
+    side, other = KEPT[found.side], KEPT[rows[0]["side"]]
+    names = [row for row in rows if row["name"] != ALL] or found.moving
+    about = {row["name"]: words.AXIAL in row["keys"] for row in names if row["name"] != ALL}
+    first = dict(list(about.items())[:_NAMED])
+    remedy = f"more joints do not decide it; find out {words.to_find_out(first)}"
+    return f"{side} as drawn ({text.percent(found.drawn[0])})", f"{other} {shown}: {remedy}"
+
+
+def more(found: Standing, file: str) -> str:
+    """Words on variations that more joints of them would decide, with the command; empty if there are none."""
+    rows = found.undecided
+    if not rows:
+        return ""
+    row = max(rows, key=lambda row: abs(row["share"] - found.accepted))
+    most = binomial.needed(row["share"], found.accepted, found.confidence)
+    named = ", ".join(f"{row['label']} ({text.percent(row['share'])})" for row in rows[:_NAMED])
+    head = f"undecided: {named}{', ...' if len(rows) > _NAMED else ''}"
+    if most > _MOST:
+        return f"{head}; too near to the accepted share"
+    n = max(math.ceil(most / 100.0) * 100, found.n)
+    return f"{head}; if its share stays, this decides {row['label']}:\ntolstat assumptions {file} --run --joints {n}"
+
+
+def also(found: Standing) -> str:
+    """End of the sentence of a verdict *kept*: in how many variations the limits are kept, too."""
+    n = len(found.rows)
+    if not n:
+        return ""
+    kept = sum(row["side"] == "yes" for row in found.rows)
+    if kept == n:
+        return f", also in {'the one variation' if n == 1 else f'all {n} variations'} of what is assumed"
+    others = sorted((row for row in found.rows if row["side"] != "yes"), key=lambda row: -row["share"])
+    return f", also in {kept} of {n} variations of what is assumed; {_most('open', others)}"
+
+
+def least(found: Standing) -> str:
+    """Sentence behind a verdict *not kept*: the variation with the smallest share."""
+    if not found.rows:
+        return ""
+    row = min(found.rows, key=lambda row: float(row["share"]))
+    n = len(found.rows)
+    head = f"Least of {n} variations" if n > 1 else "In the one variation"
+    own = f"{head}: {text.percent(row['share'])}, {row['label']}"
+    own += " (open)" if row["side"] == "open" else ""
+    others = [other for other in found.rows if other["side"] == "open" and other is not row]
+    return f"{own}; {_most('open', others)}" if others else own
+
+
+def decided(found: Standing) -> str:
+    """Sentence behind an open verdict: on which side the variations lie."""
+    if not found.rows:
+        return ""
+    numbers = {word: sum(row["side"] == side for row in found.rows) for side, word in KEPT.items()}
+    said = ", ".join(f"{word} in {number}" for word, number in numbers.items() if number) or "open in all"
+    return f"Of {len(found.rows)} variations of what is assumed: {said}"
+
+
+def reach(found: Standing) -> str:
+    """Sentence where no share is accepted: the smallest and the largest share of the variations."""
+    if not found.rows:
+        return ""
+    shares = [float(row["share"]) for row in found.rows]
+    ends = text.span(1.0 - max(shares), 1.0 - min(shares))
+    return f"In {len(shares)} variations of what is assumed: {ends}"
+
+
+def not_varied(found: Standing, file: str) -> str:
+    """Words on assumptions that the file has no joints of, with the command that simulates them."""
+    if not found.missing:
+        return ""
+    return f"{words.listed(found.missing[:_NAMED])} not varied: tolstat assumptions {file} --run"
+
+
+def still(found: Standing) -> str:
+    """Sentence on what moves nothing; empty if all that is assumed does."""
+    parts = []
+    if found.still:
+        parts.append(f"Moves nothing that {found.n} joints show: {', '.join(found.still)}.")
+    parts += [f"Not varied: {own.name} ({own.because})." for own in found.fixed]
+    return " ".join(parts)
+
+
+def shop(view: View) -> str:
+    """Sentence on what the shop must hold: capabilities of the process, and shares with other widths of a tolerance.
+
+    Capabilities are requirements that the shop can measure: they turn no verdict.
+    """
+    entries = view.study.entries
+    by_cpk: dict[float, int] = {}
+    for entry in entries:
+        if isinstance(cpk := entry.keys.get("cpk"), (int, float)):
+            by_cpk[float(cpk)] = by_cpk.get(float(cpk), 0) + 1
+    if not by_cpk:
+        return ""
+    held = words.listed([f"Cpk {cpk:g} in {n} tolerance{'s' if n > 1 else ''}" for cpk, n in by_cpk.items()])
+    head = f"What the shop must hold: {held}."
+    shares = widths(view)
+    if not shares:
+        return f"{head} What other widths do: tolstat causes {view.path.name} --run."
+    ends = []
+    for step, which in ((COARSER, max), (HALF, min)):
+        if step in shares:
+            label, share, said = which(shares[step], key=lambda own: own[1])
+            wide = " as wide" if said == HALF or said.startswith("×") else ""
+            ends.append(f"{label} {said}{wide}: {text.percent(share)}")
+    return f"{head} Alone changed: {'; '.join(ends)}."
+
+
+def values(found: Standing) -> dict[str, Any]:
+    """JSON values: ``answer`` with what is assumed, numbers of variations and joints, what turns the verdict."""
+    rows = found.rows
+    answer = "open" if found.turning or found.side == "open" else KEPT.get(found.side)
+    least, most = (
+        {"label": row["label"], "share": row["share"]} if (row := _end(found, which)) else None for which in (min, max)
+    )
+    return {
+        "answer": answer if rows else None,
+        "turned_by": [row["label"] for row in found.turning],
+        "variations": len(rows),
+        "joints": found.n,
+        "confidence": found.confidence,
+        "least": least,
+        "most": most,
+        "moves_nothing": found.still,
+        "not_varied": list(found.missing),
+    }
+
+
+def _end(found: Standing, which: Any) -> Row | None:
+    known = [row for row in found.rows if not np.isnan(row["share"])]
+    return which(known, key=lambda row: row["share"]) if known else None
+
+
+def _most(word: str, rows: list[Row]) -> str:
+    """``open in 2: H 3 (9.1 %), law sliced (8 %)``."""
+    shown = ", ".join(f"{row['label']} ({text.percent(row['share'])})" for row in rows[:_NAMED])
+    return f"{word} in {len(rows)}: {shown}{', ...' if len(rows) > _NAMED else ''}"

@@ -1,0 +1,380 @@
+"""Share of the joints above the limits with other values of what is assumed of the joint, from the same joints."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from tolstat.analysis import difference
+from tolstat.analysis.sample import Sample, total_interval
+from tolstat.campaign import what_if as sets
+from tolstat.common.errors import Fault, InputError, StoreError, TolstatError
+from tolstat.common.loads import ANY_LIMIT, FloatArray, split
+from tolstat.common.tables import Status
+from tolstat.display.table import Row, Rows
+from tolstat.questions.assumptions import words
+from tolstat.store import error_budget, known_parts
+from tolstat.store import what_if as kept
+from tolstat.store.view import View
+from tolstat.store.what_if import Altered
+from tolstat.study.assumptions import Assumption, assumptions, together
+from tolstat.study.points import at, names_of
+from tolstat.study.study import Study
+from tolstat.study.widths import lines
+
+JOINTS = 1000
+"""Default number of joints of each variation: the first of the campaign, or all if it has fewer."""
+ALL = "all assumptions"
+"""Name of the variations of all assumptions together."""
+BETTER, WORSE = "all at better values", "all at worse values"
+"""What the variations of all assumptions together are called."""
+
+Estimate = tuple[float, float, float]
+"""An estimate, and the ends of its interval."""
+
+
+class Variation(NamedTuple):
+    """Other values of what is assumed.
+
+    Attributes
+    ----------
+    name : str
+        Name of the assumption, or `ALL`.
+    label : str
+        The values in words.
+    keys : mapping
+        Dotted keys of the joint, and their values as written.
+    because : str
+        Why the value is not known; of all assumptions together, what the variation consists of.
+    """
+
+    name: str
+    label: str
+    keys: Mapping[str, Any]
+    because: str
+
+
+@dataclass(frozen=True)
+class Standing:
+    """Shares of the joints above the limits as drawn, and with other values of what is assumed.
+
+    Attributes
+    ----------
+    n : int
+        Smallest number of joints that a variation and the joints as drawn are compared on.
+    confidence : float
+        Of the intervals of `rows`: 1 - 0.05 / number of variations.
+    accepted : float
+        Accepted share; NaN if none is given.
+    drawn : tuple of float
+        Share of the joints as drawn, and its total interval of 95 %.
+    side : str
+        ``yes``, ``no`` or ``open``: where that interval lies of the accepted share; empty without one.
+    rows : sequence of mapping
+        One row per variation, by the size of its effect: ``name``, ``label``, ``keys`` (text), ``because``, ``n``,
+        ``n_failed``, ``share`` and ``change`` (from the same joints as drawn) with ``_lower`` and ``_upper``, which
+        cover sampling and joints without a valid load; ``moves``, whether the interval of the change excludes zero;
+        ``side``, as above, of the variation; ``turns``, whether it turns the verdict: it moves the share, and its
+        interval lies on the other side of the accepted share.
+    names : tuple of str
+        Names of the assumptions of `rows`, in the order of the joint file and the study.
+    missing : tuple of str
+        Names of assumptions without joints in the file.
+    fixed : tuple of Assumption
+        Assumptions that are not varied.
+    """
+
+    n: int
+    confidence: float
+    accepted: float
+    drawn: Estimate
+    side: str
+    rows: Rows
+    names: tuple[str, ...]
+    missing: tuple[str, ...]
+    fixed: tuple[Assumption, ...]
+
+    @property
+    def turning(self) -> list[Row]:
+        """Variations of one assumption that turn the verdict, in the order of the file; else those of all together."""
+        rows = [row for row in self.rows if row["turns"]]
+        alone = [row for row in rows if row["name"] != ALL]
+        return sorted(alone, key=lambda row: self.names.index(row["name"])) or rows
+
+    @property
+    def undecided(self) -> list[Row]:
+        """Variations whose share lies on the other side of the accepted share, which their joints do not decide."""
+        other = {"yes": 1.0, "no": -1.0}.get(self.side, np.nan)
+        return [row for row in self.moving if row["side"] == "open" and other * (row["share"] - self.accepted) > 0.0]
+
+    @property
+    def moving(self) -> list[Row]:
+        """Variations that move the share."""
+        return [row for row in self.rows if row["moves"]]
+
+    @property
+    def still(self) -> list[str]:
+        """Names of varied assumptions none of whose values moves the share."""
+        moving = {row["name"] for row in self.moving}
+        return list(dict.fromkeys(row["name"] for row in self.rows if row["name"] not in moving | {ALL}))
+
+
+def evaluate(view: View, accepted: float = np.nan) -> Standing:
+    """Evaluate the joints with other values of what is assumed that a file holds.
+
+    Parameters
+    ----------
+    view : View
+        A campaign of a study with limits whose joints are drawn from tolerances.
+    accepted : float
+        Accepted share; NaN if none is given.
+
+    Returns
+    -------
+    Standing
+        Without rows where the file holds no such joints (`run.simulate` adds them).
+
+    Raises
+    ------
+    InputError
+        When the study can no longer be read.
+    StoreError
+        As `check`.
+    """
+    return view.kept(("assumptions", str(accepted)), lambda: _evaluate(view, accepted))
+
+
+def _evaluate(view: View, accepted: float) -> Standing:
+    check(view)
+    study, joints = view.study, _Joints(view)
+    held = [(own, joints.held(own.keys)) for own in singles(study)]
+    missing = dict.fromkeys(own.name for own, loads in held if loads is None)
+    pairs = [(own, loads) for own, loads in held if loads is not None]
+    if not missing:
+        for own in of_all(study, joints.base, joints.level, pairs):
+            if (loads := joints.held(own.keys)) is None:
+                missing[ALL] = None
+            else:
+                pairs.append((own, loads))
+    confidence = 1.0 - 0.05 / max(len(pairs), 1)
+    drawn = _drawn(view)
+    side = side_of(drawn[1:], accepted)
+    rows = [_row(own, joints, loads, confidence) for own, loads in pairs]
+    for row in rows:
+        row["side"] = side_of((row["share_lower"], row["share_upper"]), accepted)
+        row["turns"] = row["moves"] and {row["side"], side} == {"yes", "no"}
+    names = tuple(dict.fromkeys(own.name for own, _ in pairs))
+    rows.sort(key=lambda row: -abs(np.nan_to_num(row["change"])))
+    fixed = tuple(own for own in assumptions(study) if not own.varied)
+    n = min((len(loads) for _, loads in pairs), default=0)
+    return Standing(n, confidence, accepted, drawn, side, rows, names, tuple(missing), fixed)
+
+
+def applicable(view: View, accepted: float = np.nan) -> Standing | None:
+    """Evaluate as `evaluate`; None where the question does not apply, or the study can no longer be read."""
+    with suppress(TolstatError):
+        return evaluate(view, accepted)
+    return None
+
+
+def check(view: View) -> None:
+    """Refuse a file whose joints are no sample of one joint's production, or have no limits to be judged by.
+
+    Raises
+    ------
+    StoreError
+        The hint names what can be used.
+    """
+    place = str(view.path)
+    if view.store.variants or view.method in ("sweep", "cases"):
+        remedy = "give the file of a study with tolerances and one joint"
+        raise StoreError(str(Fault(place, "holds several joints: a share stands on the values of one", remedy)))
+    view.check("difference")
+    view.check_drawn()
+    if view.study.groups:
+        remedy = 'give the file of a study with sampling.method "random", "sobol" or "lhs"'
+        raise StoreError(str(Fault(place, "holds a pick-freeze design, no sample of a production", remedy)))
+    if not view.store.whole:
+        remedy = "merge all slices first: tolstat merge SLICE... --out FILE"
+        raise StoreError(str(Fault(place, "holds a part of the campaign only", remedy)))
+    if not view.limits:
+        remedy = "write [limits] and run the study again, which simulates nothing anew"
+        raise StoreError(str(Fault(place, "has no limits: nothing stands on what is assumed", remedy)))
+
+
+def own_joints(view: View) -> int:
+    """Number of samples of the campaign, from the first, that serve as joints as drawn: none of them pending."""
+    if not view.design.has_interval("difference"):
+        return 0
+    waiting = np.flatnonzero(view.status == Status.PENDING)
+    return int(waiting[0]) if waiting.size else view.n
+
+
+def joints_of(view: View) -> int:
+    """Number of joints of each variation unless more are asked for."""
+    return min(JOINTS, own_joints(view) or view.n)
+
+
+def points_of(view: View) -> tuple[str, ...]:
+    """Operating points that the limits are about."""
+    every = tuple(view.store.points)
+    chosen = {point for name in view.limits for point in names_of(split(name)[1], every, name)}
+    return tuple(point for point in every if point in chosen)
+
+
+def all_together(view: View) -> list[Variation]:
+    """Variations of all assumptions together, of a file that holds those of each assumption."""
+    joints = _Joints(view)
+    held = [(own, loads) for own in singles(view.study) if (loads := joints.held(own.keys)) is not None]
+    return list(of_all(view.study, joints.base, joints.level, held))
+
+
+def singles(study: Study) -> list[Variation]:
+    """Variations of one assumption each: every value of those that are varied."""
+    return [
+        Variation(own.name, words.label(own.name, keys), keys, own.because)
+        for own in assumptions(study)
+        if own.varied
+        for keys in own.values
+    ]
+
+
+def of_all(
+    study: Study, base: FloatArray, level: float, held: Sequence[tuple[Variation, FloatArray]]
+) -> Iterator[Variation]:
+    """Variations of all assumptions at their better, and at their worse values.
+
+    Parameters
+    ----------
+    study : Study
+        The study.
+    base : ndarray, shape (n,)
+        Load of the joints as drawn, NaN without a valid one.
+    level : float
+        Limit of the load.
+    held : sequence of (Variation, ndarray)
+        Each variation of one assumption, with the load of its joints.
+
+    Yields
+    ------
+    Variation
+        Not where fewer than two assumptions have a better, or a worse, value than as drawn, or values exclude each
+        other.
+    """
+    for label, sign in ((BETTER, 1.0), (WORSE, -1.0)):
+        best: dict[str, tuple[float, Variation]] = {}
+        for own, loads in held:
+            effect = sign * (_share(loads, level) - _share(base[: len(loads)], level))
+            if effect < best.get(own.name, (0.0, own))[0]:
+                best[own.name] = effect, own
+        chosen = [own for _, own in best.values()]
+        if len(chosen) > 1:
+            with suppress(InputError):
+                keys = together(study, [own.keys for own in chosen])
+                yield Variation(ALL, label, keys, ", ".join(own.label for own in chosen))
+
+
+def widths(view: View) -> dict[str, list[tuple[str, float, str]]]:
+    """Share above the limits with another width of a tolerance, by step: entry, share, and the step in words."""
+    found: dict[str, list[tuple[str, float, str]]] = {}
+    entries = {line.label for line in lines(view.study)}
+    joints = _Joints(view)
+    for one in view.altered.values():
+        about = one.about
+        if about["kind"] == sets.WIDTH and about["label"] in entries and (loads := joints.read(about)) is not None:
+            found.setdefault(about["step"], []).append((about["label"], _share(loads, joints.level), about["words"]))
+    return found
+
+
+def side_of(interval: Sequence[float], accepted: float) -> str:
+    """``yes`` if an interval lies below the accepted share, ``no`` above it, ``open``; empty if one is unknown."""
+    low, high = interval
+    if np.isnan(accepted) or np.isnan(low):
+        return ""
+    return "yes" if high <= accepted else "no" if low > accepted else "open"
+
+
+class _Joints:
+    """Loads of the joints that are compared: as drawn, and with other values.
+
+    Attributes
+    ----------
+    level : float
+        Limit of the load.
+    base : ndarray, shape (n,)
+        Load of the joints as drawn, NaN without a valid one: the campaign's, then fresh ones.
+    """
+
+    def __init__(self, view: View) -> None:
+        self._view, load = view, view.load(view.decisive)
+        assert load.limit is not None
+        self.level = load.limit
+        levels = view.limits if view.decisive == ANY_LIMIT else {view.decisive: 1.0}
+        self._parts = [(_at_points(view, name), level) for name, level in levels.items()]
+        self._least, self.base = joints_of(view), load.values[: own_joints(view)]
+        fresh = view.altered.get(kept.key(sets.as_drawn(view.study, range(0)).about))
+        if fresh is not None and self._holds(fresh) and fresh.first <= len(self.base) < fresh.end:
+            self.base = np.concatenate([self.base, self._load(fresh)[len(self.base) - fresh.first :]])
+
+    def held(self, keys: Mapping[str, Any]) -> FloatArray | None:
+        """Load of each joint with other keys, NaN without a valid one, (n,); None where the file has too few."""
+        loads = self.read(sets.about_joint(self._view.study, keys))
+        loads = None if loads is None else loads[: len(self.base)]
+        return None if loads is None or len(loads) < self._least or not len(loads) else loads
+
+    def read(self, about: Mapping[str, Any]) -> FloatArray | None:
+        """Load of the joints of a change, NaN without a valid one; None where the file lacks it."""
+        one = self._view.altered.get(kept.key(about))
+        return None if one is None or one.first or not self._holds(one) else self._load(one)
+
+    def _holds(self, one: Altered) -> bool:
+        return all(one.holds(names) for names, _ in self._parts)
+
+    def _load(self, one: Altered) -> FloatArray:
+        return np.asarray(np.maximum.reduce([one.valid(names) / level for names, level in self._parts]))
+
+
+def _at_points(view: View, load: str) -> tuple[str, ...]:
+    """Names that the file keeps of a load, one for each operating point."""
+    own, plain = view.narrowed(load)
+    return tuple(at(plain, [point], list(view.store.points)) for point in own.points)
+
+
+def _drawn(view: View) -> Estimate:
+    """Share of the joints as drawn, with the interval that the verdict is from."""
+    load = view.load(view.decisive)
+    assert load.limit is not None
+    low, high = total_interval(error_budget.with_error(view, load), load.limit, 0.95)
+    if (parts := known_parts.of(view)) is not None:
+        known = parts.share(load.name, 0.95)
+        low, high = known.lower, known.upper
+    return load.above(load.limit).estimate, low, high
+
+
+def _row(own: Variation, joints: _Joints, loads: FloatArray, confidence: float) -> dict[str, Any]:
+    row: dict[str, Any] = {"name": own.name, "label": own.label, "keys": words.keys(own.keys), "because": own.because}
+    row |= {"n": len(loads), "n_failed": int(np.isnan(loads).sum())}
+    found = _sample(loads).above(joints.level, confidence)
+    share, change = (found.estimate, found.outer_lower, found.outer_upper), (np.nan,) * 3
+    with suppress(ValueError):  # no joint has a load both as drawn and with the other values
+        base = _sample(joints.base[: len(loads)])
+        d = difference.shares(base, _sample(loads), [joints.level], paired=True, confidence=confidence)
+        change = float(d.estimate[0]), float(d.outer_lower[0]), float(d.outer_upper[0])
+    for name, estimate in (("share", share), ("change", change)):
+        row |= {f"{name}{end}": value for end, value in zip(("", "_lower", "_upper"), estimate, strict=True)}
+    return row | {"moves": bool(change[1] > 0.0 or change[2] < 0.0)}
+
+
+def _share(loads: FloatArray, level: float) -> float:
+    """Share of the joints with a valid load that are above a level; zero where there is none."""
+    valid = loads[~np.isnan(loads)]
+    return float(np.mean(valid > level)) if valid.size else 0.0
+
+
+def _sample(values: FloatArray) -> Sample:
+    """Sample of loads; joints without one have failed."""
+    return Sample.of(values, np.full(values.size, Status.OK))

@@ -24,8 +24,8 @@ PAGES = [
 ]
 NOTEBOOKS = sorted((DOCS / "notebooks").glob("*.ipynb"))
 FOLDERS = [path.stem for path in (ROOT / "tolstat" / "questions").iterdir() if not path.stem.startswith("__")]
-QUESTIONS = sorted([*FOLDERS, "lines"])
-"""Pages of questions; that of the lines of the drawing, which the command ``causes`` answers, is in its folder."""
+QUESTIONS = sorted({*FOLDERS, "lines"} - {"shares"})
+"""Pages of questions: the lines of the drawing, which ``causes`` answers, have one; ``shares`` serves several."""
 PARTS = ["Intervals", "From Python", "On the page", "Limits of validity"]
 """Headings that each page of a question has, after its commands."""
 README = (ROOT / "README.md").read_text(encoding="utf-8")

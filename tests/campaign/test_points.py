@@ -16,7 +16,7 @@ from tolstat.campaign.blocks import settings_in_use
 from tolstat.campaign.remedy import Retry
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.tables import Options, Status
-from tolstat.joint import Operation
+from tolstat.joint import Operation, load
 from tolstat.questions.fatigue.loads import load_cycles
 from tolstat.store import ResultFile, Writer
 from tolstat.study.points import Point
@@ -146,7 +146,7 @@ def test_a_duty_cycle_of_one_file_is_that_of_a_file_for_each_point(tmp_path, who
     path, times, speeds = tmp_path / "duty.h5", (0.5, 0.3, 0.2), (1.0, -2.0, 4.0)
     points = [p._replace(share=t, operation=p.operation.model_copy(update={"speed": s}))
               for p, t, s in zip(POINTS, times, speeds, strict=True)]  # fmt: skip
-    run(fake(tuple(points)), path)
+    run(fake(tuple(points), joint=fakes.Dump(load("cirelli2021", {}, "test").given("json"))), path)
     with ResultFile.open(path) as store:
         view, chosen = store.view(), ["cross1.F_t", "fork2.T"]
         one = load_cycles([view], names=chosen, samples=3)

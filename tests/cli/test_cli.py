@@ -369,8 +369,9 @@ def test_run_says_why_joints_have_no_load_and_how_to_try_again(study, monkeypatc
     with ResultFile.open(path) as store:
         counts = store.counts()
     monkeypatch.setattr(campaign, "run", lambda *_, **__: counts)
-    first, *told = unwrapped(call("run", "small.toml", "--no-report").stderr).splitlines()
+    first, exact, *told = unwrapped(call("run", "small.toml", "--no-report").stderr).splitlines()
     assert first == "small: shafts rigid along their axes; contact law mode"
+    assert exact.startswith("no tolerance, taken as exact: pin positions along e and z, pin angles")
     assert told[0] == "small.h5: 61 joints, 3 failed, 1 not settled"
     assert told[1].startswith("3 joints newton_failed: ")
     assert told[2].startswith("  hint, for row 57: failed at step 0 (")

@@ -26,7 +26,7 @@ COMMANDS = (
         "time-above",
         "sorting",
     ),
-    *("reweight", "allocate", "compare", "rare", "selective", "export", "docs", "cache"),
+    *("reweight", "allocate", "compare", "shafts", "rare", "selective", "export", "docs", "cache"),
 )
 
 

@@ -8,7 +8,7 @@ from tests.golden_output import catalogue_studies as catalogue
 from tests.golden_output.catalogue import Campaign, cases
 from tests.golden_output.conftest import Check
 
-CAMPAIGNS = (catalogue.POINTS, catalogue.NEEDLES, catalogue.WELDED)
+CAMPAIGNS = (catalogue.POINTS, catalogue.NEEDLES, catalogue.WELDED, catalogue.SHAFT)
 
 
 @pytest.mark.slow

@@ -33,7 +33,7 @@ def test_report_json_and_page_give_the_same_verdict(tmp_path, study, place):
     assert text.sentence(found.sentence) in " ".join(done.stdout.split())
     assert json.loads(call("report", path, "--accept", "10 %", "--json").stdout)["facts"]["lives"] == [found.values()]
     (head,) = (block for block in section.blocks if isinstance(block, Decision))
-    card = [head.verdict, *head.cards][place]
+    card = head.verdicts[place]
     assert (f"{card.value}: {card.label}", card.verdict) == (found.sentence, found.answer)
 
 

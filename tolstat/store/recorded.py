@@ -48,7 +48,7 @@ def operation_of(store: Reader, row: int) -> Operation:
 
 def operating_points(store: Reader, slots: slice = slice(None)) -> dict[str, NDArray[np.float64]]:
     """Values that the joints of a slice of file slots have at the operating point, (m,) each; see `joint.operating`."""
-    errors = store.errors(slots)
+    errors = store.errors(slots, _OPERATION)
     if not store.variants:
         return operating(store.operation, errors)
     first, last, _ = slots.indices(store.n)

@@ -16,10 +16,10 @@ from tolstat.common.load_kinds import PINS
 from tolstat.common.loads import FloatArray
 from tolstat.common.tables import LIFE_EXPONENT, VALID, Mode
 from tolstat.display.table import Rows
-from tolstat.joint import Bearing, Operation, operating
+from tolstat.joint import Bearing
 from tolstat.joint.bearing import FOR_LIFE
 from tolstat.store import points
-from tolstat.store.recorded import joint_of
+from tolstat.store.recorded import joint_of, operating_points
 from tolstat.store.view import View
 
 JOINT = "joint"
@@ -35,7 +35,6 @@ MOSTLY = 0.5
 LOADED = {"one_end": Mode.ONE_POINT, "opposite_ends": Mode.TWO_POINT, "along": Mode.UNIFORM}
 """Contact mode of each way to load a bearing."""
 HOUR = 3600.0
-OPERATION = tuple(f"operation.{name}" for name in Operation.model_fields)
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +123,7 @@ def lives_of(view: View) -> Lives:
     view.check("quantile")
     bearing, duty, stores = _bearing(view), points.shares_of_time(view), [part.store for part in view.parts]
     loads = np.stack([store.results(slice(None), ("equivalent_load",))["equivalent_load"] for store in stores])
-    operation = [operating(store.operation, store.errors(slice(None), OPERATION)) for store in stores]
+    operation = [operating_points(store) for store in stores]
     swings, speeds = (np.abs([own[name] for own in operation]) for name in ("alpha", "speed"))  # (points, rows)
     critical = bearing.critical_amplitude
     hourly = duty[:, None] * speeds / (2.0 * np.pi) * turns_per_revolution(swings, critical) * HOUR

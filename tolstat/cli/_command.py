@@ -73,8 +73,9 @@ def prose(docstring: str) -> str:
 def entries(docstring: str) -> dict[str, str]:
     """Texts of the entries under ``Parameters`` of a docstring, by name."""
     section = re.search(r"^Parameters\n---+\n(.*?)(?=^[A-Z][a-z]+\n---+$|\Z)", docstring, re.DOTALL | re.MULTILINE)
-    parts = re.split(r"^\*?(\w+) : .*\n", section[1] if section else "", flags=re.MULTILINE)
-    return {name: " ".join(text.split()) for name, text in zip(parts[1::2], parts[2::2], strict=True)}
+    parts = re.split(r"^\*?(\w+(?:, \w+)*) : .*\n", section[1] if section else "", flags=re.MULTILINE)
+    texts = zip(parts[1::2], parts[2::2], strict=True)
+    return {name: " ".join(text.split()) for names, text in texts for name in names.split(", ")}
 
 
 def flag_of(parameter: Parameter) -> str:

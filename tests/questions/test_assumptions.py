@@ -321,6 +321,26 @@ def test_a_share_near_the_accepted_one_takes_more_joints(tmp_path, quick):
     assert " --run --joints " in said
 
 
+def test_more_joints_decide_what_the_first_ones_leave_open(tmp_path, quick):
+    """Only of this variation; all intervals are then those of two looks at each variation, and the same call ends."""
+    quick(slides=-60.0)
+    path = made(tmp_path)
+    simulated(path)
+    first = standing(path)
+    accepted = of(first, "shaft slides")["share_upper"] - 0.002
+    assert standing(path, accepted).side == "no"
+    assert [row["label"] for row in standing(path, accepted).undecided] == ["shaft slides"]
+    told = simulated(path, accepted=accepted)
+    second = standing(path, accepted)
+    row = of(second, "shaft slides")
+    assert 600 < row["n"] <= 2400
+    assert told.endswith(f", {row['n']} of shaft slides")
+    assert {other["n"] for other in second.rows if other is not row} == {600}
+    assert row["turns"]
+    assert second.confidence == 1.0 - (1.0 - first.confidence) / 2.0
+    assert simulated(path, accepted=accepted).startswith("all 4 variations are in the file")
+
+
 def test_the_joint_without_errors_is_told_first(tmp_path, quick):
     path = made(tmp_path, TEXT.replace('"700 N"', '"600 N"'))
     assert verdict(path, 0.1).sentence.startswith(

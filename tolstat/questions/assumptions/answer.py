@@ -101,7 +101,9 @@ def _parts(view: View, found: Standing) -> list[Part]:
     lead = f"As drawn {text.percent(share)} of the joints exceed a limit ({text.span(lower, upper)})."
     if any(verdict := sentences.turned(found)):
         lead += f" {text.sentence(', '.join(verdict))}"
-    title = f"Share above a limit with other values, and its change; {found.n} joints of each"
+    most = max(row["n"] for row in found.rows)
+    each = f"{found.n} joints of each" if most == found.n else f"{found.n} joints of each, {most} of those left open"
+    title = f"Share above a limit with other values, and its change; {each}"
     below = [sentences.still(found), sentences.shop(view)]
     return [
         Sentence(lead, "lead"),

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
+from tolstat.analysis import binomial
 from tolstat.campaign import what_if as sets
 from tolstat.campaign.pool import kept_workers
 from tolstat.campaign.what_if import Asked, Change
 from tolstat.campaign.work import Work
 from tolstat.common.cores import available_cores
 from tolstat.common.errors import Fault, InputError, StoreError, gather
-from tolstat.display.options import Opt
+from tolstat.display.options import Accepted, Opt
 from tolstat.display.progress import clock
 from tolstat.questions.assumptions import variations
 from tolstat.questions.assumptions.variations import Variation
@@ -24,14 +26,24 @@ from tolstat.store.view import View
 
 PILOT = 64
 """Number of joints whose time is measured."""
+FURTHER = 4
+"""Largest number of joints of a variation whose first joints leave it open, in multiples of theirs."""
+MARGIN = 1.2
+"""Factor on the number of joints that would just decide a variation."""
 
 
-def simulate(path: Path, work: Work, joints: Annotated[int, Opt("N", least=100)] = variations.JOINTS) -> list[Path]:
+def simulate(
+    path: Path,
+    work: Work,
+    joints: Annotated[int, Opt("N", least=100)] = variations.JOINTS,
+    accepted: Accepted = math.nan,
+) -> list[Path]:
     """Simulate the first joints of a campaign with each value of what is assumed, and keep their loads in the file.
 
     First each value of each assumption that is varied, all else equal, then all assumptions at their better and at
-    their worse values. Of several operating points those that a limit of the study is about. What is done stays in the
-    file, also of a run that is stopped; the same call goes on.
+    their worse values. With an accepted share, variations that would turn the verdict, but for their number of joints,
+    get up to `FURTHER` times as many. Of several operating points those that a limit of the study is about. What is
+    done stays in the file, also of a run that is stopped; the same call goes on.
 
     Parameters
     ----------
@@ -42,6 +54,8 @@ def simulate(path: Path, work: Work, joints: Annotated[int, Opt("N", least=100)]
     joints : int
         With --run: number of joints of each variation, 1000 unless given; more than the campaign has are drawn with its
         seed.
+    accepted : float
+        Accepted share of the joints that exceed at least one limit; NaN if none is given.
 
     Returns
     -------
@@ -65,6 +79,10 @@ def simulate(path: Path, work: Work, joints: Annotated[int, Opt("N", least=100)]
             raise StoreError(str(Fault(str(path), "has a joint of which nothing is assumed that is varied", remedy)))
         run.simulate(singles)
         run.simulate(variations.all_together(View(store)))
+        further, number = _further(View(store), accepted, run.n)
+        if further:
+            run.simulate(further, number)
+            run.simulate(variations.all_together(View(store)))
         work.tell(run.outcome)
     return [path]
 
@@ -81,11 +99,23 @@ def _check(view: View) -> None:
         raise StoreError(str(Fault(place, "was made by another version of the code", remedy)))
 
 
+def _further(view: View, accepted: float, n: int) -> tuple[list[Variation], int]:
+    """Variations that would turn the verdict if more joints, at most `FURTHER` times `n`, decided them; that number."""
+    standing = variations.evaluate(view, accepted)
+    second = (1.0 + standing.confidence) / 2.0
+    needed = {row["label"]: MARGIN * binomial.needed(row["share"], accepted, second) for row in standing.undecided}
+    numbers = {label: number for label, number in needed.items() if number <= FURTHER * n}
+    every = {own.label: own for own in (*variations.singles(view.study), *variations.all_together(view))}
+    return [every[label] for label in numbers], math.ceil(max(numbers.values(), default=n))
+
+
 class _Run:
     """Simulation of variations, one round after the other.
 
     Attributes
     ----------
+    n : int
+        Number of joints of each variation.
     simulated : int
         Number of joints simulated so far, each at every point.
     """
@@ -95,28 +125,32 @@ class _Run:
         self._store, self._view, self._work = store, view, work
         self._workers = work.workers or available_cores()
         self._asked = Asked(view.kept_loads, variations.points_of(view))
-        self._n = joints if joints > variations.JOINTS else min(joints, variations.joints_of(view))
-        self.simulated, self._number = 0, 0
+        self.n = joints if joints > variations.JOINTS else min(joints, variations.joints_of(view))
+        self.simulated, self._variations, self._more = 0, set[str](), ""
 
     @property
     def outcome(self) -> str:
         """What was simulated, in words."""
         spent = time.monotonic() - self._begin
         if not self.simulated:
-            return f"all {self._number} variations are in the file, {self._n} joints of each"
-        return f"simulated {self.simulated} joints in {spent:.0f} s, {self._n} of each of {self._number} variations"
+            return f"all {len(self._variations)} variations are in the file, {self.n} joints of each"
+        each = f"{self.n} of each of {len(self._variations)} variations"
+        return f"simulated {self.simulated} joints in {spent:.0f} s, {each}{self._more}"
 
-    def simulate(self, wanted: Sequence[Variation]) -> None:
-        """Simulate what the file lacks of some variations."""
+    def simulate(self, wanted: Sequence[Variation], number: int = 0) -> None:
+        """Simulate what the file lacks of the first joints of some variations: `n` of each unless a number is given."""
+        n = number or self.n
+        if number:
+            self._more = f", {number} of {', '.join(own.label for own in wanted)}"
         study, changes, faults = self._view.study, list[Change](), list[Fault]()
         for own in wanted:
             with gather(faults):
-                changes.append(sets.with_joint(study, own.keys, range(self._n)))
+                changes.append(sets.with_joint(study, own.keys, range(n)))
         if faults:
             raise InputError(faults)
-        self._number += len(changes)
-        if (first := variations.own_joints(self._view)) < self._n:
-            changes.insert(0, sets.as_drawn(study, range(first, self._n)))
+        self._variations |= {own.label for own in wanted}
+        if (first := variations.own_joints(self._view)) < n:
+            changes.insert(0, sets.as_drawn(study, range(first, n)))
         held, names = what_if.read(self._store), self._asked.names(study)
         lacking = sum(len(sets.missing(held, change, names)) for change in changes)
         if not lacking:

@@ -67,7 +67,8 @@ class Standing:
     n : int
         Smallest number of joints that a variation and the joints as drawn are compared on.
     confidence : float
-        Of the intervals of `rows`: 1 - 0.05 / number of variations.
+        Of the intervals of `rows`: 1 - 0.05 / number of intervals. These are the variations, counted twice where some
+        have more joints than others, as joints may have been added for what the first ones left open.
     accepted : float
         Accepted share; NaN if none is given.
     drawn : tuple of float
@@ -160,7 +161,8 @@ def _evaluate(view: View, accepted: float) -> Standing:
                 missing[ALL] = None
             else:
                 pairs.append((own, loads))
-    confidence = 1.0 - 0.05 / max(len(pairs), 1)
+    looks = 2 if len({len(loads) for _, loads in pairs}) > 1 else 1
+    confidence = 1.0 - 0.05 / max(looks * len(pairs), 1)
     drawn = _drawn(view)
     side = side_of(drawn[1:], accepted)
     rows = [_row(own, joints, loads, confidence) for own, loads in pairs]

@@ -56,13 +56,17 @@ def test_no_command_reads_a_whole_table(path, read, tmp_path, monkeypatch, comma
     assert len(read) >= 1500 // BLOCK
 
 
-def test_only_loads_and_the_first_errors_are_held(path, monkeypatch):
+def test_only_loads_that_were_asked_for_and_the_first_errors_are_held(path, monkeypatch):
     monkeypatch.setattr(view, "BLOCK", BLOCK)
     with ResultFile.open(path) as store:
         whole, part = store.results()[1:], store.view()
-        assert tuple(part.results) == LOAD_FIELDS
+        assert tuple(part.results) == ("status",)
+        part.load("fork2.T")
+        assert set(part.results) == {"status", "T_max", "T_lower", "T_upper"}
         for field in LOAD_FIELDS:
             np.testing.assert_array_equal(part.results[field], whole[field])
+        with pytest.raises(KeyError):
+            part.results["revolutions"]
         assert len(part._first_errors) == BLOCK
 
 

@@ -148,7 +148,7 @@ class View:
         return frozen(self.store.origin()["weight"][self.store.first_sample :].copy())
 
     @property
-    def results(self) -> dict[str, NDArray[Any]]:
+    def results(self) -> worst.Columns:
         """Columns `LOAD_FIELDS` of the results, (n, ...) each."""
         return self._tables.results
 

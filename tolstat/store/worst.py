@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,7 +11,6 @@ from numpy.typing import NDArray
 
 from tolstat.analysis.column import Column, Inexact, frozen, largest
 from tolstat.analysis.sample import Sample, is_valid
-from tolstat.common.load_kinds import SPAN
 from tolstat.common.loads import LOAD_FIELDS, LOADS, FloatArray, Limit, Load, Results, split
 from tolstat.common.tables import FAILED, RESULT, UNSETTLED, VALID, Status, deciding, without_results, worst_status
 from tolstat.store.reader import Reader
@@ -21,7 +21,7 @@ MAX_LISTED = 12
 """Number of joints without a valid load whose complete results are kept."""
 
 
-def together(parts: Sequence[Results]) -> dict[str, NDArray[Any]]:
+def together(parts: Sequence[Results]) -> Columns:
     """Largest loads of the joints over some operating points.
 
     Parameters
@@ -31,17 +31,18 @@ def together(parts: Sequence[Results]) -> dict[str, NDArray[Any]]:
 
     Returns
     -------
-    dict of str to ndarray, shape (n, ...)
-        Columns `LOAD_FIELDS`. A load is NaN if it is at one of the points. Ends of intervals are 1, and NaN for
+    Columns
+        Arrays of shape (n, ...). A load is NaN if it is at one of the points. Ends of intervals are 1, and NaN for
         stationary joints: loads of one kind may have theirs from different points, see `load_of`.
     """
-    status = [part["status"] for part in parts]
-    found: dict[str, NDArray[Any]] = {"status": worst_status(status)}
-    for kind in SPAN:
-        found[f"{kind}_max"] = np.maximum.reduce([part[f"{kind}_max"] for part in parts])
-        for end in ("lower", "upper"):
-            found[f"{kind}_{end}"] = np.where(found["status"] == Status.STATIONARY, np.nan, 1.0)
-    return found
+    return Columns(partial(_largest, parts))
+
+
+def _largest(parts: Sequence[Results], name: str) -> NDArray[Any]:
+    if name.endswith("_max"):
+        return np.asarray(np.maximum.reduce([part[name] for part in parts]))
+    status = worst_status([part["status"] for part in parts])
+    return status if name == "status" else np.where(status == Status.STATIONARY, np.nan, 1.0)
 
 
 def load_of(parts: Sequence[Results], load: Load) -> tuple[Column, NDArray[np.uint8], Inexact]:
@@ -112,13 +113,26 @@ def rank(load: Sample, limit: float | None) -> tuple[float, float]:
     return share, float(load.valid[int(0.99 * (load.valid.size - 1))]) / (1.0 if limit is None else limit)
 
 
+class Columns(dict[str, NDArray[Any]]):
+    """Columns `LOAD_FIELDS` of results, each made when it is first asked for, and not writeable."""
+
+    def __init__(self, make: Callable[[str], NDArray[Any]]) -> None:
+        super().__init__()
+        self._make = make
+
+    def __missing__(self, name: str) -> NDArray[Any]:
+        if name not in LOAD_FIELDS:
+            raise KeyError(name)
+        return self.setdefault(name, frozen(self._make(name)))
+
+
 class FirstPass(NamedTuple):
-    """What is kept of the results after one pass over them.
+    """What is kept of the results.
 
     Attributes
     ----------
-    results : dict of str to ndarray, shape (n, ...)
-        Columns `LOAD_FIELDS` of the samples; the values of one load lie side by side.
+    results : Columns
+        Those of the samples, shape (n, ...) each; the values of one load lie side by side.
     nominal : ndarray of RESULT, shape (1,) or (0,)
         The nominal joint, if the file has one and its results are valid.
     without_load : ndarray of RESULT, shape (m,)
@@ -127,7 +141,7 @@ class FirstPass(NamedTuple):
         Weighted mean over the valid joints; NaN if none is valid or the study does not keep it.
     """
 
-    results: dict[str, NDArray[Any]]
+    results: Columns
     nominal: NDArray[np.void]
     without_load: NDArray[np.void]
     mode_share: FloatArray
@@ -135,25 +149,35 @@ class FirstPass(NamedTuple):
 
 def first_pass(store: Reader, weights: FloatArray | None) -> FirstPass:
     """Read the results of a file at one operating point; `weights` are those of its samples, if they differ."""
-    skip, n = store.first_sample, store.n - store.first_sample
-    nominal = np.empty(0, RESULT)
-    results = {name: np.empty((n, *RESULT[name].shape), RESULT[name].base, "F") for name in LOAD_FIELDS}
-    kept, total, shares = [np.empty(0, RESULT)], 0.0, np.zeros((4, 4))
-    for first in range(0, store.n, AT_ONCE):
-        block = store.results(slice(first, first + AT_ONCE))
-        if first == 0 and skip:
-            nominal, block = block[:1][np.isin(block["status"][:1], VALID)].copy(), block[1:]
-        begin = max(0, first - skip)
-        for name in LOAD_FIELDS:
-            results[name][begin : begin + len(block)] = block[name]
-        if sum(map(len, kept)) < MAX_LISTED:
-            kept.append(block[np.isin(block["status"], (*FAILED, *UNSETTLED))][:MAX_LISTED])
+    skip, results = store.first_sample, Columns(partial(_column, store))
+    nominal = store.results(slice(0, skip))
+    lost = np.flatnonzero(np.isin(results["status"], (*FAILED, *UNSETTLED)))[:MAX_LISTED] + skip
+    without = [store.results(slice(slot, slot + 1)) for slot in lost.tolist()]
+    total, shares = 0.0, np.zeros((4, 4))
+    for slots in _slots(store):
+        block = store.results(slots, ("status", "mode_share"))
         valid = np.isin(block["status"], VALID)
-        weight = np.ones(len(block)) if weights is None else weights[begin : begin + len(block)]
+        weight = np.ones(len(block)) if weights is None else weights[slots.start - skip : slots.stop - skip]
         shares += np.tensordot(weight[valid], block["mode_share"][valid], 1)
         total += float(weight[valid].sum())
     mean = shares / total if total else np.full((4, 4), np.nan)
-    return FirstPass(_frozen(results), frozen(nominal), frozen(np.concatenate(kept)[:MAX_LISTED]), frozen(mean))
+    listed = np.concatenate([np.empty(0, RESULT), *without])
+    return FirstPass(results, frozen(nominal[np.isin(nominal["status"], VALID)]), frozen(listed), frozen(mean))
+
+
+def _column(store: Reader, name: str) -> NDArray[Any]:
+    """Column of the results of the samples of a file at one operating point."""
+    skip = store.first_sample
+    values = np.empty((store.n - skip, *RESULT[name].shape), RESULT[name].base, "F")
+    for slots in _slots(store):
+        values[slots.start - skip : slots.stop - skip] = store.results(slots, (name,))[name]
+    return values
+
+
+def _slots(store: Reader) -> Iterator[slice]:
+    """File slots of the samples, in blocks of those that have checksums together."""
+    for first in range(0, store.n, AT_ONCE):
+        yield slice(max(first, store.first_sample), first + AT_ONCE)
 
 
 def of_points(parts: Sequence[FirstPass], stores: Sequence[Reader]) -> FirstPass:
@@ -167,11 +191,7 @@ def of_points(parts: Sequence[FirstPass], stores: Sequence[Reader]) -> FirstPass
         without.append(stores[number].results(slice(slot, slot + 1)))
     at_each = [part.nominal for part in parts]
     nominal = without_results(int(all(map(len, at_each))), Status.OK)
-    for name, values in together(at_each).items() if nominal.size else ():
-        nominal[name] = values
+    for name in LOAD_FIELDS if nominal.size else ():
+        nominal[name] = together(at_each)[name]
     none = np.full((4, 4), np.nan)
-    return FirstPass(_frozen(results), frozen(nominal), frozen(np.concatenate(without)), frozen(none))
-
-
-def _frozen(columns: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
-    return {name: frozen(column) for name, column in columns.items()}
+    return FirstPass(results, frozen(nominal), frozen(np.concatenate(without)), frozen(none))

@@ -29,12 +29,12 @@ def named(text: str) -> list[tuple[str, list[str]]]:
     return found
 
 
-@pytest.mark.parametrize(("page", "least"), [("architecture.md", 80), ("reliability.md", 20)])
+@pytest.mark.parametrize(("page", "least"), [("architecture.md", 60), ("reliability.md", 20)])
 def test_files_and_names_are_there(page: str, least: int) -> None:
     listed = named((ROOT / "docs" / page).read_text(encoding="utf-8"))
     assert len(listed) > least
     for file, names in listed:
-        if "X" in file or file in ("query.py", "rendering.py", "section.py", "__init__.py"):
+        if "X" in file or file == "__init__.py":
             continue  # to be written, in a recipe
         texts = [path.read_text(encoding="utf-8") for path in SOURCES if path.as_posix().endswith(f"/{file}")]
         assert texts, f"there is no {file}"

@@ -173,4 +173,5 @@ def example_files(tmp_path_factory: pytest.TempPathFactory) -> Path:
     tolstat.run(tolstat.load(bearings, n=60), folder / "needle_bearings.h5", workers=1)
     sorting = folder / "studies" / "sorting.toml"
     tolstat.run(tolstat.load(sorting, n=60), folder / "sorting.h5", workers=1)
+    tolstat.run(tolstat.load(folder / "studies" / "drive_shaft.toml", n=40), folder / "drive_shaft.h5", workers=1)
     return folder

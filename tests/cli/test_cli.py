@@ -413,6 +413,8 @@ def test_another_number_of_joints_is_an_extension_of_the_file(study):
     assert more.exit_code == 2
     assert more.stderr == (
         "small: shafts rigid along their axes; contact law mode\n"
+        "no tolerance, taken as exact: pin positions along e and z, pin angles, pin\n"
+        "    diameters, hole positions, hole angles, hole diameters\n"
         "error: small.h5: is the result file of this study with 5 joints, not 60\n"
         "  hint: simulate more of its joints: tolstat extend small.h5 --n 60\n"
     )

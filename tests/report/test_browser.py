@@ -88,9 +88,7 @@ def made(tmp_path_factory):
     path = synthetic.store(folder, TEXT, failed=15, unsettled=12)
     page.write_page(path, folder / "page.html", accepted=0.05, replay=0)
     with ResultFile.open(path) as store:
-        view = store.view()
-        view.loads(view.shown_loads)  # read while the file is open
-    return folder / "page.html", view
+        yield folder / "page.html", store.view()
 
 
 @pytest.mark.parametrize("width", [1280, 400])

@@ -34,10 +34,10 @@ LIMITS = (
 )
 """Columns of the table ``shafts``."""
 OUTPUT = (
-    Column("output of the shaft", lambda row: str(row["quantity"])),
+    Column("output", lambda row: str(row["quantity"])),
     Column("ideal joints", lambda row: _value(row, "ideal")),
-    Column("half of the shafts, at most", lambda row: _value(row, "at_most_50")),
-    Column("95 % of them, at most", lambda row: _value(row, "at_most_95")),
+    Column("50 % below", lambda row: _value(row, "at_most_50")),
+    Column("95 % below", lambda row: _value(row, "at_most_95")),
 )
 """Columns of the table ``output``."""
 

@@ -13,9 +13,10 @@ from tolstat import sampling, study
 from tolstat.analysis import allocation
 from tolstat.cli import app
 from tolstat.common.errors import InputError
+from tolstat.common.tables import Simulation
 from tolstat.display.answer import Document
 from tolstat.questions.allocate import DensityRatios, allocate
-from tolstat.store import ResultFile
+from tolstat.store import ResultFile, Writer
 from tolstat.study import costs, scaling
 
 TWO = synthetic.STUDY.replace("n = 60", "n = 12000").replace(
@@ -192,6 +193,23 @@ def test_entries_are_scaled_about_the_middle_and_texts_keep_their_comments(tmp_p
     table = table.replace('", distribution = "normal", cpk = 1.0 }', '"\ndistribution = "normal"')
     new = scaling.rewritten(load(tmp_path, table, "table"), {offset.pattern: offset.scaled(0.5)}, 1)
     assert load(tmp_path, new, "new").tolerances["pin1.offset_t"].sigma == pytest.approx(0.5e-4 / 3)
+
+
+def test_any_limit_covers_limits_at_an_operating_point(tmp_path):
+    before, _, rest = synthetic.STUDY.partition("[operation]\n")
+    keys, tolerances, others = rest.partition("[tolerances]")
+    points = "".join(f'[[operation]]\nname = "{name}"\n{keys}' for name in ("low", "high"))
+    source = tmp_path / "points.toml"
+    others = others.replace("n = 60", "n = 600")
+    limits = others.replace("[limits]\n", '[limits]\n"cross1.T at high" = "15 N*m"\n')
+    assert limits != others
+    source.write_text(before + points + tolerances + limits, encoding="utf-8")
+    plan = study.load(source)
+    with Writer.create(tmp_path / "points.h5", plan, [sampling.draw(plan)]) as store:
+        for name in ("low", "high"):
+            store.at(name).write(np.arange(plan.rows), Simulation(synthetic.results(plan.rows), {}))
+    with ResultFile.open(tmp_path / "points.h5") as store:
+        assert list(allocate(store.view(), ["P(any limit) < 0.9"]).frame("limits")["target"]) == [0.9]
 
 
 def test_faults_of_limits_costs_and_names_are_told_together(path, tmp_path):

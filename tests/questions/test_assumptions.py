@@ -402,6 +402,12 @@ def test_values_that_make_no_joint_are_all_told_before_anything_is_simulated(tmp
     assert path.read_bytes() == before
 
 
+def test_what_the_shop_must_hold_has_the_capability_of_zones_too(tmp_path):
+    zone = '"pin*.position" = { zone = "⌀0.1 mm", over = "22 mm", distribution = "normal" }\n"pin*.offset_e"'
+    with ResultFile.open(made(tmp_path, TEXT.replace('"pin*.offset_z"', zone))) as store:
+        assert "Cp 1 in 1 tolerance and Cpk 1 in 1 tolerance." in sentences.shop(store.view())
+
+
 def test_the_command_prints_shares_changes_and_what_the_shop_holds(tmp_path, quick, monkeypatch):
     quick(slides=-60.0, arm=4.0)
     path = made(tmp_path)

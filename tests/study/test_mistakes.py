@@ -179,15 +179,16 @@ def test_a_zone_far_wider_than_the_clearance_is_told(folder: Path) -> None:
 
 def test_a_speed_in_the_wrong_unit_is_told(folder: Path) -> None:
     (message,) = told(folder, ("500 rpm", "800 rad/s"))
-    assert message.startswith(":5: operation.speed: 7639 rpm at 15 deg: speed times angle, 1.1e+05 rpm deg, is beyond ")
+    assert message.startswith(":5: operation.speed: 7639 rpm at 15 deg: speed times angle, 114592 rpm deg, is beyond ")
     assert told(folder, ("500 rpm", "800 rpm")) == []
+    assert told(folder, ("500 rpm", "2500 rpm"), ('alpha = "15 deg"', 'alpha = "12 deg"')) == []
     points = (
         "[operation]\nalpha",
         '[[operation]]\nname = "slow"\nspeed = "1 rpm"\nalpha = "1 deg"\n'
         'torque = "1 N*m"\n[[operation]]\nname = "fast"\nalpha',
     )
     (message,) = told(folder, points, ("500 rpm", "800 rad/s"))
-    assert message.startswith(":11: operation[1].speed: ")
+    assert message.startswith(":11: operation[1].speed: 7639 rpm at 15 deg at fast: ")
 
 
 def test_commands_tell_such_warnings(folder: Path) -> None:

@@ -19,7 +19,7 @@ from tolstat.analysis.reweight import Ratios
 from tolstat.analysis.sample import CONFIDENCE, Sample
 from tolstat.common import selected_results
 from tolstat.common.errors import Fault, InputError, gather
-from tolstat.common.loads import ANY_LIMIT, FloatArray, unit_text
+from tolstat.common.loads import ANY_LIMIT, FloatArray, split, unit_text
 from tolstat.common.tables import Status
 from tolstat.common.units import DISPLAY_UNITS
 from tolstat.display import text
@@ -301,7 +301,8 @@ def _read_request(view: View, targets: Sequence[str], costs: Path | None, keep: 
     for target in targets:
         with gather(faults):
             statements.append(rule.parse(target, "", "--target", EXAMPLE, view.limits))
-            lacking = [name for name in statements[-1].limit.loads if not selected_results.holds(view.columns, name)]
+            loads = statements[-1].limit.loads
+            lacking = [name for name in loads if not selected_results.holds(view.columns, split(name)[0])]
             if lacking:
                 kept = f"give one of: {', '.join(view.kept_loads)}"
                 faults.append(Fault("--target", f"the file does not keep {', '.join(lacking)}", kept))

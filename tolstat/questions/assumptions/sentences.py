@@ -122,13 +122,14 @@ def shop(view: View) -> str:
     Capabilities are requirements that the shop can measure: they turn no verdict.
     """
     entries = view.study.entries
-    by_cpk: dict[float, int] = {}
-    for entry in entries:
-        if isinstance(cpk := entry.keys.get("cpk"), (int, float)):
-            by_cpk[float(cpk)] = by_cpk.get(float(cpk), 0) + 1
-    if not by_cpk:
+    capabilities: dict[str, int] = {}
+    for keys in (entry.keys for entry in entries):
+        index, default = ("Cp", 1.0) if "zone" in keys and keys.get("distribution") == "normal" else ("Cpk", None)
+        if isinstance(value := keys.get(index.lower(), default), (int, float)):
+            capabilities[f"{index} {value:g}"] = capabilities.get(f"{index} {value:g}", 0) + 1
+    if not capabilities:
         return ""
-    held = words.listed([f"Cpk {cpk:g} in {n} tolerance{'s' if n > 1 else ''}" for cpk, n in by_cpk.items()])
+    held = words.listed([f"{index} in {n} tolerance{'s' if n > 1 else ''}" for index, n in capabilities.items()])
     head = f"What the shop must hold: {held}."
     shares = widths(view)
     if not shares:

@@ -9,7 +9,7 @@ from contextlib import suppress
 from typing import NamedTuple
 
 from tolstat.common.errors import Fault, InputError, gather
-from tolstat.common.loads import ANY_LIMIT, UNIT_OF_LOAD, Limit
+from tolstat.common.loads import ANY_LIMIT, AT, UNIT_OF_LOAD, Limit
 from tolstat.common.strict import did_you_mean
 from tolstat.study.selection import Entry, quantity, resolve
 
@@ -63,6 +63,9 @@ def limit_of(text: str, limits: Mapping[str, float], option: str, example: str) 
         remedy = f'write "{ANY_LIMIT}": a joint counts if it is above at least one'
         raise InputError([Fault(option, f"{text.strip()!r} is not a limit", remedy)])
     found = _LIMIT.fullmatch(text)
+    if found is None and AT in text:
+        remedy = "name the load alone: at several operating points the largest counts, with --point that at one of them"
+        raise InputError([Fault(option, f"{text.strip()!r} names an operating point", remedy)])
     if found is None:
         raise InputError([Fault(option, f"{text.strip()!r} is not a limit", example)])
     entry = Entry(found["load"], (found["load"],), found["level"])

@@ -83,12 +83,17 @@ def least(found: Standing) -> str:
 
 
 def decided(found: Standing) -> str:
-    """Sentence behind an open verdict: on which side the variations lie."""
+    """Sentence behind an open verdict: on which side the variations lie, with the farthest one of each side."""
     if not found.rows:
         return ""
-    numbers = {word: sum(row["side"] == side for row in found.rows) for side, word in KEPT.items()}
-    said = ", ".join(f"{word} in {number}" for word, number in numbers.items() if number) or "open in all"
-    return f"Of {len(found.rows)} variations of what is assumed: {said}"
+    on = {word: [row for row in found.rows if row["side"] == side] for side, word in KEPT.items()}
+    told = []
+    for word, rows in on.items():
+        alone = [row for row in rows if row["name"] != ALL] or rows
+        if alone:
+            far = max(alone, key=lambda row: abs(row["change"]))
+            told.append(f"{word} in {len(rows)} ({text.percent(far['share'])} {words.condition(far['label'])})")
+    return f"Of {len(found.rows)} variations of what is assumed: {', '.join(told) or 'open in all'}"
 
 
 def reach(found: Standing) -> str:
@@ -113,6 +118,8 @@ def still(found: Standing) -> str:
     if found.still:
         parts.append(f"Moves nothing that {found.n} joints show: {', '.join(found.still)}.")
     parts += [f"Not varied: {own.name} ({own.because})." for own in found.fixed]
+    if found.given:
+        parts.append(f"Given by the study: {words.listed(found.given)}.")
     return " ".join(parts)
 
 

@@ -21,7 +21,7 @@ from tolstat.store import error_budget, known_parts
 from tolstat.store import what_if as kept
 from tolstat.store.view import View
 from tolstat.store.what_if import Altered
-from tolstat.study.assumptions import Assumption, assumptions, together
+from tolstat.study.assumptions import Assumption, assumptions, given, together
 from tolstat.study.points import at, names_of
 from tolstat.study.study import Study
 from tolstat.study.widths import lines
@@ -87,6 +87,8 @@ class Standing:
         Names of assumptions without joints in the file.
     fixed : tuple of Assumption
         Assumptions that are not varied.
+    given : tuple of str
+        Names of assumptions of the joint file that the study gives.
     """
 
     n: int
@@ -98,6 +100,7 @@ class Standing:
     names: tuple[str, ...]
     missing: tuple[str, ...]
     fixed: tuple[Assumption, ...]
+    given: tuple[str, ...] = ()
 
     @property
     def turning(self) -> list[Row]:
@@ -173,7 +176,7 @@ def _evaluate(view: View, accepted: float) -> Standing:
     rows.sort(key=lambda row: -abs(np.nan_to_num(row["change"])))
     fixed = tuple(own for own in assumptions(study) if not own.varied)
     n = min((len(loads) for _, loads in pairs), default=0)
-    return Standing(n, confidence, accepted, drawn, side, rows, names, tuple(missing), fixed)
+    return Standing(n, confidence, accepted, drawn, side, rows, names, tuple(missing), fixed, given(study))
 
 
 def applicable(view: View, accepted: float = np.nan) -> Standing | None:
@@ -281,14 +284,20 @@ def of_all(
 
 
 def widths(view: View) -> dict[str, list[tuple[str, float, str]]]:
-    """Share above the limits with another width of a tolerance, by step: entry, share, and the step in words."""
+    """Share above the limits with another width of a tolerance, by step: entry, share, and the step in words.
+
+    Of fewer joints than are known as drawn, it is the share of all as drawn plus the change, as `causes` gives it.
+    """
     found: dict[str, list[tuple[str, float, str]]] = {}
     entries = {line.label for line in lines(view.study)}
     joints = _Joints(view)
     for one in view.altered.values():
         about = one.about
         if about["kind"] == sets.WIDTH and about["label"] in entries and (loads := joints.read(about)) is not None:
-            found.setdefault(about["step"], []).append((about["label"], _share(loads, joints.level), about["words"]))
+            base = joints.base[: len(loads)]
+            change = _share(loads[: len(base)], joints.level) - _share(base, joints.level)
+            share = _share(joints.base, joints.level) + change
+            found.setdefault(about["step"], []).append((about["label"], max(share, 0.0), about["words"]))
     return found
 
 

@@ -90,7 +90,7 @@ class PointEntry(Operation):
         Field(
             gt=0,
             le=1,
-            description="share of the service time, for lives and fatigue over all points; given for all of them or for none",
+            description="share of the service time, for lives and fatigue; given for all points or for none",
             examples=["60 %"],
         ),
     ] = None

@@ -64,7 +64,7 @@ def kind(own: Mapping[str, Any]) -> str:
     if "enum" in own:
         return ", ".join(f'`"{word}"`' for word in own["enum"])
     if "x-unit" in own and "anyOf" in own:
-        words, written = own["anyOf"]
+        words, written = own["anyOf"][:2]
         if written.get("type") == "object":
             return f"{kind(words | {'x-unit': own['x-unit']})}, table"
         return f"{kind(words)}, {kind(written | {key: own[key] for key in own if key != 'anyOf'})}"

@@ -6,7 +6,7 @@ four-point method gives the same cycles when its residue is appended to itself a
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any
 
@@ -78,6 +78,51 @@ def periodic(signal: ArrayLike, gate: float = 0.0) -> tuple[NDArray[np.float64],
     ranges, means = np.empty(x.size), np.empty(x.size)
     n = rainflow.count(x, float(gate), np.empty(x.size + 1), ranges, means)
     return ranges[:n], means[:n]
+
+
+def between(
+    visits: Sequence[int], low: NDArray[np.float64], high: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Rainflow cycles that a sequence of operating points closes beside those at each point.
+
+    The sequence repeats. A visit begins and ends at the largest load of the point, with the smallest between; cycles
+    between the two values of one point are those of its revolutions, and left out.
+
+    Parameters
+    ----------
+    visits : sequence of int
+        Points in the order in which they are visited.
+    low, high : ndarray, shape (n, points)
+        Smallest and largest load of each row at each point.
+
+    Returns
+    -------
+    ranges, means, numbers : ndarray, shape (n, k)
+        Cycles of each row, and how often each occurs in the sequence; 0 in empty places, ranges NaN where a load is.
+
+    Examples
+    --------
+    >>> between([0, 1], np.array([[0.0, 10.0]]), np.array([[1.0, 11.0]]))[0].tolist()
+    [[11.0]]
+    """
+    points = high.shape[1]
+    levels = np.hstack([high, low]).astype(float)
+    ranks = np.argsort(np.argsort(levels, axis=1, kind="stable"), axis=1)
+    orders, which = np.unique(ranks, axis=0, return_inverse=True)  # which cycles close depends on the order alone
+    found = [np.zeros((0, 3), np.intp)] * len(orders)
+    for i, order in enumerate(orders):
+        signal = order[np.column_stack([visits, points + np.asarray(visits), visits]).ravel()]
+        sizes, middles = periodic(signal)
+        ends = np.argsort(order)[np.column_stack([middles + 0.5 * sizes, middles - 0.5 * sizes]).round().astype(int)]
+        pairs, times = np.unique(ends[ends[:, 0] % points != ends[:, 1] % points], axis=0, return_counts=True)
+        found[i] = np.column_stack([pairs, times])
+    ranges, means, numbers = np.zeros((3, len(levels), max([1, *map(len, found)])))
+    for i, (top, bottom, number) in ((i, own.T) for i, own in enumerate(found)):
+        rows, k = np.flatnonzero(which.ravel() == i), len(number)
+        upper, lower = levels[rows][:, top], levels[rows][:, bottom]
+        ranges[rows, :k], means[rows, :k], numbers[rows, :k] = upper - lower, 0.5 * (upper + lower), number
+    ranges[np.isnan(levels).any(axis=1)] = np.nan
+    return ranges, means, numbers
 
 
 def count(loads: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:

@@ -37,9 +37,9 @@ def spectrum(
     """Write a study of the duty cycle in a measured signal.
 
     The signal has columns time, torque, speed of the input shaft and misalignment alpha, with units in the header: time
-    [s], torque [N*m], speed [rpm], alpha [deg]. Samples are sorted in classes; the classes that do most of the damage,
-    12 at most, become operating points with their shares of the time, which have the damage of their samples. The order
-    of their visits is written, too, for tolstat fatigue. Prints the points; what is left out is told.
+    [s], torque [N*m], speed [rpm], alpha [deg]. Samples are sorted in classes; the 12 classes that do most of the
+    damage, by revolutions and by changes of the torque, become operating points with their shares of the time. The
+    order of their visits is written, too, for tolstat fatigue. Prints the points; what is left out is told.
 
     Example: tolstat spectrum studies/drive_cycle.csv --out drive_cycle.toml
 
@@ -66,9 +66,11 @@ def spectrum(
     ]
     typer.echo(table.as_text(COLUMNS, rows))
     share, damage = text.percent(1.0 - cycle.time.sum()), text.percent(max(0.0, 1.0 - cycle.damage.sum()))
-    say(f"left out: {share} of the time in which the shaft turns, with {damage} of the damage (exponent {exponent:g})")
+    what = f"{damage} of the damage by revolutions (exponent {exponent:g})"
+    say(f"left out: {share} of the time in which the shaft turns, with {what}")
     say(f"shares in the study are of the time at the points; the shaft stands still for {text.percent(cycle.standing)}")
+    changes = f"their cycles of the torque do {text.percent(cycle.changes)} of the damage of those in the signal"
     others = f", {cycle.left_out} with smaller changes of the torque left out" if cycle.left_out else ""
-    say(f"{len(cycle.visits)} visits of the points in {cycle.turns:.4g} revolutions{others}")
+    say(f"{len(cycle.visits)} visits of the points in {cycle.turns:.4g} revolutions{others}; {changes}")
     say(f"wrote {out}")
     say(f"next: tolstat run {quote(str(out))}")

@@ -16,7 +16,7 @@ from tolstat.joint.contact import Station
 from tolstat.joint.orders import SpeedOrder, TorqueOrder
 from tolstat.joint.partner import Partner
 from tolstat.study.costs import CostEntry
-from tolstat.study.fatigue import LineEntry
+from tolstat.study.fatigue import LineEntry, SequenceEntry
 from tolstat.study.listing import Range
 from tolstat.study.model import SweepEntry
 from tolstat.study.points import PointEntry
@@ -210,6 +210,7 @@ def tables() -> dict[str, str]:
         "reject": RejectEntry,
         "range": Range,
         "line": LineEntry,
+        "sequence": SequenceEntry,
         "point": StressPointEntry,
         "cost": CostEntry,
         "torque order": TorqueOrder,

@@ -25,6 +25,8 @@ UNITS = {"time": "s", "angle": "rad", "speed": "rad/s", "torque": "N*m", "alpha"
 """SI unit of each column that a signal may have; others are ignored."""
 WRITTEN = {"speed": ("rad/s", "rpm", "%"), "torque": ("N*m", "N*m", "N*m")}
 """SI unit of a key of an operating point, unit in which its mean is written, and unit of an amplitude."""
+HEADS = {"time": "s", "angle": "deg", "speed": "rpm", "torque": "N*m", "alpha": "deg"}
+"""Unit of each column that a remedy proposes."""
 SHOWN = 20
 """Maximum number of faults of a file that are shown."""
 _HEAD = re.compile(r"\s*(\w+)\s*(?:\[([^\]]*)\])?\s*")
@@ -69,13 +71,12 @@ def read(path: Path, needed: Sequence[str] = ()) -> dict[str, FloatArray]:
             columns[name] = place, units.to_si(f"1 {match[2] or ''}", UNITS[name])
         except PydanticCustomError:
             columns[name] = place, math.nan
-            usual = units.EXAMPLES[UNITS[name]].partition(" ")[2]
             found = "has no unit" if not match[2] else f"[{match[2]}] is no unit of it"
-            faults.append(Fault(f"{path}:{head}: {name}", found, f"write the header {name} [{usual}]"))
+            faults.append(Fault(f"{path}:{head}: {name}", found, f"write the header {name} [{HEADS[name]}]"))
     for name in needed:
         if name not in columns:
-            example = f"{name} [{units.EXAMPLES[UNITS[name]].partition(' ')[2]}]"
-            faults.append(Fault(f"{path}:{head}", f"has no column {name}", f"add one with the header {example}"))
+            remedy = f"add one with the header {name} [{HEADS[name]}]"
+            faults.append(Fault(f"{path}:{head}", f"has no column {name}", remedy))
     numbers = [number for number, _ in lines[1:]]
     values = {name: np.array([_number(cells, place) for _, cells in lines[1:]]) for name, (place, _) in columns.items()}
     for name, own in values.items():

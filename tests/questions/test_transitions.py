@@ -60,7 +60,7 @@ def test_a_duty_cycle_with_a_sequence_adds_its_cycles():
     expected = 0.5 * 1.0 + 0.5 * (1.0 + 0.2**3) + 2 / 100 * 11.0**3
     np.testing.assert_allclose(cycles.moment(mixed, 3.0), expected)
     np.testing.assert_allclose(mixed.number, 0.5 + 1.0 + 0.02)
-    assert "4 visits of the points in 100 revolutions" in joints.duty_in_words[1]
+    assert "4 visits in 100 revolutions" in joints.duty_in_words[1]
     alone = replace(joints, settings=Fatigue())
     assert alone.transitions(np.zeros((2, 1, 2)), np.ones((2, 1, 2))) is None
     assert "gives no [fatigue.sequence]" in alone.duty_in_words[1]

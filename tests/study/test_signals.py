@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import math
+import tomllib
 
+import jsonschema
 import numpy as np
 import pytest
 
-from tests.study.test_points import ONE, REST, load
+from tests.study.test_points import HEAD, ONE, REST, load
 from tolstat.analysis import revolutions
+from tolstat.campaign.extend import extend
+from tolstat.campaign.run import run
 from tolstat.common.errors import InputError
+from tolstat.store import ResultFile
+from tolstat.study import schema as schemas
 from tolstat.study import signals
 
 SPEED = 150.0
@@ -83,6 +89,24 @@ def test_a_study_takes_orders_from_a_file_and_keeps_them(tmp_path, head):
     again = load(tmp_path, study.text.split("\n", 2)[2].split("[tolerances]")[0], REST)
     assert again.identity() == study.identity()
     assert "# measured" in study.text
+    schema = jsonschema.Draft7Validator(schemas.schema("study"))
+    assert [schema.is_valid(tomllib.loads(HEAD + own + REST)) for own in (text, text.replace("file", "fil"))] == [
+        True,
+        False,
+    ]
+
+
+def test_a_result_file_needs_no_signal(tmp_path):
+    time, _, speed, torque = made()
+    write(tmp_path / "engine.csv", "time [s],speed [rpm],torque [N*m]", time, speed * 30 / np.pi, torque)
+    solver = '[solver]\nfidelity = "ideal"\nsteps_per_rev = 24\n'
+    study = load(tmp_path, ONE.replace('torque = "100 N*m"', SIGNAL), REST.replace("n = 10", "n = 2"), solver)
+    run(study, tmp_path / "a.h5", workers=1, check=False)
+    (tmp_path / "engine.csv").unlink()
+    with ResultFile.open(tmp_path / "a.h5") as file:
+        assert [order.n for order in file.operation.torque_orders] == [2, 6]
+        assert file.view().study.identity() == study.identity()
+    assert not extend(tmp_path / "a.h5", 4).signals
 
 
 def test_faults_of_a_signal_come_together(tmp_path):

@@ -75,7 +75,7 @@ def periodic(signal: ArrayLike, gate: float = 0.0) -> tuple[NDArray[np.float64],
     x = np.ascontiguousarray(signal, dtype=float)
     if x.ndim != 1 or not x.size or not np.isfinite(x).all():
         raise ValueError(f"signal of shape {x.shape}: finite values of one period expected")
-    ranges, means = np.empty(x.size), np.empty(x.size)
+    ranges, means = np.empty((2, 1 + x.size // 2))
     n = rainflow.count(x, float(gate), np.empty(x.size + 1), ranges, means)
     return ranges[:n], means[:n]
 
@@ -109,18 +109,19 @@ def between(
     levels = np.hstack([high, low]).astype(float)
     ranks = np.argsort(np.argsort(levels, axis=1, kind="stable"), axis=1)
     orders, which = np.unique(ranks, axis=0, return_inverse=True)  # which cycles close depends on the order alone
-    found = [np.zeros((0, 3), np.intp)] * len(orders)
-    for i, order in enumerate(orders):
-        signal = order[np.column_stack([visits, points + np.asarray(visits), visits]).ravel()]
-        sizes, middles = periodic(signal)
-        ends = np.argsort(order)[np.column_stack([middles + 0.5 * sizes, middles - 0.5 * sizes]).round().astype(int)]
-        pairs, times = np.unique(ends[ends[:, 0] % points != ends[:, 1] % points], axis=0, return_counts=True)
-        found[i] = np.column_stack([pairs, times])
-    ranges, means, numbers = np.zeros((3, len(levels), max([1, *map(len, found)])))
-    for i, (top, bottom, number) in ((i, own.T) for i, own in enumerate(found)):
-        rows, k = np.flatnonzero(which.ravel() == i), len(number)
-        upper, lower = levels[rows][:, top], levels[rows][:, bottom]
-        ranges[rows, :k], means[rows, :k], numbers[rows, :k] = upper - lower, 0.5 * (upper + lower), number
+    course = np.column_stack([visits, points + np.asarray(visits), visits]).ravel()
+    found: list[tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]] = []
+    for order in orders:
+        sizes, middles = periodic(order[course])
+        place = np.argsort(order)
+        top, bottom = (place[np.rint(middles + end * sizes).astype(int)] for end in (0.5, -0.5))
+        pairs, times = np.unique((2 * points * top + bottom)[top % points != bottom % points], return_counts=True)
+        found.append((*np.divmod(pairs, 2 * points), times))
+    ranges, means, numbers = np.zeros((3, len(levels), max([1, *(len(times) for *_, times in found)])))
+    for row, own in enumerate(which.ravel()):
+        top, bottom, times = found[own]
+        upper, lower, k = levels[row, top], levels[row, bottom], len(times)
+        ranges[row, :k], means[row, :k], numbers[row, :k] = upper - lower, 0.5 * (upper + lower), times
     ranges[np.isnan(levels).any(axis=1)] = np.nan
     return ranges, means, numbers
 

@@ -68,10 +68,16 @@ class Joints:
         if len(self.duty) < 2:
             return []
         between = "not counted are cycles between the points: the study gives no [fatigue.sequence]"
-        if self.settings.visits:
-            visits = f"{len(self.settings.visits)} visits of the points in {self.settings.turns:g} revolutions"
-            between = f"cycles between the points are those of {visits}"
+        if self.visits:
+            between = f"cycles between the points: {len(self.visits)} visits in {self.settings.turns:g} revolutions"
         return [f"over a duty cycle: {shares}, shares of the revolutions", between]
+
+    @property
+    def visits(self) -> list[int]:
+        """Points of `duty` in the order of their visits; empty where the study gives no sequence of several of them."""
+        names = [name for name, _ in self.duty]
+        found = [names.index(name) for name in self.settings.visits if name in names]
+        return found if len(set(found)) > 1 else []
 
     def transitions(self, low: FloatArray, high: FloatArray) -> Transitions | None:
         """Cycles that the sequence of operating points closes beside those at each of them.
@@ -84,14 +90,12 @@ class Joints:
         Returns
         -------
         Transitions, optional
-            None where the study gives no sequence of several of the points.
+            None without `visits`.
         """
-        names = [name for name, _ in self.duty]
-        visits = [names.index(name) for name in self.settings.visits if name in names]
-        if len(set(visits)) < 2:
+        if not self.visits:
             return None
-        levels = (own.reshape(-1, len(names)) for own in (low, high))
-        ranges, means, numbers = (own.reshape(*low.shape[:2], -1) for own in rainflow.between(visits, *levels))
+        levels = (own.reshape(-1, len(self.duty)) for own in (low, high))
+        ranges, means, numbers = (own.reshape(*low.shape[:2], -1) for own in rainflow.between(self.visits, *levels))
         return Transitions(ranges, means, numbers / self.settings.turns)
 
 

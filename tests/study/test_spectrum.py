@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import runpy
 from dataclasses import replace
 
 import numpy as np
@@ -144,3 +145,11 @@ def test_signal_to_study_to_page_to_fatigue(tmp_path, monkeypatch):
     with ResultFile.open(tmp_path / "cycle.h5") as file:
         without = cycles.moment(load_cycles([file.view()], names=("cross1.F_t",)).cycles, 3.0)
     assert (sums > without).all()
+
+
+def test_the_signal_of_studies_is_made_by_the_script(tmp_path, monkeypatch):
+    made = runpy.run_path(str(ROOT / "data" / "drive_cycle.py"))
+    monkeypatch.setattr("sys.argv", ["drive_cycle.py", str(tmp_path / "a.csv"), "--minutes", "10", "--rate", "5"])
+    made["main"]()
+    assert (tmp_path / "a.csv").read_text() == SIGNAL.read_text()
+    assert "not measured" in SIGNAL.read_text().partition("\n")[0]

@@ -16,7 +16,7 @@ from tolstat.joint.contact import Station
 from tolstat.joint.orders import SpeedOrder, TorqueOrder
 from tolstat.joint.partner import Partner
 from tolstat.study.costs import CostEntry
-from tolstat.study.fatigue import LineEntry
+from tolstat.study.fatigue import LineEntry, SequenceEntry
 from tolstat.study.listing import Range
 from tolstat.study.model import SweepEntry
 from tolstat.study.points import PointEntry
@@ -64,7 +64,7 @@ def kind(own: Mapping[str, Any]) -> str:
     if "enum" in own:
         return ", ".join(f'`"{word}"`' for word in own["enum"])
     if "x-unit" in own and "anyOf" in own:
-        words, written = own["anyOf"]
+        words, written = own["anyOf"][:2]
         if written.get("type") == "object":
             return f"{kind(words | {'x-unit': own['x-unit']})}, table"
         return f"{kind(words)}, {kind(written | {key: own[key] for key in own if key != 'anyOf'})}"
@@ -210,6 +210,7 @@ def tables() -> dict[str, str]:
         "reject": RejectEntry,
         "range": Range,
         "line": LineEntry,
+        "sequence": SequenceEntry,
         "point": StressPointEntry,
         "cost": CostEntry,
         "torque order": TorqueOrder,

@@ -11,7 +11,8 @@ MADE = "run"
 """Name of the golden file with what making a campaign said."""
 FORMS = ("", " --wide", " --json")
 COMMANDS = (
-    *("new", "schema", "show", "simulate", "plan", "run", "extend", "merge", "status", "verify", "replay", "report"),
+    *("new", "spectrum", "schema", "show", "simulate", "plan"),
+    *("run", "extend", "merge", "status", "verify", "replay", "report"),
     *(
         "assumptions",
         "capability",
@@ -187,6 +188,11 @@ HELP = Campaign(
             "simulate iso2768_f.toml",
         ],
         "new": ["new first", "new shaft --joint own", "new first", "run first.toml --n 4", "simulate first.toml"],
+        "spectrum": [
+            "spectrum drive_cycle.csv --out cycle.toml",
+            "spectrum drive_cycle.csv --out other.toml --base iso2768_f.toml --exponent 5",
+            "spectrum overnight.csv --out none.toml",
+        ],
         "schema": ["schema study", "schema joint", "schema case --out case.json"],
         "show": ["show cirelli2021", "show tilted_pin.toml --columns 1", "show duty_cycle.toml --errors"],
         "plan": [

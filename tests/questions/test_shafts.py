@@ -8,13 +8,14 @@ import pytest
 import tolstat
 from tests.conftest import ROOT
 from tolstat import study
+from tolstat.analysis.sensitivity import first_order
 from tolstat.campaign.run import run
 from tolstat.common.errors import NotApplicable
-from tolstat.questions.shafts import interval
+from tolstat.questions.shafts import interval, shares_of_variance
 from tolstat.store import ResultFile
 
 STUDY = ROOT / "studies" / "drive_shaft.toml"
-CHEAP = ("[sampling]\nn = 1024", '[solver]\nfidelity = "quasistatic"\nsteps_per_rev = 24\n[sampling]\nn = 40')
+CHEAP = ("[sampling]\nn = 1024", '[solver]\nfidelity = "quasistatic"\nsteps_per_rev = 24\n[sampling]\nn = 60')
 
 
 @pytest.fixture(scope="module")
@@ -30,13 +31,34 @@ def view(tmp_path_factory):
 def test_a_shaft_is_joint_i_first_and_the_next_joint_second(view):
     first, second = (view.at(name).load("any limit").values > 1 for name in ("first", "second"))
     rows = {row["load"]: row for row in tolstat.shafts(view).frame("shafts").to_dict("records")}
-    pairs = [first[i] or second[(i + 1) % 40] for i in range(40)]
+    pairs = [first[i] or second[(i + 1) % 60] for i in range(60)]
     row = rows["any limit"]
-    assert (row["n"], row["count"]) == (40, sum(pairs))
-    assert 0 < row["count"] < 40
+    assert (row["n"], row["count"]) == (60, sum(pairs))
+    assert 0 < row["count"] < 60
     assert row["first"] == first.mean()
     assert row["second"] == second.mean()
     assert row["lower"] < row["estimate"] < row["upper"]
+
+
+def test_causes_of_shafts_name_each_line(view):
+    table = tolstat.shafts(view).frame("causes")
+    assert set(table["line"]) == {entry.pattern for entry in view.study.entries}
+    assert (table["first"] + table["second"]).to_numpy() == pytest.approx(table["estimate"].to_numpy())
+    assert (table["lower"] <= table["upper"]).all()
+    assert table["estimate"].is_monotonic_decreasing
+
+
+def test_an_error_of_either_joint_explains_its_share_of_the_shafts():
+    """Oracle: indices of the indicator of the pair itself."""
+    rng = np.random.default_rng(5)
+    x, y = rng.normal(size=(2, 100_000, 2))
+    above = [joint @ [1.0, 0.5] > level for joint, level in ((x, 0.7), (y, 1.4))]
+    pair = first_order(np.hstack([x, y]), (above[0] | above[1]).astype(float)).estimate
+    weights = shares_of_variance(*(own.mean() for own in above))
+    own = [w * first_order(j, a.astype(float)).estimate for w, j, a in zip(weights, (x, y), above, strict=True)]
+    np.testing.assert_allclose(np.concatenate(own), pair, atol=0.005)
+    assert shares_of_variance(0.0, 0.0) == shares_of_variance(1.0, 0.2) == (0.0, 0.0)
+    assert shares_of_variance(0.3, 0.0) == pytest.approx((1.0, 0.0))
 
 
 def test_output_of_the_shaft_against_differences_of_its_angle(view):

@@ -30,7 +30,7 @@ class Cycles(NamedTuple):
         Range and mean of each cycle, N or N m; a range of 0 marks an empty place, NaN a joint without results.
     number : ndarray, shape (n, channels)
         Cycles per revolution, including those not stored among the k; NaN for joints without results.
-    repeats : ndarray, shape (k,)
+    repeats : ndarray, shape (n, channels, k)
         Occurrences per revolution of the cycle in each place: 1, or the share of its operating point.
     omitted : ndarray, shape (n, channels, points)
         Cycles per revolution at each operating point that are not stored.
@@ -54,7 +54,7 @@ class Cycles(NamedTuple):
         stored = ranges > 0
         omitted = np.maximum(number - stored.sum(axis=2), 0.0)[..., None]
         ceiling = np.min(ranges, axis=2, initial=np.inf, where=stored)[..., None].astype(float)
-        return cls(channels, ranges, means, number, np.ones(ranges.shape[2]), omitted, ceiling)
+        return cls(channels, ranges, means, number, np.ones(ranges.shape), omitted, ceiling)
 
     def of(self, channel: str) -> Cycles:
         """Select one channel; the axis of channels stays, with length 1."""
@@ -66,34 +66,52 @@ class Cycles(NamedTuple):
         return self._picked((joints,))
 
     def _picked(self, part: tuple[slice, ...]) -> Cycles:
-        names = ("ranges", "means", "number", "omitted", "ceiling")
+        names = ("ranges", "means", "number", "repeats", "omitted", "ceiling")
         return self._replace(**{name: getattr(self, name)[part] for name in names})
 
 
-def duty_cycle(parts: Sequence[Cycles], shares: Sequence[float]) -> Cycles:
+class Transitions(NamedTuple):
+    """Cycles that going from one operating point to another closes, one place for each pair of points.
+
+    Attributes
+    ----------
+    ranges, means : ndarray, shape (n, channels, k)
+        Range and mean, N or N m; a range of 0 marks an empty place.
+    repeats : ndarray, shape (n, channels, k)
+        Occurrences per revolution.
+    """
+
+    ranges: FloatArray
+    means: FloatArray
+    repeats: FloatArray
+
+
+def duty_cycle(parts: Sequence[Cycles], shares: Sequence[float], transitions: Transitions | None = None) -> Cycles:
     """Duty cycle: the same joints under several operating points, each for a share of the revolutions.
 
     Parameters
     ----------
     parts : sequence of Cycles
-        Row i is the same joint in each. Cycles closed by the change of operating point itself are not included.
+        Row i is the same joint in each.
     shares : sequence of float
         Shares of the revolutions, positive, with the sum 1.
+    transitions : Transitions, optional
+        Cycles beside those at the points.
 
     Returns
     -------
     Cycles
         A joint without results at one operating point has none.
     """
-    return Cycles(
-        parts[0].channels,
-        np.concatenate([part.ranges for part in parts], axis=2),
-        np.concatenate([part.means for part in parts], axis=2),
-        np.sum([share * part.number for part, share in zip(parts, shares, strict=True)], axis=0),
-        np.concatenate([share * part.repeats for part, share in zip(parts, shares, strict=True)]),
-        np.concatenate([share * part.omitted for part, share in zip(parts, shares, strict=True)], axis=2),
-        np.concatenate([part.ceiling for part in parts], axis=2),
-    )
+    tables = [(part.ranges, part.means, share * part.repeats) for part, share in zip(parts, shares, strict=True)]
+    number = np.sum([share * part.number for part, share in zip(parts, shares, strict=True)], axis=0)
+    if transitions is not None:
+        tables.append(transitions)
+        number = number + transitions.repeats.sum(axis=2)
+    ranges, means, repeats = (np.concatenate(own, axis=2) for own in zip(*tables, strict=True))
+    omitted = np.concatenate([share * part.omitted for part, share in zip(parts, shares, strict=True)], axis=2)
+    ceiling = np.concatenate([part.ceiling for part in parts], axis=2)
+    return Cycles(parts[0].channels, ranges, means, number, repeats, omitted, ceiling)
 
 
 def spectrum(cycles: Cycles, numbers: ArrayLike) -> FloatArray:
@@ -115,7 +133,7 @@ def spectrum(cycles: Cycles, numbers: ArrayLike) -> FloatArray:
     wanted = np.atleast_1d(np.asarray(numbers, dtype=float)) * (1.0 - 1e-6)  # slack for rounded sums of shares
     order = np.argsort(-cycles.ranges, axis=2)
     ranges = np.take_along_axis(cycles.ranges, order, axis=2).astype(float)
-    reached = np.cumsum(cycles.repeats[order], axis=2)
+    reached = np.cumsum(np.take_along_axis(cycles.repeats, order, axis=2), axis=2)
     values = np.empty((*cycles.number.shape, wanted.size))
     for q, number in enumerate(wanted):
         place = np.minimum((reached < number).sum(axis=2, keepdims=True), reached.shape[2] - 1)
@@ -177,7 +195,7 @@ def moment(cycles: Cycles, m: float) -> FloatArray:
     """Sum of S^m over the cycles of a revolution, shape (n, channels); NaN for joints without results."""
     sums = np.empty(cycles.number.shape)
     for c in range(len(cycles.channels)):
-        sums[:, c] = cycles.ranges[:, c].astype(float) ** m @ cycles.repeats
+        sums[:, c] = np.einsum("nk,nk->n", cycles.ranges[:, c].astype(float) ** m, cycles.repeats[:, c])
     return sums
 
 

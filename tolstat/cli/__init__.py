@@ -16,6 +16,7 @@ __all__ = ["LISTED", "PLAIN", "app", "main"]
 PLAIN = {
     "Plan": {
         "new": "Write a study with comments that runs as it stands.",
+        "spectrum": "Write a study of the duty cycle in a measured signal.",
         "schema": "Print the JSON schema of a file, for editors.",
         "show": "Draw a joint, its errors, or one joint of a campaign.",
         "simulate": "Simulate one joint, with and without its errors.",

@@ -58,10 +58,12 @@ def print_warnings(path: Path, joints: Iterable[Joint], variants: Iterable[Varia
 def print_study_notes(path: Path, study: Study) -> None:
     """Print what a study stands on, and its warnings.
 
-    These are mounting and contact law; warnings of its joints, of values that are probably not meant, shares without an
-    interval, and a note where rigid shafts meet errors along them.
+    These are mounting and contact law; measured signals; warnings of its joints, of values that are probably not meant,
+    shares without an interval, and a note where rigid shafts meet errors along them.
     """
     say(f"{study.name}: {study.joint_in_words}")
+    for note in study.signals:
+        say(f"note: {note}")
     axial = [joint.shaft.axial for joint in study.joints]
     if note := mounting.note(study.tolerances, axial, mounting.command(str(path), path.stem, study.joint)):
         say(f"note: {note}")

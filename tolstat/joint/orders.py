@@ -137,8 +137,10 @@ def join_schemas(properties: dict[str, Any]) -> None:
         quantity = {name: own for name, own in properties[key].items() if name in ("type", "pattern")}
         table = {"type": "object", "required": ["mean"], "additionalProperties": False}
         table |= {"properties": {"mean": quantity, "orders": waves}}
+        signal = {"type": "string", "description": "measured signal, CSV", "examples": ["engine.csv"]}
+        file = {"type": "object", "required": ["file"], "additionalProperties": False, "properties": {"file": signal}}
         properties[key] = {name: own for name, own in properties[key].items() if name not in quantity}
-        properties[key] |= {"anyOf": [quantity, table]}
+        properties[key] |= {"anyOf": [quantity, table, file]}
 
 
 def parameters(

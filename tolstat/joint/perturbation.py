@@ -46,15 +46,16 @@ class Operation(Strict):
         units.Speed,
         AfterValidator(units.not_zero),
         Field(
-            description="speed of the input shaft, with orders { mean, orders }; negative: turns the other way",
+            description="speed of the input shaft, with orders { mean, orders }, or measured { file }; negative: turns "
+            "the other way",
             examples=["500 rpm"],
         ),
     ]
     torque: Annotated[
         units.Torque,
         Field(
-            description="resisting torque on the output shaft, with orders { mean, orders }; negative: drives the "
-            "output shaft",
+            description="resisting torque on the output shaft, with orders { mean, orders }, or measured { file }; "
+            "negative: drives the output shaft",
             examples=["100 N*m"],
         ),
     ]

@@ -7,8 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tolstat import sampling
 from tolstat.analysis import binomial
 from tolstat.analysis.independent import Independent
+from tolstat.analysis.sensitivity import FEWEST, MOST, first_order
 from tolstat.common.errors import Fault, NotApplicable
 from tolstat.common.load_kinds import ORDERS
 from tolstat.common.loads import ANY_LIMIT
@@ -33,6 +35,14 @@ LIMITS = (
     Column("95 % interval", lambda row: text.span(row["lower"], row["upper"])),
 )
 """Columns of the table ``shafts``."""
+CAUSES = (
+    Column("line of the drawing", lambda row: str(row["line"]), words=True),
+    Column("as first joint", lambda row: text.percent(row["first"]), rank=2),
+    Column("as second", lambda row: text.percent(row["second"]), rank=1),
+    Column("both", lambda row: text.percent(row["estimate"])),
+    Column("95 % interval", lambda row: text.span(row["lower"], row["upper"])),
+)
+"""Columns of the table ``causes``."""
 OUTPUT = (
     Column("output", lambda row: str(row["quantity"])),
     Column("ideal joints", lambda row: _value(row, "ideal")),
@@ -87,6 +97,7 @@ def shafts(view: View) -> Answer:
         where it has one), ``first`` and ``second`` (share of the joints above it there), ``n``, ``count``,
         ``estimate``, ``lower``, ``upper`` (95 %, shafts without a valid load counted both ways). A joint is in two
         shafts: the interval counts n shafts as n/2 independent ones, which it is too wide for by at most 41 %. Table
+        ``causes``, see `_causes`, where the file has `FEWEST` joints and more, none of them correlated. Table
         ``output``: ``quantity``, ``unit``, ``ideal`` (two ideal joints), ``at_most_50`` and ``at_most_95`` (upper
         bounds for shares of the shafts, from the speed errors of both joints): unevenness (largest less smallest
         speed, relative to its mean) and largest angular acceleration.
@@ -104,6 +115,10 @@ def shafts(view: View) -> Answer:
     if names := list(dict.fromkeys((*pair.first.limits, *pair.second.limits))):
         rows = [_limit(pair, name) for name in (*names, ANY_LIMIT)]
         parts.append(Table("shafts", "Drive shafts with a joint above a limit", LIMITS, rows))
+        if causes := _causes(pair):
+            title = "Shafts with a joint above any limit: share of the variance that each line causes by itself"
+            parts.append(Table("causes", title, CAUSES, causes))
+            parts.append(Sentence("lines by themselves, corrected for chance; the rest is by errors that act together"))
     parts.append(Table("output", "How unevenly the output of the shaft turns", OUTPUT, _output(pair)))
     errors = pair.sum_of("psi")
     speed_error = float(np.quantile(errors, QUANTILES[-1])) if errors.size else np.nan
@@ -150,6 +165,62 @@ def _limit(pair: Shafts, name: str) -> Row:
     if isinstance(pair.first.design, Independent) and n:
         lower, upper = interval(count, most, n)
     return row | {"lower": lower, "upper": upper}
+
+
+def _causes(pair: Shafts) -> Rows:
+    """Share of the variance of the indicator "a joint of the shaft is above any limit" by line of the drawing.
+
+    The first-order index of an error of either joint is its index for that joint's own indicator times the joint's
+    share of the variance, see `shares_of_variance`.
+
+    Returns
+    -------
+    sequence of mapping
+        One row per entry of ``[tolerances]``, the largest first: ``line``, ``first``, ``second`` (at either place),
+        ``estimate`` (their sum), ``lower``, ``upper`` (95 %, those of the errors taken as independent).
+    """
+    study = pair.first.study
+    loads = [view.load(ANY_LIMIT) for view in pair]
+    samples = [np.flatnonzero(load.is_valid)[:MOST] for load in loads]
+    above = [load.values[rows] > (load.limit or 0.0) for load, rows in zip(loads, samples, strict=True)]
+    if study.copula.names or study.sampling.is_matched or min(map(len, samples)) < FEWEST:
+        return []
+    weights = shares_of_variance(*(float(own.mean()) for own in above))
+    if not sum(weights) > 0:
+        return []
+    parts: dict[str, tuple[float, ...]] = {}
+    wide: dict[str, float] = {}
+    for place, view in enumerate(pair):
+        weight = weights[place]
+        errors = sampling.components(study, view.errors(samples[place], sampling.columns(study)))
+        errors = {name: own for name, own in errors.items() if np.ptp(own) > 0}
+        independent = isinstance(view.design, Independent)
+        found = first_order(np.column_stack(list(errors.values())), above[place].astype(float), iid=independent)
+        for entry in study.entries:
+            here = [name in entry.quantities or name[:-2] in entry.quantities for name in errors]
+            own = weight * np.nan_to_num(found.estimate[here])
+            half = weight * (found.upper - found.estimate)[here] if weight else np.zeros(1)
+            parts[entry.pattern] = (*parts.get(entry.pattern, ()), float(own.sum()))
+            wide[entry.pattern] = wide.get(entry.pattern, 0.0) + float((half**2).sum())
+    rows = []
+    for line, (first, second) in parts.items():
+        ends = {"estimate": first + second, "lower": max(0.0, first + second - wide[line] ** 0.5)}
+        ends |= {"upper": min(1.0, first + second + wide[line] ** 0.5)}
+        rows.append({"line": line, "first": first, "second": second} | ends)
+    return sorted(rows, key=lambda row: -float(row["estimate"]))
+
+
+def shares_of_variance(p: float, q: float) -> tuple[float, float]:
+    """Shares of the variance of "either is above" that two independent joints explain by themselves.
+
+    (1 - q)^2 p (1 - p) / (s (1 - s)) of the first, with the shares p and q of the joints above a limit and that of the
+    shafts, s = p + q - p q; 0 where no shaft has a joint above, or each has one.
+    """
+    below = (1.0 - p) * (1.0 - q)
+    if not 0.0 < below < 1.0:
+        return 0.0, 0.0
+    first, second = ((1.0 - y) ** 2 * x * (1.0 - x) / (below * (1.0 - below)) for x, y in ((p, q), (q, p)))
+    return first, second
 
 
 def interval(count: int, most: int, n: int, confidence: float = 0.95) -> tuple[float, float]:

@@ -6,7 +6,7 @@ four-point method gives the same cycles when its residue is appended to itself a
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any
 
@@ -75,9 +75,55 @@ def periodic(signal: ArrayLike, gate: float = 0.0) -> tuple[NDArray[np.float64],
     x = np.ascontiguousarray(signal, dtype=float)
     if x.ndim != 1 or not x.size or not np.isfinite(x).all():
         raise ValueError(f"signal of shape {x.shape}: finite values of one period expected")
-    ranges, means = np.empty(x.size), np.empty(x.size)
+    ranges, means = np.empty((2, 1 + x.size // 2))
     n = rainflow.count(x, float(gate), np.empty(x.size + 1), ranges, means)
     return ranges[:n], means[:n]
+
+
+def between(
+    visits: Sequence[int], low: NDArray[np.float64], high: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Rainflow cycles that a sequence of operating points closes beside those at each point.
+
+    The sequence repeats. A visit begins and ends at the largest load of the point, with the smallest between; cycles
+    between the two values of one point are those of its revolutions, and left out.
+
+    Parameters
+    ----------
+    visits : sequence of int
+        Points in the order in which they are visited.
+    low, high : ndarray, shape (n, points)
+        Smallest and largest load of each row at each point.
+
+    Returns
+    -------
+    ranges, means, numbers : ndarray, shape (n, k)
+        Cycles of each row, and how often each occurs in the sequence; 0 in empty places, ranges NaN where a load is.
+
+    Examples
+    --------
+    >>> between([0, 1], np.array([[0.0, 10.0]]), np.array([[1.0, 11.0]]))[0].tolist()
+    [[11.0]]
+    """
+    points = high.shape[1]
+    levels = np.hstack([high, low]).astype(float)
+    ranks = np.argsort(np.argsort(levels, axis=1, kind="stable"), axis=1)
+    orders, which = np.unique(ranks, axis=0, return_inverse=True)  # which cycles close depends on the order alone
+    course = np.column_stack([visits, points + np.asarray(visits), visits]).ravel()
+    found: list[tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]] = []
+    for order in orders:
+        sizes, middles = periodic(order[course])
+        place = np.argsort(order)
+        top, bottom = (place[np.rint(middles + end * sizes).astype(int)] for end in (0.5, -0.5))
+        pairs, times = np.unique((2 * points * top + bottom)[top % points != bottom % points], return_counts=True)
+        found.append((*np.divmod(pairs, 2 * points), times))
+    ranges, means, numbers = np.zeros((3, len(levels), max([1, *(len(times) for *_, times in found)])))
+    for row, own in enumerate(which.ravel()):
+        top, bottom, times = found[own]
+        upper, lower, k = levels[row, top], levels[row, bottom], len(times)
+        ranges[row, :k], means[row, :k], numbers[row, :k] = upper - lower, 0.5 * (upper + lower), times
+    ranges[np.isnan(levels).any(axis=1)] = np.nan
+    return ranges, means, numbers
 
 
 def count(loads: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -13,10 +13,23 @@ from pydantic import AfterValidator, Field, model_validator
 from tolstat.common import strict, units
 from tolstat.common.channels import UNIT_OF_CHANNEL
 from tolstat.common.errors import Fault, InputError, gather
-from tolstat.common.strict import Strict, read_section, refuse
+from tolstat.common.strict import Strict, did_you_mean, read_section, refuse
 from tolstat.study import stress_point
 from tolstat.study.selection import Assignments, Entry, entries, quantity, resolve
 from tolstat.study.stress_point import Exponent, Positive, StressPoint
+
+
+class SequenceEntry(Strict):
+    """Order in which the operating points of a duty cycle are visited; it repeats."""
+
+    points: Annotated[
+        str,
+        Field(
+            description="operating points in the order of their visits, with blanks between them",
+            examples=["drive start drive climb"],
+        ),
+    ]
+    revolutions: Annotated[Positive, Field(description="revolutions of the input shaft in it", examples=[90000])]
 
 
 class Settings(Strict):
@@ -50,6 +63,13 @@ class Settings(Strict):
         AfterValidator(units.not_negative),
         Field(description="starts from standstill in the service life, for points", examples=[2e4]),
     ] = 0.0
+    sequence: Annotated[
+        SequenceEntry | None,
+        Field(
+            description="order in which the operating points are visited, whose changes of load are counted, too",
+            examples=[{"points": "drive start drive climb", "revolutions": 9e4}],
+        ),
+    ] = None
     point: dict[str, Any] = Field(
         default_factory=dict,
         description="points of the parts by name, with stress per load and S–N line",
@@ -105,6 +125,10 @@ class Fatigue:
         Starts from standstill in the service life.
     points : tuple of StressPoint
         Points of the parts.
+    visits : tuple of str
+        Operating points in the order of their visits, which repeats; empty if it is not given.
+    turns : float
+        Revolutions of the input shaft in it.
     """
 
     exponents: tuple[float, ...] = (3.0, 5.0, 10.0)
@@ -115,6 +139,8 @@ class Fatigue:
     lines: dict[str, tuple[float, float, float]] = field(default_factory=dict)
     starts: float = 0.0
     points: tuple[StressPoint, ...] = ()
+    visits: tuple[str, ...] = ()
+    turns: float = 1.0
 
     def within(self, hours: float, hourly: float, place: str) -> Fatigue:
         """Settings with the service life that bearings require, unless the section gives one.
@@ -151,7 +177,7 @@ class Fatigue:
         return f"{self.hours:g} h ({self.revolutions:.4g} revolutions)"
 
 
-def read(table: object, place: str) -> Fatigue:
+def read(table: object, place: str, names: Sequence[str] = ()) -> Fatigue:
     """Read ``[fatigue]``.
 
     Parameters
@@ -160,6 +186,8 @@ def read(table: object, place: str) -> Fatigue:
         The section as parsed.
     place : str
         File name shown in faults.
+    names : sequence of str
+        Operating points of the study, if they are known.
 
     Raises
     ------
@@ -172,6 +200,10 @@ def read(table: object, place: str) -> Fatigue:
     with gather(faults):
         settings = strict.validate(Settings, table, place, prefix=("fatigue",))
     points: tuple[StressPoint, ...] = ()
+    visits = tuple(settings.sequence.points.split()) if settings.sequence else ()
+    if unknown := sorted(set(visits) - set(names)) if names else []:
+        found = f"no operating point {unknown[0]!r}"
+        faults.append(Fault(f"{place}: fatigue.sequence.points", found, did_you_mean(unknown[0], names)))
     for entry in entries(_inner(table, "line"), "fatigue", "line"):
         with gather(faults):
             names = resolve(entry, UNIT_OF_CHANNEL, place)
@@ -188,6 +220,8 @@ def read(table: object, place: str) -> Fatigue:
         lines=lines,
         starts=settings.starts,
         points=points,
+        visits=visits,
+        turns=settings.sequence.revolutions if settings.sequence else 1.0,
         **revolutions,  # type: ignore[arg-type]
     )
 

@@ -19,7 +19,7 @@ from tolstat.joint.assumed import Assumed
 from tolstat.joint.derived import BEARING
 from tolstat.joint.overrides import leaves, merged
 from tolstat.joint.reading import faults_of_assumed, is_joint
-from tolstat.study import fatigue, known, listing, points, proposal, selection, selective, sorting, swept
+from tolstat.study import fatigue, known, listing, points, proposal, selection, selective, signals, sorting, swept
 from tolstat.study.axes import is_zone, zone_of
 from tolstat.study.design import Design
 from tolstat.study.model import MAX_ROWS, Output, Sampling, Solver, SweepAxis, SweepEntry
@@ -50,8 +50,8 @@ SECTIONS_OF = {
 class StudyFile:
     """A TOML file and the faults found in it so far.
 
-    Each method reads one section, notes its faults and returns what could be read; `finish` raises if there
-    was any fault.
+    Each method reads one section, notes its faults and returns what could be read; `finish` raises if there was any.
+    `text` has mean and orders in place of measured signals.
 
     Parameters
     ----------
@@ -75,10 +75,14 @@ class StudyFile:
         if is_joint(self.data):
             remedy = f'name it in a study, base = "{path.name}" under [joint]; tolstat new writes one'
             raise InputError([Fault(self.place, "is a joint file, not a study or case", remedy)])
-        self.text = read_input(path) if text is None else text
+        self._source = read_input(path) if text is None else text
         self._lined = text is None
         self._overridden: set[str] = set()
         self._faults: list[Fault] = []
+        self.text, self.signals = self._source, tuple[str, ...]()
+        if "file" in self._source:
+            self.text, self.signals = signals.replaced(self._source, self.data, self.path, self._faults)
+            self.data = read_toml(path, self.text)
         self._claims = Assignments(self.place)
         self._toleranced: dict[str, str] = {}
         self._together: list[tuple[str, ...]] = []
@@ -98,7 +102,7 @@ class StudyFile:
         """
         if not self._faults:
             return
-        lined = strict.with_lines(self._faults, self.place, self.text) if self._lined else self._faults
+        lined = strict.with_lines(self._faults, self.place, self._source) if self._lined else self._faults
         pairs = zip(self._faults, lined, strict=True)
         raise InputError([fault if fault.place in self._overridden else found for fault, found in pairs])
 
@@ -111,8 +115,8 @@ class StudyFile:
     def model(self, section: str, model: type[ModelT], *, required: bool = False) -> ModelT | None:
         """Read a section that is one model; the model has its defaults where the file lacks the section."""
         if required and section not in self.data:
-            one_joint = f"; to simulate one joint: tolstat simulate {self.place}" if section == "sampling" else ""
-            self._fault((section,), "missing table", f"add [{section}]{one_joint}")
+            alone = f"; to simulate one joint: tolstat simulate {self.place}" if section == "sampling" else ""
+            self._fault((section,), "missing table", f"add [{section}]{alone}")
             return None
         with gather(self._faults):
             return strict.validate(model, self.data.get(section, {}), self.place, prefix=(section,))
@@ -273,10 +277,10 @@ class StudyFile:
                 limits |= dict.fromkeys(names, value)
         return limits
 
-    def fatigue(self) -> fatigue.Fatigue:
+    def fatigue(self, at: Sequence[Point]) -> fatigue.Fatigue:
         """``[fatigue]``: settings for the evaluation of load cycles."""
         with gather(self._faults):
-            return fatigue.read(self.data.get("fatigue", {}), self.place)
+            return fatigue.read(self.data.get("fatigue", {}), self.place, [point.name for point in at])
         return fatigue.Fatigue()
 
     def listed(self, joint: Joint | None, operation: Operation | None, solver: Solver | None) -> Design | None:

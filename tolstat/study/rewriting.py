@@ -120,11 +120,16 @@ def with_keys(text: str, changes: Mapping[tuple[int | str, ...], Mapping[str, An
 
 def inline(table: Mapping[str, Any]) -> str:
     """Table in one line, with the tables in it."""
-    values = {
-        key: inline(value) if isinstance(value, Mapping) else tomlkit.item(value).as_string()
-        for key, value in table.items()
-    }
-    return f"{{ {', '.join(f'{key} = {value}' for key, value in values.items())} }}"
+    return f"{{ {', '.join(f'{key} = {_literal(value)}' for key, value in table.items())} }}"
+
+
+def _literal(value: Any) -> str:
+    """Value in one line."""
+    if isinstance(value, Mapping):
+        return inline(value)
+    if isinstance(value, list) and any(isinstance(item, Mapping) for item in value):
+        return f"[{', '.join(map(_literal, value))}]"
+    return str(tomlkit.item(value).as_string())
 
 
 def _put(table: Any, key: str, value: Any) -> None:
@@ -136,5 +141,5 @@ def _put(table: Any, key: str, value: Any) -> None:
         comments = []
         while body and body[-1][0] is None:
             comments.append(body.pop())
-        table[key] = tomlkit.value(inline(value)) if isinstance(value, Mapping) else value
+        table[key] = tomlkit.value(_literal(value)) if isinstance(value, Mapping | list) else value
         body.extend(reversed(comments))

@@ -67,17 +67,21 @@ def write(path: Path, joint: str) -> list[Path]:
 
 def _files(path: Path, joint: str) -> Iterator[tuple[Path, str]]:
     base = f"{path.stem}_joint.toml" if joint == OWN else joint
-    study = (TEMPLATES / "study.toml").read_text(encoding="utf-8")
-    force, torque = LIMITS.get(joint, LIMIT)
-    values = {"JOINT": base, "FORCE": force, "TORQUE": torque, "STUDY.toml": path.name, "STUDY.h5": f"{path.stem}.h5"}
-    for word, value in values.items():
-        study = study.replace(word, value)
-    yield path, _header("study") + study
+    yield path, _header("study") + study_text(path, base, LIMITS.get(joint, LIMIT))
     if joint == OWN:
         text = "# The joint as designed. Keys behind a # may be left out; their values are those of another joint.\n"
         yield path.with_name(base), _header("joint") + text + joint_text()
     for kind in ("study", "joint") if joint == OWN else ("study",):
         yield path.with_name(_schema_name(kind)), json.dumps(schema(kind), indent=1, ensure_ascii=False) + "\n"
+
+
+def study_text(path: Path, base: str, limits: tuple[str, str] = LIMIT) -> str:
+    """Study with comments, of a name, on the joint `base`, with limits on force and torque of cross bushings."""
+    study = (TEMPLATES / "study.toml").read_text(encoding="utf-8")
+    words = {"JOINT": base, "FORCE": limits[0], "TORQUE": limits[1]}
+    for word, value in (words | {"STUDY.toml": path.name, "STUDY.h5": f"{path.stem}.h5"}).items():
+        study = study.replace(word, value)
+    return study
 
 
 def _schema_name(kind: str) -> str:

@@ -88,6 +88,8 @@ class Study(Case):
         Inspections at assembly; like limits they affect no joint.
     assumed : tuple of Assumed
         Assumptions that the study adds to those of its joint, see `assumptions`; they affect no joint.
+    signals : tuple of str
+        Notes on the measured signals that speed or torque follow from, see `signals.replaced`.
     """
 
     sampling: Sampling
@@ -108,6 +110,7 @@ class Study(Case):
     fit: Fit | None = None
     rejects: tuple[Gauge, ...] = ()
     assumed: tuple[Assumed, ...] = ()
+    signals: tuple[str, ...] = ()
 
     @property
     def has_axial_force(self) -> bool:
@@ -319,7 +322,7 @@ def load(path: str | Path, n: int | None = None, text: str | None = None, joint:
     sweep = file.sweep()
     limits = file.limits(points)
     rejects = file.rejects()
-    fatigue = file.fatigue()
+    fatigue = file.fatigue(points)
     output = file.model("output", Output)
     listed = None
     moved: tuple[Group, ...] = ()
@@ -370,6 +373,7 @@ def load(path: str | Path, n: int | None = None, text: str | None = None, joint:
         assumed=assumed,
         fatigue=fatigue,
         groups=moved,
+        signals=file.signals,
     )
     if found := made.faults_of_mounting():
         raise InputError(found)

@@ -298,6 +298,8 @@ def _notes_on_loads(loading: Loading, rows: Rows) -> Iterator[str]:
     cycles = f"loads are ranges: {settings.reference_cycles:g} cycles of them do the damage of "
     yield f"{loading.settled}; {cycles}{settings.service_life}"
     yield from loading.duty_in_words
+    if loading.visits:
+        yield "of a load that is constant at one of the points they are not known, and not counted"
     if not loading.design.has_interval("quantile"):
         yield "no intervals: order statistics hold for independent samples only"
     lacking = max((row["lacking"] for row in rows), default=0.0)

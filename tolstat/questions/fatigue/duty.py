@@ -8,11 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tolstat.analysis.cycles import Transitions
 from tolstat.analysis.design import Design
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import FloatArray
 from tolstat.common.tables import ERROR_FIELDS, Status, worst_status
 from tolstat.display.text import percent
+from tolstat.solver import rainflow
 from tolstat.store import points
 from tolstat.store.recorded import joint_of
 from tolstat.store.view import View
@@ -61,9 +63,40 @@ class Joints:
 
     @property
     def duty_in_words(self) -> list[str]:
-        """Sentence on the shares of a duty cycle; none for a single operating point."""
+        """Sentences on the shares of a duty cycle and its sequence; none for a single operating point."""
         shares = ", ".join(f"{percent(share)} at {name}" for name, share in self.duty)
-        return [f"over a duty cycle: {shares}, shares of the revolutions"] if len(self.duty) > 1 else []
+        if len(self.duty) < 2:
+            return []
+        between = "not counted are cycles between the points: the study gives no [fatigue.sequence]"
+        if self.visits:
+            between = f"cycles between the points: {len(self.visits)} visits in {self.settings.turns:g} revolutions"
+        return [f"over a duty cycle: {shares}, shares of the revolutions", between]
+
+    @property
+    def visits(self) -> list[int]:
+        """Points of `duty` in the order of their visits; empty where the study gives no sequence of several of them."""
+        names = [name for name, _ in self.duty]
+        found = [names.index(name) for name in self.settings.visits if name in names]
+        return found if len(set(found)) > 1 else []
+
+    def transitions(self, low: FloatArray, high: FloatArray) -> Transitions | None:
+        """Cycles that the sequence of operating points closes beside those at each of them.
+
+        Parameters
+        ----------
+        low, high : ndarray, shape (n, channels, points)
+            Smallest and largest load at each point of `duty`; NaN where it is not known.
+
+        Returns
+        -------
+        Transitions, optional
+            None without `visits`.
+        """
+        if not self.visits:
+            return None
+        levels = (own.reshape(-1, len(self.duty)) for own in (low, high))
+        ranges, means, numbers = (own.reshape(*low.shape[:2], -1) for own in rainflow.between(self.visits, *levels))
+        return Transitions(ranges, means, numbers / self.settings.turns)
 
 
 def members(views: Sequence[View], shares: Sequence[float] | None) -> tuple[Sequence[View], list[float]]:

@@ -176,10 +176,24 @@ def load_cycles(
         parts.append((whole.rows(slice(first, None)), whole.rows(slice(settled))))
     # the nominal joint of a duty cycle has settled at all operating points, or it has no row
     rows = slice(min(len(nominal.number) for _, nominal in parts))
-    own = cycles.duty_cycle([own for own, _ in parts], shares)
+    own = _mixed(joints, [own for own, _ in parts], shares)
     return Loading(
-        **vars(joints), cycles=own, nominal=cycles.duty_cycle([nominal.rows(rows) for _, nominal in parts], shares)
+        **vars(joints), cycles=own, nominal=_mixed(joints, [nominal.rows(rows) for _, nominal in parts], shares)
     )
+
+
+def _mixed(joints: Joints, parts: Sequence[Cycles], shares: Sequence[float]) -> Cycles:
+    """Cycles over the duty cycle; those between points of loads whose largest cycle at each point is known."""
+    sizes, middles = (
+        np.stack([own[..., 0] for own in each], axis=2).astype(float)
+        for each in ([part.ranges for part in parts], [part.means for part in parts])
+    )
+    sizes[sizes == 0] = np.nan  # a constant load: its level is not kept
+    between = joints.transitions(middles - 0.5 * sizes, middles + 0.5 * sizes)
+    if between is not None:
+        unknown = np.isnan(between.ranges) & ~np.isnan(parts[0].number)[..., None]
+        between.ranges[unknown] = between.repeats[unknown] = 0.0
+    return cycles.duty_cycle(parts, shares, between)
 
 
 def equivalent_loads(loading: Loading) -> Rows:
@@ -262,7 +276,8 @@ def spectrum(loading: Loading, channel: str) -> Rows:
     """
     part = loading.cycles.of(channel)
     order = np.argsort(-part.ranges[:, 0], axis=1)
-    steps = np.cumsum(part.repeats[order], axis=1)[np.take_along_axis(part.ranges[:, 0], order, axis=1) > 0]
+    steps = np.cumsum(np.take_along_axis(part.repeats[:, 0], order, axis=1), axis=1)
+    steps = steps[np.take_along_axis(part.ranges[:, 0], order, axis=1) > 0]
     numbers = np.unique(np.append(steps.round(9), 1.0))  # at which the spectra of the joints have steps
     numbers = numbers[np.linspace(0, numbers.size - 1, min(numbers.size, MAX_NUMBERS)).round().astype(int)]
     values, nominal = (cycles.spectrum(own.of(channel), numbers)[:, 0] for own in (loading.cycles, loading.nominal))

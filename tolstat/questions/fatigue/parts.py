@@ -107,10 +107,11 @@ def load_stresses(views: Sequence[View], shares: Sequence[float] | None = None, 
     slots = [np.append(view.nominal_slots[:both], view.slots(rows[both:] - 1)) for view in views]
     found = [stresses_of(view.store, own, joints.settings.points) for view, own in zip(views, slots, strict=True)]
     parts = [_spread(own, rows, 1 + joints.status.size) for own, _ in found]
-    low, high = np.min([part.low for part in parts], axis=0), np.max([part.high for part in parts], axis=0)
-    mixed = Stresses(duty_cycle([part.cycles for part in parts], shares), low, high)
+    low, high = (np.stack([getattr(part, end) for part in parts], axis=2) for end in ("low", "high"))
+    mixed = duty_cycle([part.cycles for part in parts], shares, joints.transitions(low, high))
+    whole = Stresses(mixed, low.min(axis=2), high.max(axis=2))
     apart = max(difference for _, difference in found)
-    return Stressed(**vars(joints), own=mixed.rows(slice(1, None)), nominal=mixed.rows(slice(both)), apart=apart)
+    return Stressed(**vars(joints), own=whole.rows(slice(1, None)), nominal=whole.rows(slice(both)), apart=apart)
 
 
 def stresses_of(store: Reader, slots: NDArray[np.intp], points: Sequence[StressPoint]) -> tuple[Stresses, float]:
@@ -258,7 +259,7 @@ def _in_service(stresses: Stresses, place: int, line: Line, settings: Fatigue) -
     """
     cycles = stresses.cycles
     ranges, means = cycles.ranges[:, place], cycles.means[:, place]
-    numbers = np.broadcast_to(cycles.repeats * settings.revolutions, ranges.shape).copy()
+    numbers = cycles.repeats[:, place] * settings.revolutions
     if settings.starts:
         joints = np.arange(len(ranges))
         numbers[joints, np.argmax(np.nan_to_num(ranges), axis=1)] -= settings.starts

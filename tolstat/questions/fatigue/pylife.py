@@ -85,7 +85,7 @@ def table(
                 ends[:, kind] = edges[here], edges[here + 1]
         columns |= dict(zip((f"{name}_left", f"{name}_right"), ends, strict=True))
     keys = ["joint", "channel", *(f"{name}_{side}" for name in INTERVALS for side in ("left", "right"))]
-    frame = pd.DataFrame(columns | {"cycles": cycles.repeats[place] * revolutions})
+    frame = pd.DataFrame(columns | {"cycles": cycles.repeats[joint, channel, place] * revolutions})
     classes = frame.groupby([*keys[:2], "unit", *keys[2:]])[["cycles"]].sum().reset_index()
     classes["channel"] = np.array(cycles.channels, dtype=object)[classes["channel"]]
     return classes

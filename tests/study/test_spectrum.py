@@ -1,0 +1,155 @@
+"""Duty cycles from measured signals: damage against the Miner sum of the samples, visits, the study, its fatigue."""
+
+from __future__ import annotations
+
+import runpy
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from tests.conftest import ROOT
+from tests.study.test_signals import write
+from tolstat import study
+from tolstat.analysis import cycles, load_spectrum
+from tolstat.cli import app
+from tolstat.questions.fatigue.loads import load_cycles
+from tolstat.store import ResultFile
+
+SIGNAL = ROOT / "studies" / "drive_cycle.csv"
+RPM = np.pi / 30
+
+
+def steps(*each, rate=100.0):
+    """Signal of steps: seconds, torque (N m), speed (rpm), misalignment (deg)."""
+    rows = np.repeat(np.array([own[1:] for own in each], float), [round(own[0] * rate) for own in each], axis=0)
+    return np.arange(len(rows)) / rate, rows[:, 0], rows[:, 1] * RPM, np.radians(rows[:, 2])
+
+
+def test_steps_become_points_with_their_shares_and_visits():
+    low, high, back = (30, 100, 600, 10), (10, 400, 300, 15), (10, -200, 600, 10)
+    found = load_spectrum.duty_cycle(*steps(low, high, low, (20, 50, 0, 10), back, high, (1, 0, 600, 10)), 3.0)
+    turns = {100: 600, 400: 100, -200: 100}
+    total = sum(abs(torque) ** 3 * n for torque, n in turns.items())
+    assert dict(zip(found.torque.round(6).tolist(), found.damage, strict=True)) == pytest.approx(
+        {torque: abs(torque) ** 3 * n / total for torque, n in turns.items()}, rel=2e-3
+    )
+    order = np.argsort(found.torque)
+    assert np.degrees(found.alpha[order]).round(6).tolist() == [10, 10, 15]
+    np.testing.assert_allclose(found.speed[order] / RPM, [600, 600, 300])
+    np.testing.assert_allclose(found.time[order], [10 / 91, 60 / 91, 20 / 91], rtol=2e-3)
+    # the signal goes from 400 to -200 and to 0, the visits from 400 to -200 and to 100
+    assert found.changes == pytest.approx((600**3 + 300**3) / (600**3 + 400**3))
+    assert found.standing == pytest.approx(20 / 111, rel=2e-3)
+    assert [found.torque[visit].round() for visit in found.visits] == [100, 400, 100, -200, 400]
+    assert found.turns == pytest.approx(800, rel=2e-3)
+
+
+@pytest.mark.parametrize("m", [3.0, 5.0])
+def test_damage_is_the_miner_sum_of_the_samples(m):
+    rng = np.random.default_rng(1)
+    n = 20_000
+    time, torque = np.cumsum(rng.uniform(0.05, 0.15, n)), np.cumsum(rng.normal(size=n)) + 100.0
+    speed, alpha = rng.uniform(20.0, 200.0, n), rng.uniform(0.1, 0.3, n)
+    found = load_spectrum.duty_cycle(time, torque, speed, alpha, m)
+    weight = 0.5 * (np.append(np.diff(time), 0) + np.append(0, np.diff(time)))
+    whole = np.sum(np.abs(torque) ** m * weight * speed)
+    points = np.abs(found.torque) ** m * found.time * weight.sum() * found.speed
+    assert len(points) <= load_spectrum.MOST
+    np.testing.assert_allclose(points / whole, found.damage)
+    assert load_spectrum.COVERED <= found.damage.sum() <= 1.0 + 1e-12
+
+
+def test_of_many_visits_those_with_the_largest_changes_of_the_torque_stay():
+    small, large = [(2, 100, 600, 10), (2, 140, 600, 10)], (2, 400, 600, 10)
+    found = load_spectrum.duty_cycle(*steps(*[*small * 300, large] * 3, rate=20.0), 3.0)
+    assert len(found.visits) <= load_spectrum.VISITS
+    assert found.torque[found.visits].round().tolist().count(400) == 3
+    assert found.left_out > 1000
+
+
+def test_short_visits_are_none():
+    found = load_spectrum.duty_cycle(*steps((10, 100, 600, 10), (0.05, 300, 600, 10), (10, 100, 600, 10)), 3.0)
+    assert len(found.torque) == 2
+    assert len(set(found.visits.tolist())) == 1
+
+
+def test_a_signal_without_torque_has_no_duty_cycle():
+    with pytest.raises(ValueError, match="no torque"):
+        load_spectrum.duty_cycle(*steps((10, 0, 600, 10), (10, 90, 0, 10)), 3.0)
+
+
+def spectrum(*args):
+    return CliRunner().invoke(app, ["spectrum", *map(str, args)])
+
+
+def test_the_study_runs_as_it_stands_and_keeps_what_its_base_says(tmp_path):
+    path, base = tmp_path / "cycle.toml", ROOT / "studies" / "duty_cycle.toml"
+    done = spectrum(SIGNAL, "--out", path)
+    assert done.exit_code == 0
+    assert "damage by revolutions (exponent 3)" in done.stderr.replace("\n    ", " ")
+    made = study.load(path)
+    assert len(made.points) == len(done.stdout.splitlines()) - 1 <= 12
+    assert sum(point.share for point in made.points) == pytest.approx(1.0, abs=1e-8)
+    assert set(made.fatigue.visits) <= {point.name for point in made.points}
+    assert made.output.histories == "cycles"
+    text = base.read_text().replace('"cross*.F at drive" = "2.5 kN"\n', "")
+    (tmp_path / "base.toml").write_text(text)
+    assert spectrum(SIGNAL, "--out", path, "--base", tmp_path / "base.toml", "--exponent", 5).exit_code == 0
+    again = study.load(path)
+    assert (again.fatigue.starts, again.sampling.n, again.fatigue.points[0].name) == (2e4, 512, "weld corner, fork1")
+    assert again.fatigue.visits
+
+
+def test_nothing_is_written_of_a_signal_or_a_base_with_faults(tmp_path):
+    path, signal = tmp_path / "cycle.toml", tmp_path / "signal.csv"
+    n = np.arange(20.0)
+    write(signal, "time [s],torque [N*m]", n, n)
+    done = spectrum(signal, "--out", path)
+    assert done.exit_code == 2
+    assert "has no column speed" in done.stderr
+    assert "has no column alpha" in done.stderr
+    done = spectrum(
+        SIGNAL, "--out", path, "--base", ROOT / "studies" / "duty_cycle.toml"
+    )  # limits at a point of its own
+    assert done.exit_code == 2
+    assert "no operating point 'drive'" in done.stderr
+    assert not path.exists()
+
+
+@pytest.mark.slow
+def test_signal_to_study_to_page_to_fatigue(tmp_path, monkeypatch):
+    """Welds of the duty cycle in the made signal, with few joints; without the sequence they are damaged less."""
+    monkeypatch.chdir(tmp_path)
+    text = (ROOT / "studies" / "duty_cycle.toml").read_text().replace('"cross*.F at drive" = "2.5 kN"\n', "")
+    (tmp_path / "base.toml").write_text(text + '\n[solver]\nfidelity = "quasistatic"\nsteps_per_rev = 36\n')
+    call = CliRunner().invoke
+    for command in (
+        ["spectrum", str(SIGNAL), "--out", "cycle.toml", "--base", "base.toml"],
+        ["run", "cycle.toml", "--n", "6", "--workers", "1", "--no-verify"],
+        ["report", "cycle.h5", "--out", "cycle.html"],
+        ["fatigue", "cycle.h5", "--by", "cross1.F_t", "--json"],
+    ):
+        done = call(app, command)
+        assert done.exit_code == 0, (command, done.stderr)
+    assert "Fatigue" in (tmp_path / "cycle.html").read_text()
+    with ResultFile.open(tmp_path / "cycle.h5") as file:
+        view = file.view()
+        with_sequence = load_cycles([view], names=("cross1.F_t",))
+        visited = set(with_sequence.settings.visits)
+    assert len(visited) > 6
+    sums = cycles.moment(with_sequence.cycles, 3.0)
+    alone = replace(with_sequence.settings, visits=())
+    monkeypatch.setattr("tolstat.questions.fatigue.duty.settings_of", lambda *_: alone)
+    with ResultFile.open(tmp_path / "cycle.h5") as file:
+        without = cycles.moment(load_cycles([file.view()], names=("cross1.F_t",)).cycles, 3.0)
+    assert (sums > without).all()
+
+
+def test_the_signal_of_studies_is_made_by_the_script(tmp_path, monkeypatch):
+    made = runpy.run_path(str(ROOT / "data" / "drive_cycle.py"))
+    monkeypatch.setattr("sys.argv", ["drive_cycle.py", str(tmp_path / "a.csv"), "--minutes", "10", "--rate", "5"])
+    made["main"]()
+    assert (tmp_path / "a.csv").read_text() == SIGNAL.read_text()
+    assert "not measured" in SIGNAL.read_text().partition("\n")[0]

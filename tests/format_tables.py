@@ -70,12 +70,6 @@ def status_table() -> str:
     return "\n".join(lines + [f"| {s.value} | `{s.label}` | {tables.STATUS_TEXT[s]} |" for s in tables.Status])
 
 
-def motion_table() -> str:
-    """Markdown table of the values of ``motion``."""
-    lines = ["| motion | name | meaning |", "|---|---|---|"]
-    return "\n".join(lines + [f"| {m.value} | `{m.label}` | {tables.MOTION_TEXT[m]} |" for m in tables.Motion])
-
-
 def law_table() -> str:
     """Markdown table of the contact laws, a line for each kind of station."""
     lines = ["| law | stations at s | coefficients of a station | weight |", "|---|---|---|---|"]
@@ -109,7 +103,7 @@ def documents() -> dict[Path, str]:
     origin = {f"origin {method}": draw_records.columns({"method": method}) for method in draw_records.FIELDS}
     parts = {"design": DESIGN_COLUMNS, "ledger": LEDGER_COLUMNS} | origin
     content = {name: field_table(columns) for name, columns in parts.items()}
-    content |= {"status": status_table(), "motion": motion_table(), "session": session_table(), "axes": axis_table()}
+    content |= {"status": status_table(), "session": session_table(), "axes": axis_table()}
     page = {"errors": field_table(ERROR_COLUMNS), "results": field_table(RESULT_COLUMNS)}
     return {
         FORMAT: updated(FORMAT.read_text(encoding="utf-8"), content),

@@ -70,8 +70,8 @@ cases = ["beyond the largest number"]
 )
 
 
-HERE = (Status.CRASHED, Status.NOT_PERIODIC, Status.NOT_RESOLVED)
-"""States that are reached elsewhere: one that the kernel has no part in, see test_survival.py, and two that only few of
+HERE = (Status.CRASHED, Status.NOT_RESOLVED)
+"""States that are reached elsewhere: one that the kernel has no part in, see test_survival.py, and one that only few of
 the joints that rattle end in, see test_refinement.py and test_rattle.py."""
 
 

@@ -25,7 +25,7 @@ def test_kernels_see_the_same_bytes() -> None:
     table = np.zeros(3, RESULT)
     rows = for_kernels(table)
     rows.largest[:] = np.arange(3 * N_LOADS).reshape(3, N_LOADS)
-    rows.average[:], rows.range[:], rows.lyapunov[:] = rows.largest[:, :N_AVERAGED], -1.0, 7.0
+    rows.average[:], rows.range[:], rows.step_error[:] = rows.largest[:, :N_AVERAGED], -1.0, 7.0
     np.testing.assert_array_equal(largest(table), rows.largest)
     for kind in LOAD_KINDS:
         expected = rows.largest[:, SPAN[kind.key]].reshape(3, *kind.shape)
@@ -33,7 +33,7 @@ def test_kernels_see_the_same_bytes() -> None:
         if kind.averaged:
             np.testing.assert_array_equal(table[f"{kind.key}_mean"], expected)
             assert (table[f"{kind.key}_range"] == -1).all()
-    assert (table["lyapunov"] == 7).all()
+    assert (table["step_error"] == 7).all()
 
 
 def test_the_range_of_a_modulus_that_falls_to_zero_is_not_above_its_largest_value(params) -> None:

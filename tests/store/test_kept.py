@@ -52,7 +52,7 @@ def fake(**kwargs: object) -> fakes.Study:
 
 def test_how_the_simulation_went_is_always_kept() -> None:
     assert COURSE[0] == "status"
-    assert {"settled", "closure", "motion", "period", "newton_iterations", "failed_theta"} <= set(COURSE)
+    assert {"settled", "closure", "period", "newton_iterations", "failed_theta"} <= set(COURSE)
     assert not [name for name in COURSE if "." in name or name == "psi_max"]
     left_out = [c for c in RESULT_COLUMNS if c.name not in COURSE]
     assert {c.dtype for c in left_out} == {"f8"}  # so that NaN can stand for them

@@ -21,7 +21,7 @@ from tolstat.common import tables
 from tolstat.common.columns import ERROR_COLUMNS, RESULT_COLUMNS
 from tolstat.common.counts import Counts
 from tolstat.common.errors import StoreError
-from tolstat.common.tables import Motion, Simulation, Status
+from tolstat.common.tables import Simulation, Status
 from tolstat.store import ResultFile, Writer, metadata, provenance
 from tolstat.store.hdf5 import text
 from tolstat.store.metadata import Metadata
@@ -111,7 +111,6 @@ def test_frame_holds_all_rows_and_columns(tmp_path: Path, study: fakes.Study) ->
     assert frame["nominal"].tolist() == [True] + [False] * (study.n - 1)
     pd.testing.assert_frame_equal(without, frame.iloc[1:].drop(columns="nominal"), check_index_type=False)
     assert without.index.tolist() == list(range(1, study.n))
-    assert frame["motion"].tolist() == [Motion(m).label for m in results["motion"]]
     assert frame.index.name == "row"
     assert len(frame) == study.n
     assert frame["status"].tolist() == [Status(s).label for s in results["status"]]
@@ -124,7 +123,7 @@ def test_frame_holds_all_rows_and_columns(tmp_path: Path, study: fakes.Study) ->
 def test_counts(tmp_path: Path, study: fakes.Study) -> None:
     rows = np.arange(4)
     part = simulation(study, rows)
-    part.results["status"] = [Status.NOT_PERIODIC, Status.NOT_SETTLED, Status.NOT_FINITE, Status.NOT_RESOLVED]
+    part.results["status"] = [Status.NOT_SETTLED, Status.NOT_SETTLED, Status.NOT_FINITE, Status.NOT_RESOLVED]
     with new_store(tmp_path / "a.h5", study) as store:
         store.write(rows, part)
         assert store.counts() == Counts(total=12, done=4, unsettled=3, failed=1, not_resolved=1)

@@ -21,7 +21,6 @@ from tolstat.common.tables import (
     STATUS_TEXT,
     UNSETTLED,
     HistorySpec,
-    Motion,
     Options,
     Status,
     iterations_allowed,
@@ -118,7 +117,7 @@ def remedy(row: np.void, options: Mapping[str, Any]) -> str:
     str
         Empty for a joint that is ok.
     """
-    status, motion = Status(int(row["status"])), Motion(int(row["motion"]))
+    status = Status(int(row["status"]))
     if status in (Status.OK, Status.PENDING):
         return ""
     if status in WITHOUT_RESULTS:
@@ -129,17 +128,14 @@ def remedy(row: np.void, options: Mapping[str, Any]) -> str:
         return f"the solution overflowed at {_place(row)}: try solver.steps_per_rev = {_more_steps(options)}"
     if status == Status.NOT_RESOLVED:
         return _of_unresolved(row, options)
-    if status == Status.STATIONARY and motion == Motion.SUBHARMONIC:
+    if status == Status.STATIONARY and row["period"] > 1:
         return f"the motion repeats every {row['period']} revolutions; the results cover all of them"
     if status == Status.STATIONARY:
         return f"the motion never repeats; the largest loads of {options['duration']} revolutions have an interval"
-    if motion == Motion.SLOW or (status == Status.NOT_SETTLED and float(row["closure_trend"]) < -1e-3):
+    if float(row["closure_trend"]) < -1e-3:
         return _of_slow(row, options)
-    if motion in (Motion.QUASI_PERIODIC, Motion.CHAOTIC):
-        kind = motion.label.replace("_", "-")
-        return f"the motion is {kind} and its largest loads still change: try solver.max_revs = {_more_revs(options)}"
-    classify = "" if options["max_refinements"] else ", and solver.max_refinements = 3 to classify the motion"
-    return f"try solver.max_revs = {_more_revs(options)}{classify}"
+    refine = "" if options["max_refinements"] else ", and solver.max_refinements = 3 if it never repeats"
+    return f"the largest loads still change: try solver.max_revs = {_more_revs(options)}{refine}"
 
 
 def _place(row: np.void) -> str:
@@ -176,10 +172,7 @@ def _of_unresolved(row: np.void, options: Mapping[str, Any]) -> str:
 
 
 def _of_slow(row: np.void, options: Mapping[str, Any]) -> str:
-    trend = float(row["closure_trend"])
-    if not trend < -1e-3:
-        return f"neighbouring motions converge: try solver.max_revs = {_more_revs(options)}"
-    missing = math.log10(float(row["closure"]) / options["settle_tol"]) / -trend
+    missing = math.log10(float(row["closure"]) / options["settle_tol"]) / -float(row["closure_trend"])
     revs = float(row["revolutions"]) + missing
     if revs > MAX_REVS:
         return f"would settle in some {revs:.0f} revolutions: give a larger solver.settle_tol"

@@ -15,7 +15,7 @@ from tolstat.common import loads
 from tolstat.common.channels import BUSHING_LOADS, SHAFT_LOADS, LoadHistory
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.load_kinds import CONTACTS, PINS
-from tolstat.common.tables import Motion, Options, Simulation, Status
+from tolstat.common.tables import Options, Simulation, Status
 from tolstat.joint import ideal, nominal_errors, perturb
 from tolstat.solver.compilation import warm_up
 from tolstat.solver.simulation import simulate_rows
@@ -65,7 +65,6 @@ class CaseResult(NamedTuple):
             "settled": bool(row["settled"]),
             "closure": _number(row["closure"]),
             "closure_trend": _number(row["closure_trend"]),
-            "motion": Motion(row["motion"]).label,
             "period": int(row["period"]),
             "revolutions": _number(row["revolutions"]),
             "steps": int(row["steps"]),

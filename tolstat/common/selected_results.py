@@ -1,6 +1,6 @@
 """Which results a campaign keeps: all of them, or those that ``[output] results`` of its study selects.
 
-Columns on the course of a simulation (status, closure, motion, counts) are always kept: results are meaningless
+Columns on the course of a simulation (status, closure, period, counts) are always kept: results are meaningless
 without them.
 """
 

@@ -19,7 +19,7 @@ from tolstat.common.fields import Field, dtype_of
 from tolstat.common.load_kinds import JOINT, LOAD_KINDS, OVER, PINS
 from tolstat.common.parameters import PARAM_FIELDS
 
-SCHEMA_VERSION = 10
+SCHEMA_VERSION = 11
 """Version of the result file: raise it with every change of its layout, and so of the fields of errors and results."""
 HOLES = tuple(f"hole{i}" for i in (1, 2, 3, 4))
 STEPS_PER_ITERATION = 5
@@ -51,8 +51,7 @@ class Status(IntEnum):
     NEWTON_FAILED = 3
     NOT_FINITE = 4
     OUTSIDE_MODEL = 5
-    NOT_PERIODIC = 6
-    CRASHED = 8  # 7 was a joint that made no progress, in files of earlier versions
+    CRASHED = 8  # 6 and 7 were states of joints in files of earlier versions
     INVALID_INPUT = 9
     NOT_RESOLVED = 10
     STATIONARY = 11
@@ -63,7 +62,7 @@ class Status(IntEnum):
         return self.name.lower()
 
 
-UNSETTLED = (Status.NOT_SETTLED, Status.NOT_PERIODIC, Status.NOT_RESOLVED)
+UNSETTLED = (Status.NOT_SETTLED, Status.NOT_RESOLVED)
 """States of a joint whose results would change with other revolutions or with finer steps."""
 
 VALID = (Status.OK, Status.STATIONARY)
@@ -104,8 +103,6 @@ STATUS_TEXT = {
     Status.OK: "settled; results valid",
     Status.NOT_SETTLED: "closure error still above solver.settle_tol after all revolutions, and largest loads that "
     "still change; results are those of the last revolutions",
-    Status.NOT_PERIODIC: "not the same in each revolution: quasi-periodic or chaotic, see motion, and not stationary; "
-    "results are those of the last revolutions",
     Status.NOT_RESOLVED: "largest loads not confirmed by finer steps (refinement_change, NaN if these failed); results "
     "are those of the finest steps taken",
     Status.STATIONARY: "never the same in each revolution, but its largest loads are as large in the first half of the "
@@ -154,32 +151,6 @@ class Mode(IntEnum):
     ONE_POINT = 1
     TWO_POINT = 2
     UNIFORM = 3
-
-
-class Motion(IntEnum):
-    """Class of a joint's motion; its period is counted in revolutions of the input shaft."""
-
-    UNKNOWN = 0
-    PERIODIC = 1
-    SLOW = 2
-    SUBHARMONIC = 3
-    QUASI_PERIODIC = 4
-    CHAOTIC = 5
-
-    @property
-    def label(self) -> str:
-        """Name as it is written to the user: ``"quasi_periodic"``."""
-        return self.name.lower()
-
-
-MOTION_TEXT = {
-    Motion.UNKNOWN: "not known: no results, or fewer revolutions than it takes to tell",
-    Motion.PERIODIC: "the same in each revolution",
-    Motion.SLOW: "still settling: its closure error falls, or neighbouring motions converge",
-    Motion.SUBHARMONIC: "the same after 2 to 8 revolutions, see period",
-    Motion.QUASI_PERIODIC: "repeats in no number of revolutions, and neighbouring motions stay neighbours",
-    Motion.CHAOTIC: "repeats in no number of revolutions, and neighbouring motions part exponentially",
-}
 
 
 class Options(NamedTuple):
@@ -284,10 +255,12 @@ RESULT_FIELDS = (
     Field("status", "1", "see Status", "u1"),
     Field("settled", "1", "1 when the closure error is below solver.settle_tol", "u1"),
     Field("closure", "1", "closure error of the last revolution"),
-    Field("closure_trend", "1", "change of log10(closure) a revolution, fitted to the last revolutions"),
-    Field("motion", "1", "class of the motion, see Motion", "u1"),
+    Field(
+        "closure_trend",
+        "1",
+        "change of log10(closure) a revolution, fitted to the last revolutions; after refinement 0 if it shows no fall",
+    ),
     Field("period", "1", "revolutions after which the motion repeats; 0 where it does not or is not known", "u1"),
-    Field("lyapunov", "1", "largest Lyapunov exponent a revolution, of joints that neither settle nor repeat"),
     Field("failed_step", "1", "step of the output grid at which the joint failed, from 1; -1 if it did not", "i4"),
     Field("failed_theta", "rad", "input angle at the start of that step, less whole revolutions"),
     Field("revolutions", "1", "revolutions integrated, the recorded one included"),

@@ -12,7 +12,7 @@ from tolstat.analysis.gamma import gamma as relative_errors
 from tolstat.campaign.remedy import remedy
 from tolstat.common import selected_results
 from tolstat.common.load_kinds import BUSHINGS
-from tolstat.common.tables import Motion, Status, Variant
+from tolstat.common.tables import Status, Variant
 from tolstat.display.answer import Answer, Document, Part, Sentence, Table
 from tolstat.display.table import Row, Rows, plain
 from tolstat.questions.shares import inapplicable, rows_of
@@ -21,7 +21,7 @@ from tolstat.store import Reader, recorded, verification
 from tolstat.store.view import View
 from tolstat.study.design import IDEAL
 
-RANKED = ("status", "alpha [deg]", "motion")
+RANKED = ("status", "alpha [deg]", "period")
 """Columns that a narrow terminal leaves out, the last first."""
 
 
@@ -37,7 +37,7 @@ def cases(view: View) -> Answer:
     -------
     Answer
         Table ``cases``, one row per joint: ``variant``, the ``values`` that define it, ``note``, ``alpha [deg]``,
-        ``case``, ``status``, ``motion``, ``revolutions``, ``cost`` (`refinement.work` relative to the first joint),
+        ``case``, ``status``, ``period``, ``revolutions``, ``cost`` (`refinement.work` relative to the first joint),
         ``remedy``; force and torque of each bushing, SI, and their Gamma, eq. (14), per cent; loads that the study does
         not keep are left out. If the file holds a comparison with the reference (``tolstat verify``), also
         ``reference`` (status of the reference simulation, empty for joints that were not compared),
@@ -74,7 +74,7 @@ def _rows(store: Reader) -> Rows:
         "alpha [deg]": np.degrees(recorded.operating_points(store)["alpha"]).tolist(),
         "case": [store.case_names[i] for i in design["case"]],
         "status": [Status(int(code)).label for code in results["status"]],
-        "motion": [_motion(row) for row in results],
+        "period": results["period"].tolist(),
         "revolutions": results["revolutions"].tolist(),
         "cost": (work / max(1.0, float(work[0]))).tolist(),
         "remedy": [remedy(row, store.options | _solver(v)) for row, v in zip(results, variants, strict=True)],
@@ -103,11 +103,6 @@ def _reference(store: Reader) -> dict[str, Sequence[Any]]:
     return {name: values.tolist() for name, values in columns.items()}
 
 
-def _motion(row: np.void) -> str:
-    motion = Motion(int(row["motion"]))
-    return f"{motion.label} {row['period']}" if motion == Motion.SUBHARMONIC else motion.label
-
-
 def _solver(variant: Variant) -> dict[str, Any]:
     """Options of the solver that a variant sets."""
     return {key.removeprefix("solver."): own for key, own in variant.values.items() if key.startswith("solver.")}
@@ -115,7 +110,7 @@ def _solver(variant: Variant) -> dict[str, Any]:
 
 def _worst(row: Row) -> dict[str, Any]:
     """Row for people: Gamma of the largest modulus among the bushings kept, signed, for force and for torque."""
-    short = {key: row[key] for key in ("variant", "alpha [deg]", "case", "status", "motion")}
+    short = {key: row[key] for key in ("variant", "alpha [deg]", "case", "status", "period")}
     for head in ("Gamma_F [%]", "Gamma_T [%]"):
         if gamma := _of_bushings(row, head):
             short[head] = max(gamma, key=lambda x: -1.0 if np.isnan(x) else abs(x))
@@ -132,7 +127,7 @@ def _markdown(rows: Rows) -> str:
     One line per joint: status, largest force and torque, their errors if known, and its cost relative to the first
     joint.
     """
-    heads = ["joint", "what makes it hard", "status", "motion", "revolutions", "max F (N)", "max T (N m)", "cost"]
+    heads = ["joint", "what makes it hard", "status", "period", "revolutions", "max F (N)", "max T (N m)", "cost"]
     checked = "reference" in rows[0]
     heads += ["error of F", "error of T"] if checked else []
     lines = [f"| {' | '.join(heads)} |", f"|{'---|' * len(heads)}"]
@@ -140,7 +135,7 @@ def _markdown(rows: Rows) -> str:
         joint = [row["variant"], row["note"]] if row["case"] == IDEAL else [f"{row['variant']}, {row['case']}", ""]
         largest = (float(np.fmax.reduce(_of_bushings(row, load), initial=np.nan)) for load in ("F [N]", "T [N*m]"))
         numbers = (f"{x:.3g}" for x in (row["revolutions"], *largest, row["cost"]))
-        cells = [*joint, row["status"], row["motion"], *numbers, *(_errors(row) if checked else [])]
+        cells = [*joint, row["status"], str(row["period"] or "–"), *numbers, *(_errors(row) if checked else [])]
         lines.append(f"| {' | '.join(cells)} |".replace("nan", "–"))
     return "\n".join(lines) + "\n"
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.common.load_kinds import LOAD_KINDS, SPAN, measure_of
-from tolstat.common.tables import VALID, Motion, Status
+from tolstat.common.tables import VALID, Status
 
 DISCARDED_SHARE = 1 / 3
 """Share of the revolutions watched that is discarded at their beginning."""
@@ -64,8 +64,8 @@ def classify(results: Table, blocks: Table, duration: int) -> None:
     duration : int
         Number of revolutions whose largest loads are predicted.
     """
-    for i in np.flatnonzero(np.isin(results["status"], (Status.NOT_SETTLED, Status.NOT_PERIODIC))):
-        if results["motion"][i] == Motion.SUBHARMONIC:
+    for i in np.flatnonzero(results["status"] == Status.NOT_SETTLED):
+        if results["period"][i] > 1:
             results["status"][i] = Status.STATIONARY
             continue
         made = int(results["revolutions"][i])
@@ -90,7 +90,7 @@ def fill_intervals(results: Table) -> None:
     results : ndarray of RESULT, shape (n,)
         Joints; ends of stationary ones that never repeat are left as they are.
     """
-    never = (results["status"] == Status.STATIONARY) & (results["motion"] != Motion.SUBHARMONIC)
+    never = (results["status"] == Status.STATIONARY) & (results["period"] <= 1)
     for kind in SPAN:
         for end in ("lower", "upper"):
             own = results[f"{kind}_{end}"]

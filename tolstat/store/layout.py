@@ -19,7 +19,7 @@ from tolstat.common import draw_records, selected_results
 from tolstat.common.channels import BUSHING_LOADS, MEASURING, SHAFT_LOADS, LoadHistory, channels_of
 from tolstat.common.columns import DESIGN_COLUMNS, ERROR_COLUMNS, LEDGER_COLUMNS, Column
 from tolstat.common.load_kinds import BUSHINGS, CONTACTS, PINS, SHAFTS
-from tolstat.common.tables import SCHEMA_VERSION, HistorySpec, Mode, Motion, Status
+from tolstat.common.tables import SCHEMA_VERSION, HistorySpec, Mode, Status
 from tolstat.store import metadata as documents
 from tolstat.store.hdf5 import BLOCK, put, put_attributes, put_scale, store_error
 from tolstat.store.metadata import Metadata
@@ -303,7 +303,6 @@ MAX_MEANINGS = 1000
 """Largest number of meanings that a column carries: attributes of HDF5 are small."""
 MEANINGS: dict[str, Mapping[int, str]] = {
     "status": _labels(Status),
-    "motion": _labels(Motion),
     "settled": {0: "not_settled", 1: "settled"},
     "nominal": {0: "joint_with_errors", 1: "nominal_joint"},
     "mode": _labels(Mode),

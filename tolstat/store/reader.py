@@ -21,7 +21,7 @@ from tolstat.common import draw_records, selected_results, tables
 from tolstat.common.columns import DESIGN_COLUMNS, ERROR_COLUMNS, Column
 from tolstat.common.counts import Counts, Session
 from tolstat.common.errors import Fault, StoreError
-from tolstat.common.tables import Motion, Status
+from tolstat.common.tables import Status
 from tolstat.joint import Operation
 from tolstat.store import layout, metadata
 from tolstat.store.checksums import GROUP, ROWS, CheckedFile, Integrity
@@ -213,7 +213,9 @@ class Reader:
         found = np.array(self.column("results", "status", slots))
         if found.any():  # PENDING is 0
             found[self._damaged(slots)] = Status.PENDING
-        return self._codes(found, Status)
+        if found.size and found.max() > max(Status):
+            raise store_error(self.path, f"is damaged: a joint has the unknown status {found.max()}", RUN_AGAIN)
+        return found
 
     def pending(self) -> NDArray[np.intp]:
         """File slots still to be simulated at the operating point, ascending."""
@@ -249,8 +251,6 @@ class Reader:
             table[name][pending] = np.nan if tables.RESULT[name].base.kind == "f" else 0
         if "status" in names:
             table["status"] = status
-        if "motion" in names:
-            self._codes(table["motion"], Motion)
         return table
 
     def attempt(self, slots: slice = slice(None)) -> NDArray[np.int32]:
@@ -370,12 +370,6 @@ class Reader:
             if c.field in fields:
                 c.of(table)[:] = self.column(group, c.name, slice(first, last))
         return table
-
-    def _codes(self, found: NDArray[np.uint8], codes: type[Status] | type[Motion]) -> NDArray[np.uint8]:
-        if found.size and found.max() > max(codes):
-            name = codes.__name__.lower()
-            raise store_error(self.path, f"is damaged: a joint has the unknown {name} {found.max()}", RUN_AGAIN)
-        return found
 
     def _damaged(self, slots: slice) -> NDArray[np.bool_]:
         """Whether rows are in a block of which a result is damaged, (m,)."""

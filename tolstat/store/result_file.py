@@ -98,8 +98,8 @@ class ResultFile(Reader):
         -------
         pandas.DataFrame
             Index ``row``: row of the campaign. Columns: case, variant, family and group for a study that lists its
-            joints; how each joint was drawn, where that is recorded; errors; kept results, ``status`` and ``motion``
-            as text. ``attrs["units"]`` has the SI unit of each column.
+            joints; how each joint was drawn, where that is recorded; errors; kept results, ``status`` as
+            text. ``attrs["units"]`` has the SI unit of each column.
         """
         return to_pandas(self, nominal)
 
@@ -215,8 +215,7 @@ def _frame(store: Reader, rows: slice, nominal: bool, listed: Mapping[str, NDArr
     data |= {c.name: c.of(results) for c in store.columns}
     if store.retries:
         data["attempt"] = store.attempt(rows)
-    for name in ("status", "motion"):
-        data[name] = np.array([MEANINGS[name][code] for code in data[name].tolist()], dtype=object)
+    data["status"] = np.array([MEANINGS["status"][code] for code in data["status"].tolist()], dtype=object)
     frame = pd.DataFrame(data, index=pd.RangeIndex(store.rows[rows], name="row"))
     columns = described(store)
     frame.attrs["units"] = {name: columns[name].unit if name in columns else "1" for name in data}

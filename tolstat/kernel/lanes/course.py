@@ -254,9 +254,7 @@ def start_cell(lane, c, options, control, motion, past):
         past.begun[0, i], past.begun[1, i] = motion.q0[i, lane], motion.v0[i, lane]
         past.begun[2, i] = motion.a0[i, lane]
     control.k[lane], control.origin[lane] = c, (c - 1) * control.grid[lane]
-    turns = past.turns
-    again = next_level(turns.revolution - turns.since, own, before)
-    control.level[lane] = again if turns.beside == 0 else int(own.level)
+    control.level[lane] = next_level(past.turns.revolution - past.turns.since, own, before)
     control.began[lane] = control.level[lane]
     start_parts(lane, options, control, past)
 
@@ -301,14 +299,13 @@ def part(lane, par, lanes, options, control, motion, samples, fine, past, out):
     if control.stage[lane] == 0:
         set_stage(lane, 1, options, control)
         return NOT_SETTLED, True
-    controlled, whole = past.turns.beside == 0, 1 << options.max_halvings
-    if controlled:
-        control.worst[lane] = max(control.worst[lane], control.error[lane])
-        if not control.error[lane] <= 1:
-            status = reject_cell(lane, options, control, motion, past)
-            return status, status == NOT_SETTLED
-        record(control.part[lane], lane, lanes[0], lanes[1], lanes[2].v, fine)
-        count_in(control.part[lane], fine, past.extremes[0])
+    whole = 1 << options.max_halvings
+    control.worst[lane] = max(control.worst[lane], control.error[lane])
+    if not control.error[lane] <= 1:
+        status = reject_cell(lane, options, control, motion, past)
+        return status, status == NOT_SETTLED
+    record(control.part[lane], lane, lanes[0], lanes[1], lanes[2].v, fine)
+    count_in(control.part[lane], fine, past.extremes[0])
     control.steps[lane] += 1
     control.done[lane] += whole >> control.level[lane]
     control.part[lane] += 1
@@ -327,22 +324,18 @@ def finish_cell(lane, par, lanes, options, control, motion, samples, past, out):
     for i in range(N_DOF):
         motion.q0[i, lane], motion.v0[i, lane] = motion.q[i, lane], motion.v[i, lane]
         motion.a0[i, lane] = motion.a[i, lane]
-    if turns.beside == 0:
-        refused = control.level[lane] > control.began[lane]
-        note_cell(control.level[lane], refused, control.worst[lane], turns.revolution, past.mesh[c % past.mesh.size])
-        merge_extremes(past.extremes[0], past.extremes[1])
-        cells = past.mesh.size // samples.size
-        if c % cells == 0:
-            k = c // cells
-            record(k, lane, lanes[0], lanes[1], lanes[2].v, samples)
-            predict_increment(k, motion.q[:, lane], motion.v[:, lane], motion.ahead[:, lane], samples)
+    refused = control.level[lane] > control.began[lane]
+    note_cell(control.level[lane], refused, control.worst[lane], turns.revolution, past.mesh[c % past.mesh.size])
+    merge_extremes(past.extremes[0], past.extremes[1])
+    cells = past.mesh.size // samples.size
+    if c % cells == 0:
+        k = c // cells
+        record(k, lane, lanes[0], lanes[1], lanes[2].v, samples)
+        predict_increment(k, motion.q[:, lane], motion.v[:, lane], motion.ahead[:, lane], samples)
     if c % past.mesh.size == 0:
-        point = motion.q0[:, lane], motion.v0[:, lane], motion.a0[:, lane]
         halved = turns.halved
-        status, goes_on = after_revolution(point, par, options, samples, past, out)
+        status, goes_on = after_revolution(par, options, samples, past, out)
         adapt_mesh(halved, par, options, motion.memory[:, lane], motion.weight[:, lane], past)
-        if turns.beside == 1:
-            c -= past.mesh.size
     if goes_on:
         start_cell(lane, c + 1, options, control, motion, past)
     return status, goes_on

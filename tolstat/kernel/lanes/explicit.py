@@ -117,23 +117,21 @@ def arrive(lane, par, lanes, left, options, alone, batch, samples, past, out):
         control.steps[lane] += control.count[lane]
         out.failed_step = k
         return NEWTON_FAILED, False
-    if turns.beside == 0:
-        force = largest_at_an_end(lane, lanes[2])
-        if not is_stable(force, point[0], turns):
-            control.steps[lane] += control.count[lane]
-            control.halvings[lane] += 1
-            if not repeat_finer(force, point, par, options, work, past):
-                out.failed_step = k
-                return NEWTON_FAILED, False
-            start_revolution(lane, par, options, batch)
-            return NOT_SETTLED, True
-        record(k, lane, lanes[0], lanes[1], motion.v[:, lane], samples)
+    force = largest_at_an_end(lane, lanes[2])
+    if not is_stable(force, point[0], turns):
+        control.steps[lane] += control.count[lane]
+        control.halvings[lane] += 1
+        if not repeat_finer(force, point, par, options, work, past):
+            out.failed_step = k
+            return NEWTON_FAILED, False
+        start_revolution(lane, par, options, batch)
+        return NOT_SETTLED, True
+    record(k, lane, lanes[0], lanes[1], motion.v[:, lane], samples)
     if k < n:
         return NOT_SETTLED, True
     control.steps[lane] += steps
-    if turns.beside == 0:
-        write_peaks(lane, lanes[2], past.extremes[1])
-    status, goes_on = after_revolution(point, par, options, samples, past, out)
+    write_peaks(lane, lanes[2], past.extremes[1])
+    status, goes_on = after_revolution(par, options, samples, past, out)
     if goes_on:
         begin_revolution(point, steps, par, work, past)
         start_revolution(lane, par, options, batch)

@@ -73,7 +73,7 @@ def build_resolve(newton, begin):
     """
 
     @njit_inner
-    def parts(origin, length, level, controlled, par, options, work, state, fine, extremes):
+    def parts(origin, length, level, par, options, work, state, fine, extremes):
         """Integrate a cell in 2^level parts; return the error of the worst part, above 1 if a part was rejected.
 
         Parameters
@@ -82,8 +82,6 @@ def build_resolve(newton, begin):
             Time at the start of the cell, and its duration, s.
         level : int
             Number of halvings of the cell.
-        controlled : bool
-            Whether errors are checked and loads recorded; False for the neighbouring motion of `resolve`.
         fine : ndarray of SAMPLE, shape (3,)
             Scratch: the last parts.
         extremes : record of KERNEL_RESULT
@@ -98,13 +96,12 @@ def build_resolve(newton, begin):
                 cv, ca, reach = predict(h, stage, state, options)
                 if not newton(origin + length * (done / whole) + reach * h, cv, ca, par, options, work, state):
                     return REFUSED
-            if controlled:
-                error = load_error(h, par, state)
-                worst = max(worst, error)
-                if not error <= 1:
-                    return max(2.0, worst)
-                record(j, 0, par, work, state.v, fine)
-                count_in(j, fine, extremes)
+            error = load_error(h, par, state)
+            worst = max(worst, error)
+            if not error <= 1:
+                return max(2.0, worst)
+            record(j, 0, par, work, state.v, fine)
+            count_in(j, fine, extremes)
             accept(h, state, options)
             done += share
             j += 1
@@ -120,12 +117,10 @@ def build_resolve(newton, begin):
         own, before = mesh[c % mesh.size], mesh[(c - 1) % mesh.size]
         for i in range(state.q0.size):
             begun[0, i], begun[1, i], begun[2, i] = state.q0[i], state.v0[i], state.a0[i]
-        controlled = turns.beside == 0
-        level = next_level(turns.revolution - turns.since, own, before) if controlled else int(own.level)
-        first = level
+        first = level = next_level(turns.revolution - turns.since, own, before)
         while True:
             origin = (c - 1) * length
-            worst = parts(origin, length, level, controlled, par, options, work, state, ring.fine, past.extremes[0])
+            worst = parts(origin, length, level, par, options, work, state, ring.fine, past.extremes[0])
             if worst <= 1:
                 break
             level += 1
@@ -135,9 +130,8 @@ def build_resolve(newton, begin):
                 return False
             for i in range(state.q0.size):
                 state.q0[i], state.v0[i], state.a0[i] = begun[0, i], begun[1, i], begun[2, i]
-        if controlled:
-            note_cell(level, level > first, worst, turns.revolution, own)
-            merge_extremes(past.extremes[0], past.extremes[1])
+        note_cell(level, level > first, worst, turns.revolution, own)
+        merge_extremes(past.extremes[0], past.extremes[1])
         return True
 
     @njit_inner
@@ -155,15 +149,13 @@ def build_resolve(newton, begin):
             if not cell(c, length, par, options, work, state, ring, past):
                 out.failed_step = k
                 return NEWTON_FAILED
-            if c % cells == 0 and past.turns.beside == 0:
+            if c % cells == 0:
                 record(k, 0, par, work, state.v0, ring.samples)
                 predict_increment(k, state.q0, state.v0, state.ahead, ring.samples)
             if c % past.mesh.size == 0:
-                point, halved = (state.q0, state.v0, state.a0), past.turns.halved
-                status, goes_on = after_revolution(point, par, options, ring.samples, past, out)
+                halved = past.turns.halved
+                status, goes_on = after_revolution(par, options, ring.samples, past, out)
                 adapt_mesh(halved, par, options, state.memory, state.weight, past)
-                if past.turns.beside == 1:
-                    c -= past.mesh.size
         return status
 
     return resolve

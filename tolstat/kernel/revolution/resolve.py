@@ -2,22 +2,18 @@
 
 Once the motion repeats, after one or several revolutions, the joint continues with steps half as long until it repeats
 again: from the change of the largest loads their error is estimated. A joint that does not repeat is integrated up to a
-limit. Over its last revolutions a neighbouring motion, started at a small distance, is integrated with the same steps
-and scaled back to that distance after each revolution: the mean logarithm of the growth is the largest Lyapunov
-exponent (Benettin et al. 1980). The input angle is prescribed, so that no exponent is trivially zero: a negative one
-belongs to a motion that repeats, zero to a quasi-periodic and a positive one to a chaotic motion.
+limit.
 """
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 
-from tolstat.common.tables import KERNEL_RESULT, Fidelity, Method, Motion, Options, Status
+from tolstat.common.tables import KERNEL_RESULT, Fidelity, Method, Options, Status
 from tolstat.kernel.integrators.mesh import CELL, cells_of
 from tolstat.kernel.mechanics.loads import FORCES, N_AVERAGED, N_DECIDING, N_INSTANT, TORQUES
 from tolstat.kernel.mechanics.scale import SMALLEST_FORCE, typical_force
-from tolstat.kernel.mechanics.topology import N_DOF, N_LUMPS, S
+from tolstat.kernel.mechanics.topology import N_DOF
 from tolstat.kernel.revolution.closeup import extend
 from tolstat.kernel.revolution.settle import OWN, closure_error, summarise
 from tolstat.kernel.revolution.trail import (
@@ -33,9 +29,7 @@ from tolstat.kernel.revolution.trail import (
 )
 from tolstat.kernel.simd.jit import njit
 
-PERIODIC, SLOW, SUBHARMONIC = int(Motion.PERIODIC), int(Motion.SLOW), int(Motion.SUBHARMONIC)
-QUASI_PERIODIC, CHAOTIC = int(Motion.QUASI_PERIODIC), int(Motion.CHAOTIC)
-OK, NOT_SETTLED, NOT_PERIODIC = int(Status.OK), int(Status.NOT_SETTLED), int(Status.NOT_PERIODIC)
+OK, NOT_SETTLED = int(Status.OK), int(Status.NOT_SETTLED)
 TR_BDF2, DYNAMIC = int(Method.TR_BDF2), int(Fidelity.DYNAMIC)
 NEWTON_FAILED, NOT_FINITE = int(Status.NEWTON_FAILED), int(Status.NOT_FINITE)
 
@@ -54,18 +48,9 @@ SETTLING = 16
 """Minimum number of revolutions with steps half as long before a joint is given up."""
 LONGEST_PERIOD = 8
 """Longest period that is recognised, revolutions."""
-MIN_FALL, FALL_ALONE, FALL_WITH_EXPONENT = 0.1, 10.0, 4.0
-"""Minimum fall of log10(closure) over the revolutions kept that counts as settling. It must also exceed its scatter by
-the second factor (closure errors of chaotic joints wander, and fell by four to five times their scatter in some), or by
-the third if the Lyapunov exponent is not positive."""
-APART = 1e-8
-"""Distance of the neighbouring motion, m: above the residual error of Newton's iteration, below the micrometres of a
-contact."""
-BESIDE, ALIGNING = 16, 4
-"""Revolutions of the neighbouring motion, and how many of them are left out of the exponent, while the difference turns
-to the direction that grows fastest. A joint limited to no more than `BESIDE` revolutions is not classified."""
-EXPONENT = 0.25
-"""Magnitude of an exponent (per revolution) up to which it counts as zero."""
+MIN_FALL, MIN_FALL_OVER_SCATTER = 0.1, 10.0
+"""Minimum fall of log10(closure) over the revolutions kept that counts as settling, and factor by which it must exceed
+its scatter: closure errors of chaotic joints wander, and fell by four to five times their scatter in some."""
 
 TURNS = np.dtype(
     [
@@ -74,14 +59,11 @@ TURNS = np.dtype(
         ("limit", "i8"),  # revolutions after which the joint is given up
         ("halved", "i8"),  # number of times that the steps were halved to estimate their error
         ("period", "i8"),  # period found with the steps before, revolutions; 0: none
-        ("beside", "i8"),  # 1 while the neighbouring motion is integrated
         ("force", "f8"),  # largest |F| of the last revolution, N; before the first one, an estimate
         ("torque", "f8"),  # largest |T|, N m
         ("steps", "i8"),  # explicit steps of a revolution before they were halved
         ("bearable", "f8"),  # contact force of an end station up to which the steps in use are stable, N
-        ("growth", "f8"),  # sum of the logarithms of its growth
         ("before", "f8", N_DECIDING),  # largest of the loads that decide with the steps before
-        ("other", "f8", (3, N_DOF)),  # q, v, a of the neighbour; of the joint while `beside` is 1
     ]
 )
 
@@ -149,8 +131,8 @@ def closure_target(options, turns):
 def begin_turns(par, options, past):
     """Initialise `past` for a joint at its start."""
     turns = past.turns
-    turns.revolution = turns.since = turns.halved = turns.period = turns.beside = 0
-    turns.limit, turns.growth = options.max_revs, 0.0
+    turns.revolution = turns.since = turns.halved = turns.period = 0
+    turns.limit = options.max_revs
     turns.force = typical_force(par)
     turns.torque = turns.force * par.R
     past.trail.notes.count = 0
@@ -241,94 +223,27 @@ def repeats(last, options, trail, turns, out):
         return False
     combine(last, period, trail, out)
     out.refinement_change = largest_change(True, turns.before, out)
-    out.motion, out.period = PERIODIC if period == 1 else SUBHARMONIC, period
+    out.period = period
     out.closure_trend, _ = closure_trend(turns.since, trail.notes)
     return True
 
 
 @njit
-def conclude_watch(options, trail, turns, out):
-    """Classify the motion of a joint that has not repeated; return its status."""
+def conclude(trail, turns, out):
+    """Write the loads of a joint that has not repeated, and the trend of its closure error, zero if it shows none."""
     last, kept = turns.revolution - 1, min(trail.revolution.size, turns.revolution // 2)
     slope, scatter = closure_trend(turns.revolution - kept, trail.notes)
     combine(last, kept, trail, out)
-    out.closure_trend = slope
-    if turns.limit <= BESIDE:
-        return NOT_SETTLED
-    fall = -slope * kept
-    growth = turns.growth / (BESIDE - ALIGNING)
-    out.lyapunov = growth
-    slow = fall > max(MIN_FALL, FALL_ALONE * scatter) or growth < -EXPONENT
-    if slow or (growth < EXPONENT and fall > max(MIN_FALL, FALL_WITH_EXPONENT * scatter)):
-        out.motion = SLOW
-        return NOT_SETTLED
-    out.motion = CHAOTIC if growth > EXPONENT else QUASI_PERIODIC
-    return NOT_PERIODIC
+    falls = -slope * kept > max(MIN_FALL, MIN_FALL_OVER_SCATTER * scatter)
+    out.closure_trend = slope if falls else 0.0
 
 
 @njit
-def radius_of(i, R):
-    """Radius (m) that makes unknown `i` a displacement: 1 if it is one."""
-    return 1.0 if (i < 6 * N_LUMPS and i % 6 < 3) or i == S else R
-
-
-@njit
-def set_beside(q, v, a, par, turns):
-    """Start the neighbouring motion at distance `APART`, with a difference in all unknowns that can move."""
-    turns.growth = 0.0
-    moving = N_DOF if par.slides > 0 else N_DOF - 1
-    share = APART / math.sqrt(moving)
-    for i in range(N_DOF):
-        apart = (share if i % 2 == 0 else -share) / radius_of(i, par.R)
-        turns.other[0, i] = q[i] + (apart if i < moving else 0.0)
-        turns.other[1, i], turns.other[2, i] = v[i], a[i]
-
-
-@njit
-def swap(q, v, a, turns):
-    """Exchange the states of the joint and its neighbour."""
-    for i in range(N_DOF):
-        q[i], turns.other[0, i] = turns.other[0, i], q[i]
-        v[i], turns.other[1, i] = turns.other[1, i], v[i]
-        a[i], turns.other[2, i] = turns.other[2, i], a[i]
-    turns.beside = 1 - turns.beside
-
-
-@njit
-def rescale_neighbour(q, v, a, h, R, turns):
-    """Scale the neighbour's difference back to `APART`; return the logarithm of its growth.
-
-    Velocities are weighted by `h`, the step of the output grid (s), rotations by `R` (m).
-    """
-    square = 0.0
-    for i in range(N_DOF):
-        dq, dv = turns.other[0, i] - q[i], h * (turns.other[1, i] - v[i])
-        square += radius_of(i, R) ** 2 * (dq * dq + dv * dv)
-    factor = APART / max(math.sqrt(square), 1e-6 * APART)
-    for i in range(N_DOF):
-        turns.other[0, i] = q[i] + factor * (turns.other[0, i] - q[i])
-        turns.other[1, i] = v[i] + factor * (turns.other[1, i] - v[i])
-        turns.other[2, i] = a[i] + factor * (turns.other[2, i] - a[i])
-    return -math.log(factor)
-
-
-@njit
-def neighbour_done(q, v, a, par, options, turns):
-    """Restore the joint after a revolution of its neighbour, and add the growth."""
-    swap(q, v, a, turns)
-    growth = rescale_neighbour(q, v, a, 2 * math.pi / (abs(par.omega) * options.steps_per_rev), par.R, turns)
-    if turns.revolution > turns.limit - BESIDE + ALIGNING:
-        turns.growth += growth
-
-
-@njit
-def after_revolution(point, par, options, samples, past, out):
+def after_revolution(par, options, samples, past, out):
     """Decide how a joint continues after a revolution.
 
     Parameters
     ----------
-    point : tuple of ndarray, shape (56,)
-        q, v, a of the joint; exchanged for those of the neighbour, and back.
     par, options
         Joint and settings.
     samples : ndarray of SAMPLE
@@ -345,13 +260,7 @@ def after_revolution(point, par, options, samples, past, out):
     goes_on : bool
         Whether the joint continues.
     """
-    q, v, a = point
     trail, turns = past.trail, past.turns
-    if turns.beside == 1:
-        neighbour_done(q, v, a, par, options, turns)
-        if turns.revolution == turns.limit:
-            return conclude_watch(options, trail, turns, out), False
-        return NOT_SETTLED, True
     last = turns.revolution
     turns.revolution += 1
     own = keep_revolution(par, samples, past.extremes[1], trail, last)
@@ -365,15 +274,10 @@ def after_revolution(point, par, options, samples, past, out):
         note_closure(turns.revolution, closure, trail.notes)
         out.closure = with_slow_decay(closure, turns.revolution, par, trail.notes)
         if repeats(last, options, trail, turns, out):
-            return (OK if out.period == 1 else NOT_PERIODIC), False
+            return (OK if out.period == 1 else NOT_SETTLED), False
     elif turns.period == 1 and turns.halved < options.max_refinements and largest_change(True, turns.before, own) > FAR:
         halve_steps(1, turns, own)
-    if turns.limit > BESIDE and turns.revolution >= turns.limit - BESIDE:
-        if turns.revolution == turns.limit - BESIDE:
-            set_beside(q, v, a, par, turns)
-        else:
-            swap(q, v, a, turns)
-        return NOT_SETTLED, True
     if turns.revolution == turns.limit:
-        return conclude_watch(options, trail, turns, out), False
+        conclude(trail, turns, out)
+        return NOT_SETTLED, False
     return NOT_SETTLED, True

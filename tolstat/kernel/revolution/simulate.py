@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tolstat.common.tables import MAX_ITERATIONS, Fidelity, Motion, Options, Start, Status
+from tolstat.common.tables import MAX_ITERATIONS, Fidelity, Options, Start, Status
 from tolstat.kernel.integrators import integrate
 from tolstat.kernel.integrators.mesh import parts_of
 from tolstat.kernel.integrators.state import (
@@ -46,8 +46,7 @@ from tolstat.kernel.simd.jit import njit
 
 OK, NOT_SETTLED, NEWTON_FAILED = int(Status.OK), int(Status.NOT_SETTLED), int(Status.NEWTON_FAILED)
 PENDING = int(Status.PENDING)
-NOT_FINITE, OUTSIDE_MODEL, NOT_PERIODIC = int(Status.NOT_FINITE), int(Status.OUTSIDE_MODEL), int(Status.NOT_PERIODIC)
-PERIODIC, UNKNOWN = int(Motion.PERIODIC), int(Motion.UNKNOWN)
+NOT_FINITE, OUTSIDE_MODEL = int(Status.NOT_FINITE), int(Status.OUTSIDE_MODEL)
 RAMP = int(Start.RAMP)
 DYNAMIC, QUASISTATIC, IDEAL = int(Fidelity.DYNAMIC), int(Fidelity.QUASISTATIC), int(Fidelity.IDEAL)
 CHECKS_PER_REV = 12
@@ -113,8 +112,8 @@ def clear_results(out):
     """Reset a row of KERNEL_RESULT: NaN in what may not be computed, zero in the counters."""
     nan = np.nan
     out.settled, out.steps, out.newton_iterations, out.halvings, out.factorisations = 0, 0, 0, 0, 0
-    out.motion, out.period, out.failed_step = UNKNOWN, 0, -1
-    out.lyapunov = out.closure = out.closure_trend = out.failed_theta = out.revolutions = nan
+    out.period, out.failed_step = 0, -1
+    out.closure = out.closure_trend = out.failed_theta = out.revolutions = nan
     out.step_error = out.refinement_change = nan
     for i in range(N_LOADS):
         out.largest[i] = nan
@@ -287,7 +286,7 @@ def finish(status, failed, steps_per_rev, options, counters, out):
     `failed` is the step of the output grid at which the joint failed, -1 if at none; `steps_per_rev` counts those of
     the last revolution.
     """
-    if status not in (OK, NOT_SETTLED, NOT_PERIODIC):
+    if status not in (OK, NOT_SETTLED):
         clear_results(out)
         if failed > 0:
             out.failed_step = failed
@@ -297,7 +296,7 @@ def finish(status, failed, steps_per_rev, options, counters, out):
 
 @njit
 def write_diagnostics(status, par, options, notes, samples, out):
-    """Write step error, closure trend and class of motion, unless steps are error-controlled.
+    """Write step error, closure trend and period, unless steps are error-controlled.
 
     The closure trend of a joint that has not settled is fitted over the second half of ``max_revs``.
     """
@@ -306,7 +305,7 @@ def write_diagnostics(status, par, options, notes, samples, out):
     since = 0.0 if status == OK else 0.5 * options.max_revs
     out.closure_trend, _ = closure_trend(since, notes)
     if status == OK:
-        out.motion, out.period = PERIODIC, 1
+        out.period = 1
 
 
 @njit
@@ -342,7 +341,7 @@ def simulate_joint(par, options, allowed, alone, out):
         if status == OK and options.fidelity == DYNAMIC and options.peak_substeps > 1:
             look_closer(par, options, work, state, ring.samples, ring.fine, out)
     taken = parts_of(past.mesh) if controlled else options.steps_per_rev
-    if status in (OK, NOT_SETTLED, NOT_PERIODIC, NEWTON_FAILED) and state.counters[ITERATIONS] >= allowed:
+    if status in (OK, NOT_SETTLED, NEWTON_FAILED) and state.counters[ITERATIONS] >= allowed:
         status, failed, taken = NEWTON_FAILED, max(1, failed), options.steps_per_rev
     finish(status, failed, taken, options, state.counters, out)
 

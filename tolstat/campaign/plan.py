@@ -25,7 +25,7 @@ from tolstat.display import text
 from tolstat.display.progress import Tell, silent
 from tolstat.joint import ideal
 from tolstat.sampling import dimensions, draw, streams
-from tolstat.solver import refinement
+from tolstat.solver import fidelity, refinement
 from tolstat.solver.compilation import stage_name, warm_up
 from tolstat.solver.simulation import history_specs, simulate_rows
 from tolstat.store import layout, metadata, worst
@@ -134,7 +134,7 @@ class Plan:
     failed, unsettled : int
         Numbers of pilot joints without a valid load.
     fidelity : str
-        What ``solver.fidelity = "auto"`` chooses, and why; empty if the study gives the fidelity.
+        What ``solver.fidelity = "auto"`` chooses, with the table of the pilot; empty if the study gives the fidelity.
     seconds_per_joint : float
         Mean processor time of a joint at all points, s: its time in one process that has a core of its own.
     workers : int
@@ -246,7 +246,7 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT, stage: Te
         pilot=len(rows),
         failed=int(np.isin(status, FAILED).sum()),
         unsettled=int(np.isin(status, UNSETTLED).sum()),
-        fidelity=choice.get("reason", ""),
+        fidelity=fidelity.describe(choice),
         seconds_per_joint=each,
         workers=workers,
         stages=stages,

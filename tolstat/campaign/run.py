@@ -267,7 +267,7 @@ def choose_fidelity(study: Study) -> dict[str, Any]:
     Returns
     -------
     dict
-        The record of the choice, see `fidelity.Choice`.
+        The record of the choice, see `fidelity.choose`.
     """
     options = study.solver.options()
     rows = fidelity.pilot(study.rows, study.first_sample, study.sampling.seed)
@@ -279,7 +279,7 @@ def choose_fidelity(study: Study) -> dict[str, Any]:
     budget, min_steps = study.solver.error_budget, max(least, default=0)  # steps from which histories can be computed
     with kept_workers():
         closed_form = not study.has_axial_force
-        return fidelity.choose(params, options, budget, study.asked, simulate_beside, min_steps, closed_form).record
+        return fidelity.choose(params, options, budget, study.asked, simulate_beside, min_steps, closed_form)
 
 
 def _check_same(store: Reader, study: Study, rows: range) -> None:

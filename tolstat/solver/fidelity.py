@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.common.load_kinds import measure_of
-from tolstat.common.loads import LOADS, SHOWN_LOADS, Load, of_kind
+from tolstat.common.loads import LOADS, SHOWN_LOADS, FloatArray, Load, of_kind
 from tolstat.common.tables import FINEST_STEPS, Fidelity, Options, Simulation, Status
 
 
@@ -158,11 +158,12 @@ def _entry(rung: Rung, results: NDArray[np.void], truth: NDArray[np.void], names
     }
 
 
-def _error(results: NDArray[np.void], truth: NDArray[np.void], load: Load) -> NDArray[np.float64]:
+def _error(results: NDArray[np.void], truth: NDArray[np.void], load: Load) -> FloatArray:
     """Error of a load of each joint, relative to the largest load of its measure, (n,)."""
     change = np.abs(load.of(results) - load.of(truth))
     scale = of_kind(truth, measure_of(load.kind)).max(axis=1)
-    return np.divide(change, scale, out=np.where(change > 0, np.inf, 0.0), where=scale > 0)
+    error: FloatArray = np.divide(change, scale, out=np.where(change > 0, np.inf, 0.0), where=scale > 0)
+    return error
 
 
 def _meets(entry: Mapping[str, Any], budget: float) -> bool:

@@ -16,8 +16,7 @@ from pydantic import AfterValidator, Field, ValidationInfo, field_validator
 from tolstat.common import units
 from tolstat.common.parameters import MAX_STATIONS
 from tolstat.common.strict import Strict, refuse
-from tolstat.joint.bearing import Bearing
-from tolstat.joint.needles import fit_needles
+from tolstat.joint.bearing import Bearing, fit_needles
 from tolstat.joint.sections import (
     FOLLOWS,
     NOT_NEGATIVE,

@@ -100,7 +100,7 @@ def swept(store: Reader) -> dict[str, NDArray[np.float64]]:
 
 
 def mountings(store: Reader) -> tuple[list[float | str], list[str]]:
-    """``shaft.axial`` and ``contact.law`` of each variant whose joints are in the file, see `mounting.in_words`.
+    """``shaft.axial`` and ``contact.law`` of each variant whose joints are in the file, for `mounting_and_law`.
 
     Raises
     ------

@@ -17,10 +17,10 @@ from tolstat.common import units
 from tolstat.common.parameters import MAX_STATIONS
 from tolstat.common.strict import Strict, refuse
 from tolstat.joint.bearing import Bearing, fit_needles
+from tolstat.joint.material import Array
 from tolstat.joint.sections import (
     FOLLOWS,
     NOT_NEGATIVE,
-    Array,
     Diameter,
     Force,
     Length,

@@ -15,8 +15,9 @@ from tolstat.joint import derived
 from tolstat.joint.bearing import Bearing
 from tolstat.joint.contact import COEFFICIENTS, LAWS, Contact
 from tolstat.joint.derived import DERIVED
+from tolstat.joint.material import Array
 from tolstat.joint.overrides import leaves
-from tolstat.joint.sections import Arm, Array, Bushing, Cross, Hub, Material, Pin, Shaft
+from tolstat.joint.sections import Arm, Bushing, Cross, Hub, Material, Pin, Shaft
 
 TOLD = ("description", "assumed")
 """Keys of a joint file that are about the joint and no part of it."""

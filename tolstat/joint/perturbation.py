@@ -16,9 +16,9 @@ from tolstat.common.strict import Strict
 from tolstat.common.tables import ERROR, FACTORS, HOLES, PARAM
 from tolstat.joint import material, orders
 from tolstat.joint.contact import Contact
+from tolstat.joint.material import Array
 from tolstat.joint.model import Joint
 from tolstat.joint.partner import Partner, add_partner, check_misalignment
-from tolstat.joint.sections import Array
 from tolstat.kernel.mechanics.topology import ARM, ARM_OF_PIN, PIN, TRIAD
 
 Table = NDArray[np.void]

@@ -9,15 +9,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Annotated, Any, get_args, get_origin
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import AfterValidator, BaseModel, Field, ValidationInfo, field_validator
 
 from tolstat.common import units
 from tolstat.common.strict import Strict, refuse
 from tolstat.joint.derived import DERIVED, PIN_CHI
-
-Array = NDArray[np.float64]
 
 POSITIVE = AfterValidator(units.positive)
 NOT_NEGATIVE = AfterValidator(units.not_negative)

@@ -9,8 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.aside import Aside, begun, in_order
 from tolstat.common.channels import BUSHING_LOADS, CHANNELS, LOAD_HISTORIES, MEASURING, LoadHistory, histories_of
+from tolstat.common.forked import Forked, begun, in_order
+from tolstat.common.loads import FloatArray
 from tolstat.joint import perturb
 from tolstat.solver import compilation
 from tolstat.solver.compilation import is_compiled, warm_up
@@ -28,7 +29,6 @@ JOINTS_PER_BLOCK = 256
 LARGEST = [f"{kind.key}_max" for kind in MEASURING]
 """Fields of the results that joints simulated again are compared in."""
 
-FloatArray = NDArray[np.float64]
 Loads = dict[str, NDArray[Any]]
 """Loads of m joints by name of `LOAD_HISTORIES`, (m, samples, places, components), N and N m."""
 Again = tuple[Loads, FloatArray]
@@ -169,12 +169,12 @@ class Ahead(NamedTuple):
     ----------
     slots : ndarray, shape (m,)
         File slots, ascending.
-    parts : list of Aside
+    parts : list of Forked
         Simulations of `blocks` of them.
     """
 
     slots: NDArray[np.intp]
-    parts: list[Aside[list[Again]]]
+    parts: list[Forked[list[Again]]]
 
     def of(self, slots: NDArray[np.intp]) -> Again | None:
         """Loads of some of the joints; None unless all are among them."""

@@ -14,8 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from tolstat.joint import Joint, Operation, ideal, perturb
+from tolstat.joint.material import Array
 from tolstat.joint.perturbation import PIN_TRIADS
-from tolstat.joint.rccc.statics import INPUT_PIN, OUTPUT_PIN, Array, Lines, output_load, react
+from tolstat.joint.rccc.statics import INPUT_PIN, OUTPUT_PIN, Lines, output_load, react
 from tolstat.kernel.mechanics.topology import ARM_OF_PIN
 
 CLOSED = 1e-12

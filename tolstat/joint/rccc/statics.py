@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from tolstat.joint.material import Array
 
 FREEDOMS = {"R": 1, "C": 2}
 """Freedoms of a pair: a revolute pair turns about its axis, a cylindrical one slides along it too."""

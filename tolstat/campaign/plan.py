@@ -238,7 +238,7 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT, stage: Te
     valid = slice(study.first_sample, None)
     status, solver = worst.together(list(results.values()))["status"], settings(study.solver, choice)
     specs = history_specs(solver, study.output.histories, study.output.harmonics)
-    held = metadata.of_study(study, range(study.rows), specs, dimensions(), solver, choice)
+    document = metadata.of_study(study, range(study.rows), specs, dimensions(), solver, choice)
     return Plan(
         rows=study.rows,
         points=list(at),
@@ -251,7 +251,7 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT, stage: Te
         workers=workers,
         stages=stages,
         process_bytes=_process_bytes(),
-        file_bytes=layout.size_of(held) + len(held.model_dump_json()),
+        file_bytes=layout.size_of(document) + len(document.model_dump_json()),
         widths={share: _width(share, study.samples) for share in SHARES} if iid else {},
         limits=_limits(study, {name: own[valid] for name, own in results.items()}) if iid else [],
         wilks={share: binomial.wilks(share, CONFIDENCE) for share in QUANTILES},
@@ -275,9 +275,9 @@ def _joints(
 ) -> tuple[dict[str, NDArray[np.void]], list[Options]]:
     """Parameters of some joints at each operating point, table PARAM, and the solver options of each joint."""
     errors = _errors(study, rows)
-    own = [settings(solver, choice) for solver in study.solvers]
+    each_options = [settings(solver, choice) for solver in study.solvers]
     at = {point.name: perturbed(study.at(point.name), rows, errors) for point in study.points}
-    return at, [own[number] for number in variants(study, rows)]
+    return at, [each_options[number] for number in variants(study, rows)]
 
 
 def _affordable(study: Study, choice: dict[str, Any]) -> int:
@@ -357,10 +357,10 @@ def _limits(study: Study, results: Mapping[str, NDArray[np.void]]) -> list[Limit
         points = names_of(split(name)[1], list(results), "limits")
         values, status, inexact = worst.load_of([results[point] for point in points], load_of(name))
         load = Sample(name, load_of(name).unit, level, np.nan, values, inexact, status, Independent())
-        found = load.above(level, CONFIDENCE)
-        valid = found.n - found.n_failed - found.n_unsettled
-        nearest_half = min(max(0.5, found.lower), found.upper)  # the interval is widest at a share of one half
-        plans.append(LimitPlan(name, level, found.count, valid, _width(nearest_half, study.samples)))
+        share = load.above(level, CONFIDENCE)
+        valid = share.n - share.n_failed - share.n_unsettled
+        nearest_half = min(max(0.5, share.lower), share.upper)  # the interval is widest at a share of one half
+        plans.append(LimitPlan(name, level, share.count, valid, _width(nearest_half, study.samples)))
     return plans
 
 

@@ -14,18 +14,18 @@ from tolstat.common.tables import HistorySpec
 
 def specs(kept: int) -> dict[str, HistorySpec]:
     """Describe what `of_loads` gives for a joint, as histories of a result file; `kept`: number of coefficients."""
-    found: dict[str, HistorySpec] = {}
+    result: dict[str, HistorySpec] = {}
     for history in LOAD_HISTORIES:
         shape, axes = (*history.shape, kept), (*history.axes, "harmonic")
         text = f"part of the Fourier coefficients c_h: {history.meaning}; "
         text += "load(theta) = Re(c_0 + 2 sum c_h exp(i h theta))"
         error = "largest deviation of the load so restored, relative to the largest |F| and |T| of the joint"
-        found |= {
+        result |= {
             f"{history.prefix}coefficients_real": HistorySpec(shape, "f4", "N, N*m", f"real {text}", axes),
             f"{history.prefix}coefficients_imag": HistorySpec(shape, "f4", "N, N*m", f"imaginary {text}", axes),
             f"{history.prefix}harmonics_error": HistorySpec((2,), "f8", "1", error, ("load",)),
         }
-    return found
+    return result
 
 
 def of_loads(loads: Mapping[str, NDArray[np.float64]], kept: int) -> dict[str, NDArray[Any]]:

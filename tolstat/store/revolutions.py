@@ -178,16 +178,16 @@ class Ahead(NamedTuple):
 
     def of(self, slots: NDArray[np.intp]) -> Again | None:
         """Loads of some of the joints; None unless all are among them."""
-        place = np.searchsorted(self.slots, slots)
-        if not np.array_equal(self.slots[np.minimum(place, len(self.slots) - 1)], slots):
+        position = np.searchsorted(self.slots, slots)
+        if not np.array_equal(self.slots[np.minimum(position, len(self.slots) - 1)], slots):
             return None
         pieces = in_order(self.parts)
-        block, own = np.divmod(place, JOINTS_PER_BLOCK)
+        block, joint = np.divmod(position, JOINTS_PER_BLOCK)
         loads = {
-            history.name: np.stack([pieces[b][0][history.name][k] for b, k in zip(block, own, strict=True)])
+            history.name: np.stack([pieces[b][0][history.name][k] for b, k in zip(block, joint, strict=True)])
             for history in LOAD_HISTORIES
         }
-        return loads, np.array([pieces[b][1][k] for b, k in zip(block, own, strict=True)])
+        return loads, np.array([pieces[b][1][k] for b, k in zip(block, joint, strict=True)])
 
 
 def ahead(store: Reader, slots: NDArray[np.intp], processes: int) -> None:
@@ -210,8 +210,8 @@ def ahead(store: Reader, slots: NDArray[np.intp], processes: int) -> None:
 
 def _again(store: Reader, slots: NDArray[np.intp]) -> tuple[Loads, float]:
     """Loads of joints that are simulated again, all histories, and `Revolutions.apart`."""
-    found = None if store.ahead is None else store.ahead.of(slots)
-    loads, off = found or _simulated(store, slots)
+    simulated = None if store.ahead is None else store.ahead.of(slots)
+    loads, off = simulated or _simulated(store, slots)
     return loads, float(np.max(off, initial=0.0))
 
 
@@ -225,13 +225,13 @@ def _simulated(store: Reader, slots: NDArray[np.intp]) -> Again:
     apart = np.zeros(len(slots))
     for attempt in np.unique(attempts):
         here = np.flatnonzero(attempts == attempt)
-        found = simulate_rows(params[here], options_of(store, int(slots[here[0]])), "full")
+        again = simulate_rows(params[here], options_of(store, int(slots[here[0]])), "full")
         for name, values in loads.items():
-            samples = found.histories[name]
+            samples = again.histories[name]
             values[here] = samples[:, np.arange(steps) * samples.shape[1] // steps]
         for name in LARGEST:
             with np.errstate(invalid="ignore", divide="ignore"):
-                off = np.abs(found.results[name] / stored[name][here] - 1.0)
+                off = np.abs(again.results[name] / stored[name][here] - 1.0)
             largest = off.max(axis=1, initial=0.0, where=np.isfinite(off))
             apart[here] = np.maximum(apart[here], largest)
     return loads, apart

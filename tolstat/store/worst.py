@@ -36,12 +36,12 @@ def together(parts: Sequence[Results]) -> dict[str, NDArray[Any]]:
         stationary joints: loads of one kind may have theirs from different points, see `load_of`.
     """
     status = [part["status"] for part in parts]
-    found: dict[str, NDArray[Any]] = {"status": worst_status(status)}
+    columns: dict[str, NDArray[Any]] = {"status": worst_status(status)}
     for kind in SPAN:
-        found[f"{kind}_max"] = np.maximum.reduce([part[f"{kind}_max"] for part in parts])
+        columns[f"{kind}_max"] = np.maximum.reduce([part[f"{kind}_max"] for part in parts])
         for end in ("lower", "upper"):
-            found[f"{kind}_{end}"] = np.where(found["status"] == Status.STATIONARY, np.nan, 1.0)
-    return found
+            columns[f"{kind}_{end}"] = np.where(columns["status"] == Status.STATIONARY, np.nan, 1.0)
+    return columns
 
 
 def load_of(parts: Sequence[Results], load: Load) -> tuple[Column, NDArray[np.uint8], Inexact]:
@@ -94,14 +94,14 @@ def limit_of(parts: Mapping[str, NDArray[np.void]], limit: Limit) -> tuple[Float
     limit : Limit
         The limit; its level is compared with the values.
     """
-    found, states = [], []
+    of_loads, states = [], []
     for name, level in zip(limit.loads, limit.levels, strict=True):
         where = split(name)[1]
         chosen = [parts[point] for point in where.split("+")] if where else list(parts.values())
         values, status, _ = load_of(chosen, LOADS[split(name)[0]])
-        found.append(values.values if limit.has_one_level else values.values / level)
+        of_loads.append(values.values if limit.has_one_level else values.values / level)
         states.append(status)
-    return np.maximum.reduce(found), worst_status(states)
+    return np.maximum.reduce(of_loads), worst_status(states)
 
 
 def rank(load: Sample, limit: float | None) -> tuple[float, float]:

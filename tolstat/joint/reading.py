@@ -16,7 +16,7 @@ from tolstat.common.notation import DIAMETER
 from tolstat.common.strict import validate
 from tolstat.joint import derived
 from tolstat.joint.model import Assumed, Joint, affects_results
-from tolstat.joint.overrides import laid_over, leaves, overridden
+from tolstat.joint.overrides import laid_over, leaves, nested, overridden
 
 DEFAULT_JOINT = "cirelli2021"
 """Joint in ``data/joints`` whose values are the examples of the keys of a joint."""
@@ -233,21 +233,9 @@ def varied(joint: Joint, values: Mapping[str, Any]) -> Joint:
         `Variant.values`: dotted key of the joint to SI value or string, None for a key that follows from others; keys
         of other sections are ignored.
     """
-    own = {key: value for key, value in values.items() if key.partition(".")[0] in Joint.model_fields}
-    if not own:
+    changed = {key: value for key, value in values.items() if key.partition(".")[0] in Joint.model_fields}
+    if not changed:
         return joint
-    kept = {key: value for key, value in leaves(joint.given()).items() if key not in own}
-    new = {key: value for key, value in own.items() if value is not None}
-    return validate(Joint, laid_over(_tables(kept), _tables(new)), "joint", context={"si": True})
-
-
-def _tables(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Nested tables from dotted keys."""
-    found: dict[str, Any] = {}
-    for key, value in values.items():
-        *path, name = key.split(".")
-        table = found
-        for part in path:
-            table = table.setdefault(part, {})
-        table[name] = value
-    return found
+    kept = {key: value for key, value in leaves(joint.given()).items() if key not in changed}
+    new = {key: value for key, value in changed.items() if value is not None}
+    return validate(Joint, laid_over(nested(kept), nested(new)), "joint", context={"si": True})

@@ -16,12 +16,12 @@ from tolstat.common.strict import read_section, validate
 from tolstat.common.tables import PARAM, Options
 from tolstat.joint import MEANS, Joint, Operation, operating, perturb, varied
 from tolstat.joint.derived import get
+from tolstat.joint.overrides import nested
 from tolstat.joint.sections import RIGID
 from tolstat.solver import fidelity
 from tolstat.store.hdf5 import store_error
 from tolstat.store.reader import Reader
 from tolstat.study import Study, load, mounting, subset_of
-from tolstat.study.design import nested
 from tolstat.study.model import Solver
 from tolstat.study.swept import KEYS
 

@@ -27,10 +27,10 @@ LEFT_OUT: Any = None
 
 
 def _tabulated(reliability: float) -> float:
-    if min(abs(reliability - one) for one in A1) > 1e-9:
-        known = ", ".join(f"{100.0 * one:g} %" for one in A1)
+    if min(abs(reliability - tabulated) for tabulated in A1) > 1e-9:
+        known = ", ".join(f"{100.0 * tabulated:g} %" for tabulated in A1)
         raise refuse(f"ISO 281 has no factor for a reliability of {100.0 * reliability:g} %", f"give one of: {known}")
-    return min(A1, key=lambda one: abs(one - reliability))
+    return min(A1, key=lambda tabulated: abs(tabulated - reliability))
 
 
 class Bearing(Strict):
@@ -175,7 +175,7 @@ def fit_needles(load: float, clearance: float, needles: int, length: float) -> F
         As in `needle_force`; the clearance is that of the nominal joint.
     """
     c = max(clearance, LEAST * displacement(load, 0.0, needles, length))
-    low, high = (displacement(one, c, needles, length) for one in (load / RANGE, load))
+    low, high = (displacement(end, c, needles, length) for end in (load / RANGE, load))
     delta = np.geomspace(low, high, LOADS)
     force = needle_force(delta, c, needles, length)
 
@@ -183,12 +183,12 @@ def fit_needles(load: float, clearance: float, needles: int, length: float) -> F
         return formula(delta, c, 1.0, math.exp(log_b)) / force
 
     def misfit(log_b: float) -> float:
-        own = ratio(log_b)
-        return float(1.0 - own.sum() ** 2 / (own @ own) / LOADS)  # with the best k3
+        ratios = ratio(log_b)
+        return float(1.0 - ratios.sum() ** 2 / (ratios @ ratios) / LOADS)  # with the best k3
 
     log_b = _least(misfit, math.log(1e-3), math.log(10.0))
-    own = ratio(log_b)
-    return Fit(float(own.sum() / (own @ own)), math.exp(log_b))
+    ratios = ratio(log_b)
+    return Fit(float(ratios.sum() / (ratios @ ratios)), math.exp(log_b))
 
 
 def displacement(load: float, clearance: float, needles: int, length: float) -> float:
@@ -204,9 +204,9 @@ def _least(function: Callable[[float], float], low: float, high: float) -> float
     """Place of the minimum between `low` and `high` of a function with one minimum, by golden sections."""
     share = 0.5 * (math.sqrt(5.0) - 1.0)
     while high - low > NARROW:
-        one, other = high - share * (high - low), low + share * (high - low)
-        if function(one) < function(other):
-            high = other
+        left, right = high - share * (high - low), low + share * (high - low)
+        if function(left) < function(right):
+            high = right
         else:
-            low = one
+            low = left
     return 0.5 * (low + high)

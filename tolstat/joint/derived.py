@@ -120,7 +120,7 @@ def _hub_mass(joint: Any) -> float | None:
 
 def _hub_inertia(joint: Any) -> tuple[float, ...] | None:
     hub = _hub(joint)
-    return None if hub is None else tuple(joint.hub.mass / hub[0] * one for one in hub[1])
+    return None if hub is None else tuple(joint.hub.mass / hub[0] * moment for moment in hub[1])
 
 
 def fitted_load(steel: Any, contact: Any) -> float:
@@ -246,11 +246,11 @@ def changed(given: Set[str], held: Collection[str]) -> set[str]:
 
     They contain `given`; the others follow from them.
     """
-    found = set(given)
+    keys = set(given)
     for key, rule in DERIVED.items():
-        if key not in found and not (rule.stays and key in held) and found.intersection(rule.follows):
-            found.add(key)
-    return found
+        if key not in keys and not (rule.stays and key in held) and keys.intersection(rule.follows):
+            keys.add(key)
+    return keys
 
 
 def replaced(given: Collection[str], held: Collection[str]) -> set[str]:
@@ -300,8 +300,7 @@ def completed(name: str, section: ModelT, others: Mapping[str, Any]) -> ModelT:
         path = key.split(".")
         if path[0] == name and get(joint, key) is None and rule.applies(joint):
             for table in path[1:-1]:
-                own = get(joint, f"{name}.{table}")
-                copy.__dict__[table] = own.model_copy()
+                copy.__dict__[table] = get(joint, f"{name}.{table}").model_copy()
             holder = get(joint, ".".join(path[:-1]))
             holder.__dict__[path[-1]] = rule.value(joint)
     return copy
@@ -347,21 +346,21 @@ def expected(joint: Any, given: Set[str], changed: Set[str], stay: Set[str]) -> 
     dict
         Key to SI value, words that say what gives it, and the key that may be given instead, or nothing.
     """
-    found: dict[str, Any] = {}
+    disagreeing: dict[str, Any] = {}
     hub = _hub(joint)
     if hub is not None and changed & {*DERIVED["hub.mass"].follows, "hub.mass"}:
         mass, inertia = hub
-        own = joint.hub.mass if "hub.mass" in changed else mass
-        values = {"hub.mass": mass, "hub.inertia": tuple(own / mass * one for one in inertia)}
-        found |= {key: (value, f"{_CYLINDERS}, give", "") for key, value in values.items() if key in stay}
+        ratio = joint.hub.mass / mass if "hub.mass" in changed else 1.0
+        values = {"hub.mass": mass, "hub.inertia": tuple(ratio * moment for moment in inertia)}
+        disagreeing |= {key: (value, f"{_CYLINDERS}, give", "") for key, value in values.items() if key in stay}
     of, d = joint.contact, joint.pin.d
     hole, pin, clearance = BEARING
     if "pin.d" in changed and pin in stay and not math.isclose(of.D_P, d, rel_tol=1e-6):
-        found[pin] = d, "pin.d gives", clearance
+        disagreeing[pin] = d, "pin.d gives", clearance
         if hole in stay:
-            found[hole] = d + 2.0 * of.clearance, "pin.d and the clearance of these two give", clearance
+            disagreeing[hole] = d + 2.0 * of.clearance, "pin.d and the clearance of these two give", clearance
     elif changed & {"pin.d", pin} and hole in stay and of.clearance > WIDE * of.D_P:
-        found[hole] = of.D_P, "that is much clearance; without any contact.D_P gives", clearance
+        disagreeing[hole] = of.D_P, "that is much clearance; without any contact.D_P gives", clearance
     if pin in given and {hole, clearance} & given and "pin.d" in stay and abs(of.D_P - d) > WIDE * d:
-        found["pin.d"] = of.D_P, "contact.D_P gives", ""
-    return found
+        disagreeing["pin.d"] = of.D_P, "contact.D_P gives", ""
+    return disagreeing

@@ -339,8 +339,8 @@ def _errors(study: Study, rows: NDArray[np.intp]) -> NDArray[np.void]:
 
 def simulate_timed(study: Study, params: NDArray[np.void], options: list[Options]) -> tuple[NDArray[np.void], float]:
     """Simulate each joint with its own options; also return the total processor time, s, without compilation."""
-    for one in dict.fromkeys(options):
-        simulate_rows(params[[options.index(one)]], one)  # compiles, or loads, what these options need
+    for distinct in dict.fromkeys(options):
+        simulate_rows(params[[options.index(distinct)]], distinct)  # compiles, or loads, what these options need
     kept = partial(simulate_rows, histories=study.output.histories, n_harmonics=study.output.harmonics)
     begin = time.process_time()
     return checks.simulate_each(params, options, kept), time.process_time() - begin

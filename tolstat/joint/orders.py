@@ -134,10 +134,10 @@ def join_schemas(properties: dict[str, Any]) -> None:
     """Put orders into the JSON schemas of speed and torque, which are a quantity or a table."""
     for key in ("speed", "torque"):
         waves = properties.pop(f"{key}.orders")
-        quantity = {name: own for name, own in properties[key].items() if name in ("type", "pattern")}
+        quantity = {name: value for name, value in properties[key].items() if name in ("type", "pattern")}
         table = {"type": "object", "required": ["mean"], "additionalProperties": False}
         table |= {"properties": {"mean": quantity, "orders": waves}}
-        properties[key] = {name: own for name, own in properties[key].items() if name not in quantity}
+        properties[key] = {name: value for name, value in properties[key].items() if name not in quantity}
         properties[key] |= {"anyOf": [quantity, table]}
 
 

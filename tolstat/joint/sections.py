@@ -72,18 +72,18 @@ def follows(key: str, meaning: str, *examples: Any) -> Any:
 
 def quantities(model: type[BaseModel], before: str = "") -> dict[str, str]:
     """SI unit of each quantity of a model, by dotted key; lists of quantities are left out."""
-    found: dict[str, str] = {}
+    units_of_keys: dict[str, str] = {}
     for key, field in model.model_fields.items():
         kinds = [field.annotation, *field.metadata]
         while kinds:
             kind = kinds.pop()
             if isinstance(kind, type) and issubclass(kind, BaseModel):
-                found |= quantities(kind, f"{before}{key}.")
+                units_of_keys |= quantities(kind, f"{before}{key}.")
             elif isinstance(kind, units.Quantity):
-                found[f"{before}{key}"] = kind.unit
+                units_of_keys[f"{before}{key}"] = kind.unit
             elif get_origin(kind) is not tuple:
                 kinds += [*get_args(kind), *getattr(kind, "__metadata__", ())]
-    return found
+    return units_of_keys
 
 
 class Material(Strict):

@@ -45,16 +45,16 @@ def of_loads(loads: Mapping[str, NDArray[np.float64]], kept: int) -> dict[str, N
     """
     bushing = loads[BUSHING_LOADS.name]
     size = [np.linalg.norm(bushing[..., k : k + 3], axis=-1).max() for k in (0, 3)]
-    found: dict[str, NDArray[Any]] = {}
+    coefficients: dict[str, NDArray[Any]] = {}
     for history in LOAD_HISTORIES:
         values = loads[history.name]
         spectrum = np.moveaxis(np.fft.rfft(values, axis=0) / len(values), 0, -1)[..., :kept]
         real, imag = spectrum.real.astype("f4"), spectrum.imag.astype("f4")
         difference = np.abs(restore(real, imag, len(values)) - values).max(axis=(0, 1))
         error = [difference[k : k + 3].max() / s if s > 0 else 0.0 for k, s in zip((0, 3), size, strict=True)]
-        own = {"coefficients_real": real, "coefficients_imag": imag, "harmonics_error": np.array(error)}
-        found |= {f"{history.prefix}{name}": part for name, part in own.items()}
-    return found
+        parts = {"coefficients_real": real, "coefficients_imag": imag, "harmonics_error": np.array(error)}
+        coefficients |= {f"{history.prefix}{name}": part for name, part in parts.items()}
+    return coefficients
 
 
 def restore(real: NDArray[Any], imag: NDArray[Any], samples: int) -> NDArray[np.float64]:

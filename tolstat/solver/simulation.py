@@ -263,10 +263,10 @@ def starts(rows: NDArray[np.void], options: Options) -> NDArray[np.float64]:
     from tolstat.kernel.mechanics.topology import N_DOF
     from tolstat.kernel.revolution.starts import write_starts
 
-    alone, q = scratch(options), np.zeros((len(rows), N_DOF))
+    alone, found = scratch(options), np.zeros((len(rows), N_DOF))
     if (rows["clearance"] >= 0).all(axis=1).any():
-        write_starts(rows, options, alone.work, alone.state, q)
-    return q
+        write_starts(rows, options, alone.work, alone.state, found)
+    return found
 
 
 def explicit_steps(params: NDArray[np.void], options: Options) -> NDArray[np.int64]:
@@ -281,9 +281,9 @@ def explicit_steps(params: NDArray[np.void], options: Options) -> NDArray[np.int
     from tolstat.kernel.lanes.explicit import count_steps
     from tolstat.kernel.revolution.explicit import MOST_STEPS
 
-    counted = np.zeros(len(these), np.int64)
-    count_steps(params[these].view(np.recarray), options, scratch(options).work, counted)
-    steps[these] = np.where(counted <= MOST_STEPS, counted, 0)
+    own = np.zeros(len(these), np.int64)
+    count_steps(params[these].view(np.recarray), options, scratch(options).work, own)
+    steps[these] = np.where(own <= MOST_STEPS, own, 0)
     return steps
 
 

@@ -93,8 +93,8 @@ def fill_intervals(results: Table) -> None:
     never = (results["status"] == Status.STATIONARY) & (results["motion"] != Motion.SUBHARMONIC)
     for kind in SPAN:
         for end in ("lower", "upper"):
-            ends = results[f"{kind}_{end}"]
-            ends[~never] = np.where(np.isin(results["status"][~never], VALID), 1.0, np.nan)
+            own = results[f"{kind}_{end}"]
+            own[~never] = np.where(np.isin(results["status"][~never], VALID), 1.0, np.nan)
 
 
 def is_stationary(watched: Table) -> bool:

@@ -112,7 +112,7 @@ def check(
     """
     faults: list[Fault] = []
     with gather(faults):
-        number = parse_joints(joints)
+        number = _parse_joints(joints)
     if path.suffix == ".toml":
         with gather(faults):
             study = load(path)
@@ -156,7 +156,7 @@ def check_file(
         When the file cannot be used, was made by other code, or has no settled joint.
     """
     with Writer.open(path) as store:
-        check_version(store)
+        _check_version(store)
         seed = int(store.sampling["seed"]) if seed is None else seed
         if not any((at_point.status() == Status.OK).any() for at_point in store.each()):
             raise store_error(path, "has no settled joint", f"run the campaign first: tolstat run STUDY --out {path}")
@@ -173,7 +173,7 @@ def _stored(store: Reader, name: str) -> Verification:
     return verification.together([read for read in verifications if read is not None])
 
 
-def check_version(store: Reader) -> None:
+def _check_version(store: Reader) -> None:
     """Raise a StoreError for a file that other code made."""
     if differing_code(store.versions):
         remedy = "verify it with that version, or run the campaign again: tolstat run STUDY --out OTHER.h5"
@@ -228,7 +228,7 @@ def check_near(
     StoreError
         As `check_file`, or when too few joints are settled.
     """
-    number = parse_joints(joints)
+    number = _parse_joints(joints)
     if number is None or number < LEAST_NEAR:
         found = f"{joints} joints do not tell the numerical error near a limit"
         raise InputError([Fault("--joints", found, f"give {LEAST_NEAR} or more")])
@@ -238,7 +238,7 @@ def check_near(
         if lacking:
             remedy = "give loads that it keeps, see tolstat status"
             raise InputError([Fault("--near", f"the file does not keep {', '.join(lacking)}", remedy)])
-        check_version(store)
+        _check_version(store)
         chosen = [(at_point, nearest(at_point, limit, number)) for at_point in store.each()]
         fewest = min((slots.size for _, slots in chosen if slots.size), default=0)
         if fewest < LEAST_NEAR:
@@ -299,7 +299,7 @@ def check_study(
     return verification.together(each)
 
 
-def parse_joints(joints: int | str) -> int | None:
+def _parse_joints(joints: int | str) -> int | None:
     """Parse a number of joints; None for ``"all"``.
 
     Raises

@@ -66,11 +66,6 @@ def compliance_factor(E: float, nu: float) -> float:
     return 2.0 * (1.0 - nu**2) / E
 
 
-def contact_width(load: Array, K_D: float, C_E: float) -> Array:
-    """Width b = 1.6 sqrt(F_c K_D C_E) (m) of the contact area under `load` per unit length (N/m); eq. (3)."""
-    return 1.6 * np.sqrt(load * K_D * C_E)
-
-
 def contact_displacement(load: Array, D_H: float, D_P: float, E: float, nu: float) -> Array:
     """Approach of the axes of a pin and its hole in uniform contact, eq. (3) (Hertz; Young 2011).
 
@@ -88,9 +83,10 @@ def contact_displacement(load: Array, D_H: float, D_P: float, E: float, nu: floa
     ndarray, shape (n,)
         Displacement delta (m) beyond first touch.
     """
-    b = contact_width(load, diameter_factor(D_H, D_P), compliance_factor(E, nu))
+    C_E = compliance_factor(E, nu)
+    b = 1.6 * np.sqrt(load * diameter_factor(D_H, D_P) * C_E)  # width of the contact area, m
     logs = 2.0 / 3.0 + np.log(2.0 * D_H / b) + np.log(2.0 * D_P / b)
-    return np.asarray(compliance_factor(E, nu) * load / math.pi * logs)
+    return np.asarray(C_E * load / math.pi * logs)
 
 
 def fit_contact(load_range: float, z: float, D_H: float, D_P: float, E: float, nu: float) -> tuple[float, float]:

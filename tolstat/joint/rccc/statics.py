@@ -57,7 +57,7 @@ def kinds(pairs: str) -> str:
     return pairs
 
 
-def pair_wrenches(lines: Lines, pair: int, kind: str) -> Array:
+def _pair_wrenches(lines: Lines, pair: int, kind: str) -> Array:
     """Unit wrenches that a pair can transmit from link `pair` to the next: reciprocal to the twists it allows.
 
     Parameters
@@ -111,7 +111,7 @@ def constraint_jacobian(lines: Lines, pairs: str = "RCCC") -> Array:
     """
     blocks = []
     for pair, kind in enumerate(kinds(pairs)):
-        wrenches = pair_wrenches(lines, pair, kind)
+        wrenches = _pair_wrenches(lines, pair, kind)
         rows = np.zeros((*wrenches.shape[:2], 24))
         link, following = pair, (pair + 1) % 4
         rows[..., 6 * following : 6 * following + 6] = wrenches
@@ -177,7 +177,7 @@ def react(lines: Lines, external: Array) -> Reactions:
     at_centre = np.empty((n, 4, 6))
     first = 0
     for pair, kind in enumerate("RCCC"):
-        wrenches = pair_wrenches(lines, pair, kind)
+        wrenches = _pair_wrenches(lines, pair, kind)
         last = first + wrenches.shape[1]
         at_centre[:, pair] = np.einsum("ki,kij->kj", unknown[:, first:last], wrenches)
         first = last

@@ -87,7 +87,7 @@ def contact(joint: Joint) -> list[Row]:
     fitted: tuple[float, ...] = (float("nan"),) * 4
     if of.D_H > of.D_P:
         fit = material.fit_contact(load, of.z, of.D_H, of.D_P, steel.E, steel.nu)
-        fitted = (*fit, *material.point_coefficients(*fit, ratio))
+        fitted = (*fit, fit[0] / ratio**2, fit[1] / ratio)  # eq. (4)
     rows = zip(TABLE_2.items(), of.coefficients(), fitted, strict=True)
     return [Row(f"{name} [{'N/m²' if '1' in name else 'N/m'}]", (p, own, fit)) for (name, p), own, fit in rows]
 

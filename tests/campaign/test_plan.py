@@ -292,8 +292,8 @@ def test_a_plan_chooses_the_fidelity_that_the_campaign_chooses(tmp_path: Path) -
     assert made.fidelity.startswith("auto: ")
     campaign.run(loaded, tmp_path / "a.h5", 1, tell=told.append)
     with ResultFile.open(tmp_path / "a.h5") as store:
-        assert store.fidelity["reason"] == made.fidelity
-    assert told[0].startswith(made.fidelity)
+        assert made.fidelity.startswith(store.fidelity["reason"])
+    assert told[0] == made.fidelity
 
 
 def test_start_and_report_take_longer_on_a_slower_machine(small: study.Study, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -17,9 +17,8 @@ from tolstat.common.errors import InputError
 from tolstat.common.strict import validate
 from tolstat.joint import Joint, derived, material
 from tolstat.joint.derived import BEARING, DERIVED, get
-from tolstat.joint.overrides import leaves
+from tolstat.joint.overrides import leaves, nested
 from tolstat.joint.sections import quantities
-from tolstat.study.design import nested
 
 FILE = files.data_dir() / "joints" / "cirelli2021.toml"
 GIVEN = {

@@ -10,7 +10,7 @@ from tolstat.common.errors import InputError
 from tolstat.common.strict import validate
 from tolstat.common.tables import Fidelity, Options
 from tolstat.joint import Joint, Operation, ideal
-from tolstat.joint.mounting import in_words
+from tolstat.joint.sections import mounting_and_law
 from tolstat.solver.simulation import simulate_rows
 
 AXIAL = ("slides", "m_s", "k_a", "c_a", "F_a")
@@ -93,10 +93,10 @@ def test_a_joint_is_read_back_from_its_values(written: str) -> None:
 
 
 def test_words() -> None:
-    assert in_words(["rigid"], ["mode"]) == "shafts rigid along their axes; contact law mode"
-    assert in_words(["free"] * 3, ["mode"] * 3) == "output shaft free along its axis; contact law mode"
-    assert in_words([2e7], ["sliced"]) == "output shaft held with 2e+07 N/m along its axis; contact law sliced"
-    said = in_words(["rigid", 1e6, "rigid", 3e6], ["mode", "point", "mode", "mode"])
+    assert mounting_and_law(["rigid"], ["mode"]) == "shafts rigid along their axes; contact law mode"
+    assert mounting_and_law(["free"] * 3, ["mode"] * 3) == "output shaft free along its axis; contact law mode"
+    assert mounting_and_law([2e7], ["sliced"]) == "output shaft held with 2e+07 N/m along its axis; contact law sliced"
+    said = mounting_and_law(["rigid", 1e6, "rigid", 3e6], ["mode", "point", "mode", "mode"])
     assert said == (
         "shafts rigid along their axes in 2 of 4 variants, output shaft held with 1e+06 to 3e+06 N/m along its axis in "
         "2 of 4 variants; contact laws mode, point"

@@ -12,7 +12,7 @@ from tolstat import joint as joints
 from tolstat.common.errors import InputError
 from tolstat.common.strict import validate
 from tolstat.joint import Joint, Operation, affecting_results
-from tolstat.joint.needles import Fit, displacement, fit_needles, formula, needle_force
+from tolstat.joint.bearing import Fit, displacement, fit_needles, formula, needle_force
 from tolstat.study.starter import joint_text
 
 NEEDLES = {"needles": 32, "needle_length": "22 mm"}

@@ -23,7 +23,7 @@ def polynomial(x):
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setattr(jit, "CACHE_DIRECTORY", tmp_path)
-    monkeypatch.setattr(cache_folder, "_told", set())
+    cache_folder.tell.cache_clear()
     return tmp_path
 
 
@@ -107,7 +107,7 @@ def test_processes_that_compile_at_the_same_time_lose_nothing(tmp_path: Path) ->
 def test_a_folder_that_others_may_write_to_is_not_used(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(cache_folder, "_told", set())
+    cache_folder.tell.cache_clear()
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     path = cache_folder.cache_directory()
     assert path.parent == tmp_path

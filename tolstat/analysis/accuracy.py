@@ -59,8 +59,8 @@ def loads(results: NDArray[np.void]) -> FloatArray:
 
 def size(results: Results, kind: Kind) -> FloatArray:
     """Reference value of the observables of a kind in each joint, (m,), SI."""
-    found = _largest(of_kind(results, measure_of(kind)))
-    return found if kind == measure_of(kind) or not np.isnan(found).all() else _largest(of_kind(results, kind))
+    largest = _largest(of_kind(results, measure_of(kind)))
+    return largest if kind == measure_of(kind) or not np.isnan(largest).all() else _largest(of_kind(results, kind))
 
 
 def _largest(values: FloatArray) -> FloatArray:
@@ -85,9 +85,9 @@ def differences(base: NDArray[np.void], other: NDArray[np.void]) -> FloatArray:
     """
     sizes = np.column_stack([size(other, kind) for kind in LOAD_KINDS])[:, KIND_OF]
     with np.errstate(divide="ignore", invalid="ignore"):
-        found = np.where(sizes == 0, 0.0, (loads(base) - loads(other)) / sizes)
-    found[(base["status"] != Status.OK) | ~np.isin(other["status"], SIMULATED)] = np.nan
-    return np.asarray(found)
+        relative = np.where(sizes == 0, 0.0, (loads(base) - loads(other)) / sizes)
+    relative[(base["status"] != Status.OK) | ~np.isin(other["status"], SIMULATED)] = np.nan
+    return np.asarray(relative)
 
 
 def estimate(changes: Mapping[str, FloatArray]) -> FloatArray:
@@ -141,10 +141,10 @@ def corrections(base: NDArray[np.void], checks: Mapping[str, NDArray[np.void]]) 
         (extrapolated), the smaller tolerances, and dynamic fidelity. NaN where neither is known.
     """
     changes = {name: -differences(base, results) for name, results in checks.items()}
-    found = HALF_STEP_SHARE * changes["half_step"]
+    changed = HALF_STEP_SHARE * changes["half_step"]
     for name in ("newton", "settling", FIDELITY):
-        found = found + changes.get(name, 0.0)
-    return _measured_or(found, changes, checks)
+        changed = changed + changes.get(name, 0.0)
+    return _measured_or(changed, changes, checks)
 
 
 def _measured_or(

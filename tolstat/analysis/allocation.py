@@ -111,9 +111,9 @@ def _within(problem: Problem, share: float) -> Choice:
     enough = not problem.iid or problem.above.sum(axis=0).min() >= FEWEST
     aims = ["interval"] * problem.iid + ["estimate"] * bool(enough)
     for aim in aims:
-        found = [x for x in (_cheapest(problem, share, aim, start) for start in starts) if x is not None]
-        if found:
-            return Choice(np.exp(min(found, key=lambda x: problem.cost(np.exp(x)))), aim)
+        feasible = [x for x in (_cheapest(problem, share, aim, start) for start in starts) if x is not None]
+        if feasible:
+            return Choice(np.exp(min(feasible, key=lambda x: problem.cost(np.exp(x)))), aim)
     return Choice(np.exp(lowest), "step")
 
 
@@ -154,8 +154,8 @@ def _minimise(
     low, high = np.log(problem.lower), np.log(problem.upper)
     settings: Any = {"method": "SLSQP", "options": {"maxiter": 60, "ftol": 1e-5, "eps": 1e-4}}
     settings |= {"bounds": Bounds(low, np.maximum(high, low + 1e-9)), "constraints": {"type": "ineq", "fun": room}}
-    found = minimize(what, np.clip(start, low, high), **settings)
-    return np.asarray(np.clip(found.x, low, high), dtype=float)
+    result = minimize(what, np.clip(start, low, high), **settings)
+    return np.asarray(np.clip(result.x, low, high), dtype=float)
 
 
 def _shares(problem: Problem, x: FloatArray, aim: str) -> FloatArray:

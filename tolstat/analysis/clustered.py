@@ -86,8 +86,8 @@ def interval(above: ArrayLike, joints: ArrayLike, confidence: float = 0.95) -> L
         effective = (sides.sum(axis=1) ** 2 / (sides**2).sum(axis=1)).min(axis=0)
         few = (p > 0.0) & (p < 1.0) & (effective < FEW)
         if few.any() and lots >= LEAST:
-            own = _credible(k[:, few], n[:, few], confidence)
-            lower[few], upper[few] = np.minimum(lower[few], own[0]), np.maximum(upper[few], own[1])
+            credible = _credible(k[:, few], n[:, few], confidence)
+            lower[few], upper[few] = np.minimum(lower[few], credible[0]), np.maximum(upper[few], credible[1])
         lower = np.where(p == 0.0, 0.0, np.where(p == 1.0, 1.0 - none, lower))
         upper = np.where(p == 1.0, 1.0, np.where(p == 0.0, none, upper))
         # analysis of variance of the joints, 0 or 1, with lots of different size
@@ -106,7 +106,7 @@ def _credible(k: FloatArray, n: FloatArray, confidence: float) -> tuple[FloatArr
     means, spreads = np.arange(logit(p.min()) - REACH, logit(p.max()) + REACH, STEP), SPREADS[::2]
     below = _posterior(k, n, means, spreads)[2].reshape(len(p), len(means), -1).sum(axis=2).cumsum(axis=1)
     tail = 0.5 * (1.0 - confidence)
-    ends = np.array([np.interp([tail, 1.0 - tail], own, means + 0.5 * STEP) for own in below])
+    ends = np.array([np.interp([tail, 1.0 - tail], cumulative, means + 0.5 * STEP) for cumulative in below])
     return expit(ends[:, 0]), expit(ends[:, 1])
 
 
@@ -160,8 +160,8 @@ class Clustered(Design):
         above, joints = above[joints > 0], joints[joints > 0]
         if not joints.size:
             return super().shares(x, levels, confidence)
-        found = Estimate(*interval(above, joints, confidence)[:3])
-        return or_independent(found, x, levels, confidence)
+        over_lots = Estimate(*interval(above, joints, confidence)[:3])
+        return or_independent(over_lots, x, levels, confidence)
 
     def counts(self, x: Column, levels: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Joints above each level, (lots, m), and joints that count, (lots,), of each lot of `numbers`."""

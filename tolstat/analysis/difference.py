@@ -217,10 +217,10 @@ def _valid(a: Sample, b: Sample, paired: bool) -> tuple[Sample, Sample]:
 def _pairs(x: Column, y: Column, a: Design, b: Design, level: FloatArray, confidence: float) -> tuple[Any, ...]:
     """Fields of `ShareDifference` up to the interval, of pairs."""
     both = ~np.isnan(x.values) & ~np.isnan(y.values)
-    one, other = x.values[both], y.values[both]
-    n, up, down = one.size, other > one, other < one
-    only_b = Column(other[up]).above(level) - Column(one[up]).above(level)
-    only_a = Column(one[down]).above(level) - Column(other[down]).above(level)
+    of_a, of_b = x.values[both], y.values[both]
+    n, up, down = of_a.size, of_b > of_a, of_b < of_a
+    only_b = Column(of_b[up]).above(level) - Column(of_a[up]).above(level)
+    only_a = Column(of_a[down]).above(level) - Column(of_b[down]).above(level)
     (lower_p, upper_p), (lower_q, upper_q) = (clopper_pearson(count, n, confidence) for count in (only_a, only_b))
     p, q = only_a / n, only_b / n
     with np.errstate(divide="ignore", invalid="ignore"):  # multinomial counts: negatively correlated
@@ -228,7 +228,7 @@ def _pairs(x: Column, y: Column, a: Design, b: Design, level: FloatArray, confid
     lower, upper = _recovered((q - lower_q, upper_q - q), (p - lower_p, upper_p - p), correlation)
     if not _have_interval(a, b, "difference"):
         lower = upper = np.full(level.shape, np.nan)
-    shares = Column(one).above(level) / n, Column(other).above(level) / n
+    shares = Column(of_a).above(level) / n, Column(of_b).above(level) / n
     return *shares, n, only_a, only_b, q - p, q - p - lower, q - p + upper
 
 
@@ -246,8 +246,8 @@ def _recovered(
 ) -> tuple[FloatArray, FloatArray]:
     """Lengths of the interval of b - a below and above the estimate, from those of b and of a, correlated by `rho`."""
     ends = []
-    for one, other in ((of_b[0], of_a[1]), (of_b[1], of_a[0])):
-        i, j = np.asarray(one, dtype=float), np.asarray(other, dtype=float)
+    for length_b, length_a in ((of_b[0], of_a[1]), (of_b[1], of_a[0])):
+        i, j = np.asarray(length_b, dtype=float), np.asarray(length_a, dtype=float)
         with np.errstate(invalid="ignore"):
             length = np.sqrt(np.maximum(i**2 + j**2 - 2.0 * np.asarray(rho) * i * j, 0.0))
         ends.append(np.where(np.isinf(i) | np.isinf(j), np.inf, length))
@@ -264,17 +264,17 @@ def _resampled(x: FloatArray, y: FloatArray, share: float) -> FloatArray:
     rank = int(np.ceil(n * share * (1.0 - 4e-16)))
     reach = int(np.ceil(_REACH * np.sqrt(n * share * (1.0 - share)))) + 1
     ranks = np.empty((2, n), dtype=np.intp)
-    for own, values in zip(ranks, (x, y), strict=True):
-        own[np.argsort(values, kind="stable")] = np.arange(1, n + 1)
+    for rank_of, values in zip(ranks, (x, y), strict=True):
+        rank_of[np.argsort(values, kind="stable")] = np.arange(1, n + 1)
     near = (np.abs(ranks - rank) <= reach).any(axis=0)
     below = ranks[:, ~near] < rank
     cells = np.bincount(2 * below[0] + below[1], minlength=4)
     k = int(near.sum())
     shares = np.concatenate([np.full(k, 1.0 / n), cells / n])
     drawn = np.random.default_rng(_SEED).multinomial(n, shares, size=RESAMPLES)
-    found = []
+    resampled = []
     for values, far in ((x[near], drawn[:, k + 2] + drawn[:, k + 3]), (y[near], drawn[:, k + 1] + drawn[:, k + 3])):
         order = np.argsort(values, kind="stable")
         reached = far[:, None] + np.cumsum(drawn[:, order], axis=1) >= rank
-        found.append(values[order][np.argmax(reached, axis=1)])
-    return np.asarray(found[1] - found[0])
+        resampled.append(values[order][np.argmax(reached, axis=1)])
+    return np.asarray(resampled[1] - resampled[0])

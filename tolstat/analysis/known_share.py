@@ -82,12 +82,12 @@ def supported(n: int, drawn: Draws, known: tuple[Known, ...], mixture: Sequence[
     mixture : sequence of Mixture
         What the joints were drawn from; parts of it may be left out.
     """
-    found = np.zeros(len(drawn.mean), dtype=bool)
+    is_supported = np.zeros(len(drawn.mean), dtype=bool)
     for part in mixture:
         logs = process.log_mean_square(drawn, known, part.parts) - np.log(part.share)
         bounded = None not in part.parts
-        found |= (logs <= np.log(n / LEAST_ESS)) & (bounded | (logs <= np.log(LARGEST_SPREAD)))
-    return found
+        is_supported |= (logs <= np.log(n / LEAST_ESS)) & (bounded | (logs <= np.log(LARGEST_SPREAD)))
+    return is_supported
 
 
 def tallies(
@@ -168,11 +168,11 @@ def intervals(
 
 def _upper_end(split: Split, side: int, usable: Mask, tail: float) -> float:
     """Largest share of a side, above (0) or below (1), that is exceeded with the probability `tail`."""
-    own, other = (parameter[side] for parameter in split.far())
-    inner = usable & (split.total[1 - side] > 0.0) & np.isfinite(own) & (own > 0.0) & (other > 0.0)
+    inside, outside = (parameter[side] for parameter in split.far())
+    inner = usable & (split.total[1 - side] > 0.0) & np.isfinite(inside) & (inside > 0.0) & (outside > 0.0)
 
     def covers(share: FloatArray) -> bool:
-        below = betainc(np.where(inner, own, 1.0), np.where(inner, other, 1.0), share)
+        below = betainc(np.where(inner, inside, 1.0), np.where(inner, outside, 1.0), share)
         return bool(np.where(inner, below, 0.0).mean() >= 1.0 - tail)
 
     return float(first(covers, 0.0, 1.0, STEPS))

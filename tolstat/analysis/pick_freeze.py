@@ -146,13 +146,13 @@ def _recovered(
     shares = cells / counts
     low, high = clopper_pearson(cells, counts, confidence)
     least, estimate, most = variance
-    found = (signs * shares).sum(axis=0) / estimate
+    index = (signs * shares).sum(axis=0) / estimate
     down, up = signs * (shares - low), signs * (high - shares)
     lengths = []
     for away, back in ((np.where(signs > 0, down, up), most), (np.where(signs > 0, up, down), least)):
-        of_variance = found * (estimate / back - 1.0)
+        of_variance = index * (estimate / back - 1.0)
         lengths.append(np.sqrt((away**2).sum(axis=0) / estimate**2 + of_variance**2))
-    return Estimate(found, found - lengths[0], found + lengths[1])
+    return Estimate(index, index - lengths[0], index + lengths[1])
 
 
 def _index(terms: FloatArray, square: FloatArray, half: float) -> Estimate[FloatArray]:

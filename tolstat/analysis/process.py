@@ -124,16 +124,16 @@ def log_mean_square(drawn: Draws, known: tuple[Known, ...], over: tuple[int | No
     ndarray, (K,)
         Infinite where the mean square is.
     """
-    found = np.zeros(len(drawn.mean))
+    total = np.zeros(len(drawn.mean))
     for a, b, entry, parts in zip(drawn.mean.T, drawn.deviation.T, known, over, strict=True):
         if parts is None:
             room = 2.0 - b**2
             with np.errstate(invalid="ignore", divide="ignore"):
                 square = entry.errors * (a**2 / room - np.log(b) - 0.5 * np.log(room))
-            found = found + np.where(room > 0.0, square, np.inf)
+            total = total + np.where(room > 0.0, square, np.inf)
         else:
-            found = found + _over_student(a, b, Known(parts, entry.errors))
-    return found
+            total = total + _over_student(a, b, Known(parts, entry.errors))
+    return total
 
 
 def _over_student(a: FloatArray, b: FloatArray, known: Known) -> FloatArray:

@@ -91,12 +91,12 @@ def places(values: ArrayLike) -> NDArray[np.intp]:
     return np.array([np.unique(column, return_inverse=True)[1] for column in columns]).reshape(columns.shape)
 
 
-def from_places(found: NDArray[np.intp]) -> FloatArray:
+def from_places(place: NDArray[np.intp]) -> FloatArray:
     """Ranks, from 1, of columns whose `places` are given, or of some of their rows.
 
     Parameters
     ----------
-    found : ndarray, shape (d, m)
+    place : ndarray, shape (d, m)
         Places of m rows among all.
 
     Returns
@@ -104,10 +104,10 @@ def from_places(found: NDArray[np.intp]) -> FloatArray:
     ndarray, shape (d, m)
         Ranks among these m rows, the same as those of `scipy.stats.rankdata` for each column.
     """
-    ranks = np.empty(found.shape)
-    for own, out in zip(found, ranks, strict=True):
-        alike = np.bincount(own)
-        out[:] = (np.cumsum(alike) - 0.5 * (alike - 1))[own]
+    ranks = np.empty(place.shape)
+    for column, out in zip(place, ranks, strict=True):
+        alike = np.bincount(column)
+        out[:] = (np.cumsum(alike) - 0.5 * (alike - 1))[column]
     return ranks
 
 
@@ -204,30 +204,30 @@ def tail(scores: ArrayLike, above: ArrayLike, confidence: float = 0.95, iid: boo
     order = np.argsort(p)
     adjusted = np.empty_like(p)
     adjusted[order] = np.minimum(np.maximum.accumulate(p[order] * np.arange(p.size, 0, -1)), 1.0)  # Holm
-    found = Part(*_larger(both, over, confidence), adjusted)
+    compared = Part(*_larger(both, over, confidence), adjusted)
     if not iid:
-        found = found._replace(lower=np.full(len(both), np.nan), upper=np.full(len(both), np.nan))
+        compared = compared._replace(lower=np.full(len(both), np.nan), upper=np.full(len(both), np.nan))
     d = z.shape[1]
-    return Overrepresentation(Part(*(part[:d] for part in found)), Part(*(part[d:] for part in found)))
+    return Overrepresentation(Part(*(part[:d] for part in compared)), Part(*(part[d:] for part in compared)))
 
 
 def _larger(
-    found: NDArray[np.intp], over: NDArray[np.bool_], confidence: float
+    place: NDArray[np.intp], over: NDArray[np.bool_], confidence: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """P(value of one above > of one not above), ties count half, with DeLong's (1988) interval on the logit scale.
 
-    The quantile is Student's, with Welch's (1947) degrees of freedom. `found` has the `places` of all joints,
+    The quantile is Student's, with Welch's (1947) degrees of freedom. `place` has the `places` of all joints,
     (d, n).
     """
     m, k = int(over.sum()), int((~over).sum())
-    joint = from_places(found)
-    of_above = (joint[:, over] - from_places(found[:, over])) / k  # share of the others that each one surpasses
-    of_others = 1.0 - (joint[:, ~over] - from_places(found[:, ~over])) / m
+    joint = from_places(place)
+    of_above = (joint[:, over] - from_places(place[:, over])) / k  # share of the others that each one surpasses
+    of_others = 1.0 - (joint[:, ~over] - from_places(place[:, ~over])) / m
     estimate = of_above.mean(axis=1)
     least = 0.5 / (m * k)
-    one, other = of_above.var(axis=1, ddof=1) / m + least**2, of_others.var(axis=1, ddof=1) / k
-    error = np.sqrt(one + other) * (1.0 + WIDER / min(m, k))
-    degrees = (one + other) ** 2 / (one**2 / (m - 1) + other**2 / (k - 1))
+    var_above, var_others = of_above.var(axis=1, ddof=1) / m + least**2, of_others.var(axis=1, ddof=1) / k
+    error = np.sqrt(var_above + var_others) * (1.0 + WIDER / min(m, k))
+    degrees = (var_above + var_others) ** 2 / (var_above**2 / (m - 1) + var_others**2 / (k - 1))
     inside = np.clip(estimate, least, 1.0 - least)
     half = half_width(confidence, degrees) * error / (inside * (1.0 - inside))
     return estimate, expit(logit(inside) - half), expit(logit(inside) + half)

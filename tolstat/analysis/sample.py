@@ -280,8 +280,8 @@ class Sample:
         assert self.limit is not None
         limit, (joints, lower, upper) = self.limit, self.inexact
         inexact = Inexact(joints, lower / limit, upper / limit)
-        own = replace(self, value=Column(self.values / limit), inexact=inexact, unit="1", limit=1.0)
-        return replace(own, nominal=self.nominal / limit, scale=self.scale * limit)
+        ratios = replace(self, value=Column(self.values / limit), inexact=inexact, unit="1", limit=1.0)
+        return replace(ratios, nominal=self.nominal / limit, scale=self.scale * limit)
 
     def only(self, joints: NDArray[np.intp] | Mask) -> Sample:
         """Return the load of some of the joints."""

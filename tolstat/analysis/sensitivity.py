@@ -126,8 +126,8 @@ def first_order(x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: bool 
     [0.2, 0.8]
     """
     errors, loads = _checked(x, y)
-    found, _ = over_revolution(errors, loads.reshape(len(loads), -1), confidence, iid)
-    return FirstOrder(*(own.reshape(own.shape[:-1] + loads.shape[1:]) for own in found))
+    at_angles, _ = over_revolution(errors, loads.reshape(len(loads), -1), confidence, iid)
+    return FirstOrder(*(own.reshape(own.shape[:-1] + loads.shape[1:]) for own in at_angles))
 
 
 def over_revolution(
@@ -166,18 +166,18 @@ def over_revolution(
     # chance contributions at two angles are correlated as the loads at these angles are
     alike = ((centred.T @ centred / n) ** 2).sum() / whole**2 if whole > 0 else np.nan
     local = np.full((2, errors.shape[1], centred.shape[1]), np.nan)
-    found = np.full((2, errors.shape[1]), np.nan)
+    over_all = np.full((2, errors.shape[1]), np.nan)
     for i, column in enumerate(errors.T):
         if np.ptp(column) > 0 and whole > 0:
             fit = _fit(column, centred)
             local[0, i], local[1, i] = fit.share, _error(fit.influence, fit.chance) * wider
             share, influence = np.nan_to_num(fit.share), np.nan_to_num(fit.influence)
-            found[0, i] = variance @ share / whole
-            own = (influence @ variance + square @ (share - found[0, i])) / whole
-            found[1, i] = _error(own, alike * _chance(found[0, i], fit.degrees, n)) * overall
+            over_all[0, i] = variance @ share / whole
+            influence_over_all = (influence @ variance + square @ (share - over_all[0, i])) / whole
+            over_all[1, i] = _error(influence_over_all, alike * _chance(over_all[0, i], fit.degrees, n)) * overall
     return (
         _with_ends(local[0], local[1], variance, confidence, iid),
-        _with_ends(found[0], found[1], np.asarray(variance.mean()), confidence, iid),
+        _with_ends(over_all[0], over_all[1], np.asarray(variance.mean()), confidence, iid),
     )
 
 
@@ -267,8 +267,8 @@ def _fit(column: FloatArray, centred: FloatArray) -> Fit:
     hats[rows, piece], hats[rows, piece + 1] = 1.0 - part, part
     hats = hats[:, 1:] - hats[:, 1:].mean(axis=0)
     size, axes = np.linalg.eigh(hats.T @ hats)  # well conditioned: hats overlap with neighbours only
-    held = size > 1e-12 * n
-    basis, degrees = axes[:, held] / np.sqrt(size[held]), int(held.sum())
+    scatters = size > 1e-12 * n
+    basis, degrees = axes[:, scatters] / np.sqrt(size[scatters]), int(scatters.sum())
     mean = hats @ (basis @ (basis.T @ (hats.T @ centred)))
     with np.errstate(invalid="ignore", divide="ignore"):
         variance = (centred**2).mean(axis=0)

@@ -46,11 +46,11 @@ def looks(n: int, taken: Sequence[int] = ()) -> list[int]:
     >>> looks(26)
     [20, 21, 23, 24, 25, 26]
     """
-    own, joints = set(taken), 2.0 * LEAST_BESIDE
+    numbers, joints = set(taken), 2.0 * LEAST_BESIDE
     while joints < n:
-        own.add(int(np.ceil(joints)))
+        numbers.add(int(np.ceil(joints)))
         joints *= GROWTH
-    return [*sorted(number for number in own if number < n), n]
+    return [*sorted(number for number in numbers if number < n), n]
 
 
 def interval(count: ArrayLike, others: ArrayLike, joints: ArrayLike) -> tuple[FloatArray, FloatArray]:

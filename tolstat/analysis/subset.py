@@ -211,8 +211,8 @@ class Walk:
         acceptance = self._accepted / tried if tried else math.nan
         share = float(beyond.mean())
         self._add_variance(beyond, share, states.families)
-        own = math.sqrt(float((self._sums[-1][0] ** 2).sum()))
-        self.levels.append(Level(self._threshold, share, own, self._simulated, acceptance, self._step))
+        error = math.sqrt(float((self._sums[-1][0] ** 2).sum()))
+        self.levels.append(Level(self._threshold, share, error, self._simulated, acceptance, self._step))
         self.reached = threshold >= self.limit
         self.done = self.reached or self.probability < LEAST or threshold <= self._threshold
         if self.done:
@@ -233,12 +233,12 @@ class Walk:
         influence = (beyond - share) / (beyond.size * share)
         self._sums.append([np.bincount(family, influence).astype(float) for family in families.T])
         lag = families.shape[1] - 1
-        own = self._sums[-1][lag]
-        self._variance += float((own**2).sum())
+        influence_of_chains = self._sums[-1][lag]
+        self._variance += float((influence_of_chains**2).sum())
         for back in range(1, lag + 1):
             related = self._sums[-1 - back][lag - back]
-            most = min(related.size, own.size)  # the last chains may have no descendants
-            self._variance += 2.0 * float((related[:most] * own[:most]).sum())
+            most = min(related.size, influence_of_chains.size)  # the last chains may have no descendants
+            self._variance += 2.0 * float((related[:most] * influence_of_chains[:most]).sum())
         self._variance = max(self._variance, 0.0)
 
     @property

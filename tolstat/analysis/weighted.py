@@ -94,16 +94,16 @@ class Split(NamedTuple):
             looked at.
         """
         tail = 0.5 * (1.0 - confidence)
-        own, other = self.far()
+        inside, outside = self.far()
 
         def beyond(share: FloatArray) -> NDArray[np.bool_]:
-            looked_at = betainc(least, np.maximum(own + other - least, 1.0), 1.0 - share)
-            return np.asarray(betainc(other, own, 1.0 - share) / looked_at <= tail)
+            looked_at = betainc(least, np.maximum(inside + outside - least, 1.0), 1.0 - share)
+            return np.asarray(betainc(outside, inside, 1.0 - share) / looked_at <= tail)
 
         with np.errstate(invalid="ignore"):
-            ends = betaincinv(own, other, 1.0 - tail)
+            ends = betaincinv(inside, outside, 1.0 - tail)
             if least:
-                ends = np.where(other > least, first(beyond, ends, 1.0, 50), 1.0)
+                ends = np.where(outside > least, first(beyond, ends, 1.0, 50), 1.0)
         ends = np.where((self.total[::-1] == 0) | np.isnan(ends), 1.0, ends)
         return 1.0 - ends[1], ends[0]
 
@@ -219,8 +219,8 @@ class Weighted(Design):
         """See `Design.upper_if_missed`: that of the joints drawn from the tolerances themselves."""
         if self.from_tolerances is None:
             return np.nan
-        own = Column(x.values[self.from_tolerances])
-        return float(Independent().shares(own, np.array([level]), confidence).upper[0])
+        drawn = Column(x.values[self.from_tolerances])
+        return float(Independent().shares(drawn, np.array([level]), confidence).upper[0])
 
     def smallest(self, n: int, shares: FloatArray) -> float:
         """See `Design.smallest`: the smallest that is not zero."""

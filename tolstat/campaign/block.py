@@ -53,8 +53,8 @@ BlockWork = Work[Block, Timed | Lost]
 
 def load_kernels(warm_up: Callable[[Options], object], options: Iterable[Options]) -> None:
     """Load what joints with any of the options need."""
-    for own in options:
-        warm_up(own)
+    for each in options:
+        warm_up(each)
 
 
 def simulate_block(

@@ -171,7 +171,7 @@ def compile_for(study: Study, store: Reader) -> None:
     first = min(store.n, READ)
     slots = np.unique(np.linspace(0, first - 1, min(first, SOME)).astype(np.intp))
     errors = store.errors(slice(0, first))[slots]
-    each = [perturbed(study.at(one.point or ""), one.row(slots), errors) for one in store.each()]
+    each = [perturbed(study.at(at_point.point or ""), at_point.row(slots), errors) for at_point in store.each()]
     for options in settings_in_use(study, store):
         _compile_missing(options, np.concatenate(each))
 
@@ -181,10 +181,10 @@ def _blocks(study: Study, store: Reader, stop_slot: int, pace: Pace) -> Iterator
     studies = {point: study.at(point) for point in store.points}
     distinct = settings_in_use(study, store)
     numbers = np.array([distinct.index(own) for own in _each_settings(study, store)])
-    for one, slots in store.pending_blocks(stop_slot):
+    for at_point, slots in store.pending_blocks(stop_slot):
         read = slice(slots[0], slots[-1] + 1)
-        errors, attempt = store.errors(read), one.attempt(read)[slots - slots[0]]
-        point = one.point or ""
+        errors, attempt = store.errors(read), at_point.attempt(read)[slots - slots[0]]
+        point = at_point.point or ""
         option = numbers[np.where(attempt, len(study.solvers) + attempt - 1, variants(study, store.row(slots)))]
         for number in np.unique(option):
             left = slots[option == number]

@@ -94,16 +94,16 @@ def run_checks(
     -------
     dict of str to Check
     """
-    lower = any(own.fidelity != Fidelity.DYNAMIC for own in options)
+    lower = any(changed.fidelity != Fidelity.DYNAMIC for changed in options)
     checks = {}
     with kept_workers():
         for name in (*names, *(("fidelity",) if lower else ())):
-            own = [options_of_check(one, name) for one in options]
+            changed = [options_of_check(joint_options, name) for joint_options in options]
             if name == "reference":
-                results = _references(params, own, workers, progress)
+                results = _references(params, changed, workers, progress)
             else:
-                results = simulate_each(params, own, simulate)
-            checks[name] = Check(DESCRIPTION[name], to_names(own[0]), results)
+                results = simulate_each(params, changed, simulate)
+            checks[name] = Check(DESCRIPTION[name], to_names(changed[0]), results)
     return checks
 
 
@@ -139,7 +139,7 @@ def simulate_each(
 ) -> NDArray[np.void]:
     """Results of joints, (m,) table RESULT, each with its own options, without histories."""
     results = np.empty(len(params), RESULT)
-    for one in dict.fromkeys(options):
-        here = np.array([own == one for own in options])
-        results[here] = simulate(params[here], one).results
+    for distinct in dict.fromkeys(options):
+        here = np.array([each == distinct for each in options])
+        results[here] = simulate(params[here], distinct).results
     return results

@@ -87,7 +87,7 @@ def map_on_cluster(
             threads = sum(client.nthreads().values())
             seen = time.monotonic() if threads or scheduler else seen
             while len(running) < 2 * max(1, threads) and not stop() and (block := next(todo, None)) is not None:
-                future = client.submit(process_block, work, expected, block, pure=False)
+                future = client.submit(_process_block, work, expected, block, pure=False)
                 running[future] = block
                 future.add_done_callback(ended.put)
             if not running:
@@ -119,7 +119,7 @@ def map_on_cluster(
     yield from pool.map_blocks(work, chain(failed, todo), workers, stop)
 
 
-def process_block(work: Work[Any, Any], expected: Mapping[str, str], block: Any) -> Any:
+def _process_block(work: Work[Any, Any], expected: Mapping[str, str], block: Any) -> Any:
     """Process a block in a worker, one block at a time."""
     check(expected, _versions(), "a Dask worker")
     with _ONE_AT_A_TIME:

@@ -115,7 +115,7 @@ def grow(
     StoreError
         When the file cannot be replaced.
     """
-    held = store.metadata.changed(
+    document = store.metadata.changed(
         identity=json.loads(json.dumps(study.identity())),
         sampling=study.sampling.model_dump(mode="json") | {"dimensions": store.sampling["dimensions"]},
         stop={"reached": False, "looks": store.stop["looks"]} if store.stop else {},  # looks of a rule stay looks
@@ -125,7 +125,7 @@ def grow(
     tables = {"errors": chain(_blocks(store, store.errors), errors)}
     if origin is not None:
         tables["origin"] = chain(_blocks(store, store.origin), origin)
-    write_new(store.path, held, OTHER_FILE, tables, partial(_copy_results, sources=[store]), overwrite=True)
+    write_new(store.path, document, OTHER_FILE, tables, partial(_copy_results, sources=[store]), overwrite=True)
 
 
 def merge(paths: Sequence[Path], out: Path) -> Merged:
@@ -158,7 +158,7 @@ def merge(paths: Sequence[Path], out: Path) -> Merged:
         stores.sort(key=lambda store: (store.rows[0], store.rows.stop))
         _check_one_campaign(stores)
         rows = stores[0].campaign_rows
-        held = stores[0].metadata.changed(stop={}, first_row=0, n=rows)
+        document = stores[0].metadata.changed(stop={}, first_row=0, n=rows)
         # each file that adds rows to those of the files before it, and the first file slot that does
         shares = [(s, s.slot(end)) for s, end in zip(stores, _ends(stores), strict=False) if s.rows.stop > end]
         tables = {"errors": (block for store, begin in shares for block in _blocks(store, store.errors, begin))}
@@ -166,14 +166,14 @@ def merge(paths: Sequence[Path], out: Path) -> Merged:
             tables["design"] = (s.design()[begin:] for s, begin in shares)
         if columns(stores[0].sampling):
             tables["origin"] = (block for store, begin in shares for block in _blocks(store, store.origin, begin))
-        write_new(out, held, OTHER_FILE, tables, partial(_copy_results, sources=stores))
+        write_new(out, document, OTHER_FILE, tables, partial(_copy_results, sources=stores))
         twice = sum(len(store.rows) for store in stores) - rows
     with Reader.open(out) as store:
         return Merged(store.counts(), twice)
 
 
 def _check_extendable(store: Reader, n: int) -> None:
-    place, held = str(store.path), store.sampling["n"]
+    place, joints = str(store.path), store.sampling["n"]
     faults = []
     reason = NOT_EXTENDABLE.get(store.sampling["method"])
     if "replicates" in store.sampling:
@@ -181,8 +181,9 @@ def _check_extendable(store: Reader, n: int) -> None:
     if reason:
         remedy = "change the study, and run it as another campaign: tolstat run STUDY --out OTHER.h5"
         faults.append(Fault(place, f"cannot be extended: {reason}", remedy))
-    elif n <= held:
-        faults.append(Fault(place, f"has {held} joints already", f"give a larger number, for example --n {2 * held}"))
+    elif n <= joints:
+        remedy = f"give a larger number, for example --n {2 * joints}"
+        faults.append(Fault(place, f"has {joints} joints already", remedy))
     if not store.whole:
         found = f"holds only rows {store.rows[0]}:{store.rows.stop} of the campaign"
         faults.append(Fault(place, found, "merge all slices first: tolstat merge SLICE... --out FILE"))
@@ -242,8 +243,8 @@ def _copy_results(file: h5py.File, sources: Sequence[Reader]) -> None:
         When two of them hold different results of one row.
     """
     for source in sources:
-        for one in source.each():
-            for row, column in _copy(file, one):
+        for at_point in source.each():
+            for row, column in _copy(file, at_point):
                 holding = [str(store.path) for store in sources if row in store.rows]
                 found = f"hold different results of row {row}: {column} differs"
                 remedy = f"find the file that is wrong, and leave it out: tolstat replay {holding[0]} --row {row}"
@@ -255,23 +256,24 @@ def _copy(file: h5py.File, source: Reader) -> Iterator[tuple[int, str]]:
     place = layout.place_of(source.point or "") or "/"
     columns = [("ledger", "attempt"), *(("histories", name) for name in source.history_specs)]
     # the status last: it says what a file holds
-    columns += sorted((("results", c.name) for c in source.columns), key=lambda own: own[1] == "status")
+    columns += sorted((("results", c.name) for c in source.columns), key=lambda column: column[1] == "status")
     for group, name in columns:
         dataset = file[place][group][name]
         size = min(BLOCK, max(1, COPY_BYTES // (dataset.dtype.itemsize * math.prod(dataset.shape[1:]))))
         for first in range(0, source.n, size):
-            own = slice(first, min(first + size, source.n))
-            there = slice(source.row(own.start), source.row(own.stop))
-            done = source.status(own) != Status.PENDING
-            held = file[place]["results/status"][there] != Status.PENDING
-            values, before = source.column(group, name, own), dataset[there]
-            new = ~held if group == "ledger" else done & ~held  # also pending joints have an attempt, the one to come
-            both = np.flatnonzero(done & held)
+            slots = slice(first, min(first + size, source.n))
+            rows = slice(source.row(slots.start), source.row(slots.stop))
+            done = source.status(slots) != Status.PENDING
+            finished = file[place]["results/status"][rows] != Status.PENDING
+            values, before = source.column(group, name, slots), dataset[rows]
+            # also pending joints have an attempt, the one to come
+            new = ~finished if group == "ledger" else done & ~finished
+            both = np.flatnonzero(done & finished)
             same = (_bytes(values[both]) == _bytes(before[both])).all(axis=1)
             if group != "ledger" and not same.all():
-                yield int(there.start + both[np.argmin(same)]), name
+                yield int(rows.start + both[np.argmin(same)]), name
             before[new] = values[new]
-            dataset[there] = before
+            dataset[rows] = before
 
 
 def _bytes(values: NDArray[Any]) -> NDArray[np.uint8]:

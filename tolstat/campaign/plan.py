@@ -25,7 +25,7 @@ from tolstat.display import text
 from tolstat.display.progress import Tell, silent
 from tolstat.joint import ideal
 from tolstat.sampling import dimensions, draw, streams
-from tolstat.solver import refinement
+from tolstat.solver import fidelity, refinement
 from tolstat.solver.compilation import stage_name, warm_up
 from tolstat.solver.simulation import history_specs, simulate_rows
 from tolstat.store import layout, metadata, worst
@@ -134,7 +134,7 @@ class Plan:
     failed, unsettled : int
         Numbers of pilot joints without a valid load.
     fidelity : str
-        What ``solver.fidelity = "auto"`` chooses, and why; empty if the study gives the fidelity.
+        What ``solver.fidelity = "auto"`` chooses, with the table of the pilot; empty if the study gives the fidelity.
     seconds_per_joint : float
         Mean processor time of a joint at all points, s: its time in one process that has a core of its own.
     workers : int
@@ -238,7 +238,7 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT, stage: Te
     valid = slice(study.first_sample, None)
     status, solver = worst.together(list(results.values()))["status"], settings(study.solver, choice)
     specs = history_specs(solver, study.output.histories, study.output.harmonics)
-    held = metadata.of_study(study, range(study.rows), specs, dimensions(), solver, choice)
+    document = metadata.of_study(study, range(study.rows), specs, dimensions(), solver, choice)
     return Plan(
         rows=study.rows,
         points=list(at),
@@ -246,12 +246,12 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT, stage: Te
         pilot=len(rows),
         failed=int(np.isin(status, FAILED).sum()),
         unsettled=int(np.isin(status, UNSETTLED).sum()),
-        fidelity=choice.get("reason", ""),
+        fidelity=fidelity.describe(choice),
         seconds_per_joint=each,
         workers=workers,
         stages=stages,
         process_bytes=_process_bytes(),
-        file_bytes=layout.size_of(held) + len(held.model_dump_json()),
+        file_bytes=layout.size_of(document) + len(document.model_dump_json()),
         widths={share: _width(share, study.samples) for share in SHARES} if iid else {},
         limits=_limits(study, {name: own[valid] for name, own in results.items()}) if iid else [],
         wilks={share: binomial.wilks(share, CONFIDENCE) for share in QUANTILES},
@@ -275,9 +275,9 @@ def _joints(
 ) -> tuple[dict[str, NDArray[np.void]], list[Options]]:
     """Parameters of some joints at each operating point, table PARAM, and the solver options of each joint."""
     errors = _errors(study, rows)
-    own = [settings(solver, choice) for solver in study.solvers]
+    each_options = [settings(solver, choice) for solver in study.solvers]
     at = {point.name: perturbed(study.at(point.name), rows, errors) for point in study.points}
-    return at, [own[number] for number in variants(study, rows)]
+    return at, [each_options[number] for number in variants(study, rows)]
 
 
 def _affordable(study: Study, choice: dict[str, Any]) -> int:
@@ -339,8 +339,8 @@ def _errors(study: Study, rows: NDArray[np.intp]) -> NDArray[np.void]:
 
 def simulate_timed(study: Study, params: NDArray[np.void], options: list[Options]) -> tuple[NDArray[np.void], float]:
     """Simulate each joint with its own options; also return the total processor time, s, without compilation."""
-    for one in dict.fromkeys(options):
-        simulate_rows(params[[options.index(one)]], one)  # compiles, or loads, what these options need
+    for distinct in dict.fromkeys(options):
+        simulate_rows(params[[options.index(distinct)]], distinct)  # compiles, or loads, what these options need
     kept = partial(simulate_rows, histories=study.output.histories, n_harmonics=study.output.harmonics)
     begin = time.process_time()
     return checks.simulate_each(params, options, kept), time.process_time() - begin
@@ -357,10 +357,10 @@ def _limits(study: Study, results: Mapping[str, NDArray[np.void]]) -> list[Limit
         points = names_of(split(name)[1], list(results), "limits")
         values, status, inexact = worst.load_of([results[point] for point in points], load_of(name))
         load = Sample(name, load_of(name).unit, level, np.nan, values, inexact, status, Independent())
-        found = load.above(level, CONFIDENCE)
-        valid = found.n - found.n_failed - found.n_unsettled
-        nearest_half = min(max(0.5, found.lower), found.upper)  # the interval is widest at a share of one half
-        plans.append(LimitPlan(name, level, found.count, valid, _width(nearest_half, study.samples)))
+        share = load.above(level, CONFIDENCE)
+        valid = share.n - share.n_failed - share.n_unsettled
+        nearest_half = min(max(0.5, share.lower), share.upper)  # the interval is widest at a share of one half
+        plans.append(LimitPlan(name, level, share.count, valid, _width(nearest_half, study.samples)))
     return plans
 
 

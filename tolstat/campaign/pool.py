@@ -60,7 +60,7 @@ class Lost(NamedTuple):
     reason: str
 
 
-def no_preparation() -> None:
+def _no_preparation() -> None:
     """Do nothing before the first block."""
 
 
@@ -80,7 +80,7 @@ class Work(Generic[BlockT, ResultT]):
 
     function: Callable[[BlockT], ResultT]
     split: Callable[[BlockT], Sequence[BlockT]] = lambda block: [block]
-    prepare: Callable[[], object] = no_preparation
+    prepare: Callable[[], object] = _no_preparation
 
 
 def map_blocks(

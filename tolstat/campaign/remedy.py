@@ -92,14 +92,14 @@ def reasons(store: Reader, status: Mapping[str, NDArray[np.uint8]]) -> list[Reas
     status : mapping of str to ndarray, shape (n,)
         Status of its joints at each operating point, the nominal joint included.
     """
-    found = []
+    each = []
     for point, state in product(status, (*FAILED, *UNSETTLED)):
         slots = np.flatnonzero(status[point] == state)
         if slots.size:
             first, joint = int(slots[0]), int(store.row(slots[:1])[0])
             row = store.at(point).results(slice(first, first + 1))[0]
-            found.append(Reason(Status(state), len(slots), joint, remedy(row, store.options), point))
-    return sorted(found, key=lambda reason: -reason.joints)
+            each.append(Reason(Status(state), len(slots), joint, remedy(row, store.options), point))
+    return sorted(each, key=lambda reason: -reason.joints)
 
 
 def remedy(row: np.void, options: Mapping[str, Any]) -> str:

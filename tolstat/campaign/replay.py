@@ -252,11 +252,11 @@ def replay(store: Reader, row: int) -> Replay:
 def _different_histories(store: Reader, row: int, params: NDArray[np.void], options: Options) -> list[Difference]:
     kind: Any = store.identity["output.histories"]
     now = simulate_rows(params, options, kind, store.identity["output.harmonics"]).histories
-    found = []
+    differences = []
     for name in store.history_specs:
         before = store.histories(name, np.array([row]))
         if before.tobytes() != now[name].tobytes():
             apart = np.nan_to_num(np.abs(before.astype(float) - now[name]), nan=np.inf)
             at = np.unravel_index(np.argmax(apart), apart.shape)
-            found.append(Difference(f"histories/{name}", float(before[at]), float(now[name][at])))
-    return found
+            differences.append(Difference(f"histories/{name}", float(before[at]), float(now[name][at])))
+    return differences

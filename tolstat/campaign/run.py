@@ -208,8 +208,8 @@ def run(
         except KeyboardInterrupt:
             raise Interrupted(path, store.counts(), stop.number) from None
         except WorkerDied as error:
-            held = store.counts()
-            kept = f"{path} holds the results of {held.done} of {held.total} joints"
+            reached = store.counts()
+            kept = f"{path} holds the results of {reached.done} of {reached.total} joints"
             raise WorkerDied(f"{error}\n  {kept}; to resume, run the same command again") from error
         if next(store.pending_blocks(last), None) is not None:
             raise Interrupted(path, counts, stop.number)
@@ -267,7 +267,7 @@ def choose_fidelity(study: Study) -> dict[str, Any]:
     Returns
     -------
     dict
-        The record of the choice, see `fidelity.Choice`.
+        The record of the choice, see `fidelity.choose`.
     """
     options = study.solver.options()
     rows = fidelity.pilot(study.rows, study.first_sample, study.sampling.seed)
@@ -279,7 +279,7 @@ def choose_fidelity(study: Study) -> dict[str, Any]:
     budget, min_steps = study.solver.error_budget, max(least, default=0)  # steps from which histories can be computed
     with kept_workers():
         closed_form = not study.has_axial_force
-        return fidelity.choose(params, options, budget, study.asked, simulate_beside, min_steps, closed_form).record
+        return fidelity.choose(params, options, budget, study.asked, simulate_beside, min_steps, closed_form)
 
 
 def _check_same(store: Reader, study: Study, rows: range) -> None:
@@ -299,13 +299,13 @@ def _check_same(store: Reader, study: Study, rows: range) -> None:
 
 def _of_number(store: Reader, asked: int) -> StoreError:
     """Error of a file of this study with another number of joints."""
-    path, held, method = store.path, int(store.sampling["n"]), store.sampling["method"]
+    path, joints, method = store.path, int(store.sampling["n"]), store.sampling["method"]
     remedy = f"simulate more of its joints: tolstat extend {path} --n {asked}"
-    if asked < held:
+    if asked < joints:
         remedy = f"read it as it is: tolstat report {path}, or give another file: --out OTHER.h5"
     elif method in NOT_EXTENDABLE:
         remedy = f"give another file: --out OTHER.h5; {NOT_EXTENDABLE[method]}"
-    return store_error(path, f"is the result file of this study with {held} joints, not {asked}", remedy)
+    return store_error(path, f"is the result file of this study with {joints} joints, not {asked}", remedy)
 
 
 def _history_options(study: Study) -> tuple[Histories, int]:

@@ -149,7 +149,7 @@ def _look(store: Reader, limit: Limit, rows: range) -> Look:
     count = unresolved = 0
     for begin in range(0, len(rows), BLOCK):
         block = rows[begin : begin + BLOCK]
-        parts = {one.point or "": one.results(slice(block.start, block.stop)) for one in store.each()}
+        parts = {at_point.point or "": at_point.results(slice(block.start, block.stop)) for at_point in store.each()}
         part = Sample.of(*worst.limit_of(parts, limit)).above(limit.level)
         count += part.count
         unresolved += part.n_failed + part.n_unsettled

@@ -86,10 +86,10 @@ def check_few(store: Writer) -> None:
     Does nothing if the file is a slice, and leaves checks that it has as they are.
     """
     seed, made = int(store.sampling["seed"]), []
-    for one in store.each() if store.whole else ():
-        if one.complete and verification.read(one) is None:
-            found = check_campaign(one, QUICK_CHECKS, few(one.n), seed, 1, no_progress)
-            made += [(one, found)] if found else []
+    for at_point in store.each() if store.whole else ():
+        if at_point.complete and verification.read(at_point) is None:
+            verified = check_campaign(at_point, QUICK_CHECKS, few(at_point.n), seed, 1, no_progress)
+            made += [(at_point, verified)] if verified else []
     if made:
         verification.write(made)
 
@@ -112,7 +112,7 @@ def check(
     """
     faults: list[Fault] = []
     with gather(faults):
-        number = parse_joints(joints)
+        number = _parse_joints(joints)
     if path.suffix == ".toml":
         with gather(faults):
             study = load(path)
@@ -156,24 +156,24 @@ def check_file(
         When the file cannot be used, was made by other code, or has no settled joint.
     """
     with Writer.open(path) as store:
-        check_version(store)
+        _check_version(store)
         seed = int(store.sampling["seed"]) if seed is None else seed
-        if not any((one.status() == Status.OK).any() for one in store.each()):
+        if not any((at_point.status() == Status.OK).any() for at_point in store.each()):
             raise store_error(path, "has no settled joint", f"run the campaign first: tolstat run STUDY --out {path}")
         compilation.announce()
-        for one in store.each():
-            if found := check_campaign(one, names, joints, seed, workers, progress):
-                verification.write([(one, found)])
+        for at_point in store.each():
+            if verified := check_campaign(at_point, names, joints, seed, workers, progress):
+                verification.write([(at_point, verified)])
         return _stored(store, verification.VERIFY)
 
 
 def _stored(store: Reader, name: str) -> Verification:
     """Verifications of a group at all operating points at which the file has one."""
-    found = [verification.read(one, name) for one in store.each()]
-    return verification.together([one for one in found if one is not None])
+    verifications = [verification.read(at_point, name) for at_point in store.each()]
+    return verification.together([read for read in verifications if read is not None])
 
 
-def check_version(store: Reader) -> None:
+def _check_version(store: Reader) -> None:
     """Raise a StoreError for a file that other code made."""
     if differing_code(store.versions):
         remedy = "verify it with that version, or run the campaign again: tolstat run STUDY --out OTHER.h5"
@@ -185,15 +185,15 @@ def nearest(store: Reader, limit: Limit, joints: int) -> NDArray[np.intp]:
     slots = np.arange(store.first_sample, store.n)
     results = store.results(slice(store.first_sample, None))
     settled = results["status"] == Status.OK
-    found: set[int] = set()
+    nearest_slots: set[int] = set()
     for name, level in zip(limit.loads, limit.levels, strict=True):
         plain, points = split(name)
         if points and store.point not in points.split("+"):
             continue
         distance = np.where(settled, np.abs(LOADS[plain].of(results) - level), np.inf)
         order = np.argsort(distance, kind="stable")[:joints]
-        found |= set(slots[order[np.isfinite(distance[order])]].tolist())
-    return np.array(sorted(found), dtype=np.intp)
+        nearest_slots |= set(slots[order[np.isfinite(distance[order])]].tolist())
+    return np.array(sorted(nearest_slots), dtype=np.intp)
 
 
 def check_near(
@@ -228,7 +228,7 @@ def check_near(
     StoreError
         As `check_file`, or when too few joints are settled.
     """
-    number = parse_joints(joints)
+    number = _parse_joints(joints)
     if number is None or number < LEAST_NEAR:
         found = f"{joints} joints do not tell the numerical error near a limit"
         raise InputError([Fault("--joints", found, f"give {LEAST_NEAR} or more")])
@@ -238,28 +238,28 @@ def check_near(
         if lacking:
             remedy = "give loads that it keeps, see tolstat status"
             raise InputError([Fault("--near", f"the file does not keep {', '.join(lacking)}", remedy)])
-        check_version(store)
-        chosen = [(one, nearest(one, limit, number)) for one in store.each()]
+        _check_version(store)
+        chosen = [(at_point, nearest(at_point, limit, number)) for at_point in store.each()]
         fewest = min((slots.size for _, slots in chosen if slots.size), default=0)
         if fewest < LEAST_NEAR:
             found = f"has {fewest} settled joints; {LEAST_NEAR} are needed"
             raise store_error(path, found, f"add joints: tolstat extend {path}")
         compilation.announce()
-        for one, slots in chosen:
-            before = verification.read(one, verification.NEAR)
-            new = slots if before is None else slots[~np.isin(one.row(slots), before.rows)]
+        for at_point, slots in chosen:
+            before = verification.read(at_point, verification.NEAR)
+            new = slots if before is None else slots[~np.isin(at_point.row(slots), before.rows)]
             if new.size:
-                made = check_slots(one, new, QUICK_CHECKS, 0, workers, progress)
-                verification.write([(one, made if before is None else _merged(before, made))], verification.NEAR)
+                made = check_slots(at_point, new, QUICK_CHECKS, 0, workers, progress)
+                verification.write([(at_point, made if before is None else _merged(before, made))], verification.NEAR)
         return _stored(store, verification.NEAR)
 
 
 def _merged(*both: Verification) -> Verification:
     """Joints of both, ascending."""
-    found = verification.together(both)
-    order = np.argsort(found.rows)
-    checks = {name: check._replace(results=check.results[order]) for name, check in found.checks.items()}
-    return found._replace(rows=found.rows[order], base=found.base[order], checks=checks)
+    merged = verification.together(both)
+    order = np.argsort(merged.rows)
+    checks = {name: check._replace(results=check.results[order]) for name, check in merged.checks.items()}
+    return merged._replace(rows=merged.rows[order], base=merged.base[order], checks=checks)
 
 
 def check_study(
@@ -299,7 +299,7 @@ def check_study(
     return verification.together(each)
 
 
-def parse_joints(joints: int | str) -> int | None:
+def _parse_joints(joints: int | str) -> int | None:
     """Parse a number of joints; None for ``"all"``.
 
     Raises

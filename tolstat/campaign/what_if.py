@@ -60,25 +60,25 @@ class Change(NamedTuple):
 
 def stepped(study: Study, line: Line, step: str, numbers: range) -> Change:
     """A line after a step (`widths.steps`); joint i is sample i of the campaign but for this line."""
-    own = widths.after(study, line, step)
+    changed = widths.after(study, line, step)
     about = {
         "kind": WIDTH,
         "label": line.label,
         "step": step,
         "words": widths.words(study, line, step),
         "seed": study.sampling.seed,
-        "tolerances": {name: own.tolerances[name].describe() for name in line.names},
+        "tolerances": {name: changed.tolerances[name].describe() for name in line.names},
     }
-    if step not in widths.STEPS and own.fit is not None:
-        about |= {"kind": FIT, "diameters": own.fit.diameters}
-    return Change(about, own, partial(_draw, own), numbers)
+    if step not in widths.STEPS and changed.fit is not None:
+        about |= {"kind": FIT, "diameters": changed.fit.diameters}
+    return Change(about, changed, partial(_draw, changed), numbers)
 
 
 def exchanged(study: Study, line: Line, numbers: range) -> Change:
     """Joint i is sample 2i of the campaign with the line's errors of sample 2i + 1."""
     about = {"kind": EXCHANGE, "label": line.label, "seed": study.sampling.seed, "names": list(line.names)}
-    own = widths.applied(study, {})
-    return Change(about, own, partial(_exchange, own, line), numbers)
+    unchanged = widths.applied(study, {})
+    return Change(about, unchanged, partial(_exchange, unchanged, line), numbers)
 
 
 def about_joint(study: Study, keys: Mapping[str, Any]) -> dict[str, Any]:
@@ -95,15 +95,15 @@ def with_joint(study: Study, keys: Mapping[str, Any], numbers: range) -> Change:
     InputError
         When the keys make no valid joint.
     """
-    own = widths.applied(with_value(study, keys), {})
-    return Change(about_joint(study, keys), own, partial(_draw, own), numbers)
+    changed = widths.applied(with_value(study, keys), {})
+    return Change(about_joint(study, keys), changed, partial(_draw, changed), numbers)
 
 
 def as_drawn(study: Study, numbers: range) -> Change:
     """Further samples of the campaign, or samples at random of one that is not: nothing is changed."""
     about = {"kind": AS_DRAWN, "label": "no line", "seed": study.sampling.seed}
-    own = widths.applied(study, {})
-    return Change(about, own, partial(_draw, own), numbers)
+    unchanged = widths.applied(study, {})
+    return Change(about, unchanged, partial(_draw, unchanged), numbers)
 
 
 class Asked(NamedTuple):
@@ -128,10 +128,10 @@ class Asked(NamedTuple):
 
 def missing(held: Mapping[str, Altered], wanted: Change, names: Sequence[str]) -> range:
     """Joints of a change that the file lacks; all of them if those held begin later, or lack one of the loads."""
-    own = held.get(what_if.key(wanted.about))
-    if own is None or own.first > wanted.numbers.start or not own.holds(names):
+    altered = held.get(what_if.key(wanted.about))
+    if altered is None or altered.first > wanted.numbers.start or not altered.holds(names):
         return wanted.numbers
-    return range(max(own.end, wanted.numbers.start), max(own.end, wanted.numbers.stop))
+    return range(max(altered.end, wanted.numbers.start), max(altered.end, wanted.numbers.stop))
 
 
 def options_of(study: Study, store: Writer) -> Options:
@@ -213,15 +213,15 @@ class _Table:
         self.status = np.full((n, len(asked.points)), Status.PENDING, np.uint8)
 
     def put(self, block: Block, results: NDArray[np.void]) -> NDArray[np.uint8]:
-        own = block.slots, self.asked.points.index(block.point)
+        place = block.slots, self.asked.points.index(block.point)
         loads = np.column_stack([LOADS[name].of(results) for name in self.asked.loads])
-        self.loads[own] = np.where(np.isin(results["status"], VALID)[:, None], loads, np.nan)
-        self.status[own] = results["status"]
-        return np.asarray(self.status[own])
+        self.loads[place] = np.where(np.isin(results["status"], VALID)[:, None], loads, np.nan)
+        self.status[place] = results["status"]
+        return np.asarray(self.status[place])
 
     def sets(self, held: Mapping[str, Altered]) -> dict[str, Altered]:
         """Sets that have grown: of each, the joints before the first that is not done, behind those held."""
-        found, begin = {}, 0
+        grown, begin = {}, 0
         for about, _, _, numbers in self.todo:
             here = slice(begin, begin + len(numbers))
             begin = here.stop
@@ -231,19 +231,19 @@ class _Table:
                 name, states = what_if.key(about), list(self.status[own].T)
                 status = worst_status(states)
                 loads, old = self.loads[own].reshape(-1, len(self.names)), held.get(name)
-                found[name] = Altered(about, numbers.start, self.names, loads, status)
+                grown[name] = Altered(about, numbers.start, self.names, loads, status)
                 if old is not None and (old.end, old.names) == (numbers.start, self.names):
                     joined = np.concatenate([old.loads, loads]), np.concatenate([old.status, status])
-                    found[name] = old._replace(loads=joined[0], status=joined[1])
-        return found
+                    grown[name] = old._replace(loads=joined[0], status=joined[1])
+        return grown
 
 
 def _blocks(study: Study, options: Options, todo: Sequence[Change], points: Sequence[str]) -> Iterator[Block]:
     operations, begin = {point: study.at(point).operation for point in points}, 0
     for _, changed, draw, numbers in todo:
         for first in range(0, len(numbers), BLOCK):
-            own = numbers[first : first + BLOCK]
-            slots, errors = np.arange(begin + first, begin + first + len(own)), draw(own)
+            part = numbers[first : first + BLOCK]
+            slots, errors = np.arange(begin + first, begin + first + len(part)), draw(part)
             for point, operation in operations.items():
                 yield Block(point, slots, perturb(changed.joint, operation, errors), options)
         begin += len(numbers)
@@ -256,6 +256,6 @@ def _draw(study: Study, numbers: range) -> NDArray[np.void]:
 
 def _exchange(study: Study, line: Line, numbers: range) -> NDArray[np.void]:
     scores = sampling.scores(study, range(2 * numbers.start, 2 * numbers.stop))
-    own = {stream for name in line.names for stream in axes.streams_of(name)}
-    moved = np.array([stream in own for stream in sampling.streams(study)])
+    exchanged = {stream for name in line.names for stream in axes.streams_of(name)}
+    moved = np.array([stream in exchanged for stream in sampling.streams(study)])
     return sampling.from_scores(study, np.where(moved, scores[1::2], scores[::2]))

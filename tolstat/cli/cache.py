@@ -29,7 +29,3 @@ def cache(*, clear: bool = False) -> None:
         files, size = cache_folder.size(folder)
         typer.echo(f"{folder}: {files} kernels, {size / 1e6:.1f} MB")
     say(f"in use: {cache_folder.CACHE_DIRECTORY}")
-    try:
-        import tolstat.kernel.simd.cache  # noqa: F401
-    except ImportError:
-        say("without checksums: the cache of this Numba is not the one that tolstat knows")

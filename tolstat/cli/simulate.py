@@ -19,7 +19,7 @@ from tolstat.common.tables import STATUS_TEXT, Status
 from tolstat.display import table
 from tolstat.display.options import AsJson, Opt, Point, ResultPath, Trace
 from tolstat.display.table import Column, has
-from tolstat.joint.mounting import in_words
+from tolstat.joint.sections import mounting_and_law
 from tolstat.solver import compilation
 from tolstat.store import ResultFile
 
@@ -49,7 +49,7 @@ def simulate(case: Annotated[Path, Opt("CASE")], *, out: Trace = None, as_json: 
     """
     loaded = study.load_case(case)
     print_warnings(case, [loaded.joint])
-    say(f"{loaded.name}: {in_words([loaded.joint.shaft.axial], [loaded.joint.contact.law])}")
+    say(f"{loaded.name}: {mounting_and_law([loaded.joint.shaft.axial], [loaded.joint.contact.law])}")
     compilation.announce()
     with progress("simulation"):
         result = replays.simulate_case(loaded)

@@ -12,7 +12,7 @@ from typing import Any
 import jinja2
 from markupsafe import Markup
 
-from tolstat.common.aside import mapped
+from tolstat.common.forked import mapped
 from tolstat.display import drawing, style
 from tolstat.display.blocks import Block, Decision, Panel, Panels
 from tolstat.display.unseen import visible

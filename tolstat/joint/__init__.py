@@ -20,14 +20,13 @@ if TYPE_CHECKING:
     from tolstat.joint.perturbation import operating as operating
     from tolstat.joint.perturbation import perturb as perturb
     from tolstat.joint.reading import load as load
-    from tolstat.joint.variant import varied as varied
+    from tolstat.joint.reading import varied as varied
 
 _HOMES = {
     "bearing": ("Bearing",),
     "model": ("affecting_results", "affects_results", "Joint"),
     "perturbation": ("HOLE_OF_PIN", "MEANS", "Operation", "nominal_errors", "operating", "perturb"),
-    "reading": ("load",),
-    "variant": ("varied",),
+    "reading": ("load", "varied"),
 }
 
 

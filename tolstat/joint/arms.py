@@ -26,12 +26,12 @@ def one_force(rows: Iterable[Mapping[str, Any]], level: str, size: str) -> list[
     level, size : str
         Of the rows of one force, that of the largest `size` is shown, with the names of all in ``load``.
     """
-    found: dict[Any, list[Mapping[str, Any]]] = {}
+    by_force: dict[Any, list[Mapping[str, Any]]] = {}
     for row in rows:
         name, points = split(row["load"])
         force = (PIN_OF_LOAD[name], points, row[level]) if name in PIN_OF_LOAD else row["load"]
-        found.setdefault(force, []).append(row)
+        by_force.setdefault(force, []).append(row)
     return [
         {**max(same, key=lambda row: row[size]), "load": ", ".join(row["load"] for row in same)}
-        for same in found.values()
+        for same in by_force.values()
     ]

@@ -16,12 +16,11 @@ from pydantic import AfterValidator, Field, ValidationInfo, field_validator
 from tolstat.common import units
 from tolstat.common.parameters import MAX_STATIONS
 from tolstat.common.strict import Strict, refuse
-from tolstat.joint.bearing import Bearing
-from tolstat.joint.needles import fit_needles
+from tolstat.joint.bearing import Bearing, fit_needles
+from tolstat.joint.material import Array
 from tolstat.joint.sections import (
     FOLLOWS,
     NOT_NEGATIVE,
-    Array,
     Diameter,
     Force,
     Length,
@@ -132,14 +131,14 @@ def _mode(contact: Contact, bearing: Bearing | None) -> Stations:
 
 def _uniform(contact: Contact, bearing: Bearing | None) -> Stations:
     k1u, k2u, _, _ = contact.coefficients()
-    one = np.ones(2)
-    return Stations(contact.ends(), 0.5 * k1u * one, 0.5 * k2u * one, 0.0 * one, one)
+    weight = np.ones(2)
+    return Stations(contact.ends(), 0.5 * k1u * weight, 0.5 * k2u * weight, 0.0 * weight, weight)
 
 
 def _point(contact: Contact, bearing: Bearing | None) -> Stations:
     _, _, k1p, k2p = contact.coefficients()
-    one = np.ones(2)
-    return Stations(contact.ends(), k1p * one, k2p * one, 0.0 * one, one)
+    weight = np.ones(2)
+    return Stations(contact.ends(), k1p * weight, k2p * weight, 0.0 * weight, weight)
 
 
 def _slices(contact: Contact) -> tuple[Array, Array]:
@@ -166,13 +165,13 @@ def _needles(contact: Contact, bearing: Bearing | None) -> Stations:
 
 def _given(contact: Contact, bearing: Bearing | None) -> Stations:
     assert contact.stations is not None
-    own = sorted(contact.stations, key=lambda station: -station.s_over_z)
+    stations = sorted(contact.stations, key=lambda station: -station.s_over_z)
     return Stations(
-        contact.z * np.array([station.s_over_z for station in own]),
-        np.array([station.k1 for station in own]),
-        np.array([station.k2 for station in own]),
-        np.zeros(len(own)),
-        np.array([station.weight for station in own]),
+        contact.z * np.array([station.s_over_z for station in stations]),
+        np.array([station.k1 for station in stations]),
+        np.array([station.k2 for station in stations]),
+        np.zeros(len(stations)),
+        np.array([station.weight for station in stations]),
     )
 
 
@@ -308,12 +307,12 @@ class Contact(Strict):
     @classmethod
     def _leaves_a_middle(cls, value: float | None, info: ValidationInfo) -> float | None:
         """Refuse a negative middle station: uniform less twice the point coefficient."""
-        name = str(info.field_name)
-        uniform = info.data.get(name.replace("p", "u"))
-        if _has_middle(info) and value is not None and uniform is not None and 2.0 * value > uniform:
-            of = f"{name[:2]}u"
-            found = f"2 {name} exceeds {of} = {{{of}}}: the middle station would be negative"
-            raise refuse(found, f"give {name} <= {of} / 2, or another law", of)
+        point = str(info.field_name)
+        uniform = {"k1p": "k1u", "k2p": "k2u"}[point]
+        whole = info.data.get(uniform)
+        if _has_middle(info) and value is not None and whole is not None and 2.0 * value > whole:
+            found = f"2 {point} exceeds {uniform} = {{{uniform}}}: the middle station would be negative"
+            raise refuse(found, f"give {point} <= {uniform} / 2, or another law", uniform)
         return value
 
     @field_validator("H")
@@ -351,10 +350,10 @@ class Contact(Strict):
         Along a straight pin the largest displacement is at an end, so that a station with stiffness can touch alone if
         no station farther out has stiffness; a station with a weight that is at least as far out damps it.
         """
-        found = []
+        undamped = set()
         for side in (1.0, -1.0):
             carrying = [(side * x.s_over_z, i) for i, x in enumerate(self.stations or ()) if x.k1 > 0.0 or x.k2 > 0.0]
             damping = [side * x.s_over_z for x in self.stations or () if x.weight > 0.0]
             if carrying and max(carrying)[0] > max(damping, default=-1.0):
-                found.append(max(carrying)[1])
-        return sorted(set(found))
+                undamped.add(max(carrying)[1])
+        return sorted(undamped)

@@ -63,41 +63,27 @@ class Rule(NamedTuple):
         return any(all(get(joint, of) is not None for of in keys) for keys in self.enough or (self.follows,))
 
 
-def _beam(body: str, l: str, bending: tuple[str, str]) -> dict[str, Rule]:  # noqa: E741
-    """Rules of the stiffness of a pin's or an arm's bushing, eqs. (9)-(11); `bending`: area moments about x and y."""
-    section = {"pin": "cross", "arm": "fork"}[body]
-    about_x, about_y = bending
+def _beam(name: str, body: str) -> Rule:
+    """Rule of a stiffness of a bushing: that of a pin or arm as a beam along z, lumped at its end, eqs. (9)-(11)."""
+    length, about_x, about_y = ("l", "J", "J") if body == "pin" else ("l_f", "Jx", "Jy")
+    modulus, section = {
+        "k_x": ("G", "A"),
+        "k_y": ("G", "A"),
+        "k_z": ("E", "A"),
+        "k_bx": ("E", about_x),
+        "k_by": ("E", about_y),
+        "k_tz": ("G", "Jp"),
+    }[name]
+    is_shear = name in ("k_x", "k_y")
 
-    def rule(name: str, of: tuple[str, ...], formula: str, unit: str) -> Rule:
-        def value(joint: Any) -> float:
-            part, steel = getattr(joint, body), joint.material
-            beam = material.beam_stiffness(
-                steel.E,
-                steel.G,
-                length=getattr(part, l),
-                A=part.A,
-                Jx=getattr(part, about_x),
-                Jy=getattr(part, about_y),
-                Jp=part.Jp,
-                chi=part.chi,
-            )
-            return float(getattr(beam, name))
+    def value(joint: Any) -> float:
+        part = getattr(joint, body)
+        factor = part.chi * getattr(part, length) if is_shear else getattr(part, length)
+        return float(getattr(joint.material, modulus) * getattr(part, section) / factor)
 
-        keys = tuple(f"material.{key}" if key in "EG" else f"{body}.{key}" for key in of)
-        return Rule((*keys, f"{body}.{l}"), formula, value, unit)
-
-    shear = (("G", "A", "chi"), f"G A/(chi {l}), eqs. (9)-(11)", "N/m")
-    return {
-        f"bushing.{section}.{name}": rule(name, *entry)
-        for name, entry in {
-            "k_x": shear,
-            "k_y": shear,
-            "k_z": (("E", "A"), f"E A/{l}, eqs. (9)-(11)", "N/m"),
-            "k_bx": (("E", about_x), f"E {about_x}/{l}, eqs. (9)-(11)", "N*m/rad"),
-            "k_by": (("E", about_y), f"E {about_y}/{l}, eqs. (9)-(11)", "N*m/rad"),
-            "k_tz": (("G", "Jp"), f"G Jp/{l}, eqs. (9)-(11)", "N*m/rad"),
-        }.items()
-    }
+    keys = (f"material.{modulus}", f"{body}.{section}", *([f"{body}.chi"] if is_shear else []), f"{body}.{length}")
+    formula = f"{modulus} {section}/{f'(chi {length})' if is_shear else length}, eqs. (9)-(11)"
+    return Rule(keys, formula, value, "N/m" if section == "A" else "N*m/rad")
 
 
 def _section(name: str, unit: str, of_round: str, of_rectangular: str) -> Rule:
@@ -134,7 +120,7 @@ def _hub_mass(joint: Any) -> float | None:
 
 def _hub_inertia(joint: Any) -> tuple[float, ...] | None:
     hub = _hub(joint)
-    return None if hub is None else tuple(joint.hub.mass / hub[0] * one for one in hub[1])
+    return None if hub is None else tuple(joint.hub.mass / hub[0] * moment for moment in hub[1])
 
 
 def fitted_load(steel: Any, contact: Any) -> float:
@@ -210,8 +196,18 @@ DERIVED: dict[str, Rule] = {
     "hub.inertia": Rule(
         ("hub.mass", "pin.d", "cross.r_b"), f"{_CYLINDERS}, of this mass", _hub_inertia, "kg*m^2", stays=True
     ),
-    **_beam("pin", "l", ("J", "J")),
-    **_beam("arm", "l_f", ("Jx", "Jy")),
+    "bushing.cross.k_x": _beam("k_x", "pin"),
+    "bushing.cross.k_y": _beam("k_y", "pin"),
+    "bushing.cross.k_z": _beam("k_z", "pin"),
+    "bushing.cross.k_bx": _beam("k_bx", "pin"),
+    "bushing.cross.k_by": _beam("k_by", "pin"),
+    "bushing.cross.k_tz": _beam("k_tz", "pin"),
+    "bushing.fork.k_x": _beam("k_x", "arm"),
+    "bushing.fork.k_y": _beam("k_y", "arm"),
+    "bushing.fork.k_z": _beam("k_z", "arm"),
+    "bushing.fork.k_bx": _beam("k_bx", "arm"),
+    "bushing.fork.k_by": _beam("k_by", "arm"),
+    "bushing.fork.k_tz": _beam("k_tz", "arm"),
     "contact.D_P": Rule(
         ("pin.d",), "D_H - 2 clearance, or pin.d where D_H or clearance is left out", _pin_diameter, "m", stays=True
     ),
@@ -250,11 +246,11 @@ def changed(given: Set[str], held: Collection[str]) -> set[str]:
 
     They contain `given`; the others follow from them.
     """
-    found = set(given)
+    keys = set(given)
     for key, rule in DERIVED.items():
-        if key not in found and not (rule.stays and key in held) and found.intersection(rule.follows):
-            found.add(key)
-    return found
+        if key not in keys and not (rule.stays and key in held) and keys.intersection(rule.follows):
+            keys.add(key)
+    return keys
 
 
 def replaced(given: Collection[str], held: Collection[str]) -> set[str]:
@@ -304,8 +300,7 @@ def completed(name: str, section: ModelT, others: Mapping[str, Any]) -> ModelT:
         path = key.split(".")
         if path[0] == name and get(joint, key) is None and rule.applies(joint):
             for table in path[1:-1]:
-                own = get(joint, f"{name}.{table}")
-                copy.__dict__[table] = own.model_copy()
+                copy.__dict__[table] = get(joint, f"{name}.{table}").model_copy()
             holder = get(joint, ".".join(path[:-1]))
             holder.__dict__[path[-1]] = rule.value(joint)
     return copy
@@ -351,21 +346,21 @@ def expected(joint: Any, given: Set[str], changed: Set[str], stay: Set[str]) -> 
     dict
         Key to SI value, words that say what gives it, and the key that may be given instead, or nothing.
     """
-    found: dict[str, Any] = {}
+    disagreeing: dict[str, Any] = {}
     hub = _hub(joint)
     if hub is not None and changed & {*DERIVED["hub.mass"].follows, "hub.mass"}:
         mass, inertia = hub
-        own = joint.hub.mass if "hub.mass" in changed else mass
-        values = {"hub.mass": mass, "hub.inertia": tuple(own / mass * one for one in inertia)}
-        found |= {key: (value, f"{_CYLINDERS}, give", "") for key, value in values.items() if key in stay}
+        ratio = joint.hub.mass / mass if "hub.mass" in changed else 1.0
+        values = {"hub.mass": mass, "hub.inertia": tuple(ratio * moment for moment in inertia)}
+        disagreeing |= {key: (value, f"{_CYLINDERS}, give", "") for key, value in values.items() if key in stay}
     of, d = joint.contact, joint.pin.d
     hole, pin, clearance = BEARING
     if "pin.d" in changed and pin in stay and not math.isclose(of.D_P, d, rel_tol=1e-6):
-        found[pin] = d, "pin.d gives", clearance
+        disagreeing[pin] = d, "pin.d gives", clearance
         if hole in stay:
-            found[hole] = d + 2.0 * of.clearance, "pin.d and the clearance of these two give", clearance
+            disagreeing[hole] = d + 2.0 * of.clearance, "pin.d and the clearance of these two give", clearance
     elif changed & {"pin.d", pin} and hole in stay and of.clearance > WIDE * of.D_P:
-        found[hole] = of.D_P, "that is much clearance; without any contact.D_P gives", clearance
+        disagreeing[hole] = of.D_P, "that is much clearance; without any contact.D_P gives", clearance
     if pin in given and {hole, clearance} & given and "pin.d" in stay and abs(of.D_P - d) > WIDE * d:
-        found["pin.d"] = of.D_P, "contact.D_P gives", ""
-    return found
+        disagreeing["pin.d"] = of.D_P, "contact.D_P gives", ""
+    return disagreeing

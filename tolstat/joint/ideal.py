@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tolstat.common.errors import Fault, InputError
-
-Array = NDArray[np.float64]
+from tolstat.joint.material import Array
 
 NO_CLOSED_FORM = (
     "'ideal' does not hold with an axial force on an output shaft that is not rigid: its joint carries none",

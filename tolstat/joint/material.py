@@ -1,4 +1,4 @@
-"""Closed forms of material and geometry: beam stiffness, lumped inertia, contact stiffness, damping.
+"""Closed forms of material and geometry: lumped inertia, contact stiffness, damping.
 
 Equation and table numbers are those of Cirelli, Rossi, Valentini and Pennestrì, "A dynamic model of a
 Cardan joint to evaluate the effect of elasticity and manufacturing errors" (2021). SI units throughout.
@@ -7,7 +7,6 @@ Cardan joint to evaluate the effect of elasticity and manufacturing errors" (202
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,50 +15,6 @@ Array = NDArray[np.float64]
 
 FIT_LOADS = 100
 """Number of loads at which the fit samples eq. (3); ten times as many change k1 by 0.2 % and k2 by 0.05 %."""
-
-
-class BeamStiffness(NamedTuple):
-    """End stiffness of a prismatic beam along z, eqs. (9)-(11), in the axes of Table 3.
-
-    Attributes
-    ----------
-    k_x, k_y, k_z : float
-        Shear along x and y, tension along z (N/m).
-    k_bx, k_by, k_tz : float
-        Bending about x and y, torsion about z (N*m/rad).
-    """
-
-    k_x: float
-    k_y: float
-    k_z: float
-    k_bx: float
-    k_by: float
-    k_tz: float
-
-
-def beam_stiffness(
-    E: float, G: float, *, length: float, A: float, Jx: float, Jy: float, Jp: float, chi: float
-) -> BeamStiffness:
-    """Stiffness of a beam lumped at its end, eqs. (9)-(11).
-
-    Parameters
-    ----------
-    E, G : float
-        Young's modulus and shear modulus (Pa).
-    length, A : float
-        Length (m) and section area (m^2).
-    Jx, Jy, Jp : float
-        Area moments about x and y, polar moment (m^4).
-    chi : float
-        Shear factor of the section (1.11 for a circle, 1.2 for a rectangle).
-
-    Returns
-    -------
-    BeamStiffness
-        Tension EA/l, shear GA/(chi l), bending EJ/l, torsion G Jp/l.
-    """
-    shear = G * A / (chi * length)
-    return BeamStiffness(shear, shear, E * A / length, E * Jx / length, E * Jy / length, G * Jp / length)
 
 
 def bushing_damping(k: Array, mass: float, inertia: Array, xi: float) -> Array:
@@ -111,11 +66,6 @@ def compliance_factor(E: float, nu: float) -> float:
     return 2.0 * (1.0 - nu**2) / E
 
 
-def contact_width(load: Array, K_D: float, C_E: float) -> Array:
-    """Width b = 1.6 sqrt(F_c K_D C_E) (m) of the contact area under `load` per unit length (N/m); eq. (3)."""
-    return 1.6 * np.sqrt(load * K_D * C_E)
-
-
 def contact_displacement(load: Array, D_H: float, D_P: float, E: float, nu: float) -> Array:
     """Approach of the axes of a pin and its hole in uniform contact, eq. (3) (Hertz; Young 2011).
 
@@ -133,9 +83,10 @@ def contact_displacement(load: Array, D_H: float, D_P: float, E: float, nu: floa
     ndarray, shape (n,)
         Displacement delta (m) beyond first touch.
     """
-    b = contact_width(load, diameter_factor(D_H, D_P), compliance_factor(E, nu))
+    C_E = compliance_factor(E, nu)
+    b = 1.6 * np.sqrt(load * diameter_factor(D_H, D_P) * C_E)  # width of the contact area, m
     logs = 2.0 / 3.0 + np.log(2.0 * D_H / b) + np.log(2.0 * D_P / b)
-    return np.asarray(compliance_factor(E, nu) * load / math.pi * logs)
+    return np.asarray(C_E * load / math.pi * logs)
 
 
 def fit_contact(load_range: float, z: float, D_H: float, D_P: float, E: float, nu: float) -> tuple[float, float]:
@@ -166,24 +117,6 @@ def fit_contact(load_range: float, z: float, D_H: float, D_P: float, E: float, n
     x = delta / scale
     (k1, k2), *_ = np.linalg.lstsq(np.column_stack([x * x, x]), force, rcond=None)
     return float(k1 / scale**2), float(k2 / scale)
-
-
-def point_coefficients(k1u: float, k2u: float, H: float) -> tuple[float, float]:
-    """Coefficients of point contact, eq. (4): the same force at H times the displacement.
-
-    Parameters
-    ----------
-    k1u, k2u : float
-        Quadratic (N/m^2) and linear (N/m) coefficient of uniform contact.
-    H : float
-        Ratio of the displacements (Brutti et al. 2011).
-
-    Returns
-    -------
-    k1p, k2p : float
-        ``k1u / H**2`` (N/m^2) and ``k2u / H`` (N/m).
-    """
-    return k1u / H**2, k2u / H
 
 
 def contact_damping(xi: float, mass: float, *, length: float, A: float, J: float, E: float, rho: float) -> float:

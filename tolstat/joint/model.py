@@ -12,12 +12,12 @@ from pydantic import BaseModel, Field, ValidationInfo, field_validator
 from tolstat.common.errors import Fault
 from tolstat.common.strict import Strict, refuse
 from tolstat.joint import derived
-from tolstat.joint.assumed import Assumed
 from tolstat.joint.bearing import Bearing
 from tolstat.joint.contact import COEFFICIENTS, LAWS, Contact
 from tolstat.joint.derived import DERIVED
+from tolstat.joint.material import Array
 from tolstat.joint.overrides import leaves
-from tolstat.joint.sections import Arm, Array, Bushing, Cross, Hub, Material, Pin, Shaft
+from tolstat.joint.sections import Arm, Bushing, Cross, Hub, Material, Pin, Shaft
 
 TOLD = ("description", "assumed")
 """Keys of a joint file that are about the joint and no part of it."""
@@ -35,6 +35,26 @@ def affecting_results(given: Mapping[str, Any]) -> dict[str, Any]:
     """Values of a joint by dotted key, of sections as `Joint.given` returns them, that affect results."""
     values = leaves(given)
     return {key: value for key, value in values.items() if affects_results(key, values.get("contact.law"))}
+
+
+class Assumed(Strict):
+    """Keys of the joint whose values are assumed, and other values that they may have; affects no result."""
+
+    name: Annotated[str, Field(min_length=1, description="what is assumed, as a noun", examples=["contact law"])]
+    values: Annotated[
+        tuple[Annotated[dict[str, Any], Field(min_length=1, json_schema_extra={"x-table": "keys"})], ...],
+        Field(
+            min_length=1,
+            description="other values, each some keys of the joint, with those that follow from them and are to stay",
+            examples=[[{"contact": {"law": "sliced"}}, {"contact": {"law": "uniform"}}]],
+        ),
+    ]
+    because: Annotated[
+        str, Field(min_length=1, description="why the value is not known", examples=["no drawing gives it"])
+    ]
+    varied: Annotated[
+        bool, Field(strict=True, description="whether it is varied unless it is asked for by name", examples=[False])
+    ] = True
 
 
 class Joint(Strict):

@@ -75,7 +75,7 @@ class SpeedOrder(Order):
         return data | {"amplitude": f"{share / n!r} rad"}
 
 
-def check_numbers(orders: Sequence[Order]) -> Sequence[Order]:
+def _check_numbers(orders: Sequence[Order]) -> Sequence[Order]:
     """Refuse an order that is given twice, as a `PydanticCustomError`."""
     numbers = [order.n for order in orders]
     twice = next((n for n in numbers if numbers.count(n) > 1), None)
@@ -84,7 +84,7 @@ def check_numbers(orders: Sequence[Order]) -> Sequence[Order]:
     return orders
 
 
-def check_turning(orders: Sequence[SpeedOrder]) -> Sequence[SpeedOrder]:
+def _check_turning(orders: Sequence[SpeedOrder]) -> Sequence[SpeedOrder]:
     """Refuse orders with which the input shaft stops: sum n a_n of 1 and more."""
     total = sum(order.n * order.amplitude for order in orders)
     if not total < 1:
@@ -94,13 +94,13 @@ def check_turning(orders: Sequence[SpeedOrder]) -> Sequence[SpeedOrder]:
 
 SpeedOrders = Annotated[
     tuple[SpeedOrder, ...],
-    AfterValidator(check_numbers),
-    AfterValidator(check_turning),
+    AfterValidator(_check_numbers),
+    AfterValidator(_check_turning),
     Field(max_length=MAX_GIVEN, description="orders of the speed, { n, amplitude, phase } each"),
 ]
 TorqueOrders = Annotated[
     tuple[TorqueOrder, ...],
-    AfterValidator(check_numbers),
+    AfterValidator(_check_numbers),
     Field(max_length=MAX_GIVEN, description="orders of the resisting torque, { n, amplitude, phase } each"),
 ]
 
@@ -134,12 +134,12 @@ def join_schemas(properties: dict[str, Any]) -> None:
     """Put orders into the JSON schemas of speed and torque, which are a quantity or a table."""
     for key in ("speed", "torque"):
         waves = properties.pop(f"{key}.orders")
-        quantity = {name: own for name, own in properties[key].items() if name in ("type", "pattern")}
+        quantity = {name: value for name, value in properties[key].items() if name in ("type", "pattern")}
         table = {"type": "object", "required": ["mean"], "additionalProperties": False}
         table |= {"properties": {"mean": quantity, "orders": waves}}
         signal = {"type": "string", "description": "measured signal, CSV", "examples": ["engine.csv"]}
         file = {"type": "object", "required": ["file"], "additionalProperties": False, "properties": {"file": signal}}
-        properties[key] = {name: own for name, own in properties[key].items() if name not in quantity}
+        properties[key] = {name: value for name, value in properties[key].items() if name not in quantity}
         properties[key] |= {"anyOf": [quantity, table, file]}
 
 

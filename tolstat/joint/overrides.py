@@ -18,9 +18,9 @@ def overridden(data: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, An
 
 def laid_over(below: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
     """Replace keys of a joint by those of `over`, and remove those of another contact law or a third of a bearing."""
-    contact, own = below.get("contact"), over.get("contact")
-    if isinstance(contact, Mapping) and isinstance(own, Mapping) and "law" in own:
-        below = {**below, "contact": keys_valid_for(contact, own["law"])}
+    contact, new = below.get("contact"), over.get("contact")
+    if isinstance(contact, Mapping) and isinstance(new, Mapping) and "law" in new:
+        below = {**below, "contact": keys_valid_for(contact, new["law"])}
     return merged(_without(below, derived.replaced(leaves(over), leaves(below))), over)
 
 
@@ -37,10 +37,22 @@ def merged(data: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
 
 def leaves(table: Mapping[str, Any], before: str = "") -> dict[str, Any]:
     """Values of a joint by dotted key."""
-    found: dict[str, Any] = {}
+    values: dict[str, Any] = {}
     for key, value in table.items():
-        found |= leaves(value, f"{before}{key}.") if isinstance(value, Mapping) else {f"{before}{key}": value}
-    return found
+        values |= leaves(value, f"{before}{key}.") if isinstance(value, Mapping) else {f"{before}{key}": value}
+    return values
+
+
+def nested(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Nested tables from dotted keys: the inverse of `leaves`."""
+    result: dict[str, Any] = {}
+    for key, value in values.items():
+        *tables, name = key.split(".")
+        inner: Any = value if not tables else {name: value}
+        for part in reversed(tables[1:]):
+            inner = {part: inner}
+        result = merged(result, {tables[0] if tables else name: inner})
+    return result
 
 
 def _without(table: Mapping[str, Any], away: Collection[str], before: str = "") -> dict[str, Any]:

@@ -18,6 +18,7 @@ from tolstat.common import units
 from tolstat.common.parameters import MAX_ORDERS
 from tolstat.common.strict import Strict, refuse
 from tolstat.joint import ideal
+from tolstat.joint.material import Array
 
 SAMPLES = 512
 """Number of angles of a revolution that waves are expanded from."""
@@ -118,7 +119,7 @@ def add_partner(partner: Partner, params: NDArray[np.void]) -> None:
     _expand(turned, torque, params)
 
 
-def output_motion(partner: Partner, params: NDArray[np.void]) -> tuple[ideal.Array, ideal.Array]:
+def output_motion(partner: Partner, params: NDArray[np.void]) -> tuple[Array, Array]:
     """Motion of the output of a drive shaft of two ideal joints.
 
     Parameters
@@ -138,8 +139,8 @@ def output_motion(partner: Partner, params: NDArray[np.void]) -> tuple[ideal.Arr
 
 
 def _second_joint(
-    partner: Partner, params: NDArray[np.void], theta: ideal.Array, slope: ideal.Array, bend: ideal.Array
-) -> tuple[ideal.Array, ideal.Array, ideal.Array]:
+    partner: Partner, params: NDArray[np.void], theta: Array, slope: Array, bend: Array
+) -> tuple[Array, Array, Array]:
     """Speed ratio of the ideal joint after this one, its output speed over the mean input speed, its acceleration."""
     alpha = params["alpha"][:, None]
     ratio, steepness = ideal.speed_ratio(theta, alpha), ideal.steepness(theta, alpha)
@@ -150,7 +151,7 @@ def _second_joint(
     return second, second * turning, params["omega"][:, None] ** 2 * acceleration
 
 
-def _expand(turned: ideal.Array, torque: ideal.Array, params: NDArray[np.void]) -> None:
+def _expand(turned: Array, torque: Array, params: NDArray[np.void]) -> None:
     """Write waves over the phase, (n, `SAMPLES`), as orders: the largest `MAX_ORDERS`; rad and N m."""
     waves = {}
     size = np.zeros(SAMPLES // 2 + 1)

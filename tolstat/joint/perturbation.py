@@ -16,9 +16,9 @@ from tolstat.common.strict import Strict
 from tolstat.common.tables import ERROR, FACTORS, HOLES, PARAM
 from tolstat.joint import material, orders
 from tolstat.joint.contact import Contact
+from tolstat.joint.material import Array
 from tolstat.joint.model import Joint
 from tolstat.joint.partner import Partner, add_partner, check_misalignment
-from tolstat.joint.sections import Array
 from tolstat.kernel.mechanics.topology import ARM, ARM_OF_PIN, PIN, TRIAD
 
 Table = NDArray[np.void]
@@ -166,8 +166,8 @@ def perturb(joint: Joint, operation: Operation, errors: Table) -> Table:
         params["pin_point"][:, i], params["pin_axis"][:, i] = _axis(errors, PINS[i], PIN_TRIADS[i])
         params["hole_point"][:, i], params["hole_axis"][:, i] = _axis(errors, HOLES[i], ARM_TRIADS[i])
         hole = errors[f"{HOLE_OF_PIN[PINS[i]]}.diameter"]
-        pin, own = errors[f"{PINS[i]}.diameter"], errors[f"{PINS[i]}.clearance"]
-        params["clearance"][:, i] = _clearance(joint.contact, hole, pin, own)
+        pin, clearance = errors[f"{PINS[i]}.diameter"], errors[f"{PINS[i]}.clearance"]
+        params["clearance"][:, i] = _clearance(joint.contact, hole, pin, clearance)
     return params
 
 
@@ -176,7 +176,13 @@ def _constants(joint: Joint) -> dict[str, Any]:
     pin, arm = joint.pin, joint.arm
     stations = joint.contact.springs(joint.bearing)
     n_stations = len(stations.s)
-    columns = {f"station_{name}": getattr(stations, name) for name in ("s", "k1", "k2", "k3", "weight")}
+    columns = {
+        "station_s": stations.s,
+        "station_k1": stations.k1,
+        "station_k2": stations.k2,
+        "station_k3": stations.k3,
+        "station_weight": stations.weight,
+    }
     xi, shaft = joint.bushing.xi, joint.shaft
     return {
         "Js": shaft.Js,
@@ -223,12 +229,12 @@ def _axis(errors: Table, feature: str, triad: Array) -> tuple[Array, Array]:
     return np.asarray(point), axis
 
 
-def _clearance(contact: Contact, hole: Array, pin: Array, own: Array) -> Array:
-    """Radial clearance (m) from deviations (m) of both diameters and of its own, shape (n,).
+def _clearance(contact: Contact, hole: Array, pin: Array, deviation: Array) -> Array:
+    """Radial clearance (m) from deviations (m) of both diameters and of the clearance, shape (n,).
 
     Rounding errors about zero become zero: otherwise a pin meant to fit exactly could have an interference fit of
     1e-17 m.
     """
-    clearance = 0.5 * ((contact.D_H + hole) - (contact.D_P + pin)) + own
+    clearance = 0.5 * ((contact.D_H + hole) - (contact.D_P + pin)) + deviation
     clearance[np.abs(clearance) < 4.0 * np.finfo(float).eps * contact.D_H] = 0.0
     return np.asarray(clearance)

@@ -13,10 +13,10 @@ from tolstat.common import strict, units
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.files import data_dir
 from tolstat.common.notation import DIAMETER
+from tolstat.common.strict import validate
 from tolstat.joint import derived
-from tolstat.joint.assumed import Assumed
-from tolstat.joint.model import Joint, affects_results
-from tolstat.joint.overrides import laid_over, leaves, overridden
+from tolstat.joint.model import Assumed, Joint, affects_results
+from tolstat.joint.overrides import laid_over, leaves, nested, overridden
 
 DEFAULT_JOINT = "cirelli2021"
 """Joint in ``data/joints`` whose values are the examples of the keys of a joint."""
@@ -194,13 +194,18 @@ def _inherited(joint: Joint, data: Mapping[str, Any], over: Mapping[str, Any], p
     changed = derived.changed(given, held)
     stay = held.keys() - changed - derived.replaced(given, held)
     for key, (expected, reason, instead) in derived.expected(joint, given, changed, stay).items():
-        if key == "pin.d" and _as_before(held.get("contact.D_P"), joint.contact.D_P):
+        D_P = held.get("contact.D_P")
+        if key == "pin.d" and D_P and math.isclose(units.to_si(D_P, "m", DIAMETER), expected, rel_tol=derived.WIDE):
             continue  # the joint file has pins of two diameters itself
-        text, unit = held[key], derived.UNITS[key]
-        words = [_written(one, unit, like) for one, like in zip(*map(_listed, (expected, text)), strict=True)]
-        new = _quoted(words if isinstance(text, list) else words[0])
+        inherited = held[key]
+        if isinstance(inherited, list):
+            each = zip(expected, inherited, strict=True)
+            value = f"[{', '.join(_written(number, key, like) for number, like in each)}]"
+            inherited = f"[{', '.join(inherited)}]"
+        else:
+            value = _written(expected, key, inherited)
         remedy = f"give {instead}, from which it follows, or {key}" if instead else f"give {key}, this value or that"
-        yield Fault(key, f"{_quoted(text)} is inherited from {path.stem}; {reason} {new}", remedy)
+        yield Fault(key, f"{inherited} is inherited from {path.stem}; {reason} {value}", remedy)
 
 
 def _lowered(joint: Joint, written: object) -> Iterator[Fault]:
@@ -213,18 +218,24 @@ def _lowered(joint: Joint, written: object) -> Iterator[Fault]:
     yield Fault("contact.fit_load", found, f'write fit_load = "{text}", or give k1u and k2u')
 
 
-def _as_before(held: object, diameter: float) -> bool:
-    """Whether a diameter is, but for a few per cent, that of the joint file."""
-    return held is not None and math.isclose(units.to_si(held, "m", DIAMETER), diameter, rel_tol=derived.WIDE)
+def _written(value: float, key: str, like: object) -> str:
+    return str(units.written(value, derived.UNITS[key], like, digits=3))
 
 
-def _listed(value: Any) -> list[Any]:
-    return list(value) if isinstance(value, (list, tuple)) else [value]
+def varied(joint: Joint, values: Mapping[str, Any]) -> Joint:
+    """Return the joint of a variant.
 
-
-def _quoted(value: Any) -> str:
-    return f"[{', '.join(value)}]" if isinstance(value, list) else str(value)
-
-
-def _written(value: float, unit: str, like: object) -> str:
-    return str(units.written(value, unit, like, digits=3))
+    Parameters
+    ----------
+    joint : Joint
+        The joint of the study.
+    values : mapping
+        `Variant.values`: dotted key of the joint to SI value or string, None for a key that follows from others; keys
+        of other sections are ignored.
+    """
+    changed = {key: value for key, value in values.items() if key.partition(".")[0] in Joint.model_fields}
+    if not changed:
+        return joint
+    kept = {key: value for key, value in leaves(joint.given()).items() if key not in changed}
+    new = {key: value for key, value in changed.items() if value is not None}
+    return validate(Joint, laid_over(nested(kept), nested(new)), "joint", context={"si": True})

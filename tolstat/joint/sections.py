@@ -6,17 +6,14 @@ out: `Joint` fills it in by the formula of `derived.DERIVED`.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated, Any, get_args, get_origin
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import AfterValidator, BaseModel, Field, ValidationInfo, field_validator
 
 from tolstat.common import units
 from tolstat.common.strict import Strict, refuse
 from tolstat.joint.derived import DERIVED, PIN_CHI
-
-Array = NDArray[np.float64]
 
 POSITIVE = AfterValidator(units.positive)
 NOT_NEGATIVE = AfterValidator(units.not_negative)
@@ -75,18 +72,18 @@ def follows(key: str, meaning: str, *examples: Any) -> Any:
 
 def quantities(model: type[BaseModel], before: str = "") -> dict[str, str]:
     """SI unit of each quantity of a model, by dotted key; lists of quantities are left out."""
-    found: dict[str, str] = {}
+    units_of_keys: dict[str, str] = {}
     for key, field in model.model_fields.items():
         kinds = [field.annotation, *field.metadata]
         while kinds:
             kind = kinds.pop()
             if isinstance(kind, type) and issubclass(kind, BaseModel):
-                found |= quantities(kind, f"{before}{key}.")
+                units_of_keys |= quantities(kind, f"{before}{key}.")
             elif isinstance(kind, units.Quantity):
-                found[f"{before}{key}"] = kind.unit
+                units_of_keys[f"{before}{key}"] = kind.unit
             elif get_origin(kind) is not tuple:
                 kinds += [*get_args(kind), *getattr(kind, "__metadata__", ())]
-    return found
+    return units_of_keys
 
 
 class Material(Strict):
@@ -245,3 +242,38 @@ class Bushing(Strict):
     xi: Annotated[Ratio, Field(description="damping ratio: damping is 2 xi sqrt(k m), of rotations 2 xi sqrt(k J)")]
     cross: Annotated[PinBushing, Field(description="Stiffness of a pin's bushing")] = PinBushing()
     fork: Annotated[ArmBushing, Field(description="Stiffness of an arm's bushing")] = ArmBushing()
+
+
+RIGID_SHAFTS = "shafts rigid along their axes"
+FREE_SHAFT = "output shaft free along its axis"
+
+
+def mounting_and_law(axial: Sequence[float | str], laws: Sequence[str]) -> str:
+    """Mounting and contact law of a joint, or of several variants.
+
+    Parameters
+    ----------
+    axial : sequence of float or str
+        ``shaft.axial`` of each variant: ``"rigid"``, ``"free"``, or a stiffness, N/m.
+    laws : sequence of str
+        ``contact.law`` of each variant.
+
+    Returns
+    -------
+    str
+        ``"output shaft free along its axis; contact law mode"``.
+    """
+    stiffness = [value for value in axial if not isinstance(value, str)]
+    rigid, free = (list(axial).count(word) for word in (RIGID, FREE))
+    kinds = {RIGID_SHAFTS: rigid, FREE_SHAFT: free, _stiffness_range(stiffness): len(stiffness)}
+    numbers = {text: number for text, number in kinds.items() if number}
+    each = numbers if len(numbers) == 1 else [f"{text} in {n} of {len(axial)} variants" for text, n in numbers.items()]
+    distinct = list(dict.fromkeys(laws))
+    return f"{', '.join(each)}; contact law{'' if len(distinct) == 1 else 's'} {', '.join(distinct)}"
+
+
+def _stiffness_range(stiffness: Sequence[float]) -> str:
+    if not stiffness:
+        return ""
+    ends = dict.fromkeys(f"{end:.4g}" for end in (min(stiffness), max(stiffness)))
+    return f"output shaft held with {' to '.join(ends)} N/m along its axis"

@@ -13,7 +13,7 @@ from tolstat.common.errors import Fault, InputError
 from tolstat.display import text
 from tolstat.display.answer import Answer, Part, Sentence, Sheet, Table
 from tolstat.display.progress import silent
-from tolstat.joint.mounting import in_words
+from tolstat.joint.sections import mounting_and_law
 from tolstat.questions import accuracy, shares
 from tolstat.questions.cases import cases
 from tolstat.questions.exceedance import answer as exceedance
@@ -49,7 +49,7 @@ def report(view: View, accepted: float = math.nan) -> Answer:
         for a sweep the table ``sweep``, for listed joints ``cases``. Loads that the study does not keep are left out.
     """
     store = view.store
-    stands_on = [Sentence(text.sentence(in_words(*recorded.mountings(store))), "lead")]
+    stands_on = [Sentence(text.sentence(mounting_and_law(*recorded.mountings(store))), "lead")]
     if store.case_names or view.method == "sweep":
         found = cases(view) if store.case_names else sweep(view)
         notes = [] if store.case_names else [*_notes(view)]

@@ -7,7 +7,7 @@ from contextlib import suppress
 
 from tolstat.common.errors import TolstatError
 from tolstat.display.text import capital
-from tolstat.joint.mounting import in_words
+from tolstat.joint.sections import mounting_and_law
 from tolstat.questions.assumptions.words import AXIAL, LAW
 from tolstat.store import recorded
 from tolstat.store.view import View
@@ -26,7 +26,7 @@ def lines(view: View) -> tuple[str, str]:
     at = points[0].in_words if len(points) == 1 else f"{len(points)} operating points"
     axial, laws = recorded.mountings(view.store)
     bearing = "needle bearings" if set(laws) == {NEEDLES} else "plain bearings" if NEEDLES not in laws else "bearings"
-    mounting, law = in_words(axial, laws).split("; ")
+    mounting, law = mounting_and_law(axial, laws).split("; ")
     assumed = _assumed(view)
     of_bearing = assumed is not None and any(key.startswith("bearing.") for key in assumed)
     first = f"{at}{_mark(assumed, False)}; {bearing}{_mark(assumed, of_bearing)}."

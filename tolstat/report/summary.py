@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from tolstat import questions
 from tolstat.common.errors import Fault, StoreError
 from tolstat.common.tables import Status
-from tolstat.joint.mounting import in_words
+from tolstat.joint.sections import mounting_and_law
 from tolstat.report.headline import headline
 from tolstat.report.life import life_verdicts
 from tolstat.solver.fidelity import sentence
@@ -74,5 +74,8 @@ def statistics(view: View, accepted: float = math.nan) -> dict[str, Any]:
         "stop": store.stop,
     }
     found = questions.statistics(view)
-    stands_on = {"joint": in_words(*recorded.mountings(store)), "fidelity": sentence(store.options, store.fidelity)}
+    stands_on = {
+        "joint": mounting_and_law(*recorded.mountings(store)),
+        "fidelity": sentence(store.options, store.fidelity),
+    }
     return head | found | stands_on | {"provenance": provenance}

@@ -5,11 +5,9 @@ from __future__ import annotations
 import logging
 import subprocess
 import sys
-import threading
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import NamedTuple
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +18,6 @@ from tolstat.common.tables import PARAM, RESULT, Options
 from tolstat.solver import rainflow, refinement, simulation
 
 LOG = logging.getLogger("tolstat")
-POLL_S = 0.2
-"""Time between two looks for kernels that have been compiled, s."""
 
 
 def announce() -> None:
@@ -30,65 +26,38 @@ def announce() -> None:
         LOG.info("compiling the kernels: about half a minute, once per machine and version")
 
 
-def _outside() -> NDArray[np.void]:
-    """One joint with negative clearance: it ends at once."""
+def _outside_model(torque_reverses: bool = False) -> NDArray[np.void]:
+    """Parameters of a joint with negative clearance, whose simulation ends at once."""
     params = np.zeros(1, PARAM)
     params["clearance"] = -1.0
+    if torque_reverses:
+        params["omega"], params["alpha"], params["Js"] = 1.0, 0.1, 1.0
     return params
 
 
-def _reversing() -> NDArray[np.void]:
-    """One such joint whose torque reverses."""
-    params = _outside()
-    params["omega"], params["alpha"], params["Js"] = 1.0, 0.1, 1.0
-    return params
-
-
-def _starts(options: Options) -> None:
-    simulation.starts(np.zeros(1, PARAM).view(np.recarray), options)
-
-
-def _lockstep(options: Options) -> None:
-    found = np.zeros(1, RESULT).view(np.recarray)
-    list(simulation.simulate_together(_outside(), options, np.ones(1, np.int64), False, found))
-
-
-def _alone(options: Options) -> None:
-    found = np.zeros(1, RESULT).view(np.recarray)
-    list(simulation.simulate_alone(_outside(), options, np.ones(1, np.int64), False, found))
+def _simulate(simulate: Callable[..., Iterator[object]], options: Options) -> None:
+    list(simulate(_outside_model(), options, np.ones(1, np.int64), False, np.zeros(1, RESULT).view(np.recarray)))
 
 
 def _explicit(options: Options) -> None:
-    found, steps = np.zeros(1, RESULT).view(np.recarray), np.full(1, options.steps_per_rev)
-    settings = refinement.settings(options)
-    list(simulation.simulate_together(_reversing(), settings, np.full(1, 2**31), False, found, found[:, None], steps))
+    results, steps = np.zeros(1, RESULT).view(np.recarray), np.full(1, options.steps_per_rev)
+    joint, settings, revolutions = _outside_model(torque_reverses=True), refinement.settings(options), np.full(1, 2**31)
+    list(simulation.simulate_together(joint, settings, revolutions, False, results, results[:, None], steps))
 
 
-def _count_steps(options: Options) -> None:
-    simulation.explicit_steps(_reversing(), options)
-
-
-def _rainflow(options: Options) -> None:
-    rainflow.count({history.name: np.zeros((2, *history.shape)) for history in LOAD_HISTORIES})
-
-
-class Kernel(NamedTuple):
-    """A kernel that Python calls: what it is for, a call that compiles it, and how long that takes, as a ratio."""
-
-    what: str
-    compile: Callable[[Options], None]
-    share: int = 1
-
-
-KERNELS = {
-    "lockstep.lockstep": Kernel("joints in lanes", _lockstep, 10),
-    "simulate.simulate_joint": Kernel("single joints", _alone, 8),
-    "explicit.explicit": Kernel("explicit steps", _explicit, 8),
-    "starts.write_starts": Kernel("starts of joints", _starts, 2),
-    "explicit.count_steps": Kernel("number of explicit steps", _count_steps),
-    "rainflow.count_joint": Kernel("load cycles", _rainflow),
+KERNELS: dict[str, Callable[[Options], object]] = {
+    "lockstep.lockstep": partial(_simulate, simulation.simulate_together),
+    "simulate.simulate_joint": partial(_simulate, simulation.simulate_alone),
+    "explicit.explicit": _explicit,
+    "explicit.count_steps": lambda options: simulation.explicit_steps(_outside_model(torque_reverses=True), options),
+    "starts.write_starts": lambda options: simulation.starts(np.zeros(1, PARAM).view(np.recarray), options),
+    "rainflow.count_joint": lambda options: rainflow.count(
+        {of.name: np.zeros((2, *of.shape)) for of in LOAD_HISTORIES}
+    ),
 }
-"""Kernels by their names in the cache; those that take longest first."""
+"""Kernels that Python calls, by their names in the cache, each with a call that compiles it."""
+SECOND = ("simulate.simulate_joint", "explicit.explicit")
+"""Kernels that the second process compiles; they take about as long as all others together."""
 
 
 def kernels(options: Options, params: NDArray[np.void] | None = None) -> list[str]:
@@ -104,18 +73,14 @@ def kernels(options: Options, params: NDArray[np.void] | None = None) -> list[st
 
 
 def missing(options: Options, params: NDArray[np.void] | None = None) -> list[str]:
-    """Names of those that do not lie in the cache."""
-    return [name for name in kernels(options, params) if not _is_held(name)]
-
-
-def _is_held(name: str) -> bool:
+    """Names of those that are not in the cache."""
     from tolstat.kernel.simd.cache_folder import CACHE_DIRECTORY, SUFFIX
 
-    return any(CACHE_DIRECTORY.rglob(f"{name}*{SUFFIX}"))
+    return [name for name in kernels(options, params) if not any(CACHE_DIRECTORY.rglob(f"{name}*{SUFFIX}"))]
 
 
 def is_compiled(options: Options | None = None, params: NDArray[np.void] | None = None) -> bool:
-    """Whether the kernels that joints with `options` need, such as `params`, lie in the cache."""
+    """Whether the kernels that joints with `options` need, such as `params`, are in the cache."""
     return not missing(options or Options(), params)
 
 
@@ -123,72 +88,32 @@ def warm_up(options: Options | None = None, params: NDArray[np.void] | None = No
     """Compile the kernels that joints with `options` need, such as `params`, in two processes, or load them."""
     options = options or Options()
     names = missing(options, params)
-    own, others = halves(names)
-    with _told(names):
-        with _compiling(others, options):
-            compile_kernels(own, options)
-        compile_kernels(kernels(options, params), options)
-
-
-def halves(names: list[str]) -> tuple[list[str], list[str]]:
-    """Divide kernels between two processes that take about as long: each goes to the one that is done earlier."""
-    parts: tuple[list[str], list[str]] = [], []
-    busy = [0, 0]
-    for name in names:
-        earlier = int(busy[1] < busy[0])
-        parts[earlier].append(name)
-        busy[earlier] += KERNELS[name].share
-    return parts
+    second = [name for name in names if name in SECOND and names != [name] and available_cores() > 1]
+    with _compiling(second, options):
+        compile_kernels([name for name in names if name not in second], options)
+    compile_kernels(kernels(options, params), options)
 
 
 def compile_kernels(names: list[str], options: Options) -> None:
     """Compile or load these kernels of `KERNELS`."""
     for name in names:
-        KERNELS[name].compile(options)
+        KERNELS[name](options)
 
 
 @contextmanager
 def _compiling(names: list[str], options: Options) -> Iterator[None]:
-    """Compile kernels into the cache in another process; what fails there is compiled when it is called."""
-    if not names or available_cores() < 2:
-        yield
-        return
-    said = f"from {__name__} import *; compile_kernels({names!r}, Options{tuple(options)!r})"
-    none = subprocess.DEVNULL
-    other = subprocess.Popen([sys.executable, "-c", said], stdin=none, stdout=none, stderr=none)
-    try:
-        yield
-        other.wait()
-    finally:
-        other.kill()
-        other.wait()
-
-
-@contextmanager
-def _told(names: list[str]) -> Iterator[None]:
-    """Log each of these kernels when it is compiled, in whatever process: it lies in the cache then."""
+    """Compile kernels into the cache in a second process; what fails there is compiled when it is called."""
     if not names:
         yield
         return
-    ended = threading.Event()
-    watch = threading.Thread(target=_watch, args=(names, ended), daemon=True)
-    watch.start()
-    try:
-        yield
-    finally:
-        ended.set()
-        watch.join()
-
-
-def _watch(names: list[str], ended: threading.Event) -> None:
-    begun, work, left = time.monotonic(), sum(KERNELS[name].share for name in names), list(names)
-    over = False
-    while left and not over:
-        over = ended.wait(POLL_S)
-        for name in [name for name in left if _is_held(name)]:
-            left.remove(name)
-            done = 1 - sum(KERNELS[name].share for name in left) / work
-            LOG.info("compiled: %s (%.0f %%, %.0f s)", KERNELS[name].what, 100 * done, time.monotonic() - begun)
+    code = f"from {__name__} import *; compile_kernels({names!r}, Options{tuple(options)!r})"
+    none = subprocess.DEVNULL
+    with subprocess.Popen([sys.executable, "-c", code], stdin=none, stdout=none, stderr=none) as second:
+        try:
+            yield
+            second.wait()
+        finally:
+            second.kill()
 
 
 def stage_name() -> str:

@@ -13,10 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.common.load_kinds import measure_of
-from tolstat.common.loads import LOADS, SHOWN_LOADS, of_kind
+from tolstat.common.loads import LOADS, SHOWN_LOADS, FloatArray, Load, of_kind
 from tolstat.common.tables import FINEST_STEPS, Fidelity, Options, Simulation, Status
-
-Array = NDArray[np.float64]
 
 
 class Rung(NamedTuple):
@@ -45,25 +43,6 @@ WEIGHTS = {"steps": 2.3, "newton_iterations": 2.6, "factorisations": 4.3}
 revolution."""
 
 
-class Choice(NamedTuple):
-    """The rung that a campaign is computed with, and why.
-
-    Attributes
-    ----------
-    rung : Rung
-        The rung.
-    met : bool
-        Whether it meets the budget; if not it is the finest.
-    record : dict
-        All that was measured, as the result file keeps it: ``fidelity``, ``steps_per_rev``, ``met``, ``reason``,
-        ``budget``, ``margin``, ``joints``, ``loads`` and, by rung, ``table``.
-    """
-
-    rung: Rung
-    met: bool
-    record: dict[str, Any]
-
-
 def pilot(rows: int, first_sample: int, seed: int) -> NDArray[np.intp]:
     """Select the rows of the pilot: the nominal joint, if the campaign has one, and random others; ascending."""
     samples = rows - first_sample
@@ -79,12 +58,12 @@ def choose(
     simulate: Callable[..., Simulation],
     min_steps: int = 0,
     closed_form: bool = True,
-) -> Choice:
+) -> dict[str, Any]:
     """Choose a rung by a pilot of joints.
 
     A rung is good enough when the error of every load asked for, times `MARGIN`, is within the budget for every joint
     of the pilot that settles in the reference, and when every joint ends with the same status as in the reference.
-    Errors are relative to the joint's largest load of the measure.
+    Errors are relative to the joint's largest load of the measure. Where no rung is good enough, the finest is taken.
 
     Parameters
     ----------
@@ -105,30 +84,37 @@ def choose(
 
     Returns
     -------
-    Choice
+    dict
+        The choice and what was measured, as the result file keeps it: ``fidelity``, ``steps_per_rev``, whether they
+        ``met`` the ``budget``, ``reason``, ``margin``, ``joints``, ``loads`` and, by rung, ``table``.
     """
     names = tuple(loads) or SHOWN_LOADS
     truth = simulate(params, _at(options, REFERENCE)).results
-    table = []
-    for rung in RUNGS:
-        if rung.steps_per_rev >= min_steps and (closed_form or rung.fidelity != Fidelity.IDEAL):
-            table.append(_entry(rung, simulate(params, _at(options, rung)).results, truth, names))
+    rungs = [
+        rung for rung in RUNGS if rung.steps_per_rev >= min_steps and (closed_form or rung.fidelity != Fidelity.IDEAL)
+    ]
+    table = [_entry(rung, simulate(params, _at(options, rung)).results, truth, names) for rung in rungs]
     good = [entry for entry in table if _meets(entry, budget)]
-    met = bool(good)
-    best = min(good, key=lambda entry: float(entry["cost"])) if met else table[-1]
-    rung = Rung(Fidelity[best["fidelity"].upper()], best["steps_per_rev"])
-    record = {
+    best = min(good, key=lambda entry: float(entry["cost"]), default=table[-1])
+    rung, worst = Rung(Fidelity[best["fidelity"].upper()], best["steps_per_rev"]), _figure(best["worst"])
+    reason = (
+        f"auto: {rung}, the cheapest with {MARGIN:g} x worst error {worst} of {len(params)} joints within {budget:g}"
+        if good
+        else f"warning: auto: no rung meets the error budget {budget:g} over {len(params)} joints; "
+        f"the finest is used, {rung} (worst error {worst})\n"
+        '  hint: give a larger solver.error_budget, or fidelity = "dynamic" with more steps_per_rev'
+    )
+    return {
         "fidelity": best["fidelity"],
         "steps_per_rev": best["steps_per_rev"],
-        "met": met,
-        "reason": _reason(rung, best, met, budget, len(params)),
+        "met": bool(good),
+        "reason": reason,
         "budget": budget,
         "margin": MARGIN,
         "joints": len(params),
         "loads": list(names),
         "table": table,
     }
-    return Choice(rung, met, record)
 
 
 def apply(options: Options, record: Mapping[str, Any]) -> Options:
@@ -137,12 +123,13 @@ def apply(options: Options, record: Mapping[str, Any]) -> Options:
 
 
 def describe(record: Mapping[str, Any]) -> str:
-    """Format the choice and its table as aligned text, one line per rung."""
-    lines = [str(record["reason"]), "  rung                    error worst     q95    cost  other status"]
+    """Format the choice and its table of error against cost as aligned text, one line per rung; empty without one."""
+    if not record:
+        return ""
+    lines = [str(record["reason"]), "  rung              worst error    cost  other status"]
     for entry in record["table"]:
         name = f"{entry['fidelity']} {entry['steps_per_rev']}"
-        error = f"{_figure(entry['worst']):>14} {_figure(entry['q95']):>7}"
-        lines.append(f"  {name:<20} {error} {entry['cost']:>7.0f} {entry['differing']:>13}")
+        lines.append(f"  {name:<17} {_figure(entry['worst']):>11} {entry['cost']:>7.0f} {entry['differing']:>13}")
     return "\n".join(lines)
 
 
@@ -154,53 +141,33 @@ def sentence(options: Mapping[str, Any], record: Mapping[str, Any]) -> str:
     return "" if rung.fidelity == Fidelity.DYNAMIC else f"fidelity: {rung}"
 
 
-def values(results: NDArray[np.void], name: str) -> tuple[Array, Array]:
-    """Return a load of each joint and, as scale of its error, the largest of its measure; (n,) each, SI."""
-    load = LOADS[name]
-    return load.of(results), of_kind(results, measure_of(load.kind)).max(axis=1)
-
-
 def _at(options: Options, rung: Rung) -> Options:
     return options._replace(fidelity=int(rung.fidelity), steps_per_rev=rung.steps_per_rev)
 
 
 def _entry(rung: Rung, results: NDArray[np.void], truth: NDArray[np.void], names: Sequence[str]) -> dict[str, Any]:
-    """Summarise the pilot on one rung, as plain values for the result file; errors are None if no joint settled."""
+    """Error and cost of the pilot on one rung; the error is None if no joint settled."""
     settled = (results["status"] == Status.OK) & (truth["status"] == Status.OK)
-    errors = {name: _error(results[settled], truth[settled], name) for name in names}
-    worst = np.max(list(errors.values()), axis=0)
-    cost = sum(weight * float(results[name].mean()) for name, weight in WEIGHTS.items())
+    errors = [_error(results[settled], truth[settled], LOADS[name]) for name in names]
     return {
         "fidelity": rung.fidelity.name.lower(),
         "steps_per_rev": rung.steps_per_rev,
-        "worst": float(worst.max()) if worst.size else None,
-        "q95": float(np.quantile(worst, 0.95)) if worst.size else None,
-        "errors": {name: float(error.max()) if error.size else None for name, error in errors.items()},
-        "cost": cost,
+        "worst": float(np.max(errors)) if settled.any() else None,
+        "cost": sum(weight * float(results[name].mean()) for name, weight in WEIGHTS.items()),
         "differing": int((results["status"] != truth["status"]).sum()),
     }
 
 
+def _error(results: NDArray[np.void], truth: NDArray[np.void], load: Load) -> FloatArray:
+    """Error of a load of each joint, relative to the largest load of its measure, (n,)."""
+    change = np.abs(load.of(results) - load.of(truth))
+    scale = of_kind(truth, measure_of(load.kind)).max(axis=1)
+    error: FloatArray = np.divide(change, scale, out=np.where(change > 0, np.inf, 0.0), where=scale > 0)
+    return error
+
+
 def _meets(entry: Mapping[str, Any], budget: float) -> bool:
     return entry["differing"] == 0 and entry["worst"] is not None and MARGIN * entry["worst"] <= budget
-
-
-def _error(results: NDArray[np.void], truth: NDArray[np.void], name: str) -> Array:
-    found, _ = values(results, name)
-    true, scale = values(truth, name)
-    change = np.abs(found - true)
-    return np.divide(change, scale, out=np.where(change > 0, np.inf, 0.0), where=scale > 0)
-
-
-def _reason(rung: Rung, entry: Mapping[str, Any], met: bool, budget: float, joints: int) -> str:
-    worst = _figure(entry["worst"])
-    if met:
-        return f"auto: {rung}, the cheapest with {MARGIN:g} x worst error {worst} of {joints} joints within {budget:g}"
-    return (
-        f"warning: auto: no rung meets the error budget {budget:g} over {joints} joints; "
-        f"the finest is used, {rung} (worst error {worst})\n"
-        f'  hint: give a larger solver.error_budget, or fidelity = "dynamic" with more steps_per_rev'
-    )
 
 
 def _figure(value: float | None) -> str:

@@ -29,18 +29,18 @@ are within 1 %."""
 
 def specs() -> dict[str, HistorySpec]:
     """Describe what `count` gives for a joint, as histories of a result file."""
-    found: dict[str, HistorySpec] = {}
+    result: dict[str, HistorySpec] = {}
     for history in LOAD_HISTORIES:
         n, channel = len(channels_of(history)), f"{history.prefix}channel"
         text = "range and mean of the largest rainflow cycles of the last revolution, descending, 0 where there are "
         text += f"none; {history.channels}"
-        found |= {
+        result |= {
             f"{history.prefix}cycles": HistorySpec((n, KEPT, 2), "f4", "N, N*m", text, (channel, "cycle", "of_cycle")),
             f"{history.prefix}cycle_count": HistorySpec(
                 (n,), "u2", "1", "rainflow cycles of the last revolution, those not kept included", (channel,)
             ),
         }
-    return found
+    return result
 
 
 def periodic(signal: ArrayLike, gate: float = 0.0) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

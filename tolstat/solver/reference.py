@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.common.load_kinds import LOAD_KINDS, SPAN, measure_of
-from tolstat.common.loads import put_largest
+from tolstat.common.loads import FloatArray, put_largest
 from tolstat.common.tables import (
     RESULT,
     SIMULATED,
@@ -26,7 +26,6 @@ from tolstat.common.tables import (
     without_results,
 )
 
-FloatArray = NDArray[np.float64]
 IntegratorName = Literal["Radau", "BDF", "LSODA"]
 
 SAMPLES_PER_REV = 2880

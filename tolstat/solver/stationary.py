@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.common.load_kinds import LOAD_KINDS, SPAN, measure_of
+from tolstat.common.loads import FloatArray
 from tolstat.common.tables import VALID, Status
 
 DISCARDED_SHARE = 1 / 3
@@ -40,7 +41,6 @@ PIVOTS = 40_000
 STEP_ERROR = 0.01
 """Relative error of a load that the time steps may cause: no interval is narrower on either side."""
 
-FloatArray = NDArray[np.float64]
 Table = NDArray[np.void]
 
 

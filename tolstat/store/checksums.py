@@ -113,16 +113,16 @@ class CheckedFile:
         for path in paths:
             self.dataset(path)
         with told_as_damage(self.path):
-            held = self.file[GROUP]["crc"][:, blocks[0] : blocks[-1] + 1][[self._index[path] for path in paths]]
-            found = computed(self.file, [self.stored[path] for path in paths], blocks)
-            return np.asarray((held[:, blocks - blocks[0]] != found).any(axis=0))
+            written = self.file[GROUP]["crc"][:, blocks[0] : blocks[-1] + 1][[self._index[path] for path in paths]]
+            actual = computed(self.file, [self.stored[path] for path in paths], blocks)
+            return np.asarray((written[:, blocks - blocks[0]] != actual).any(axis=0))
 
     def check(self) -> dict[str, NDArray[np.intp]]:
         """Compare everything that has a checksum with it, histories included; damaged blocks by dataset."""
         n = next(iter(self.stored.values())).shape[0]
         paths = [path for path in self.stored if self.number % 2 == 0 or not layout.is_at_point(path)]
-        found = {path: self.damaged((path,), 0, n) for path in paths}
-        return {path: blocks for path, blocks in found.items() if blocks.size}
+        damaged_blocks = {path: self.damaged((path,), 0, n) for path in paths}
+        return {path: blocks for path, blocks in damaged_blocks.items() if blocks.size}
 
 
 def blocks_of(n: int) -> int:
@@ -137,7 +137,7 @@ def create(file: h5py.File, metadata: Metadata) -> None:
     crc = group.create_dataset("crc", data=np.zeros((len(stored), len(blocks)), "u8"))
     put_attributes(group, {"description": "CRC-32 of each column and block of rows, plus 2^32; 0 if never computed"})
     put_attributes(crc, {"units": "1", "description": "of path, type, shape and first slot as text, then the bytes"})
-    columns = np.array([one.path.encode() for one in stored])
+    columns = np.array([dataset.path.encode() for dataset in stored])
     crc.dims[0].attach_scale(put_scale(group, "column", columns, "1", "path of the dataset in this file"))
     crc.dims[1].attach_scale(put_scale(group, "block", blocks, "1", "first file slot of the block"))
     update(file, metadata, False, np.arange(len(blocks)))
@@ -146,19 +146,19 @@ def create(file: h5py.File, metadata: Metadata) -> None:
 def update(file: h5py.File, metadata: Metadata, at_points: bool, blocks: NDArray[np.intp]) -> None:
     """Write the checksums of some blocks, ascending, as they are now: of all results and histories, or all others."""
     each = list(enumerate(layout.datasets(metadata)))
-    own = {k: one for k, one in each if layout.is_at_point(one.path) == at_points}  # consecutive
-    if own and blocks.size:
-        file[GROUP]["crc"][min(own) : max(own) + 1, blocks] = computed(file, list(own.values()), blocks)
+    chosen = {k: column for k, column in each if layout.is_at_point(column.path) == at_points}  # consecutive
+    if chosen and blocks.size:
+        file[GROUP]["crc"][min(chosen) : max(chosen) + 1, blocks] = computed(file, list(chosen.values()), blocks)
 
 
 def computed(file: h5py.File, stored: Sequence[Stored], blocks: NDArray[np.intp]) -> NDArray[np.uint64]:
     """Checksums of some blocks of datasets, (datasets, blocks), from what is in the file now."""
-    found = np.empty((len(stored), len(blocks)), np.uint64)
+    checksums = np.empty((len(stored), len(blocks)), np.uint64)
     runs = np.split(np.arange(len(blocks)), np.flatnonzero(np.diff(blocks) != 1) + 1) if len(blocks) else []
     for k, own in enumerate(stored):
         for run in runs:
-            found[k, run] = _of_run(file[own.path], own, int(blocks[run[0]]), int(blocks[run[-1]]) + 1)
-    return found
+            checksums[k, run] = _of_run(file[own.path], own, int(blocks[run[0]]), int(blocks[run[-1]]) + 1)
+    return checksums
 
 
 def _of_run(dataset: h5py.Dataset, stored: Stored, first: int, last: int) -> list[int]:
@@ -166,7 +166,7 @@ def _of_run(dataset: h5py.Dataset, stored: Stored, first: int, last: int) -> lis
     n, stop = stored.shape[0], min(last * ROWS, stored.shape[0])
     # a power of two, as ROWS: one divides the other
     step = 1 << ((READ_BYTES // stored.row_bytes) or 1).bit_length() - 1
-    found, crc = [], 0
+    checksums, crc = [], 0
     for begin in range(first * ROWS, stop, step):
         values = dataset[begin : min(begin + step, stop)]
         for start in range(begin, begin + len(values), ROWS):
@@ -176,5 +176,5 @@ def _of_run(dataset: h5py.Dataset, stored: Stored, first: int, last: int) -> lis
             end = min(start + ROWS, begin + len(values))
             crc = zlib.crc32(values[start - begin : end - begin].data, crc)
             if end % ROWS == 0 or end == n:
-                found.append(crc + KNOWN)
-    return found
+                checksums.append(crc + KNOWN)
+    return checksums

@@ -30,9 +30,9 @@ def _shifted(view: View, load: Sample) -> tuple[Sample, Sample] | None:
     """
     if load.parts:
         return _together(load, (_shifted(view, part) for part in load.each()))
-    found = near(view, load)
-    if found is not None:
-        return found
+    ends = near(view, load)
+    if ends is not None:
+        return ends
     error = relative(view, load.name)
     if np.isnan(error):
         return None
@@ -67,31 +67,31 @@ def near(view: View, load: Sample) -> tuple[Sample, Sample] | None:
     checks = {name: check.results for name, check in view.near.checks.items()}
     distance = np.abs(load.values - load.limit)
     nearest = view.rows(np.argsort(distance, kind="stable")[: 2 * LEAST_NEAR])
-    found = corrections(view.near.base, checks)[np.isin(view.near.rows, nearest), OBSERVABLES.index(name)]
-    found = found[np.isfinite(found)]
-    if found.size < LEAST_NEAR:
+    missing = corrections(view.near.base, checks)[np.isin(view.near.rows, nearest), OBSERVABLES.index(name)]
+    missing = missing[np.isfinite(missing)]
+    if missing.size < LEAST_NEAR:
         return None
     sizes = np.nan_to_num(_largest(view, LOADS[name].kind) / load.scale)
-    low, high = corrected(np.zeros(load.values.size), sizes, found)
+    low, high = corrected(np.zeros(load.values.size), sizes, missing)
     return load.shifted(low), load.shifted(high)
 
 
 def _at(part: View, name: str, load: Sample) -> Sample:
     """A load at one operating point, with the limit, and as the ratio, of the load over several."""
     assert load.limit is not None
-    own = replace(part.load(name), limit=load.limit * load.scale)
-    return own if load.scale == 1.0 else own.of_limit()
+    at_point = replace(part.load(name), limit=load.limit * load.scale)
+    return at_point if load.scale == 1.0 else at_point.of_limit()
 
 
 def _together(load: Sample, pairs: Iterable[tuple[Sample, Sample] | None]) -> tuple[Sample, Sample] | None:
     """The largest of the loads at each end, taken one by one to save memory; None if one of them is not known."""
-    found: tuple[Sample, Sample] | None = None
+    ends: tuple[Sample, Sample] | None = None
     for pair in pairs:
         if pair is None:
             return None
-        low, high = pair if found is None else (largest_of(load.name, both) for both in zip(found, pair, strict=True))
-        found = replace(low, name=load.name, parts=()), replace(high, name=load.name, parts=())
-    return found
+        low, high = pair if ends is None else (largest_of(load.name, both) for both in zip(ends, pair, strict=True))
+        ends = replace(low, name=load.name, parts=()), replace(high, name=load.name, parts=())
+    return ends
 
 
 def unknown(view: View) -> str:
@@ -112,7 +112,7 @@ def relative(view: View, name: str) -> float:
     Of all limits that of the load whose error is the largest.
     """
     if name == ANY_LIMIT:
-        return float(np.max([relative(view, own) for own in view.limits]))
+        return float(np.max([relative(view, limit) for limit in view.limits]))
     narrowed, plain = view.narrowed(name)
     return narrowed.numerical_error.get(LOADS[plain].kind.key, np.nan)
 
@@ -125,5 +125,5 @@ def delivery(samples: Sequence[Sample], level: float, number: int, confidence: f
     dict
         ``next_lower``, ``next_upper``: whole numbers, ends included; NaN without an interval; ``delivery``: `number`.
     """
-    found = [sample.delivery(level, number, confidence) for sample in samples]
-    return prediction.columns((min(low for low, _ in found), max(high for _, high in found)), number)
+    intervals = [sample.delivery(level, number, confidence) for sample in samples]
+    return prediction.columns((min(low for low, _ in intervals), max(high for _, high in intervals)), number)

@@ -165,12 +165,12 @@ def put(group: h5py.Group, rows: NDArray[np.intp], columns: Mapping[str, NDArray
     opened = [(h5d.open(group.id, name.encode()), values) for name, values in columns.items()]
     ends = [*(np.flatnonzero(np.diff(rows) != 1) + 1), len(rows)]
     for begin, end in pairwise([0, *ends]):
-        for held, values in opened:
-            own = np.ascontiguousarray(values[begin:end])
-            there = held.get_space()
-            zeros = (0,) * (own.ndim - 1)
-            there.select_hyperslab((int(rows[begin]), *zeros), own.shape)
-            held.write(h5s.create_simple(own.shape), there, own)
+        for dataset, values in opened:
+            part = np.ascontiguousarray(values[begin:end])
+            there = dataset.get_space()
+            zeros = (0,) * (part.ndim - 1)
+            there.select_hyperslab((int(rows[begin]), *zeros), part.shape)
+            dataset.write(h5s.create_simple(part.shape), there, part)
 
 
 def put_attributes(holder: h5py.Group | h5py.Dataset, values: Mapping[str, str | int | float]) -> None:

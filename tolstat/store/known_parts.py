@@ -61,9 +61,9 @@ class KnownParts:
         none = KnownShare(np.nan, np.nan, np.nan, np.nan, np.nan, 1.0)
         if not self._done.any():
             return none
-        found = known_share.intervals(*self._tallies[name], self.supported, confidence)
-        refused = found.unsupported >= 0.5 * (1.0 - confidence)
-        return none._replace(unsupported=found.unsupported) if refused else found
+        estimate = known_share.intervals(*self._tallies[name], self.supported, confidence)
+        refused = estimate.unsupported >= 0.5 * (1.0 - confidence)
+        return none._replace(unsupported=estimate.unsupported) if refused else estimate
 
     @cached_property
     def supported(self) -> Mask:
@@ -92,14 +92,14 @@ class KnownParts:
         """Parts of the distribution that joints were drawn from which differ from the tolerances in no other way."""
         proposals = self.view.study.proposals
         tolerances = 1.0 - sum(proposal.share for proposal in proposals)
-        found = [Mixture(tolerances, (None,) * len(self.entries))]
+        mixtures = [Mixture(tolerances, (None,) * len(self.entries))]
         for proposal in proposals:
             of = {frozenset(own.streams): own.parts for own in reversed(proposal.processes)}
             parts = [of.get(frozenset(streams_of(name)[0] for name in entry.names)) for entry in self.entries]
             others = len(proposal.scores) + len(proposal.processes) - sum(own is not None for own in parts)
             if not others:
-                found.append(Mixture(proposal.share, tuple(parts)))
-        return found
+                mixtures.append(Mixture(proposal.share, tuple(parts)))
+        return mixtures
 
     @cached_property
     def _done(self) -> Mask:
@@ -114,18 +114,18 @@ class KnownParts:
         places = []
         for load in view.loads(names):
             ends, limit = error_budget.with_error(view, load), float(load.limit or np.nan)
-            own = [(load.values > limit, load.is_valid)]
-            own += [(end.lower.values > limit, done) for end in ends]
-            own += [(end.upper.values > limit, done) for end in ends]
+            above_level = [(load.values > limit, load.is_valid)]
+            above_level += [(end.lower.values > limit, done) for end in ends]
+            above_level += [(end.upper.values > limit, done) for end in ends]
             places.append((len(events), len(ends)))
-            events += own
+            events += above_level
         events = [(above[done], counted[done]) for above, counted in events]
         weights, heaviest = view.design.counts_as(view.n)[done], 0.0
         if isinstance(view.design, Weighted) and np.isfinite(view.design.heaviest):
             heaviest = view.design.heaviest
-        found = known_share.tallies(self._sums(), self._known, self._drawn, weights, events, heaviest)
+        each = known_share.tallies(self._sums(), self._known, self._drawn, weights, events, heaviest)
         return {
-            name: (found[k], found[k + 1 : k + 1 + m], found[k + 1 + m : k + 1 + 2 * m])
+            name: (each[k], each[k + 1 : k + 1 + m], each[k + 1 + m : k + 1 + 2 * m])
             for name, (k, m) in zip(names, places, strict=True)
         }
 

@@ -89,28 +89,28 @@ def is_at_point(path: str) -> bool:
 
 def columns(metadata: Metadata) -> dict[str, tuple[Column, ...]]:
     """Columns of each group that a file has, by group."""
-    own = {"errors": ERROR_COLUMNS}
+    groups = {"errors": ERROR_COLUMNS}
     if metadata.design.variants:
-        own["design"] = DESIGN_COLUMNS
+        groups["design"] = DESIGN_COLUMNS
     if drawn := draw_records.columns(metadata.sampling):
-        own["origin"] = drawn
-    return own | {"results": selected_results.columns(metadata.identity), "ledger": LEDGER_COLUMNS}
+        groups["origin"] = drawn
+    return groups | {"results": selected_results.columns(metadata.identity), "ledger": LEDGER_COLUMNS}
 
 
 def datasets(metadata: Metadata) -> list[Stored]:
     """All datasets with a checksum: first those that are complete in a new file, then those of each operating point."""
-    n, held = metadata.n, columns(metadata)
-    at_points = {group: held.pop(group) for group in AT_POINTS if group in held}
-    found = [Stored(path_of("", g, c.name), np.dtype(c.dtype), (n,)) for g, own in held.items() for c in own]
+    n, groups = metadata.n, columns(metadata)
+    at_points = {group: groups.pop(group) for group in AT_POINTS if group in groups}
+    stored = [Stored(path_of("", g, c.name), np.dtype(c.dtype), (n,)) for g, each in groups.items() for c in each]
     for point in metadata.points:
-        found += [
-            Stored(path_of(point, g, c.name), np.dtype(c.dtype), (n,)) for g, own in at_points.items() for c in own
+        stored += [
+            Stored(path_of(point, g, c.name), np.dtype(c.dtype), (n,)) for g, each in at_points.items() for c in each
         ]
-        found += [
+        stored += [
             Stored(path_of(point, "histories", name), np.dtype(spec.dtype), (n, *spec.shape))
             for name, spec in metadata.histories.items()
         ]
-    return found
+    return stored
 
 
 def check_names(file: h5py.File, metadata: Metadata) -> None:
@@ -130,7 +130,7 @@ def check_names(file: h5py.File, metadata: Metadata) -> None:
 def size_of(metadata: Metadata) -> int:
     """Approximate upper bound on the size of a new file, bytes, without its metadata."""
     stored = datasets(metadata)
-    return sum(one.shape[0] * one.row_bytes for one in stored) + COLUMN_OVERHEAD * len(stored)
+    return sum(dataset.shape[0] * dataset.row_bytes for dataset in stored) + COLUMN_OVERHEAD * len(stored)
 
 
 def create(file: h5py.File, metadata: Metadata, tables: Tables) -> None:
@@ -145,7 +145,7 @@ def create(file: h5py.File, metadata: Metadata, tables: Tables) -> None:
     tables : Tables
         ``errors``; ``design`` of a study that lists its joints; ``origin`` for methods with `draw_records.columns`.
     """
-    n, first, codes, held = metadata.n, metadata.first_row, meanings_of(metadata), columns(metadata)
+    n, first, codes, groups = metadata.n, metadata.first_row, meanings_of(metadata), columns(metadata)
     put_attributes(file, {"filetype": FILETYPE, "schema_version": SCHEMA_VERSION, "description": ABOUT})
     documents.write(file, metadata)
     row = file.create_dataset("row", (n,), "i8", dcpl=_allocated(None))
@@ -159,13 +159,13 @@ def create(file: h5py.File, metadata: Metadata, tables: Tables) -> None:
     put_attributes(nominal, {"units": "1", "description": "1 for the nominal joint, which is no sample"})
     put_meanings(nominal, MEANINGS["nominal"])
     for group, blocks in tables.items():
-        create_table(file, group, held[group], n, blocks, codes)
+        create_table(file, group, groups[group], n, blocks, codes)
     for point in metadata.points:
-        place = file.require_group(place_of(point) or "/")
+        holder = file.require_group(place_of(point) or "/")
         for group in ("results", "ledger"):
-            create_table(place, group, held[group], n, codes=codes)
+            create_table(holder, group, groups[group], n, codes=codes)
         if metadata.histories:
-            _create_histories(place, metadata)
+            _create_histories(holder, metadata)
     session = file.create_group("session")
     for name, (dtype, unit, description) in SESSION.items():
         blank = np.nan if dtype == "f8" else int(name == "number")
@@ -217,11 +217,11 @@ def create_table(
         raise ValueError(f"{first} rows of {name} given, {n} expected")
 
 
-def _create_histories(place: h5py.Group, metadata: Metadata) -> None:
+def _create_histories(holder: h5py.Group, metadata: Metadata) -> None:
     """Create the datasets of all histories at full size: a full disk is told before the first joint."""
-    group, row = place.create_group("histories"), place.file["row"]
+    group, row = holder.create_group("histories"), holder.file["row"]
     for link in LINKED:
-        group[link] = place.file[link]
+        group[link] = holder.file[link]
     for name, spec in metadata.histories.items():
         attach_scales(_create(group, name, (metadata.n, *spec.shape), spec, row, MEANINGS), spec)
 

@@ -157,6 +157,6 @@ def write(file: h5py.File, metadata: Metadata) -> None:
     document = json.dumps(metadata.model_dump(), allow_nan=False).encode()
     if DATASET in file:
         del file[DATASET]
-    held = file.create_dataset(DATASET, data=np.bytes_(document))
+    dataset = file.create_dataset(DATASET, data=np.bytes_(document))
     about = "study, joint and settings of the campaign as JSON in UTF-8"
-    put_attributes(held, {"description": about, CHECKSUM: hashlib.sha256(document).hexdigest()})
+    put_attributes(dataset, {"description": about, CHECKSUM: hashlib.sha256(document).hexdigest()})

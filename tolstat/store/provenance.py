@@ -22,8 +22,8 @@ RESULT_SOURCES = (
 
 def versions() -> dict[str, str]:
     """Versions of tolstat, of Python and of the libraries that affect results, and `source_hash`."""
-    found = {"tolstat": tolstat.__version__, "sources": source_hash(), "python": platform.python_version()}
-    return found | {name: metadata.version(name) for name in LIBRARIES}
+    own_versions = {"tolstat": tolstat.__version__, "sources": source_hash(), "python": platform.python_version()}
+    return own_versions | {name: metadata.version(name) for name in LIBRARIES}
 
 
 def differing(held: Mapping[str, str], other: Mapping[str, str], here: str, there: str) -> list[str]:
@@ -45,8 +45,8 @@ def source_hash() -> str:
     package = Path(tolstat.__file__).parent
     digest = hashlib.sha256()
     for name in RESULT_SOURCES:
-        found = package / name
-        for path in sorted(found.rglob("*.py")) if found.is_dir() else [found]:
+        source = package / name
+        for path in sorted(source.rglob("*.py")) if source.is_dir() else [source]:
             digest.update(path.relative_to(package).as_posix().encode())
             digest.update(hashlib.sha256(path.read_bytes()).digest())
     return digest.hexdigest()[:16]

@@ -93,17 +93,19 @@ class Reader:
         self._left_out: set[int] = set()
         self.point = next(iter(self.points)) if len(self.points) == 1 else None
 
-    def _describe(self, held: metadata.Metadata) -> None:
-        self.metadata = held
-        self.study_name, self.study_text, self.joint, self.limits = held.study_name, held.study, held.joint, held.limits
-        self.identity, self.options, self.fidelity = held.identity, held.options, held.fidelity
-        self.sampling, self.versions, self.history_specs = held.sampling, held.versions, held.histories
-        self.retries, self.stop, self.created, self.git_commit = held.retries, held.stop, held.created, held.git_commit
-        self.case_names, self.variants = held.design.cases, held.design.variants
-        self.n, self.campaign_rows = held.n, held.campaign_rows
-        self.rows = range(held.first_row, held.first_row + held.n)
-        self.columns = selected_results.columns(held.identity)
-        self.points = {name: Point.of(name, values) for name, values in held.points.items()}
+    def _describe(self, document: metadata.Metadata) -> None:
+        self.metadata = document
+        self.study_name, self.study_text = document.study_name, document.study
+        self.joint, self.limits = document.joint, document.limits
+        self.identity, self.options, self.fidelity = document.identity, document.options, document.fidelity
+        self.sampling, self.versions, self.history_specs = document.sampling, document.versions, document.histories
+        self.retries, self.stop = document.retries, document.stop
+        self.created, self.git_commit = document.created, document.git_commit
+        self.case_names, self.variants = document.design.cases, document.design.variants
+        self.n, self.campaign_rows = document.n, document.campaign_rows
+        self.rows = range(document.first_row, document.first_row + document.n)
+        self.columns = selected_results.columns(document.identity)
+        self.points = {name: Point.of(name, values) for name, values in document.points.items()}
 
     def at(self, point: str) -> Self:
         """Return the file at one of its operating points; both are closed together. `InputError` if it has no such."""
@@ -192,8 +194,8 @@ class Reader:
         """Count the joints of the file by status; each at every operating point."""
         each = self.each()
         counts = Counts(self.n * len(each), 0, 0, 0, points=len(each))
-        for one in each:
-            counts = counts.after(one.status())
+        for at_point in each:
+            counts = counts.after(at_point.status())
         return counts
 
     def session(self) -> Session | None:
@@ -210,12 +212,12 @@ class Reader:
 
         Raises a `StoreError` when a status is unknown to this version.
         """
-        found = np.array(self.column("results", "status", slots))
-        if found.any():  # PENDING is 0
-            found[self._damaged(slots)] = Status.PENDING
-        if found.size and found.max() > max(Status):
-            raise store_error(self.path, f"is damaged: a joint has the unknown status {found.max()}", RUN_AGAIN)
-        return found
+        codes = np.array(self.column("results", "status", slots))
+        if codes.any():  # PENDING is 0
+            codes[self._damaged(slots)] = Status.PENDING
+        if codes.size and codes.max() > max(Status):
+            raise store_error(self.path, f"is damaged: a joint has the unknown status {codes.max()}", RUN_AGAIN)
+        return codes
 
     def pending(self) -> NDArray[np.intp]:
         """File slots still to be simulated at the operating point, ascending."""
@@ -228,11 +230,11 @@ class Reader:
         """
         each, stop = self.each(), self.n if stop is None else stop
         for first in range(0, stop, TOGETHER):
-            for one in each:
-                status = one.status(slice(first, min(first + TOGETHER, stop)))
+            for at_point in each:
+                status = at_point.status(slice(first, min(first + TOGETHER, stop)))
                 slots = first + np.flatnonzero(status == Status.PENDING)
                 if slots.size:
-                    yield one, slots
+                    yield at_point, slots
 
     def results(self, slots: slice = slice(None), fields: Sequence[str] | None = None) -> NDArray[np.void]:
         """Results of every joint, (n,) table RESULT, or of a slice of file slots.
@@ -258,13 +260,13 @@ class Reader:
 
         Raises a `StoreError` when an attempt is damaged.
         """
-        found = np.array(self.column("ledger", "attempt", slots))
-        found[self._damaged(slots)] = 0
-        wrong = (found < 0) | (found > len(self.retries))
+        attempts = np.array(self.column("ledger", "attempt", slots))
+        attempts[self._damaged(slots)] = 0
+        wrong = (attempts < 0) | (attempts > len(self.retries))
         if wrong.any():
             row = self.row(slots.indices(self.n)[0] + int(np.argmax(wrong)))
             raise store_error(self.path, f"is damaged: row {row} names a retry that the file does not have", RESTORE)
-        return found
+        return attempts
 
     def errors(self, slots: slice = slice(None), fields: Sequence[str] | None = None) -> NDArray[np.void]:
         """Errors of every joint, (n,) table ERROR, or of a slice of file slots; with `fields` these only.

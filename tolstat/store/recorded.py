@@ -16,12 +16,12 @@ from tolstat.common.strict import read_section, validate
 from tolstat.common.tables import PARAM, Options
 from tolstat.joint import MEANS, Joint, Operation, operating, perturb, varied
 from tolstat.joint.derived import get
+from tolstat.joint.overrides import nested
 from tolstat.joint.sections import RIGID
 from tolstat.solver import fidelity
 from tolstat.store.hdf5 import store_error
 from tolstat.store.reader import Reader
 from tolstat.study import Study, load, mounting, subset_of
-from tolstat.study.design import nested
 from tolstat.study.model import Solver
 from tolstat.study.swept import KEYS
 
@@ -42,8 +42,8 @@ def joint_of(store: Reader, row: int) -> Joint:
 
 def operation_of(store: Reader, row: int) -> Operation:
     """Operating point of file slot `row`: that of the store, or of the slot's variant; see `joint.operating`."""
-    own = {key.removeprefix("operation."): value for key, value in _values(store, row).items() if key in _OPERATION}
-    return store.operation.model_copy(update=own)
+    values = {key.removeprefix("operation."): value for key, value in _values(store, row).items() if key in _OPERATION}
+    return store.operation.model_copy(update=values)
 
 
 def operating_points(store: Reader, slots: slice = slice(None)) -> dict[str, NDArray[np.float64]]:
@@ -54,7 +54,7 @@ def operating_points(store: Reader, slots: slice = slice(None)) -> dict[str, NDA
     first, last, _ = slots.indices(store.n)
     rows = (operating(operation_of(store, row), errors[row - first : row - first + 1]) for row in range(first, last))
     each = list(rows)
-    return {name: np.concatenate([one[name] for one in each]) for name in MEANS}
+    return {name: np.concatenate([point[name] for point in each]) for name in MEANS}
 
 
 def options_of(store: Reader, row: int) -> Options:
@@ -66,9 +66,9 @@ def options_of(store: Reader, row: int) -> Options:
         When the settings of the variant cannot be used.
     """
     attempt = int(store.attempt(slice(row, row + 1))[0])
-    own = {key: value for key, value in _values(store, row).items() if key.startswith("solver.")}
-    if own and not attempt:
-        written = {key: value for key, value in store.identity.items() if key.startswith("solver.")} | own
+    changed = {key: value for key, value in _values(store, row).items() if key.startswith("solver.")}
+    if changed and not attempt:
+        written = {key: value for key, value in store.identity.items() if key.startswith("solver.")} | changed
         if written.get("solver.fidelity") != "auto":
             written.pop("solver.error_budget", None)  # identity holds its default; studies give it with "auto" only
         solver = validate(Solver, nested(written)["solver"], f"{store.path}: solver")
@@ -100,7 +100,7 @@ def swept(store: Reader) -> dict[str, NDArray[np.float64]]:
 
 
 def mountings(store: Reader) -> tuple[list[float | str], list[str]]:
-    """``shaft.axial`` and ``contact.law`` of each variant whose joints are in the file, see `mounting.in_words`.
+    """``shaft.axial`` and ``contact.law`` of each variant whose joints are in the file, for `mounting_and_law`.
 
     Raises
     ------
@@ -109,9 +109,9 @@ def mountings(store: Reader) -> tuple[list[float | str], list[str]]:
     """
     nominal = validate(Joint, store.joint, f"{store.path}: joint")
     numbers = np.unique(store.design()["variant"]) if store.variants else ()
-    own = [store.variants[number].values for number in numbers] or [{}]
-    axial = [values.get("shaft.axial", nominal.shaft.axial) or RIGID for values in own]
-    return axial, [values.get("contact.law", nominal.contact.law) for values in own]
+    changed = [store.variants[number].values for number in numbers] or [{}]
+    axial = [values.get("shaft.axial", nominal.shaft.axial) or RIGID for values in changed]
+    return axial, [values.get("contact.law", nominal.contact.law) for values in changed]
 
 
 def note_on_mounting(store: Reader) -> str:
@@ -174,19 +174,19 @@ def recall(store: Reader, n: int | None = None, path: Path | None = None) -> Stu
     StoreError
         When the study does not have the identity of the campaign in the file.
     """
-    held = store.sampling["n"]
+    joints = store.sampling["n"]
     source = path if path is not None else store.path.parent / f"{Path(store.study_name).name}.toml"
     text = None if path is not None else store.study_text
     joint = None if path is not None or store.variants else joint_of(store, 0)
     try:
-        study = load(source, n=held, text=text, joint=joint)
+        study = load(source, n=joints, text=text, joint=joint)
     except InputError as error:
         if path is not None:
             raise
-        own = [fault for fault in error.faults if fault.place.startswith(f"{source}: ")]
+        of_study = [fault for fault in error.faults if fault.place.startswith(f"{source}: ")]
         found = "holds the text of this study; what the text names is looked for in the folder of the result file"
         remedy = "give the study file, if the command has this option: --study STUDY"
-        raise InputError([*own, Fault(str(store.path), found, remedy)]) from error
+        raise InputError([*of_study, Fault(str(store.path), found, remedy)]) from error
     if store.sampling["method"] == "subset":
         study = subset_of(study, {key: value for key, value in store.sampling.items() if key != "dimensions"})
     study = _at_point(store, study)
@@ -211,8 +211,8 @@ def _has_key(table: Mapping[str, Any], keys: Collection[str]) -> bool:
 def _at_point(store: Reader, study: Study) -> Study:
     """Study at the point of a file with one operating point that was made from a study with several."""
     if len(study.points) > 1 and len(store.points) == 1:
-        own = next((point for point in study.points if point.operation == store.operation), None)
-        return study if own is None else study.at(own.name)
+        point_of_file = next((point for point in study.points if point.operation == store.operation), None)
+        return study if point_of_file is None else study.at(point_of_file.name)
     return study
 
 

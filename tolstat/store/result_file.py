@@ -80,8 +80,8 @@ class ResultFile(Reader):
         """Largest loads of the nominal joint by name, SI; NaN where the file has none or its results are not valid."""
         import pandas as pd
 
-        names, held = list(self.loads), self.loads.view.nominal
-        values = [float(LOADS[name].of(held)[0]) if len(held) else np.nan for name in names]
+        names, results = list(self.loads), self.loads.view.nominal
+        values = [float(LOADS[name].of(results)[0]) if len(results) else np.nan for name in names]
         series = pd.Series(values, pd.Index(names, name="load"), dtype=float, name="nominal")
         series.attrs["units"] = {name: LOADS[name].unit for name in names}
         return series
@@ -181,8 +181,8 @@ class NamedLoads(Mapping[str, "pd.Series[float]"]):
 
 def described(store: Reader) -> dict[str, Column]:
     """Columns with unit and description that an export has, by name; see `to_pandas` for the others."""
-    own = [c._replace(description=OPERATING.get(c.name, c.description)) for c in ERROR_COLUMNS]
-    return {c.name: c for c in (*draw_records.columns(store.sampling), *own, *store.columns)}
+    errors = [c._replace(description=OPERATING.get(c.name, c.description)) for c in ERROR_COLUMNS]
+    return {c.name: c for c in (*draw_records.columns(store.sampling), *errors, *store.columns)}
 
 
 def to_pandas(store: Reader, nominal: bool) -> pd.DataFrame:

@@ -9,8 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.aside import Aside, begun, in_order
 from tolstat.common.channels import BUSHING_LOADS, CHANNELS, LOAD_HISTORIES, MEASURING, LoadHistory, histories_of
+from tolstat.common.forked import Forked, begun, in_order
+from tolstat.common.loads import FloatArray
 from tolstat.joint import perturb
 from tolstat.solver import compilation
 from tolstat.solver.compilation import is_compiled, warm_up
@@ -28,7 +29,6 @@ JOINTS_PER_BLOCK = 256
 LARGEST = [f"{kind.key}_max" for kind in MEASURING]
 """Fields of the results that joints simulated again are compared in."""
 
-FloatArray = NDArray[np.float64]
 Loads = dict[str, NDArray[Any]]
 """Loads of m joints by name of `LOAD_HISTORIES`, (m, samples, places, components), N and N m."""
 Again = tuple[Loads, FloatArray]
@@ -169,25 +169,25 @@ class Ahead(NamedTuple):
     ----------
     slots : ndarray, shape (m,)
         File slots, ascending.
-    parts : list of Aside
+    parts : list of Forked
         Simulations of `blocks` of them.
     """
 
     slots: NDArray[np.intp]
-    parts: list[Aside[list[Again]]]
+    parts: list[Forked[list[Again]]]
 
     def of(self, slots: NDArray[np.intp]) -> Again | None:
         """Loads of some of the joints; None unless all are among them."""
-        place = np.searchsorted(self.slots, slots)
-        if not np.array_equal(self.slots[np.minimum(place, len(self.slots) - 1)], slots):
+        position = np.searchsorted(self.slots, slots)
+        if not np.array_equal(self.slots[np.minimum(position, len(self.slots) - 1)], slots):
             return None
         pieces = in_order(self.parts)
-        block, own = np.divmod(place, JOINTS_PER_BLOCK)
+        block, joint = np.divmod(position, JOINTS_PER_BLOCK)
         loads = {
-            history.name: np.stack([pieces[b][0][history.name][k] for b, k in zip(block, own, strict=True)])
+            history.name: np.stack([pieces[b][0][history.name][k] for b, k in zip(block, joint, strict=True)])
             for history in LOAD_HISTORIES
         }
-        return loads, np.array([pieces[b][1][k] for b, k in zip(block, own, strict=True)])
+        return loads, np.array([pieces[b][1][k] for b, k in zip(block, joint, strict=True)])
 
 
 def ahead(store: Reader, slots: NDArray[np.intp], processes: int) -> None:
@@ -210,8 +210,8 @@ def ahead(store: Reader, slots: NDArray[np.intp], processes: int) -> None:
 
 def _again(store: Reader, slots: NDArray[np.intp]) -> tuple[Loads, float]:
     """Loads of joints that are simulated again, all histories, and `Revolutions.apart`."""
-    found = None if store.ahead is None else store.ahead.of(slots)
-    loads, off = found or _simulated(store, slots)
+    simulated = None if store.ahead is None else store.ahead.of(slots)
+    loads, off = simulated or _simulated(store, slots)
     return loads, float(np.max(off, initial=0.0))
 
 
@@ -225,13 +225,13 @@ def _simulated(store: Reader, slots: NDArray[np.intp]) -> Again:
     apart = np.zeros(len(slots))
     for attempt in np.unique(attempts):
         here = np.flatnonzero(attempts == attempt)
-        found = simulate_rows(params[here], options_of(store, int(slots[here[0]])), "full")
+        again = simulate_rows(params[here], options_of(store, int(slots[here[0]])), "full")
         for name, values in loads.items():
-            samples = found.histories[name]
+            samples = again.histories[name]
             values[here] = samples[:, np.arange(steps) * samples.shape[1] // steps]
         for name in LARGEST:
             with np.errstate(invalid="ignore", divide="ignore"):
-                off = np.abs(found.results[name] / stored[name][here] - 1.0)
+                off = np.abs(again.results[name] / stored[name][here] - 1.0)
             largest = off.max(axis=1, initial=0.0, where=np.isfinite(off))
             apart[here] = np.maximum(apart[here], largest)
     return loads, apart

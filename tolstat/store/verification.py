@@ -116,7 +116,7 @@ def together(parts: Sequence[Verification]) -> Verification:
     return Verification(first.seed, rows, base, checks)
 
 
-def write(found: Sequence[tuple[Writer, Verification]], name: str = VERIFY) -> None:
+def write(verifications: Sequence[tuple[Writer, Verification]], name: str = VERIFY) -> None:
     """Write verifications at operating points of one file, replacing earlier ones; the file is replaced once for all.
 
     Raises
@@ -126,10 +126,10 @@ def write(found: Sequence[tuple[Writer, Verification]], name: str = VERIFY) -> N
     """
 
     def change(file: h5py.File) -> None:
-        for store, verification in found:
+        for store, verification in verifications:
             _write(file[layout.place_of(store.point or "") or "/"], name, verification, store.columns)
 
-    found[0][0].replace(change)
+    verifications[0][0].replace(change)
 
 
 def _write(holder: h5py.Group, place: str, verification: Verification, columns: tuple[Column, ...]) -> None:

@@ -124,8 +124,8 @@ class View:
 
     def _verified(self, group: str) -> Verification | None:
         """Verifications of all operating points; None if one of them has none."""
-        found = [one for part in self.parts if (one := verification.read(part.store, group)) is not None]
-        return verification.together(found) if len(found) == len(self.parts) else None
+        verifications = [held for part in self.parts if (held := verification.read(part.store, group)) is not None]
+        return verification.together(verifications) if len(verifications) == len(self.parts) else None
 
     @cached_property
     def altered(self) -> dict[str, Altered]:
@@ -202,8 +202,8 @@ class View:
                 return self._loads.setdefault(name, self.together)
             view, plain = self.narrowed(name)
             if view is not self:
-                own = view.load(plain)
-                self._loads[name] = replace(own, name=name, limit=self.limits.get(name, own.limit))
+                at_points = view.load(plain)
+                self._loads[name] = replace(at_points, name=name, limit=self.limits.get(name, at_points.limit))
                 return self._loads[name]
             if name not in LOADS:
                 raise InputError([Fault(name, "is not a load", did_you_mean(name, list(LOADS)))])
@@ -261,12 +261,12 @@ class View:
         the one whose limit the largest share of the joints exceeds; ties are decided by the 99 % quantile over the
         limit (without limits by the 99 % quantile).
         """
-        found: dict[str, tuple[tuple[float, float], str]] = {}
+        by_kind: dict[str, tuple[tuple[float, float], str]] = {}
         for load in self.loads(list(self.limits) or self.bushing_loads):
             if load.valid.size:
-                kind, own = LOADS[split(load.name)[0]].kind.key, (worst.rank(load, load.limit), load.name)
-                found[kind] = max(found.get(kind, own), own, key=lambda item: item[0])
-        return tuple(name for _, name in found.values())
+                kind, candidate = LOADS[split(load.name)[0]].kind.key, (worst.rank(load, load.limit), load.name)
+                by_kind[kind] = max(by_kind.get(kind, candidate), candidate, key=lambda item: item[0])
+        return tuple(name for _, name in by_kind.values())
 
     @property
     def decisive(self) -> str:
@@ -328,7 +328,7 @@ class View:
         if not samples.size or samples[-1] < len(self._first_errors):
             return self._first_errors[samples]
         names = tuple(ERROR.names or ()) if columns is None else tuple(columns)
-        found = np.empty(len(samples), [(name, ERROR[name]) for name in names])
+        table = np.empty(len(samples), [(name, ERROR[name]) for name in names])
         for first in range(0, self.n, BLOCK):
             here = np.flatnonzero((samples >= first) & (samples < first + BLOCK))
             if here.size:
@@ -336,8 +336,8 @@ class View:
                 begin, end = int(samples[here[0]]), int(samples[here[-1]]) + 1
                 block = self._errors(begin, end, names)
                 for name in names:
-                    found[name][here] = block[name][samples[here] - begin]
-        return found
+                    table[name][here] = block[name][samples[here] - begin]
+        return table
 
     def error_blocks(self, columns: Sequence[str]) -> Iterator[NDArray[np.void]]:
         """Yield the errors of all samples in consecutive blocks, with at least these columns."""
@@ -390,8 +390,9 @@ def design_of(store: Reader, weights: FloatArray | None, unfinished: bool) -> De
         shares, changes = zip(*store.identity["proposal"], strict=True)
         # proposals of processes alone leave out no way to a limit
         others = any(set(changed) != {"parts"} for changed in changes)
-        own = frozen(store.origin()["component"][skip:] == 0) if others else None
-        return Weighted(weights, 1.0 / (1.0 - math.fsum(shares)), own)  # one over the share of the tolerances
+        from_tolerances = frozen(store.origin()["component"][skip:] == 0) if others else None
+        heaviest = 1.0 / (1.0 - math.fsum(shares))  # one over the share of the tolerances
+        return Weighted(weights, heaviest, from_tolerances)
     if sampling.get("joints_per_lot", 1) > 1:
         return Clustered(np.asarray(store.samples) // int(sampling["joints_per_lot"]))
     if sampling.get("replicates", 1) > 1 and n == sampling["n"] and not unfinished:

@@ -74,12 +74,12 @@ def key(about: Mapping[str, Any]) -> str:
 
 def read(store: Reader) -> dict[str, Altered]:
     """Read all sets, by the digest of their change; damaged ones are left out with a warning, and so run again."""
-    found, lost = _read(store)
+    altered, lost = _read(store)
     if lost:
         place, sets = str(store.path), "1 change" if lost == 1 else f"{lost} changes"
         remedy = f"simulate them again: tolstat causes {store.path} --run, tolstat assumptions {store.path} --run"
         LOG.warning("warning: %s", Fault(place, f"the joints of {sets} of what_if are damaged and left out", remedy))
-    return found
+    return altered
 
 
 def damaged(store: Reader) -> int:
@@ -90,25 +90,25 @@ def damaged(store: Reader) -> int:
 def _read(store: Reader) -> tuple[dict[str, Altered], int]:
     """Sets by the digest of their change, and number of damaged ones."""
     held = store.group(GROUP, at_point=False)
-    found: dict[str, Altered] = {}
+    sets: dict[str, Altered] = {}
     lost = 0
     for name, group in {} if held is None else held.items():
         try:
-            one = Altered(
+            altered = Altered(
                 json.loads(text(group.attrs, "change")),
                 int(group["sample"][0]),
                 tuple(group["load"].asstr()[:].tolist()),
                 np.asarray(group["loads"][:], float),
                 np.asarray(group["status"][:], np.uint8),
             )
-            sound = text(group.attrs, "check") == _check(one) and key(one.about) == name
+            sound = text(group.attrs, "check") == _check(altered) and key(altered.about) == name
         except DAMAGE_ERRORS:  # not what `write` writes
             sound = False
         if sound:
-            found[name] = one
+            sets[name] = altered
         else:
             lost += 1
-    return found, lost
+    return sets, lost
 
 
 def write(store: Writer, sets: Mapping[str, Altered]) -> None:
@@ -119,37 +119,37 @@ def write(store: Writer, sets: Mapping[str, Altered]) -> None:
     StoreError
         When there is no room for a second copy of the file.
     """
-    growth = sum(one.loads.nbytes + one.status.nbytes for one in sets.values())
+    growth = sum(altered.loads.nbytes + altered.status.nbytes for altered in sets.values())
     store.replace(lambda file: _write(file, sets), growth)
 
 
 def _write(file: h5py.File, sets: Mapping[str, Altered]) -> None:
     group = file.require_group(GROUP)
     put_attributes(group, {"description": GROUPS[GROUP]})
-    for name, one in sets.items():
+    for name, altered in sets.items():
         if name in group:
             del group[name]
-        own = group.create_group(name)
-        change, seed = json.dumps(dict(one.about), allow_nan=False), int(one.about["seed"])
-        about = ": ".join(str(one.about[word]) for word in ("kind", "label", "step") if word in one.about)
-        put_attributes(own, {"description": about, "change": change, "seed": seed, "check": _check(one)})
-        columns = {"sample": np.arange(one.first, one.end), "load": np.array(one.names, dtype=object)}
-        for column, values in (columns | {"loads": one.loads, "status": one.status}).items():
+        holder = group.create_group(name)
+        change, seed = json.dumps(dict(altered.about), allow_nan=False), int(altered.about["seed"])
+        about = ": ".join(str(altered.about[word]) for word in ("kind", "label", "step") if word in altered.about)
+        put_attributes(holder, {"description": about, "change": change, "seed": seed, "check": _check(altered)})
+        columns = {"sample": np.arange(altered.first, altered.end), "load": np.array(altered.names, dtype=object)}
+        for column, values in (columns | {"loads": altered.loads, "status": altered.status}).items():
             dtype, unit, description = DATASETS[column]
-            dataset = own.create_dataset(column, data=values, dtype=dtype)
+            dataset = holder.create_dataset(column, data=values, dtype=dtype)
             put_attributes(dataset, {"units": unit, "description": description})
             if column in columns:
                 dataset.make_scale(column)
                 continue
             for k, scale in enumerate(list(columns)[: dataset.ndim]):
-                dataset.dims[k].attach_scale(own[scale])
-        put_meanings(own["status"], MEANINGS["status"])
+                dataset.dims[k].attach_scale(holder[scale])
+        put_meanings(holder["status"], MEANINGS["status"])
 
 
-def _check(one: Altered) -> str:
+def _check(altered: Altered) -> str:
     """SHA-256 of a set: its change, numbers, loads and states."""
-    head = json.dumps([dict(one.about), one.first, one.names], sort_keys=True, allow_nan=False)
+    head = json.dumps([dict(altered.about), altered.first, altered.names], sort_keys=True, allow_nan=False)
     digest = hashlib.sha256(head.encode())
-    for values in (one.loads.astype("<f8"), one.status):
+    for values in (altered.loads.astype("<f8"), altered.status):
         digest.update(np.ascontiguousarray(values).tobytes())
     return digest.hexdigest()

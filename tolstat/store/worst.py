@@ -95,14 +95,14 @@ def limit_of(parts: Mapping[str, NDArray[np.void]], limit: Limit) -> tuple[Float
     limit : Limit
         The limit; its level is compared with the values.
     """
-    found, states = [], []
+    of_loads, states = [], []
     for name, level in zip(limit.loads, limit.levels, strict=True):
         where = split(name)[1]
         chosen = [parts[point] for point in where.split("+")] if where else list(parts.values())
         values, status, _ = load_of(chosen, LOADS[split(name)[0]])
-        found.append(values.values if limit.has_one_level else values.values / level)
+        of_loads.append(values.values if limit.has_one_level else values.values / level)
         states.append(status)
-    return np.maximum.reduce(found), worst_status(states)
+    return np.maximum.reduce(of_loads), worst_status(states)
 
 
 def rank(load: Sample, limit: float | None) -> tuple[float, float]:

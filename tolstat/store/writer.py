@@ -78,14 +78,14 @@ class Writer(Reader):
             When the file exists or cannot be written.
         """
         rows = range(study.rows) if rows is None else rows
-        held = metadata.of_study(study, rows, histories or {}, dimensions or {}, options, fidelity)
+        document = metadata.of_study(study, rows, histories or {}, dimensions or {}, options, fidelity)
         tables = {"errors": errors}
         if study.variants:
             tables["design"] = [study.design[rows.start : rows.stop]]
         if origin is not None:
             tables["origin"] = origin
         exists = "resume it with its own study, or give another file: --out OTHER.h5"
-        write_new(Path(path), held, exists, tables)
+        write_new(Path(path), document, exists, tables)
         return cls.open(path)
 
     @classmethod
@@ -113,25 +113,25 @@ class Writer(Reader):
 
     def _verify(self) -> None:
         """Compare everything with its checksums: errors must match, joints with damaged results become pending."""
-        found = self._checked.check()
+        damaged_blocks = self._checked.check()
         self._written = np.full(blocks_of(self.n), self._checked.number % 2 == 1)
-        for path in found:
+        for path in damaged_blocks:
             if not layout.is_at_point(path):
-                self._refuse(path, found[path])
+                self._refuse(path, damaged_blocks[path])
         block = np.arange(self.n) // ROWS
-        for one in self.each():
-            places = [layout.path_of(one.point or "", group, "") for group in layout.AT_POINTS]
-            own = [blocks for path, blocks in found.items() if path.rpartition("/")[0] in places]
+        for at_point in self.each():
+            places = [layout.path_of(at_point.point or "", group, "") for group in layout.AT_POINTS]
+            own = [blocks for path, blocks in damaged_blocks.items() if path.rpartition("/")[0] in places]
             damaged = np.unique(np.concatenate([np.empty(0, np.intp), *own]))
             if damaged.size:
-                one._left_out.update(damaged.tolist())
-                ledger = found.get(layout.path_of(one.point or "", "ledger", "attempt"), damaged[:0])
+                at_point._left_out.update(damaged.tolist())
+                ledger = damaged_blocks.get(layout.path_of(at_point.point or "", "ledger", "attempt"), damaged[:0])
                 rows, again = (np.flatnonzero(np.isin(block, own)) for own in (damaged, ledger))
-                one._begin_writing(rows)
-                put(one._place("results"), rows, {"status": np.full(rows.size, Status.PENDING, np.uint8)})
+                at_point._begin_writing(rows)
+                put(at_point._place("results"), rows, {"status": np.full(rows.size, Status.PENDING, np.uint8)})
                 # attempts that are damaged: again with the study's settings
-                put(one._place("ledger"), again, {"attempt": np.zeros(again.size, np.int32)})
-                one._sync()
+                put(at_point._place("ledger"), again, {"attempt": np.zeros(again.size, np.int32)})
+                at_point._sync()
         self._tell("pending again", "run its study to simulate these joints: tolstat run STUDY")
 
     def close(self) -> None:
@@ -200,16 +200,16 @@ class Writer(Reader):
         StoreError
             When there is no room for a second copy of the file.
         """
-        held = self.metadata.changed(**values)
-        if held == self.metadata:
+        document = self.metadata.changed(**values)
+        if document == self.metadata:
             return
 
         def both(file: h5py.File) -> None:
-            metadata.write(file, held)
+            metadata.write(file, document)
             change(file)
 
         self.replace(both)
-        self._describe(held)
+        self._describe(document)
 
     def begin_retry(self, rows: Mapping[str, NDArray[np.intp]], entry: Mapping[str, Any]) -> None:
         """Mark joints as pending that are to be simulated again, with the settings of `entry`.

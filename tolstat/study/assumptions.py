@@ -13,9 +13,8 @@ from tolstat.common.tables import HOLES
 from tolstat.joint import derived
 from tolstat.joint.contact import keys_valid_for
 from tolstat.joint.derived import get
-from tolstat.joint.overrides import leaves, merged
+from tolstat.joint.overrides import leaves, merged, nested
 from tolstat.joint.reading import with_keys
-from tolstat.study.design import nested
 from tolstat.study.selection import EXCLUDES, UNITS
 from tolstat.study.study import Study
 

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from tolstat.common.tables import DESIGN, Variant
 from tolstat.joint import Joint, Operation
-from tolstat.joint.overrides import merged
 from tolstat.study.model import Solver
 
 IDEAL = "ideal"
@@ -120,15 +119,3 @@ def flat(value: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]
             yield from flat(inner, f"{prefix}{key}.")
         else:
             yield f"{prefix}{key}", list(inner) if isinstance(inner, tuple) else inner
-
-
-def nested(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Nested tables from dotted keys: the inverse of `flat`."""
-    result: dict[str, Any] = {}
-    for key, value in values.items():
-        *tables, name = key.split(".")
-        inner: Any = value if not tables else {name: value}
-        for part in reversed(tables[1:]):
-            inner = {part: inner}
-        result = merged(result, {tables[0] if tables else name: inner})
-    return result

@@ -15,8 +15,8 @@ from tolstat.common.loads import UNIT_OF_LOAD, load_of, split
 from tolstat.common.strict import read_toml
 from tolstat.common.tables import FINEST_STEPS
 from tolstat.joint import Joint, Operation
-from tolstat.joint.assumed import Assumed
 from tolstat.joint.derived import BEARING
+from tolstat.joint.model import Assumed
 from tolstat.joint.overrides import leaves, merged
 from tolstat.joint.reading import faults_of_assumed, is_joint
 from tolstat.study import fatigue, known, listing, points, proposal, selection, selective, signals, sorting, swept

@@ -17,9 +17,9 @@ from tolstat.common.strict import Strict, described, refuse, whole
 from tolstat.common.tables import Variant
 from tolstat.joint import Joint, Operation
 from tolstat.joint.model import TOLD
-from tolstat.joint.overrides import laid_over
+from tolstat.joint.overrides import laid_over, nested
 from tolstat.study import selection
-from tolstat.study.design import IDEAL, Design, cube, flat, nested, table
+from tolstat.study.design import IDEAL, Design, cube, flat, table
 from tolstat.study.model import MAX_ROWS, Solver
 from tolstat.study.selection import UNITS, Assignments, Entry
 

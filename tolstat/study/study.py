@@ -17,8 +17,8 @@ from tolstat.common.loads import UNIT_OF_LOAD, limits_in_words, split
 from tolstat.common.strict import dotted
 from tolstat.common.tables import DESIGN, Variant
 from tolstat.joint import Joint, Operation, affecting_results
-from tolstat.joint.assumed import Assumed
-from tolstat.joint.mounting import in_words
+from tolstat.joint.model import Assumed
+from tolstat.joint.sections import mounting_and_law
 from tolstat.study import listing, mounting
 from tolstat.study.axes import Axis
 from tolstat.study.case import Case
@@ -121,7 +121,7 @@ class Study(Case):
     def joint_in_words(self) -> str:
         """Mounting of the shafts and contact law, in words."""
         joints = self.joints
-        return in_words([own.shaft.axial for own in joints], [own.contact.law for own in joints])
+        return mounting_and_law([own.shaft.axial for own in joints], [own.contact.law for own in joints])
 
     def faults_of_mounting(self) -> list[Fault]:
         """Faults of settings without effect, see `mounting.refusals`."""

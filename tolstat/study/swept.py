@@ -13,8 +13,8 @@ from tolstat.common.errors import Fault, InputError
 from tolstat.common.tables import DESIGN, Variant
 from tolstat.common.units import Quantity
 from tolstat.joint import Joint, affects_results
+from tolstat.joint.overrides import nested
 from tolstat.joint.sections import quantities
-from tolstat.study.design import nested
 from tolstat.study.listing import Variants
 from tolstat.study.model import SweepAxis
 

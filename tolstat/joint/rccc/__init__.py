@@ -27,10 +27,17 @@ by a constant or do not change it, and position errors only make the pairs slide
 joint come from the pins left out here.
 """
 
-from tolstat.joint.rccc.constraints import FREEDOMS, Lines, constraint_jacobian
 from tolstat.joint.rccc.linkage import Revolution, solve
-from tolstat.joint.rccc.mobility import Mobility, kutzbach, mobility
-from tolstat.joint.rccc.statics import Reactions, react
+from tolstat.joint.rccc.statics import (
+    FREEDOMS,
+    Lines,
+    Mobility,
+    Reactions,
+    constraint_jacobian,
+    kutzbach,
+    mobility,
+    react,
+)
 
 __all__ = [
     "FREEDOMS",

@@ -1,4 +1,9 @@
-"""The RCCC linkage over a revolution: angles, slides, speed ratio and reactions from one row of errors."""
+"""The RCCC linkage over a revolution: angles, slides, speed ratio and reactions from one row of errors.
+
+The loop is cut at the output fork. The pose of the output fork through input fork and cross must equal its pose on the
+output shaft. Newton's method solves these six equations for three angles and three slides, at all input angles at once.
+The Jacobian consists of the screws of the pairs, which also give the rates of angles and slides.
+"""
 
 from __future__ import annotations
 
@@ -6,13 +11,137 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.transform import Rotation
 
 from tolstat.joint import Joint, Operation, ideal, perturb
+from tolstat.joint.material import Array
 from tolstat.joint.perturbation import PIN_TRIADS
-from tolstat.joint.rccc.closure import Pose, Side, close, forward, rates
-from tolstat.joint.rccc.constraints import Array, Lines
-from tolstat.joint.rccc.statics import INPUT_PIN, OUTPUT_PIN, output_load, react
+from tolstat.joint.rccc.statics import INPUT_PIN, OUTPUT_PIN, Lines, output_load, react
 from tolstat.kernel.mechanics.topology import ARM_OF_PIN
+
+CLOSED = 1e-12
+"""A loop is closed when all components of its gap are below this, in rad and in units of ``cross.R``."""
+
+MAX_ITERATIONS = 25
+
+
+class Side(NamedTuple):
+    """The kept pin and hole of one fork: number of the pin, then point (m) and direction of both axes, (3,) each.
+
+    Pin point and axis are in axes of the cross, hole point and axis in axes of the fork; directions point away from O.
+    `sign` is +1 where the nominal direction is the frame's x or y, -1 where it is the opposite.
+    """
+
+    pin: int
+    sign: float
+    pin_point: Array
+    pin_axis: Array
+    hole_point: Array
+    hole_axis: Array
+
+
+class Pose(NamedTuple):
+    """Links at k poses, in axes of G.
+
+    Attributes
+    ----------
+    attitude : ndarray, shape (k, 3, 3, 3)
+        Attitudes of input fork, cross and output fork; columns are the link's axes x, y, z.
+    origin : ndarray, shape (k, 3, 3)
+        Positions of the links' nominal centres, which are at O in the ideal joint, m.
+    """
+
+    attitude: Array
+    origin: Array
+
+
+def _turn(axis: Array, angle: Array) -> Array:
+    """Rotations by `angle` (k,) about a fixed `axis` (3,), shape (k, 3, 3)."""
+    return np.asarray(Rotation.from_rotvec(np.multiply.outer(angle, axis)).as_matrix())
+
+
+def _aligning(start: Array, end: Array) -> Array:
+    """The shortest rotation from unit vector `start` to `end`, which must not be opposite, shape (3, 3)."""
+    skew = np.cross(np.eye(3), np.cross(start, end))
+    return np.asarray(np.eye(3) + skew + skew @ skew / (1.0 + start @ end))
+
+
+def forward(sides: tuple[Side, Side], alpha: float, theta: Array, q: Array, radius: float) -> tuple[Pose, Lines, Array]:
+    """Pose of the links and axes of the pairs at coordinates `q` (k, 6), and the gap of the loop (k, 6).
+
+    Coordinates are pair angles, output angle and slides, in the order of `Revolution`. The gap is the rotation (to
+    first order, rad) and the displacement (m) from the output fork's pose on its shaft to its pose through the chain.
+    """
+    into, out = sides
+    beta, gamma, output_angle, slide_in, slide_out, slide_shaft = q.T
+    z, y = np.eye(3)[2], np.eye(3)[1]
+    shaft = np.array([np.sin(alpha), 0.0, np.cos(alpha)])
+
+    fork = _turn(z, theta)
+    cross = fork @ _turn(into.hole_axis, into.sign * beta) @ _aligning(into.pin_axis, into.hole_axis)
+    axis_in = fork @ into.hole_axis
+    point_in = fork @ into.hole_point + slide_in[:, None] * axis_in
+    centre = point_in - cross @ into.pin_point
+
+    follower = cross @ _turn(out.pin_axis, out.sign * gamma) @ _aligning(out.hole_axis, out.pin_axis)
+    axis_out = cross @ out.pin_axis
+    point_out = centre + cross @ out.pin_point
+    end = point_out - slide_out[:, None] * axis_out - follower @ out.hole_point
+
+    on_shaft = _turn(y, np.array([alpha]))[0] @ _turn(z, output_angle)
+    turned = follower @ np.swapaxes(on_shaft, 1, 2)
+    rotation = 0.5 * np.stack(
+        [turned[:, 2, 1] - turned[:, 1, 2], turned[:, 0, 2] - turned[:, 2, 0], turned[:, 1, 0] - turned[:, 0, 1]],
+        axis=1,
+    )
+    gap = np.concatenate([rotation, end - slide_shaft[:, None] * shaft], axis=1)
+    zero = np.zeros_like(end)
+    pose = Pose(np.stack([fork, cross, follower], axis=1), np.stack([zero, centre, end], axis=1))
+    points = np.stack([zero, point_in, point_out, zero], axis=1)
+    axes = np.stack([zero + z, axis_in, axis_out, zero + shaft], axis=1)
+    return pose, Lines(points, axes, radius), gap
+
+
+def _screws(sides: tuple[Side, Side], lines: Lines, pose: Pose) -> Array:
+    """Jacobian of the loop's gap in the coordinates: the pairs' screws at the output fork's centre, (k, 6, 6)."""
+    screws = np.zeros((len(lines.point), 6, 6))
+    for k, side in enumerate(sides):
+        axis, arm = lines.axis[:, k + 1], pose.origin[:, 2] - lines.point[:, k + 1]
+        screws[:, :3, k] = side.sign * axis
+        screws[:, 3:, k] = side.sign * np.cross(axis, arm)
+    screws[:, :3, 2] = -lines.axis[:, 3]
+    screws[:, 3:, 3] = lines.axis[:, 1]
+    screws[:, 3:, 4] = -lines.axis[:, 2]
+    screws[:, 3:, 5] = -lines.axis[:, 3]
+    return screws
+
+
+def _input_screw(pose: Pose) -> Array:
+    """Derivative of the loop's gap with respect to the input angle, (k, 6, 1)."""
+    z = np.zeros_like(pose.origin[:, 2])
+    z[:, 2] = 1.0
+    return np.concatenate([z, np.cross(z, pose.origin[:, 2])], axis=1)[..., None]
+
+
+def rates(sides: tuple[Side, Side], lines: Lines, pose: Pose) -> Array:
+    """Derivatives of the six coordinates with respect to the input angle, (k, 6): pure numbers, slides m/rad."""
+    return np.asarray(np.linalg.solve(_screws(sides, lines, pose), -_input_screw(pose))[..., 0], float)
+
+
+def close(sides: tuple[Side, Side], alpha: float, theta: Array, radius: float) -> Array:
+    """Solve for the coordinates (k, 6) that close the loop, by Newton's method from the ideal joint; NaN on failure."""
+    q = np.zeros((len(theta), 6))
+    q[:, 0] = ideal.cross_angle(theta, alpha)
+    q[:, 1] = np.arcsin(np.sin(alpha) * np.cos(theta))
+    q[:, 2] = ideal.output_angle(theta, alpha)
+    unit = np.array([1.0, 1.0, 1.0, radius, radius, radius])
+    for _ in range(MAX_ITERATIONS):
+        pose, lines, gap = forward(sides, alpha, theta, q, radius)
+        closed = np.max(np.abs(gap) / unit, axis=1) < CLOSED
+        if closed.all():
+            break
+        q[~closed] -= np.linalg.solve(_screws(sides, lines, pose), gap[..., None])[~closed, :, 0]
+    return np.where(closed[:, None], q, np.nan)
 
 
 class Revolution(NamedTuple):

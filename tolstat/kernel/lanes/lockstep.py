@@ -3,9 +3,9 @@
 A round evaluates the residual of every lane once, at the lane's own time and trial point. Each lane is then corrected,
 gets a new tangent, or continues: from the search for equilibrium to its first step, to the next sub-step, grid point,
 cell or angle. Lanes never wait for each other's convergence, and a lane whose joint is finished takes the next one from
-the queue. A joint in which a step or angle has finally failed is left `PENDING`, unless its steps are error-controlled:
-the caller simulates it again from its start, alone, as in `simulate`. What a lane does depends only on its own joint,
-and so does every bit of the result.
+the queue. A joint in which a step or angle has finally failed is left `AGAIN_ALONE`, unless its steps are
+error-controlled: the caller simulates it again from its start, alone, as in `simulate`. What a lane does depends only
+on its own joint, and so does every bit of the result.
 """
 
 from tolstat.kernel.integrators.mesh import cells_of, load_error, parts_of
@@ -48,12 +48,12 @@ from tolstat.kernel.revolution.quasistatic import angle_time, speed_ratios
 from tolstat.kernel.revolution.resolve import Past, follows_error
 from tolstat.kernel.revolution.settle import grid_step, summarise
 from tolstat.kernel.revolution.simulate import (
+    AGAIN_ALONE,
     DYNAMIC,
     NEWTON_FAILED,
     NOT_SETTLED,
     OK,
     OUTSIDE_MODEL,
-    PENDING,
     QUASISTATIC,
     RAMP,
     clear,
@@ -82,7 +82,7 @@ STANDSTILL = 2 * WIDTH
 def finish_joint(lane, status, rows, left, options, alone, batch, samples, results):
     """Continue a lane whose joint has ended, or whose step of a closer look has: next closer look, or results.
 
-    A joint that has not settled gets no closer look. A joint in which a step has failed is left `PENDING`; a failed
+    A joint that has not settled gets no closer look. A joint in which a step has failed is left `AGAIN_ALONE`; a failed
     step of a closer look ends that look. `status` is that of the joint or step; for the other arguments see `lockstep`.
     """
     control, joint, own = batch.control, batch.control.joint[lane], samples_of(lane, batch, samples)
@@ -110,7 +110,7 @@ def finish_joint(lane, status, rows, left, options, alone, batch, samples, resul
         left[joint] -= counters[ITERATIONS]
     else:
         left[joint] -= int(control.iterations[lane])
-        out.status = PENDING
+        out.status = AGAIN_ALONE
     empty(lane, batch)
 
 
@@ -256,7 +256,7 @@ def lockstep(rows, words, starts, left, options, patience, alone, batch, samples
         Written unless empty: statistics of the last revolutions of every joint with error-controlled steps; revolution
         r (from 0) at r modulo their number.
     results : ndarray of KERNEL_RESULT, shape (n,)
-        Written; status `PENDING` means that the joint is to be simulated alone, with the iterations in `left`.
+        Written; status `AGAIN_ALONE`: the joint is to be simulated from its start, with the iterations in `left`.
     tally : ndarray of int, shape (3,)
         Counters, increased: rounds; lanes with a joint, summed over rounds; rounds with new tangents.
     """

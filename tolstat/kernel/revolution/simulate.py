@@ -45,7 +45,8 @@ from tolstat.kernel.revolution.trail import closure_trend, note_closure, with_sl
 from tolstat.kernel.simd.jit import njit
 
 OK, NOT_SETTLED, NEWTON_FAILED = int(Status.OK), int(Status.NOT_SETTLED), int(Status.NEWTON_FAILED)
-PENDING = int(Status.PENDING)
+AGAIN_ALONE = int(Status.PENDING)
+"""Status of a joint that lanes leave to be simulated again, alone."""
 NOT_FINITE, OUTSIDE_MODEL = int(Status.NOT_FINITE), int(Status.OUTSIDE_MODEL)
 RAMP = int(Start.RAMP)
 DYNAMIC, QUASISTATIC, IDEAL = int(Fidelity.DYNAMIC), int(Fidelity.QUASISTATIC), int(Fidelity.IDEAL)

@@ -5,51 +5,27 @@ and compared with its checksum before it is unpickled. There is a file for each 
 was compiled from and for: processes that compile at the same time write the same files, each as a whole, and none
 overwrites another one's. Checksums are against accidents; against others, `cache_folder.is_trusted` asks who may write.
 
-This module depends on Numba's internals, as `unit` does; where they have other names, its import fails and `jit` uses
-Numba's own cache, which has no checksums.
+This module depends on Numba's internals, as `unit` does; ``tests/kernel/test_cache.py`` fails where they change.
 """
 
 import hashlib
 import os
 import pickle
-import sys
 import uuid
 from pathlib import Path
 
-import llvmlite
-import numba
-from numba.core.caching import Cache, FunctionCache
+from numba.core.caching import FunctionCache
 from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 
 from tolstat.kernel.simd.cache_folder import SUFFIX, tell
 
-NEEDED = ("_index_key", "_load_overload", "_save_overload")
-if not all(hasattr(Cache, name) for name in NEEDED):
-    raise ImportError("Numba's cache is not the one that checked files are written for")
-
-VERSIONS = (sys.version, numba.__version__, llvmlite.__version__)
 DIGEST = hashlib.sha256
-
-
-def sealed(key, content):
-    """Bytes of a file: a checksum, then the key and what was compiled for it."""
-    body = dumps((repr(key), content))
-    return DIGEST(body).digest() + body
-
-
-def opened(key, data):
-    """Content of a file, from its bytes; None if they do not match their checksum, or the file is of another key."""
-    size = DIGEST().digest_size
-    body = data[size:]
-    if DIGEST(body).digest() != data[:size]:
-        return None
-    of, content = pickle.loads(body)
-    return content if of == repr(key) else None
+SIZE = DIGEST().digest_size
 
 
 class CheckedFiles:
-    """Files of one kernel; takes the place of Numba's index and data files."""
+    """Files of one kernel, each a checksum and what it is of; takes the place of Numba's index and data files."""
 
     def __init__(self, folder, name, stamp):
         self.folder = Path(folder)
@@ -58,36 +34,33 @@ class CheckedFiles:
 
     def path(self, key):
         """File of one version of the kernel."""
-        of = DIGEST(repr((VERSIONS, self.stamp, key)).encode()).hexdigest()[:16]
-        return self.folder / f"{self.name}.{of}{SUFFIX}"
+        version = DIGEST(repr((self.stamp, key)).encode()).hexdigest()[:16]
+        return self.folder / f"{self.name}.{version}{SUFFIX}"
 
     def load(self, key):
-        """What was saved under `key`; None if there is nothing, or nothing that can be believed."""
+        """What was saved under `key`; None if there is no file, or a damaged one, or that of another version."""
         try:
             data = self.path(key).read_bytes()
         except OSError:
             return None
-        content = opened(key, data)
-        if content is None:
+        if DIGEST(data[SIZE:]).digest() != data[:SIZE]:
             tell(f"compiled code in {self.folder} is damaged: it is compiled anew, which takes about half a minute")
-        return content
+            return None
+        saved, content = pickle.loads(data[SIZE:])
+        return content if saved == repr(key) else None
 
     def save(self, key, content):
         """Save a version of the kernel; where the folder cannot be written, it is compiled at each start."""
         path = self.path(key)
         part = path.with_name(f"{path.name}.{uuid.uuid4().hex[:8]}.part")
+        body = dumps((repr(key), content))
         try:
             self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-            part.write_bytes(sealed(key, content))
+            part.write_bytes(DIGEST(body).digest() + body)
             os.replace(part, path)
         except OSError as error:
             part.unlink(missing_ok=True)
             tell(f"compiled code cannot be kept in {self.folder}: {error.strerror}")
-
-    def flush(self):
-        """Remove all versions of the kernel."""
-        for path in self.folder.glob(f"{self.name}.*{SUFFIX}"):
-            path.unlink(missing_ok=True)
 
 
 class CheckedCache(FunctionCache):

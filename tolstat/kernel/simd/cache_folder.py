@@ -21,24 +21,23 @@ TABLES = ("fields.py", "load_kinds.py", "parameters.py", "tables.py")
 """Files of ``common/`` that the layout of the tables follows from."""
 PREFIX, SUFFIX = "kernel-", ".nbc"
 """How names of folders begin, and how those of files with compiled code end."""
-_told = set()
 
 
 @cache
 def source_hash() -> str:
-    """Hash of everything that compiled kernels depend on: the kernel's sources, the tables' layout, Numba's version."""
-    digest = hashlib.sha256(metadata.version("numba").encode())  # importing numba takes longer than all else here
+    """Hash of what compiled kernels depend on: their sources, the tables' layout, versions of Python and Numba."""
+    versions = sys.version + metadata.version("numba") + metadata.version("llvmlite")  # numba is slow to import
+    digest = hashlib.sha256(versions.encode())
     for path in [*sorted(KERNEL.rglob("*.py")), *(KERNEL.parent / "common" / name for name in TABLES)]:
         digest.update(path.relative_to(KERNEL.parent).as_posix().encode())
         digest.update(path.read_bytes())
     return digest.hexdigest()[:16]
 
 
+@cache
 def tell(text: str) -> None:
-    """Say something of the cache on stderr, once in a process."""
-    if text not in _told:
-        _told.add(text)
-        print(f"tolstat: {text}", file=sys.stderr, flush=True)
+    """Write a message about the cache to stderr, once in a process."""
+    print(f"tolstat: {text}", file=sys.stderr, flush=True)
 
 
 def is_trusted(path: Path) -> bool:
@@ -46,10 +45,10 @@ def is_trusted(path: Path) -> bool:
     if not hasattr(os, "getuid"):
         return path.is_dir()
     try:
-        found = os.lstat(path)
+        owner = os.lstat(path)
     except OSError:
         return False
-    return stat.S_ISDIR(found.st_mode) and found.st_uid in (os.getuid(), 0) and not found.st_mode & 0o022
+    return stat.S_ISDIR(owner.st_mode) and owner.st_uid in (os.getuid(), 0) and not owner.st_mode & 0o022
 
 
 def root() -> Path:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -11,19 +10,10 @@ import numba
 from numba.core import config
 from numba.core.caching import UserProvidedCacheLocator
 
+import tolstat.kernel.simd.without_blas  # noqa: F401
+from tolstat.kernel.simd.cache import CheckedCache
 from tolstat.kernel.simd.cache_folder import CACHE_DIRECTORY, KERNEL
-
-try:
-    from tolstat.kernel.simd.unit import Kernel
-except ImportError:  # Numba's internals differ: compile each function separately, which takes minutes
-    from numba.core.registry import CPUDispatcher as Kernel
-try:
-    from tolstat.kernel.simd.cache import CheckedCache
-except ImportError:  # likewise: Numba's own cache, without checksums
-    from numba.core.caching import FunctionCache as CheckedCache
-
-with suppress(ImportError):  # likewise: slower to start
-    import tolstat.kernel.simd.without_blas  # noqa: F401
+from tolstat.kernel.simd.unit import Kernel
 
 OPTIONS = {"nopython": True, "boundscheck": None, "error_model": "numpy", "fastmath": False, "no_cfunc_wrapper": True}
 """No ``fastmath``: it removes the checks for NaN. No ``parallel``: the work is divided among processes."""

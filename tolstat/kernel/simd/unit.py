@@ -4,8 +4,8 @@ Numba optimises and emits each function separately, with a copy of all its calle
 calls. Here a kernel that is called by kernels stays intermediate code. The kernel that Python calls links each of its
 direct and indirect callees once, and is optimised, emitted and cached together with them.
 
-This is the one module that depends on Numba's internals. If names in them change, its import fails and `jit` compiles
-as Numba does; if their meaning changes, ``tests/kernel/test_compilation.py`` fails.
+This module depends on internals of the Numba that ``pyproject.toml`` names; ``tests/kernel/test_compilation.py`` fails
+where they change.
 """
 
 from llvmlite.binding import Linkage
@@ -16,10 +16,6 @@ from numba.core.registry import CPUDispatcher
 from numba.core.typed_passes import AnnotateTypes, NativeLowering, NopythonRewrites
 from numba.core.types import Dispatcher, unliteral
 from numba.core.untyped_passes import InlineClosureLikes
-
-NEEDED = ("_get_module_for_linking", "_optimize_final_module", "_finalize_final_module", "_raise_if_finalized")
-if not all(hasattr(JITCodeLibrary, name) for name in NEEDED):
-    raise ImportError("Numba's code libraries are not those that units are written for")
 
 
 class Unit(JITCodeLibrary):

@@ -14,8 +14,8 @@ import numpy as np
 
 from tolstat import study
 from tolstat.campaign.work import Work
-from tolstat.common.aside import mapped
 from tolstat.common.errors import Fault, InputError, NotApplicable, TolstatError
+from tolstat.common.forked import mapped
 from tolstat.common.loads import unit_text
 from tolstat.common.tables import VALID
 from tolstat.display import drawing, style

@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.analysis import cycles, prediction
-from tolstat.analysis.cycles import Cycles, FloatArray
+from tolstat.analysis.cycles import Cycles
 from tolstat.analysis.prediction import DELIVERY
 from tolstat.analysis.sample import Sample
 from tolstat.common.channels import BUSHING_LOADS, CHANNELS, LoadHistory, channels_of, histories_of
 from tolstat.common.errors import Fault, InputError, StoreError
 from tolstat.common.load_kinds import PLACES
-from tolstat.common.loads import PANELS
+from tolstat.common.loads import PANELS, FloatArray
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import SIMULATED, Status
 from tolstat.display.table import Row, Rows

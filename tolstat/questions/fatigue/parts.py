@@ -10,13 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.analysis import prediction, strength
-from tolstat.analysis.cycles import Cycles, FloatArray, duty_cycle
+from tolstat.analysis.cycles import Cycles, duty_cycle
 from tolstat.analysis.prediction import DELIVERY
 from tolstat.analysis.sample import Sample
 from tolstat.analysis.strength import Collective, Failures, Line
 from tolstat.common.bisection import first
 from tolstat.common.channels import BUSHING_LOADS
 from tolstat.common.errors import Fault, InputError
+from tolstat.common.loads import FloatArray
 from tolstat.common.tables import FAILED, Status
 from tolstat.display.table import Rows
 from tolstat.questions.fatigue import duty

@@ -15,7 +15,7 @@ from tolstat.common.files import data_dir
 from tolstat.common.loads import UNIT_OF_LOAD
 from tolstat.common.units import EXAMPLES
 from tolstat.joint import Joint, Operation
-from tolstat.joint.assumed import Assumed
+from tolstat.joint.model import Assumed
 from tolstat.joint.reading import DEFAULT_JOINT
 from tolstat.study.axes import is_zone, vectors_of
 from tolstat.study.fatigue import LineEntry, Settings

@@ -11,8 +11,8 @@ import time
 import pytest
 
 from tests.support.environment import environment
-from tolstat.common import aside
-from tolstat.common.aside import CAN_FORK, Aside, mapped
+from tolstat.common import forked
+from tolstat.common.forked import CAN_FORK, Forked, mapped
 
 
 @pytest.mark.parametrize("processes", [1, 2, 3, 9])
@@ -22,8 +22,8 @@ def test_results_come_in_the_order_of_the_functions(processes: int) -> None:
 
 
 def test_a_function_is_evaluated_in_another_process() -> None:
-    assert (Aside(os.getpid).result() != os.getpid()) == CAN_FORK
-    assert Aside(os.getpid, forks=False).result() == os.getpid()
+    assert (Forked(os.getpid).result() != os.getpid()) == CAN_FORK
+    assert Forked(os.getpid, forks=False).result() == os.getpid()
 
 
 def test_what_was_killed_is_evaluated_here() -> None:
@@ -34,12 +34,12 @@ def test_what_was_killed_is_evaluated_here() -> None:
             os.kill(os.getpid(), signal.SIGKILL)
         return 7
 
-    other = Aside(killed)
+    other = Forked(killed)
     assert other.result() == other.result() == 7
 
 
 def test_what_hangs_is_evaluated_here(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(aside, "STILL_S", 0.1)
+    monkeypatch.setattr(forked, "STILL_S", 0.1)
     parent = os.getpid()
 
     def hangs() -> int:
@@ -47,11 +47,11 @@ def test_what_hangs_is_evaluated_here(monkeypatch: pytest.MonkeyPatch) -> None:
             time.sleep(1000)
         return 7
 
-    assert Aside(hangs).result() == 7
+    assert Forked(hangs).result() == 7
 
 
 def test_what_fails_raises_where_the_result_is_asked_for() -> None:
-    other = Aside(lambda: 1 / 0)
+    other = Forked(lambda: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         other.result()
 
@@ -71,8 +71,8 @@ def test_no_process_outlives_one_that_is_killed() -> None:
 
 KILLED = """
 import os, signal
-from tolstat.common.aside import Aside
-others = [Aside(lambda: bytes(10**6)) for _ in range(2)]
+from tolstat.common.forked import Forked
+others = [Forked(lambda: bytes(10**6)) for _ in range(2)]
 assert all(other._end.poll(60) for other in others)
 os.kill(os.getpid(), signal.SIGKILL)
 """

@@ -23,7 +23,7 @@ STILL_S = 60.0
 """Time without any processor time after which a process is killed, s: a fork may wait for what a thread had locked."""
 
 
-class Aside(Generic[T]):
+class Forked(Generic[T]):
     """A function that is being evaluated in a forked process.
 
     Parameters
@@ -36,7 +36,7 @@ class Aside(Generic[T]):
 
     def __init__(self, function: Callable[[], T], forks: bool = True) -> None:
         self._function = function
-        self._found: list[T] = []
+        self._results: list[T] = []
         self._process = None
         if forks and CAN_FORK:
             context = multiprocessing.get_context("fork")
@@ -47,20 +47,20 @@ class Aside(Generic[T]):
 
     def result(self) -> T:
         """Result of the function; where its process failed, hung or was killed, it is evaluated here, and may raise."""
-        if not self._found and self._process is not None:
+        if not self._results and self._process is not None:
             used = -1.0
             while not self._end.poll(STILL_S):
                 before, (used, _) = used, processor_time(self._process.pid or 0)
                 if used == before:
                     self._process.kill()
             with suppress(EOFError, OSError):  # the process has ended without its result
-                self._found.append(self._end.recv())
+                self._results.append(self._end.recv())
             self._end.close()
             self._process.join()
             self._process = None
-        if not self._found:
-            self._found.append(self._function())
-        return self._found[0]
+        if not self._results:
+            self._results.append(self._function())
+        return self._results[0]
 
 
 def _send(function: Callable[[], object], end: Connection, parents: Connection) -> None:
@@ -76,20 +76,20 @@ def mapped(functions: Sequence[Callable[[], T]], processes: int) -> list[T]:
     return in_order(begun(functions, processes, here=1))
 
 
-def begun(functions: Sequence[Callable[[], T]], processes: int, here: int) -> list[Aside[list[T]]]:
+def begun(functions: Sequence[Callable[[], T]], processes: int, here: int) -> list[Forked[list[T]]]:
     """Begin to evaluate functions in so many processes: every other one in the same, if these are two.
 
     What is left to the first `here` of them is evaluated in this process when the results are asked for.
     """
     number = min(processes, len(functions))
-    return [Aside(partial(_all, functions[first::number]), first >= here) for first in range(number)]
+    return [Forked(partial(_evaluated, functions[first::number]), first >= here) for first in range(number)]
 
 
-def in_order(parts: Sequence[Aside[list[T]]]) -> list[T]:
+def in_order(parts: Sequence[Forked[list[T]]]) -> list[T]:
     """Results of the functions that `begun` divides among processes."""
-    found = [part.result() for part in parts]
-    return [found[i % len(found)][i // len(found)] for i in range(sum(map(len, found)))]
+    results = [part.result() for part in parts]
+    return [results[i % len(results)][i // len(results)] for i in range(sum(map(len, results)))]
 
 
-def _all(functions: Sequence[Callable[[], T]]) -> list[T]:
-    return [one() for one in functions]
+def _evaluated(functions: Sequence[Callable[[], T]]) -> list[T]:
+    return [function() for function in functions]

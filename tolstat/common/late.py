@@ -1,0 +1,24 @@
+"""Modules of SciPy, each imported when it is first used: `scipy.special` takes longer to import than tolstat."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+
+class Late:
+    """A module that is imported when one of its attributes is read."""
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+
+    def __getattr__(self, attribute: str) -> Any:
+        return getattr(import_module(self._name), attribute)
+
+
+if TYPE_CHECKING:
+    from scipy import optimize as optimize
+    from scipy import special as special
+    from scipy import stats as stats
+else:
+    optimize, special, stats = (Late(f"scipy.{name}") for name in ("optimize", "special", "stats"))

@@ -18,7 +18,7 @@ from tolstat.campaign.work import Work
 from tolstat.cli import app
 from tolstat.common.errors import InputError, NotApplicable, StoreError
 from tolstat.common.tables import RESULT, Simulation, Status
-from tolstat.display.asked import Asked
+from tolstat.display.answer import Asked
 from tolstat.joint import perturb
 from tolstat.questions.assumptions import run, sentences, variations, words
 from tolstat.questions.assumptions.answer import assumptions_on_page

@@ -30,8 +30,7 @@ from tolstat.common.errors import InputError, NotApplicable, StoreError
 from tolstat.common.loads import LOADS
 from tolstat.common.tables import RESULT, Simulation, Status
 from tolstat.display import text
-from tolstat.display.answer import Sentence
-from tolstat.display.asked import Asked
+from tolstat.display.answer import Asked, Sentence
 from tolstat.display.progress import Display
 from tolstat.joint import perturb
 from tolstat.questions.causes import lines as question

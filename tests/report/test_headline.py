@@ -15,7 +15,7 @@ from tolstat.analysis.binomial import clopper_pearson, needed
 from tolstat.analysis.sample import Sample
 from tolstat.cli import app
 from tolstat.common.tables import RESULT, Simulation, Status
-from tolstat.display.asked import Asked
+from tolstat.display.answer import Asked
 from tolstat.questions.exceedance import rows as exceedance
 from tolstat.questions.exceedance.verdicts import WORDS, ends, verdict
 from tolstat.report import headline, page, summary

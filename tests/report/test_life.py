@@ -11,7 +11,7 @@ from tests.cli.test_cli import call
 from tests.questions.test_bearing_life import STUDY
 from tests.support import synthetic, views
 from tolstat.display import text
-from tolstat.display.asked import Asked
+from tolstat.display.answer import Asked
 from tolstat.display.blocks import Decision
 from tolstat.questions.bearing_life import answer as bearing_life
 from tolstat.report import verdict

@@ -17,7 +17,7 @@ from tests.support import exceedance, synthetic
 from tolstat.cli import app
 from tolstat.common.errors import StoreError
 from tolstat.common.tables import Status
-from tolstat.display.asked import Asked
+from tolstat.display.answer import Asked
 from tolstat.display.blocks import Section
 from tolstat.display.html import bound, grouped
 from tolstat.questions import accuracy, joints

@@ -22,9 +22,9 @@ from tolstat.common.late import special
 from tolstat.common.loads import ANY_LIMIT
 from tolstat.common.tables import VALID
 from tolstat.display import drawing, style, text
-from tolstat.display.answer import Answer, Axes, Column, Panel, Panels, Row, Rows, Sentence, Table, has, has_unresolved
-from tolstat.display.asked import Asked
+from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Row, Rows, Sentence, Table
 from tolstat.display.options import Accepted, Opt
+from tolstat.display.table import has, has_unresolved
 from tolstat.questions import shares
 from tolstat.store import error_budget
 from tolstat.store.view import View

@@ -16,10 +16,8 @@ from tolstat.common.strict import read_section
 from tolstat.common.tables import ERROR_FIELDS, FAILED, SIMULATED, UNSETTLED, Status
 from tolstat.common.units import DISPLAY_UNITS
 from tolstat.display import drawing, style, text
-from tolstat.display.answer import Answer, Axes, Part, Row, Sheet, Table
-from tolstat.display.blocks import Panel, Panels
+from tolstat.display.answer import Answer, Axes, Panel, Panels, Part, Row, Sheet, Table, plain
 from tolstat.display.mpl import lines, ticker
-from tolstat.display.table import plain
 from tolstat.questions.shares import inapplicable, rows_of
 from tolstat.store import recorded
 from tolstat.store.view import View

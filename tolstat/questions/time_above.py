@@ -20,8 +20,7 @@ from tolstat.common.loads import FloatArray
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import Status
 from tolstat.display import drawing, text
-from tolstat.display.answer import Answer, Axes, Column, Part, Row, Rows, Sentence, Table
-from tolstat.display.blocks import Panel, Panels
+from tolstat.display.answer import Answer, Axes, Column, Panel, Panels, Part, Row, Rows, Sentence, Table
 from tolstat.display.options import Loads, Opt
 from tolstat.questions.shares import NO_INTERVALS, Cell, unusable
 from tolstat.store import revolutions

@@ -12,7 +12,7 @@ import numpy as np
 from tolstat import questions
 from tolstat.common.errors import Fault, NotApplicable, StoreError
 from tolstat.common.tables import SCHEMA_VERSION
-from tolstat.display.asked import Asked
+from tolstat.display.answer import Asked
 from tolstat.display.blocks import Facts, Listing, Page, Panels, Section, Text
 from tolstat.display.progress import silent
 from tolstat.display.text import sentence

@@ -10,7 +10,7 @@ from tolstat.common.draw_records import METHODS
 from tolstat.common.loads import load_of
 from tolstat.common.tables import VALID
 from tolstat.display import text
-from tolstat.display.asked import Asked
+from tolstat.display.answer import Asked
 from tolstat.display.blocks import Card, Decision, Section, Table, Text
 from tolstat.display.table import Column, as_block, has
 from tolstat.display.verdict import Verdict

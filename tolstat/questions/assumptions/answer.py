@@ -11,11 +11,8 @@ import numpy as np
 
 from tolstat.common.errors import Fault, NotApplicable
 from tolstat.display import text
-from tolstat.display.answer import Answer, Part, Sentence, Table
-from tolstat.display.asked import Asked
-from tolstat.display.blocks import Panels
+from tolstat.display.answer import Answer, Asked, Column, Panels, Part, Row, Sentence, Table
 from tolstat.display.options import Accepted
-from tolstat.display.table import Column, Row
 from tolstat.questions.assumptions import figure, sentences
 from tolstat.questions.assumptions.run import simulate as simulate
 from tolstat.questions.assumptions.variations import Standing, applicable, evaluate

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -14,18 +14,13 @@ from tolstat.analysis.rating_life import A1, FRETTING
 from tolstat.common.errors import NotApplicable
 from tolstat.common.tables import VALID
 from tolstat.display import style, text
-from tolstat.display.answer import Answer, Part, Sentence, Table
-from tolstat.display.asked import Asked
-from tolstat.display.blocks import Panel, Panels
+from tolstat.display.answer import Answer, Asked, Axes, Panel, Panels, Part, Sentence, Table
 from tolstat.display.mpl import ticker
 from tolstat.display.table import Column, Row, Rows, by_share, has, has_unresolved, of_shares
 from tolstat.display.verdict import Verdict, on_share
 from tolstat.questions.bearing_life import lives as rating
 from tolstat.questions.bearing_life.lives import JOINT, SHARES, Lives
 from tolstat.store.view import View
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 FEW = "needs more joints"
 PLACE_NAMES = {JOINT: "all four", rating.ANY: "at least one"}

@@ -18,10 +18,7 @@ from tolstat.common.loads import load_of
 from tolstat.common.strict import read_toml, validate
 from tolstat.common.tables import SIMULATED
 from tolstat.display import drawing, text
-from tolstat.display.answer import Answer, Part, Sentence
-from tolstat.display.asked import Asked
-from tolstat.display.blocks import Panel, Panels
-from tolstat.display.table import Rows
+from tolstat.display.answer import Answer, Asked, Panel, Panels, Part, Rows, Sentence
 from tolstat.joint import Joint, Operation
 from tolstat.questions.drawings import views
 from tolstat.store import ResultFile

@@ -10,9 +10,7 @@ from typing import Any
 from tolstat.common.errors import Fault, NotApplicable
 from tolstat.common.tables import VALID, Status
 from tolstat.display import text
-from tolstat.display.answer import Answer, Part, Sentence, Table
-from tolstat.display.asked import Asked
-from tolstat.display.blocks import Panels, Text
+from tolstat.display.answer import Answer, Asked, Panels, Part, Sentence, Table, Text
 from tolstat.display.options import Accepted
 from tolstat.display.table import Column, Row, Rows, has, has_unresolved
 from tolstat.joint.arms import one_force

@@ -19,9 +19,8 @@ from tolstat.common.late import special
 from tolstat.common.loads import LOADS, Limit
 from tolstat.common.tables import VALID
 from tolstat.display import text
-from tolstat.display.answer import Answer, Part, Sentence, Table
+from tolstat.display.answer import Answer, Column, Part, Row, Rows, Sentence, Table
 from tolstat.display.options import Delivery
-from tolstat.display.table import Column, Row, Rows
 from tolstat.questions.rare.simulation import Subsets, plan_of, simulate
 from tolstat.store import error_budget, verification
 from tolstat.store.reader import Reader

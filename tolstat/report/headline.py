@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from tolstat.analysis import binomial
+from tolstat.common.errors import TolstatError
 from tolstat.common.loads import ANY_LIMIT
 from tolstat.common.tables import FAILED, STATUS_TEXT, UNSETTLED, VALID
 from tolstat.display import text
 from tolstat.display.table import Row
+from tolstat.display.verdict import Verdict
 from tolstat.questions import joints, shares
 from tolstat.questions.assumptions import sentences
 from tolstat.questions.assumptions.variations import Standing, applicable
+from tolstat.questions.bearing_life import answer as bearing_life
 from tolstat.questions.exceedance import rows as exceedance
-from tolstat.questions.exceedance.verdicts import WORDS, ends, share_of, unresolved_matter, verdict
+from tolstat.questions.exceedance.rows import WORDS, ends, share_of, unresolved_matter, verdict
+from tolstat.questions.fatigue import answer as fatigue
 from tolstat.store import known_parts
 from tolstat.store.points import point_of
 from tolstat.store.view import View
@@ -299,3 +305,34 @@ def _causes(view: View) -> Iterator[str]:
 def _pending(view: View) -> tuple[str, ...]:
     pending = view.counts.total - view.counts.done
     return (f"{pending} of {view.counts.total} joints are still pending",) if pending else ()
+
+
+SAMPLES = 1000
+"""Maximum number of joints that are simulated again for the stresses of their parts."""
+
+
+def life_verdicts(view: View, accepted: float = math.nan, samples: int | None = None) -> list[Verdict]:
+    """Verdicts on the lives that the study of a campaign requires; none of joints that are no sample of a production.
+
+    Parameters
+    ----------
+    view : View
+        The campaign; it may be unfinished.
+    accepted : float
+        Accepted share: share of the joints that may have a shorter life; NaN if none is given.
+    samples : int, optional
+        Number of joints that may be simulated again; by default `SAMPLES`, and none while joints are pending.
+    """
+    if not (view.sampled and view.count(*VALID)):
+        return []
+    if samples is None:
+        samples = SAMPLES if view.counts.done == view.counts.total else 0
+    found: list[Verdict] = []
+    of_parts = partial(fatigue.life_verdicts, samples=samples)
+    for about, verdicts in (("bearing life", bearing_life.life_verdicts), ("failures of parts", of_parts)):
+        try:
+            found += verdicts(view, accepted)
+        except TolstatError as error:
+            reason = str(error).splitlines()[0].replace(str(view.path), view.path.name)
+            found.append(Verdict(about, "none", f"{about}: {reason}"))
+    return found

@@ -115,7 +115,7 @@ class _Run:
         if faults:
             raise InputError(faults)
         self._number += len(changes)
-        if (first := variations.own_joints(self._view)) < self._n:
+        if (first := sets.own_joints(self._view)) < self._n:
             changes.insert(0, sets.as_drawn(study, range(first, self._n)))
         held, names = what_if.read(self._store), self._asked.names(study)
         lacking = sum(len(sets.missing(held, change, names)) for change in changes)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,8 +11,7 @@ import numpy as np
 from tolstat.analysis import binomial
 from tolstat.display import text
 from tolstat.display.table import Row
-from tolstat.questions.assumptions import words
-from tolstat.questions.assumptions.variations import ALL, Standing, widths
+from tolstat.questions.assumptions.variations import ALL, AXIAL, SHAFT, Standing, widths
 from tolstat.store.view import View
 from tolstat.study.widths import COARSER, HALF
 
@@ -32,13 +32,13 @@ def turned(found: Standing) -> tuple[str, str]:
     rows = found.turning
     if not rows:
         return "", ""
-    ways = [f"{words.condition(row['label'])} ({text.percent(row['share'])})" for row in rows]
+    ways = [f"{_condition(row['label'])} ({text.percent(row['share'])})" for row in rows]
     shown = " or ".join(ways[:_NAMED]) + (f", and in {len(ways) - _NAMED} more" if len(ways) > _NAMED else "")
     side, other = KEPT[found.side], KEPT[rows[0]["side"]]
     names = [row for row in rows if row["name"] != ALL] or found.moving
-    about = {row["name"]: words.AXIAL in row["keys"] for row in names if row["name"] != ALL}
+    about = {row["name"]: AXIAL in row["keys"] for row in names if row["name"] != ALL}
     first = dict(list(about.items())[:_NAMED])
-    remedy = f"more joints do not decide it; find out {words.to_find_out(first)}"
+    remedy = f"more joints do not decide it; find out {_to_find_out(first)}"
     return f"{side} as drawn ({text.percent(found.drawn[0])})", f"{other} {shown}: {remedy}"
 
 
@@ -104,7 +104,7 @@ def not_varied(found: Standing, file: str) -> str:
     """Words on assumptions that the file has no joints of, with the command that simulates them."""
     if not found.missing:
         return ""
-    return f"{words.listed(found.missing[:_NAMED])} not varied: tolstat assumptions {file} --run"
+    return f"{_listed(found.missing[:_NAMED])} not varied: tolstat assumptions {file} --run"
 
 
 def still(found: Standing) -> str:
@@ -128,7 +128,7 @@ def shop(view: View) -> str:
             by_cpk[float(cpk)] = by_cpk.get(float(cpk), 0) + 1
     if not by_cpk:
         return ""
-    held = words.listed([f"Cpk {cpk:g} in {n} tolerance{'s' if n > 1 else ''}" for cpk, n in by_cpk.items()])
+    held = _listed([f"Cpk {cpk:g} in {n} tolerance{'s' if n > 1 else ''}" for cpk, n in by_cpk.items()])
     head = f"What the shop must hold: {held}."
     shares = widths(view)
     if not shares:
@@ -171,3 +171,25 @@ def _most(word: str, rows: list[Row]) -> str:
     """``open in 2: H 3 (9.1 %), law sliced (8 %)``."""
     shown = ", ".join(f"{row['label']} ({text.percent(row['share'])})" for row in rows[:_NAMED])
     return f"{word} in {len(rows)}: {shown}{', ...' if len(rows) > _NAMED else ''}"
+
+
+def _condition(label: str) -> str:
+    """Under which condition the share is that of a variation: ``if the shaft slides``, ``with law sliced``."""
+    return dict(SHAFT.values()).get(label) or f"with {label.replace('all at', 'all assumptions at')}"
+
+
+def _to_find_out(names: Mapping[str, bool]) -> str:
+    """What has to be found out: names of assumptions, and whether each is about what holds the shaft."""
+    return _listed([_noun(name, is_mounting) for name, is_mounting in names.items()])
+
+
+def _listed(items: Sequence[str]) -> str:
+    """``a, b and c``."""
+    *most, last = items
+    return f"{', '.join(most)} and {last}" if most else last
+
+
+def _noun(name: str, is_mounting: bool) -> str:
+    if is_mounting:
+        return "how the shaft is held"
+    return f"the {name}" if name[:1].islower() else name

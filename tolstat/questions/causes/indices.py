@@ -12,6 +12,7 @@ from tolstat import sampling
 from tolstat.analysis import pick_freeze, ranks, sensitivity
 from tolstat.analysis.design import Claim
 from tolstat.analysis.sample import Sample
+from tolstat.campaign.what_if import tail_level
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import ANY_LIMIT, FloatArray
 from tolstat.display import text
@@ -19,8 +20,6 @@ from tolstat.display.table import Column, Row, Rows, has
 from tolstat.store.hdf5 import store_error
 from tolstat.store.view import View
 
-TAIL_STARTS_AT = 0.9
-"""Share of the joints below the tail, for a load without a limit."""
 MIN_JOINTS = 200
 """Minimum number of valid joints."""
 MAX_JOINTS = sensitivity.MOST
@@ -123,7 +122,7 @@ def indices(
     names, parts, variance = estimate(view, load, logarithm, confidence)
     first: Any = parts["first"]
     ranks: Any = parts.get("srrc")
-    valid, level = load.valid, _tail_level(load)
+    valid, level = load.valid, tail_level(load)
     facts = {"load": load.name, "unit": load.unit, "logarithm": logarithm, "joints": valid.size}
     facts |= {"used": min(valid.size, MAX_JOINTS) if ranks else valid.size, "without_load": sum(load.unresolved)}
     facts |= {"level": level, "above": int((valid > level).sum()), "std": math.sqrt(variance)}
@@ -179,7 +178,7 @@ def _of_samples(view: View, load: Sample, logarithm: bool, confidence: float) ->
         first = sensitivity.first_order(x, response, confidence, independent)
     else:
         first, parts["total"] = sensitivity.first_and_total(x, response, confidence, independent)
-    above = values > _tail_level(load)
+    above = values > tail_level(load)
     if ranks.FEWEST <= above.sum() <= above.size - ranks.FEWEST:
         chosen = np.sort(np.concatenate([np.flatnonzero(side)[:MAX_JOINTS] for side in (above, ~above)]))
         scores = sampling.normal_scores(study, view.errors(samples[chosen], columns))
@@ -208,7 +207,3 @@ def _logarithm(name: str, values: FloatArray) -> FloatArray:
         remedy = "decompose the variance of the load itself, not of its logarithm"
         raise InputError([Fault(name, "is not positive in all joints", remedy)])
     return np.asarray(np.log(values))
-
-
-def _tail_level(load: Sample) -> float:
-    return load.quantile(TAIL_STARTS_AT).estimate if load.limit is None else load.limit

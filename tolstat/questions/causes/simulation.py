@@ -125,7 +125,7 @@ class _Looks:
         self._held, self._asked = what_if.read(store), Asked(view.kept_loads, points_of(view, load))
         options = sets.options_of(view.study, store)
         self._seconds = sets.seconds_per_joint(view.study, options, PILOT, self._asked.points) / self._workers
-        self._own = shares.own_joints(view)
+        self._own = sets.own_joints(view)
         self._looks, self._simulated, self._cut = 0, 0, False
 
     @property

@@ -16,7 +16,7 @@ from tolstat.display.table import Column, Row, Rows, has, has_unresolved
 from tolstat.joint.arms import one_force
 from tolstat.questions.exceedance import rows as of
 from tolstat.questions.exceedance.curves import forest_panel, leading_panel, reader
-from tolstat.questions.exceedance.verdicts import WORDS, verdict
+from tolstat.questions.exceedance.rows import WORDS, verdict
 from tolstat.store import known_parts
 from tolstat.store.recorded import joint_of
 from tolstat.store.view import View

@@ -16,8 +16,7 @@ from tolstat.display import drawing, style, text
 from tolstat.display.blocks import Panel, Reader
 from tolstat.display.mpl import lines, ticker
 from tolstat.display.table import Rows
-from tolstat.questions.exceedance.rows import curve, limit_rows, most_exceeded, readings
-from tolstat.questions.exceedance.verdicts import ends
+from tolstat.questions.exceedance.rows import curve, ends, limit_rows, most_exceeded, readings
 from tolstat.store.view import View
 
 if TYPE_CHECKING:

@@ -20,7 +20,8 @@ from tolstat.common.errors import InputError, NotApplicable, StoreError
 from tolstat.common.tables import RESULT, Simulation, Status
 from tolstat.display.answer import Asked
 from tolstat.joint import perturb
-from tolstat.questions.assumptions import run, sentences, variations
+from tolstat.questions.assumptions import answer as run
+from tolstat.questions.assumptions import sentences, variations
 from tolstat.questions.assumptions.answer import assumptions_on_page
 from tolstat.questions.assumptions.variations import ALL, BETTER, evaluate
 from tolstat.report import headline

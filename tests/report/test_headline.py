@@ -16,8 +16,9 @@ from tolstat.analysis.sample import Sample
 from tolstat.cli import app
 from tolstat.common.tables import RESULT, Simulation, Status
 from tolstat.display.answer import Asked
+from tolstat.display.verdict import WORDS
 from tolstat.questions.exceedance import rows as exceedance
-from tolstat.questions.exceedance.rows import WORDS, ends, verdict
+from tolstat.questions.exceedance.rows import ends, verdict
 from tolstat.report import headline, page
 from tolstat.report.answer import statistics
 from tolstat.store import ResultFile, Writer

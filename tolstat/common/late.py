@@ -1,4 +1,4 @@
-"""Modules of SciPy, each imported when it is first used: `scipy.special` takes longer to import than tolstat."""
+"""Modules of other packages, imported when first used: `scipy.special` takes longer to import than tolstat."""
 
 from __future__ import annotations
 
@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 
 class Late:
-    """A module that is imported when one of its attributes is read."""
+    """A module that is imported when one of its attributes, or modules, is read."""
 
     def __init__(self, name: str) -> None:
         self._name = name
 
     def __getattr__(self, attribute: str) -> Any:
-        return getattr(import_module(self._name), attribute)
+        module = import_module(self._name)
+        return getattr(module, attribute) if hasattr(module, attribute) else import_module(f"{self._name}.{attribute}")
 
 
 if TYPE_CHECKING:

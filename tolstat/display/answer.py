@@ -15,16 +15,16 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from tolstat.common.errors import TolstatError
 from tolstat.display import drawing, style, text
-from tolstat.display.blocks import Axes, Block, Facts, Listing, Panel, Panels, Reader, Text
+from tolstat.display.blocks import Artist, Axes, Block, Facts, Figure, Listing, Panel, Panels, Reader, Text
 from tolstat.display.progress import Tell, silent
 from tolstat.display.table import Column, Row, Rows, as_block, by_share, has, has_unresolved, of_shares, plain
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
 
-__all__ = ["Answer", "Asked", "Axes", "Column", "Document", "Listing", "Panel", "Panels", "Part", "Reader", "Row"]
-__all__ += ["Rows", "Sentence", "Sheet", "Table", "Text", "by_share", "has", "has_unresolved", "of_shares", "plain"]
+__all__ = ["Answer", "Artist", "Asked", "Axes", "Column", "Document", "Figure", "Listing", "Panel", "Panels", "Part"]
+__all__ += ["Reader", "Row", "Rows", "Sentence", "Sheet", "Table", "Text", "by_share", "has"]
+__all__ += ["has_unresolved", "of_shares", "plain"]
 
 Place = Literal["lead", "note", "warning"]
 

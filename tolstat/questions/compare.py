@@ -23,8 +23,8 @@ from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import Status
 from tolstat.display import drawing, style, text
 from tolstat.display.answer import Answer, Axes, Column, Panel, Panels, Row, Rows, Sentence, Table
-from tolstat.display.mpl import patches
 from tolstat.display.options import Loads
+from tolstat.display.style import patches
 from tolstat.questions.shares import NO_INTERVALS, inapplicable, share, word
 from tolstat.store.view import View
 

@@ -15,7 +15,7 @@ from tolstat.common.loads import LOADS, FloatArray, load_of
 from tolstat.common.tables import VALID
 from tolstat.display import drawing, style, text
 from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Part, Row, Rows, Sentence, Table, has
-from tolstat.display.mpl import lines, patches, ticker
+from tolstat.display.style import lines, patches, ticker
 from tolstat.questions.shares import unusable, value, values, word
 from tolstat.store import revolutions
 from tolstat.store.points import point_of

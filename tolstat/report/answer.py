@@ -7,13 +7,14 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from tolstat import questions
+from tolstat.campaign.stop_rule import BIASED
 from tolstat.common.errors import Fault, InputError, StoreError
 from tolstat.common.tables import Status
 from tolstat.display import text
-from tolstat.display.answer import Answer, Part, Sentence, Sheet, Table
+from tolstat.display.answer import Answer, Figure, Part, Sentence, Sheet, Table
 from tolstat.display.progress import silent
 from tolstat.joint.mounting import in_words
 from tolstat.questions import accuracy, shares
@@ -24,12 +25,7 @@ from tolstat.questions.exceedance.rows import curve_rows, not_kept
 from tolstat.questions.sweep import sweep
 from tolstat.report.headline import headline, life_verdicts, tells_yield
 from tolstat.solver import fidelity
-from tolstat.store import Reader, recorded, viewed
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from tolstat.store.view import View
+from tolstat.store import Reader, View, recorded, viewed
 
 
 def report(view: View, accepted: float = math.nan) -> Answer:
@@ -158,22 +154,22 @@ def _notes(view: View) -> Iterator[Part]:
 def _run(view: View) -> Iterator[Part]:
     """Restrictions that come from how the campaign was run."""
     store = view.store
-    stopped = _stopped(store.stop) if store.stop.get("reached") else ""
     missing = "" if store.case_names else not_kept(view)
-    for note in (missing, stopped, fidelity.sentence(store.options, store.fidelity)):
+    for note in (missing, stopped(view), fidelity.sentence(store.options, store.fidelity)):
         if note:
             yield Sentence(note)
 
 
-def _stopped(stop: dict[str, Any]) -> str:
-    """Sentences about a campaign that its stop rule ended."""
-    from tolstat.campaign.stop_rule import BIASED
-
+def stopped(view: View) -> str:
+    """Sentences about a campaign that its stop rule ended; empty if none did."""
+    stop = view.store.stop
+    if not stop.get("reached"):
+        return ""
     confidence = f"{100 * stop['confidence']:.0f} %"
     return (
         f"stopped by {stop['rule']} at {stop['joints']} joints: {confidence} interval {stop['lower']:.5f} to "
         f"{stop['upper']:.5f}, valid after any number of looks; share {stop['estimate']:.5f}, {BIASED}. Shares and "
-        "intervals above are not corrected for the stop."
+        "intervals of this report are not corrected for the stop."
     )
 
 

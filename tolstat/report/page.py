@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -29,17 +29,14 @@ from tolstat.joint.sections import quantities
 from tolstat.questions.assumptions.variations import AXIAL, LAW
 from tolstat.questions.causes import worst
 from tolstat.questions.causes.lines import lines_on_page
+from tolstat.report import verdict
+from tolstat.report.answer import stopped
 from tolstat.solver import fidelity
 from tolstat.store import Reader, recorded, viewed
 from tolstat.store.points import point_of
 from tolstat.store.recorded import joint_of
 from tolstat.store.view import View
 from tolstat.study.assumptions import assumptions, unselected
-
-if TYPE_CHECKING:
-    from tolstat.store.reader import Reader
-    from tolstat.store.view import View
-
 
 REPLAYED = 1000
 """Default number of joints whose load histories are evaluated: some 2 s if they are simulated again."""
@@ -114,8 +111,6 @@ def compose(view: View, asked: Asked, full: bool = False) -> Page:
     What cannot be evaluated is left out, and a note in the first section says why.
     """
     worst.begin_replay(view, asked)
-    from tolstat.report import verdict  # draws, and takes long to import: joints are being simulated
-
     asked.notes.extend(_notes(view))
     if len(view.points) > 1:
         point = point_of(view, view.most_exceeded) if view.leading else view.points[0]
@@ -133,8 +128,6 @@ def compose(view: View, asked: Asked, full: bool = False) -> Page:
 
 def compose_brief(view: View, asked: Asked) -> Page:
     """Compose the page that prints on one sheet: verdict with its drawing, and the line of the drawing to change."""
-    from tolstat.report import verdict
-
     asked.notes.extend(_notes(view))
     sections = [verdict.section(view, asked)]
     with asked.noting("nothing on the lines of the drawing"), suppress(NotApplicable):
@@ -166,18 +159,11 @@ def _notes(view: View) -> Iterator[str]:
     for note in (
         exact(view),
         fidelity.sentence(view.store.options, view.store.fidelity),
-        _stopped(view),
+        stopped(view),
         recorded.note_on_mounting(view.store),
     ):
         if note:
             yield note
-
-
-def _stopped(view: View) -> str:
-    stop = view.store.stop
-    if not stop.get("reached"):
-        return ""
-    return f"stopped by {stop['rule']} at {stop['joints']} joints: intervals here are not corrected for it"
 
 
 def _facts(store: Reader) -> Iterator[tuple[str, str]]:
@@ -212,7 +198,9 @@ def scene(view: View) -> tuple[str, str]:
     axial, laws = recorded.mountings(view.store)
     bearing = "needle bearings" if set(laws) == {NEEDLES} else "plain bearings" if NEEDLES not in laws else "bearings"
     mounting, law = in_words(axial, laws).split("; ")
-    assumed = _assumed(view)
+    assumed: set[str] | None = None  # where the study can no longer be read
+    with suppress(TolstatError):
+        assumed = {key for own in assumptions(view.study) for value in own.values for key in value}
     of_bearing = assumed is not None and any(key.startswith("bearing.") for key in assumed)
     first = f"{at}{_mark(assumed, False)}; {bearing}{_mark(assumed, of_bearing)}."
     second = f"{mounting}{_mark(assumed, AXIAL in (assumed or ()))}; {law}{_mark(assumed, LAW in (assumed or ()))}."
@@ -225,19 +213,6 @@ def exact(view: View) -> str:
         if names := unselected(view.study):
             return f"no tolerance, taken as exact: {', '.join(names)}"
     return ""
-
-
-def _assumed(view: View) -> set[str] | None:
-    """Keys of the joint that are assumed; None where the study can no longer be read."""
-    with suppress(TolstatError):
-        return set(_keys(view))
-    return None
-
-
-def _keys(view: View) -> Iterator[str]:
-    for own in assumptions(view.study):
-        for value in own.values:
-            yield from value
 
 
 def _mark(assumed: set[str] | None, is_assumed: bool) -> str:

@@ -3,29 +3,33 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+import time
+from collections.abc import Iterator, Sequence
 from functools import partial
+from pathlib import Path
 from shlex import quote
-from typing import TYPE_CHECKING, Any
+from typing import Annotated, Any
 
 import numpy as np
 
-from tolstat.common.errors import Fault, NotApplicable
+from tolstat.campaign import what_if as sets
+from tolstat.campaign.pool import kept_workers
+from tolstat.campaign.what_if import Change
+from tolstat.campaign.work import Work
+from tolstat.common.cores import available_cores
+from tolstat.common.errors import Fault, InputError, NotApplicable, StoreError, gather
 from tolstat.display import drawing, style, text
-from tolstat.display.answer import Answer, Asked, Column, Panels, Part, Row, Sentence, Table
-from tolstat.display.blocks import Panel
-from tolstat.display.mpl import markers
-from tolstat.display.options import Accepted
-from tolstat.display.table import Rows
-from tolstat.questions.assumptions import sentences
-from tolstat.questions.assumptions.run import simulate as simulate
+from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Part, Row, Rows, Sentence, Table
+from tolstat.display.options import Accepted, Opt
+from tolstat.display.progress import clock
+from tolstat.display.style import markers
+from tolstat.questions.assumptions import sentences, variations
 from tolstat.questions.assumptions.sentences import KEPT
-from tolstat.questions.assumptions.variations import Standing, applicable, evaluate
+from tolstat.questions.assumptions.variations import Standing, Variation, applicable, evaluate
+from tolstat.solver.compilation import warm_up
+from tolstat.store import Writer, what_if
+from tolstat.store.provenance import versions
 from tolstat.store.view import View
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
 
 TITLE = "What the verdict stands on"
 _UNITS = {f"{name}{end}": "1" for name in ("share", "change") for end in ("", "_lower", "_upper")}
@@ -44,7 +48,7 @@ COLUMNS = (
     Column("change, %", partial(_interval, name="change", form="+.1f")),
     Column(
         "verdict",
-        lambda row: sentences.KEPT.get(row["side"]) or str(row["side"]),
+        lambda row: KEPT.get(row["side"]) or str(row["side"]),
         shown=lambda rows: any(r["side"] for r in rows),
         words=True,
         rank=1,
@@ -189,3 +193,114 @@ def _bars(ax: Axes, found: Standing, rows: Rows, labels: list[str]) -> None:
         words: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 8.0, "backgroundcolor": "white"}
         ax.text(accepted, -0.9, f"accepted {text.percent(accepted)}", **words)
     ax.set_xlabel("share of the joints that exceed a limit")
+
+
+PILOT = 64
+"""Number of joints whose time is measured."""
+
+
+def simulate(path: Path, work: Work, joints: Annotated[int, Opt("N", least=100)] = variations.JOINTS) -> list[Path]:
+    """Simulate the first joints of a campaign with each value of what is assumed, and keep their loads in the file.
+
+    First each value of each assumption that is varied, all else equal, then all assumptions at their better and at
+    their worse values. Of several operating points those that a limit of the study is about. What is done stays in the
+    file, also of a run that is stopped; the same call goes on.
+
+    Parameters
+    ----------
+    path : Path
+        Result file of a campaign whose joints are drawn from tolerances.
+    work : Work
+        Workers, progress and messages.
+    joints : int
+        With --run: number of joints of each variation, 1000 unless given; more than the campaign has are drawn with its
+        seed.
+
+    Returns
+    -------
+    list of Path
+        The file.
+
+    Raises
+    ------
+    InputError
+        With every fault of the values.
+    StoreError
+        When the file cannot be used, was made by other code, or its joint has no assumptions that are varied.
+    """
+    with Writer.open(path) as store, kept_workers():
+        view = View(store)
+        _check(view)
+        run = _Run(store, view, work, joints)
+        singles = variations.singles(view.study)
+        if not singles:
+            remedy = "write [[assumed]] in the study, with name, values and because: tolstat docs study"
+            raise StoreError(str(Fault(str(path), "has a joint of which nothing is assumed that is varied", remedy)))
+        run.simulate(singles)
+        run.simulate(variations.all_together(View(store)))
+        work.tell(run.outcome)
+    return [path]
+
+
+def _check(view: View) -> None:
+    """Refuse a file that the question does not apply to, that has no joints yet, or that the code cannot continue."""
+    variations.check(view)
+    store, place = view.store, str(view.path)
+    if not variations.joints_of(view):
+        remedy = f"run its study: tolstat run {store.study_name}.toml"
+        raise StoreError(str(Fault(place, "has no simulated joint to compare with", remedy)))
+    if any(store.versions.get(name) != value for name, value in versions().items() if name in ("tolstat", "sources")):
+        remedy = "use that version, or run the campaign again: tolstat run STUDY --out OTHER.h5"
+        raise StoreError(str(Fault(place, "was made by another version of the code", remedy)))
+
+
+class _Run:
+    """Simulation of variations, one round after the other.
+
+    Attributes
+    ----------
+    simulated : int
+        Number of joints simulated so far, each at every point.
+    """
+
+    def __init__(self, store: Writer, view: View, work: Work, joints: int) -> None:
+        self._begin, self._seconds = time.monotonic(), 0.0
+        self._store, self._view, self._work = store, view, work
+        self._workers = work.workers or available_cores()
+        self._asked = sets.Asked(view.kept_loads, variations.points_of(view))
+        self._n = joints if joints > variations.JOINTS else min(joints, variations.joints_of(view))
+        self.simulated, self._number = 0, 0
+
+    @property
+    def outcome(self) -> str:
+        """What was simulated, in words."""
+        spent = time.monotonic() - self._begin
+        if not self.simulated:
+            return f"all {self._number} variations are in the file, {self._n} joints of each"
+        return f"simulated {self.simulated} joints in {spent:.0f} s, {self._n} of each of {self._number} variations"
+
+    def simulate(self, wanted: Sequence[Variation]) -> None:
+        """Simulate what the file lacks of some variations."""
+        study, changes, faults = self._view.study, list[Change](), list[Fault]()
+        for own in wanted:
+            with gather(faults):
+                changes.append(sets.with_joint(study, own.keys, range(self._n)))
+        if faults:
+            raise InputError(faults)
+        self._number += len(changes)
+        if (first := sets.own_joints(self._view)) < self._n:
+            changes.insert(0, sets.as_drawn(study, range(first, self._n)))
+        held, names = what_if.read(self._store), self._asked.names(study)
+        lacking = sum(len(sets.missing(held, change, names)) for change in changes)
+        if not lacking:
+            return
+        if not self._seconds:
+            warm_up()
+            options = sets.options_of(study, self._store)
+            self._seconds = sets.seconds_per_joint(study, options, PILOT, self._asked.points) / self._workers
+        cost, where = clock(self._seconds * lacking), ", ".join(self._asked.points)
+        where = f" at {where}" if where else ""
+        self._work.tell(f"{lacking} joints to simulate{where}, about {cost} on {self._workers} processes")
+        self._work.display.stage("variations")
+        sets.simulate(study, self._store, changes, self._asked, self._workers, lambda: False, self._work.display)
+        self.simulated += lacking

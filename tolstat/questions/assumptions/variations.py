@@ -136,7 +136,7 @@ def evaluate(view: View, accepted: float = np.nan) -> Standing:
     Returns
     -------
     Standing
-        Without rows where the file holds no such joints (`run.simulate` adds them).
+        Without rows where the file holds no such joints (`answer.simulate` adds them).
 
     Raises
     ------

@@ -15,7 +15,7 @@ from tolstat.common.errors import NotApplicable
 from tolstat.common.tables import VALID
 from tolstat.display import style, text
 from tolstat.display.answer import Answer, Asked, Axes, Panel, Panels, Part, Sentence, Table
-from tolstat.display.mpl import ticker
+from tolstat.display.style import ticker
 from tolstat.display.table import Column, Row, Rows, by_share, has, has_unresolved, of_shares
 from tolstat.display.verdict import Verdict, on_share
 from tolstat.questions.bearing_life import lives as rating

@@ -20,8 +20,8 @@ from tolstat.common.loads import unit_text
 from tolstat.common.tables import VALID
 from tolstat.display import drawing, style
 from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Part, Row, Rows, Sentence, Table, has
-from tolstat.display.mpl import patches
 from tolstat.display.options import Costs, Load, Opt, Top
+from tolstat.display.style import patches
 from tolstat.display.text import ends
 from tolstat.questions.causes import lines, simulation
 from tolstat.questions.causes.indices import Indices, estimated, indices

@@ -203,16 +203,6 @@ def not_kept(view: View) -> str:
     return f"not kept, see [output] results of the study: {', '.join(names)}" if names else ""
 
 
-WORDS = {
-    "yes": "kept",
-    "searched": "consistent with what was searched",
-    "no": "not kept",
-    "open": "open",
-    "none": "no verdict",
-}
-"""Answers of `verdict` in words."""
-
-
 def verdict(row: Row, accepted: float) -> str:
     """Verdict on a limit, or on all together: whether the interval `ends` lies below or above the accepted share.
 

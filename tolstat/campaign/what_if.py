@@ -22,6 +22,8 @@ from tolstat.common.loads import ANY_LIMIT, LOADS, FloatArray
 from tolstat.common.tables import VALID, Options, Status, worst_status
 from tolstat.joint import perturb
 from tolstat.store import Writer, what_if
+from tolstat.store.hdf5 import store_error
+from tolstat.store.provenance import versions
 from tolstat.store.recorded import settings
 from tolstat.store.view import View
 from tolstat.store.what_if import Altered
@@ -267,6 +269,13 @@ class Joints:
         a = a[: len(b)]
         found = difference.shares(sample_of(a), sample_of(b), [self.level], paired=True, confidence=confidence)
         return float(found.estimate[0]), float(found.outer_lower[0]), float(found.outer_upper[0])
+
+
+def check_code(store: Writer) -> None:
+    """Refuse a file whose joints another version of the code simulated; raises a StoreError."""
+    if any(store.versions.get(name) != versions()[name] for name in ("tolstat", "sources")):
+        remedy = "use that version, or run the campaign again: tolstat run STUDY --out OTHER.h5"
+        raise store_error(store.path, "was made by another version of the code", remedy)
 
 
 def sample_of(values: FloatArray) -> Sample:

@@ -17,7 +17,7 @@ from tolstat.campaign.pool import kept_workers
 from tolstat.campaign.what_if import Change
 from tolstat.campaign.work import Work
 from tolstat.common.cores import available_cores
-from tolstat.common.errors import Fault, InputError, NotApplicable, StoreError, gather
+from tolstat.common.errors import Fault, InputError, NotApplicable, gather
 from tolstat.display import drawing, style, text
 from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Part, Row, Rows, Sentence, Table
 from tolstat.display.options import Accepted, Opt
@@ -26,9 +26,9 @@ from tolstat.display.style import markers
 from tolstat.questions.assumptions import sentences, variations
 from tolstat.questions.assumptions.sentences import KEPT
 from tolstat.questions.assumptions.variations import Standing, Variation, applicable, evaluate
+from tolstat.questions.shares import inapplicable, unusable
 from tolstat.solver.compilation import warm_up
 from tolstat.store import Writer, what_if
-from tolstat.store.provenance import versions
 from tolstat.store.view import View
 
 TITLE = "What the verdict stands on"
@@ -93,7 +93,7 @@ def assumptions(view: View, accepted: Accepted = math.nan) -> Answer:
     found = evaluate(view, accepted)
     if not found.rows:
         remedy = f"simulate them: tolstat assumptions {quote(str(view.path))} --run"
-        raise NotApplicable(str(Fault(str(view.path), "holds no joints with other values of what is assumed", remedy)))
+        raise inapplicable(view, "holds no joints with other values of what is assumed", remedy)
     return Answer("assumptions", TITLE, [*_parts(view, found), *map(Sentence, _notes(found, view))], _facts(found))
 
 
@@ -230,28 +230,25 @@ def simulate(path: Path, work: Work, joints: Annotated[int, Opt("N", least=100)]
     """
     with Writer.open(path) as store, kept_workers():
         view = View(store)
-        _check(view)
+        _check(view, store)
         run = _Run(store, view, work, joints)
         singles = variations.singles(view.study)
         if not singles:
             remedy = "write [[assumed]] in the study, with name, values and because: tolstat docs study"
-            raise StoreError(str(Fault(str(path), "has a joint of which nothing is assumed that is varied", remedy)))
+            raise unusable(view, "has a joint of which nothing is assumed that is varied", remedy)
         run.simulate(singles)
         run.simulate(variations.all_together(View(store)))
         work.tell(run.outcome)
     return [path]
 
 
-def _check(view: View) -> None:
+def _check(view: View, store: Writer) -> None:
     """Refuse a file that the question does not apply to, that has no joints yet, or that the code cannot continue."""
     variations.check(view)
-    store, place = view.store, str(view.path)
     if not variations.joints_of(view):
         remedy = f"run its study: tolstat run {store.study_name}.toml"
-        raise StoreError(str(Fault(place, "has no simulated joint to compare with", remedy)))
-    if any(store.versions.get(name) != value for name, value in versions().items() if name in ("tolstat", "sources")):
-        remedy = "use that version, or run the campaign again: tolstat run STUDY --out OTHER.h5"
-        raise StoreError(str(Fault(place, "was made by another version of the code", remedy)))
+        raise unusable(view, "has no simulated joint to compare with", remedy)
+    sets.check_code(store)
 
 
 class _Run:

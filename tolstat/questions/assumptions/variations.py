@@ -12,9 +12,10 @@ import numpy as np
 from tolstat.analysis.sample import total_interval
 from tolstat.campaign import what_if as sets
 from tolstat.campaign.what_if import Estimate
-from tolstat.common.errors import Fault, InputError, StoreError, TolstatError
+from tolstat.common.errors import InputError, TolstatError
 from tolstat.common.loads import FloatArray, split
 from tolstat.display.table import Row, Rows
+from tolstat.questions.shares import check_sample, unusable, with_ends
 from tolstat.store import error_budget, known_parts
 from tolstat.store import what_if as kept
 from tolstat.store.view import View
@@ -189,21 +190,13 @@ def check(view: View) -> None:
     StoreError
         The hint names what can be used.
     """
-    place = str(view.path)
     if view.store.variants or view.method in ("sweep", "cases"):
         remedy = "give the file of a study with tolerances and one joint"
-        raise StoreError(str(Fault(place, "holds several joints: a share stands on the values of one", remedy)))
-    view.check("difference")
-    view.check_drawn()
-    if view.study.groups:
-        remedy = 'give the file of a study with sampling.method "random", "sobol" or "lhs"'
-        raise StoreError(str(Fault(place, "holds a pick-freeze design, no sample of a production", remedy)))
-    if not view.store.whole:
-        remedy = "merge all slices first: tolstat merge SLICE... --out FILE"
-        raise StoreError(str(Fault(place, "holds a part of the campaign only", remedy)))
+        raise unusable(view, "holds several joints: a share stands on the values of one", remedy)
+    check_sample(view, "difference", whole=True)
     if not view.limits:
         remedy = "write [limits] and run the study again, which simulates nothing anew"
-        raise StoreError(str(Fault(place, "has no limits: nothing stands on what is assumed", remedy)))
+        raise unusable(view, "has no limits: nothing stands on what is assumed", remedy)
 
 
 def joints_of(view: View) -> int:
@@ -326,8 +319,7 @@ def _row(own: Variation, joints: _Joints, loads: FloatArray, confidence: float) 
     share, change = joints.share(loads, confidence), (np.nan,) * 3
     with suppress(ValueError):  # no joint has a load both as drawn and with the other values
         change = joints.difference(joints.base, loads, confidence)
-    for name, estimate in (("share", share), ("change", change)):
-        row |= {f"{name}{end}": value for end, value in zip(("", "_lower", "_upper"), estimate, strict=True)}
+    row |= with_ends("share", share) | with_ends("change", change)
     return row | {"moves": bool(change[1] > 0.0 or change[2] < 0.0)}
 
 

@@ -21,7 +21,8 @@ from tolstat.display import drawing, style
 from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Part, Row, Sentence, Table
 from tolstat.display.options import Load, Opt, Top
 from tolstat.display.text import ends
-from tolstat.questions.causes.indices import check_sample, scattering
+from tolstat.questions.causes.indices import scattering
+from tolstat.questions.shares import check_sample, with_ends
 from tolstat.store import revolutions
 from tolstat.store.hdf5 import store_error
 from tolstat.store.view import View
@@ -280,7 +281,7 @@ def _parts(found: Sequence[AgainstAngle], shown: Container[str]) -> list[Part]:
 
 def _share(indices: FirstOrder, place: int | tuple[int, int]) -> dict[str, float]:
     """One share with the ends of its interval."""
-    return {f"share{end}": float(part[place]) for end, part in zip(("", "_lower", "_upper"), indices[:3], strict=True)}
+    return with_ends("share", (part[place] for part in indices[:3]))
 
 
 def _overall_rows(angle: AgainstAngle) -> list[Row]:

@@ -23,6 +23,7 @@ from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, P
 from tolstat.display.options import Costs, Load, Opt, Top
 from tolstat.display.style import patches
 from tolstat.display.text import ends
+from tolstat.questions import shares
 from tolstat.questions.causes import lines, simulation
 from tolstat.questions.causes.indices import Indices, estimated, indices
 from tolstat.store.view import View
@@ -274,7 +275,7 @@ def _notes(found: Indices, command: str) -> list[str]:
     elif not (found.of_design or _has_narrow_bounds(rows)):
         remedy = f"; {command} gives them" if command else ""
         notes.append(f"no shares in all: given joints bound them too widely{remedy}")
-    return notes if found.has_intervals else [*notes, "no intervals: they hold for independent samples only"]
+    return notes if found.has_intervals else [*notes, shares.NO_INTERVALS]
 
 
 def _tornado(found: Indices) -> Panel:

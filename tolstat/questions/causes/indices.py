@@ -10,13 +10,13 @@ import numpy as np
 
 from tolstat import sampling
 from tolstat.analysis import pick_freeze, ranks, sensitivity
-from tolstat.analysis.design import Claim
 from tolstat.analysis.sample import Sample
 from tolstat.campaign.what_if import tail_level
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import ANY_LIMIT, FloatArray
 from tolstat.display import text
 from tolstat.display.table import Column, Row, Rows, has
+from tolstat.questions.shares import rows_of
 from tolstat.store.hdf5 import store_error
 from tolstat.store.view import View
 
@@ -133,23 +133,7 @@ def indices(
         keys = {"": "estimate", "_lower": "lower", "_upper": "upper"} | ({"_p": "p"} if kind in TAIL else {})
         for end, key in keys.items():
             columns[f"{kind}{end}"] = np.broadcast_to(found.get(key, np.nan), len(names)).tolist()
-    rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
-    return Indices(facts, sorted(rows, key=lambda row: -row["first"]))
-
-
-def check_sample(view: View, statistic: Claim) -> None:
-    """Refuse joints that are not drawn from tolerances, do not support a statistic, or form a pick-freeze design.
-
-    Raises
-    ------
-    StoreError
-        The hint names what can be used.
-    """
-    view.check_drawn()
-    view.check(statistic)
-    if view.study.groups:
-        remedy = 'give the file of a study with sampling.method "random", "sobol" or "lhs"'
-        raise store_error(view.path, "holds a pick-freeze design", remedy)
+    return Indices(facts, sorted(rows_of(columns), key=lambda row: -row["first"]))
 
 
 def scattering(components: Mapping[str, FloatArray]) -> dict[str, FloatArray]:

@@ -16,8 +16,7 @@ from tolstat.campaign.what_if import Estimate
 from tolstat.common.loads import ANY_LIMIT, FloatArray
 from tolstat.display import text
 from tolstat.display.table import Row, Rows
-from tolstat.questions.causes.indices import check_sample
-from tolstat.store.hdf5 import store_error
+from tolstat.questions.shares import check_sample, with_ends
 from tolstat.store.view import View
 from tolstat.store.what_if import Altered
 from tolstat.study import Study, scaling, widths
@@ -129,7 +128,7 @@ def evaluate(view: View, by: str, costs: Path | None = None) -> Lines | None:
     StoreError
         When the joints are not drawn from tolerances, or differ in weight.
     """
-    check(view)
+    check_sample(view, "difference", whole=True)
     joints = Joints(view, by, view.altered)
     rows = joints.rows() if np.isfinite(joints.base).any() else []
     rows = rows if costs is None else _with_costs(view.study, rows, costs)
@@ -143,20 +142,6 @@ def evaluate(view: View, by: str, costs: Path | None = None) -> Lines | None:
     facts |= {"settled": joints.settled([line for line in entries if line.label in decisive])}
     facts |= {"missing": [line.label for line in entries if line.label not in lines]}
     return Lines(facts | {"left_out": widths.left_out(view.study)}, rows, joints.indices(lines))
-
-
-def check(view: View) -> None:
-    """Refuse a file whose joints are not drawn from tolerances, differ in weight, or are a part of the campaign's.
-
-    Raises
-    ------
-    StoreError
-        The hint names what can be used.
-    """
-    check_sample(view, "difference")
-    if not view.store.whole:
-        remedy = "merge all slices first: tolstat merge SLICE... --out FILE"
-        raise store_error(view.path, "holds a part of the campaign only", remedy)
 
 
 class Joints(sets.Joints):
@@ -215,7 +200,7 @@ class Joints(sets.Joints):
                 factors = {own.get("factor", np.nan) for own in about["tolerances"].values()}
                 row = {**about_line, "step": step, "words": about["words"]}
                 row |= {"factor": factors.pop() if len(factors) == 1 else np.nan, "n": len(values)}
-                rows.append(row | _named("share", share) | _named("change", change))
+                rows.append(row | with_ends("share", share) | with_ends("change", change))
                 place = 0 if is_decisive(step) else 1 if step == EXACT else 2, share[0]
                 places[line.label] = min(places.get(line.label, place), place)
         orders = {step: (place, 0.0) for place, step in enumerate(STEPS)}
@@ -240,8 +225,8 @@ class Joints(sets.Joints):
             for name, (a, b, ab), estimate in pairs:
                 with suppress(ValueError):  # too few joints with a load, or none, or all of them, above the level
                     found = estimate(a, b, ab[:, None])
-                    row |= _named(f"{name}alone", [float(x[0]) for x in found.first])
-                    row |= _named(f"{name}in_all", [float(x[0]) for x in found.total])
+                    row |= with_ends(f"{name}alone", [x[0] for x in found.first])
+                    row |= with_ends(f"{name}in_all", [x[0] for x in found.total])
             rows.append(row)
         return sorted(rows, key=lambda row: lines.index(row["line"]))
 
@@ -289,10 +274,6 @@ def is_settled(values: Sequence[FloatArray], base: FloatArray, level: float, con
         if low <= 0.0 <= high and max(-low, high) > NEGLIGIBLE * drawn:
             return False
     return True
-
-
-def _named(key: str, estimate: Sequence[float]) -> dict[str, float]:
-    return {f"{key}{end}": value for end, value in zip(ENDS, estimate, strict=True)}
 
 
 def _sum(share: Estimate, change: Estimate, least: float) -> Estimate:

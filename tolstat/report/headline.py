@@ -91,7 +91,8 @@ def _judged(view: View, records: Sequence[Row], accepted: float, standing: Stand
     numbers = ", ".join(f"{answers.count(own)} {word}" for own, word in WORDS.items() if own in answers)
     notes: tuple[str, ...] = (f"of {len(records)} limits, each by itself: {numbers}",) if several else ()
     if answer == "open" and row.get("parts_lower", np.nan) <= accepted < row.get("parts_upper", np.nan):
-        notes += (f"not decided by more joints: the parts leave shares of {_open(row)} open. Measure more parts",)
+        parts = text.span(row["parts_lower"], row["parts_upper"])
+        notes += (f"not decided by more joints: the parts leave shares of {parts} open. Measure more parts",)
     if answer == "none":
         return Verdict(answer, WORDS[answer], _reason(view, [row]), notes)
     value, words = _sentence(view, row, accepted, answer, standing)
@@ -161,10 +162,6 @@ def tells_yield(view: View) -> bool:
 def _decisive(view: View, records: Sequence[Row]) -> Row:
     """Row on which the verdict is: that of the joints above at least one limit, or of the only limit."""
     return exceedance.all_limits(view) if len(records) > 1 else records[0]
-
-
-def _open(row: Row) -> str:
-    return text.span(row["parts_lower"], row["parts_upper"])
 
 
 def _untold(view: View, records: Sequence[Row]) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -38,7 +38,7 @@ def turned(found: Standing) -> tuple[str, str]:
     names = [row for row in rows if row["name"] != ALL] or found.moving
     about = {row["name"]: AXIAL in row["keys"] for row in names if row["name"] != ALL}
     first = dict(list(about.items())[:_NAMED])
-    remedy = f"more joints do not decide it; find out {_to_find_out(first)}"
+    remedy = f"more joints do not decide it; find out {_listed([_noun(*own) for own in first.items()])}"
     return f"{side} as drawn ({text.percent(found.drawn[0])})", f"{other} {shown}: {remedy}"
 
 
@@ -178,11 +178,6 @@ def _condition(label: str) -> str:
     return dict(SHAFT.values()).get(label) or f"with {label.replace('all at', 'all assumptions at')}"
 
 
-def _to_find_out(names: Mapping[str, bool]) -> str:
-    """What has to be found out: names of assumptions, and whether each is about what holds the shaft."""
-    return _listed([_noun(name, is_mounting) for name, is_mounting in names.items()])
-
-
 def _listed(items: Sequence[str]) -> str:
     """``a, b and c``."""
     *most, last = items
@@ -190,6 +185,7 @@ def _listed(items: Sequence[str]) -> str:
 
 
 def _noun(name: str, is_mounting: bool) -> str:
+    """What has to be found out: an assumption, or what holds the shaft."""
     if is_mounting:
         return "how the shaft is held"
     return f"the {name}" if name[:1].islower() else name

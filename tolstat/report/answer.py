@@ -169,7 +169,7 @@ def stopped(view: View) -> str:
     return (
         f"stopped by {stop['rule']} at {stop['joints']} joints: {confidence} interval {stop['lower']:.5f} to "
         f"{stop['upper']:.5f}, valid after any number of looks; share {stop['estimate']:.5f}, {BIASED}. Shares and "
-        "intervals of this report are not corrected for the stop."
+        "intervals of this report are not corrected for the stop"
     )
 
 

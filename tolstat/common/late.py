@@ -13,6 +13,8 @@ class Late:
         self._name = name
 
     def __getattr__(self, attribute: str) -> Any:
+        if attribute.startswith("__"):  # which doctest and inspect ask any object for
+            raise AttributeError(attribute)
         module = import_module(self._name)
         return getattr(module, attribute) if hasattr(module, attribute) else import_module(f"{self._name}.{attribute}")
 

@@ -60,7 +60,7 @@ def examples(tmp_path_factory):
     fewer = campaign(folder, TWO.replace("n = 12000", "n = 500"), "fewer")
     known = made(folder, TEXT.replace("3000", "600"))
     return {
-        **{name: {"path": two} for name in ("questions.allocate", "questions.reweight", "report.summary")},
+        **{name: {"path": two} for name in ("questions.allocate", "questions.reweight", "report.answer")},
         "questions.compare": {"path": two, "other": fewer},
         "questions.causes.errors": {"path": known},
     }
@@ -73,7 +73,7 @@ def examples(tmp_path_factory):
         "questions.reweight",
         "questions.compare",
         "questions.causes.errors",
-        "report.summary",
+        "report.answer",
     ],
 )
 def test_examples_on_files(module, examples):

@@ -29,9 +29,9 @@ if TYPE_CHECKING:
     from tolstat.questions.drawings.answer import draw_errors as draw_errors
     from tolstat.questions.drawings.answer import draw_joint as draw_joint
     from tolstat.questions.drawings.answer import draw_row as draw_row
+    from tolstat.report.answer import statistics as statistics
     from tolstat.report.answer import write_report as write_report
     from tolstat.report.page import write_page as write_page
-    from tolstat.report.summary import statistics as statistics
     from tolstat.sampling import draw as draw
     from tolstat.solver.simulation import simulate_rows as simulate_rows
     from tolstat.store import ResultFile
@@ -58,7 +58,7 @@ _HOMES = {
     "run": "tolstat.campaign.run:run",
     "simulate_case": "tolstat.campaign.replay:simulate_case",
     "simulate_rows": "tolstat.solver.simulation:simulate_rows",
-    "statistics": "tolstat.report.summary:statistics",
+    "statistics": "tolstat.report.answer:statistics",
     "write_page": "tolstat.report.page:write_page",
     "write_report": "tolstat.report.answer:write_report",
 } | {name: f"{module}:{name}" for name, module in PUBLIC.items()}

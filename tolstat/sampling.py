@@ -14,11 +14,11 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr, ndtri
 
 from tolstat.analysis import process
 from tolstat.common import draw_records
 from tolstat.common.errors import InputError
+from tolstat.common.late import special
 from tolstat.common.tables import ERROR_FIELDS
 from tolstat.joint import MEANS, Operation, nominal_errors
 from tolstat.study import Study, axes
@@ -114,13 +114,13 @@ def scores(study: Study, numbers: range) -> Array:
     ndarray, (len(numbers), d)
         One column for each of the d `streams`.
     """
-    return np.column_stack([ndtri(u) for u in _uniforms(streams(study), numbers, study).values()])
+    return np.column_stack([special.ndtri(u) for u in _uniforms(streams(study), numbers, study).values()])
 
 
 def noise(study: Study, level: int, first: int, count: int) -> Array:
     """Independent standard normal numbers of a level of a subset simulation, from number `first` on, (count, d)."""
     own = (_stream(study.sampling.seed, f"subset {level} {name}", first) for name in streams(study))
-    return np.column_stack([ndtri(np.maximum(stream.random(count), 2.0**-54)) for stream in own])
+    return np.column_stack([special.ndtri(np.maximum(stream.random(count), 2.0**-54)) for stream in own])
 
 
 def from_scores(study: Study, scores: Array) -> Table:
@@ -283,7 +283,7 @@ def _of_lots(study: Study, u: dict[str, Array], numbers: range) -> dict[str, Arr
     found = {}
     for name, lot in study.lots.items():
         drawn = _stream(study.sampling.seed, f"lot {lot.score}", first).random(last - first)
-        z_lot, z_part = ndtri(np.maximum(drawn, 2.0**-54))[own], ndtri(u[name])
+        z_lot, z_part = special.ndtri(np.maximum(drawn, 2.0**-54))[own], special.ndtri(u[name])
         found[name] = _probability(np.sqrt(lot.share) * z_lot + np.sqrt(1.0 - lot.share) * z_part)
     return found
 
@@ -349,7 +349,7 @@ def _proposed(study: Study, names: Sequence[str], numbers: range) -> tuple[dict[
     A sample i drawn from the tolerances (component 0) equals sample i of the random campaign.
     """
     part = component(study.proposals, _stream(study.sampling.seed, "proposal", numbers.start).random(len(numbers)))
-    scores = {name: ndtri(u) for name, u in _uniforms(names, numbers, study).items()}
+    scores = {name: special.ndtri(u) for name, u in _uniforms(names, numbers, study).items()}
     for number, proposal in enumerate(study.proposals, 1):
         here = part == number
         for name, (mean, deviation) in proposal.scores.items():
@@ -358,7 +358,7 @@ def _proposed(study: Study, names: Sequence[str], numbers: range) -> tuple[dict[
             first = one.streams[0]
             u, v = (_stream(study.sampling.seed, f"{of} {first}", numbers.start) for of in ("deviation", "mean"))
             spread = process.deviation(np.maximum(u.random(len(numbers))[here], 2.0**-54), one.parts)
-            middle = spread * ndtri(np.maximum(v.random(len(numbers))[here], 2.0**-54)) / np.sqrt(one.parts)
+            middle = spread * special.ndtri(np.maximum(v.random(len(numbers))[here], 2.0**-54)) / np.sqrt(one.parts)
             for name in one.streams:
                 scores[name][here] = middle + spread * scores[name][here]
     return scores, part
@@ -366,7 +366,7 @@ def _proposed(study: Study, names: Sequence[str], numbers: range) -> tuple[dict[
 
 def _probability(scores: Array) -> Array:
     """Probabilities in (0, 1) of standard normal scores, clipped where double precision would round to 0 or 1."""
-    found: Array = np.clip(ndtr(scores), np.finfo(float).tiny, 1 - np.finfo(float).epsneg)
+    found: Array = np.clip(special.ndtr(scores), np.finfo(float).tiny, 1 - np.finfo(float).epsneg)
     return found
 
 

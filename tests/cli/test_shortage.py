@@ -89,7 +89,7 @@ def test_of_what_hdf5_says_the_words_of_the_system_are_kept() -> None:
 
 
 def test_a_page_that_does_not_fit_the_disk_leaves_the_old_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from tolstat.report import html
+    from tolstat.display import html
 
     (tmp_path / "page.html").write_text("the old one")
     template = SimpleNamespace(render=lambda **_: "the new one")

@@ -14,7 +14,7 @@ from tolstat.common.channels import CHANNELS
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.load_kinds import BUSHINGS
 from tolstat.common.loads import LOADS, SHOWN_LOADS
-from tolstat.display.asked import Asked
+from tolstat.display.answer import Asked
 from tolstat.questions.causes import angles
 from tolstat.questions.causes.angles import against_angle, angles_on_page
 from tolstat.questions.causes.errors import causes_on_page

@@ -18,9 +18,10 @@ from tolstat.campaign.work import Work
 from tolstat.cli import app
 from tolstat.common.errors import InputError, NotApplicable, StoreError
 from tolstat.common.tables import RESULT, Simulation, Status
-from tolstat.display.asked import Asked
+from tolstat.display.answer import Asked
 from tolstat.joint import perturb
-from tolstat.questions.assumptions import run, sentences, variations, words
+from tolstat.questions.assumptions import answer as run
+from tolstat.questions.assumptions import sentences, variations
 from tolstat.questions.assumptions.answer import assumptions_on_page
 from tolstat.questions.assumptions.variations import ALL, BETTER, evaluate
 from tolstat.report import headline
@@ -442,5 +443,5 @@ def test_the_command_prints_shares_changes_and_what_the_shop_holds(tmp_path, qui
     ],
 )
 def test_values_in_words(name, keys, label, condition):
-    assert words.label(name, keys) == label
-    assert condition is None or words.condition(label) == condition
+    assert variations.label_of(name, keys) == label
+    assert condition is None or sentences._condition(label) == condition

@@ -18,8 +18,7 @@ from tolstat.common.errors import InputError, NotApplicable, StoreError
 from tolstat.common.load_kinds import PINS
 from tolstat.common.tables import Mode, Status
 from tolstat.display import text
-from tolstat.display.answer import Sentence, Table
-from tolstat.display.asked import Asked
+from tolstat.display.answer import Asked, Sentence, Table
 from tolstat.display.blocks import Panels, Text
 from tolstat.joint import Operation
 from tolstat.questions.bearing_life import answer as question

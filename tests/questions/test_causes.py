@@ -15,8 +15,7 @@ from tolstat.cli import app
 from tolstat.common.errors import NotApplicable
 from tolstat.common.loads import ANY_LIMIT
 from tolstat.common.tables import SIMULATED, Simulation, Status
-from tolstat.display.answer import Sentence
-from tolstat.display.asked import Asked
+from tolstat.display.answer import Asked, Sentence
 from tolstat.display.text import value
 from tolstat.questions import QUESTIONS, Question
 from tolstat.questions.capability import capability

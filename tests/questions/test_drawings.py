@@ -22,7 +22,7 @@ from tolstat.common.load_kinds import PINS
 from tolstat.common.loads import LOADS
 from tolstat.common.tables import HOLES
 from tolstat.display import drawing
-from tolstat.display.asked import Asked
+from tolstat.display.answer import Asked
 from tolstat.joint import nominal_errors, perturb
 from tolstat.kernel.mechanics import bushing
 from tolstat.kernel.mechanics.topology import ARM, ARM_OF_PIN, BUSHING_BASE, FRAME, PIN, TRIAD

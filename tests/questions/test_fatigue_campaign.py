@@ -18,7 +18,7 @@ from tests.support.environment import ROOT
 from tolstat.analysis.cycles import Line, damage, equivalent_load, moment
 from tolstat.common.channels import CHANNELS
 from tolstat.common.errors import InputError, NotApplicable, StoreError
-from tolstat.display.asked import Asked
+from tolstat.display.answer import Asked
 from tolstat.display.blocks import Panels, Table, Text
 from tolstat.questions.fatigue import loads as fatigue
 from tolstat.questions.fatigue import pylife

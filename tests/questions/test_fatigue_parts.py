@@ -22,7 +22,7 @@ from tolstat.common.errors import InputError, NotApplicable
 from tolstat.common.load_kinds import BUSHINGS
 from tolstat.common.tables import Status
 from tolstat.display import text
-from tolstat.display.asked import Asked
+from tolstat.display.answer import Asked
 from tolstat.display.blocks import Panels, Table
 from tolstat.questions.fatigue import parts
 from tolstat.questions.fatigue.answer import _notes_on_parts, _verdict, fatigue_on_page, life_verdicts

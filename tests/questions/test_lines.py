@@ -30,8 +30,7 @@ from tolstat.common.errors import InputError, NotApplicable, StoreError
 from tolstat.common.loads import LOADS
 from tolstat.common.tables import RESULT, Simulation, Status
 from tolstat.display import text
-from tolstat.display.answer import Sentence
-from tolstat.display.asked import Asked
+from tolstat.display.answer import Asked, Sentence
 from tolstat.display.progress import Display
 from tolstat.joint import perturb
 from tolstat.questions.causes import lines as question
@@ -710,7 +709,7 @@ def test_changed_joints_are_simulated_at_all_points(tmp_path):
         assert {"cross1.F at cruise", "cross1.F at start"} < set(one.names)
         cruise, start = (one.valid([f"cross1.F at {point}"]) for point in ("cruise", "start"))
         np.testing.assert_allclose(start, 1.05 * cruise)
-        np.testing.assert_array_equal(one.valid(shares.names_at_points(view, "cross1.F")), start)
+        np.testing.assert_array_equal(one.valid(sets.names_at_points(view, "cross1.F")), start)
         worst, at_start, at_cruise = (tolstat.lines(view, f"cross1.F{at}") for at in ("", " at start", " at cruise"))
         assert worst.facts["load"] == "cross1.F"
         assert (worst.frame("lines")["share"] == at_start.frame("lines")["share"]).all()

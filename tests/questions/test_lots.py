@@ -19,7 +19,7 @@ from tolstat.common.errors import InputError, NotApplicable, StoreError
 from tolstat.common.loads import ANY_LIMIT
 from tolstat.common.tables import Status
 from tolstat.display import drawing
-from tolstat.display.asked import Asked
+from tolstat.display.answer import Asked
 from tolstat.display.table import as_text
 from tolstat.questions import lots as question
 from tolstat.questions.capability import capability

@@ -17,7 +17,7 @@ from tolstat.common.load_kinds import ORDERS, SHAFTS
 from tolstat.common.loads import LOADS
 from tolstat.common.tables import Options, Simulation
 from tolstat.display import drawing
-from tolstat.display.asked import Asked
+from tolstat.display.answer import Asked
 from tolstat.display.blocks import Panels
 from tolstat.questions import orders as module
 from tolstat.questions import sections

@@ -16,7 +16,7 @@ from tolstat.cli import app
 from tolstat.common.errors import NotApplicable, StoreError
 from tolstat.common.load_kinds import PINS
 from tolstat.common.tables import ERROR, Simulation
-from tolstat.display.asked import Asked
+from tolstat.display.answer import Asked
 from tolstat.joint import HOLE_OF_PIN, load, perturb
 from tolstat.questions.causes.pairs import MISSED, combinations, pairs_on_page
 from tolstat.store import ResultFile, Writer

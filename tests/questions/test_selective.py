@@ -13,7 +13,7 @@ from tolstat import sampling
 from tolstat.campaign.extend import merge
 from tolstat.cli import app
 from tolstat.common.errors import InputError, NotApplicable
-from tolstat.display.asked import Asked
+from tolstat.display.answer import Asked
 from tolstat.display.table import as_text
 from tolstat.questions import selective as question
 

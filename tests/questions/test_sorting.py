@@ -12,7 +12,7 @@ from tests.support import synthetic
 from tolstat.analysis import binomial
 from tolstat.cli import app
 from tolstat.common.errors import InputError, NotApplicable
-from tolstat.display.asked import Asked
+from tolstat.display.answer import Asked
 from tolstat.joint import nominal_errors
 from tolstat.questions import sorting as question
 from tolstat.report import page

@@ -10,7 +10,8 @@ import pytest
 
 from tests.report.test_page import TEXT
 from tests.support import exceedance, synthetic
-from tolstat.report import html, page
+from tolstat.display import html
+from tolstat.report import page
 from tolstat.store import ResultFile
 
 BROWSER = next(

@@ -15,10 +15,12 @@ from tolstat.analysis.binomial import clopper_pearson, needed
 from tolstat.analysis.sample import Sample
 from tolstat.cli import app
 from tolstat.common.tables import RESULT, Simulation, Status
-from tolstat.display.asked import Asked
+from tolstat.display.answer import Asked
+from tolstat.display.verdict import WORDS
 from tolstat.questions.exceedance import rows as exceedance
-from tolstat.questions.exceedance.verdicts import WORDS, ends, verdict
-from tolstat.report import headline, page, summary
+from tolstat.questions.exceedance.rows import ends, verdict
+from tolstat.report import headline, page
+from tolstat.report.answer import statistics
 from tolstat.store import ResultFile, Writer
 from tolstat.study import load
 
@@ -96,7 +98,7 @@ def everywhere(path, accepted):
     text = reports.build(path, *([] if np.isnan(accepted) else ["--accept", str(accepted)]))
     with ResultFile.open(path) as store:
         made = store.view()
-        json_ = summary.statistics(made, accepted=accepted)["verdict"]
+        json_ = statistics(made, accepted=accepted)["verdict"]
         first = page.compose(made, Asked(path, accepted)).sections[0]
     decision = next(block for block in first.blocks if block.kind == "decision")
     card, place = decision.verdicts[0], decision.picture.title.partition(":")[0]

@@ -11,11 +11,11 @@ from tests.cli.test_cli import call
 from tests.questions.test_bearing_life import STUDY
 from tests.support import synthetic, views
 from tolstat.display import text
-from tolstat.display.asked import Asked
+from tolstat.display.answer import Asked
 from tolstat.display.blocks import Decision
 from tolstat.questions.bearing_life import answer as bearing_life
 from tolstat.report import verdict
-from tolstat.report.life import life_verdicts
+from tolstat.report.headline import life_verdicts
 from tolstat.store import ResultFile
 
 LIMITED = STUDY.replace("[sampling]", '[limits]\n"cross1.F" = "700 N"\n[sampling]')

@@ -14,7 +14,8 @@ from tests.support import fakes, reports, synthetic
 from tolstat.cli import app
 from tolstat.common.tables import Simulation
 from tolstat.display.text import capital
-from tolstat.report import page, summary
+from tolstat.report import page
+from tolstat.report.answer import statistics
 from tolstat.store import ResultFile
 from tolstat.store.recorded import mountings, note_on_mounting, swept
 
@@ -64,7 +65,7 @@ def test_run_report_page_and_json_begin_with_it(tmp_path: Path, text: str, said:
     assert re.search(rf"<br>{shafts} \((given|assumed)\); {law.lower()} \(assumed\)\.</p>", header[0])
     assert "60 joints (random sampling), 0 failed, 0 not settled." in html
     with ResultFile.open(Path("small.h5")) as store:
-        assert json.loads(json.dumps(summary.statistics(store.view())))["joint"] == said
+        assert json.loads(json.dumps(statistics(store.view())))["joint"] == said
 
 
 def test_a_note_where_rigid_shafts_meet_errors_along_them(tmp_path: Path) -> None:

@@ -17,13 +17,13 @@ from tests.support import exceedance, synthetic
 from tolstat.cli import app
 from tolstat.common.errors import StoreError
 from tolstat.common.tables import Status
-from tolstat.display.asked import Asked
+from tolstat.display import html as writer
+from tolstat.display.answer import Asked
 from tolstat.display.blocks import Section
 from tolstat.display.html import bound, grouped
 from tolstat.questions import accuracy, joints
 from tolstat.questions.exceedance import rows
 from tolstat.report import headline as verdict
-from tolstat.report import html as writer
 from tolstat.report import page
 from tolstat.store import Reader, ResultFile, revolutions
 from tolstat.store.recorded import recall

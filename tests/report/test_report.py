@@ -24,8 +24,8 @@ from tolstat.questions import sweep
 from tolstat.questions.exceedance import answer as exceedance
 from tolstat.questions.exceedance import curves, rows
 from tolstat.questions.sweep import swept_axes
-from tolstat.report import joint_values
 from tolstat.report.answer import write_report
+from tolstat.report.page import joint_values
 from tolstat.store import ResultFile
 
 
@@ -312,9 +312,9 @@ def test_colours_differ_for_dichromats():
 
 def test_values_of_the_joint_that_differ_from_the_one_that_comes_along():
     file = SimpleNamespace(path="x.h5", joint=joint.load("cirelli2021", {}, "x").given("json"))
-    assert joint_values.listing(file).text == "none: it is cirelli2021"
+    assert joint_values(file).text == "none: it is cirelli2021"
     file.joint = joint.load("cirelli2021", {"contact": {"clearance": "0.05 mm", "law": "point"}}, "x").given("json")
-    rows = [line.split("  ") for line in joint_values.listing(file).text.splitlines()]
+    rows = [line.split("  ") for line in joint_values(file).text.splitlines()]
     rows = {row[0]: [cell.strip() for cell in row[1:] if cell.strip()] for row in rows}
     assert rows["contact.clearance"] == ["0.05 mm", "0.1 mm", "given"]
     assert rows["contact.law"] == ["point", "mode", "given"]

@@ -15,7 +15,7 @@ from tolstat.common.errors import InputError, StoreError
 from tolstat.common.loads import SHOWN_LOADS
 from tolstat.questions.capability import capability
 from tolstat.questions.exceedance.answer import exceedance
-from tolstat.report import summary
+from tolstat.report import answer as reports
 from tolstat.store import ResultFile, result_file
 
 
@@ -45,7 +45,7 @@ def test_json_has_all_statistics_as_the_reports_have_them(tmp_path):
 def test_statistics_are_of_a_sample(tmp_path):
     path = synthetic.store(tmp_path, synthetic.SWEEP, "sweep")
     with ResultFile.open(path) as store, pytest.raises(StoreError, match="no sample of a production"):
-        summary.statistics(store.view())
+        reports.statistics(store.view())
     done = export(synthetic.store(tmp_path), "--csv", "x.csv", "--by", "cross1.F")
     assert done.exit_code == 2
     assert "--by is used with --statistics only" in done.stderr

@@ -5,7 +5,7 @@ import pytest
 
 from tests.support import synthetic, views
 from tolstat.common.tables import Status
-from tolstat.display.asked import Asked
+from tolstat.display.answer import Asked
 from tolstat.questions.causes.worst import _largest, joint_rows
 from tolstat.questions.exceedance.answer import exceedance, exceedance_on_page, limits_on_page
 from tolstat.report import verdict

@@ -11,11 +11,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import Bounds, minimize
 
 from tolstat.analysis import reweight
 from tolstat.analysis.binomial import clopper_pearson
 from tolstat.analysis.weighted import Split
+from tolstat.common.late import optimize
 from tolstat.common.loads import FloatArray
 
 FEWEST = 10
@@ -153,8 +153,11 @@ def _minimise(
 ) -> FloatArray:
     low, high = np.log(problem.lower), np.log(problem.upper)
     settings: Any = {"method": "SLSQP", "options": {"maxiter": 60, "ftol": 1e-5, "eps": 1e-4}}
-    settings |= {"bounds": Bounds(low, np.maximum(high, low + 1e-9)), "constraints": {"type": "ineq", "fun": room}}
-    result = minimize(what, np.clip(start, low, high), **settings)
+    settings |= {
+        "bounds": optimize.Bounds(low, np.maximum(high, low + 1e-9)),
+        "constraints": {"type": "ineq", "fun": room},
+    }
+    result = optimize.minimize(what, np.clip(start, low, high), **settings)
     return np.asarray(np.clip(result.x, low, high), dtype=float)
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import betaincinv, betaln, stdtrit
 
 from tolstat.common.bisection import first
+from tolstat.common.late import special
 from tolstat.common.loads import FloatArray
 
 STAKE = 0.75
@@ -41,8 +41,8 @@ def clopper_pearson(count: ArrayLike, n: ArrayLike, confidence: float = 0.95) ->
     tail = 0.5 * (1.0 - confidence)
     # The beta function of order 0 does not exist; those ends are 0 and 1 by definition.
     some, others = np.where(k > 0, k, 1.0), np.where(k < m, m - k, 1.0)
-    lower = np.where(k > 0, betaincinv(some, m - some + 1.0, tail), 0.0)
-    upper = np.where(k < m, betaincinv(k + 1.0, others, 1.0 - tail), 1.0)
+    lower = np.where(k > 0, special.betaincinv(some, m - some + 1.0, tail), 0.0)
+    upper = np.where(k < m, special.betaincinv(k + 1.0, others, 1.0 - tail), 1.0)
     return lower, upper
 
 
@@ -134,14 +134,14 @@ def unresolved_matter(count: int, n: int, n_unresolved: int, confidence: float =
 
 def half_width(confidence: float, freedom: float | FloatArray = np.inf) -> FloatArray:
     """Half the width of Student's interval, in standard errors; of the normal one without degrees of freedom."""
-    return np.asarray(stdtrit(freedom, 0.5 * (1.0 + confidence)), dtype=float)
+    return np.asarray(special.stdtrit(freedom, 0.5 * (1.0 + confidence)), dtype=float)
 
 
 def log_beta_binomial(k: ArrayLike, n: ArrayLike, a: ArrayLike, b: ArrayLike) -> FloatArray:
     """Logarithm of the probability of k of n joints whose share is a beta variate with the parameters a and b."""
     k, n, a, b = (np.asarray(own, dtype=float) for own in (k, n, a, b))
-    choose = -np.log(n + 1.0) - betaln(k + 1.0, n - k + 1.0)
-    return np.asarray(choose + betaln(k + a, n - k + b) - betaln(a, b))
+    choose = -np.log(n + 1.0) - special.betaln(k + 1.0, n - k + 1.0)
+    return np.asarray(choose + special.betaln(k + a, n - k + b) - special.betaln(a, b))
 
 
 def wilks(share: float, confidence: float = 0.95) -> int:

@@ -13,11 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import nctdtrinc
 
 from tolstat.analysis import binomial
 from tolstat.analysis.estimates import Exceedance
 from tolstat.analysis.sample import Sample
+from tolstat.common.late import special, stats
 from tolstat.common.loads import FloatArray
 
 REFERENCE = 0.9986501019683699
@@ -92,14 +92,12 @@ def of_sample(sample: Sample, limit: float, confidence: float = 0.95) -> Capabil
     >>> round(found.cpk_normal, 1), found.above.count, found.needed
     (1.3, 0, 3244)
     """
-    from scipy.stats import normaltest
-
     valid = sample.valid
     normal = general = (np.nan, np.nan, np.nan)
     p = np.nan
     if valid.size > 1 and np.ptp(valid) > 0:
         normal, general = (index(sample, limit, confidence) for index in (_normal, _of_quantiles))
-        p = float(normaltest(valid).pvalue) if valid.size >= 20 else np.nan
+        p = float(stats.normaltest(valid).pvalue) if valid.size >= 20 else np.nan
     # Bonferroni over two quantiles with two ends each: a quarter of the error probability for this upper end
     needed = binomial.wilks(REFERENCE, 1.0 - 0.25 * (1.0 - confidence))
     return Capability(sample.above(limit, confidence), *normal, p, *general, needed)
@@ -127,7 +125,7 @@ def cpk_interval(cpk: ArrayLike, n: int, confidence: float = 0.95) -> tuple[Floa
     """
     scale, tail = 3.0 * np.sqrt(n), 0.5 * (1.0 - confidence)
     t = scale * np.asarray(cpk, dtype=float)
-    return nctdtrinc(n - 1, 1.0 - tail, t) / scale, nctdtrinc(n - 1, tail, t) / scale
+    return special.nctdtrinc(n - 1, 1.0 - tail, t) / scale, special.nctdtrinc(n - 1, tail, t) / scale
 
 
 def _normal(sample: Sample, limit: float, confidence: float) -> tuple[float, float, float]:

@@ -12,13 +12,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import expit, logit
 
 from tolstat.analysis import prediction
 from tolstat.analysis.binomial import clopper_pearson, half_width, log_beta_binomial
 from tolstat.analysis.column import Column
 from tolstat.analysis.design import Design, counts_by_group, or_independent
 from tolstat.analysis.estimates import Estimate
+from tolstat.common.late import special
 from tolstat.common.loads import FloatArray
 
 LEAST = 30
@@ -80,7 +80,7 @@ def interval(above: ArrayLike, joints: ArrayLike, confidence: float = 0.95) -> L
         p = k.sum(axis=0) / total
         between = ((k - p * n) ** 2).sum(axis=0) * lots / (lots - 1.0)
         half = half_width(confidence, lots - 1) * np.sqrt(between) / total / (p * (1.0 - p))
-        lower, upper = np.asarray(expit(logit(p) - half)), np.asarray(expit(logit(p) + half))
+        lower, upper = (np.asarray(special.expit(special.logit(p) + end)) for end in (-half, half))
         none = float(clopper_pearson(0, lots, confidence)[1])
         sides = np.stack([k, n - k])
         effective = (sides.sum(axis=1) ** 2 / (sides**2).sum(axis=1)).min(axis=0)
@@ -103,11 +103,11 @@ def interval(above: ArrayLike, joints: ArrayLike, confidence: float = 0.95) -> L
 def _credible(k: FloatArray, n: FloatArray, confidence: float) -> tuple[FloatArray, FloatArray]:
     """Credible interval of the mean share of m limits, k of n joints in each lot, both (lots, m)."""
     p = k.sum(axis=0) / n.sum(axis=0)
-    means, spreads = np.arange(logit(p.min()) - REACH, logit(p.max()) + REACH, STEP), SPREADS[::2]
+    means, spreads = np.arange(special.logit(p.min()) - REACH, special.logit(p.max()) + REACH, STEP), SPREADS[::2]
     below = _posterior(k, n, means, spreads)[2].reshape(len(p), len(means), -1).sum(axis=2).cumsum(axis=1)
     tail = 0.5 * (1.0 - confidence)
     ends = np.array([np.interp([tail, 1.0 - tail], cumulative, means + 0.5 * STEP) for cumulative in below])
-    return expit(ends[:, 0]), expit(ends[:, 1])
+    return special.expit(ends[:, 0]), special.expit(ends[:, 1])
 
 
 def _posterior(
@@ -119,7 +119,7 @@ def _posterior(
     correlation of two joints of a lot; all limits share it, so that the density is computed once for each pair of k and
     n. The prior distribution of the mean is Jeffreys' of a share, that of the correlation uniform.
     """
-    mean, r = (own.ravel() for own in np.meshgrid(expit(means), expit(spreads), indexing="ij"))
+    mean, r = (own.ravel() for own in np.meshgrid(special.expit(means), special.expit(spreads), indexing="ij"))
     a, b = mean * (1.0 - r) / r, (1.0 - mean) * (1.0 - r) / r
     pairs, which = np.unique(np.stack([k.ravel(), n.ravel()]), axis=1, return_inverse=True)
     times = np.zeros((k.shape[1], pairs.shape[1]))
@@ -263,7 +263,7 @@ def law_of(above: ArrayLike, joints: ArrayLike) -> Law:
     p = (k.sum() + 0.5) / (n.sum() + 1.0)
     spread = max(float(np.nan_to_num(interval(k, n).correlation)), 0.05)
     error = np.sqrt((1.0 + (n.mean() - 1.0) * spread) / (n.sum() * p * (1.0 - p)))
-    means = logit(p) + np.linspace(-REACH, REACH, GRID) * min(float(error), 1.0)
+    means = special.logit(p) + np.linspace(-REACH, REACH, GRID) * min(float(error), 1.0)
     a, b, (weight,) = _posterior(k[:, None], n[:, None], means, SPREADS)
     kept = weight > NEGLIGIBLE
     return Law(a[kept], b[kept], weight[kept] / weight[kept].sum(), (int(k.sum()), int(n.sum())))

@@ -12,12 +12,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import bdtr
 
 from tolstat.analysis.binomial import clopper_pearson, half_width
 from tolstat.analysis.column import Column
 from tolstat.analysis.design import Claim, Design
 from tolstat.analysis.sample import Sample
+from tolstat.common.late import special
 from tolstat.common.loads import FloatArray
 
 RESAMPLES = 500
@@ -118,7 +118,7 @@ def shares(a: Sample, b: Sample, levels: ArrayLike, paired: bool, confidence: fl
     p = np.full(level.shape, np.nan)
     if paired and _have_interval(a.design, b.design, "difference"):
         only_a, only_b = found[3:5]
-        p = np.minimum(2.0 * bdtr(np.minimum(only_a, only_b) + 0.0, np.maximum(only_a + only_b, 1), 0.5), 1.0)
+        p = np.minimum(2.0 * special.bdtr(np.minimum(only_a, only_b) + 0.0, np.maximum(only_a + only_b, 1), 0.5), 1.0)
     return ShareDifference._make((*found, p, least[5], most[5], least[6], most[7]))
 
 

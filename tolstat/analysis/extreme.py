@@ -13,11 +13,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.special import gammaincinv, xlog1py, xlogy
 
 from tolstat.analysis import pareto
 from tolstat.analysis.estimates import Estimate
 from tolstat.analysis.sample import Sample
+from tolstat.common.late import special
 from tolstat.common.loads import FloatArray
 
 MIN_EXCESSES = 50
@@ -186,12 +186,12 @@ def fit(sample: Sample, share: float | None = None, confidence: float = 0.95) ->
     if excesses.size < MIN_EXCESSES:
         raise TooThinError(excesses.size, int(np.ceil(joints * MIN_EXCESSES / max(excesses.size, 1))))
     m, n = excesses.size, valid.size
-    reach = float(gammaincinv(0.5, confidence))  # half the quantile of chi-square with one degree of freedom
+    reach = float(special.gammaincinv(0.5, confidence))  # half the quantile of chi-square with one degree of freedom
     k, sigma, deficit = _likelihood(excesses, reach)
     best = [float(value) for value in pareto.most_likely(excesses)]
     half = 5.0 * np.sqrt(m * (1.0 - m / n)) / n
     shares = np.clip(np.linspace(m / n - half, m / n + half, SHARES), 0.5 / n, 1.0 - 0.5 / n)
-    binomial = xlogy(m, m / n / shares) + xlog1py(n - m, -m / n) - xlog1py(n - m, -shares)
+    binomial = special.xlogy(m, m / n / shares) + special.xlog1py(n - m, -m / n) - special.xlog1py(n - m, -shares)
     inside = np.argwhere(deficit[None] + binomial[:, None, None] <= reach)
     region = np.column_stack([shares[inside[:, 0]], k[inside[:, 1], inside[:, 2]], sigma[inside[:, 1], inside[:, 2]]])
     ends = [(float(v.min()), float(v.max())) if iid else (np.nan, np.nan) for v in region.T[1:]]

@@ -13,7 +13,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import betainc
 
 from tolstat.analysis import process
 from tolstat.analysis.column import Mask
@@ -21,6 +20,7 @@ from tolstat.analysis.process import Draws, Known, Sums
 from tolstat.analysis.reweight import LARGEST_SPREAD, LEAST_ESS
 from tolstat.analysis.weighted import Split
 from tolstat.common.bisection import first
+from tolstat.common.late import special
 from tolstat.common.loads import FloatArray
 
 BLOCK = 1 << 20
@@ -172,7 +172,7 @@ def _upper_end(split: Split, side: int, usable: Mask, tail: float) -> float:
     inner = usable & (split.total[1 - side] > 0.0) & np.isfinite(inside) & (inside > 0.0) & (outside > 0.0)
 
     def covers(share: FloatArray) -> bool:
-        below = betainc(np.where(inner, inside, 1.0), np.where(inner, outside, 1.0), share)
+        below = special.betainc(np.where(inner, inside, 1.0), np.where(inner, outside, 1.0), share)
         return bool(np.where(inner, below, 0.0).mean() >= 1.0 - tail)
 
     return float(first(covers, 0.0, 1.0, STEPS))

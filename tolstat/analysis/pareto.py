@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import boxcox, inv_boxcox
 
+from tolstat.common.late import special
 from tolstat.common.loads import FloatArray
 
 STRAIGHT = 1e-8
@@ -112,12 +112,12 @@ def log_likelihood(excesses: FloatArray, k: ArrayLike, sigma: ArrayLike) -> Floa
 def upper_share(x: ArrayLike, k: ArrayLike, sigma: ArrayLike) -> FloatArray:
     """1 - F(x), broadcast."""
     with np.errstate(invalid="ignore"):  # NaN beyond the end of the tail
-        return np.nan_to_num(1.0 / inv_boxcox(np.divide(x, sigma), k))
+        return np.nan_to_num(1.0 / special.inv_boxcox(np.divide(x, sigma), k))
 
 
 def quantile(share_above: ArrayLike, k: ArrayLike, sigma: ArrayLike) -> FloatArray:
     """Excess x with 1 - F(x) = `share_above`, broadcast."""
-    return np.asarray(-np.asarray(sigma) * boxcox(np.asarray(share_above, dtype=float), np.negative(k)))
+    return np.asarray(-np.asarray(sigma) * special.boxcox(np.asarray(share_above, dtype=float), np.negative(k)))
 
 
 def anderson_darling(excesses: FloatArray, k: ArrayLike, sigma: ArrayLike) -> FloatArray:

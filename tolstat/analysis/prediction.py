@@ -12,6 +12,7 @@ import math
 import numpy as np
 
 from tolstat.analysis.binomial import log_beta_binomial
+from tolstat.common.late import stats
 
 DELIVERY = 1000
 """Joints of the next delivery, unless another number is given."""
@@ -69,12 +70,10 @@ def of_share(lower: float, upper: float, number: int, confidence: float = 0.95) 
     lower, upper : float
         Whole numbers, ends included; NaN if an end of the share is.
     """
-    from scipy.stats import binom
-
     if math.isnan(lower) or math.isnan(upper):
         return math.nan, math.nan
     tail = 0.5 * (1.0 - half(confidence))
-    return float(binom.ppf(tail, number, lower)), float(binom.ppf(1.0 - tail, number, upper))
+    return float(stats.binom.ppf(tail, number, lower)), float(stats.binom.ppf(1.0 - tail, number, upper))
 
 
 def columns(ends: tuple[float, float], number: int) -> dict[str, float]:

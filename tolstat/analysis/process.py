@@ -14,9 +14,9 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import chdtri, ndtri, roots_genlaguerre
 
 from tolstat.analysis.column import frozen
+from tolstat.common.late import special, stats
 from tolstat.common.loads import FloatArray
 
 LEAST_PARTS, MOST_PARTS = 5, 100_000
@@ -55,18 +55,16 @@ def deviation(u: FloatArray, parts: int) -> FloatArray:
 
     The mean is normal about 0 with the deviation b / sqrt(parts).
     """
-    return np.asarray(np.sqrt((parts - 1) / chdtri(parts - 1, u)))
+    return np.asarray(np.sqrt((parts - 1) / special.chdtri(parts - 1, u)))
 
 
 @cache
 def draws(parts: tuple[int, ...]) -> Draws:
     """`DRAWS` likely processes of entries known from so many parts each, at scrambled Sobol' points."""
-    from scipy.stats import qmc
-
-    points = qmc.Sobol(2 * len(parts), seed=np.random.default_rng(SEED)).random(DRAWS)
+    points = stats.qmc.Sobol(2 * len(parts), seed=np.random.default_rng(SEED)).random(DRAWS)
     points = np.clip(points, 0.5 / DRAWS, 1.0 - 0.5 / DRAWS)
     b = np.column_stack([deviation(u, n) for u, n in zip(points.T[::2], parts, strict=True)])
-    return Draws(frozen(b * ndtri(points[:, 1::2]) / np.sqrt(parts)), frozen(b))
+    return Draws(frozen(b * special.ndtri(points[:, 1::2]) / np.sqrt(parts)), frozen(b))
 
 
 def log_student(sums: Sums, known: Known) -> FloatArray:
@@ -140,7 +138,7 @@ def _over_student(a: FloatArray, b: FloatArray, known: Known) -> FloatArray:
     """The same of one entry drawn from a posterior predictive, by Gauss quadrature along and across the mean, (K,)."""
     d, free = known.errors, known.parts - 1
     x, along = np.polynomial.hermite.hermgauss(NODES)
-    r, across = roots_genlaguerre(NODES, 0.5 * (d - 1) - 1.0) if d > 1 else (np.zeros(1), np.ones(1))
+    r, across = special.roots_genlaguerre(NODES, 0.5 * (d - 1) - 1.0) if d > 1 else (np.zeros(1), np.ones(1))
     # the square of the normal density is a normal density of variance b^2 / 2; x and r are its standard numbers
     v = math.sqrt(d) * a[:, None] + b[:, None] * x
     inside = (known.parts / (known.parts + d)) * np.square(v)[:, :, None] + np.square(b)[:, None, None] * r

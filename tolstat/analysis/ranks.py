@@ -14,9 +14,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import expit, logit
 
 from tolstat.analysis.binomial import half_width
+from tolstat.common.late import special, stats
 from tolstat.common.loads import FloatArray
 
 GROUPS = 20
@@ -191,8 +191,6 @@ def tail(scores: ArrayLike, above: ArrayLike, confidence: float = 0.95, iid: boo
     ValueError
         When fewer than `FEWEST` joints are on one side of the limit, or an error does not scatter.
     """
-    from scipy.stats import mannwhitneyu
-
     z, over = np.asarray(scores, dtype=float), np.asarray(above, dtype=bool)
     n = int(over.sum())
     if min(n, over.size - n) < FEWEST:
@@ -200,7 +198,7 @@ def tail(scores: ArrayLike, above: ArrayLike, confidence: float = 0.95, iid: boo
     if (np.ptp(z, axis=0) == 0).any():
         raise ValueError("give errors that scatter")
     both = places(np.concatenate([z, np.abs(z)], axis=1))
-    p = np.asarray(mannwhitneyu(both[:, over], both[:, ~over], axis=1, method="asymptotic").pvalue)
+    p = np.asarray(stats.mannwhitneyu(both[:, over], both[:, ~over], axis=1, method="asymptotic").pvalue)
     order = np.argsort(p)
     adjusted = np.empty_like(p)
     adjusted[order] = np.minimum(np.maximum.accumulate(p[order] * np.arange(p.size, 0, -1)), 1.0)  # Holm
@@ -230,4 +228,4 @@ def _larger(
     degrees = (var_above + var_others) ** 2 / (var_above**2 / (m - 1) + var_others**2 / (k - 1))
     inside = np.clip(estimate, least, 1.0 - least)
     half = half_width(confidence, degrees) * error / (inside * (1.0 - inside))
-    return estimate, expit(logit(inside) - half), expit(logit(inside) + half)
+    return estimate, special.expit(special.logit(inside) - half), special.expit(special.logit(inside) + half)

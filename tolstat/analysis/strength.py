@@ -13,10 +13,10 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import ndtr
 
 from tolstat.analysis.binomial import clopper_pearson, mean_interval
 from tolstat.analysis.column import Mask
+from tolstat.common.late import special
 from tolstat.common.loads import FloatArray
 
 DECILES = 2.5631031310892007
@@ -213,7 +213,7 @@ def probability(factor: FloatArray, T_S: float) -> FloatArray:
     if T_S <= 1.0:
         return np.where(np.isnan(factor), np.nan, (factor >= 1.0).astype(float))
     with np.errstate(divide="ignore"):
-        return np.asarray(ndtr(np.log10(factor) * DECILES / math.log10(T_S)))
+        return np.asarray(special.ndtr(np.log10(factor) * DECILES / math.log10(T_S)))
 
 
 def failures(

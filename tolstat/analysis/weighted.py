@@ -15,7 +15,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import betainc, betaincinv
 
 from tolstat.analysis import pareto
 from tolstat.analysis.column import Column
@@ -23,6 +22,7 @@ from tolstat.analysis.design import Claim, Design
 from tolstat.analysis.estimates import Estimate
 from tolstat.analysis.independent import Independent
 from tolstat.common.bisection import first
+from tolstat.common.late import special
 from tolstat.common.loads import FloatArray
 
 LEAST_EFFECTIVE = 20.0
@@ -97,11 +97,11 @@ class Split(NamedTuple):
         inside, outside = self.far()
 
         def beyond(share: FloatArray) -> NDArray[np.bool_]:
-            looked_at = betainc(least, np.maximum(inside + outside - least, 1.0), 1.0 - share)
-            return np.asarray(betainc(outside, inside, 1.0 - share) / looked_at <= tail)
+            looked_at = special.betainc(least, np.maximum(inside + outside - least, 1.0), 1.0 - share)
+            return np.asarray(special.betainc(outside, inside, 1.0 - share) / looked_at <= tail)
 
         with np.errstate(invalid="ignore"):
-            ends = betaincinv(inside, outside, 1.0 - tail)
+            ends = special.betaincinv(inside, outside, 1.0 - tail)
             if least:
                 ends = np.where(outside > least, first(beyond, ends, 1.0, 50), 1.0)
         ends = np.where((self.total[::-1] == 0) | np.isnan(ends), 1.0, ends)

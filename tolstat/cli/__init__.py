@@ -8,7 +8,7 @@ from importlib import import_module
 from typing import Any
 
 from tolstat.cli._app import LISTED, Listed, app, main
-from tolstat.cli._shortage import check_memory
+from tolstat.cli._command import check_memory
 from tolstat.questions import QUESTIONS, Question
 
 __all__ = ["LISTED", "PLAIN", "app", "main"]

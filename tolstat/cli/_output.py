@@ -11,9 +11,7 @@ import typer
 
 from tolstat.cli._talk import WIDTH, say, warn, wrapped
 from tolstat.display import table
-from tolstat.display.answer import Answer, Sentence, Table
-from tolstat.display.blocks import Listing
-from tolstat.display.table import Column, Rows
+from tolstat.display.answer import Answer, Column, Listing, Rows, Sentence, Table
 
 
 def deliver(answer: Answer, wide: bool, as_json: bool) -> None:

@@ -21,7 +21,8 @@ from tolstat.display.options import Accepted, Opt, Point, ResultPath
 from tolstat.display.text import csv_rows
 from tolstat.questions.causes.errors import causes
 from tolstat.questions.fatigue import pylife
-from tolstat.report import summary, workbook
+from tolstat.report import workbook
+from tolstat.report.answer import statistics as statistics_of
 from tolstat.store import Reader, ResultFile
 from tolstat.store.result_file import in_blocks, to_pandas
 
@@ -106,7 +107,7 @@ def export(
             write = partial(table.to_csv, index=False, lineterminator="\n")
             _write(cycles, write, f"cycles of {table['joint'].nunique()} joints")
         if statistics is not None:
-            values = summary.statistics(view, accepted=accepted)
+            values = statistics_of(view, accepted=accepted)
             values["causes"] = {load: causes(view, load).values() for load in by or ()}
             _write(statistics, lambda out: out.write(json_of(values) + "\n"), "all statistics")
         if joints is not None:

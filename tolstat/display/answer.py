@@ -1,26 +1,30 @@
 """The answer to a question: tables, figures and sentences in reading order, and facts by name.
 
 A question returns an `Answer`; terminal, page, JSON, CSV and notebook are generic functions of it. It imports from here
-all that an answer is made of.
+all that an answer is made of, and what the reader of a page asks for.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from tolstat.common.errors import TolstatError
 from tolstat.display import drawing, style, text
-from tolstat.display.blocks import Axes, Block, Facts, Listing, Panel, Panels, Reader, Text
-from tolstat.display.table import Column, Row, Rows, as_block, has, has_unresolved
+from tolstat.display.blocks import Artist, Axes, Block, Facts, Figure, Listing, Panel, Panels, Reader, Text
+from tolstat.display.progress import Tell, silent
+from tolstat.display.table import Column, Row, Rows, as_block, by_share, has, has_unresolved, of_shares, plain
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
 
-__all__ = ["Answer", "Axes", "Column", "Document", "Listing", "Panel", "Panels", "Part", "Reader", "Row", "Rows"]
-__all__ += ["Sentence", "Sheet", "Table", "Text", "has", "has_unresolved"]
+__all__ = ["Answer", "Artist", "Asked", "Axes", "Column", "Document", "Figure", "Listing", "Panel", "Panels", "Part"]
+__all__ += ["Reader", "Row", "Rows", "Sentence", "Sheet", "Table", "Text", "by_share", "has"]
+__all__ += ["has_unresolved", "of_shares", "plain"]
 
 Place = Literal["lead", "note", "warning"]
 
@@ -189,3 +193,43 @@ def _block(part: Part) -> Block | None:
     if isinstance(part, Table):
         return as_block(part.title, part.columns, part.for_people, part.verdicts) if part.columns else None
     return None if isinstance(part, Document | Sheet) else part
+
+
+@dataclass(frozen=True)
+class Asked:
+    """Settings of a page that its sections follow.
+
+    Attributes
+    ----------
+    path : Path
+        The result file.
+    accepted : float
+        Accepted share: share of the joints that may be above a limit; NaN if none is given.
+    replay : int
+        Number of joints whose load histories are evaluated; without stored histories they are simulated again. With 0
+        the page shows no histories.
+    notes : list of str
+        Remarks that concern the whole page; sections append to it.
+    stage : callable
+        Called with the name of each part of the page when its computation begins.
+    processes : int
+        Number of processes that make the page, whose bytes do not depend on it.
+    """
+
+    path: Path
+    accepted: float = math.nan
+    replay: int = 0
+    notes: list[str] = field(default_factory=list)
+    stage: Tell = silent
+    processes: int = 1
+
+    @contextmanager
+    def noting(self, what: str) -> Iterator[None]:
+        """Turn a `TolstatError` into a note that begins with `what`, so that the rest of the page is still made.
+
+        The note names the file without its folder, so that the page does not depend on the folder.
+        """
+        try:
+            yield
+        except TolstatError as error:
+            self.notes.append(f"{what}: {str(error).splitlines()[0].replace(str(self.path), self.path.name)}")

@@ -8,9 +8,11 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist as Artist
     from matplotlib.axes import Axes as Axes
+    from matplotlib.figure import Figure as Figure
 else:
-    Axes = Any  # an annotation, for which matplotlib is not imported
+    Artist = Axes = Figure = Any  # annotations, for which matplotlib is not imported
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,7 @@ from numpy.typing import ArrayLike
 
 from tolstat.display import style, text
 from tolstat.display.blocks import Panel
-from tolstat.display.mpl import figure as figures
-from tolstat.display.mpl import mpl, ticker
+from tolstat.display.style import ticker
 from tolstat.display.unseen import visible
 
 if TYPE_CHECKING:
@@ -48,7 +47,7 @@ def settings() -> Iterator[None]:
         "legend.edgecolor": "none",
         "svg.fonttype": "none",  # keep text as text: small, sharp, searchable, readable aloud
     }
-    with style.settings(), mpl.rc_context(given):
+    with style.settings(given):
         yield
 
 
@@ -71,7 +70,7 @@ def svg(panel: Panel) -> tuple[str, tuple[float, ...]]:
         Left, right, upper, lower edge of the axes, points from the left and the top; loads at both ends of the x axis.
     """
     with settings():
-        figure = figures.Figure(figsize=panel.size, dpi=72)
+        figure = style.new_figure(figsize=panel.size, dpi=72)
         ax = figure.add_axes(_place(panel))
         panel.draw(ax)
         buffer = io.StringIO()
@@ -92,7 +91,7 @@ def sheet(panels: Sequence[Panel], title: str = "", notes: Sequence[str] = (), c
     head, foot = wrap(title, 44 * columns), [line for note in notes for line in wrap(note, 62 * columns)]
     size = (columns * panels[0].size[0], sum(heights) + 0.35 * len(head) + 0.2 * len(foot))
     with settings():
-        figure = figures.Figure(figsize=size, layout="constrained")
+        figure = style.new_figure(figsize=size, layout="constrained")
         axes = figure.subplots(len(heights), columns, squeeze=False, height_ratios=heights)
         for panel, ax in zip(panels, axes.flat, strict=True):
             panel.draw(ax)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import base64
+import hashlib
 import json
 import re
 from collections.abc import Callable, Sequence
@@ -12,9 +14,11 @@ from typing import Any
 import jinja2
 from markupsafe import Markup
 
+import tolstat
+from tolstat.common.files import atomic_write
 from tolstat.common.forked import mapped
 from tolstat.display import drawing, style
-from tolstat.display.blocks import Block, Decision, Panel, Panels
+from tolstat.display.blocks import Block, Decision, Page, Panel, Panels
 from tolstat.display.unseen import visible
 
 TEMPLATES = Path(__file__).parent / "templates"
@@ -77,3 +81,36 @@ def _data(value: Any) -> Markup:
 
 def _shown(value: Any) -> Any:
     return visible(value) if isinstance(value, str) and not isinstance(value, Markup) else value
+
+
+POLICY = (
+    "default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'; script-src {}"
+)
+"""Content-Security-Policy: nothing is loaded or sent; pictures and page have styles of their own."""
+
+
+def write(page: Page, path: Path, processes: int = 1) -> None:
+    """Write a page; the same page gives the same bytes, with any number of processes.
+
+    Parameters
+    ----------
+    page : Page
+        The page.
+    path : Path
+        HTML file.
+    processes : int
+        Number of processes that draw pictures.
+    """
+    drawn = figures([block for section in page.sections for block in section.blocks], processes)
+    script = (TEMPLATES / "page.js").read_text(encoding="utf-8")
+    template = environment(drawn).get_template("page.html.j2")
+    text = template.render(
+        page=page, version=tolstat.__version__, script=Markup(script), policy=POLICY.format(allowed(script))
+    )
+    with atomic_write(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def allowed(script: str) -> str:
+    """Source of a Content-Security-Policy that lets one script run: its SHA-256."""
+    return f"'sha256-{base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()}'"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
@@ -12,14 +12,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tolstat.common.files import atomic_write
+from tolstat.common.late import Late
 from tolstat.common.load_kinds import Kind
 from tolstat.common.loads import PANELS, QUANTITY
-from tolstat.display.mpl import figure as figures
-from tolstat.display.mpl import mpl, ticker
 
 if TYPE_CHECKING:
+    import matplotlib.figure
+    from matplotlib import lines as lines
+    from matplotlib import markers as markers
+    from matplotlib import patches as patches
+    from matplotlib import ticker as ticker
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+else:
+    matplotlib = Late("matplotlib")
+    lines, markers, patches, ticker = (Late(f"matplotlib.{name}") for name in ("lines", "markers", "patches", "ticker"))
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#56B4E9")
 """Colours of bushings 1 to 4: the four of Okabe and Ito's colours (2008) that dichromats tell apart best."""
@@ -74,7 +81,7 @@ _SETTINGS: Any = {
 
 def shades(first: float = 0.0, last: float = 0.88) -> list[str]:
     """Twelve colours of viridis, which stay in order in grey and for colour-blind readers."""
-    return [mpl.colors.to_hex(mpl.colormaps["viridis"](x)) for x in np.linspace(first, last, 12)]
+    return [matplotlib.colors.to_hex(matplotlib.colormaps["viridis"](x)) for x in np.linspace(first, last, 12)]
 
 
 @cache
@@ -102,10 +109,15 @@ def style_sheet() -> str:
 
 
 @contextmanager
-def settings() -> Iterator[None]:
-    """Apply the common style inside the context; the caller's settings are restored afterwards."""
-    with mpl.rc_context(_SETTINGS):
+def settings(others: Mapping[str, Any] | None = None) -> Iterator[None]:
+    """Apply the common style, and `others`, inside the context; the caller's settings are restored afterwards."""
+    with matplotlib.rc_context(_SETTINGS | (others or {})):
         yield
+
+
+def new_figure(**look: Any) -> Figure:
+    """Make a figure that is drawn into files only."""
+    return matplotlib.figure.Figure(**look)
 
 
 def panels(title: str, subtitle: str) -> tuple[Figure, list[tuple[str, Kind, Axes]]]:
@@ -123,7 +135,7 @@ def panels(title: str, subtitle: str) -> tuple[Figure, list[tuple[str, Kind, Axe
     panels : list of (group, kind, Axes)
         One for each of `loads.PANELS`.
     """
-    figure = figures.Figure(figsize=(11.0, 8.5))
+    figure = new_figure(figsize=(11.0, 8.5))
     axes = figure.subplots(2, 2).ravel()
     figure.subplots_adjust(left=0.085, right=0.975, top=0.82, bottom=0.125, hspace=0.42, wspace=0.16)
     figure.text(0.02, 0.972, title, fontsize=15, fontweight="bold", va="top")

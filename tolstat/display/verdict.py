@@ -1,67 +1,79 @@
-"""Verdict on the share of the joints that do not last: one sentence, the same in text, on the page and in JSON."""
+"""Verdicts on shares of the joints: one sentence each, the same in text, on the page and in JSON."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 from tolstat.display import text
 from tolstat.display.table import Row
 
-WORDS = {"yes": "Kept", "no": "Not kept", "open": "Open", "none": "No verdict"}
+WORDS = {
+    "yes": "kept",
+    "searched": "consistent with what was searched",
+    "no": "not kept",
+    "open": "open",
+    "none": "no verdict",
+}
 """Answers in words."""
 
 
 class Verdict(NamedTuple):
-    """A verdict.
+    """A verdict on the limits of a campaign, or on a life that its study requires.
 
     Attributes
     ----------
-    about : str
-        What it is on, in words: ``bearing life``.
     answer : str
-        ``yes``, ``no``, ``open``, ``none`` (no verdict); empty if no accepted share is given and a share can be.
-    words : str
-        The rest of the sentence, without full stop.
+        ``yes``, ``searched``, ``no``, ``open``, ``none`` (no verdict); empty if no accepted share is given and a share
+        can be.
+    value, words : str
+        The answer or, without one, a share or its interval; the rest of the sentence, without full stop.
+    notes : tuple of str
+        Causes, remedies, and what else restricts the verdict.
+    load : str
+        The load whose limit it is about: of several, that most joints exceed. Empty if there is no verdict on limits.
+    stands_on : mapping, optional
+        What a verdict on limits stands on, see `sentences.values`; None if that question does not apply.
+    about : str
+        What a verdict on a life is on, in words: ``bearing life``.
     share, lower, upper : float
         Share of the joints that do not last, with its interval; NaN if unknown.
-    notes : tuple of str
-        What restricts the verdict.
     """
 
-    about: str
     answer: str
+    value: str
     words: str
+    notes: tuple[str, ...] = ()
+    load: str = ""
+    stands_on: Mapping[str, Any] | None = None
+    about: str = ""
     share: float = math.nan
     lower: float = math.nan
     upper: float = math.nan
-    notes: tuple[str, ...] = ()
-
-    @property
-    def value(self) -> str:
-        """The first words: the answer or, without one, the share or its interval."""
-        share = text.span(self.lower, self.upper) if math.isnan(self.share) else text.percent(self.share)
-        return WORDS.get(self.answer, share)
-
-    @property
-    def shade(self) -> str:
-        """``yes``, ``no`` or ``open`` of the page."""
-        return "open" if self.answer == "none" else self.answer
 
     @property
     def sentence(self) -> str:
         """The whole sentence, without full stop."""
-        return f"{self.value}{':' if self.answer else ''} {self.words}"
+        return f"{self.value}{',' if self.is_turned else ':' if self.answer else ''} {self.words}"
+
+    @property
+    def is_turned(self) -> bool:
+        """Whether what is assumed decides the verdict."""
+        return bool(self.stands_on and self.stands_on["turned_by"])
+
+    @property
+    def shade(self) -> str:
+        """``yes``, ``no`` or ``open`` of the page: also open where what is assumed, or was not searched, decides."""
+        return "open" if self.is_turned or self.answer in ("none", "searched") else self.answer
 
     def values(self) -> dict[str, Any]:
-        """JSON values: the answer in words, null without one, the sentence, and the other attributes."""
-        known = {"share": self.share, "lower": self.lower, "upper": self.upper}
-        numbers = {name: None if math.isnan(value) else float(value) for name, value in known.items()}
-        answer = WORDS[self.answer].lower() if self.answer else None
-        return (
-            {"about": self.about, "answer": answer, "sentence": self.sentence} | numbers | {"notes": list(self.notes)}
-        )
+        """JSON values: the answer of the joints as drawn in words, null without one, the sentence, other attributes."""
+        found: dict[str, Any] = {"about": self.about, "answer": WORDS.get(self.answer), "stands_on": self.stands_on}
+        found |= {"sentence": self.sentence, "share": self.share, "lower": self.lower, "upper": self.upper}
+        others = ("stands_on",) if self.about else ("about", "share", "lower", "upper")
+        shown = {key: value for key, value in found.items() if key not in others}
+        return {**text.plain(shown), "notes": list(self.notes)}
 
 
 def on_share(
@@ -114,4 +126,5 @@ def on_share(
         answer, words = "open", f"{told}; {most} is accepted; {number} decide it"
     else:
         answer, words = "", rest
-    return Verdict(about, answer, words, share, *ends)
+    value = text.capital(WORDS[answer]) if answer else (numbers or ["-"])[0]
+    return Verdict(answer, value, words, about=about, share=share, lower=ends[0], upper=ends[1])

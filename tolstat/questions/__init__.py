@@ -20,8 +20,7 @@ from tolstat.common.errors import NotApplicable, StoreError
 from tolstat.display.blocks import Block, Section, Text
 
 if TYPE_CHECKING:
-    from tolstat.display.answer import Answer
-    from tolstat.display.asked import Asked
+    from tolstat.display.answer import Answer, Asked
     from tolstat.store.view import View
 
 

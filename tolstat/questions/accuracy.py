@@ -13,8 +13,7 @@ from tolstat.common.load_kinds import KIND, LOAD_KINDS
 from tolstat.common.loads import UNIT_OF_LOAD, FloatArray, load_of
 from tolstat.common.tables import Status
 from tolstat.display import text
-from tolstat.display.answer import Answer, Sentence, Table
-from tolstat.display.table import Column, Rows
+from tolstat.display.answer import Answer, Column, Rows, Sentence, Table
 from tolstat.questions.shares import inapplicable, word
 from tolstat.store.verification import Verification
 from tolstat.store.view import View

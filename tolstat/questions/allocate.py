@@ -23,10 +23,8 @@ from tolstat.common.loads import ANY_LIMIT, FloatArray, split, unit_text
 from tolstat.common.tables import Status
 from tolstat.common.units import DISPLAY_UNITS
 from tolstat.display import text
-from tolstat.display.answer import Answer, Document, Part, Sentence, Table
-from tolstat.display.blocks import Listing
+from tolstat.display.answer import Answer, Column, Document, Listing, Part, Row, Rows, Sentence, Table
 from tolstat.display.options import Costs, Delivery, Opt
-from tolstat.display.table import Column, Row, Rows
 from tolstat.store import error_budget
 from tolstat.store.hdf5 import store_error
 from tolstat.store.view import View

@@ -17,8 +17,7 @@ from tolstat.common.forked import mapped
 from tolstat.common.loads import ANY_LIMIT
 from tolstat.common.tables import VALID
 from tolstat.display import text
-from tolstat.display.answer import Answer, Column, Part, Rows, Sentence, Table
-from tolstat.display.asked import Asked
+from tolstat.display.answer import Answer, Asked, Column, Part, Rows, Sentence, Table
 from tolstat.display.options import Delivery, Opt
 from tolstat.questions import shares
 from tolstat.store import error_budget, known_parts

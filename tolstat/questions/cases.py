@@ -13,8 +13,7 @@ from tolstat.campaign.remedy import remedy
 from tolstat.common import selected_results
 from tolstat.common.load_kinds import BUSHINGS
 from tolstat.common.tables import Status, Variant
-from tolstat.display.answer import Answer, Document, Part, Sentence, Table
-from tolstat.display.table import Row, Rows, plain
+from tolstat.display.answer import Answer, Document, Part, Row, Rows, Sentence, Table, plain
 from tolstat.questions.shares import inapplicable, rows_of
 from tolstat.solver import refinement
 from tolstat.store import Reader, recorded, verification

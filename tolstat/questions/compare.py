@@ -22,10 +22,9 @@ from tolstat.common.loads import ANY_LIMIT, FloatArray, unit_text
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import Status
 from tolstat.display import drawing, style, text
-from tolstat.display.answer import Answer, Axes, Column, Row, Rows, Sentence, Table
-from tolstat.display.blocks import Panel, Panels
-from tolstat.display.mpl import patches
+from tolstat.display.answer import Answer, Axes, Column, Panel, Panels, Row, Rows, Sentence, Table
 from tolstat.display.options import Loads
+from tolstat.display.style import patches
 from tolstat.questions.shares import NO_INTERVALS, inapplicable, share, word
 from tolstat.store.view import View
 

@@ -13,9 +13,8 @@ from tolstat.common.loads import FloatArray
 from tolstat.common.tables import VALID
 from tolstat.common.units import DISPLAY_UNITS
 from tolstat.display import drawing, style, text
-from tolstat.display.answer import Answer, Axes, Panel, Panels, Part, Sentence
-from tolstat.display.asked import Asked
-from tolstat.display.mpl import ticker
+from tolstat.display.answer import Answer, Asked, Axes, Panel, Panels, Part, Sentence
+from tolstat.display.style import ticker
 from tolstat.questions.shares import inapplicable
 from tolstat.store.view import View
 from tolstat.study import axes

@@ -13,9 +13,7 @@ from tolstat.common import units
 from tolstat.common.load_kinds import PINS
 from tolstat.common.tables import FAILED, STATUS_TEXT, UNSETTLED, Mode, Status
 from tolstat.display import drawing, style, text
-from tolstat.display.answer import Answer, Axes, Panel, Panels, Part, Sentence, Table
-from tolstat.display.asked import Asked
-from tolstat.display.table import Column, Rows
+from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Part, Rows, Sentence, Table
 from tolstat.questions.shares import inapplicable, rows_of, share, word
 from tolstat.store.view import View
 from tolstat.study.tolerances import meaning

@@ -8,9 +8,8 @@ from functools import partial
 from tolstat.analysis.sample import CONFIDENCE
 from tolstat.common.loads import ANY_LIMIT
 from tolstat.display import drawing, style, text
-from tolstat.display.answer import Answer, Axes, Column, Part, Row, Rows, Sentence, Table
-from tolstat.display.blocks import Panel, Panels, Text
-from tolstat.display.mpl import lines
+from tolstat.display.answer import Answer, Axes, Column, Panel, Panels, Part, Row, Rows, Sentence, Table, Text
+from tolstat.display.style import lines
 from tolstat.questions import shares
 from tolstat.store import known_parts as known
 from tolstat.store.view import View

@@ -11,7 +11,6 @@ from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import bdtr
 
 from tolstat.analysis import clustered, prediction
 from tolstat.analysis.clustered import Clustered, Delivery
@@ -19,12 +18,13 @@ from tolstat.analysis.column import Column as Values
 from tolstat.analysis.sample import CONFIDENCE, Sample, total_interval
 from tolstat.campaign.work import Work
 from tolstat.common.errors import Fault, InputError, NotApplicable, StoreError
+from tolstat.common.late import special
 from tolstat.common.loads import ANY_LIMIT
 from tolstat.common.tables import VALID
 from tolstat.display import drawing, style, text
-from tolstat.display.answer import Answer, Axes, Column, Panel, Panels, Row, Rows, Sentence, Table, has, has_unresolved
-from tolstat.display.asked import Asked
+from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Row, Rows, Sentence, Table
 from tolstat.display.options import Accepted, Opt
+from tolstat.display.table import has, has_unresolved
 from tolstat.questions import shares
 from tolstat.store import error_budget
 from tolstat.store.view import View
@@ -251,7 +251,7 @@ def _draw(ax: Axes, above: Integers, n: Integers, size: int) -> None:
     top = max(2, int(np.ceil(size * min(1.0, share[-1] * 1.15 + 1.0 / size))))
     at, x = np.arange(top + 1), np.arange(top + 2) / size
     expected = np.cumsum(clustered.law_of(above, n).delivery(size).probability)[at]
-    alone = bdtr(at, size, above.sum() / n.sum())
+    alone = special.bdtr(at, size, above.sum() / n.sum())
     for cdf, colour, dash in ((alone, style.FAINT, style.DASHES[2]), (expected, style.COLOURS[1], style.DASHES[1])):
         ax.step(x, 100.0 * np.append(cdf, cdf[-1]), where="post", color=colour, ls=dash)
     steps = 100.0 * np.arange(1, share.size + 1) / share.size

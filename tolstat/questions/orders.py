@@ -14,9 +14,8 @@ from tolstat.common.load_kinds import LOAD_KINDS, ORDERS, SHAFTS
 from tolstat.common.loads import LOADS, FloatArray, load_of
 from tolstat.common.tables import VALID
 from tolstat.display import drawing, style, text
-from tolstat.display.answer import Answer, Axes, Column, Panel, Panels, Part, Row, Rows, Sentence, Table, has
-from tolstat.display.asked import Asked
-from tolstat.display.mpl import lines, patches, ticker
+from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Part, Row, Rows, Sentence, Table, has
+from tolstat.display.style import lines, patches, ticker
 from tolstat.questions.shares import unusable, value, values, word
 from tolstat.store import revolutions
 from tolstat.store.points import point_of

@@ -13,8 +13,7 @@ from tolstat.common import units
 from tolstat.common.errors import InputError, NotApplicable
 from tolstat.common.tables import VALID
 from tolstat.display import drawing, style, text
-from tolstat.display.answer import Answer, Axes, Column, Panel, Panels, Row, Rows, Sentence, Table
-from tolstat.display.asked import Asked
+from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Row, Rows, Sentence, Table
 from tolstat.display.options import Opt
 from tolstat.joint.perturbation import HOLE_OF_PIN
 from tolstat.questions import shares

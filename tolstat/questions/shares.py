@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any, NamedTuple
 
 from tolstat.analysis import binomial
+from tolstat.analysis.design import Claim
 from tolstat.analysis.estimates import Exceedance
 from tolstat.analysis.prediction import DELIVERY
 from tolstat.analysis.sample import total_interval
@@ -53,6 +54,11 @@ def limit(row: Row) -> str:
     return "-" if row["load"] == ANY_LIMIT else text.value(row["limit"], row["unit"])
 
 
+def with_ends(name: str, estimate: Iterable[float]) -> dict[str, float]:
+    """Keys and values of an estimate and the ends of its interval: ``NAME``, ``NAME_lower``, ``NAME_upper``."""
+    return {f"{name}{end}": float(value) for end, value in zip(("", "_lower", "_upper"), estimate, strict=True)}
+
+
 def rows_of(columns: Mapping[str, Iterable[Any]]) -> list[dict[str, Any]]:
     """Rows of a table from its columns, which are of one length."""
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
@@ -66,6 +72,26 @@ def inapplicable(view: View, found: str, remedy: str) -> NotApplicable:
 def unusable(view: View, found: str, remedy: str) -> StoreError:
     """Make the error of a file that cannot be used for a question."""
     return StoreError(str(Fault(str(view.path), found, remedy)))
+
+
+def check_sample(view: View, statistic: Claim, whole: bool = False) -> None:
+    """Refuse joints that are no sample of a production, or do not support a statistic; or that are not `whole`.
+
+    Raises
+    ------
+    StoreError
+        Joints are not drawn from tolerances, form a pick-freeze design, or are a part of the campaign's. The hint names
+        what can be used.
+    """
+    view.check_drawn()
+    view.check(statistic)
+    if view.study.groups:
+        remedy = 'give the file of a study with sampling.method "random", "sobol" or "lhs"'
+        raise unusable(view, "holds a pick-freeze design", remedy)
+    if whole and not view.store.whole:
+        raise unusable(
+            view, "holds a part of the campaign only", "merge all slices first: tolstat merge SLICE... --out FILE"
+        )
 
 
 def grouped(reasons: Iterable[tuple[str, str]]) -> str:

@@ -15,8 +15,7 @@ from tolstat.analysis.weighted import Weighted
 from tolstat.common.errors import NotApplicable
 from tolstat.common.loads import ANY_LIMIT, FloatArray
 from tolstat.display import drawing, style, text
-from tolstat.display.answer import Answer, Axes, Column, Panel, Panels, Row, Rows, Table, Text
-from tolstat.display.asked import Asked
+from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Row, Rows, Table, Text
 from tolstat.display.options import Costs
 from tolstat.questions import shares
 from tolstat.store import error_budget

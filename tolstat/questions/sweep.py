@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from fnmatch import fnmatchcase
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,19 +16,13 @@ from tolstat.common.strict import read_section
 from tolstat.common.tables import ERROR_FIELDS, FAILED, SIMULATED, UNSETTLED, Status
 from tolstat.common.units import DISPLAY_UNITS
 from tolstat.display import drawing, style, text
-from tolstat.display.answer import Answer, Axes, Part, Row, Sheet, Table
-from tolstat.display.blocks import Panel, Panels
-from tolstat.display.mpl import lines, ticker
-from tolstat.display.table import plain
+from tolstat.display.answer import Answer, Artist, Axes, Figure, Panel, Panels, Part, Row, Sheet, Table, plain
+from tolstat.display.style import lines, ticker
 from tolstat.questions.shares import inapplicable, rows_of
 from tolstat.store import recorded
 from tolstat.store.view import View
 from tolstat.study.selection import UNITS
 from tolstat.study.swept import KEYS
-
-if TYPE_CHECKING:
-    from matplotlib.artist import Artist
-    from matplotlib.figure import Figure
 
 MAX_LEGEND = 6
 """Maximum number of values of the second swept quantity in the legend."""

@@ -20,10 +20,9 @@ from tolstat.common.loads import FloatArray
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import Status
 from tolstat.display import drawing, text
-from tolstat.display.answer import Answer, Axes, Column, Part, Row, Rows, Sentence, Table
-from tolstat.display.blocks import Panel, Panels
+from tolstat.display.answer import Answer, Axes, Column, Panel, Panels, Part, Row, Rows, Sentence, Table
 from tolstat.display.options import Loads, Opt
-from tolstat.questions.shares import NO_INTERVALS, Cell, unusable
+from tolstat.questions.shares import NO_INTERVALS, Cell, unusable, with_ends
 from tolstat.store import revolutions
 from tolstat.store.view import View
 from tolstat.study.selection import Entry, quantity
@@ -175,18 +174,14 @@ def _row(name: str, level: float, time: FloatArray, design: Design) -> Row:
     sample = Sample.of(time, np.full(time.size, Status.OK), design)
     above, known = sample.above(0.0, CONFIDENCE), design.has_interval("mean")
     row = {"load": name, "unit": CHANNELS[name].unit, "level": float(level)}
-    row |= _ends("joints_above", above.estimate, above.lower, above.upper)
+    row |= with_ends("joints_above", (above.estimate, above.lower, above.upper))
     # a variable in [0, 1] has at most the variance of a Bernoulli variable with the same mean
     mean = binomial.clopper_pearson(time.sum(), time.size, CONFIDENCE) if known else (np.nan, np.nan)
-    row |= _ends("time", time.mean(), *mean)
+    row |= with_ends("time", (time.mean(), *mean))
     for share in SHARES:
         q = sample.quantile(share, CONFIDENCE)
-        row |= _ends(f"time_{100 * share:g}", q.estimate, *np.clip([q.lower, q.upper], 0.0, 1.0))
+        row |= with_ends(f"time_{100 * share:g}", (q.estimate, *np.clip([q.lower, q.upper], 0.0, 1.0)))
     return row
-
-
-def _ends(name: str, *values: Any) -> dict[str, float]:
-    return {f"{name}{end}": float(value) for end, value in zip(("", "_lower", "_upper"), values, strict=True)}
 
 
 def _panels(name: str, rows: Rows, levels: FloatArray) -> Iterator[Panel]:

@@ -7,11 +7,14 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from tolstat.common.errors import Fault, InputError
+from tolstat import questions
+from tolstat.campaign.stop_rule import BIASED
+from tolstat.common.errors import Fault, InputError, StoreError
+from tolstat.common.tables import Status
 from tolstat.display import text
-from tolstat.display.answer import Answer, Part, Sentence, Sheet, Table
+from tolstat.display.answer import Answer, Figure, Part, Sentence, Sheet, Table
 from tolstat.display.progress import silent
 from tolstat.joint.sections import mounting_and_law
 from tolstat.questions import accuracy, shares
@@ -20,15 +23,9 @@ from tolstat.questions.exceedance import answer as exceedance
 from tolstat.questions.exceedance import curves
 from tolstat.questions.exceedance.rows import curve_rows, not_kept
 from tolstat.questions.sweep import sweep
-from tolstat.report.headline import headline, tells_yield
-from tolstat.report.life import life_verdicts
+from tolstat.report.headline import headline, life_verdicts, tells_yield
 from tolstat.solver import fidelity
-from tolstat.store import Reader, recorded, viewed
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from tolstat.store.view import View
+from tolstat.store import Reader, View, recorded, viewed
 
 
 def report(view: View, accepted: float = math.nan) -> Answer:
@@ -157,20 +154,83 @@ def _notes(view: View) -> Iterator[Part]:
 def _run(view: View) -> Iterator[Part]:
     """Restrictions that come from how the campaign was run."""
     store = view.store
-    stopped = _stopped(store.stop) if store.stop.get("reached") else ""
     missing = "" if store.case_names else not_kept(view)
-    for note in (missing, stopped, fidelity.sentence(store.options, store.fidelity)):
+    for note in (missing, stopped(view), fidelity.sentence(store.options, store.fidelity)):
         if note:
             yield Sentence(note)
 
 
-def _stopped(stop: dict[str, Any]) -> str:
-    """Sentences about a campaign that its stop rule ended."""
-    from tolstat.campaign.stop_rule import BIASED
-
+def stopped(view: View) -> str:
+    """Sentences about a campaign that its stop rule ended; empty if none did."""
+    stop = view.store.stop
+    if not stop.get("reached"):
+        return ""
     confidence = f"{100 * stop['confidence']:.0f} %"
     return (
         f"stopped by {stop['rule']} at {stop['joints']} joints: {confidence} interval {stop['lower']:.5f} to "
         f"{stop['upper']:.5f}, valid after any number of looks; share {stop['estimate']:.5f}, {BIASED}. Shares and "
-        "intervals above are not corrected for the stop."
+        "intervals of this report are not corrected for the stop"
     )
+
+
+def statistics(view: View, accepted: float = math.nan) -> dict[str, Any]:
+    """Collect the statistics of a campaign.
+
+    Parameters
+    ----------
+    view : View
+        Campaign of a study whose joints are drawn from tolerances.
+    accepted : float
+        Accepted share: share of the joints that may be above each limit; NaN if none is given.
+
+    Returns
+    -------
+    dict
+        JSON values in SI units, null if unknown: ``study``, ``method``, ``confidence``; ``verdict``, with ``answer``
+        of the joints as drawn (null without an accepted share), ``stands_on``, ``sentence`` and ``notes``, null without
+        limits; ``joints``, numbers by status; ``lives``, verdicts on required lives, only where the study requires one
+        that is known without simulation; the answers ``exceedance``, ``lots``, ``bearing_life``, ``capability`` and
+        ``accuracy``, each with
+        ``facts``, ``sentences`` and ``tables``, null where the file cannot give it;
+        ``joint``, mounting of the shafts and contact law in words; ``fidelity``, a sentence on the fidelity of the
+        results; ``provenance``.
+
+    Raises
+    ------
+    StoreError
+        When the file holds listed joints or a sweep.
+
+    Examples
+    --------
+    >>> with tolstat.open(path) as store:
+    ...     found = tolstat.statistics(store.view())
+    >>> found["joints"], round(found["exceedance"]["tables"]["limits"]["rows"][0]["estimate"], 2)
+    ({'ok': 12000}, 0.15)
+    """
+    store = view.store
+    if view.method in ("cases", "sweep"):
+        remedy = "its joints are in: tolstat export --csv"
+        raise StoreError(str(Fault(str(store.path), "holds no sample of a production, and has no statistics", remedy)))
+    verdict = headline(view, accepted)
+    head = {
+        "study": view.name,
+        "method": view.method,
+        "confidence": 0.95,
+        "verdict": None if verdict is None else verdict.values(),
+        "joints": {status.label: count for status in Status if (count := view.count(status))},
+    }
+    if lives := life_verdicts(view, accepted, samples=0):
+        head["lives"] = [own.values() for own in lives]
+    provenance = {
+        "created": store.created,
+        "git_commit": store.git_commit,
+        "versions": store.versions,
+        "sampling": store.sampling,
+        "stop": store.stop,
+    }
+    found = questions.statistics(view)
+    stands_on = {
+        "joint": mounting_and_law(*recorded.mountings(store)),
+        "fidelity": fidelity.sentence(store.options, store.fidelity),
+    }
+    return head | found | stands_on | {"provenance": provenance}

@@ -2,73 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, NamedTuple
+import math
+from collections.abc import Iterator, Sequence
+from functools import partial
 
 import numpy as np
 
 from tolstat.analysis import binomial
+from tolstat.common.errors import TolstatError
 from tolstat.common.loads import ANY_LIMIT
 from tolstat.common.tables import FAILED, STATUS_TEXT, UNSETTLED, VALID
 from tolstat.display import text
 from tolstat.display.table import Row
+from tolstat.display.verdict import WORDS, Verdict
 from tolstat.questions import joints, shares
 from tolstat.questions.assumptions import sentences
 from tolstat.questions.assumptions.variations import Standing, applicable
+from tolstat.questions.bearing_life import answer as bearing_life
+from tolstat.questions.causes import lines
 from tolstat.questions.exceedance import rows as exceedance
-from tolstat.questions.exceedance.verdicts import WORDS, ends, share_of, unresolved_matter, verdict
+from tolstat.questions.exceedance.rows import ends, share_of, unresolved_matter, verdict
+from tolstat.questions.fatigue import answer as fatigue
 from tolstat.store import known_parts
 from tolstat.store.points import point_of
 from tolstat.store.view import View
 
 
-class Headline(NamedTuple):
-    """The verdict.
-
-    Attributes
-    ----------
-    answer : str
-        ``yes``, ``searched``, ``no``, ``open``, ``none`` (no verdict); empty if no accepted share is given and a share
-        can be.
-    value, words : str
-        The answer or, without one, a share or its interval; the rest of the sentence.
-    notes : tuple of str
-        Causes, remedies, and what else restricts the verdict.
-    load : str
-        The load whose limit it is about: of several, that most joints exceed. Empty if there is no verdict.
-    stands_on : mapping, optional
-        What it stands on, see `sentences.values`; None if that question does not apply.
-    """
-
-    answer: str
-    value: str
-    words: str
-    notes: tuple[str, ...] = ()
-    load: str = ""
-    stands_on: Mapping[str, Any] | None = None
-
-    @property
-    def sentence(self) -> str:
-        """The whole sentence, without full stop."""
-        return f"{self.value}{',' if self.is_turned else ':' if self.answer else ''} {self.words}"
-
-    @property
-    def is_turned(self) -> bool:
-        """Whether what is assumed decides the verdict."""
-        return bool(self.stands_on and self.stands_on["turned_by"])
-
-    @property
-    def shade(self) -> str:
-        """``yes``, ``no`` or ``open`` of the page: also open where what is assumed, or was not searched, decides."""
-        return "open" if self.is_turned or self.answer in ("none", "searched") else self.answer
-
-    def values(self) -> dict[str, Any]:
-        """JSON values: ``answer`` of the joints as drawn in words or null, ``stands_on``, ``sentence``, ``notes``."""
-        found = {"answer": WORDS.get(self.answer), "stands_on": text.plain(self.stands_on)}
-        return found | {"sentence": self.sentence, "notes": list(self.notes)}
-
-
-def headline(view: View, accepted: float = np.nan) -> Headline | None:
+def headline(view: View, accepted: float = np.nan) -> Verdict | None:
     """Verdict on the limits of a campaign.
 
     Parameters
@@ -80,14 +40,14 @@ def headline(view: View, accepted: float = np.nan) -> Headline | None:
 
     Returns
     -------
-    Headline or None
+    Verdict or None
         None without limits, and for joints that are no sample of a production.
     """
     if not (view.sampled and view.limits):
         return None
     counts = view.counts
     if not counts.done:
-        return Headline("none", WORDS["none"], "no joint has been simulated", _pending(view))
+        return Verdict("none", WORDS["none"], "no joint has been simulated", _pending(view))
     records = exceedance.limit_rows(view)
     standing = applicable(view, accepted)
     found = _yield(view, records, standing) if np.isnan(accepted) else _judged(view, records, accepted, standing)
@@ -118,7 +78,7 @@ def _needed(row: Row, accepted: float) -> str:
     return f"{text.number(joints)} joints" if joints < 1e7 else "more than 1e7 joints"
 
 
-def _judged(view: View, records: Sequence[Row], accepted: float, standing: Standing | None) -> Headline:
+def _judged(view: View, records: Sequence[Row], accepted: float, standing: Standing | None) -> Verdict:
     row, worst = _decisive(view, records), exceedance.most_exceeded(view, records)
     several = len(records) > 1
     answers = [verdict(own, accepted) for own in records]
@@ -131,9 +91,10 @@ def _judged(view: View, records: Sequence[Row], accepted: float, standing: Stand
     numbers = ", ".join(f"{answers.count(own)} {word}" for own, word in WORDS.items() if own in answers)
     notes: tuple[str, ...] = (f"of {len(records)} limits, each by itself: {numbers}",) if several else ()
     if answer == "open" and row.get("parts_lower", np.nan) <= accepted < row.get("parts_upper", np.nan):
-        notes += (f"not decided by more joints: the parts leave shares of {_open(row)} open. Measure more parts",)
+        parts = text.span(row["parts_lower"], row["parts_upper"])
+        notes += (f"not decided by more joints: the parts leave shares of {parts} open. Measure more parts",)
     if answer == "none":
-        return Headline(answer, WORDS[answer], _reason(view, [row]), notes)
+        return Verdict(answer, WORDS[answer], _reason(view, [row]), notes)
     value, words = _sentence(view, row, accepted, answer, standing)
     if first := _without_errors(view):
         words = f"{first}. {words}" if value == WORDS[answer] else f"{words}. {text.capital(first)}"
@@ -142,11 +103,9 @@ def _judged(view: View, records: Sequence[Row], accepted: float, standing: Stand
     elif several and worst["count"] and not np.isnan(worst["estimate"]):
         words += _most_often(view, records, worst)
     if value == WORDS["no"]:
-        from tolstat.questions.causes import lines  # simulates, which other verdicts need not wait for
-
         better = lines.advice(view, row["load"], accepted)
         words += f". {better}" if better else ""
-    return Headline(answer, value, words, notes, worst["load"])
+    return Verdict(answer, value, words, notes, worst["load"])
 
 
 def _sentence(view: View, row: Row, accepted: float, answer: str, standing: Standing | None) -> tuple[str, str]:
@@ -205,10 +164,6 @@ def _decisive(view: View, records: Sequence[Row]) -> Row:
     return exceedance.all_limits(view) if len(records) > 1 else records[0]
 
 
-def _open(row: Row) -> str:
-    return text.span(row["parts_lower"], row["parts_upper"])
-
-
 def _untold(view: View, records: Sequence[Row]) -> str:
     """Why the verdict is on one of several limits."""
     return f"No share of the joints that exceed at least one limit: {_reason(view, [_decisive(view, records)])}"
@@ -233,7 +188,7 @@ def _most_often(view: View, records: Sequence[Row], worst: Row) -> str:
     return f". Most often {_limit(view, worst)}: {share_of(worst)}{others}"
 
 
-def _yield(view: View, records: Sequence[Row], standing: Standing | None) -> Headline:
+def _yield(view: View, records: Sequence[Row], standing: Standing | None) -> Verdict:
     """Without an accepted share: share of the joints that keep all limits; of weighted joints, that exceed any."""
     without = view.design.without_interval("share")
     notes: tuple[str, ...] = (without,) if without else ()
@@ -242,11 +197,11 @@ def _yield(view: View, records: Sequence[Row], standing: Standing | None) -> Hea
         if np.isnan(row["estimate"]):
             known = [own for own in records if not np.isnan(own["estimate"])]
             if len(records) == 1 or not known or _undecided(known):
-                return Headline("none", WORDS["none"], _reason(view, [row]), notes)
+                return Verdict("none", WORDS["none"], _reason(view, [row]), notes)
             notes += (_untold(view, records),)
             row = worst = exceedance.most_exceeded(view, known)
         if _undecided([row]) or np.isnan(ends(row)[0]):
-            return Headline("none", WORDS["none"], _reason(view, [row]), notes)
+            return Verdict("none", WORDS["none"], _reason(view, [row]), notes)
         interval = "total interval" if unresolved_matter(row) else f"total interval {text.span(*ends(row))}"
         missed = row["unsearched_upper"]
         missed = "" if np.isnan(missed) else f"; whatever the proposals miss, at most {text.percent(missed)}"
@@ -254,13 +209,13 @@ def _yield(view: View, records: Sequence[Row], standing: Standing | None) -> Hea
         said = f"of the joints exceed {_words(view, row)}{most} ({interval}{missed})"
         if row["load"] == ANY_LIMIT and worst["count"] and not np.isnan(worst["estimate"]):
             said += _most_often(view, records, worst)
-        return Headline("", share_of(row), said, notes, worst["load"])
+        return Verdict("", share_of(row), said, notes, worst["load"])
     found = shares.together(shares.good(view), len(view.limits))
     if not found.decides:
-        return Headline("none", WORDS["none"], _reason(view, [_decisive(view, records)]), notes)
+        return Verdict("none", WORDS["none"], _reason(view, [_decisive(view, records)]), notes)
     behind = [sentences.reach(standing) if standing else "", text.capital(_without_errors(view))]
     words = ". ".join([found.words + _not_varied(view, standing), *filter(None, behind)])
-    return Headline("", found.value, words, notes, exceedance.most_exceeded(view, records)["load"])
+    return Verdict("", found.value, words, notes, exceedance.most_exceeded(view, records)["load"])
 
 
 def _undecided(records: Sequence[Row]) -> bool:
@@ -299,3 +254,34 @@ def _causes(view: View) -> Iterator[str]:
 def _pending(view: View) -> tuple[str, ...]:
     pending = view.counts.total - view.counts.done
     return (f"{pending} of {view.counts.total} joints are still pending",) if pending else ()
+
+
+SAMPLES = 1000
+"""Maximum number of joints that are simulated again for the stresses of their parts."""
+
+
+def life_verdicts(view: View, accepted: float = math.nan, samples: int | None = None) -> list[Verdict]:
+    """Verdicts on the lives that the study of a campaign requires; none of joints that are no sample of a production.
+
+    Parameters
+    ----------
+    view : View
+        The campaign; it may be unfinished.
+    accepted : float
+        Accepted share: share of the joints that may have a shorter life; NaN if none is given.
+    samples : int, optional
+        Number of joints that may be simulated again; by default `SAMPLES`, and none while joints are pending.
+    """
+    if not (view.sampled and view.count(*VALID)):
+        return []
+    if samples is None:
+        samples = SAMPLES if view.counts.done == view.counts.total else 0
+    found: list[Verdict] = []
+    of_parts = partial(fatigue.life_verdicts, samples=samples)
+    for about, verdicts in (("bearing life", bearing_life.life_verdicts), ("failures of parts", of_parts)):
+        try:
+            found += verdicts(view, accepted)
+        except TolstatError as error:
+            reason = str(error).splitlines()[0].replace(str(view.path), view.path.name)
+            found.append(Verdict("none", "No verdict", f"{about}: {reason}", about=about))
+    return found

@@ -5,28 +5,37 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
 from tolstat import questions
-from tolstat.common.errors import Fault, NotApplicable, StoreError
+from tolstat.common import notation, units
+from tolstat.common.errors import Fault, NotApplicable, StoreError, TolstatError
+from tolstat.common.strict import validate
 from tolstat.common.tables import SCHEMA_VERSION
-from tolstat.display.asked import Asked
+from tolstat.display import text
+from tolstat.display.answer import Asked
 from tolstat.display.blocks import Facts, Listing, Page, Panels, Section, Text
 from tolstat.display.progress import silent
-from tolstat.display.text import sentence
+from tolstat.display.text import capital, sentence
+from tolstat.joint import Joint, load
+from tolstat.joint.derived import DERIVED, UNITS
+from tolstat.joint.model import TOLD
+from tolstat.joint.overrides import leaves
+from tolstat.joint.reading import DEFAULT_JOINT, examples
+from tolstat.joint.sections import mounting_and_law, quantities
+from tolstat.questions.assumptions.variations import AXIAL, LAW
 from tolstat.questions.causes import worst
 from tolstat.questions.causes.lines import lines_on_page
-from tolstat.report import joint_values, scene
+from tolstat.report import verdict
+from tolstat.report.answer import stopped
 from tolstat.solver import fidelity
-from tolstat.store import recorded, viewed
+from tolstat.store import Reader, recorded, viewed
 from tolstat.store.points import point_of
 from tolstat.store.recorded import joint_of
-
-if TYPE_CHECKING:
-    from tolstat.store.reader import Reader
-    from tolstat.store.view import View
+from tolstat.store.view import View
+from tolstat.study.assumptions import assumptions, unselected
 
 REPLAYED = 1000
 """Default number of joints whose load histories are evaluated: some 2 s if they are simulated again."""
@@ -89,7 +98,7 @@ def write_page(
         asked = Asked(view.path, accepted, replay, stage=stage, processes=processes)
         made = compose_brief(view.at(point), asked) if brief else compose(view.at(point), asked, full)
         stage("page: pictures")  # drawn from the view
-        from tolstat.report import html
+        from tolstat.display import html
 
         html.write(made, Path(out), processes)
     return Path(out)
@@ -101,8 +110,6 @@ def compose(view: View, asked: Asked, full: bool = False) -> Page:
     What cannot be evaluated is left out, and a note in the first section says why.
     """
     worst.begin_replay(view, asked)
-    from tolstat.report import verdict  # draws, and takes long to import: joints are being simulated
-
     asked.notes.extend(_notes(view))
     if len(view.points) > 1:
         point = point_of(view, view.most_exceeded) if view.leading else view.points[0]
@@ -112,7 +119,7 @@ def compose(view: View, asked: Asked, full: bool = False) -> Page:
     sections.sort(key=lambda section: section.folded)
     listings = (
         Facts(tuple(_facts(view.store)), "Provenance"),
-        joint_values.listing(view.store),
+        joint_values(view.store),
         Listing("The study as it was run", view.store.study_text),
     )
     return _page(view, [verdict.section(view, asked), *sections], listings, full)
@@ -120,8 +127,6 @@ def compose(view: View, asked: Asked, full: bool = False) -> Page:
 
 def compose_brief(view: View, asked: Asked) -> Page:
     """Compose the page that prints on one sheet: verdict with its drawing, and the line of the drawing to change."""
-    from tolstat.report import verdict
-
     asked.notes.extend(_notes(view))
     sections = [verdict.section(view, asked)]
     with asked.noting("nothing on the lines of the drawing"), suppress(NotApplicable):
@@ -138,7 +143,7 @@ def _page(
     return Page(
         view.name,
         joint_of(store, 0).description,
-        scene.lines(view),
+        scene(view),
         sections,
         f"{sentence(view.head())} Sampling {store.sampling['method']}, seed {store.sampling['seed']}; "
         f"begun {store.created}; tolstat {store.versions.get('tolstat', 'of unknown version')}; "
@@ -151,20 +156,13 @@ def _page(
 def _notes(view: View) -> Iterator[str]:
     """What restricts the numbers of the whole page."""
     for note in (
-        scene.exact(view),
+        exact(view),
         fidelity.sentence(view.store.options, view.store.fidelity),
-        _stopped(view),
+        stopped(view),
         recorded.note_on_mounting(view.store),
     ):
         if note:
             yield note
-
-
-def _stopped(view: View) -> str:
-    stop = view.store.stop
-    if not stop.get("reached"):
-        return ""
-    return f"stopped by {stop['rule']} at {stop['joints']} joints: intervals here are not corrected for it"
 
 
 def _facts(store: Reader) -> Iterator[tuple[str, str]]:
@@ -183,3 +181,83 @@ def _facts(store: Reader) -> Iterator[tuple[str, str]]:
     yield "Solver", ", ".join(f"{name} {value}" for name, value in store.options.items())
     for k, retry in enumerate(store.retries, 1):
         yield f"Retry {k}", ", ".join(f"{name} {value}" for name, value in retry.get("settings", {}).items())
+
+
+NEEDLES = "needles"
+"""Contact law of needle bearings."""
+
+
+def scene(view: View) -> tuple[str, str]:
+    """Operating point and bearing, mounting and contact law, each with ``given`` or ``assumed``.
+
+    A view whose study can no longer be read has lines without these words.
+    """
+    points = [view.store.points[name] for name in view.points]
+    at = points[0].in_words if len(points) == 1 else f"{len(points)} operating points"
+    axial, laws = recorded.mountings(view.store)
+    bearing = "needle bearings" if set(laws) == {NEEDLES} else "plain bearings" if NEEDLES not in laws else "bearings"
+    mounting, law = mounting_and_law(axial, laws).split("; ")
+    assumed: set[str] | None = None  # where the study can no longer be read
+    with suppress(TolstatError):
+        assumed = {key for own in assumptions(view.study) for value in own.values for key in value}
+    of_bearing = assumed is not None and any(key.startswith("bearing.") for key in assumed)
+    first = f"{at}{_mark(assumed, False)}; {bearing}{_mark(assumed, of_bearing)}."
+    second = f"{mounting}{_mark(assumed, AXIAL in (assumed or ()))}; {law}{_mark(assumed, LAW in (assumed or ()))}."
+    return capital(first), capital(second)
+
+
+def exact(view: View) -> str:
+    """Note on errors that no tolerance mentions; empty where there are none."""
+    with suppress(TolstatError):
+        if names := unselected(view.study):
+            return f"no tolerance, taken as exact: {', '.join(names)}"
+    return ""
+
+
+def _mark(assumed: set[str] | None, is_assumed: bool) -> str:
+    return "" if assumed is None else " (assumed)" if is_assumed else " (given)"
+
+
+UNIT = UNITS | quantities(Joint)
+DIGITS = 5
+
+
+def joint_values(store: Reader) -> Listing:
+    """Table of the values that differ from those of `DEFAULT_JOINT`, with the formula of those that were not given.
+
+    Raises
+    ------
+    InputError
+        When this version cannot read the joint in the file.
+    """
+    joint = validate(Joint, store.joint, f"{store.path}: joint")
+    given, own, default = leaves(joint.given()), _values(joint), _values(load(DEFAULT_JOINT, {}, DEFAULT_JOINT))
+    rows = [
+        (key, value, default.get(key, "-"), "given" if key in given else DERIVED[key].formula)
+        for key, value in own.items()
+        if value != default.get(key) and (key in given or key in DERIVED)
+    ]
+    title = f"The joint: values that differ from {DEFAULT_JOINT}"
+    if not rows:
+        return Listing(title, f"none: it is {DEFAULT_JOINT}")
+    return Listing(title, text.align([("key", "value", DEFAULT_JOINT, "by"), *rows], [True, False, False, True]))
+
+
+def _values(joint: Joint) -> dict[str, str]:
+    """Values by dotted key, in the unit in which a joint file has them."""
+    found = leaves(joint.model_dump(exclude=set(TOLD)))
+    return {key: _written(key, value) for key, value in found.items() if value is not None}
+
+
+def _written(key: str, value: Any) -> str:
+    if not isinstance(value, (float, tuple)):
+        return str(value)
+    unit = UNIT.get(key, "1")
+    like = examples().get(key, units.EXAMPLES[unit])
+    numbers, name = [], ""
+    for one in value if isinstance(value, tuple) else (value,):
+        read = notation.read(str(units.written(one, unit, like[0] if isinstance(like, list) else like)))
+        if read is not None:
+            numbers.append(f"{read.number:.{DIGITS}g}")
+            name = read.unit
+    return f"{', '.join(numbers)} {name}".rstrip()

@@ -10,19 +10,19 @@ from tolstat.common.draw_records import METHODS
 from tolstat.common.loads import load_of
 from tolstat.common.tables import VALID
 from tolstat.display import text
-from tolstat.display.asked import Asked
+from tolstat.display.answer import Asked
 from tolstat.display.blocks import Card, Decision, Section, Table, Text
 from tolstat.display.table import Column, as_block, has
-from tolstat.display.verdict import Verdict
+from tolstat.display.verdict import WORDS, Verdict
 from tolstat.questions import accuracy, shares
-from tolstat.questions.assumptions import figure, sentences
+from tolstat.questions.assumptions import sentences
+from tolstat.questions.assumptions.answer import bars
 from tolstat.questions.assumptions.variations import applicable
 from tolstat.questions.drawings.answer import place_of
 from tolstat.questions.exceedance import rows as exceedance
 from tolstat.questions.exceedance.answer import above
-from tolstat.questions.exceedance.verdicts import WORDS, ends, share_of
-from tolstat.report.headline import Headline, headline, tells_yield
-from tolstat.report.life import life_verdicts
+from tolstat.questions.exceedance.rows import ends, share_of
+from tolstat.report.headline import headline, life_verdicts, tells_yield
 from tolstat.store.view import View
 
 
@@ -38,7 +38,7 @@ def section(view: View, asked: Asked) -> Section:
         lives if found is None and lives else [_card(found) if found else _without_verdict(view), *lives],
         _cards(view, found),
         place_of(view, load, asked),
-        figure.bars(standing) if standing and standing.rows else None,
+        bars(standing) if standing and standing.rows else None,
         [own for own in below if own],
     )
     notes = (Text(f"{note[0].upper()}{note[1:]}.", small=True) for note in asked.notes)
@@ -80,7 +80,7 @@ def question_of(text: str) -> str:
     return " ".join(found[1].split()) if found else ""
 
 
-def _card(found: Headline | Verdict) -> Card:
+def _card(found: Verdict) -> Card:
     return Card(found.value, found.words, " ".join(map(text.sentence, found.notes)), found.shade)
 
 
@@ -89,7 +89,7 @@ def _without_verdict(view: View) -> Card:
     return Card("", f"{why}, so there is no verdict.", "")
 
 
-def _cards(view: View, found: Headline | None) -> list[Card]:
+def _cards(view: View, found: Verdict | None) -> list[Card]:
     """Unless the verdict says it, the yield and the limit exceeded most; next delivery, number of joints, errors."""
     cards = []
     if found is not None and tells_yield(view):

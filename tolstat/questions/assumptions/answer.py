@@ -3,22 +3,33 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+import time
+from collections.abc import Iterator, Sequence
 from functools import partial
+from pathlib import Path
 from shlex import quote
+from typing import Annotated, Any
 
 import numpy as np
 
-from tolstat.common.errors import Fault, NotApplicable
-from tolstat.display import text
-from tolstat.display.answer import Answer, Part, Sentence, Table
-from tolstat.display.asked import Asked
-from tolstat.display.blocks import Panels
-from tolstat.display.options import Accepted
-from tolstat.display.table import Column, Row
-from tolstat.questions.assumptions import figure, sentences
-from tolstat.questions.assumptions.run import simulate as simulate
-from tolstat.questions.assumptions.variations import Standing, applicable, evaluate
+from tolstat.analysis import binomial
+from tolstat.campaign import what_if as sets
+from tolstat.campaign.pool import kept_workers
+from tolstat.campaign.what_if import Change
+from tolstat.campaign.work import Work
+from tolstat.common.cores import available_cores
+from tolstat.common.errors import Fault, InputError, NotApplicable, gather
+from tolstat.display import drawing, style, text
+from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Part, Row, Rows, Sentence, Table
+from tolstat.display.options import Accepted, Opt
+from tolstat.display.progress import clock
+from tolstat.display.style import markers
+from tolstat.questions.assumptions import sentences, variations
+from tolstat.questions.assumptions.sentences import KEPT
+from tolstat.questions.assumptions.variations import Standing, Variation, applicable, evaluate
+from tolstat.questions.shares import inapplicable, unusable
+from tolstat.solver.compilation import warm_up
+from tolstat.store import Writer, what_if
 from tolstat.store.view import View
 
 TITLE = "What the verdict stands on"
@@ -38,7 +49,7 @@ COLUMNS = (
     Column("change, %", partial(_interval, name="change", form="+.1f")),
     Column(
         "verdict",
-        lambda row: sentences.KEPT.get(row["side"]) or str(row["side"]),
+        lambda row: KEPT.get(row["side"]) or str(row["side"]),
         shown=lambda rows: any(r["side"] for r in rows),
         words=True,
         rank=1,
@@ -83,7 +94,7 @@ def assumptions(view: View, accepted: Accepted = math.nan) -> Answer:
     found = evaluate(view, accepted)
     if not found.rows:
         remedy = f"simulate them: tolstat assumptions {quote(str(view.path))} --run"
-        raise NotApplicable(str(Fault(str(view.path), "holds no joints with other values of what is assumed", remedy)))
+        raise inapplicable(view, "holds no joints with other values of what is assumed", remedy)
     return Answer("assumptions", TITLE, [*_parts(view, found), *map(Sentence, _notes(found, view))], _facts(found))
 
 
@@ -107,7 +118,7 @@ def _parts(view: View, found: Standing) -> list[Part]:
     below = [sentences.still(found), sentences.shop(view)]
     return [
         Sentence(lead, "lead"),
-        Panels([figure.bars(found)]),
+        Panels([bars(found)]),
         Table("assumptions", title, COLUMNS, found.rows, _UNITS),
         *(Sentence(own, "lead") for own in below if own),
     ]
@@ -129,3 +140,199 @@ def _facts(found: Standing) -> dict[str, object]:
     share, lower, upper = found.drawn
     about = {"n": found.n, "confidence": found.confidence, "share": share, "lower": lower, "upper": upper}
     return about | {"stands_on": sentences.values(found)}
+
+
+DRAWN = "as drawn"
+_LONGEST = 30
+"""Number of letters of a label from which on it has two lines."""
+_ACCEPTED: dict[str, Any] = {"color": style.COLOURS[2], "lw": 1.4, "ls": (0.0, (6.0, 2.0))}
+"""Style of the accepted share."""
+
+
+def bars(found: Standing) -> Panel:
+    """Share as drawn, then with each value that moves it, on one axis with the accepted share."""
+    rows = found.moving
+    said = "; ".join(f"{row['label']} {text.percent(row['share'])}" for row in rows)
+    labels = [DRAWN, *map(_label, rows)]
+    return Panel(
+        "assumptions",
+        "Share of the joints above a limit, with other values of what is assumed",
+        f"As drawn {text.percent(found.drawn[0])}. {said or 'Nothing that is assumed moves it'}",
+        partial(_bars, found=found, rows=rows, labels=labels),
+        (drawing.WIDTH, 0.27 * (len(labels) + 1) + drawing.BOTTOM + 0.3),
+        drawing.rows_left([part for label in labels for part in label.split("\n")]),
+    )
+
+
+def _label(row: Any) -> str:
+    words = f"{row['label']}: {KEPT[row['side']]}" if row["turns"] else str(row["label"])
+    return words.replace(" (", "\n(") if len(words) > _LONGEST else words
+
+
+def _bars(ax: Axes, found: Standing, rows: Rows, labels: list[str]) -> None:
+    share, lower, upper = found.drawn
+    accepted = found.accepted
+    ends = [lower, upper, *(row[f"share{end}"] for row in rows for end in ("", "_lower", "_upper"))]
+    shown = np.array([share, accepted, *ends])
+    known = shown[shown >= 0.5 / max(found.n, 1)]
+    floor, high = 0.6 * float(known.min(initial=0.1)), min(1.2 * float(known.max(initial=0.1)), 1.0)
+    drawing.rows(ax, labels)
+    ax.set_ylim(len(labels) - 0.4, -1.3)  # a row above, for the accepted share in words
+    style.share_axis(ax, floor, "x", high)
+    drawn = max(share, floor)
+    ax.axvline(drawn, color=style.INK, lw=1.0)
+    if not np.isnan(lower):
+        ax.plot([max(lower, floor), max(upper, floor)], [0, 0], color=style.INK, lw=1.6)
+    ax.plot(drawn, 0, "o" if share >= floor else markers.CARETLEFT, color=style.INK, ms=6.0, clip_on=False)
+    for place, row in enumerate(rows, 1):
+        own = max(row["share"], floor)
+        ax.barh(place, own - drawn, 0.62, left=drawn, color=style.COLOURS[row["change"] > 0.0], zorder=2)
+        low, top = (max(row[f"share_{end}"], floor) for end in ("lower", "upper"))
+        ax.plot([low, top], [place, place], color=style.INK, lw=1.2, zorder=3)
+        if row["share_lower"] < floor:
+            ax.plot(floor, place, marker=markers.CARETLEFT, color=style.INK, ms=5.0, zorder=4, clip_on=False)
+    if accepted > 0.0:
+        ax.axvline(accepted, **_ACCEPTED)
+        words: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 8.0, "backgroundcolor": "white"}
+        ax.text(accepted, -0.9, f"accepted {text.percent(accepted)}", **words)
+    ax.set_xlabel("share of the joints that exceed a limit")
+
+
+PILOT = 64
+"""Number of joints whose time is measured."""
+FURTHER = 4
+"""Largest number of joints of a variation whose first joints leave it open, in multiples of theirs."""
+MARGIN = 1.2
+"""Factor on the number of joints that would just decide a variation."""
+
+
+def simulate(
+    path: Path,
+    work: Work,
+    joints: Annotated[int, Opt("N", least=100)] = variations.JOINTS,
+    accepted: Accepted = math.nan,
+) -> list[Path]:
+    """Simulate the first joints of a campaign with each value of what is assumed, and keep their loads in the file.
+
+    First each value of each assumption that is varied, all else equal, then all assumptions at their better and at
+    their worse values. With an accepted share, variations that would turn the verdict, but for their number of joints,
+    get up to `FURTHER` times as many. Of several operating points those that a limit of the study is about. What is
+    done stays in the file, also of a run that is stopped; the same call goes on.
+
+    Parameters
+    ----------
+    path : Path
+        Result file of a campaign whose joints are drawn from tolerances.
+    work : Work
+        Workers, progress and messages.
+    joints : int
+        With --run: number of joints of each variation, 1000 unless given; more than the campaign has are drawn with its
+        seed.
+    accepted : float
+        Accepted share of the joints that exceed at least one limit; NaN if none is given.
+
+    Returns
+    -------
+    list of Path
+        The file.
+
+    Raises
+    ------
+    InputError
+        With every fault of the values.
+    StoreError
+        When the file cannot be used, was made by other code, or its joint has no assumptions that are varied.
+    """
+    with Writer.open(path) as store, kept_workers():
+        view = View(store)
+        _check(view, store)
+        run = _Run(store, view, work, joints)
+        singles = variations.singles(view.study)
+        if not singles:
+            remedy = "write [[assumed]] in the study, with name, values and because: tolstat docs study"
+            raise unusable(view, "has a joint of which nothing is assumed that is varied", remedy)
+        run.simulate(singles)
+        run.simulate(variations.all_together(View(store)))
+        further, number = _further(View(store), accepted, run.n)
+        if further:
+            run.simulate(further, number)
+            run.simulate(variations.all_together(View(store)))
+        work.tell(run.outcome)
+    return [path]
+
+
+def _check(view: View, store: Writer) -> None:
+    """Refuse a file that the question does not apply to, that has no joints yet, or that the code cannot continue."""
+    variations.check(view)
+    if not variations.joints_of(view):
+        remedy = f"run its study: tolstat run {store.study_name}.toml"
+        raise unusable(view, "has no simulated joint to compare with", remedy)
+    sets.check_code(store)
+
+
+def _further(view: View, accepted: float, n: int) -> tuple[list[Variation], int]:
+    """Variations that would turn the verdict if more joints, at most `FURTHER` times `n`, decided them; that number."""
+    standing = evaluate(view, accepted)
+    second = (1.0 + standing.confidence) / 2.0
+    needed = {row["label"]: MARGIN * binomial.needed(row["share"], accepted, second) for row in standing.undecided}
+    numbers = {label: number for label, number in needed.items() if number <= FURTHER * n}
+    every = {own.label: own for own in (*variations.singles(view.study), *variations.all_together(view))}
+    return [every[label] for label in numbers], math.ceil(max(numbers.values(), default=n))
+
+
+class _Run:
+    """Simulation of variations, one round after the other.
+
+    Attributes
+    ----------
+    n : int
+        Number of joints of each variation.
+    simulated : int
+        Number of joints simulated so far, each at every point.
+    """
+
+    def __init__(self, store: Writer, view: View, work: Work, joints: int) -> None:
+        self._begin, self._seconds = time.monotonic(), 0.0
+        self._store, self._view, self._work = store, view, work
+        self._workers = work.workers or available_cores()
+        self._asked = sets.Asked(view.kept_loads, variations.points_of(view))
+        self.n = joints if joints > variations.JOINTS else min(joints, variations.joints_of(view))
+        self.simulated, self._variations, self._more = 0, set[str](), ""
+
+    @property
+    def outcome(self) -> str:
+        """What was simulated, in words."""
+        spent = time.monotonic() - self._begin
+        if not self.simulated:
+            return f"all {len(self._variations)} variations are in the file, {self.n} joints of each"
+        each = f"{self.n} of each of {len(self._variations)} variations"
+        return f"simulated {self.simulated} joints in {spent:.0f} s, {each}{self._more}"
+
+    def simulate(self, wanted: Sequence[Variation], number: int = 0) -> None:
+        """Simulate what the file lacks of the first joints of some variations: `n` of each unless a number is given."""
+        n = number or self.n
+        if number:
+            self._more = f", {number} of {', '.join(own.label for own in wanted)}"
+        study, changes, faults = self._view.study, list[Change](), list[Fault]()
+        for own in wanted:
+            with gather(faults):
+                changes.append(sets.with_joint(study, own.keys, range(n)))
+        if faults:
+            raise InputError(faults)
+        self._variations |= {own.label for own in wanted}
+        if (first := sets.own_joints(self._view)) < n:
+            changes.insert(0, sets.as_drawn(study, range(first, n)))
+        held, names = what_if.read(self._store), self._asked.names(study)
+        lacking = sum(len(sets.missing(held, change, names)) for change in changes)
+        if not lacking:
+            return
+        if not self._seconds:
+            warm_up()
+            options = sets.options_of(study, self._store)
+            self._seconds = sets.seconds_per_joint(study, options, PILOT, self._asked.points) / self._workers
+        cost, where = clock(self._seconds * lacking), ", ".join(self._asked.points)
+        where = f" at {where}" if where else ""
+        self._work.tell(f"{lacking} joints to simulate{where}, about {cost} on {self._workers} processes")
+        self._work.display.stage("variations")
+        sets.simulate(study, self._store, changes, self._asked, self._workers, lambda: False, self._work.display)
+        self.simulated += lacking

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,8 +11,7 @@ import numpy as np
 from tolstat.analysis import binomial
 from tolstat.display import text
 from tolstat.display.table import Row
-from tolstat.questions.assumptions import words
-from tolstat.questions.assumptions.variations import ALL, Standing, widths
+from tolstat.questions.assumptions.variations import ALL, AXIAL, SHAFT, Standing, widths
 from tolstat.store.view import View
 from tolstat.study.widths import COARSER, HALF
 
@@ -32,13 +32,13 @@ def turned(found: Standing) -> tuple[str, str]:
     rows = found.turning
     if not rows:
         return "", ""
-    ways = [f"{words.condition(row['label'])} ({text.percent(row['share'])})" for row in rows]
+    ways = [f"{_condition(row['label'])} ({text.percent(row['share'])})" for row in rows]
     shown = " or ".join(ways[:_NAMED]) + (f", and in {len(ways) - _NAMED} more" if len(ways) > _NAMED else "")
     side, other = KEPT[found.side], KEPT[rows[0]["side"]]
     names = [row for row in rows if row["name"] != ALL] or found.moving
-    about = {row["name"]: words.AXIAL in row["keys"] for row in names if row["name"] != ALL}
+    about = {row["name"]: AXIAL in row["keys"] for row in names if row["name"] != ALL}
     first = dict(list(about.items())[:_NAMED])
-    remedy = f"more joints do not decide it; find out {words.to_find_out(first)}"
+    remedy = f"more joints do not decide it; find out {_listed([_noun(*own) for own in first.items()])}"
     return f"{side} as drawn ({text.percent(found.drawn[0])})", f"{other} {shown}: {remedy}"
 
 
@@ -92,7 +92,7 @@ def decided(found: Standing) -> str:
         alone = [row for row in rows if row["name"] != ALL] or rows
         if alone:
             far = max(alone, key=lambda row: abs(row["change"]))
-            told.append(f"{word} in {len(rows)} ({text.percent(far['share'])} {words.condition(far['label'])})")
+            told.append(f"{word} in {len(rows)} ({text.percent(far['share'])} {_condition(far['label'])})")
     return f"Of {len(found.rows)} variations of what is assumed: {', '.join(told) or 'open in all'}"
 
 
@@ -109,7 +109,7 @@ def not_varied(found: Standing, file: str) -> str:
     """Words on assumptions that the file has no joints of, with the command that simulates them."""
     if not found.missing:
         return ""
-    return f"{words.listed(found.missing[:_NAMED])} not varied: tolstat assumptions {file} --run"
+    return f"{_listed(found.missing[:_NAMED])} not varied: tolstat assumptions {file} --run"
 
 
 def still(found: Standing) -> str:
@@ -119,7 +119,7 @@ def still(found: Standing) -> str:
         parts.append(f"Moves nothing that {found.n} joints show: {', '.join(found.still)}.")
     parts += [f"Not varied: {own.name} ({own.because})." for own in found.fixed]
     if found.given:
-        parts.append(f"Given by the study: {words.listed(found.given)}.")
+        parts.append(f"Given by the study: {_listed(found.given)}.")
     return " ".join(parts)
 
 
@@ -136,7 +136,7 @@ def shop(view: View) -> str:
             capabilities[f"{index} {value:g}"] = capabilities.get(f"{index} {value:g}", 0) + 1
     if not capabilities:
         return ""
-    held = words.listed([f"{index} in {n} tolerance{'s' if n > 1 else ''}" for index, n in capabilities.items()])
+    held = _listed([f"{index} in {n} tolerance{'s' if n > 1 else ''}" for index, n in capabilities.items()])
     head = f"What the shop must hold: {held}."
     shares = widths(view)
     if not shares:
@@ -179,3 +179,21 @@ def _most(word: str, rows: list[Row]) -> str:
     """``open in 2: H 3 (9.1 %), law sliced (8 %)``."""
     shown = ", ".join(f"{row['label']} ({text.percent(row['share'])})" for row in rows[:_NAMED])
     return f"{word} in {len(rows)}: {shown}{', ...' if len(rows) > _NAMED else ''}"
+
+
+def _condition(label: str) -> str:
+    """Under which condition the share is that of a variation: ``if the shaft slides``, ``with law sliced``."""
+    return dict(SHAFT.values()).get(label) or f"with {label.replace('all at', 'all assumptions at')}"
+
+
+def _listed(items: Sequence[str]) -> str:
+    """``a, b and c``."""
+    *most, last = items
+    return f"{', '.join(most)} and {last}" if most else last
+
+
+def _noun(name: str, is_mounting: bool) -> str:
+    """What has to be found out: an assumption, or what holds the shaft."""
+    if is_mounting:
+        return "how the shaft is held"
+    return f"the {name}" if name[:1].islower() else name

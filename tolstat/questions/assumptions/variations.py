@@ -9,20 +9,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tolstat.analysis import difference
-from tolstat.analysis.sample import Sample, total_interval
+from tolstat.analysis.sample import total_interval
 from tolstat.campaign import what_if as sets
-from tolstat.common.errors import Fault, InputError, StoreError, TolstatError
-from tolstat.common.loads import ANY_LIMIT, FloatArray, split
-from tolstat.common.tables import Status
+from tolstat.campaign.what_if import Estimate
+from tolstat.common.errors import InputError, TolstatError
+from tolstat.common.loads import FloatArray, split
 from tolstat.display.table import Row, Rows
-from tolstat.questions.assumptions import words
+from tolstat.questions.shares import check_sample, unusable, with_ends
 from tolstat.store import error_budget, known_parts
 from tolstat.store import what_if as kept
 from tolstat.store.view import View
-from tolstat.store.what_if import Altered
 from tolstat.study.assumptions import Assumption, assumptions, given, together
-from tolstat.study.points import at, names_of
+from tolstat.study.points import names_of
 from tolstat.study.study import Study
 from tolstat.study.widths import lines
 
@@ -33,8 +31,11 @@ ALL = "all assumptions"
 BETTER, WORSE = "all at better values", "all at worse values"
 """What the variations of all assumptions together are called."""
 
-Estimate = tuple[float, float, float]
-"""An estimate, and the ends of its interval."""
+AXIAL, LAW = "shaft.axial", "contact.law"
+SHAFT = {"free": ("shaft slides", "if the shaft slides"), "rigid": ("shaft rigid", "if the shaft is held rigidly")}
+"""Mounting of the shafts: as a label, and as a condition."""
+_LONGEST = 12
+"""Number of letters of a name up to which a label has it beside the key."""
 
 
 class Variation(NamedTuple):
@@ -140,7 +141,7 @@ def evaluate(view: View, accepted: float = np.nan) -> Standing:
     Returns
     -------
     Standing
-        Without rows where the file holds no such joints (`run.simulate` adds them).
+        Without rows where the file holds no such joints (`answer.simulate` adds them).
 
     Raises
     ------
@@ -194,34 +195,18 @@ def check(view: View) -> None:
     StoreError
         The hint names what can be used.
     """
-    place = str(view.path)
     if view.store.variants or view.method in ("sweep", "cases"):
         remedy = "give the file of a study with tolerances and one joint"
-        raise StoreError(str(Fault(place, "holds several joints: a share stands on the values of one", remedy)))
-    view.check("difference")
-    view.check_drawn()
-    if view.study.groups:
-        remedy = 'give the file of a study with sampling.method "random", "sobol" or "lhs"'
-        raise StoreError(str(Fault(place, "holds a pick-freeze design, no sample of a production", remedy)))
-    if not view.store.whole:
-        remedy = "merge all slices first: tolstat merge SLICE... --out FILE"
-        raise StoreError(str(Fault(place, "holds a part of the campaign only", remedy)))
+        raise unusable(view, "holds several joints: a share stands on the values of one", remedy)
+    check_sample(view, "difference", whole=True)
     if not view.limits:
         remedy = "write [limits] and run the study again, which simulates nothing anew"
-        raise StoreError(str(Fault(place, "has no limits: nothing stands on what is assumed", remedy)))
-
-
-def own_joints(view: View) -> int:
-    """Number of samples of the campaign, from the first, that serve as joints as drawn: none of them pending."""
-    if not view.design.has_interval("difference"):
-        return 0
-    waiting = np.flatnonzero(view.status == Status.PENDING)
-    return int(waiting[0]) if waiting.size else view.n
+        raise unusable(view, "has no limits: nothing stands on what is assumed", remedy)
 
 
 def joints_of(view: View) -> int:
     """Number of joints of each variation unless more are asked for."""
-    return min(JOINTS, own_joints(view) or view.n)
+    return min(JOINTS, sets.own_joints(view) or view.n)
 
 
 def points_of(view: View) -> tuple[str, ...]:
@@ -241,7 +226,7 @@ def all_together(view: View) -> list[Variation]:
 def singles(study: Study) -> list[Variation]:
     """Variations of one assumption each: every value of those that are varied."""
     return [
-        Variation(own.name, words.label(own.name, keys), keys, own.because)
+        Variation(own.name, label_of(own.name, keys), keys, own.because)
         for own in assumptions(study)
         if own.varied
         for keys in own.values
@@ -309,50 +294,23 @@ def side_of(interval: Sequence[float], accepted: float) -> str:
     return "yes" if high <= accepted else "no" if low > accepted else "open"
 
 
-class _Joints:
-    """Loads of the joints that are compared: as drawn, and with other values.
-
-    Attributes
-    ----------
-    level : float
-        Limit of the load.
-    base : ndarray, shape (n,)
-        Load of the joints as drawn, NaN without a valid one: the campaign's, then fresh ones.
-    """
+class _Joints(sets.Joints):
+    """Loads of the joints that are compared: as drawn, and with other values."""
 
     def __init__(self, view: View) -> None:
-        self._view, load = view, view.load(view.decisive)
-        assert load.limit is not None
-        self.level = load.limit
-        levels = view.limits if view.decisive == ANY_LIMIT else {view.decisive: 1.0}
-        self._parts = [(_at_points(view, name), level) for name, level in levels.items()]
-        self._least, self.base = joints_of(view), load.values[: own_joints(view)]
-        fresh = view.altered.get(kept.key(sets.as_drawn(view.study, range(0)).about))
-        if fresh is not None and self._holds(fresh) and fresh.first <= len(self.base) < fresh.end:
-            self.base = np.concatenate([self.base, self._load(fresh)[len(self.base) - fresh.first :]])
+        super().__init__(view, view.decisive, view.altered)
+        self._least = joints_of(view)
 
     def held(self, keys: Mapping[str, Any]) -> FloatArray | None:
         """Load of each joint with other keys, NaN without a valid one, (n,); None where the file has too few."""
-        loads = self.read(sets.about_joint(self._view.study, keys))
+        loads = self.read(sets.about_joint(self._study, keys))
         loads = None if loads is None else loads[: len(self.base)]
         return None if loads is None or len(loads) < self._least or not len(loads) else loads
 
     def read(self, about: Mapping[str, Any]) -> FloatArray | None:
         """Load of the joints of a change, NaN without a valid one; None where the file lacks it."""
-        one = self._view.altered.get(kept.key(about))
-        return None if one is None or one.first or not self._holds(one) else self._load(one)
-
-    def _holds(self, one: Altered) -> bool:
-        return all(one.holds(names) for names, _ in self._parts)
-
-    def _load(self, one: Altered) -> FloatArray:
-        return np.asarray(np.maximum.reduce([one.valid(names) / level for names, level in self._parts]))
-
-
-def _at_points(view: View, load: str) -> tuple[str, ...]:
-    """Names that the file keeps of a load, one for each operating point."""
-    own, plain = view.narrowed(load)
-    return tuple(at(plain, [point], list(view.store.points)) for point in own.points)
+        one = self._held.get(kept.key(about))
+        return None if one is None or one.first or not self.holds(one) else self.of(one)
 
 
 def _drawn(view: View) -> Estimate:
@@ -367,16 +325,12 @@ def _drawn(view: View) -> Estimate:
 
 
 def _row(own: Variation, joints: _Joints, loads: FloatArray, confidence: float) -> dict[str, Any]:
-    row: dict[str, Any] = {"name": own.name, "label": own.label, "keys": words.keys(own.keys), "because": own.because}
-    row |= {"n": len(loads), "n_failed": int(np.isnan(loads).sum())}
-    found = _sample(loads).above(joints.level, confidence)
-    share, change = (found.estimate, found.outer_lower, found.outer_upper), (np.nan,) * 3
+    row: dict[str, Any] = {"name": own.name, "label": own.label, "keys": keys_in_words(own.keys)}
+    row |= {"because": own.because, "n": len(loads), "n_failed": int(np.isnan(loads).sum())}
+    share, change = joints.share(loads, confidence), (np.nan,) * 3
     with suppress(ValueError):  # no joint has a load both as drawn and with the other values
-        base = _sample(joints.base[: len(loads)])
-        d = difference.shares(base, _sample(loads), [joints.level], paired=True, confidence=confidence)
-        change = float(d.estimate[0]), float(d.outer_lower[0]), float(d.outer_upper[0])
-    for name, estimate in (("share", share), ("change", change)):
-        row |= {f"{name}{end}": value for end, value in zip(("", "_lower", "_upper"), estimate, strict=True)}
+        change = joints.difference(joints.base, loads, confidence)
+    row |= with_ends("share", share) | with_ends("change", change)
     return row | {"moves": bool(change[1] > 0.0 or change[2] < 0.0)}
 
 
@@ -386,6 +340,35 @@ def _share(loads: FloatArray, level: float) -> float:
     return float(np.mean(valid > level)) if valid.size else 0.0
 
 
-def _sample(values: FloatArray) -> Sample:
-    """Sample of loads; joints without one have failed."""
-    return Sample.of(values, np.full(values.size, Status.OK))
+def label_of(name: str, values: Mapping[str, Any]) -> str:
+    """Label of a value of an assumption: ``shaft slides``, ``law sliced``, ``clearance 0.05 mm``, ``fork (l_f 30 mm)``.
+
+    Where the name is long it is the key alone, ``r_b 30 mm``.
+
+    Parameters
+    ----------
+    name : str
+        Name of the assumption.
+    values : mapping
+        Dotted keys of the joint, and their values as written; the first is the one that the assumption is about.
+    """
+    if AXIAL in values:
+        return SHAFT.get(values[AXIAL], (f"shaft held with {_written(values[AXIAL])}", ""))[0]
+    if LAW in values:
+        return f"law {values[LAW]}"
+    key, value = next(iter(values.items()))
+    last = key.rpartition(".")[2]
+    if last in name.split():
+        return f"{name} {_written(value)}"
+    symbol = f"{last} {_written(value)}"
+    return symbol if len(name) > _LONGEST else f"{name} ({symbol})"
+
+
+def keys_in_words(values: Mapping[str, Any]) -> str:
+    """Keys of the joint with their values, as a joint file has them."""
+    return ", ".join(f"{key} = {_written(value)}" for key, value in values.items())
+
+
+def _written(value: Any) -> str:
+    text = f"{value:g}" if isinstance(value, float) else str(value)
+    return text.replace("*", " ").replace("^2", "²").replace("^3", "³")

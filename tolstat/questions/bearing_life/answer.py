@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -14,18 +14,14 @@ from tolstat.analysis.rating_life import A1, FRETTING
 from tolstat.common.errors import NotApplicable
 from tolstat.common.tables import VALID
 from tolstat.display import style, text
-from tolstat.display.answer import Answer, Part, Sentence, Table
-from tolstat.display.asked import Asked
-from tolstat.display.blocks import Panel, Panels
-from tolstat.display.mpl import ticker
+from tolstat.display.answer import Answer, Asked, Axes, Panel, Panels, Part, Sentence, Table
+from tolstat.display.style import ticker
 from tolstat.display.table import Column, Row, Rows, by_share, has, has_unresolved, of_shares
 from tolstat.display.verdict import Verdict, on_share
+from tolstat.questions import shares
 from tolstat.questions.bearing_life import lives as rating
 from tolstat.questions.bearing_life.lives import JOINT, SHARES, Lives
 from tolstat.store.view import View
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 FEW = "needs more joints"
 PLACE_NAMES = {JOINT: "all four", rating.ANY: "at least one"}
@@ -70,21 +66,16 @@ BELOW = (
     BEARING,
     Column("below", lambda row: f"{row['count']} of {row['n'] - row['n_failed'] - row['n_unsettled']}"),
     Column("share", lambda row: "-" if _undecided(row) else text.percent(row["estimate"])),
-    Column("95 % interval", lambda row: text.span(row["lower"], row["upper"]), shown=has("lower")),
-    Column("total interval", lambda row: text.span(row["total_lower"], row["total_upper"]), shown=has("total_lower")),
-    Column(
-        "without a life above, below",
-        lambda row: text.span(row["bound_lower"], row["bound_upper"]),
-        shown=has_unresolved,
-        rank=1,
-    ),
+    Column("95 % interval", shares.shares("lower", "upper"), shown=has("lower")),
+    Column("total interval", shares.shares("total_lower", "total_upper"), shown=has("total_lower")),
+    Column("without a life above, below", shares.shares("bound_lower", "bound_upper"), shown=has_unresolved, rank=1),
 )
 """Columns of the table ``below_required``."""
 CONTACTS = (
     BEARING,
-    Column("at one end", lambda row: text.percent(row["one_end"])),
-    Column("at opposite ends", lambda row: text.percent(row["opposite_ends"])),
-    Column("along its length", lambda row: text.percent(row["along"])),
+    Column("at one end", shares.share("one_end")),
+    Column("at opposite ends", shares.share("opposite_ends")),
+    Column("along its length", shares.share("along")),
 )
 """Columns of the table ``contacts``."""
 
@@ -258,8 +249,8 @@ def _notes(lives: Lives, contacts: Rows) -> Iterator[str]:
             "first of the four bearings fails, Weibull slope 9/8"
         )
     if len(lives.duty) > 1:
-        shares = ", ".join(f"{text.percent(share)} at {point}" for point, share in lives.duty.items())
-        yield f"over a duty cycle: {shares} of the time; P: the constant load with the same life"
+        times = ", ".join(f"{text.percent(share)} at {point}" for point, share in lives.duty.items())
+        yield f"over a duty cycle: {times} of the time; P: the constant load with the same life"
     edge = "the rating knows no edge load: it takes the resultant force as spread along the needles"
     if contacts:
         row = contacts[-1]
@@ -276,7 +267,7 @@ def _notes(lives: Lives, contacts: Rows) -> Iterator[str]:
     if lives.load_error > 0.0:
         yield f"numerical error of an equivalent load: {text.percent(lives.load_error)}, in the total interval"
     if not lives.view.design.has_interval("quantile"):
-        yield "no intervals: they hold for independent samples only"
+        yield shares.NO_INTERVALS
 
 
 def _draw(ax: Axes, lives: Lives) -> None:
@@ -284,11 +275,11 @@ def _draw(ax: Axes, lives: Lives) -> None:
     rate = lives.rate(JOINT)
     table = rate.curve(np.unique(rate.valid))[::-1]
     x, floor = 1.0 / table["level"], 0.5 / float(table["n"][0])
-    shares = {name: table[name].clip(floor, 1.0) for name in ("outer_lower", "estimate", "outer_upper")}
+    drawn = {name: table[name].clip(floor, 1.0) for name in ("outer_lower", "estimate", "outer_upper")}
     if lives.view.design.has_interval("quantile"):
-        band = shares["outer_lower"], shares["outer_upper"]
+        band = drawn["outer_lower"], drawn["outer_upper"]
         ax.fill_between(x, *band, step="pre", color=style.COLOURS[0], alpha=0.2, lw=0, label="95 % band")
-    ax.step(x, shares["estimate"], where="pre", color=style.COLOURS[0])
+    ax.step(x, drawn["estimate"], where="pre", color=style.COLOURS[0])
     ax.set_xscale("log")
     style.share_axis(ax, floor)
     ax.xaxis.set_major_locator(ticker.LogLocator(subs=(1.0, 2.0, 5.0)))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Container, Iterator, Sequence
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,19 +18,14 @@ from tolstat.common.loads import FloatArray, unit_text
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import VALID, Status
 from tolstat.display import drawing, style
-from tolstat.display.answer import Answer, Part, Sentence, Table
-from tolstat.display.asked import Asked
-from tolstat.display.blocks import Panel, Panels
+from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Part, Row, Sentence, Table
 from tolstat.display.options import Load, Opt, Top
-from tolstat.display.table import Column, Row
 from tolstat.display.text import ends
-from tolstat.questions.causes.indices import check_sample, scattering
+from tolstat.questions.causes.indices import scattering
+from tolstat.questions.shares import check_sample, with_ends
 from tolstat.store import revolutions
 from tolstat.store.hdf5 import store_error
 from tolstat.store.view import View
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 JOINTS = 1000
 """Default number of joints evaluated, the first settled ones: some 2 s if they are simulated again."""
@@ -286,7 +281,7 @@ def _parts(found: Sequence[AgainstAngle], shown: Container[str]) -> list[Part]:
 
 def _share(indices: FirstOrder, place: int | tuple[int, int]) -> dict[str, float]:
     """One share with the ends of its interval."""
-    return {f"share{end}": float(part[place]) for end, part in zip(("", "_lower", "_upper"), indices[:3], strict=True)}
+    return with_ends("share", (part[place] for part in indices[:3]))
 
 
 def _overall_rows(angle: AgainstAngle) -> list[Row]:

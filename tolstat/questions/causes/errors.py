@@ -8,7 +8,7 @@ from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from shlex import quote
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 
@@ -19,21 +19,16 @@ from tolstat.common.forked import mapped
 from tolstat.common.loads import unit_text
 from tolstat.common.tables import VALID
 from tolstat.display import drawing, style
-from tolstat.display.answer import Answer, Part, Sentence, Table
-from tolstat.display.asked import Asked
-from tolstat.display.blocks import Panel, Panels
-from tolstat.display.mpl import patches
+from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Part, Row, Rows, Sentence, Table, has
 from tolstat.display.options import Costs, Load, Opt, Top
-from tolstat.display.table import Column, Row, Rows, has
+from tolstat.display.style import patches
 from tolstat.display.text import ends
+from tolstat.questions import shares
 from tolstat.questions.causes import lines, simulation
 from tolstat.questions.causes.indices import Indices, estimated, indices
 from tolstat.store.view import View
 from tolstat.study import Study
 from tolstat.study.rewriting import with_keys
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 SIGNIFICANT = 0.05
 """p-value below which a table marks an error of the tail."""
@@ -280,7 +275,7 @@ def _notes(found: Indices, command: str) -> list[str]:
     elif not (found.of_design or _has_narrow_bounds(rows)):
         remedy = f"; {command} gives them" if command else ""
         notes.append(f"no shares in all: given joints bound them too widely{remedy}")
-    return notes if found.has_intervals else [*notes, "no intervals: they hold for independent samples only"]
+    return notes if found.has_intervals else [*notes, shares.NO_INTERVALS]
 
 
 def _tornado(found: Indices) -> Panel:

@@ -10,17 +10,16 @@ import numpy as np
 
 from tolstat import sampling
 from tolstat.analysis import pick_freeze, ranks, sensitivity
-from tolstat.analysis.design import Claim
 from tolstat.analysis.sample import Sample
+from tolstat.campaign.what_if import tail_level
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import ANY_LIMIT, FloatArray
 from tolstat.display import text
 from tolstat.display.table import Column, Row, Rows, has
+from tolstat.questions.shares import rows_of
 from tolstat.store.hdf5 import store_error
 from tolstat.store.view import View
 
-TAIL_STARTS_AT = 0.9
-"""Share of the joints below the tail, for a load without a limit."""
 MIN_JOINTS = 200
 """Minimum number of valid joints."""
 MAX_JOINTS = sensitivity.MOST
@@ -123,7 +122,7 @@ def indices(
     names, parts, variance = estimate(view, load, logarithm, confidence)
     first: Any = parts["first"]
     ranks: Any = parts.get("srrc")
-    valid, level = load.valid, _tail_level(load)
+    valid, level = load.valid, tail_level(load)
     facts = {"load": load.name, "unit": load.unit, "logarithm": logarithm, "joints": valid.size}
     facts |= {"used": min(valid.size, MAX_JOINTS) if ranks else valid.size, "without_load": sum(load.unresolved)}
     facts |= {"level": level, "above": int((valid > level).sum()), "std": math.sqrt(variance)}
@@ -134,23 +133,7 @@ def indices(
         keys = {"": "estimate", "_lower": "lower", "_upper": "upper"} | ({"_p": "p"} if kind in TAIL else {})
         for end, key in keys.items():
             columns[f"{kind}{end}"] = np.broadcast_to(found.get(key, np.nan), len(names)).tolist()
-    rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
-    return Indices(facts, sorted(rows, key=lambda row: -row["first"]))
-
-
-def check_sample(view: View, statistic: Claim) -> None:
-    """Refuse joints that are not drawn from tolerances, do not support a statistic, or form a pick-freeze design.
-
-    Raises
-    ------
-    StoreError
-        The hint names what can be used.
-    """
-    view.check_drawn()
-    view.check(statistic)
-    if view.study.groups:
-        remedy = 'give the file of a study with sampling.method "random", "sobol" or "lhs"'
-        raise store_error(view.path, "holds a pick-freeze design", remedy)
+    return Indices(facts, sorted(rows_of(columns), key=lambda row: -row["first"]))
 
 
 def scattering(components: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
@@ -179,7 +162,7 @@ def _of_samples(view: View, load: Sample, logarithm: bool, confidence: float) ->
         first = sensitivity.first_order(x, response, confidence, independent)
     else:
         first, parts["total"] = sensitivity.first_and_total(x, response, confidence, independent)
-    above = values > _tail_level(load)
+    above = values > tail_level(load)
     if ranks.FEWEST <= above.sum() <= above.size - ranks.FEWEST:
         chosen = np.sort(np.concatenate([np.flatnonzero(side)[:MAX_JOINTS] for side in (above, ~above)]))
         scores = sampling.normal_scores(study, view.errors(samples[chosen], columns))
@@ -208,7 +191,3 @@ def _logarithm(name: str, values: FloatArray) -> FloatArray:
         remedy = "decompose the variance of the load itself, not of its logarithm"
         raise InputError([Fault(name, "is not positive in all joints", remedy)])
     return np.asarray(np.log(values))
-
-
-def _tail_level(load: Sample) -> float:
-    return load.quantile(TAIL_STARTS_AT).estimate if load.limit is None else load.limit

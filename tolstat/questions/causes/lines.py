@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from shlex import quote
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -13,21 +13,14 @@ from tolstat.common.errors import Fault, NotApplicable
 from tolstat.common.loads import ANY_LIMIT
 from tolstat.common.tables import VALID
 from tolstat.display import drawing, style, text
-from tolstat.display.answer import Answer, Part, Sentence, Table
-from tolstat.display.asked import Asked
-from tolstat.display.blocks import Panel, Panels
-from tolstat.display.mpl import markers, patches
+from tolstat.display.answer import Answer, Artist, Asked, Axes, Column, Panel, Panels, Part, Row, Sentence, Table, has
 from tolstat.display.options import Accepted, Costs, Load
-from tolstat.display.table import Column, Row, has
+from tolstat.display.style import markers, patches
 from tolstat.questions.causes import shares
 from tolstat.questions.causes.indices import estimated
 from tolstat.questions.causes.shares import INDICES, Lines
 from tolstat.store.view import View
 from tolstat.study.widths import COARSER, EXACT, FINER, HALF, STEPS
-
-if TYPE_CHECKING:
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
 
 TITLE = "Which line of the drawing to change"
 ON_PAGE = (

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,18 +20,12 @@ from tolstat.common.errors import NotApplicable
 from tolstat.common.load_kinds import PINS
 from tolstat.common.loads import FloatArray, unit_text
 from tolstat.display import style, text
-from tolstat.display.answer import Answer, Part, Sentence, Table
-from tolstat.display.asked import Asked
-from tolstat.display.blocks import Panel, Panels
+from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Part, Sentence, Table
 from tolstat.display.options import Load
-from tolstat.display.table import Column
 from tolstat.joint import HOLE_OF_PIN, perturb
 from tolstat.store import points
 from tolstat.store.hdf5 import store_error
 from tolstat.store.view import View
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 MOST = 4000
 """Number of joints used, the first ones."""

@@ -11,21 +11,17 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tolstat.analysis import difference, pick_freeze
-from tolstat.analysis.sample import Sample
 from tolstat.campaign import what_if as sets
+from tolstat.campaign.what_if import Estimate
 from tolstat.common.loads import ANY_LIMIT, FloatArray
-from tolstat.common.tables import Status
 from tolstat.display import text
 from tolstat.display.table import Row, Rows
-from tolstat.questions.causes.indices import TAIL_STARTS_AT, check_sample
-from tolstat.store import what_if as kept
-from tolstat.store.hdf5 import store_error
+from tolstat.questions.shares import check_sample, with_ends
 from tolstat.store.view import View
 from tolstat.store.what_if import Altered
 from tolstat.study import Study, scaling, widths
 from tolstat.study.costs import Cost
 from tolstat.study.costs import of as prices_of
-from tolstat.study.points import at
 from tolstat.study.widths import COARSER, EXACT, FINER, HALF, STEPS, Line
 
 NEGLIGIBLE = 0.1
@@ -34,9 +30,6 @@ ENDS = ("", "_lower", "_upper")
 """Ends of the keys of an estimate and its interval."""
 INDICES = tuple(f"{name}{word}{end}" for name in ("", "above_") for word in ("alone", "in_all") for end in ENDS)
 """Keys of the Sobol' indices of a line, with their intervals."""
-
-Estimate = tuple[float, float, float]
-"""An estimate, and the ends of its interval."""
 
 
 class Lines(NamedTuple):
@@ -135,7 +128,7 @@ def evaluate(view: View, by: str, costs: Path | None = None) -> Lines | None:
     StoreError
         When the joints are not drawn from tolerances, or differ in weight.
     """
-    check(view)
+    check_sample(view, "difference", whole=True)
     joints = Joints(view, by, view.altered)
     rows = joints.rows() if np.isfinite(joints.base).any() else []
     rows = rows if costs is None else _with_costs(view.study, rows, costs)
@@ -151,68 +144,8 @@ def evaluate(view: View, by: str, costs: Path | None = None) -> Lines | None:
     return Lines(facts | {"left_out": widths.left_out(view.study)}, rows, joints.indices(lines))
 
 
-def check(view: View) -> None:
-    """Refuse a file whose joints are not drawn from tolerances, differ in weight, or are a part of the campaign's.
-
-    Raises
-    ------
-    StoreError
-        The hint names what can be used.
-    """
-    check_sample(view, "difference")
-    if not view.store.whole:
-        remedy = "merge all slices first: tolstat merge SLICE... --out FILE"
-        raise store_error(view.path, "holds a part of the campaign only", remedy)
-
-
-def own_joints(view: View) -> int:
-    """Number of samples of the campaign, from the first, that serve as joints as drawn: none of them pending."""
-    if not view.design.has_interval("difference"):
-        return 0
-    waiting = np.flatnonzero(view.status == Status.PENDING)
-    return int(waiting[0]) if waiting.size else view.n
-
-
-class Joints:
-    """Load of the joints that the lines are compared on, as drawn and with each change.
-
-    Parameters
-    ----------
-    view : View
-        A campaign whose joints are drawn from tolerances.
-    by : str
-        A load, or ``"any limit"``.
-    held : mapping
-        Changes by their digest, as `View.altered`.
-
-    Attributes
-    ----------
-    load : Sample
-        The load in the campaign.
-    level : float
-        Its limit; without one, its quantile `indices.TAIL_STARTS_AT`.
-    base : ndarray, shape (n,)
-        Load of the joints as drawn, from sample 0 on, NaN without a valid one: the campaign's, then fresh ones.
-    """
-
-    def __init__(self, view: View, by: str, held: Mapping[str, Altered]) -> None:
-        self.load, self._study, self._held = view.load(by), view.study, held
-        limit = self.load.limit
-        self.level = self.load.quantile(TAIL_STARTS_AT).estimate if limit is None else limit
-        levels = view.limits if by == ANY_LIMIT else {by: 1.0}
-        self._parts = [(names_at_points(view, name), level) for name, level in levels.items()]
-        own = own_joints(view)
-        self.base, more = self.load.values[:own], held.get(kept.key(sets.as_drawn(view.study, range(0)).about))
-        if more is not None and self.holds(more) and more.first <= own < more.end:
-            self.base = np.concatenate([self.base, self.of(more)[own - more.first :]])
-
-    def holds(self, one: Altered) -> bool:
-        """Whether a change has the load."""
-        return all(one.holds(names) for names, _ in self._parts)
-
-    def of(self, one: Altered) -> FloatArray:
-        """Load of each joint with a change, or its largest ratio to all limits; NaN without a valid one, (n,)."""
-        return np.asarray(np.maximum.reduce([one.valid(names) / level for names, level in self._parts]))
+class Joints(sets.Joints):
+    """Load of the joints that the lines are compared on, as drawn and with each change."""
 
     def settled(self, lines: Sequence[Line], confidence: float = 0.95) -> bool:
         """Whether the file has all these lines half as wide, or with other fits, and their order `is_settled`."""
@@ -232,13 +165,8 @@ class Joints:
         }
         if not found:
             return widths.steps(self._study, line)[0], None
-        step = min(found, key=lambda own: self._difference(self.base, found[own][: len(self.base)])[0])
+        step = min(found, key=lambda own: self.difference(self.base, found[own][: len(self.base)])[0])
         return step, found[step]
-
-    def share(self, values: FloatArray) -> Estimate:
-        """Share of joints above the level."""
-        found = _sample(values).above(self.level)
-        return found.estimate, found.outer_lower, found.outer_upper
 
     def estimates(self, values: FloatArray, half: FloatArray | None) -> tuple[Estimate, Estimate]:
         """Share of joints with one line changed above the level, and its change from the joints as drawn.
@@ -247,13 +175,13 @@ class Joints:
         are known with the line half as wide, `half`, it is the share of these plus the difference on the joints that
         both have, so that a line exact does not seem worse than half as wide because its joints are fewer.
         """
-        change = self._difference(self.base, values)
+        change = self.difference(self.base, values)
         if len(values) == len(self.base):
             return self.share(values), change
         if half is None or len(half) <= len(values) or not np.isfinite(values + half[: len(values)]).any():
             return _sum(self.share(self.base), change, 0.0), change
         share, change = self.estimates(half, None)
-        further = self._difference(half, values)
+        further = self.difference(half, values)
         return _sum(share, further, 0.0), _sum(change, further, -1.0)
 
     def rows(self) -> list[dict[str, Any]]:
@@ -272,7 +200,7 @@ class Joints:
                 factors = {own.get("factor", np.nan) for own in about["tolerances"].values()}
                 row = {**about_line, "step": step, "words": about["words"]}
                 row |= {"factor": factors.pop() if len(factors) == 1 else np.nan, "n": len(values)}
-                rows.append(row | _named("share", share) | _named("change", change))
+                rows.append(row | with_ends("share", share) | with_ends("change", change))
                 place = 0 if is_decisive(step) else 1 if step == EXACT else 2, share[0]
                 places[line.label] = min(places.get(line.label, place), place)
         orders = {step: (place, 0.0) for place, step in enumerate(STEPS)}
@@ -297,8 +225,8 @@ class Joints:
             for name, (a, b, ab), estimate in pairs:
                 with suppress(ValueError):  # too few joints with a load, or none, or all of them, above the level
                     found = estimate(a, b, ab[:, None])
-                    row |= _named(f"{name}alone", [float(x[0]) for x in found.first])
-                    row |= _named(f"{name}in_all", [float(x[0]) for x in found.total])
+                    row |= with_ends(f"{name}alone", [x[0] for x in found.first])
+                    row |= with_ends(f"{name}in_all", [x[0] for x in found.total])
             rows.append(row)
         return sorted(rows, key=lambda row: lines.index(row["line"]))
 
@@ -306,11 +234,6 @@ class Joints:
         """Changes of some kinds that have the load from the first joint on."""
         every = self._held.values()
         return [(one.about, one) for one in every if one.about["kind"] in kinds and not one.first and self.holds(one)]
-
-    def _difference(self, a: FloatArray, b: FloatArray) -> Estimate:
-        """Share of B above the level less that of A, joint by joint; A may have more joints."""
-        found = difference.shares(_sample(a[: len(b)]), _sample(b), [self.level], paired=True)
-        return float(found.estimate[0]), float(found.outer_lower[0]), float(found.outer_upper[0])
 
 
 def _with_costs(study: Study, rows: list[dict[str, Any]], table: Path) -> list[dict[str, Any]]:
@@ -331,12 +254,6 @@ def _with_costs(study: Study, rows: list[dict[str, Any]], table: Path) -> list[d
     return rows
 
 
-def names_at_points(view: View, load: str) -> tuple[str, ...]:
-    """Names that the file keeps of a load, one for each operating point: that of the load unless it has several."""
-    own, plain = view.narrowed(load)
-    return tuple(at(plain, [point], list(view.store.points)) for point in own.points)
-
-
 def is_settled(values: Sequence[FloatArray], base: FloatArray, level: float, confidence: float = 0.95) -> bool:
     """Whether the order of lines by their shares above a level is settled.
 
@@ -350,15 +267,13 @@ def is_settled(values: Sequence[FloatArray], base: FloatArray, level: float, con
     drawn = float(np.mean(base[:n] > level))
     own = 1.0 - (1.0 - confidence) / (len(values) - 1)
     for one, other in pairwise(ranked):
-        found = difference.shares(_sample(one[:n]), _sample(other[:n]), [level], paired=True, confidence=own)
+        found = difference.shares(
+            sets.sample_of(one[:n]), sets.sample_of(other[:n]), [level], paired=True, confidence=own
+        )
         low, high = float(found.lower[0]), float(found.upper[0])
         if low <= 0.0 <= high and max(-low, high) > NEGLIGIBLE * drawn:
             return False
     return True
-
-
-def _named(key: str, estimate: Sequence[float]) -> dict[str, float]:
-    return {f"{key}{end}": value for end, value in zip(ENDS, estimate, strict=True)}
 
 
 def _sum(share: Estimate, change: Estimate, least: float) -> Estimate:
@@ -369,8 +284,3 @@ def _sum(share: Estimate, change: Estimate, least: float) -> Estimate:
     total = share[0] + change[0]
     low, high = (np.hypot(share[0] - share[k], change[0] - change[k]) for k in (1, 2))
     return tuple(float(np.clip(x, least, 1.0)) for x in (total, total - low, total + high))  # type: ignore[return-value]
-
-
-def _sample(values: FloatArray) -> Sample:
-    """Sample of loads; joints without one have failed."""
-    return Sample.of(values, np.full(values.size, Status.OK))

@@ -18,10 +18,10 @@ from tolstat.common.cores import available_cores
 from tolstat.common.loads import ANY_LIMIT, split
 from tolstat.display.progress import clock
 from tolstat.questions.causes import shares
+from tolstat.questions.shares import check_sample
 from tolstat.solver.compilation import warm_up
 from tolstat.store import Writer, what_if
 from tolstat.store.hdf5 import store_error
-from tolstat.store.provenance import versions
 from tolstat.store.view import View
 from tolstat.study import widths
 from tolstat.study.points import names_of
@@ -88,12 +88,10 @@ def simulate(
     """
     with Writer.open(path) as store, kept_workers():
         view = View(store)
-        shares.check(view)
+        check_sample(view, "difference", whole=True)
         load = by or view.decisive
         view.load(load)  # which refuses what is none
-        if any(store.versions.get(name) != versions()[name] for name in ("tolstat", "sources")):
-            remedy = "use that version, or run the campaign again: tolstat run STUDY --out OTHER.h5"
-            raise store_error(path, "was made by another version of the code", remedy)
+        sets.check_code(store)
         lines = [*LINES[each](view.study), *widths.named(view.study, group)]
         if not lines:
             remedy = 'name what a study can change: --group "tilts = pin*.tilt_*, hole*.tilt_*"'
@@ -125,7 +123,7 @@ class _Looks:
         self._held, self._asked = what_if.read(store), Asked(view.kept_loads, points_of(view, load))
         options = sets.options_of(view.study, store)
         self._seconds = sets.seconds_per_joint(view.study, options, PILOT, self._asked.points) / self._workers
-        self._own = shares.own_joints(view)
+        self._own = sets.own_joints(view)
         self._looks, self._simulated, self._cut = 0, 0, False
 
     @property

@@ -5,7 +5,6 @@ from __future__ import annotations
 from contextlib import suppress
 from functools import partial
 from shlex import quote
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,17 +17,11 @@ from tolstat.common.loads import LOADS, FloatArray, unit_text
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import SIMULATED, VALID, Status
 from tolstat.display import drawing, style, text
-from tolstat.display.answer import Answer, Part, Sentence, Table
-from tolstat.display.asked import Asked
-from tolstat.display.blocks import Panel, Panels
+from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Part, Row, Rows, Sentence, Table
 from tolstat.display.options import Load, Top
-from tolstat.display.table import Column, Row, Rows
 from tolstat.questions.causes import angles
 from tolstat.store import revolutions
 from tolstat.store.view import View
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 ON_PAGE = 8
 """Number of worst joints of each load on the page."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,19 +17,13 @@ from tolstat.common.loads import load_of
 from tolstat.common.strict import read_toml, validate
 from tolstat.common.tables import SIMULATED
 from tolstat.display import drawing, text
-from tolstat.display.answer import Answer, Part, Sentence
-from tolstat.display.asked import Asked
-from tolstat.display.blocks import Panel, Panels
-from tolstat.display.table import Rows
+from tolstat.display.answer import Answer, Asked, Figure, Panel, Panels, Part, Rows, Sentence
 from tolstat.joint import Joint, Operation
 from tolstat.questions.drawings import views
 from tolstat.store import ResultFile
 from tolstat.store.points import point_of
 from tolstat.store.recorded import joint_of, operation_of
 from tolstat.store.view import View
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 LEGEND = (
     "The joint from its own dimensions. Marked: the bushings, pins and shafts of the leading loads. Loads of cross1–4 "

@@ -8,24 +8,19 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.common.load_kinds import PINS
 from tolstat.common.tables import HOLES
-from tolstat.display.blocks import Panel
+from tolstat.display.answer import Axes, Panel, Rows
 from tolstat.display.drawing import WIDTH
-from tolstat.display.mpl import patches
-from tolstat.display.style import COLOURS, INK
-from tolstat.display.table import Rows
+from tolstat.display.style import COLOURS, INK, patches
 from tolstat.joint import Joint, Operation, nominal_errors, perturb
 from tolstat.joint.perturbation import ARM_TRIADS, PIN_TRIADS
 from tolstat.kernel.mechanics.topology import ARM_OF_PIN
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 Array = NDArray[np.float64]
 Place = Array | tuple[float, float]

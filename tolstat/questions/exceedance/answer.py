@@ -10,15 +10,15 @@ from typing import Any
 from tolstat.common.errors import Fault, NotApplicable
 from tolstat.common.tables import VALID, Status
 from tolstat.display import text
-from tolstat.display.answer import Answer, Part, Sentence, Table
-from tolstat.display.asked import Asked
-from tolstat.display.blocks import Panels, Text
+from tolstat.display.answer import Answer, Asked, Panels, Part, Sentence, Table, Text
 from tolstat.display.options import Accepted
 from tolstat.display.table import Column, Row, Rows, has, has_unresolved
+from tolstat.display.verdict import WORDS
 from tolstat.joint.arms import one_force
+from tolstat.questions import shares
 from tolstat.questions.exceedance import rows as of
 from tolstat.questions.exceedance.curves import forest_panel, leading_panel, reader
-from tolstat.questions.exceedance.verdicts import WORDS, verdict
+from tolstat.questions.exceedance.rows import verdict
 from tolstat.store import known_parts
 from tolstat.store.recorded import joint_of
 from tolstat.store.view import View
@@ -37,6 +37,10 @@ def _outer(row: Row) -> str:
     return _span(row, "bound" if math.isnan(row["outer_lower"]) else "outer")
 
 
+def _has_parts(rows: Rows) -> bool:
+    return "both_lower" in rows[0]
+
+
 def above(row: Row) -> str:
     """Joints above a limit, and of how many with a valid load."""
     return f"{row['count']} of {row['n'] - row['n_failed'] - row['n_unsettled']}"
@@ -48,20 +52,18 @@ LIMITS = (
     Column("limit", lambda row: text.value(row["level"], row["unit"])),
     Column("nominal", lambda row: text.value(row["nominal"], row["unit"]), rank=1),
     Column("above", above),
-    Column("share", lambda row: text.percent(row["estimate"])),
-    Column("95 % interval", lambda row: text.span(row["lower"], row["upper"]), shown=_differs, rank=3),
+    Column("share", shares.share("estimate")),
+    Column("95 % interval", shares.shares("lower", "upper"), shown=_differs, rank=3),
     Column("with unresolved joints", _outer, shown=has_unresolved, rank=2),
-    Column("total interval", partial(_span, ends="total"), shown=has("numerical_error")),
-    Column("with measured parts", partial(_span, ends="both"), shown=lambda rows: "both_lower" in rows[0], rank=1),
-    Column(
-        "at most, if ways are missed", lambda row: text.percent(row["unsearched_upper"]), shown=has("unsearched_upper")
-    ),
+    Column("total interval", shares.shares("total_lower", "total_upper"), shown=has("numerical_error")),
+    Column("with measured parts", shares.shares("both_lower", "both_upper"), shown=_has_parts, rank=1),
+    Column("at most, if ways are missed", shares.share("unsearched_upper"), shown=has("unsearched_upper")),
 )
 """Columns of the table ``limits``. Joints above are counted among the valid ones, as the share is; the last columns
 count failed and unsettled joints below, then above the limit, and shift every load by the numerical error."""
 BUDGET = (
     Column("limit", text.limit),
-    Column("share", lambda row: text.percent(row["estimate"])),
+    Column("share", shares.share("estimate")),
     Column("sampling, ±", lambda row: text.percent(0.5 * (row["upper"] - row["lower"]))),
     Column("numerical error, up to", lambda row: text.percent(_numerical(row))),
     Column("failed and unsettled, width", lambda row: text.percent(row["bound_upper"] - row["bound_lower"])),
@@ -185,7 +187,7 @@ def limit_tables(view: View, accepted: float = math.nan) -> list[Table]:
     if points := of.point_rows(view):
         title = "Share of the joints above each limit at each operating point"
         columns = [LIMITS[0], Column("limit", lambda row: text.value(row["level"], row["unit"]))]
-        columns += [Column(point, partial(_share_at, point)) for point in view.points]
+        columns += [Column(point, shares.share(point)) for point in view.points]
         shown = one_force(points, "level", view.points[0])
         found.append(Table("at_points", title, columns, points, seen=shown))
     return found
@@ -225,10 +227,6 @@ def _quantiles(view: View, title: str, whole: bool) -> Table:
         columns.append(Column(f"{100 * share:g} %{whole * ' stay below'}", partial(quantile, share), rank=rank))
     head = "tolerance limit 99 % / 95 %" if whole else f"95 % interval of {100 * of.SHARES[-1]:g} %"
     return Table("quantiles", title, [*columns, Column(head, last)], rows, seen=list(seen.values()))
-
-
-def _share_at(point: str, row: Row) -> str:
-    return text.percent(row[point])
 
 
 def note(view: View) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,16 +13,10 @@ from tolstat.analysis.binomial import simultaneous
 from tolstat.analysis.sample import Sample
 from tolstat.common.loads import LOADS, PANELS, load_of, names_of
 from tolstat.display import drawing, style, text
-from tolstat.display.blocks import Panel, Reader
-from tolstat.display.mpl import lines, ticker
-from tolstat.display.table import Rows
-from tolstat.questions.exceedance.rows import curve, limit_rows, most_exceeded, readings
-from tolstat.questions.exceedance.verdicts import ends
+from tolstat.display.answer import Axes, Figure, Panel, Reader, Rows
+from tolstat.display.style import lines, ticker
+from tolstat.questions.exceedance.rows import curve, ends, limit_rows, most_exceeded, readings
 from tolstat.store.view import View
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 DRAWN_LEVELS = 200
 """Maximum number of points of a curve in the picture."""

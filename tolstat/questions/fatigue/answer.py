@@ -17,11 +17,10 @@ from tolstat.common.errors import NotApplicable
 from tolstat.common.loads import unit_text
 from tolstat.common.tables import Status
 from tolstat.display import drawing, style, text
-from tolstat.display.answer import Answer, Part, Sentence, Table
-from tolstat.display.asked import Asked
+from tolstat.display.answer import Answer, Asked, Part, Sentence, Table
 from tolstat.display.blocks import Panel, Panels
-from tolstat.display.mpl import ticker
 from tolstat.display.options import Delivery, Loads, Opt
+from tolstat.display.style import ticker
 from tolstat.display.table import Column, Row, Rows, by_share, of_shares
 from tolstat.display.verdict import Verdict, on_share
 from tolstat.questions.fatigue import loads, parts

@@ -9,19 +9,18 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chdtrc
 
 from tolstat.analysis import accuracy, prediction
 from tolstat.analysis.prediction import DELIVERY
 from tolstat.analysis.sample import CONFIDENCE
 from tolstat.analysis.subset import Estimate
 from tolstat.common.errors import Fault, InputError, StoreError
+from tolstat.common.late import special
 from tolstat.common.loads import LOADS, Limit
 from tolstat.common.tables import VALID
 from tolstat.display import text
-from tolstat.display.answer import Answer, Part, Sentence, Table
+from tolstat.display.answer import Answer, Column, Part, Row, Rows, Sentence, Table
 from tolstat.display.options import Delivery
-from tolstat.display.table import Column, Row, Rows
 from tolstat.questions.rare.simulation import Subsets, plan_of, simulate
 from tolstat.store import error_budget, verification
 from tolstat.store.reader import Reader
@@ -207,7 +206,9 @@ def together(estimates: Sequence[Estimate]) -> tuple[Estimate, bool]:
     variances = [(one.probability * one.deviation) ** 2 for one in reached]
     deviation = math.sqrt(sum(variances)) / len(estimates) / mean if mean else math.nan
     spread = sum((one.probability - mean) ** 2 / v for one, v in zip(reached, variances, strict=True) if v)
-    agree = len(reached) == len(estimates) and (len(reached) == 1 or bool(chdtrc(len(reached) - 1, spread) >= 0.01))
+    agree = len(reached) == len(estimates) and (
+        len(reached) == 1 or bool(special.chdtrc(len(reached) - 1, spread) >= 0.01)
+    )
     if not agree or len(estimates) == 1:
         return Estimate(mean, *ends, deviation), agree
     # the logarithm of an unbiased product is low by half its variance; the ends of one seed tell Student's quantile

@@ -1,0 +1,27 @@
+"""Modules of other packages, imported when first used: `scipy.special` takes longer to import than tolstat."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+
+class Late:
+    """A module that is imported when one of its attributes, or modules, is read."""
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+
+    def __getattr__(self, attribute: str) -> Any:
+        if attribute.startswith("__"):  # which doctest and inspect ask any object for
+            raise AttributeError(attribute)
+        module = import_module(self._name)
+        return getattr(module, attribute) if hasattr(module, attribute) else import_module(f"{self._name}.{attribute}")
+
+
+if TYPE_CHECKING:
+    from scipy import optimize as optimize
+    from scipy import special as special
+    from scipy import stats as stats
+else:
+    optimize, special, stats = (Late(f"scipy.{name}") for name in ("optimize", "special", "stats"))

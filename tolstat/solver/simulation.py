@@ -308,14 +308,16 @@ def _resolved(
     Joints that turn out too stiff for explicit steps get error-controlled ones. Other arguments are as of
     `simulate_together`.
     """
-    steps = steps.copy()
+    from tolstat.kernel.simd.lane import WIDTH
+
+    few, steps = 1 + WIDTH // 4, steps.copy()  # as many joints alone take less time than most lanes without a joint
     for explicit in (True, False):
         rows = np.flatnonzero((steps > 0) == explicit)
         if not len(rows):
             continue
         out = np.zeros(len(rows), RESULT).view(np.recarray)
         own = np.zeros((len(rows), blocks.shape[1]), RESULT).view(np.recarray)
-        run: Run = simulate_together if in_lanes(options) else simulate_alone
+        run: Run = simulate_together if in_lanes(options) and len(rows) > few else simulate_alone
         if explicit:
             run = partial(simulate_together, steps=steps[rows])
         allowed = left[rows]

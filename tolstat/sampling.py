@@ -142,13 +142,36 @@ def from_scores(study: Study, scores: Array) -> Table:
     InputError
         When pins and holes are matched by classes: their diameters depend on each other.
     """
+    return from_probabilities(study, _probability(scores))
+
+
+def from_probabilities(study: Study, u: Array) -> Table:
+    """Errors of joints with given probabilities of the streams: those that a random campaign draws, to the last bit.
+
+    Parameters
+    ----------
+    study : Study
+        Its tolerances, correlation and fixed errors are applied.
+    u : ndarray, (n, d)
+        Independent probabilities, one column for each of `streams`; 0 and 1 count as the nearest numbers between them.
+
+    Returns
+    -------
+    ndarray, (n,), dtype ERROR
+
+    Raises
+    ------
+    InputError
+        When pins and holes are matched by classes: their diameters depend on each other.
+    """
     if study.sampling.is_matched:
         remedy = "remove sampling.selective, or change the study and run it as another campaign"
         raise InputError([study.fault("sampling.selective", "matches diameters: joints have no free scores", remedy)])
-    table = nominal_errors(len(scores))
+    table = nominal_errors(len(u))
     for name, value in study.errors.items():
         table[name] = value
-    _fill_from(table, study, {name: _probability(z) for name, z in zip(streams(study), scores.T, strict=True)})
+    inside = np.clip(np.ascontiguousarray(u.T), np.finfo(float).tiny, 1 - np.finfo(float).epsneg)
+    _fill_from(table, study, dict(zip(streams(study), inside, strict=True)))
     return table
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from contextlib import closing
 from functools import cached_property
@@ -26,11 +27,15 @@ from tolstat.store.recorded import settings
 from tolstat.study import Study, axes
 from tolstat.study.selection import select, suggestion
 from tolstat.study.tolerances import distributions as law
+from tolstat.study.tolerances.scipy_law import ScipyLaw
 
 if TYPE_CHECKING:
     import openturns
 
 Array = NDArray[np.float64]
+
+STEP = 0.1
+"""Step of the finite differences that OpenTURNS takes for a gradient, in standard deviations of the input."""
 
 LEAST_SHARED = 256
 """Number of joints from which on worker processes are started: fewer take less time than the start, on the main job."""
@@ -61,6 +66,8 @@ class Function:
         Gaussian copula of the errors.
     status : ndarray, (n,), uint8
         `Status` of the joints of the last call.
+    simulated : int
+        Number of joints simulated so far.
     """
 
     def __init__(self, study: Study, loads: Sequence[str], point: str, workers: int | None) -> None:
@@ -72,6 +79,7 @@ class Function:
         self.reason = _reason(study)
         self.distributions = None if self.reason else dict(study.tolerances)
         self.status: NDArray[np.uint8] = np.zeros(0, np.uint8)
+        self.simulated = 0
 
     def __repr__(self) -> str:
         return f"<function of {len(self.names)} errors, {len(self.loads)} loads, of study {self.study.name!r}>"
@@ -137,26 +145,28 @@ class Function:
         """
         import openturns as ot
 
-        if self.distributions is None or cube:
-            names, k = self.cube_names, len(self.cube_names)
-            parts, correlation = [ot.Uniform(0.0, 1.0)] * k, np.eye(k)
+        is_cube = cube or self.distributions is None
+        names = self.cube_names if is_cube else self.names
+        copula = ot.IndependentCopula(len(names))
+        if is_cube:
+            parts, steps = [ot.Uniform(0.0, 1.0)] * len(names), [STEP / math.sqrt(12.0)] * len(names)
         else:
-            names, parts = self.names, [_marginal(ot, own) for own in self.distributions.values()]
-            correlation = np.eye(len(names))
-            at = [names.index(name) for name in self.copula.names]
-            correlation[np.ix_(at, at)] = self.copula.matrix
+            laws = list((self.distributions or {}).values())
+            parts, steps = [_marginal(ot, own) for own in laws], [STEP * own.moments.deviation for own in laws]
+            if self.copula.names:
+                correlation, at = np.eye(len(names)), [names.index(name) for name in self.copula.names]
+                correlation[np.ix_(at, at)] = self.copula.matrix
+                copula = ot.NormalCopula(ot.CorrelationMatrix(correlation.tolist()))
 
         def loads(sample: Any) -> Array:
             x = np.array(sample)
-            return self(self.uniform(x) if names is self.cube_names else x)
+            return self(self.uniform(x) if is_cube else x)
 
         function = ot.PythonFunction(len(names), len(self.loads), func_sample=loads)
+        function.setGradient(ot.CenteredFiniteDifferenceGradient(steps, function.getEvaluation()))
         function.setInputDescription(names)
         function.setOutputDescription(self.loads)
-        copula = ot.NormalCopula(ot.CorrelationMatrix(correlation.tolist()))
-        joint = ot.JointDistribution(
-            parts, copula if self.copula.names and names is self.names else ot.IndependentCopula(len(names))
-        )
+        joint = ot.JointDistribution(parts, copula)
         joint.setDescription(names)
         return function, joint
 
@@ -172,6 +182,7 @@ class Function:
 
     def _simulate(self, errors: NDArray[np.void]) -> Array:
         n, workers = len(errors), self.workers or available_cores()
+        self.simulated += n
         params = perturb(self.study.joint, self.study.operation, errors)
         loads, self.status = np.full((n, len(self.loads)), np.nan), np.zeros(n, np.uint8)
 
@@ -282,4 +293,10 @@ def _marginal(ot: Any, own: law.Distribution) -> Any:
             )
         case law.Measured():
             return ot.UserDefined(own.values[:, None].tolist())
+        case ScipyLaw():
+            whole = ot.Distribution(ot.SciPyDistribution(own.whole))
+            inside = ot.TruncatedDistribution(
+                whole, ot.Interval([own.ends[0]], [own.ends[1]], [own.lower is not None], [own.upper is not None])
+            )
+            return ot.CompositeDistribution(ot.SymbolicFunction("x", f"{own.unit!r} * x"), inside)
     raise NotImplementedError(f"{type(own).__name__} has no equal in OpenTURNS: use openturns(cube=True)")

@@ -1,4 +1,4 @@
-"""``python -m tests.measure.other_tools``: OpenTURNS and SALib beside our own methods, on the main job.
+"""``python -m tests.measure.other_tools [PART ...]``: OpenTURNS and SALib beside our own methods, on the main job.
 
 Printed are tables of docs/functions.md: a rare load with equilibria at 36 angles, Sobol' indices of the lines of the
 drawing, and the processor time of ``f(x)`` beside that of a campaign of the same joints. Needs the extra ``oracles``.
@@ -7,6 +7,7 @@ drawing, and the processor time of ``f(x)`` beside that of a campaign of the sam
 from __future__ import annotations
 
 import resource
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -30,16 +31,22 @@ LOAD, LIMIT, PER_LEVEL, SEEDS = "cross1.F", 3000.0, 1000, 4
 POINTS, JOINTS, ROUNDS, FORM_SAMPLE = 1024, 10_000, 3, 30_000
 
 
-def main() -> None:
-    """Print all tables."""
-    study = load(MAIN, text=MAIN.read_text("utf-8") + EQUILIBRIA)
-    print("| method | P | 95 % interval | joints |\n|---|---|---|---|")
-    ours_rare(study)
-    subset_simulation(study)
-    form(study)
-    print("\n| line | ours, alone | in all | SALib, alone | in all |\n|---|---|---|---|---|")
-    sobol(load(MAIN))
-    print(f"\nprocessor time of f(x) over that of a campaign, {JOINTS} joints: {cost(load(MAIN)):.3f}")
+def main(*parts: str) -> None:
+    """Print the tables of these parts, by default of all: rare, form, sobol, cost."""
+    parts = parts or ("rare", "form", "sobol", "cost")
+    equilibria, main_job = load(MAIN, text=MAIN.read_text("utf-8") + EQUILIBRIA), load(MAIN)
+    if {"rare", "form"} & set(parts):
+        print("| method | P | 95 % interval | joints |\n|---|---|---|---|")
+    if "rare" in parts:
+        ours_rare(equilibria)
+        subset_simulation(equilibria)
+    if "form" in parts:
+        form(equilibria)
+    if "sobol" in parts:
+        print("\n| line | ours, alone | in all | SALib, alone | in all |\n|---|---|---|---|---|")
+        sobol(main_job)
+    if "cost" in parts:
+        print(f"\nprocessor time of f(x) over that of a campaign, {JOINTS} joints: {cost(main_job)}")
 
 
 def line(name: str, p: float, lower: float, upper: float, joints: int) -> None:
@@ -140,7 +147,9 @@ def sobol(study: Study) -> None:
     with TemporaryDirectory() as folder:
         (path,) = causes.simulate(study, Work(folder=Path(folder), tell=silent), points=POINTS)
         with tolstat.open(path) as store:
-            ours = {row["error"]: row for row in tolstat.causes(store.view(), LOAD, logarithm=True).rows("errors")}
+            ours = {
+                row["error"]: row for row in tolstat.causes(store.view(), LOAD, logarithm=True).tables["errors"].rows
+            }
     f = tolstat.function(study, [LOAD])
     entries = {name: entry.pattern for entry in study.entries for name in entry.quantities}
     problem = f.salib() | {"groups": [entries[name] for name in f.cube_names]}
@@ -157,8 +166,8 @@ def sobol(study: Study) -> None:
     print(f"\n{len(loads)} joints each, {int(np.isnan(loads).sum())} of SALib's without a load")
 
 
-def cost(study: Study) -> float:
-    """Median ratio of processor times, the two in turn, same joints and workers."""
+def cost(study: Study) -> str:
+    """Ratios of processor times, the two in turn, same joints and workers."""
     f = tolstat.function(study, workers=2)
     x = f.uniform(np.random.default_rng(1).random((JOINTS, len(f.cube_names))))
     whole = load(MAIN, n=JOINTS)
@@ -168,7 +177,7 @@ def cost(study: Study) -> float:
             path = Path(folder) / f"{number}.h5"
             campaign = seconds(lambda path=path: tolstat.run(whole, path, workers=2, check=False, tell=silent))
             ratios.append(seconds(lambda: f(x)) / campaign)
-    return float(np.median(ratios))
+    return ", ".join(f"{ratio:.2f}" for ratio in ratios)
 
 
 def seconds(job: Callable[[], Any]) -> float:
@@ -184,4 +193,4 @@ def seconds(job: Callable[[], Any]) -> float:
 
 
 if __name__ == "__main__":
-    main()
+    main(*sys.argv[1:])

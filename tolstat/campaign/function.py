@@ -183,7 +183,7 @@ class Function:
     def _simulate(self, errors: NDArray[np.void]) -> Array:
         n, workers = len(errors), self.workers or available_cores()
         self.simulated += n
-        params = perturb(self.study.joint, self.study.operation, errors)
+        joint, operation, options = self.study.joint, self.study.operation, self.options
         loads, self.status = np.full((n, len(self.loads)), np.nan), np.zeros(n, np.uint8)
 
         def put(block: Block, result: Timed | pool.Lost) -> None:
@@ -196,12 +196,12 @@ class Function:
         if n >= LEAST_SHARED and workers > 1:
             size = min(size, -(-n // (MIN_BLOCKS_PER_WORKER * workers)))
         parts = [np.arange(first, min(first + size, n)) for first in range(0, n, size)]
-        blocks = [Block("", slots, params[slots], self.options) for slots in parts]
+        blocks = (Block("", slots, perturb(joint, operation, errors[slots]), options) for slots in parts)
         if n < LEAST_SHARED or workers == 1:
             for block in blocks:
                 put(block, simulate_block(simulate_rows, "none", 0, {}, block))
             return loads
-        with closing(pool.map_blocks(work_beside(self.options), blocks, workers)) as finished:
+        with closing(pool.map_blocks(work_beside(options), blocks, workers)) as finished:
             for block, result in finished:
                 put(block, result)
         return loads

@@ -6,6 +6,8 @@ import pytest
 import tolstat
 from tests.campaign.test_function import MAIN, TEXT, study_of
 from tests.study.test_tolerance import build
+from tests.support.environment import ROOT
+from tests.test_docs import blocks
 from tolstat.campaign.function import _marginal
 from tolstat.study import load
 
@@ -62,6 +64,16 @@ def test_function_and_gradient(cube):
     assert gradient.shape == (48, 2)
     assert np.isfinite(gradient).all()
     assert np.abs(gradient).min(axis=0).max() > 0.0
+
+
+@pytest.mark.slow
+def test_examples_of_the_page_run(monkeypatch):
+    pytest.importorskip("SALib", reason="pip install .[oracles]")
+    monkeypatch.chdir(ROOT)
+    names = {"__name__": "__main__"}
+    for code in blocks(ROOT / "docs" / "functions.md", "python"):
+        exec(code, names)
+    assert names["indices"]["ST"].shape == (48,)
 
 
 @pytest.mark.slow

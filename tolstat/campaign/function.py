@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 STEP = 0.1
-"""Step of the finite differences that OpenTURNS takes for a gradient, in standard deviations of the input."""
+"""Step of the finite differences that OpenTURNS takes for derivatives, in standard deviations of the input."""
 
 LEAST_SHARED = 256
 """Number of joints from which on worker processes are started: fewer take less time than the start, on the main job."""
@@ -164,6 +164,7 @@ class Function:
 
         function = ot.PythonFunction(len(names), len(self.loads), func_sample=loads)
         function.setGradient(ot.CenteredFiniteDifferenceGradient(steps, function.getEvaluation()))
+        function.setHessian(ot.CenteredFiniteDifferenceHessian(steps, function.getEvaluation()))
         function.setInputDescription(names)
         function.setOutputDescription(self.loads)
         joint = ot.JointDistribution(parts, copula)

@@ -41,9 +41,9 @@ def evaluate(
     point: Annotated[str, Opt("POINT")] = "",
     workers: Workers = None,
 ) -> None:
-    """Simulate joints whose errors a CSV file gives, for other programs.
+    """Simulate joints whose errors another program gives.
 
-    The first line of the file has the names of the errors that STUDY draws, in any order; the second their units, or
+    The first line of the CSV file has the names of the errors that STUDY draws, in any order; the second their units, or
     SI units hold. Other columns are left out. The output has a row for each joint in the same order: its status, then
     its loads, with the names in the first line and the units in the second. A load is empty where a joint has none.
 

@@ -45,7 +45,8 @@ def evaluate(
 
     The first line of the CSV file has the names of the errors that STUDY draws, in any order; the second their units,
     or SI units hold. Other columns are left out. The output has a row for each joint in the same order: its status,
-    then its loads, with the names in the first line and the units in the second. A load is empty where a joint has none.
+    then its loads, with the names in the first line and the units in the second. A load is empty where a joint has
+    none.
 
     Example: tolstat evaluate iso2768_f.toml --in x.csv --out y.csv --load 'cross*.F'
 

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 from tolstat.questions import PUBLIC
 
 if TYPE_CHECKING:
+    from tolstat.campaign.function import function as function
     from tolstat.campaign.replay import simulate_case as simulate_case
     from tolstat.campaign.run import run as run
     from tolstat.common.errors import InputError as InputError
@@ -51,6 +52,7 @@ _HOMES = {
     "draw_errors": "tolstat.questions.drawings.answer:draw_errors",
     "draw_joint": "tolstat.questions.drawings.answer:draw_joint",
     "draw_row": "tolstat.questions.drawings.answer:draw_row",
+    "function": "tolstat.campaign.function:function",
     "load": "tolstat.study:load",
     "load_case": "tolstat.study:load_case",
     "open": "tolstat.store:ResultFile.open",

@@ -124,14 +124,19 @@ def noise(study: Study, level: int, first: int, count: int) -> Array:
 
 
 def from_scores(study: Study, scores: Array) -> Table:
-    """Errors of joints with given scores.
+    """Errors of joints, (n,) table ERROR, with given standard normal scores, (n, d); see `from_probabilities`."""
+    return from_probabilities(study, _probability(scores))
+
+
+def from_probabilities(study: Study, u: Array) -> Table:
+    """Errors of joints with given probabilities of the streams: those that a random campaign draws, to the last bit.
 
     Parameters
     ----------
     study : Study
         Its tolerances, correlation and fixed errors are applied.
-    scores : ndarray, (n, d)
-        Standard normal scores, one column for each of `streams`, as the function `scores` returns them.
+    u : ndarray, (n, d)
+        Independent probabilities, one column for each of `streams`; 0 and 1 count as the nearest numbers between them.
 
     Returns
     -------
@@ -145,10 +150,11 @@ def from_scores(study: Study, scores: Array) -> Table:
     if study.sampling.is_matched:
         remedy = "remove sampling.selective, or change the study and run it as another campaign"
         raise InputError([study.fault("sampling.selective", "matches diameters: joints have no free scores", remedy)])
-    table = nominal_errors(len(scores))
+    table = nominal_errors(len(u))
     for name, value in study.errors.items():
         table[name] = value
-    _fill_from(table, study, {name: _probability(z) for name, z in zip(streams(study), scores.T, strict=True)})
+    inside = np.clip(np.ascontiguousarray(u.T), np.finfo(float).tiny, 1 - np.finfo(float).epsneg)
+    _fill_from(table, study, dict(zip(streams(study), inside, strict=True)))
     return table
 
 

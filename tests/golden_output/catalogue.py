@@ -12,7 +12,7 @@ MADE = "run"
 FORMS = ("", " --wide", " --json")
 COMMANDS = (
     *("new", "spectrum", "schema", "show", "simulate", "plan"),
-    *("run", "extend", "merge", "status", "verify", "replay", "report"),
+    *("run", "extend", "merge", "status", "verify", "replay", "evaluate", "report"),
     *(
         "assumptions",
         "capability",
@@ -205,6 +205,31 @@ HELP = Campaign(
             "plan clearance.toml --pilot 4",
         ],
         "docs": ["docs causes", "docs nothing"],
+        "evaluate": [
+            *(
+                f'sed \'|"{old}"|"{new}"|\' iso2768_f.toml'
+                for old, new in {
+                    "pin*.offset_[etz]": "pin1.offset_t",
+                    "hole*.offset_[etz]": "hole1.offset_t",
+                    "pin*.tilt_[tz]": "pin1.tilt_t",
+                    "hole*.tilt_[tz]": "hole1.tilt_t",
+                    "pin*.diameter": "pin1.diameter",
+                    "hole*.diameter": "hole1.diameter",
+                }.items()
+            ),
+            "sed '|speed_rpm,torque_Nm|pin1.tilt_t,hole1.tilt_t,pin1.offset_t,hole1.offset_t,part|' rattle.csv",
+            "evaluate iso2768_f.toml --in rattle.csv --out -",
+            "sed '|,part|,pin1.diameter,hole1.diameter\\ndeg,deg,mm,mm,um,um|' rattle.csv",
+            "sed '|-250,-90|0,0,0,0,0,0|' rattle.csv",
+            "sed '|0,-70|0.4,-0.4,0.05,0.05,-10,10|' rattle.csv",
+            "sed '|500,0|0,0,0,0,900,0|' rattle.csv",
+            "sed '|1500,200|0,0,0.1,0,x|' rattle.csv",
+            "evaluate iso2768_f.toml --in rattle.csv --out y.csv",
+            "sed '|0.1,0,x|0.1,0,1,1|' rattle.csv",
+            "sed '|2500,900|0,0,0,0.1,0,0|' rattle.csv",
+            "evaluate iso2768_f.toml --in rattle.csv --out y.csv --load 'cross*.F' --load psi",
+            "evaluate iso2768_f.toml --in rattle.csv --out - --load cross1.G",
+        ],
         "wrong": [
             "sed '|15 deg|15 rpm|' iso2768_f.toml",
             "sed '|cpk = 1.0|cpk = -1.0|' iso2768_f.toml",

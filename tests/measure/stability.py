@@ -22,9 +22,8 @@ from tolstat.joint.contact import PREDEFINED
 from tolstat.kernel.integrators import first_order
 from tolstat.kernel.integrators.integrate import reset
 from tolstat.kernel.integrators.state import CV_FACTORISED, H_OLD, make_state_record
-from tolstat.kernel.mechanics.topology import N_DOF, S
+from tolstat.kernel.mechanics.topology import N_DOF, N_LUMPS, S
 from tolstat.kernel.mechanics.work import WORK
-from tolstat.kernel.revolution.resolve import APART, radius_of
 from tolstat.kernel.revolution.settle import grid_step
 from tolstat.kernel.revolution.simulate import advance, begin, clear, make_scratch
 from tolstat.kernel.simd.jit import njit, njit_inner
@@ -36,6 +35,14 @@ ANGLES = 36
 """Angles of a revolution at which eigenvalues are taken."""
 ALIGNING = 4
 """Revolutions in which the neighbour turns to the direction that grows."""
+APART = 1e-8
+"""Distance of the neighbour, m: above the residual error of Newton's iteration, below the micrometres of a contact."""
+
+
+@njit
+def radius_of(i, R):
+    """Radius (m) that makes unknown `i` a displacement: 1 if it is one."""
+    return 1.0 if (i < 6 * N_LUMPS and i % 6 < 3) or i == S else R
 
 
 class Growth(NamedTuple):

@@ -194,6 +194,20 @@ def test_reweighted_campaign_agrees_with_a_fresh_one(tmp_path):
     assert row["bound_lower"] == pytest.approx(row["estimate"])
 
 
+def test_a_law_of_scipy_is_reweighted_as_ours_is(tmp_path):
+    """The same joints and shares with a normal law of scipy and with ours: weights by its density."""
+    ours = campaign(tmp_path, synthetic.STUDY.replace("n = 60", "n = 4000"))
+    band = 'plus_minus = "0.1 mm", distribution = "normal", cpk = 1.0'
+    law = 'distribution = "scipy:norm(scale=0.03333333333333333)", unit = "mm"'
+    theirs = campaign(tmp_path, synthetic.STUDY.replace("n = 60", "n = 4000").replace(band, law), "theirs")
+    rows = []
+    for path, setting in ((ours, "plus_minus=0.09 mm"), (theirs, "distribution=scipy:norm(scale=0.03)")):
+        with ResultFile.open(path) as store:
+            rows.append(question.reweight(store.view(), [f"pin[12].offset_t.{setting}"]).frame("loads"))
+    names = ["before", "estimate", "lower", "upper"]
+    np.testing.assert_allclose(rows[0][names], rows[1][names], rtol=1e-6)
+
+
 def test_errors_where_no_joint_was_drawn_need_new_runs(tmp_path):
     path = campaign(tmp_path, synthetic.STUDY.replace('"normal", cpk = 1.0', '"uniform"'), "band")
     with ResultFile.open(path) as store:

@@ -24,7 +24,7 @@ from tests.support import fakes
 from tolstat.common import tables
 from tolstat.common.columns import ERROR_COLUMNS, RESULT_COLUMNS
 from tolstat.common.errors import StoreError
-from tolstat.common.tables import SCHEMA_VERSION, Mode, Motion, Status
+from tolstat.common.tables import SCHEMA_VERSION, Mode, Status
 from tolstat.store import ResultFile, Writer, layout, metadata, verification, what_if
 from tolstat.store.hdf5 import text
 
@@ -121,7 +121,7 @@ def verify(path: Path) -> None:
 
 def test_codes_carry_their_meanings(whole: Path) -> None:
     with h5py.File(whole) as file:
-        for name, codes in (("results/status", Status), ("results/motion", Motion), ("histories/mode", Mode)):
+        for name, codes in (("results/status", Status), ("histories/mode", Mode)):
             held = file[name]
             assert held.attrs["flag_values"].dtype == held.dtype
             assert held.attrs["flag_values"].tolist() == [code.value for code in codes]

@@ -16,6 +16,7 @@ from tolstat.study.tolerances import distributions
 from tolstat.study.tolerances.accepted import Accepted
 from tolstat.study.tolerances.distributions import Distribution
 from tolstat.study.tolerances.radial import Disc, Rayleigh, plane_scores
+from tolstat.study.tolerances.scipy_law import ScipyLaw
 
 U = np.concatenate([10.0 ** np.arange(-15, -2), np.linspace(0.01, 0.99, 99), 1 - 10.0 ** np.arange(-3.0, -16, -1)])
 
@@ -36,6 +37,10 @@ PAIRS = [
     (distributions.LogNormal(-1.0, distributions.Normal(0.2, 0.4)), stats.lognorm(0.4, -1.0, math.exp(0.2))),
     (distributions.Beta(2.0, 5.0, -1.0, 3.0), stats.beta(2.0, 5.0, -1.0, 4.0)),
     (distributions.Beta(1.5, 1.0, -1.0, 3.0), stats.beta(1.5, 1.0, -1.0, 4.0)),
+    (ScipyLaw("weibull_min", (("c", 1.8), ("scale", 0.012)), 1e-3), stats.weibull_min(1.8, scale=1.2e-5)),
+    (ScipyLaw("norm", (("loc", 1.0), ("scale", 2.0)), 1.0, 0.5, 9.0), stats.truncnorm(-0.25, 4.0, 1.0, 2.0)),
+    (ScipyLaw("norm", (), 1.0, 5.0, 6.0), stats.truncnorm(5.0, 6.0)),
+    (ScipyLaw("norm", (), 1.0, None, -4.0), stats.truncnorm(-np.inf, -4.0)),
     (Rayleigh(2.0), stats.rayleigh(scale=2.0)),
     (Disc(3.0), stats.powerlaw(2.0, scale=3.0)),
     (widths.Rescaled(distributions.Normal(1.0, 2.0), 0.5, 0.25), stats.norm(0.625, 0.5)),

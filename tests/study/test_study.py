@@ -121,6 +121,21 @@ def test_a_study_is_read_whole(tmp_path: Path) -> None:
     assert (s.output.histories, s.output.harmonics) == ("harmonics", 12)
 
 
+def test_a_study_of_dictionaries_is_that_of_its_file(tmp_path: Path) -> None:
+    path = ROOT / "studies" / "duty_cycle.toml"
+    sections = tomllib.loads(path.read_text(encoding="utf-8"))
+    made = study.load(sections, n=8)
+    assert made.identity() == study.load(path, n=8).identity()
+    assert (made.name, made.limits) == ("study", study.load(path).limits)
+    sections["operation"][0]["speed"], sections["sampling"]["n"] = 500, 0
+    with pytest.raises(InputError) as caught:
+        study.load(sections)
+    assert "operation[0].speed: 500 has no unit" in str(caught.value)
+    assert "sampling.n" in str(caught.value)
+    with pytest.raises(InputError, match="a value cannot be written to a study"):
+        study.load(sections | {"sampling": {"n": object()}})
+
+
 def test_solver_defaults_are_those_of_the_kernel() -> None:
     assert Solver().options() == tables.Options()
     changed = Solver(method="generalized_alpha", start="ramp", rho_inf=0.5).options()

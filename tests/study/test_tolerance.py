@@ -87,6 +87,48 @@ def test_other_entries() -> None:
     assert radial == Rayleigh(pytest.approx(3e-4))
 
 
+def test_laws_of_scipy() -> None:
+    entry = {"distribution": "scipy:weibull_min(1.8, scale=0.012)", "unit": "mm", "upper": "20 um"}
+    law = build(entry)
+    assert law.describe() == {
+        "distribution": "scipy:weibull_min",
+        "c": 1.8,
+        "scale": 0.012,
+        "unit": pytest.approx(1e-3),
+        "upper": pytest.approx(2e-5),
+    }
+    assert law.ppf(np.array([1.0])) == pytest.approx(2e-5)
+    assert build(entry | {"unit": "um"}) != law
+    pure = build({"distribution": "scipy:gumbel_r(loc=-0.01, scale=1e-3)"}, "material.E_factor", 1.0, "1")
+    assert pure.moments.mean == pytest.approx(stats.gumbel_r.mean(-0.01, 1e-3))
+
+
+@pytest.mark.parametrize(
+    ("law", "found"),
+    [
+        ("scipy", "offset_t.distribution"),
+        ("scipy:", "'' is no law with numbers"),
+        ("scipy:norm", "'norm' is no law with numbers"),
+        ("scipy:norm(scale=open('x'))", "is no law with numbers"),
+        ("scipy:norm(scale=True)", "is no law with numbers"),
+        ("scipy:norm(**{'scale': 1})", "is no law with numbers"),
+        ("scipy:stats.norm()", "is no law with numbers"),
+        ("scipy:" + "(" * 150 + ")" * 150, "is no law with numbers"),
+        ("scipy:norms(scale=1)", "did you mean 'norm'?"),
+        ("scipy:poisson(3)", "no continuous law 'poisson'"),
+        ("scipy:weibull_min(scale=1)", "weibull_min has c, loc, scale"),
+        ("scipy:norm(0, loc=1)", "does not give each parameter once"),
+        ("scipy:norm(0, 1, 2)", "does not give each parameter once"),
+        ("scipy:norm(scale=-1)", "a parameter that the law does not allow"),
+        ("scipy:cauchy(scale=1)", "no finite standard deviation"),
+    ],
+)
+def test_faults_of_laws_of_scipy(law: str, found: str) -> None:
+    message = faults({"distribution": law, "unit": "mm"})
+    assert found in message
+    assert "hint: " in message
+
+
 def test_lognormal_entries_have_the_moments_and_limits_asked_for() -> None:
     by_moments = build({"mean": "0.2 mm", "std": "0.1 mm", "distribution": "lognormal"})
     middle = (np.arange(200_000) + 0.5) / 200_000
@@ -150,6 +192,10 @@ def test_measured_entry_reads_a_column(tmp_path: Path) -> None:
         ({"distribution": "lognormal", "plus_minus": "1 mm"}, "not above threshold"),
         ({"distribution": "lognormal", "mean": "1 mm"}, "mean without std"),
         ({"distribution": "beta", "plus_minus": "1 mm", "a": -1}, "offset_t.b: missing key"),
+        ({"distribution": "scipy:norm(scale=1)"}, "missing key unit"),
+        ({"distribution": "scipy:norm(scale=1)", "unit": "s"}, "offset_t"),
+        ({"distribution": "scipy:norm(scale=1)", "unit": "mm", "cpk": 1.0}, "offset_t.cpk: unknown key"),
+        ({"distribution": "scipy:expon(scale=1)", "unit": "mm", "upper": "0 mm"}, "no part lies between"),
         ({"distribution": "uniform", "plus_minus": "nan mm"}, "'nan mm' is not a finite number"),
     ],
 )
@@ -162,7 +208,7 @@ def test_faults_of_entries(entry: object, found: str) -> None:
 
 def test_every_kind_is_reachable() -> None:
     assert set(KINDS) | {kind for kinds in ZONE_KINDS.values() for kind in kinds} == {
-        *("normal", "uniform", "triangular", "lognormal", "beta", "rayleigh", "measured"),
+        *("normal", "uniform", "triangular", "lognormal", "beta", "rayleigh", "measured", "scipy"),
     }
 
 

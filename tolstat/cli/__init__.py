@@ -29,6 +29,7 @@ PLAIN = {
         "status": "Print the number of joints by status.",
         "verify": "Estimate the numerical error on some joints.",
         "replay": "Simulate one joint again and compare with the file.",
+        "evaluate": "Simulate joints whose errors another program gives.",
     },
     "Read": {"report": "Report the share of joints above each load."},
     "Decide": {},

@@ -54,6 +54,23 @@ def with_settings(text: str, settings: Sequence[str]) -> str:
     return text
 
 
+def as_text(sections: Mapping[str, Any]) -> str:
+    """TOML of a study's sections.
+
+    Raises
+    ------
+    InputError
+        When a value is of no type that TOML has.
+    """
+    try:
+        return tomlkit.dumps(sections)
+    except (TOMLKitError, TypeError, ValueError) as error:
+        found = f"a value cannot be written to a study: {error}"
+        raise InputError(
+            [Fault("study", found, "give texts, numbers, true or false, lists and dictionaries")]
+        ) from error
+
+
 def given(value: str) -> Any:
     """Value of a setting of the command line: as in TOML; a text may lack its quotes."""
     try:

@@ -281,13 +281,16 @@ class Study(Case):
         return named.get("", named)
 
 
-def load(path: str | Path, n: int | None = None, text: str | None = None, joint: Joint | None = None) -> Study:
-    """Read a study file.
+def load(
+    path: str | Path | Mapping[str, Any], n: int | None = None, text: str | None = None, joint: Joint | None = None
+) -> Study:
+    """Read a study file, or make a study of its sections.
 
     Parameters
     ----------
-    path : str or Path
-        TOML file.
+    path : str, Path or mapping
+        TOML file; or the sections of one as nested dictionaries, ``{"joint": {"base": "cirelli2021"}, ...}``, whose
+        paths start from the working directory.
     n : int, optional
         Number of joints instead of the file's ``sampling.n``.
     text : str, optional
@@ -305,6 +308,11 @@ def load(path: str | Path, n: int | None = None, text: str | None = None, joint:
     InputError
         With every fault of the file, of the joint file and of measured data that it names.
     """
+    if isinstance(path, Mapping):
+        from tolstat.study import rewriting  # it loads tomlkit
+
+        text = rewriting.as_text(path)
+        path = "study.toml"
     file = StudyFile(Path(path), SECTIONS, text)
     if n is not None:
         file.override("sampling", "n", n)

@@ -29,6 +29,7 @@ from tolstat.study.tolerances.entry import (
 )
 from tolstat.study.tolerances.measured import MeasuredEntry
 from tolstat.study.tolerances.radial import Rayleigh
+from tolstat.study.tolerances.scipy_law import PREFIX, ScipyEntry
 from tolstat.study.tolerances.zones import CoaxialityEntry, OrientationEntry, PositionEntry
 
 CPK = "capability index Cpk of the process: sigma is the distance from the mean to the nearer limit over 3 Cpk"
@@ -241,6 +242,7 @@ KINDS: dict[str, type[ToleranceEntry]] = {
     "lognormal": LogNormalEntry,
     "beta": BetaEntry,
     "measured": MeasuredEntry,
+    "scipy": ScipyEntry,
 }
 ZONE_KINDS: dict[str, dict[str, type[ToleranceEntry]]] = {
     "offset_radial": {"rayleigh": RayleighEntry},
@@ -290,6 +292,8 @@ def entry(data: object, site: Site, place: str, path: tuple[int | str, ...]) -> 
     if kind is None:
         remedy = f"add distribution, one of {', '.join(kinds)}"
         raise InputError([Fault(f"{where}.distribution", "missing key", remedy)])
+    if isinstance(kind, str) and kind.startswith(PREFIX):
+        kind = PREFIX.rstrip(":")
     if not isinstance(kind, str) or kind not in kinds:
         also = " (rayleigh is for offset_radial)" if kind == "rayleigh" else ""
         remedy = strict.did_you_mean(str(kind), list(kinds))

@@ -1,0 +1,106 @@
+"""The function of a study: a campaign's loads for its errors, its errors for its random numbers, to the last bit."""
+
+import numpy as np
+import pytest
+
+import tolstat
+from tests.support.environment import ROOT
+from tolstat import sampling
+from tolstat.campaign import function as functions
+from tolstat.common.errors import InputError
+from tolstat.common.tables import Status
+from tolstat.study import load
+
+STUDIES = ROOT / "studies"
+MAIN = STUDIES / "iso2768_f.toml"
+TEXT = """
+[joint]
+base = "cirelli2021"
+[operation]
+alpha = "15 deg"
+speed = "500 rpm"
+torque = "100 N*m"
+[errors]
+"pin3.offset_e" = "0.05 mm"
+[tolerances]
+"pin1.position" = { zone = "⌀0.1 mm", over = "22 mm", distribution = "normal", cp = 1.0 }
+"hole1.offset_radial" = { plus_minus = "0.05 mm", distribution = "rayleigh", cpk = 1.0 }
+"pin[234].tilt_t" = { plus_minus = "0.2 deg", distribution = "uniform" }
+"pin*.diameter" = { lower = "-0.030 mm", upper = "0 mm", distribution = "normal", truncate = true }
+[[correlation]]
+between = ["pin*.diameter"]
+rho = 0.6
+[sampling]
+n = 64
+seed = 3
+"""
+
+
+def study_of(text, method="random"):
+    return load(ROOT / "f.toml", text=text.replace("seed = 3", f'seed = 3\nmethod = "{method}"'))
+
+
+@pytest.mark.parametrize("method", ["random", "sobol"])
+@pytest.mark.parametrize("text", [TEXT, MAIN.read_text("utf-8").replace('method = "random"\n', "")])
+def test_errors_of_the_cube_are_those_of_a_campaign(text, method):
+    study = study_of(text.replace("seed = 2021", "seed = 3").replace("n = 1024", "n = 64"), method)
+    f = tolstat.function(study)
+    u = np.column_stack(list(sampling._uniforms(f.cube_names, range(64), study).values()))
+    drawn = sampling.draw(study)[study.first_sample :]
+    assert f.uniform(u).tobytes() == np.column_stack([drawn[name] for name in f.names]).tobytes()
+    assert f.uniform(u[5:9]).tobytes() == f.uniform(u)[5:9].tobytes()
+    assert np.isfinite(f.uniform(np.array([[0.0], [1.0]]) * np.ones(len(f.cube_names)))).all()
+
+
+def test_what_is_drawn_alone_has_a_distribution():
+    f = tolstat.function(load(MAIN))
+    assert (list(f.distributions), f.reason) == (f.names, "")
+    assert f.names == f.cube_names
+    assert f.loads == list(f.limits)
+    assert f.limits["cross1.F"] == 1000.0
+    zones = tolstat.function(study_of(TEXT), ["cross*.F", "psi"])
+    assert zones.distributions is None
+    assert "pin1.position_inner is drawn as a vector" in zones.reason
+    assert zones.loads == ["cross1.F", "cross2.F", "cross3.F", "cross4.F", "psi"]
+    assert len(zones.salib()["groups"]) == len(zones.cube_names) == 13
+    assert "groups" not in f.salib()
+
+
+def test_faults():
+    with pytest.raises(InputError, match=r"(?s)did you mean 'cross1'.*is no load") as caught:
+        tolstat.function(load(MAIN), ["cros1.F", "cross1.G"])
+    assert len(caught.value.faults) == 2
+    lots = study_of(
+        TEXT.replace("n = 64", "n = 128").replace('"uniform" }', '"uniform", lot = { share = 0.3 } }')
+        + "joints_per_lot = 4\n"
+    )
+    f = tolstat.function(lots)
+    with pytest.raises(InputError, match="joints of one lot depend on each other"):
+        f.uniform(np.full((2, len(f.cube_names)), 0.5))
+    with pytest.raises(ValueError, match=r"shape \(n, 13\)"):
+        f(np.zeros((2, 3)))
+    with pytest.raises(InputError, match="draws no errors"):
+        tolstat.function(load(STUDIES / "clearance.toml"))
+
+
+@pytest.mark.slow
+def test_loads_are_those_of_a_campaign(tmp_path, monkeypatch):
+    """For one and two workers, in any order; a joint that cannot be assembled has no loads, and a status."""
+    study = load(MAIN, n=24)
+    tolstat.run(study, tmp_path / "a.h5", workers=1, check=False)
+    f = tolstat.function(study, ["cross*.F", "fork1.T", "psi"], workers=1)
+    with tolstat.open(tmp_path / "a.h5") as store:
+        errors = store.errors()[store.first_sample :]
+        expected = np.column_stack([store.loads[name].to_numpy() for name in f.loads])
+        assert f.nominal.tolist() == [store.nominal[name] for name in f.loads]
+    x = np.column_stack([errors[name] for name in f.names])
+    assert f(x).tobytes() == expected.tobytes()
+    assert (f.status == Status.OK).all()
+    x[3, f.names.index("pin1.diameter")] = 1e-3
+    x[4, 0] = np.nan
+    alone = f(x)
+    assert f.status[[3, 4, 5]].tolist() == [Status.OUTSIDE_MODEL, Status.INVALID_INPUT, Status.OK]
+    assert np.isnan(alone[3:5]).all()
+    monkeypatch.setattr(functions, "LEAST_SHARED", 2)
+    both = tolstat.function(study, f.loads, workers=2)
+    assert both(x[::-1])[::-1].tobytes() == alone.tobytes()

@@ -1,0 +1,303 @@
+"""The joints of a study as a function from errors to loads, for other tools of reliability and design."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from contextlib import closing
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tolstat import sampling
+from tolstat.campaign import pool
+from tolstat.campaign.block import Block, Timed, results_of, simulate_block
+from tolstat.campaign.blocks import MAX_BLOCK, MIN_BLOCKS_PER_WORKER, work_beside
+from tolstat.campaign.run import choose_fidelity
+from tolstat.common.cores import available_cores
+from tolstat.common.errors import Fault, InputError
+from tolstat.common.loads import LOADS, SHOWN_LOADS, UNIT_OF_LOAD
+from tolstat.common.tables import VALID, Options
+from tolstat.joint import nominal_errors, perturb
+from tolstat.solver.compilation import is_compiled, warm_up
+from tolstat.solver.simulation import simulate_rows
+from tolstat.store.recorded import settings
+from tolstat.study import Study, axes
+from tolstat.study.selection import select, suggestion
+from tolstat.study.tolerances import distributions as law
+from tolstat.study.tolerances.scipy_law import ScipyLaw
+
+if TYPE_CHECKING:
+    import openturns
+
+Array = NDArray[np.float64]
+
+STEP = 0.1
+"""Step of the finite differences that OpenTURNS takes for derivatives, in standard deviations of the input."""
+
+LEAST_SHARED = 256
+"""Number of joints from which on worker processes are started: fewer take less time than the start, on the main job."""
+
+
+class Function:
+    """Loads of joints as a function of their errors; see `function`.
+
+    ``f(x)`` takes errors, (n, d), SI, in the order of `names`, and returns loads, (n, m), SI, in the order of `loads`;
+    NaN where a joint has no valid one, and `status` says why. It equals what a campaign of the study stores for the
+    same errors, to the last bit.
+
+    Attributes
+    ----------
+    names : list of str
+        Errors that the study draws; all others are those of the study.
+    cube_names : list of str
+        Coordinates of the unit cube that `uniform` maps to errors.
+    loads : list of str
+        Loads.
+    limits : dict of str to float
+        Limits of the study on these loads, SI.
+    distributions : dict of str to Distribution, optional
+        Distribution of each of `names` if each is drawn alone; `copula` correlates some. None where other errors enter.
+    reason : str
+        Why `distributions` is None; empty otherwise.
+    copula : Copula
+        Gaussian copula of the errors.
+    status : ndarray, (n,), uint8
+        `Status` of the joints of the last call.
+    simulated : int
+        Number of joints simulated so far.
+    """
+
+    def __init__(self, study: Study, loads: Sequence[str], point: str, workers: int | None) -> None:
+        self._whole, self.study = study, study.at(point)
+        self.loads, self.workers = list(loads), workers
+        self.names, self.cube_names = sampling.columns(study), sampling.streams(study)
+        self.limits = {name: self.study.limits[name] for name in loads if name in self.study.limits}
+        self.copula = study.copula
+        self.reason = _reason(study)
+        self.distributions = None if self.reason else dict(study.tolerances)
+        self.status: NDArray[np.uint8] = np.zeros(0, np.uint8)
+        self.simulated = 0
+
+    def __repr__(self) -> str:
+        return f"<function of {len(self.names)} errors, {len(self.loads)} loads, of study {self.study.name!r}>"
+
+    def __call__(self, x: Array) -> Array:
+        """Loads of joints, (n, m), from their errors `x`, (n, d)."""
+        errors = nominal_errors(len(x))
+        for name, value in self.study.errors.items():
+            errors[name] = value
+        for name, column in zip(self.names, _columns(x, self.names), strict=True):
+            errors[name] = column
+        return self._simulate(errors)
+
+    def uniform(self, u: Array) -> Array:
+        """Errors of joints, (n, d), SI, from points `u` of the unit cube, (n, k), in the order of `cube_names`.
+
+        A campaign draws its errors so from independent random numbers: zones, fits and correlation are in them.
+
+        Raises
+        ------
+        InputError
+            When joints of the study depend on each other: with lots of several joints, and matched by classes.
+        """
+        if self.study.sampling.joints_per_lot > 1:
+            remedy = "remove sampling.joints_per_lot: joints of one lot depend on each other"
+            raise InputError([self.study.fault("sampling.joints_per_lot", "joints have no free errors", remedy)])
+        errors = sampling.from_probabilities(self.study, np.array(_columns(u, self.cube_names)).T)
+        return np.column_stack([errors[name] for name in self.names])
+
+    @cached_property
+    def nominal(self) -> Array:
+        """Loads of the joint without errors, (m,), SI."""
+        status = self.status
+        try:
+            return np.asarray(self._simulate(nominal_errors(1))[0])
+        finally:
+            self.status = status
+
+    @cached_property
+    def options(self) -> Options:
+        """Solver options of a campaign of the study; those of fidelity "auto" come from its pilot."""
+        solver = self._whole.solver
+        options = settings(solver, choose_fidelity(self._whole) if solver.fidelity == "auto" else {})
+        if not is_compiled(options):
+            warm_up(options)
+        return options
+
+    def openturns(self, cube: bool = False) -> tuple[openturns.Function, openturns.Distribution]:
+        """Return the function for OpenTURNS, and the distribution of its input.
+
+        Parameters
+        ----------
+        cube : bool
+            Take points of the unit cube as input, independent and uniform. So it is, too, where `distributions` is
+            None; `uniform` gives the errors of a design point.
+
+        Returns
+        -------
+        function : openturns.Function
+            From errors, or points of the cube, to loads.
+        distribution : openturns.Distribution
+            Of the errors, with their copula, or of the cube.
+        """
+        import openturns as ot
+
+        is_cube = cube or self.distributions is None
+        names = self.cube_names if is_cube else self.names
+        copula = ot.IndependentCopula(len(names))
+        if is_cube:
+            parts, steps = [ot.Uniform(0.0, 1.0)] * len(names), [STEP / math.sqrt(12.0)] * len(names)
+        else:
+            laws = list((self.distributions or {}).values())
+            parts, steps = [_marginal(ot, own) for own in laws], [STEP * own.moments.deviation for own in laws]
+            if self.copula.names:
+                correlation, at = np.eye(len(names)), [names.index(name) for name in self.copula.names]
+                correlation[np.ix_(at, at)] = self.copula.matrix
+                copula = ot.NormalCopula(ot.CorrelationMatrix(correlation.tolist()))
+
+        def loads(sample: Any) -> Array:
+            x = np.array(sample)
+            return self(self.uniform(x) if is_cube else x)
+
+        function = ot.PythonFunction(len(names), len(self.loads), func_sample=loads)
+        function.setGradient(ot.CenteredFiniteDifferenceGradient(steps, function.getEvaluation()))
+        function.setHessian(ot.CenteredFiniteDifferenceHessian(steps, function.getEvaluation()))
+        function.setInputDescription(names)
+        function.setOutputDescription(self.loads)
+        joint = ot.JointDistribution(parts, copula)
+        joint.setDescription(names)
+        return function, joint
+
+    def salib(self) -> dict[str, Any]:
+        """Return the problem for SALib, on the unit cube: ``f(f.uniform(u))`` are loads of its points.
+
+        Coordinates of one vector, such as both of a position's zone, are one group.
+        """
+        groups = {stream: name for name in self.study.tolerances for stream in axes.streams_of(name)}
+        names, labels = self.cube_names, [groups[name] for name in self.cube_names]
+        problem: dict[str, Any] = {"num_vars": len(names), "names": names, "bounds": [[0.0, 1.0]] * len(names)}
+        return problem if len(set(labels)) == len(labels) else problem | {"groups": labels}
+
+    def _simulate(self, errors: NDArray[np.void]) -> Array:
+        n, workers = len(errors), self.workers or available_cores()
+        self.simulated += n
+        joint, operation, options = self.study.joint, self.study.operation, self.options
+        loads, self.status = np.full((n, len(self.loads)), np.nan), np.zeros(n, np.uint8)
+
+        def put(block: Block, result: Timed | pool.Lost) -> None:
+            table = results_of(block, result)
+            self.status[block.slots], valid = table["status"], np.isin(table["status"], VALID)
+            values = np.column_stack([LOADS[name].of(table) for name in self.loads])
+            loads[block.slots] = np.where(valid[:, None], values, np.nan)
+
+        size = MAX_BLOCK
+        if n >= LEAST_SHARED and workers > 1:
+            size = min(size, -(-n // (MIN_BLOCKS_PER_WORKER * workers)))
+        parts = [np.arange(first, min(first + size, n)) for first in range(0, n, size)]
+        blocks = (Block("", slots, perturb(joint, operation, errors[slots]), options) for slots in parts)
+        if n < LEAST_SHARED or workers == 1:
+            for block in blocks:
+                put(block, simulate_block(simulate_rows, "none", 0, {}, block))
+            return loads
+        with closing(pool.map_blocks(work_beside(options), blocks, workers)) as finished:
+            for block, result in finished:
+                put(block, result)
+        return loads
+
+
+def function(
+    study: Study, loads: Sequence[str] | None = None, *, point: str = "", workers: int | None = None
+) -> Function:
+    """Loads of the joints of a study as a function of their errors, for other tools.
+
+    Parameters
+    ----------
+    study : Study
+        Study with toleranced errors; how it samples is left to the other tool.
+    loads : sequence of str, optional
+        Names of loads or patterns such as ``cross*.F``; by default those with limits, without limits those of reports.
+    point : str
+        Operating point, of a study with several.
+    workers : int, optional
+        Number of processes for `LEAST_SHARED` joints or more; by default one per core. Affects no result.
+
+    Returns
+    -------
+    Function
+
+    Raises
+    ------
+    InputError
+        When the study draws no errors, a load or the point is unknown.
+    """
+    faults = []
+    if not study.tolerances or study.sweep or study.listed is not None:
+        found = "the study draws no errors, so that nothing is left to give"
+        faults.append(study.fault("tolerances", found, 'add tolerances, and sampling.method = "random"'))
+    chosen: dict[str, None] = {}
+    for pattern in (study.asked or SHOWN_LOADS) if loads is None else loads:
+        names = select(pattern, UNIT_OF_LOAD)
+        chosen.update(dict.fromkeys(names))
+        if not names:
+            faults.append(Fault("loads", f"{pattern!r} is no load", suggestion(pattern, list(UNIT_OF_LOAD))))
+    if faults:
+        raise InputError(faults)
+    return Function(study, list(chosen), point, workers)
+
+
+def _columns(values: Array, names: Sequence[str]) -> list[Array]:
+    """Columns of a table with these names.
+
+    Raises
+    ------
+    ValueError
+        When it has not one column for each of them.
+    """
+    table = np.asarray(values, float)
+    if table.ndim != 2 or table.shape[1] != len(names):
+        raise ValueError(f"an array of shape (n, {len(names)}) is needed, a column for each of {', '.join(names)}")
+    return [np.ascontiguousarray(column) for column in table.T]
+
+
+def _reason(study: Study) -> str:
+    """Why the errors of a study have no distribution each; empty if they have."""
+    zones = [name for name in study.tolerances if axes.is_zone(name)]
+    if zones:
+        return f"{zones[0]} is drawn as a vector, from which errors follow"
+    if study.sampling.is_matched:
+        return "sampling.selective matches diameters by classes"
+    return "joints of one lot depend on each other" if study.sampling.joints_per_lot > 1 else ""
+
+
+def _marginal(ot: Any, own: law.Distribution) -> Any:
+    """Distribution of OpenTURNS that equals one of a tolerance."""
+    match own:
+        case law.Normal():
+            return ot.Normal(own.mean, own.sigma)
+        case law.TruncatedNormal():
+            return ot.TruncatedNormal(own.mean, own.sigma, own.lower, own.upper)
+        case law.Uniform():
+            return ot.Uniform(own.lower, own.upper)
+        case law.Triangular():
+            return ot.Triangular(own.lower, own.peak, own.upper)
+        case law.Beta():
+            return ot.Beta(own.a, own.b, own.lower, own.upper)
+        case law.LogNormal(log=log):
+            whole = ot.LogNormal(log.mean, log.sigma, own.threshold)
+            if isinstance(log, law.Normal):
+                return whole
+            return ot.TruncatedDistribution(
+                whole, *(own.threshold + float(np.exp(end)) for end in (log.lower, log.upper))
+            )
+        case law.Measured():
+            return ot.UserDefined(own.values[:, None].tolist())
+        case ScipyLaw():
+            whole = ot.Distribution(ot.SciPyDistribution(own.whole))
+            inside = ot.TruncatedDistribution(
+                whole, ot.Interval([own.ends[0]], [own.ends[1]], [own.lower is not None], [own.upper is not None])
+            )
+            return ot.CompositeDistribution(ot.SymbolicFunction("x", f"{own.unit!r} * x"), inside)
+    raise NotImplementedError(f"{type(own).__name__} has no equal in OpenTURNS: use openturns(cube=True)")

@@ -1,0 +1,154 @@
+"""``tolstat evaluate``: loads of joints whose errors another program gives as CSV."""
+
+from __future__ import annotations
+
+import csv
+import math
+import sys
+from collections.abc import Mapping
+from io import StringIO
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic_core import PydanticCustomError
+
+from tolstat.campaign.function import function
+from tolstat.cli._talk import say
+from tolstat.cli._work import work
+from tolstat.common import units
+from tolstat.common.errors import Fault, InputError
+from tolstat.common.files import atomic_write, check_target
+from tolstat.common.loads import UNIT_OF_LOAD
+from tolstat.common.strict import read_text
+from tolstat.common.tables import ERROR_FIELDS, VALID, Status
+from tolstat.display.options import Opt, SimulatedPath, Workers
+from tolstat.display.text import csv_rows
+from tolstat.study import load
+
+MAX_FAULTS = 20
+"""Most faults of a table that a message lists."""
+
+
+def evaluate(
+    study: SimulatedPath,
+    *,
+    errors: Annotated[Path, Opt("CSV", name="in")],
+    out: Annotated[str, Opt("CSV", writes=True)],
+    loads: Annotated[list[str] | None, Opt("LOAD", name="load")] = None,
+    uniform: bool = False,
+    point: Annotated[str, Opt("POINT")] = "",
+    workers: Workers = None,
+) -> None:
+    """Simulate joints whose errors another program gives.
+
+    The first line of the CSV file has the names of the errors that STUDY draws, in any order; the second their units,
+    or SI units hold. Other columns are left out. The output has a row for each joint in the same order: its status,
+    then its loads, with the names in the first line and the units in the second. A load is empty where a joint has
+    none.
+
+    Example: tolstat evaluate iso2768_f.toml --in x.csv --out y.csv --load 'cross*.F'
+
+    Parameters
+    ----------
+    errors : Path
+        Errors of the joints, for example joints.csv of tolstat export.
+    out : str
+        Loads of the joints; - for standard output.
+    loads : list of str, optional
+        Load or pattern, such as cross*.F; repeatable; default: those with limits.
+    uniform : bool
+        The columns are points of the unit cube, from which errors are drawn as in a campaign.
+    point : str
+        Operating point, such as cruise; needed if STUDY has several.
+    """
+    if out != "-":
+        check_target(Path(out), errors)
+    f = function(load(study), loads, point=point, workers=workers)
+    names = f.cube_names if uniform else f.names
+    si = {field.name: field.unit for field in ERROR_FIELDS}
+    given = read_table(errors, {name: "1" if uniform else si[name] for name in names})
+    with work(workers=workers) as shown:
+        shown.display.stage("simulation")
+        y = f(f.uniform(given) if uniform else given)
+    head = [["status", *f.loads], ["", *(UNIT_OF_LOAD[name] for name in f.loads)]]
+    rows = csv_rows([[Status(number).label for number in f.status], *y.T.tolist()])
+    if out == "-":
+        csv.writer(sys.stdout, lineterminator="\n").writerows([*head, *rows])
+    else:
+        with atomic_write(Path(out)) as temporary, temporary.open("w", encoding="utf-8", newline="") as stream:
+            csv.writer(stream, lineterminator="\n").writerows([*head, *rows])
+    without = int((~np.isin(f.status, VALID)).sum())
+    say(f"{'' if out == '-' else f'wrote {out}: '}{len(y)} joints, {without} of them without a valid load")
+
+
+def read_table(path: Path, names: Mapping[str, str]) -> NDArray[np.float64]:
+    """Read columns of a CSV file: names in the first line, and units in the second if a cell of it is no number.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    names : mapping of str to str
+        Columns to read, and the SI unit of each; others are left out.
+
+    Returns
+    -------
+    ndarray, (n, len(names))
+        SI.
+
+    Raises
+    ------
+    InputError
+        With the faults of the file: columns that it lacks or has twice, units, cells that are no finite numbers.
+    """
+    lines = csv.reader(StringIO(read_text(path), newline=""))
+    rows = [(lines.line_num, [cell.strip() for cell in row]) for row in lines if any(cell.strip() for cell in row)]
+    head = rows.pop(0)[1] if rows else []
+    faults = [
+        Fault(
+            f"{path}:1", f"{'no' if name not in head else 'more than one'} column {name!r}", "give one for each error"
+        )
+        for name in names
+        if head.count(name) != 1
+    ]
+    kept = {name: head.index(name) for name in names if name in head}
+    for number, cells in rows:
+        if len(cells) != len(head):
+            found = f"has {len(cells)} cells, the first line {len(head)}"
+            faults.append(Fault(f"{path}:{number}", found, "give a cell for each column"))
+    whole = [(number, cells) for number, cells in rows if len(cells) == len(head)]
+    factors = dict.fromkeys(kept, 1.0)
+    if whole and any(not is_number(whole[0][1][column]) for column in kept.values()):
+        number, cells = whole.pop(0)
+        for name, column in kept.items():
+            unit = cells[column]
+            try:
+                factors[name] = units.to_si(f"1 {unit}" if unit not in ("", "1") else 1.0, names[name])
+            except PydanticCustomError:
+                place = f"{path}:{number}: {name}"
+                faults.append(Fault(place, f"{unit!r} is no unit of it", f"write {names[name]}, or another such unit"))
+    if not whole and not faults:
+        faults.append(Fault(str(path), "has no joints", "give a row of numbers for each"))
+    table = np.empty((len(whole), len(names)))
+    for i, (number, cells) in enumerate(whole):
+        for j, (name, column) in enumerate(kept.items()):
+            if is_number(cells[column]):
+                table[i, j] = factors[name] * float(cells[column])
+            else:
+                found = f"{cells[column]!r} is no finite number"
+                faults.append(Fault(f"{path}:{number}: {name}", found, "give the error of this joint"))
+    if faults:
+        more = len(faults) - MAX_FAULTS
+        rest = [Fault(str(path), f"and {more} more faults", "mend these first")] if more > 0 else []
+        raise InputError([*faults[:MAX_FAULTS], *rest])
+    return table
+
+
+def is_number(cell: str) -> bool:
+    """Whether a cell holds a finite number."""
+    try:
+        return math.isfinite(float(cell))
+    except ValueError:
+        return False

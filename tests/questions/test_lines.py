@@ -36,6 +36,7 @@ from tolstat.joint import perturb
 from tolstat.questions.causes import lines as question
 from tolstat.questions.causes import shares
 from tolstat.questions.causes import simulation as runner
+from tolstat.questions.shares import names_at_points
 from tolstat.report.headline import headline
 from tolstat.solver import stationary
 from tolstat.solver.simulation import simulate_rows
@@ -709,7 +710,7 @@ def test_changed_joints_are_simulated_at_all_points(tmp_path):
         assert {"cross1.F at cruise", "cross1.F at start"} < set(one.names)
         cruise, start = (one.valid([f"cross1.F at {point}"]) for point in ("cruise", "start"))
         np.testing.assert_allclose(start, 1.05 * cruise)
-        np.testing.assert_array_equal(one.valid(sets.names_at_points(view, "cross1.F")), start)
+        np.testing.assert_array_equal(one.valid(names_at_points(view, "cross1.F")), start)
         worst, at_start, at_cruise = (tolstat.lines(view, f"cross1.F{at}") for at in ("", " at start", " at cruise"))
         assert worst.facts["load"] == "cross1.F"
         assert (worst.frame("lines")["share"] == at_start.frame("lines")["share"]).all()

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from tests.study.test_points import HEAD, ONE, REST, load
-from tolstat.analysis import revolutions
 from tolstat.campaign.extend import extend
 from tolstat.campaign.run import run
 from tolstat.common.errors import InputError
@@ -40,35 +39,33 @@ def write(path, head, *columns):
 
 def test_orders_of_speed_and_torque_come_back():
     time, angle, speed, torque = made()
-    found = revolutions.orders(angle, time)
+    found = signals.orders(angle, time)
     assert found.mean == pytest.approx(SPEED, rel=1e-6)
     assert found.numbers.tolist() == list(WAVES)
     np.testing.assert_allclose(found.amplitudes / SPEED, [n * a for n, (a, _) in WAVES.items()], rtol=1e-5)
     np.testing.assert_allclose(found.phases, [p for _, p in WAVES.values()], atol=1e-4)
-    found = revolutions.orders(angle, time, torque)
+    found = signals.orders(angle, time, torque)
     assert (found.turns, found.mean) == (6, pytest.approx(180.0, rel=1e-6))
     np.testing.assert_allclose(found.amplitudes, [40.0, 5.0], rtol=1e-5)
     np.testing.assert_allclose(found.phases, [0.5, -1.0], atol=1e-4)
     assert found.unrepeated < 1e-8
-    np.testing.assert_allclose(
-        revolutions.orders(angle, time, speed).amplitudes / SPEED, [0.002, 0.02, 0.015], rtol=1e-5
-    )
+    np.testing.assert_allclose(signals.orders(angle, time, speed).amplitudes / SPEED, [0.002, 0.02, 0.015], rtol=1e-5)
 
 
 def test_half_orders_do_not_repeat():
     time, angle, _, torque = made(half=10.0)
-    found = revolutions.orders(angle, time, torque)
+    found = signals.orders(angle, time, torque)
     assert found.numbers.tolist() == [2, 6]
     assert found.unrepeated == pytest.approx(50.0 / (800.0 + 12.5 + 50.0), rel=1e-4)
 
 
 def test_small_orders_are_left_out_and_sixteen_kept():
     angle = np.radians(np.arange(360.0))  # the sample at 360 deg is missing
-    one = revolutions.orders(angle, angle, 100 * np.cos(angle) + 0.9 * np.cos(3 * angle))
+    one = signals.orders(angle, angle, 100 * np.cos(angle) + 0.9 * np.cos(3 * angle))
     assert one.numbers.tolist() == [1]
     assert one.left_out == pytest.approx(0.81 / 10000.81, rel=1e-3)
     assert math.isnan(one.unrepeated)
-    many = revolutions.orders(angle, angle, sum((30 - n) * np.cos(n * angle) for n in range(1, 21)))
+    many = signals.orders(angle, angle, sum((30 - n) * np.cos(n * angle) for n in range(1, 21)))
     assert many.numbers.tolist() == list(range(1, 17))
 
 

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 from tests.conftest import ROOT
 from tests.study.test_signals import write
 from tolstat import study
-from tolstat.analysis import cycles, load_spectrum
+from tolstat.analysis import cycles
 from tolstat.cli import app
 from tolstat.questions.fatigue.loads import load_cycles
 from tolstat.store import ResultFile
@@ -29,7 +29,7 @@ def steps(*each, rate=100.0):
 
 def test_steps_become_points_with_their_shares_and_visits():
     low, high, back = (30, 100, 600, 10), (10, 400, 300, 15), (10, -200, 600, 10)
-    found = load_spectrum.duty_cycle(*steps(low, high, low, (20, 50, 0, 10), back, high, (1, 0, 600, 10)), 3.0)
+    found = spectra.duty_cycle(*steps(low, high, low, (20, 50, 0, 10), back, high, (1, 0, 600, 10)), 3.0)
     turns = {100: 600, 400: 100, -200: 100}
     total = sum(abs(torque) ** 3 * n for torque, n in turns.items())
     assert dict(zip(found.torque.round(6).tolist(), found.damage, strict=True)) == pytest.approx(
@@ -52,32 +52,32 @@ def test_damage_is_the_miner_sum_of_the_samples(m):
     n = 20_000
     time, torque = np.cumsum(rng.uniform(0.05, 0.15, n)), np.cumsum(rng.normal(size=n)) + 100.0
     speed, alpha = rng.uniform(20.0, 200.0, n), rng.uniform(0.1, 0.3, n)
-    found = load_spectrum.duty_cycle(time, torque, speed, alpha, m)
+    found = spectra.duty_cycle(time, torque, speed, alpha, m)
     weight = 0.5 * (np.append(np.diff(time), 0) + np.append(0, np.diff(time)))
     whole = np.sum(np.abs(torque) ** m * weight * speed)
     points = np.abs(found.torque) ** m * found.time * weight.sum() * found.speed
-    assert len(points) <= load_spectrum.MOST
+    assert len(points) <= spectra.MOST
     np.testing.assert_allclose(points / whole, found.damage)
-    assert load_spectrum.COVERED <= found.damage.sum() <= 1.0 + 1e-12
+    assert spectra.COVERED <= found.damage.sum() <= 1.0 + 1e-12
 
 
 def test_of_many_visits_those_with_the_largest_changes_of_the_torque_stay():
     small, large = [(2, 100, 600, 10), (2, 140, 600, 10)], (2, 400, 600, 10)
-    found = load_spectrum.duty_cycle(*steps(*[*small * 300, large] * 3, rate=20.0), 3.0)
-    assert len(found.visits) <= load_spectrum.VISITS
+    found = spectra.duty_cycle(*steps(*[*small * 300, large] * 3, rate=20.0), 3.0)
+    assert len(found.visits) <= spectra.VISITS
     assert found.torque[found.visits].round().tolist().count(400) == 3
     assert found.left_out > 1000
 
 
 def test_short_visits_are_none():
-    found = load_spectrum.duty_cycle(*steps((10, 100, 600, 10), (0.05, 300, 600, 10), (10, 100, 600, 10)), 3.0)
+    found = spectra.duty_cycle(*steps((10, 100, 600, 10), (0.05, 300, 600, 10), (10, 100, 600, 10)), 3.0)
     assert len(found.torque) == 2
     assert len(set(found.visits.tolist())) == 1
 
 
 def test_a_signal_without_torque_has_no_duty_cycle():
     with pytest.raises(ValueError, match="no torque"):
-        load_spectrum.duty_cycle(*steps((10, 0, 600, 10), (10, 90, 0, 10)), 3.0)
+        spectra.duty_cycle(*steps((10, 0, 600, 10), (10, 90, 0, 10)), 3.0)
 
 
 def spectrum(*args):

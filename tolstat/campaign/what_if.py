@@ -12,20 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat import sampling
-from tolstat.analysis import difference
-from tolstat.analysis.sample import Sample
 from tolstat.campaign import pool
 from tolstat.campaign.block import Block, Timed, results_of
 from tolstat.campaign.blocks import work_beside
 from tolstat.common.counts import Counts
-from tolstat.common.loads import ANY_LIMIT, LOADS, FloatArray
+from tolstat.common.loads import LOADS
 from tolstat.common.tables import VALID, Options, Status, worst_status
 from tolstat.joint import perturb
 from tolstat.store import Writer, what_if
 from tolstat.store.hdf5 import store_error
 from tolstat.store.provenance import versions
 from tolstat.store.recorded import settings
-from tolstat.store.view import View
 from tolstat.store.what_if import Altered
 from tolstat.study import Study, axes, widths
 from tolstat.study.assumptions import with_value
@@ -36,15 +33,10 @@ WIDTH, FIT, EXCHANGE, JOINT, AS_DRAWN = "width", "fit", "exchange", "joint", "as
 """Kinds of sets: a line with another width, with another fit, with the errors of another joint; other keys; nothing."""
 BLOCK = 128
 """Number of joints that a worker takes at a time: enough to keep the lanes busy, and 0.2 s on the main job."""
-TAIL_STARTS_AT = 0.9
-"""Share of the joints below the tail, for a load without a limit."""
 SLOW_S = 60.0
 """Time of a joint that is assumed where all joints of the pilot crash, s."""
 SAVE_S = 60.0
 """Time after which finished joints are written to the file, s: a kill loses those since."""
-
-Estimate = tuple[float, float, float]
-"""An estimate, and the ends of its interval."""
 
 
 class Change(NamedTuple):
@@ -213,93 +205,11 @@ def simulate(
     return held | new
 
 
-class Joints:
-    """Load of joints that are compared, as drawn and with each change.
-
-    Parameters
-    ----------
-    view : View
-        A campaign whose joints are drawn from tolerances.
-    by : str
-        A load, or ``"any limit"``.
-    held : mapping
-        Changes by their digest, as `View.altered`.
-
-    Attributes
-    ----------
-    load : Sample
-        The load in the campaign.
-    level : float
-        Its limit; without one, its quantile `TAIL_STARTS_AT`.
-    base : ndarray, shape (n,)
-        Load of the joints as drawn, from sample 0 on, NaN without a valid one: the campaign's, then fresh ones.
-    """
-
-    def __init__(self, view: View, by: str, held: Mapping[str, Altered]) -> None:
-        self.load, self._study, self._held = view.load(by), view.study, held
-        self.level = tail_level(self.load)
-        levels = view.limits if by == ANY_LIMIT else {by: 1.0}
-        self._parts = [(names_at_points(view, name), level) for name, level in levels.items()]
-        own = own_joints(view)
-        self.base, more = self.load.values[:own], held.get(what_if.key(as_drawn(view.study, range(0)).about))
-        if more is not None and self.holds(more) and more.first <= own < more.end:
-            self.base = np.concatenate([self.base, self.of(more)[own - more.first :]])
-
-    def holds(self, one: Altered) -> bool:
-        """Whether a change has the load."""
-        return all(one.holds(names) for names, _ in self._parts)
-
-    def of(self, one: Altered) -> FloatArray:
-        """Load of each joint with a change, or its largest ratio to all limits; NaN without a valid one, (n,)."""
-        return np.asarray(np.maximum.reduce([one.valid(names) / level for names, level in self._parts]))
-
-    def share(self, values: FloatArray, confidence: float = 0.95) -> Estimate:
-        """Share of joints above the level."""
-        found = sample_of(values).above(self.level, confidence)
-        return found.estimate, found.outer_lower, found.outer_upper
-
-    def difference(self, a: FloatArray, b: FloatArray, confidence: float = 0.95) -> Estimate:
-        """Share of B above the level less that of A, joint by joint; A may have more joints.
-
-        Raises
-        ------
-        ValueError
-            No joint has a load in both.
-        """
-        a = a[: len(b)]
-        found = difference.shares(sample_of(a), sample_of(b), [self.level], paired=True, confidence=confidence)
-        return float(found.estimate[0]), float(found.outer_lower[0]), float(found.outer_upper[0])
-
-
 def check_code(store: Writer) -> None:
     """Refuse a file whose joints another version of the code simulated; raises a StoreError."""
     if any(store.versions.get(name) != versions()[name] for name in ("tolstat", "sources")):
         remedy = "use that version, or run the campaign again: tolstat run STUDY --out OTHER.h5"
         raise store_error(store.path, "was made by another version of the code", remedy)
-
-
-def sample_of(values: FloatArray) -> Sample:
-    """Sample of loads; joints without one have failed."""
-    return Sample.of(values, np.full(values.size, Status.OK))
-
-
-def tail_level(load: Sample) -> float:
-    """Limit of a load; without one, its quantile `TAIL_STARTS_AT`."""
-    return load.quantile(TAIL_STARTS_AT).estimate if load.limit is None else load.limit
-
-
-def own_joints(view: View) -> int:
-    """Number of samples of the campaign, from the first, that serve as joints as drawn: none of them pending."""
-    if not view.design.has_interval("difference"):
-        return 0
-    waiting = np.flatnonzero(view.status == Status.PENDING)
-    return int(waiting[0]) if waiting.size else view.n
-
-
-def names_at_points(view: View, load: str) -> tuple[str, ...]:
-    """Names that the file keeps of a load, one for each operating point: that of the load unless it has several."""
-    own, plain = view.narrowed(load)
-    return tuple(at(plain, [point], list(view.store.points)) for point in own.points)
 
 
 class _Table:

@@ -1,4 +1,4 @@
-"""What several questions have in common: shares above limits as cells, rows and words, and reasons for refusals."""
+"""What several questions have in common: shares above limits, joints compared with changed ones, reasons to refuse."""
 
 from __future__ import annotations
 
@@ -6,22 +6,32 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, NamedTuple
 
-from tolstat.analysis import binomial
+import numpy as np
+
+from tolstat.analysis import binomial, difference
 from tolstat.analysis.design import Claim
 from tolstat.analysis.estimates import Exceedance
 from tolstat.analysis.prediction import DELIVERY
-from tolstat.analysis.sample import total_interval
+from tolstat.analysis.sample import Sample, total_interval
+from tolstat.campaign import what_if as sets
 from tolstat.common.errors import Fault, NotApplicable, StoreError
-from tolstat.common.loads import ANY_LIMIT
+from tolstat.common.loads import ANY_LIMIT, FloatArray
+from tolstat.common.tables import Status
 from tolstat.display import text
 from tolstat.display.table import Row
-from tolstat.store import error_budget
+from tolstat.store import error_budget, what_if
 from tolstat.store.view import View
+from tolstat.store.what_if import Altered
+from tolstat.study.points import at
 
 WIDEST = 0.5
 """Total interval of a yield, or its bounds without one, from which on it says too little for a verdict."""
+TAIL_STARTS_AT = 0.9
+"""Share of the joints below the tail, for a load without a limit."""
 NO_INTERVALS = "no intervals: they hold for independent samples only"
 Cell = Callable[[Row], str]
+Estimate = tuple[float, float, float]
+"""An estimate, and the ends of its interval."""
 
 
 def word(key: str) -> Cell:
@@ -162,3 +172,85 @@ def delivered(row: Row, limits: int) -> str:
     """What `good` predicts of the next `DELIVERY` joints; empty without an interval."""
     exceeded = "at least one limit" if limits > 1 else "the limit"
     return "" if math.isnan(row["next_lower"]) else f"of the next {DELIVERY} joints exceed {exceeded}"
+
+
+class ChangedJoints:
+    """Load of joints as drawn and with each change, to be compared.
+
+    Parameters
+    ----------
+    view : View
+        A campaign whose joints are drawn from tolerances.
+    by : str
+        A load, or ``"any limit"``.
+    held : mapping
+        Changes by their digest, as `View.altered`.
+
+    Attributes
+    ----------
+    load : Sample
+        The load in the campaign.
+    level : float
+        Its limit; without one, its quantile `TAIL_STARTS_AT`.
+    base : ndarray, shape (n,)
+        Load of the joints as drawn, from sample 0 on, NaN without a valid one: the campaign's, then fresh ones.
+    """
+
+    def __init__(self, view: View, by: str, held: Mapping[str, Altered]) -> None:
+        self.load, self._study, self._held = view.load(by), view.study, held
+        self.level = tail_level(self.load)
+        levels = view.limits if by == ANY_LIMIT else {by: 1.0}
+        self._parts = [(names_at_points(view, name), level) for name, level in levels.items()]
+        own = own_joints(view)
+        self.base, more = self.load.values[:own], held.get(what_if.key(sets.as_drawn(view.study, range(0)).about))
+        if more is not None and self.holds(more) and more.first <= own < more.end:
+            self.base = np.concatenate([self.base, self.of(more)[own - more.first :]])
+
+    def holds(self, one: Altered) -> bool:
+        """Whether a change has the load."""
+        return all(one.holds(names) for names, _ in self._parts)
+
+    def of(self, one: Altered) -> FloatArray:
+        """Load of each joint with a change, or its largest ratio to all limits; NaN without a valid one, (n,)."""
+        return np.asarray(np.maximum.reduce([one.valid(names) / level for names, level in self._parts]))
+
+    def share(self, values: FloatArray, confidence: float = 0.95) -> Estimate:
+        """Share of joints above the level."""
+        found = sample_of(values).above(self.level, confidence)
+        return found.estimate, found.outer_lower, found.outer_upper
+
+    def difference(self, a: FloatArray, b: FloatArray, confidence: float = 0.95) -> Estimate:
+        """Share of B above the level less that of A, joint by joint; A may have more joints.
+
+        Raises
+        ------
+        ValueError
+            No joint has a load in both.
+        """
+        a = a[: len(b)]
+        found = difference.shares(sample_of(a), sample_of(b), [self.level], paired=True, confidence=confidence)
+        return float(found.estimate[0]), float(found.outer_lower[0]), float(found.outer_upper[0])
+
+
+def sample_of(values: FloatArray) -> Sample:
+    """Sample of loads; joints without one have failed."""
+    return Sample.of(values, np.full(values.size, Status.OK))
+
+
+def tail_level(load: Sample) -> float:
+    """Limit of a load; without one, its quantile `TAIL_STARTS_AT`."""
+    return load.quantile(TAIL_STARTS_AT).estimate if load.limit is None else load.limit
+
+
+def own_joints(view: View) -> int:
+    """Number of samples of the campaign, from the first, that serve as joints as drawn: none of them pending."""
+    if not view.design.has_interval("difference"):
+        return 0
+    waiting = np.flatnonzero(view.status == Status.PENDING)
+    return int(waiting[0]) if waiting.size else view.n
+
+
+def names_at_points(view: View, load: str) -> tuple[str, ...]:
+    """Names that the file keeps of a load, one for each operating point: that of the load unless it has several."""
+    own, plain = view.narrowed(load)
+    return tuple(at(plain, [point], list(view.store.points)) for point in own.points)

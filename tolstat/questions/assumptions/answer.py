@@ -27,7 +27,7 @@ from tolstat.display.style import markers
 from tolstat.questions.assumptions import sentences, variations
 from tolstat.questions.assumptions.sentences import KEPT
 from tolstat.questions.assumptions.variations import Standing, Variation, applicable, evaluate
-from tolstat.questions.shares import inapplicable, unusable
+from tolstat.questions.shares import inapplicable, own_joints, unusable
 from tolstat.solver.compilation import warm_up
 from tolstat.store import Writer, what_if
 from tolstat.store.view import View
@@ -320,7 +320,7 @@ class _Run:
         if faults:
             raise InputError(faults)
         self._variations |= {own.label for own in wanted}
-        if (first := sets.own_joints(self._view)) < n:
+        if (first := own_joints(self._view)) < n:
             changes.insert(0, sets.as_drawn(study, range(first, n)))
         held, names = what_if.read(self._store), self._asked.names(study)
         lacking = sum(len(sets.missing(held, change, names)) for change in changes)

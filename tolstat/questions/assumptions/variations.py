@@ -11,11 +11,10 @@ import numpy as np
 
 from tolstat.analysis.sample import total_interval
 from tolstat.campaign import what_if as sets
-from tolstat.campaign.what_if import Estimate
 from tolstat.common.errors import InputError, TolstatError
 from tolstat.common.loads import FloatArray, split
 from tolstat.display.table import Row, Rows
-from tolstat.questions.shares import check_sample, unusable, with_ends
+from tolstat.questions.shares import ChangedJoints, Estimate, check_sample, own_joints, unusable, with_ends
 from tolstat.store import error_budget, known_parts
 from tolstat.store import what_if as kept
 from tolstat.store.view import View
@@ -206,7 +205,7 @@ def check(view: View) -> None:
 
 def joints_of(view: View) -> int:
     """Number of joints of each variation unless more are asked for."""
-    return min(JOINTS, sets.own_joints(view) or view.n)
+    return min(JOINTS, own_joints(view) or view.n)
 
 
 def points_of(view: View) -> tuple[str, ...]:
@@ -294,7 +293,7 @@ def side_of(interval: Sequence[float], accepted: float) -> str:
     return "yes" if high <= accepted else "no" if low > accepted else "open"
 
 
-class _Joints(sets.Joints):
+class _Joints(ChangedJoints):
     """Loads of the joints that are compared: as drawn, and with other values."""
 
     def __init__(self, view: View) -> None:

@@ -11,12 +11,11 @@ import numpy as np
 from tolstat import sampling
 from tolstat.analysis import pick_freeze, ranks, sensitivity
 from tolstat.analysis.sample import Sample
-from tolstat.campaign.what_if import tail_level
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import ANY_LIMIT, FloatArray
 from tolstat.display import text
 from tolstat.display.table import Column, Row, Rows, has
-from tolstat.questions.shares import rows_of
+from tolstat.questions.shares import rows_of, tail_level
 from tolstat.store.hdf5 import store_error
 from tolstat.store.view import View
 

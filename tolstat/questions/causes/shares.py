@@ -12,11 +12,10 @@ import numpy as np
 
 from tolstat.analysis import difference, pick_freeze
 from tolstat.campaign import what_if as sets
-from tolstat.campaign.what_if import Estimate
 from tolstat.common.loads import ANY_LIMIT, FloatArray
 from tolstat.display import text
 from tolstat.display.table import Row, Rows
-from tolstat.questions.shares import check_sample, with_ends
+from tolstat.questions.shares import ChangedJoints, Estimate, check_sample, sample_of, with_ends
 from tolstat.store.view import View
 from tolstat.store.what_if import Altered
 from tolstat.study import Study, scaling, widths
@@ -144,7 +143,7 @@ def evaluate(view: View, by: str, costs: Path | None = None) -> Lines | None:
     return Lines(facts | {"left_out": widths.left_out(view.study)}, rows, joints.indices(lines))
 
 
-class Joints(sets.Joints):
+class Joints(ChangedJoints):
     """Load of the joints that the lines are compared on, as drawn and with each change."""
 
     def settled(self, lines: Sequence[Line], confidence: float = 0.95) -> bool:
@@ -267,9 +266,7 @@ def is_settled(values: Sequence[FloatArray], base: FloatArray, level: float, con
     drawn = float(np.mean(base[:n] > level))
     own = 1.0 - (1.0 - confidence) / (len(values) - 1)
     for one, other in pairwise(ranked):
-        found = difference.shares(
-            sets.sample_of(one[:n]), sets.sample_of(other[:n]), [level], paired=True, confidence=own
-        )
+        found = difference.shares(sample_of(one[:n]), sample_of(other[:n]), [level], paired=True, confidence=own)
         low, high = float(found.lower[0]), float(found.upper[0])
         if low <= 0.0 <= high and max(-low, high) > NEGLIGIBLE * drawn:
             return False

@@ -18,7 +18,7 @@ from tolstat.common.cores import available_cores
 from tolstat.common.loads import ANY_LIMIT, split
 from tolstat.display.progress import clock
 from tolstat.questions.causes import shares
-from tolstat.questions.shares import check_sample
+from tolstat.questions.shares import check_sample, own_joints
 from tolstat.solver.compilation import warm_up
 from tolstat.store import Writer, what_if
 from tolstat.store.hdf5 import store_error
@@ -123,7 +123,7 @@ class _Looks:
         self._held, self._asked = what_if.read(store), Asked(view.kept_loads, points_of(view, load))
         options = sets.options_of(view.study, store)
         self._seconds = sets.seconds_per_joint(view.study, options, PILOT, self._asked.points) / self._workers
-        self._own = sets.own_joints(view)
+        self._own = own_joints(view)
         self._looks, self._simulated, self._cut = 0, 0, False
 
     @property

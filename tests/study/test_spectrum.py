@@ -16,6 +16,7 @@ from tolstat.analysis import cycles
 from tolstat.cli import app
 from tolstat.questions.fatigue.loads import load_cycles
 from tolstat.store import ResultFile
+from tolstat.study import spectrum as spectra
 
 SIGNAL = ROOT / "studies" / "drive_cycle.csv"
 RPM = np.pi / 30

@@ -102,27 +102,30 @@ class CheckedFile:
         known = self._known.setdefault(paths, np.full(blocks_of(self.stored[paths[0]].shape[0]), UNKNOWN, np.uint8))
         new = blocks[known[blocks] == UNKNOWN]
         if new.size:
-            wrong = self._differ(paths, new)
+            wrong = self._differ(paths, new).any(axis=0)
             if changes and self.number != number:  # a run has begun meanwhile
                 return blocks[:0]
             known[new] = np.where(wrong, DAMAGED, SOUND)
         return np.asarray(blocks[known[blocks] == DAMAGED])
 
-    def _differ(self, paths: tuple[str, ...], blocks: NDArray[np.intp]) -> NDArray[np.bool_]:
-        """Whether one of the datasets does not match its checksum, (blocks,)."""
+    def _differ(self, paths: Sequence[str], blocks: NDArray[np.intp]) -> NDArray[np.bool_]:
+        """Whether datasets do not match their checksums, (paths, blocks)."""
         for path in paths:
             self.dataset(path)
         with told_as_damage(self.path):
             written = self.file[GROUP]["crc"][:, blocks[0] : blocks[-1] + 1][[self._index[path] for path in paths]]
             actual = computed(self.file, [self.stored[path] for path in paths], blocks)
-            return np.asarray((written[:, blocks - blocks[0]] != actual).any(axis=0))
+            return np.asarray(written[:, blocks - blocks[0]] != actual)
 
     def check(self) -> dict[str, NDArray[np.intp]]:
         """Compare everything that has a checksum with it, histories included; damaged blocks by dataset."""
-        n = next(iter(self.stored.values())).shape[0]
-        paths = [path for path in self.stored if self.number % 2 == 0 or not layout.is_at_point(path)]
-        damaged_blocks = {path: self.damaged((path,), 0, n) for path in paths}
-        return {path: blocks for path, blocks in damaged_blocks.items() if blocks.size}
+        blocks, number = np.arange(blocks_of(next(iter(self.stored.values())).shape[0])), self.number
+        paths = [path for path in self.stored if number % 2 == 0 or not layout.is_at_point(path)]
+        damaged_blocks = {path: blocks[wrong] for path, wrong in zip(paths, self._differ(paths, blocks), strict=True)}
+        begun = self.number != number  # a run, meanwhile
+        return {
+            path: own for path, own in damaged_blocks.items() if own.size and not (begun and layout.is_at_point(path))
+        }
 
 
 def blocks_of(n: int) -> int:

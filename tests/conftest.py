@@ -10,11 +10,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import tolstat
 from tests.support.environment import ROOT
 from tolstat import joint as joints
 from tolstat.campaign import pool
+from tolstat.cli import app
 from tolstat.common.tables import PARAM
 from tolstat.joint import orders
 
@@ -174,4 +176,6 @@ def example_files(tmp_path_factory: pytest.TempPathFactory) -> Path:
     sorting = folder / "studies" / "sorting.toml"
     tolstat.run(tolstat.load(sorting, n=60), folder / "sorting.h5", workers=1)
     tolstat.run(tolstat.load(folder / "studies" / "drive_shaft.toml", n=40), folder / "drive_shaft.h5", workers=1)
+    done = CliRunner().invoke(app, ["export", str(folder / "iso2768_f.h5"), "--csv", str(folder / "joints.csv")])
+    assert done.exit_code == 0, done.stderr
     return folder

@@ -48,7 +48,7 @@ def evaluate(
     then its loads, with the names in the first line and the units in the second. A load is empty where a joint has
     none.
 
-    Example: tolstat evaluate iso2768_f.toml --in x.csv --out y.csv --load 'cross*.F'
+    Example: tolstat evaluate studies/iso2768_f.toml --in joints.csv --out y.csv
 
     Parameters
     ----------

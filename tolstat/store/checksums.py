@@ -122,10 +122,9 @@ class CheckedFile:
         blocks, number = np.arange(blocks_of(next(iter(self.stored.values())).shape[0])), self.number
         paths = [path for path in self.stored if number % 2 == 0 or not layout.is_at_point(path)]
         damaged_blocks = {path: blocks[wrong] for path, wrong in zip(paths, self._differ(paths, blocks), strict=True)}
-        begun = self.number != number  # a run, meanwhile
-        return {
-            path: own for path, own in damaged_blocks.items() if own.size and not (begun and layout.is_at_point(path))
-        }
+        if self.number != number:  # a run has begun meanwhile
+            paths = [path for path in paths if not layout.is_at_point(path)]
+        return {path: wrong for path in paths if (wrong := damaged_blocks[path]).size}
 
 
 def blocks_of(n: int) -> int:

@@ -300,4 +300,6 @@ def _marginal(ot: Any, own: law.Distribution) -> Any:
                 whole, ot.Interval([own.ends[0]], [own.ends[1]], [own.lower is not None], [own.upper is not None])
             )
             return ot.CompositeDistribution(ot.SymbolicFunction("x", f"{own.unit!r} * x"), inside)
-    raise NotImplementedError(f"{type(own).__name__} has no equal in OpenTURNS: use openturns(cube=True)")
+    raise InputError(
+        [Fault(type(own).__name__, "has no equal in OpenTURNS", "take the unit cube: openturns(cube=True)")]
+    )

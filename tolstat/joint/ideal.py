@@ -117,7 +117,7 @@ def reversal_torque(params: NDArray[np.void]) -> Array:
 
 
 def input_motion(phase: ArrayLike, params: NDArray[np.void]) -> tuple[Array, Array, Array, Array]:
-    """Input angle and resisting torque of joints with orders (docs/model.md, "Drive and load: orders").
+    """Input angle and resisting torque of joints with orders (docs/model.md, "Drive and load").
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 """Orders of input speed and resisting torque: waves over the mean input angle, whole numbers of them a revolution.
 
-The phase omega t is the mean input angle (docs/model.md, "Drive and load: orders"):
+The phase omega t is the mean input angle (docs/model.md, "Drive and load"):
 
     theta = phase + sum a_n sin(n phase + p_n)          T_r = T + sum b_n cos(n phase + q_n)
 """

@@ -1,4 +1,4 @@
-"""The other joint of a drive shaft, which this joint sees as an ideal one (docs/model.md, "A joint in a drive shaft").
+"""The other joint of a drive shaft, which this joint sees as an ideal one (docs/drive.md, "A joint of a drive shaft").
 
 A partner before this joint turns its input unevenly: orders of the input angle. A partner after it loads its output
 unevenly: orders of the resisting torque. Both follow from the closed form of the ideal joint, row by row, since

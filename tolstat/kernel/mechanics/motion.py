@@ -17,7 +17,7 @@ def speed_ratio(theta, alpha):
 
 @njit
 def drive_and_load(phase, par):
-    """Input angle, its derivatives and the resisting torque at a phase (docs/model.md, "Drive and load: orders").
+    """Input angle, its derivatives and the resisting torque at a phase (docs/model.md, "Drive and load").
 
     Parameters
     ----------

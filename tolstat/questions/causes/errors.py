@@ -199,7 +199,7 @@ def causes_on_page(view: View, asked: Asked) -> Answer:
         raise NotApplicable
     introduction = [BARS, *([GREY] if any(_has_narrow_bounds(own.rows) for own in found) else [])]
     introduction += [LOGARITHMS] if any(own.facts["logarithm"] for own in found) else []
-    introduction += [] if found[0].has_intervals else ["No intervals: the samples are not independent."]
+    introduction += [] if found[0].with_intervals else ["No intervals: the samples are not independent."]
     parts: list[Part] = [Sentence(" ".join(introduction), "lead"), Panels(list(map(_tornado, found)))]
     command = "" if view.altered else f"tolstat causes {quote(view.path.name)} --run"
     for own in found:
@@ -275,7 +275,7 @@ def _notes(found: Indices, command: str) -> list[str]:
     elif not (found.of_design or _has_narrow_bounds(rows)):
         remedy = f"; {command} gives them" if command else ""
         notes.append(f"no shares in all: given joints bound them too widely{remedy}")
-    return notes if found.has_intervals else [*notes, shares.NO_INTERVALS]
+    return notes if found.with_intervals else [*notes, shares.NO_INTERVALS]
 
 
 def _tornado(found: Indices) -> Panel:

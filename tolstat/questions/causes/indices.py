@@ -62,7 +62,7 @@ class Indices(NamedTuple):
         return math.isnan(self.facts["r2"])
 
     @property
-    def has_intervals(self) -> bool:
+    def with_intervals(self) -> bool:
         """Whether the samples are independent."""
         return not all(math.isnan(row["first_lower"]) for row in self.rows)
 

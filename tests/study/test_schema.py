@@ -238,6 +238,21 @@ def readable(field: FieldInfo, example: object) -> bool:
     return False
 
 
+SIDES = {"minimum": -1.0, "exclusiveMinimum": 0.0, "maximum": 1.0, "exclusiveMaximum": 0.0}
+"""Side on which a value lies beyond a bound; the bound itself is beyond an exclusive one."""
+
+
+@pytest.mark.parametrize("model", models(), ids=lambda model: model.__name__)
+def test_the_bounds_of_each_key_hold(model: type[Strict]) -> None:
+    """Pydantic drops bounds that stand before what reads a quantity."""
+    made = parts.of_model(model)["properties"]
+    for name, field in model.model_fields.items():
+        own = made.get(field.alias or name, {})
+        if own.get("type") == "integer" or own.get("x-unit") == "1":
+            for bound, side in SIDES.items():
+                assert bound not in own or not readable(field, type(own[bound])(own[bound] + side)), f"{name}: {bound}"
+
+
 def test_an_example_that_cannot_be_read_is_found() -> None:
     assert not readable(joint.Operation.model_fields["speed"], "500 mm")
 

@@ -22,62 +22,42 @@ from tolstat.study.stress_point import Exponent, Positive, StressPoint
 class SequenceEntry(Strict):
     """Order in which the operating points of a duty cycle are visited; it repeats."""
 
-    points: Annotated[
-        str,
-        Field(
-            description="operating points in the order of their visits, with blanks between them",
-            examples=["drive start drive climb"],
-        ),
-    ]
-    revolutions: Annotated[Positive, Field(description="revolutions of the input shaft in it", examples=[90000])]
+    points: str = Field(examples=["drive start drive climb"])
+    """operating points in the order of their visits, with blanks between them"""
+    revolutions: Positive = Field(examples=[90000])
+    """revolutions of the input shaft in it"""
 
 
 class Settings(Strict):
     """Evaluation of load cycles; affects no result."""
 
-    exponents: list[Exponent] = Field(
-        default_factory=lambda: [3.0, 5.0, 10.0],
-        min_length=1,
-        description="Wöhler exponents of the damage-equivalent loads",
-        examples=[[5.0]],
-    )
-    revolutions: Annotated[
-        Positive | None,
-        Field(
-            description="service life in revolutions of the input shaft; left out: the `required_life` of the bearings "
-            "at the speeds of the study, without it 1e6",
-            examples=[2e7],
-        ),
-    ] = None
-    reference_cycles: Annotated[
-        Positive, Field(description="number of cycles that the damage-equivalent loads refer to", examples=[2e6])
-    ] = 1e6
+    exponents: list[Exponent] = Field(default_factory=lambda: [3.0, 5.0, 10.0], min_length=1, examples=[[5.0]])
+    """Wöhler exponents of the damage-equivalent loads"""
+    revolutions: Positive | None = Field(default=None, examples=[2e7])
+    """service life in revolutions of the input shaft; left out: the `required_life` of the bearings at the speeds of
+    the study, without it 1e6"""
+    reference_cycles: Positive = Field(default=1e6, examples=[2e6])
+    """number of cycles that the damage-equivalent loads refer to"""
     line: dict[str, Any] = Field(
         default_factory=dict,
-        description="S–N lines by channel or pattern",
-        examples=[{"cross*.T": {"m": 5, "S0": "150 N*m", "N0": 2e6}}],
         json_schema_extra={"x-table": "lines"},
+        examples=[{"cross*.T": {"m": 5, "S0": "150 N*m", "N0": 2e6}}],
     )
-    starts: Annotated[
-        units.Number,
-        AfterValidator(units.not_negative),
-        Field(description="starts from standstill in the service life, for points", examples=[2e4]),
-    ] = 0.0
-    sequence: Annotated[
-        SequenceEntry | None,
-        Field(
-            description="order in which the operating points are visited, whose changes of load are counted, too",
-            examples=[{"points": "drive start drive climb", "revolutions": 9e4}],
-        ),
-    ] = None
+    """S–N lines by channel or pattern"""
+    starts: Annotated[units.Number, AfterValidator(units.not_negative)] = Field(default=0.0, examples=[2e4])
+    """starts from standstill in the service life, for points"""
+    sequence: SequenceEntry | None = Field(
+        default=None, examples=[{"points": "drive start drive climb", "revolutions": 9e4}]
+    )
+    """order in which the operating points are visited, whose changes of load are counted, too"""
     point: dict[str, Any] = Field(
         default_factory=dict,
-        description="points of the parts by name, with stress per load and S–N line",
+        json_schema_extra={"x-table": "points"},
         examples=[
             {"pin root": {"bushing": "cross*", "T_t": "0.2 MPa/Nm", "k": 5, "N_D": 2e6, "S_D": "360 MPa", "T_S": 1.25}}
         ],
-        json_schema_extra={"x-table": "points"},
     )
+    """points of the parts by name, with stress per load and S–N line"""
 
     @model_validator(mode="after")
     def _starts_take_revolutions(self) -> Settings:
@@ -91,16 +71,12 @@ class Settings(Strict):
 class LineEntry(Strict):
     """S–N line N = N0 (S/S0)^-m, S the range of a load cycle."""
 
-    m: Annotated[Exponent, Field(description="exponent", examples=[5])]
-    S0: Annotated[
-        Any,
-        Field(
-            description="range of the load that is borne for N0 cycles, a force or torque",
-            examples=["150 N*m"],
-            json_schema_extra={"x-table": "quantity"},
-        ),
-    ]
-    N0: Annotated[Positive, Field(description="number of cycles at the range S0", examples=[2e6])]
+    m: Exponent = Field(examples=[5])
+    """exponent"""
+    S0: Any = Field(json_schema_extra={"x-table": "quantity"}, examples=["150 N*m"])
+    """range of the load that is borne for N0 cycles, a force or torque"""
+    N0: Positive = Field(examples=[2e6])
+    """number of cycles at the range S0"""
 
 
 @dataclass(frozen=True)

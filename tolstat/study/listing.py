@@ -7,13 +7,13 @@ from itertools import product
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple, Self
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from tolstat import joint
 from tolstat.common import strict, units
 from tolstat.common.errors import Fault, InputError, gather
 from tolstat.common.notation import DIAMETER
-from tolstat.common.strict import Strict, described, refuse, whole
+from tolstat.common.strict import Strict, described, refuse
 from tolstat.common.tables import Variant
 from tolstat.joint import Joint, Operation
 from tolstat.joint.model import TOLD
@@ -29,23 +29,21 @@ Section = tuple[int | str, ...]
 class CaseEntry(Strict):
     """A joint with these errors; the joint without errors is always run, too."""
 
-    name: Annotated[str, described("name of the case", "tilt", min_length=1)]
-    errors: Annotated[
-        dict[str, Any],
-        described(
-            "errors by name or pattern, as in [errors]",
-            {"pin1.tilt_z": "0.5 deg"},
-            min_length=1,
-            json_schema_extra={"x-table": "errors"},
-        ),
-    ]
+    name: str = Field(min_length=1, examples=["tilt"])
+    """name of the case"""
+    errors: dict[str, Any] = Field(
+        min_length=1, json_schema_extra={"x-table": "errors"}, examples=[{"pin1.tilt_z": "0.5 deg"}]
+    )
+    """errors by name or pattern, as in [errors]"""
 
 
 class Range(Strict):
     """One entry of ``vary``: a key of the joint goes from `start` to `stop`, given as in the file."""
 
-    start: Annotated[Any, described("value of the first joint, a quantity of the key's unit", "76.0 mm", alias="from")]
-    stop: Annotated[Any, described("value of the last joint, a quantity of the key's unit", "75.6 mm", alias="to")]
+    start: Any = Field(alias="from", examples=["76.0 mm"])
+    """value of the first joint, a quantity of the key's unit"""
+    stop: Any = Field(alias="to", examples=["75.6 mm"])
+    """value of the last joint, a quantity of the key's unit"""
 
 
 def _table(meaning: str, example: dict[str, Any], of: str) -> Any:
@@ -56,9 +54,8 @@ def _table(meaning: str, example: dict[str, Any], of: str) -> Any:
 class VariantEntry(Strict):
     """Another joint, or a family of them."""
 
-    name: Annotated[
-        str, described("name of the family; entries of one name make one family", "clearance", min_length=1)
-    ]
+    name: str = Field(min_length=1, examples=["clearance"])
+    """name of the family; entries of one name make one family"""
     joint: Annotated[
         dict[str, Any],
         _table(
@@ -67,16 +64,13 @@ class VariantEntry(Strict):
             "overrides",
         ),
     ]
-    points: Annotated[int | None, whole(2, 10_000, "number of joints of a family; needed with `vary`", 21)] = None
-    design: Annotated[
-        Literal["line", "sobol"],
-        described(
-            "`line`: all keys of `vary` go from one end to the other together; `sobol`: a scrambled Sobol' "
-            "sequence fills the box",
-            "sobol",
-        ),
-    ] = "line"
-    seed: Annotated[int, described("seed of the scrambling of `sobol`", 2021, strict=True, ge=0, lt=2**63)] = 0
+    points: int | None = Field(default=None, strict=True, ge=2, le=10_000, examples=[21])
+    """number of joints of a family; needed with `vary`"""
+    design: Literal["line", "sobol"] = Field(default="line", examples=["sobol"])
+    """`line`: all keys of `vary` go from one end to the other together; `sobol`: a scrambled Sobol' sequence fills the
+    box"""
+    seed: int = Field(default=0, strict=True, ge=0, lt=2**63, examples=[2021])
+    """seed of the scrambling of `sobol`"""
     vary: Annotated[
         dict[str, Any],
         _table(
@@ -85,15 +79,14 @@ class VariantEntry(Strict):
             "vary",
         ),
     ]
-    cases: Annotated[
-        list[str] | None,
-        described("names of the cases to run; all by default; the joint without errors is always run", ["tilt"]),
-    ] = None
+    cases: list[str] | None = Field(default=None, examples=[["tilt"]])
+    """names of the cases to run; all by default; the joint without errors is always run"""
     operation: Annotated[
         dict[str, Any], _table("keys in place of those of [operation]", {"torque": "0 N*m"}, "operation")
     ]
     solver: Annotated[dict[str, Any], _table("keys in place of those of [solver]", {"steps_per_rev": 720}, "solver")]
-    note: Annotated[str, described("note for the reader of the report", "long free flight")] = ""
+    note: str = Field(default="", examples=["long free flight"])
+    """note for the reader of the report"""
 
     @model_validator(mode="after")
     def _family(self) -> Self:

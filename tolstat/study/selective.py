@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator
+from pydantic import AfterValidator, Field
 
 from tolstat.common import units
 from tolstat.common.bisection import first
 from tolstat.common.errors import Fault
 from tolstat.common.load_kinds import PINS
-from tolstat.common.strict import Strict, described, refuse
+from tolstat.common.strict import Strict, refuse
 from tolstat.study.tolerances.accepted import scores_among
 from tolstat.study.tolerances.distributions import Array, Distribution, probability
 
@@ -44,20 +44,13 @@ def _not_negative(value: float) -> float:
 class SelectiveEntry(Strict):
     """Pins and holes are sorted by their measured diameters, and crosses and forks of equal class matched."""
 
-    classes: Annotated[int, described("number of classes; 1: not sorted", 3, strict=True, ge=1, le=MAX_CLASSES)]
-    gauge: Annotated[
-        units.Length,
-        AfterValidator(_not_negative),
-        described("standard deviation of the error with which a diameter is measured", "2 um"),
-    ] = 0.0
-    split: Annotated[
-        Literal["width", "count"],
-        described(
-            "`width`: classes are equal parts of the tolerance bands, those at the ends are open; `count`: "
-            "each class has as many crosses, and as many forks, as any other",
-            "count",
-        ),
-    ] = "width"
+    classes: int = Field(strict=True, ge=1, le=MAX_CLASSES, examples=[3])
+    """number of classes; 1: not sorted"""
+    gauge: Annotated[units.Length, AfterValidator(_not_negative)] = Field(default=0.0, examples=["2 um"])
+    """standard deviation of the error with which a diameter is measured"""
+    split: Literal["width", "count"] = Field(default="width", examples=["count"])
+    """`width`: classes are equal parts of the tolerance bands, those at the ends are open; `count`: each class has as
+    many crosses, and as many forks, as any other"""
 
 
 class Kind(NamedTuple):

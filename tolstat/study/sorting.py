@@ -9,16 +9,16 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from tolstat.common import strict
 from tolstat.common.errors import Fault, gather
 from tolstat.common.load_kinds import PINS
-from tolstat.common.strict import Strict, described, refuse
+from tolstat.common.strict import Strict, refuse
 from tolstat.common.tables import HOLES
 from tolstat.joint import HOLE_OF_PIN, Joint
 from tolstat.study import selection
@@ -34,11 +34,12 @@ CROSS, INPUT, OUTPUT = PARTS = ("cross", "input fork", "output fork")
 class RejectEntry(Strict):
     """Joints that are rejected at assembly by a measured value."""
 
-    below: Annotated[Value | None, described("smaller measured values are rejected", "0.06 mm")] = None
-    above: Annotated[Value | None, described("larger measured values are rejected", "0.14 mm")] = None
-    gauge: Annotated[NotNegative, described("standard deviation of the measurement; exact by default", "0.005 mm")] = (
-        0.0
-    )
+    below: Value | None = Field(default=None, examples=["0.06 mm"])
+    """smaller measured values are rejected"""
+    above: Value | None = Field(default=None, examples=["0.14 mm"])
+    """larger measured values are rejected"""
+    gauge: NotNegative = Field(default=0.0, examples=["0.005 mm"])
+    """standard deviation of the measurement; exact by default"""
 
     @model_validator(mode="after")
     def _has_a_limit(self) -> Self:

@@ -27,10 +27,6 @@ PLACES = 24
 """Places around a round section: the stress between two of them is at most 1 - cos(7.5 deg), 0.9 %, above theirs."""
 
 
-def _per(what: str) -> str:
-    return f"stress at the point by the {what} of the bushing"
-
-
 def _found(name: str, other: str, value: float | None) -> str:
     return f"has neither {name} nor {other}" if value is None else f"has both {name} and {other}"
 
@@ -41,54 +37,44 @@ class StressPointEntry(Strict):
     A round section has no one point where bending about two axes is largest: it is evaluated all around.
     """
 
-    bushing: Annotated[
-        str, Field(description="bushing whose load stresses the point, or pattern of several", examples=["fork*"])
-    ]
-    F_e: Annotated[PerForce, Field(description=_per("force along e"), examples=["2.5 MPa/kN"])] = 0.0
-    F_t: Annotated[PerForce, Field(description=_per("force along t"), examples=["0.8 MPa/kN"])] = 0.0
-    F_z: Annotated[PerForce, Field(description=_per("force along z"), examples=["2.5 MPa/kN"])] = 0.0
-    T_e: Annotated[PerTorque, Field(description=_per("torque about e"), examples=["0.2 MPa/(N*m)"])] = 0.0
-    T_t: Annotated[PerTorque, Field(description=_per("torque about t"), examples=["-0.2 MPa/(N*m)"])] = 0.0
-    T_z: Annotated[PerTorque, Field(description=_per("torque about z"), examples=["0.1 MPa/(N*m)"])] = 0.0
-    T_et: Annotated[
-        PerTorque,
-        Field(description="bending of a round arm: as T_e and T_t, all around it", examples=["0.2 MPa/(N*m)"]),
-    ] = 0.0
-    T_tz: Annotated[
-        PerTorque,
-        Field(description="bending of a round pin: as T_t and T_z, all around it", examples=["0.2 MPa/(N*m)"]),
-    ] = 0.0
-    k: Annotated[Exponent, Field(description="exponent of the S–N line above the knee", examples=[3])]
-    k_2: Annotated[
-        units.Number | None,
-        Field(ge=1, le=100, description="exponent below the knee; 2k - 1 (Haibach) by default", examples=[5]),
-    ] = None
-    N_D: Annotated[Positive, Field(description="cycles at the knee", examples=[1e7])]
-    S_D: Annotated[
-        PositiveStress | None,
-        Field(description="range of the stress at the knee that half of the parts survive", examples=["29 MPa"]),
-    ] = None
-    S_aD: Annotated[
-        PositiveStress | None,
-        Field(description="amplitude of the stress at the knee, half of S_D; instead of S_D", examples=["14.5 MPa"]),
-    ] = None
-    T_S: Annotated[
-        units.Number | None,
-        Field(ge=1, description="scatter of the strength: 90 % quantile over 10 % quantile; 1: none", examples=[1.5]),
-    ] = None
-    T_N: Annotated[
-        units.Number | None,
-        Field(ge=1, description="scatter of the life at one range, T_S^k; instead of T_S", examples=[3.4]),
-    ] = None
-    D_c: Annotated[Positive, Field(description="damage sum at which a part fails", examples=[0.3])] = 1.0
-    M: Annotated[
-        units.Number,
-        Field(ge=0, le=1, description="mean-stress sensitivity; 0: the mean has no effect", examples=[0.3]),
-    ] = 0.0
-    R: Annotated[
-        units.Number,
-        Field(ge=-1, lt=1, description="stress ratio, smallest over largest stress, of the S–N line", examples=[0.0]),
-    ] = -1.0
+    bushing: str = Field(examples=["fork*"])
+    """bushing whose load stresses the point, or pattern of several"""
+    F_e: PerForce = Field(default=0.0, examples=["2.5 MPa/kN"])
+    """stress at the point by the force along e of the bushing"""
+    F_t: PerForce = Field(default=0.0, examples=["0.8 MPa/kN"])
+    """stress at the point by the force along t of the bushing"""
+    F_z: PerForce = Field(default=0.0, examples=["2.5 MPa/kN"])
+    """stress at the point by the force along z of the bushing"""
+    T_e: PerTorque = Field(default=0.0, examples=["0.2 MPa/(N*m)"])
+    """stress at the point by the torque about e of the bushing"""
+    T_t: PerTorque = Field(default=0.0, examples=["-0.2 MPa/(N*m)"])
+    """stress at the point by the torque about t of the bushing"""
+    T_z: PerTorque = Field(default=0.0, examples=["0.1 MPa/(N*m)"])
+    """stress at the point by the torque about z of the bushing"""
+    T_et: PerTorque = Field(default=0.0, examples=["0.2 MPa/(N*m)"])
+    """bending of a round arm: as T_e and T_t, all around it"""
+    T_tz: PerTorque = Field(default=0.0, examples=["0.2 MPa/(N*m)"])
+    """bending of a round pin: as T_t and T_z, all around it"""
+    k: Exponent = Field(examples=[3])
+    """exponent of the S–N line above the knee"""
+    k_2: Annotated[units.Number | None, Field(ge=1, le=100)] = Field(default=None, examples=[5])
+    """exponent below the knee; 2k - 1 (Haibach) by default"""
+    N_D: Positive = Field(examples=[1e7])
+    """cycles at the knee"""
+    S_D: PositiveStress | None = Field(default=None, examples=["29 MPa"])
+    """range of the stress at the knee that half of the parts survive"""
+    S_aD: PositiveStress | None = Field(default=None, examples=["14.5 MPa"])
+    """amplitude of the stress at the knee, half of S_D; instead of S_D"""
+    T_S: Annotated[units.Number | None, Field(ge=1)] = Field(default=None, examples=[1.5])
+    """scatter of the strength: 90 % quantile over 10 % quantile; 1: none"""
+    T_N: Annotated[units.Number | None, Field(ge=1)] = Field(default=None, examples=[3.4])
+    """scatter of the life at one range, T_S^k; instead of T_S"""
+    D_c: Positive = Field(default=1.0, examples=[0.3])
+    """damage sum at which a part fails"""
+    M: Annotated[units.Number, Field(ge=0, le=1)] = Field(default=0.0, examples=[0.3])
+    """mean-stress sensitivity; 0: the mean has no effect"""
+    R: Annotated[units.Number, Field(ge=-1, lt=1)] = Field(default=-1.0, examples=[0.0])
+    """stress ratio, smallest over largest stress, of the S–N line"""
 
     @model_validator(mode="after")
     def _complete(self) -> StressPointEntry:

@@ -8,9 +8,10 @@ from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from tolstat.common.errors import Fault, InputError, gather
-from tolstat.common.strict import Strict, described
+from tolstat.common.strict import Strict
 from tolstat.common.units import Number
 from tolstat.study.axes import is_zone
 from tolstat.study.selection import select
@@ -24,23 +25,10 @@ MIN_EIGENVALUE = 1e-9
 class Correlation(Strict):
     """Correlation of every pair of some errors."""
 
-    between: Annotated[
-        list[str],
-        described(
-            "names or patterns of errors that have a tolerance; every pair of them has the correlation `rho`",
-            ["pin*.diameter"],
-            min_length=1,
-        ),
-    ]
-    rho: Annotated[
-        Number,
-        described(
-            "correlation of the normal scores (Gaussian copula), and of the errors themselves if normal",
-            0.6,
-            gt=-1,
-            lt=1,
-        ),
-    ]
+    between: list[str] = Field(min_length=1, examples=[["pin*.diameter"]])
+    """names or patterns of errors that have a tolerance; every pair of them has the correlation `rho`"""
+    rho: Annotated[Number, Field(gt=-1, lt=1)] = Field(examples=[0.6])
+    """correlation of the normal scores (Gaussian copula), and of the errors themselves if normal"""
 
 
 @dataclass(frozen=True)

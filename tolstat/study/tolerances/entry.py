@@ -161,9 +161,8 @@ class ToleranceEntry(strict.Strict):
 class SingleEntry(ToleranceEntry):
     """Entry for one error: one model for each distribution."""
 
-    lot: Annotated[
-        LotEntry | None, Field(description="parts of one lot deviate together", examples=[{"share": 0.3}])
-    ] = None
+    lot: LotEntry | None = Field(default=None, examples=[{"share": 0.3}])
+    """parts of one lot deviate together"""
 
     @abstractmethod
     def build(self, site: Site) -> Distribution:
@@ -228,17 +227,12 @@ class Toleranced(NamedTuple):
 class HalfBand(SingleEntry):
     """Entry with a band that may be given by its half width."""
 
-    plus_minus: Annotated[
-        HalfWidth | None, Field(description="half width of the band about the nominal value", examples=["0.1 mm"])
-    ] = None
-    iso2768: Annotated[
-        Literal["f", "m"] | None,
-        Field(description="band of this class of ISO 2768-1, for the size `nominal`", examples=["f"]),
-    ] = None
-    nominal: Annotated[
-        PositiveLength | None,
-        Field(description="size for `iso2768`; for an angle its shorter leg", examples=["72.8 mm"]),
-    ] = None
+    plus_minus: HalfWidth | None = Field(default=None, examples=["0.1 mm"])
+    """half width of the band about the nominal value"""
+    iso2768: Literal["f", "m"] | None = Field(default=None, examples=["f"])
+    """band of this class of ISO 2768-1, for the size `nominal`"""
+    nominal: PositiveLength | None = Field(default=None, examples=["72.8 mm"])
+    """size for `iso2768`; for an angle its shorter leg"""
 
     def half_width(self, site: Site) -> float | None:
         """Half width of the band; None where none is given."""
@@ -268,14 +262,10 @@ class HalfBand(SingleEntry):
 class Banded(HalfBand):
     """Entry with a band."""
 
-    lower: Annotated[
-        Value | None,
-        Field(
-            description="lower limit of the band",
-            examples=["0 mm"],
-        ),
-    ] = None
-    upper: Annotated[Value | None, Field(description="upper limit of the band", examples=["0.030 mm"])] = None
+    lower: Value | None = Field(default=None, examples=["0 mm"])
+    """lower limit of the band"""
+    upper: Value | None = Field(default=None, examples=["0.030 mm"])
+    """upper limit of the band"""
 
     def band(self, site: Site) -> tuple[float, float] | None:
         """Lower and upper limit; None where none is given."""

@@ -57,25 +57,20 @@ def _check_code(code: str) -> str:
 class FitEntry(Strict):
     """``fit`` of ``[tolerances]``: basic size and classes of a fit, and how diameters scatter in their zones."""
 
-    basic: Annotated[
-        PositiveLength, AfterValidator(_check_size), Field(description="basic size of the fit", examples=["76 mm"])
-    ]
-    code: Annotated[
-        str, AfterValidator(_check_code), Field(description="class of hole and pin by ISO 286", examples=["H7/f7"])
-    ]
-    distribution: Annotated[
-        Literal["normal", "uniform", "triangular", "beta"],
-        Field(description="distribution of the diameters, centred in their zones", examples=["normal"]),
-    ]
-    cpk: Annotated[
-        PositiveNumber | None, Field(description="Cpk of both diameters, for normal; 1 unless given", examples=[1.33])
-    ] = None
-    truncate: Annotated[
-        bool | None,
-        Field(strict=True, description="whether parts outside the zone are sorted out, for normal", examples=[True]),
-    ] = None
-    a: Annotated[PositiveNumber | None, Field(description="shape, for beta", examples=[2.0])] = None
-    b: Annotated[PositiveNumber | None, Field(description="shape, for beta", examples=[4.0])] = None
+    basic: Annotated[PositiveLength, AfterValidator(_check_size)] = Field(examples=["76 mm"])
+    """basic size of the fit"""
+    code: Annotated[str, AfterValidator(_check_code)] = Field(examples=["H7/f7"])
+    """class of hole and pin by ISO 286"""
+    distribution: Literal["normal", "uniform", "triangular", "beta"] = Field(examples=["normal"])
+    """distribution of the diameters, centred in their zones"""
+    cpk: PositiveNumber | None = Field(default=None, examples=[1.33])
+    """Cpk of both diameters, for normal; 1 unless given"""
+    truncate: bool | None = Field(default=None, strict=True, examples=[True])
+    """whether parts outside the zone are sorted out, for normal"""
+    a: PositiveNumber | None = Field(default=None, examples=[2.0])
+    """shape, for beta"""
+    b: PositiveNumber | None = Field(default=None, examples=[4.0])
+    """shape, for beta"""
 
     @field_validator(*_KEYS_OF)
     @classmethod

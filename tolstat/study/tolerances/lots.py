@@ -11,9 +11,10 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import numpy as np
+from pydantic import Field
 
 from tolstat.common.errors import Fault, InputError
-from tolstat.common.strict import Strict, described, dotted
+from tolstat.common.strict import Strict, dotted
 from tolstat.common.units import Number
 from tolstat.study.tolerances.correlation import Copula
 
@@ -24,19 +25,11 @@ if TYPE_CHECKING:
 class LotEntry(Strict):
     """Key ``lot`` of an entry: parts of one lot deviate together."""
 
-    share: Annotated[
-        Number,
-        described("share of the variance of the normal score that is between lots", 0.3, gt=0, lt=1),
-    ]
-    shared: Annotated[
-        bool,
-        described(
-            "whether all errors that the pattern selects have one score of the lot, so that they are "
-            "correlated in each joint; else each error has its own",
-            True,
-            strict=True,
-        ),
-    ] = False
+    share: Annotated[Number, Field(gt=0, lt=1)] = Field(examples=[0.3])
+    """share of the variance of the normal score that is between lots"""
+    shared: bool = Field(default=False, strict=True, examples=[True])
+    """whether all errors that the pattern selects have one score of the lot, so that they are correlated in each
+    joint; else each error has its own"""
 
 
 class Lot(NamedTuple):

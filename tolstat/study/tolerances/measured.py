@@ -7,14 +7,15 @@ import math
 from collections.abc import Sequence
 from io import StringIO
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Literal
 
 import numpy as np
+from pydantic import Field
 
 from tolstat.analysis.process import LEAST_PARTS
 from tolstat.common import strict, units
 from tolstat.common.files import about_encoding, read_input
-from tolstat.common.strict import described, refuse
+from tolstat.common.strict import refuse
 from tolstat.study.tolerances import distributions as tolerance
 from tolstat.study.tolerances.entry import SingleEntry, Site
 
@@ -29,21 +30,16 @@ class MeasuredEntry(SingleEntry):
     """
 
     distribution: Literal["measured"]
-    file: Annotated[str | None, described("path of the CSV file, from the study's folder", "rattle.csv")] = None
-    column: Annotated[str | None, described("name of the column in the header row", "speed_rpm")] = None
-    values: Annotated[
-        list[float] | None,
-        described("the measured values, in place of a file; needs `law`", [0.012, -0.004, 0.007]),
-    ] = None
-    unit: Annotated[str | None, described("unit of the values; needed unless the error is a pure number", "rpm")] = None
-    law: Annotated[
-        Literal["normal", "lognormal"] | None,
-        described(
-            "law that the parts are a sample of, for shares far out; without it each joint has one of the "
-            "measured values",
-            "normal",
-        ),
-    ] = None
+    file: str | None = Field(default=None, examples=["rattle.csv"])
+    """path of the CSV file, from the study's folder"""
+    column: str | None = Field(default=None, examples=["speed_rpm"])
+    """name of the column in the header row"""
+    values: list[float] | None = Field(default=None, examples=[[0.012, -0.004, 0.007]])
+    """the measured values, in place of a file; needs `law`"""
+    unit: str | None = Field(default=None, examples=["rpm"])
+    """unit of the values; needed unless the error is a pure number"""
+    law: Literal["normal", "lognormal"] | None = Field(default=None, examples=["normal"])
+    """law that the parts are a sample of, for shares far out; without it each joint has one of the measured values"""
 
     def measured_parts(self, site: Site) -> int | None:
         """See `ToleranceEntry.measured_parts`."""

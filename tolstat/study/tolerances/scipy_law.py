@@ -9,12 +9,13 @@ import ast
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
+from pydantic import Field
 
 from tolstat.common import units
-from tolstat.common.strict import described, did_you_mean, refuse
+from tolstat.common.strict import did_you_mean, refuse
 from tolstat.study.tolerances.distributions import Array, Distribution
 from tolstat.study.tolerances.entry import SingleEntry, Site, Value
 
@@ -97,14 +98,14 @@ class ScipyEntry(SingleEntry):
     `loc` and `scale` have the unit `unit`. Parts outside `lower` and `upper` are sorted out.
     """
 
-    distribution: Annotated[
-        str, described("name and parameters of the law", "scipy:weibull_min(c=1.8, scale=0.012)", pattern=f"^{PREFIX}")
-    ]
-    unit: Annotated[
-        str | None, described("unit of `loc` and `scale`; needed unless the error is a pure number", "mm")
-    ] = None
-    lower: Annotated[Value | None, described("parts below are sorted out", "0 mm")] = None
-    upper: Annotated[Value | None, described("parts above are sorted out", "0.030 mm")] = None
+    distribution: str = Field(pattern=f"^{PREFIX}", examples=["scipy:weibull_min(c=1.8, scale=0.012)"])
+    """name and parameters of the law"""
+    unit: str | None = Field(default=None, examples=["mm"])
+    """unit of `loc` and `scale`; needed unless the error is a pure number"""
+    lower: Value | None = Field(default=None, examples=["0 mm"])
+    """parts below are sorted out"""
+    upper: Value | None = Field(default=None, examples=["0.030 mm"])
+    """parts above are sorted out"""
 
     def build(self, site: Site) -> ScipyLaw:
         """See `SingleEntry.build`."""

@@ -1,7 +1,7 @@
 """JSON schema of the input models: what an editor needs to complete and check the keys of a file.
 
 `study.schema` assembles the schemas of whole files from these parts. Keywords of this package: ``x-unit``, the SI unit
-of a quantity, ``"error"`` for that of the error that an entry is for; ``x-table``, the name of a table of
+of a quantity, ``"error"`` for that of the error that an entry is for; ``x-table``, the name of a definition of
 `study.schema` that stands in place of the property.
 """
 
@@ -46,6 +46,12 @@ def quantity(unit: str, example: str, words: tuple[str, ...] = ()) -> dict[str, 
         written = {"type": "string", "pattern": WITH_UNIT}
         return {"anyOf": [{"enum": list(words)}, written], "x-unit": unit, "examples": [example]}
     return {"type": "string", "pattern": WITH_UNIT, "x-unit": unit, "examples": [example]}
+
+
+def positive(own: dict[str, Any]) -> dict[str, Any]:
+    """JSON schema of a quantity that must be above zero."""
+    bounded = own | {"exclusiveMinimum": 0}
+    return bounded | sign(bounded)
 
 
 def sign(own: Mapping[str, Any]) -> dict[str, Any]:

@@ -10,11 +10,10 @@ from tolstat.common.errors import Fault, InputError
 from tolstat.common.strict import dotted, with_lines
 from tolstat.joint import Joint, Operation
 from tolstat.study import mounting
-from tolstat.study.file import StudyFile
+from tolstat.study.file import OF_CASE, StudyFile
 from tolstat.study.model import Solver
 from tolstat.study.mounting import Setting
 from tolstat.study.points import Point
-from tolstat.study.schema.files import SECTIONS
 
 
 @dataclass(frozen=True, repr=False)
@@ -78,7 +77,7 @@ def load_case(path: str | Path) -> Case:
     InputError
         With every fault of the file.
     """
-    file = StudyFile(Path(path), [name for name, section in SECTIONS.items() if section.in_case])
+    file = StudyFile(Path(path), OF_CASE)
     if "sampling" in file.data:
         raise InputError(
             [Fault(file.place, "is a study, not a case of one joint", f"run it with: tolstat run {file.path}")]

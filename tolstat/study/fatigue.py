@@ -8,9 +8,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Field, WithJsonSchema, model_validator
 
-from tolstat.common import strict, units
+from tolstat.common import json_schema, strict, units
 from tolstat.common.channels import UNIT_OF_CHANNEL
 from tolstat.common.errors import Fault, InputError, gather
 from tolstat.common.strict import Strict, did_you_mean, read_section, refuse
@@ -73,7 +73,9 @@ class LineEntry(Strict):
 
     m: Exponent = Field(examples=[5])
     """exponent"""
-    S0: Any = Field(json_schema_extra={"x-table": "quantity"}, examples=["150 N*m"])
+    S0: Annotated[Any, WithJsonSchema(json_schema.positive(json_schema.quantity("", "150 N*m")))] = Field(
+        examples=["150 N*m"]
+    )
     """range of the load that is borne for N0 cycles, a force or torque"""
     N0: Positive = Field(examples=[2e6])
     """number of cycles at the range S0"""

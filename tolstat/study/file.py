@@ -37,6 +37,14 @@ from tolstat.study.tolerances.reading import Nominal, Tolerances
 
 ModelT = TypeVar("ModelT", bound=strict.Strict)
 
+OF_CASE = ("joint", "operation", "solver", "errors")
+"""Sections that a case may have, too."""
+SECTIONS = (
+    *OF_CASE,
+    *("tolerances", "correlation", "sampling", "proposal", "sweep", "grid", "case", "variant", "assumed", "reject"),
+    *("limits", "fatigue", "output"),
+)
+"""Sections of a study, in the order of the reference."""
 SCATTER = ("tolerances", "correlation", "errors", "reject")
 """Sections that define the joints of most sampling methods; the first is required."""
 SECTIONS_OF = {

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from itertools import product
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple, Self
+from typing import Any, Literal, NamedTuple, Self
 
 from pydantic import Field, model_validator
 
@@ -13,7 +13,7 @@ from tolstat import joint
 from tolstat.common import strict, units
 from tolstat.common.errors import Fault, InputError, gather
 from tolstat.common.notation import DIAMETER
-from tolstat.common.strict import Strict, described, refuse
+from tolstat.common.strict import Strict, refuse
 from tolstat.common.tables import Variant
 from tolstat.joint import Joint, Operation
 from tolstat.joint.model import TOLD
@@ -46,9 +46,9 @@ class Range(Strict):
     """value of the last joint, a quantity of the key's unit"""
 
 
-def _table(meaning: str, example: dict[str, Any], of: str) -> Any:
-    """Field of a table that may be left out; `of` is the name of its schema."""
-    return described(meaning, example, default_factory=dict, json_schema_extra={"x-table": of})
+def _keys_of(table: str, example: dict[str, Any]) -> Any:
+    """Field of a table that may be left out; its JSON schema has a name."""
+    return Field(default_factory=dict, json_schema_extra={"x-table": table}, examples=[example])
 
 
 class VariantEntry(Strict):
@@ -56,14 +56,8 @@ class VariantEntry(Strict):
 
     name: str = Field(min_length=1, examples=["clearance"])
     """name of the family; entries of one name make one family"""
-    joint: Annotated[
-        dict[str, Any],
-        _table(
-            "keys in place of those of [joint], which may name another `base`, too",
-            {"contact": {"law": "point"}},
-            "overrides",
-        ),
-    ]
+    joint: dict[str, Any] = _keys_of("overrides", {"contact": {"law": "point"}})
+    """keys in place of those of [joint], which may name another `base`, too"""
     points: int | None = Field(default=None, strict=True, ge=2, le=10_000, examples=[21])
     """number of joints of a family; needed with `vary`"""
     design: Literal["line", "sobol"] = Field(default="line", examples=["sobol"])
@@ -71,20 +65,14 @@ class VariantEntry(Strict):
     box"""
     seed: int = Field(default=0, strict=True, ge=0, lt=2**63, examples=[2021])
     """seed of the scrambling of `sobol`"""
-    vary: Annotated[
-        dict[str, Any],
-        _table(
-            "keys of the joint that the family varies, each with its range",
-            {"cross.R": {"from": "60 mm", "to": "90 mm"}},
-            "vary",
-        ),
-    ]
+    vary: dict[str, Any] = _keys_of("vary", {"cross.R": {"from": "60 mm", "to": "90 mm"}})
+    """keys of the joint that the family varies, each with its range"""
     cases: list[str] | None = Field(default=None, examples=[["tilt"]])
     """names of the cases to run; all by default; the joint without errors is always run"""
-    operation: Annotated[
-        dict[str, Any], _table("keys in place of those of [operation]", {"torque": "0 N*m"}, "operation")
-    ]
-    solver: Annotated[dict[str, Any], _table("keys in place of those of [solver]", {"steps_per_rev": 720}, "solver")]
+    operation: dict[str, Any] = _keys_of("operation", {"torque": "0 N*m"})
+    """keys in place of those of [operation]"""
+    solver: dict[str, Any] = _keys_of("solver", {"steps_per_rev": 720})
+    """keys in place of those of [solver]"""
     note: str = Field(default="", examples=["long free flight"])
     """note for the reader of the report"""
 

@@ -24,13 +24,12 @@ from tolstat.study.axes import Axis
 from tolstat.study.case import Case
 from tolstat.study.design import Design, flat
 from tolstat.study.fatigue import Fatigue
-from tolstat.study.file import StudyFile
+from tolstat.study.file import SECTIONS, StudyFile
 from tolstat.study.freeze_design import Group, groups
 from tolstat.study.model import Output, Sampling, Solver, SweepAxis
 from tolstat.study.mounting import Setting
 from tolstat.study.points import Point, limits_at, only_one
 from tolstat.study.proposal import Proposal
-from tolstat.study.schema.files import SECTIONS
 from tolstat.study.sorting import Gauge
 from tolstat.study.swept import Swept
 from tolstat.study.tolerances.correlation import Copula

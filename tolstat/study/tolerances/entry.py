@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal, NamedTuple, Self
 import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, WithJsonSchema, model_validator
 
-from tolstat.common import strict, units
+from tolstat.common import json_schema, strict, units
 from tolstat.common.notation import PLUS_MINUS
 from tolstat.common.strict import refuse
 from tolstat.study.tolerances import iso2768
@@ -101,7 +101,8 @@ def _read(value: object, info: ValidationInfo) -> float:
     return units.to_si(value, site.unit)
 
 
-Value = Annotated[float, BeforeValidator(_read), WithJsonSchema({"x-unit": "error"})]
+OF_ERROR = WithJsonSchema(json_schema.quantity("error", units.EXAMPLES["m"]))
+Value = Annotated[float, BeforeValidator(_read), OF_ERROR]
 """Quantity in the unit of the error that the entry is for."""
 
 
@@ -123,9 +124,7 @@ def _not_negative(value: float) -> float:
 
 NotNegative = Annotated[Value, AfterValidator(_not_negative)]
 Positive = Annotated[Value, AfterValidator(units.positive)]
-HalfWidth = Annotated[
-    float, BeforeValidator(_read_half_width), AfterValidator(units.positive), WithJsonSchema({"x-unit": "error"})
-]
+HalfWidth = Annotated[float, BeforeValidator(_read_half_width), AfterValidator(units.positive), OF_ERROR]
 PositiveNumber = Annotated[units.Number, AfterValidator(units.positive)]
 Truncate = Annotated[
     bool, Field(strict=True, description="whether parts outside the band are sorted out", examples=[True])

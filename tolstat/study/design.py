@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tolstat.common.late import stats
 from tolstat.common.tables import DESIGN, Variant
 from tolstat.joint import Joint, Operation
 from tolstat.study.model import Solver
@@ -96,9 +97,7 @@ def table(cases: Sequence[Sequence[int]], points: int) -> NDArray[np.void]:
 
 def sobol(n: int, dimensions: int, seed: int | Sequence[int], first: int = 0) -> NDArray[np.float64]:
     """Scrambled Sobol' points `first` and following in the unit cube, (n, dimensions), at the middle of their cells."""
-    from scipy.stats import qmc
-
-    engine = qmc.Sobol(dimensions, scramble=True, bits=SOBOL_BITS, seed=np.random.default_rng(seed))
+    engine = stats.qmc.Sobol(dimensions, scramble=True, bits=SOBOL_BITS, seed=np.random.default_rng(seed))
     # SciPy expects a power of two when it draws from the start of the sequence
     start = engine.fast_forward(first).random(n) if first else engine.random_base2(max(n - 1, 0).bit_length())
     points: NDArray[np.float64] = start[:n]

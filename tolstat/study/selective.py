@@ -18,6 +18,7 @@ from pydantic import AfterValidator, Field
 from tolstat.common import units
 from tolstat.common.bisection import first
 from tolstat.common.errors import Fault
+from tolstat.common.late import special
 from tolstat.common.load_kinds import PINS
 from tolstat.common.strict import Strict, refuse
 from tolstat.study.tolerances.accepted import scores_among
@@ -113,13 +114,11 @@ class Range(NamedTuple):
 
     def scores(self, u: Array) -> Array:
         """Score, among all parts, of the diameter that is exceeded with probability 1 - u in the range; both (n,)."""
-        from scipy.special import ndtri
-
         if self.gauge:
             z, own, _ = _among(self)
-            return np.asarray(np.interp(ndtri(u), own, z))
+            return np.asarray(np.interp(special.ndtri(u), own, z))
         low, high = self._ends
-        return np.asarray(ndtri(np.clip(low + u * (high - low), LEAST, 1.0 - 2.0**-53)))
+        return np.asarray(special.ndtri(np.clip(low + u * (high - low), LEAST, 1.0 - 2.0**-53)))
 
     @property
     def _ends(self) -> Array:
@@ -129,11 +128,9 @@ class Range(NamedTuple):
 
 @lru_cache(maxsize=512)
 def _among(of: Range) -> tuple[Array, Array, float]:
-    from scipy.special import ndtr
-
     def inside(deviation: Array) -> Array:
         d = np.clip(deviation, -1.0, 1.0)  # beyond the largest score an unbounded one is infinite
-        return np.asarray(ndtr((of.high - d) / of.gauge) - ndtr((of.low - d) / of.gauge))
+        return np.asarray(special.ndtr((of.high - d) / of.gauge) - special.ndtr((of.low - d) / of.gauge))
 
     return scores_among(of.distribution, inside)
 
@@ -180,8 +177,6 @@ class Matching(NamedTuple):
         dict of str to ndarray, (n,)
             Probabilities of the same diameters in their distributions among all parts.
         """
-        from scipy.special import ndtr
-
         upto = np.cumsum(self.matched) / self.matched.sum()
         number = np.searchsorted(upto[:-1], u_class, side="right")
         found: dict[str, Array] = {}
@@ -191,7 +186,8 @@ class Matching(NamedTuple):
                 drawn = _in_class([u[name][here] for name in kind.errors], near[c], within[c])
                 for name, z in zip(kind.errors, drawn, strict=True):
                     found.setdefault(name, np.empty(len(number)))[here] = z
-        return {name: np.clip(ndtr(z), np.finfo(float).tiny, 1.0 - np.finfo(float).epsneg) for name, z in found.items()}
+        low, high = np.finfo(float).tiny, 1.0 - np.finfo(float).epsneg
+        return {name: np.clip(special.ndtr(z), low, high) for name, z in found.items()}
 
 
 def _in_class(u: list[Array], near: Range, within: Range) -> list[Array]:

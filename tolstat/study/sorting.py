@@ -23,6 +23,7 @@ from tolstat.common.tables import HOLES
 from tolstat.joint import HOLE_OF_PIN, Joint
 from tolstat.study import selection
 from tolstat.study.selection import UNITS, Entry
+from tolstat.study.tolerances.distributions import share_between
 from tolstat.study.tolerances.entry import NotNegative, Site, Toleranced, Value
 
 MEASURABLE = {name: unit for name, unit in UNITS.items() if name.startswith(("pin", "hole"))}
@@ -84,8 +85,6 @@ class Gauge(NamedTuple):
 
         The error of the gauge is normal with mean zero; without deviation the gauge is exact.
         """
-        from scipy.special import ndtr
-
         values = np.asarray(errors[self.name])
         if self.name.endswith(".clearance"):
             _, pin, hole = self.columns
@@ -94,8 +93,7 @@ class Gauge(NamedTuple):
         if self.deviation == 0.0:
             return ((values >= self.lower) & (values <= self.upper)).astype(float)
         low, high = (self.lower - values) / self.deviation, (self.upper - values) / self.deviation
-        # from the tail that is nearer, where a difference keeps its digits
-        return np.where(low > 0.0, ndtr(-low) - ndtr(-high), ndtr(high) - ndtr(low))
+        return share_between(low, high)
 
 
 def part_of(name: str) -> str:

@@ -19,7 +19,7 @@ from tolstat.common.tables import DESIGN, Variant
 from tolstat.joint import Joint, Operation, affecting_results
 from tolstat.joint.model import Assumed
 from tolstat.joint.sections import mounting_and_law
-from tolstat.study import listing, mounting
+from tolstat.study import listing, mounting, rewriting
 from tolstat.study.axes import Axis
 from tolstat.study.case import Case
 from tolstat.study.design import Design, flat
@@ -308,8 +308,6 @@ def load(
         With every fault of the file, of the joint file and of measured data that it names.
     """
     if isinstance(path, Mapping):
-        from tolstat.study import rewriting  # it loads tomlkit
-
         text = rewriting.as_text(path)
         path = "study.toml"
     file = StudyFile(Path(path), SECTIONS, text)

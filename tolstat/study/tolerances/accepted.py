@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from tolstat.common.late import special
 from tolstat.study.bonus import Bonus
 from tolstat.study.tolerances.distributions import Array, Distribution, score
 
@@ -38,15 +39,13 @@ def scores_among(every: Distribution, accepted: Callable[[Array], Array]) -> tup
     share : float
         Share of accepted parts.
     """
-    from scipy.special import ndtr, ndtri
-
     z = np.linspace(-END, END, CELLS + 1)
-    weight = accepted(every.ppf(ndtr(0.5 * (z[1:] + z[:-1]))))
-    below, above = np.diff(ndtr(z)), -np.diff(ndtr(-z))  # each half from its own tail
+    weight = accepted(every.ppf(special.ndtr(0.5 * (z[1:] + z[:-1]))))
+    below, above = np.diff(special.ndtr(z)), -np.diff(special.ndtr(-z))  # each half from its own tail
     mass = weight * np.where(z[1:] <= 0.0, below, above)
     low, high = np.append(0.0, np.cumsum(mass)), np.append(np.cumsum(mass[::-1])[::-1], 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
-        own = np.where(low <= high, ndtri(low / low[-1]), -ndtri(high / low[-1]))
+        own = np.where(low <= high, special.ndtri(low / low[-1]), -special.ndtri(high / low[-1]))
     own = np.clip(own, -FAR, FAR)  # where no part is accepted on one side
     own[[0, -1]] = np.minimum(own[1] - 1.0, -END), np.maximum(own[-2] + 1.0, END)
     return z, own, float(low[-1])
@@ -78,18 +77,14 @@ class Accepted(Distribution):
 
     def ppf(self, u: Array) -> Array:
         """See `Distribution.ppf`."""
-        from scipy.special import ndtr, ndtri
-
         z, own, _ = self._table
-        among_all = ndtr(np.interp(ndtri(u), own, z))
+        among_all = special.ndtr(np.interp(special.ndtri(u), own, z))
         return self.every.ppf(np.where((u > 0.0) & (u < 1.0), among_all, u))
 
     def cdf(self, x: Array) -> Array:
         """See `Distribution.cdf`."""
-        from scipy.special import ndtr
-
         z, own, _ = self._table
-        return np.asarray(ndtr(np.interp(score(self.every, x), z, own)))
+        return np.asarray(special.ndtr(np.interp(score(self.every, x), z, own)))
 
     def logpdf(self, x: Array) -> Array:
         """See `Distribution.logpdf`."""

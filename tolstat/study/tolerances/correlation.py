@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.late import special
 from tolstat.common.strict import Strict
 from tolstat.common.units import Number
 from tolstat.study.axes import is_zone
@@ -60,14 +61,12 @@ class Copula:
         ndarray, (n, m)
             Uniform in each column, correlated across; the first column is unchanged but for rounding.
         """
-        from scipy.special import ndtr, ndtri
-
-        scores, factor = ndtri(u), np.linalg.cholesky(self.matrix)
+        scores, factor = special.ndtri(u), np.linalg.cholesky(self.matrix)
         # term by term: in a matrix product the rounding of a row depends on the number of rows
         mixed = np.zeros_like(scores)
         for i, j in zip(*np.nonzero(factor), strict=True):
             mixed[:, i] += factor[i, j] * scores[:, j]
-        correlated: Array = ndtr(mixed)
+        correlated: Array = special.ndtr(mixed)
         return np.clip(correlated, np.finfo(float).tiny, 1 - np.finfo(float).epsneg)
 
 

@@ -15,6 +15,7 @@ import numpy as np
 from pydantic import Field
 
 from tolstat.common import units
+from tolstat.common.late import stats
 from tolstat.common.strict import did_you_mean, refuse
 from tolstat.study.tolerances.distributions import Array, Distribution
 from tolstat.study.tolerances.entry import SingleEntry, Site, Value
@@ -50,8 +51,6 @@ class ScipyLaw(Distribution):
     @cached_property
     def whole(self) -> Any:
         """The law of scipy.stats before parts are rejected, in units of `unit`."""
-        from scipy import stats
-
         return getattr(stats, self.name)(**dict(self.parameters))
 
     @cached_property
@@ -133,8 +132,6 @@ class ScipyEntry(SingleEntry):
 
 def _parsed(text: str) -> tuple[str, tuple[tuple[str, float], ...]]:
     """Name and parameters of a law from a call with literal numbers."""
-    from scipy import stats
-
     try:
         call = ast.parse(text.strip() if len(text) <= MAX_LENGTH else "", mode="eval").body
         if not (isinstance(call, ast.Call) and isinstance(call.func, ast.Name)):

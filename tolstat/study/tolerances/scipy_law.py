@@ -9,6 +9,7 @@ import ast
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -143,11 +144,10 @@ def _parsed(text: str) -> tuple[str, tuple[tuple[str, float], ...]]:
             raise ValueError("not only numbers")
     except (SyntaxError, ValueError, TypeError, MemoryError, RecursionError) as error:
         raise refuse(f"{text[:MAX_LENGTH]!r} is no law with numbers", EXAMPLE) from error
-    law = getattr(stats, name, None)
-    if not isinstance(law, stats.rv_continuous):
-        known = [own for own in dir(stats) if isinstance(getattr(stats, own), stats.rv_continuous)]
-        raise refuse(f"scipy.stats has no continuous law {name!r}", did_you_mean(name, known))
-    shapes = law.shapes.split(", ") if law.shapes else []
+    laws = {key: law for key, law in vars(import_module("scipy.stats")).items() if isinstance(law, stats.rv_continuous)}
+    if name not in laws:
+        raise refuse(f"scipy.stats has no continuous law {name!r}", did_you_mean(name, sorted(laws)))
+    shapes = laws[name].shapes.split(", ") if laws[name].shapes else []
     allowed = [*shapes, "loc", "scale"]
     pairs = [*zip(allowed, placed, strict=False), *given]
     names = [key for key, _ in pairs]

@@ -96,8 +96,7 @@ def with_value(study: Study, keys: Mapping[str, Any]) -> Study:
         raise InputError([Fault(str(study.path), found, "vary the joint of a study with tolerances")])
     joint = with_keys(study.joint.given("json"), _keys_of_study(study), nested(keys), f"{study.path}: joint")
     changed = replace(study, joint=joint)
-    if faults := changed.faults_of_mounting():
-        raise InputError(faults)
+    changed.check_mounting()
     return changed
 
 

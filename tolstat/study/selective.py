@@ -7,9 +7,9 @@ with forks of class c. Of the parts of a class as many are matched as the rarest
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from functools import lru_cache
-from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,17 +17,13 @@ from pydantic import AfterValidator, Field
 
 from tolstat.common import units
 from tolstat.common.bisection import first
-from tolstat.common.errors import Fault
 from tolstat.common.late import special
 from tolstat.common.load_kinds import PINS
 from tolstat.common.strict import Strict, refuse
 from tolstat.study.tolerances.accepted import scores_among
 from tolstat.study.tolerances.distributions import Array, Distribution, probability
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from tolstat.study.tolerances.entry import Toleranced
+from tolstat.study.tolerances.entry import Toleranced
+from tolstat.study.tolerances.reading import Tolerances
 
 MAX_CLASSES = 20
 ROUNDING = 1e-8
@@ -272,28 +268,21 @@ def _bands(entries: Iterable[Toleranced]) -> dict[str, tuple[float, float] | Non
     return {site.name: model.band(site) for site, model in models}
 
 
-def faults(
-    settings: SelectiveEntry,
-    entries: tuple[Toleranced, ...],
-    found: Mapping[str, Distribution],
-    depending: set[str],
-    place: str,
-) -> list[Fault]:
-    """Faults of ``sampling.selective`` beside the tolerances; `depending`: errors that depend on others."""
-    where, bands = f"{place}: sampling.selective", _bands(entries)
-    missing = [name for name in DIAMETERS if name not in found]
+def faults(settings: SelectiveEntry, scatter: Tolerances, depending: Collection[str]) -> Iterator[tuple[str, str]]:
+    """Faults of ``sampling.selective`` with their remedies; `depending`: errors that depend on others."""
+    distributions, bands = scatter.distributions, _bands(scatter.entries)
+    missing = [name for name in DIAMETERS if name not in distributions]
     if missing:
         remedy = 'add "pin*.diameter" and "hole*.diameter" to [tolerances], or fit'
-        return [Fault(where, f"{missing[0]} has no tolerance", remedy)]
-    made = []
+        yield f"{missing[0]} has no tolerance", remedy
+        return
     for kind in KINDS:
-        if len({(str(found[name].describe()), bands[name]) for name in kind.errors}) > 1:
+        if len({(str(distributions[name].describe()), bands[name]) for name in kind.errors}) > 1:
             remedy = "give the diameters of one part one tolerance"
-            made.append(Fault(where, f"the diameters of the {kind.name} have different tolerances", remedy))
+            yield f"the diameters of the {kind.name} have different tolerances", remedy
         if settings.split == "width" and bands[kind.errors[0]] is None:
-            made.append(Fault(where, f"{kind.errors[0]} has no band", 'add plus_minus, or write split = "count"'))
-    both = sorted(depending & set(DIAMETERS))
+            yield f"{kind.errors[0]} has no band", 'add plus_minus, or write split = "count"'
+    both = sorted(set(DIAMETERS) & set(depending))
     if both:
-        found_ = f"{both[0]} depends on other parts or errors: by a correlation, a lot or a bonus with reject"
-        made.append(Fault(where, found_, "remove that, or selective"))
-    return made
+        found = f"{both[0]} depends on other parts or errors: by a correlation, a lot or a bonus with reject"
+        yield found, "remove that, or selective"

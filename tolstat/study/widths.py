@@ -22,7 +22,8 @@ from tolstat.common.strict import did_you_mean
 from tolstat.joint import HOLE_OF_PIN, varied
 from tolstat.study import rewriting, scaling, selection
 from tolstat.study.axes import is_zone
-from tolstat.study.study import Study, load
+from tolstat.study.loading import load
+from tolstat.study.study import Study
 from tolstat.study.tolerances import fits, iso286, iso2768
 from tolstat.study.tolerances.distributions import Array, Distribution
 from tolstat.study.tolerances.entry import SingleEntry, Site, Toleranced, ToleranceEntry

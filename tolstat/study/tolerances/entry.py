@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple, Self
 
@@ -221,6 +221,30 @@ class Toleranced(NamedTuple):
         """Number of parts that mean and deviation were estimated from; None if they are taken as exact."""
         site, model = self.models[0]
         return model.measured_parts(site)
+
+
+class KnownEntry(NamedTuple):
+    """An entry that is known from measured parts.
+
+    Attributes
+    ----------
+    pattern : str
+        Pattern as written in the study.
+    names : tuple of str
+        Errors that it draws, all from one process.
+    parts : int
+        Number of measured parts.
+    """
+
+    pattern: str
+    names: tuple[str, ...]
+    parts: int
+
+
+def known_of(entries: Sequence[Toleranced]) -> tuple[KnownEntry, ...]:
+    """Entries of a study that are known from measured parts, in the order of the file."""
+    measured = ((entry, entry.measured_parts) for entry in entries)
+    return tuple(KnownEntry(e.pattern, tuple(e.quantities), parts) for e, parts in measured if parts is not None)
 
 
 class HalfBand(SingleEntry):

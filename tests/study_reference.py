@@ -17,7 +17,7 @@ from tolstat.joint.orders import SpeedOrder, TorqueOrder
 from tolstat.joint.partner import Partner
 from tolstat.study import schema
 from tolstat.study.costs import CostEntry
-from tolstat.study.fatigue import LineEntry, SequenceEntry
+from tolstat.study.fatigue import LineEntry, SequenceEntry, StressPointEntry
 from tolstat.study.file import OF_CASE
 from tolstat.study.listing import Range
 from tolstat.study.model import SweepEntry
@@ -26,11 +26,9 @@ from tolstat.study.schema import of_model
 from tolstat.study.selection import TOLERANCED
 from tolstat.study.selective import SelectiveEntry
 from tolstat.study.sorting import RejectEntry
-from tolstat.study.stress_point import StressPointEntry
-from tolstat.study.tolerances.entry import Banded, SingleEntry
+from tolstat.study.tolerances.entry import Banded, LotEntry, SingleEntry
 from tolstat.study.tolerances.fits import FitEntry
 from tolstat.study.tolerances.kinds import ZONE_KINDS, kinds_of
-from tolstat.study.tolerances.lots import LotEntry
 
 BAND = tuple(key for key in Banded.model_fields if key not in SingleEntry.model_fields)
 ZONES = tuple(key for key in ZONE_KINDS if key != "offset_radial")

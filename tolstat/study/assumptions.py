@@ -91,7 +91,7 @@ def with_value(study: Study, keys: Mapping[str, Any]) -> Study:
         When the keys make no valid joint, or one that does not go with the study's settings; when the joints of the
         study have dimensions of their own.
     """
-    if study.listed or study.swept:
+    if study.variants:
         found = "has joints with dimensions of their own: they are no variations of one joint"
         raise InputError([Fault(str(study.path), found, "vary the joint of a study with tolerances")])
     joint = with_keys(study.joint.given("json"), _keys_of_study(study), nested(keys), f"{study.path}: joint")

@@ -18,22 +18,19 @@ from tolstat.joint.derived import BEARING
 from tolstat.joint.model import Assumed
 from tolstat.joint.overrides import leaves, merged
 from tolstat.joint.reading import faults_of_assumed, is_joint
-from tolstat.study import fatigue, listing, points, proposal, selection, signals, sorting, swept
+from tolstat.study import fatigue, listing, points, proposal, selection, signals, sorting
 from tolstat.study.axes import is_zone, zone_of
-from tolstat.study.design import Design
+from tolstat.study.design import KEYS, Design, swept
 from tolstat.study.fatigue import Fatigue
-from tolstat.study.freeze_design import Group, groups
 from tolstat.study.model import Output, Sampling, Solver, SweepAxis, SweepEntry
 from tolstat.study.points import Point
 from tolstat.study.proposal import Proposal, ProposalEntry
 from tolstat.study.selection import TOLERANCED, UNITS, Assignments, Entry
 from tolstat.study.sorting import Gauge
-from tolstat.study.swept import KEYS, Swept
 from tolstat.study.tolerances import fits, reading
-from tolstat.study.tolerances.correlation import Copula, Correlation, assemble
+from tolstat.study.tolerances.correlation import Copula, Correlation, Group, assemble, correlated, groups
 from tolstat.study.tolerances.entry import Site
 from tolstat.study.tolerances.fits import Fit
-from tolstat.study.tolerances.lots import correlated
 from tolstat.study.tolerances.reading import Nominal, Tolerances
 
 ModelT = TypeVar("ModelT", bound=strict.Strict)
@@ -325,13 +322,13 @@ class StudyFile:
         return None
 
     @cached_property
-    def swept(self) -> Swept | None:
+    def swept(self) -> Design | None:
         """Joints of a sweep of dimensions; None if it sweeps errors alone."""
         if self.sampling is None or self.sampling.method != "sweep" or self._nominal is None:
             return None
         variants = listing.Variants(self._table("joint"), self._nominal, self.place, self.path.parent)
         with gather(self.faults):
-            return swept.read(self.sweep, variants, self._nominal.joint, self.sampling.nominal_first, self.place)
+            return swept(self.sweep, self._nominal, variants.swept, self.sampling.first_sample, self.place)
         return None
 
     def model(self, section: str, model: type[ModelT], if_missing: str = "") -> ModelT | None:

@@ -274,7 +274,7 @@ class Variants:
         own |= {f"solver.{key}": getattr(solver, key) for key in entry.solver}
         written = [key for key, _ in flat(entry.joint)] + list(ranges)
         return [
-            Listed(Variant(entry.name, self.values(joint, written) | own, entry.note), joint, operation, solver, run)
+            Listed(Variant(entry.name, self._values(joint, written) | own, entry.note), joint, operation, solver, run)
             for joint in made
         ]
 
@@ -324,15 +324,16 @@ class Variants:
             nested({key: _written(value, text[key], ranges[key].start) for key, value in own.items()}) for own in values
         ]
 
-    def joint(self, over: Mapping[str, Any], at: Section) -> Joint:
-        """Make a joint from the study's by the keys `over`; `at` is their key path in faults."""
-        return self._loaded(laid_over(self._study, over), at)
+    def swept(self, point: Mapping[str, Any]) -> tuple[Variant, Joint]:
+        """Variant at a point of a sweep, from dotted keys with values as a file writes them, and its joint."""
+        joint = self._loaded(laid_over(self._study, nested(point)), ("sweep",))
+        return Variant("sweep", self._values(joint, list(point))), joint
 
     def _loaded(self, keys: Mapping[str, Any], at: Section) -> Joint:
         overrides = {key: value for key, value in keys.items() if key != "base"}
         return joint.load(keys["base"], overrides, self._place, self._folder, strict.dotted(at))
 
-    def values(self, made: Joint, written: list[str]) -> dict[str, Any]:
+    def _values(self, made: Joint, written: list[str]) -> dict[str, Any]:
         """Return the keys `written` and all others in which a joint differs from the study's, see `Variant.values`."""
         nominal, values = (dict(flat(joint.given())) for joint in (self._nominal.joint, made))
         keys = [key for key in nominal | values if key not in TOLD]

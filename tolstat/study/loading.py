@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from tolstat.common.errors import Fault, InputError
-from tolstat.common.loads import load_of
-from tolstat.common.strict import dotted
+from tolstat.common import selected_results
+from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.loads import LOADS, load_of
+from tolstat.common.strict import dotted, validate
 from tolstat.common.tables import FINEST_STEPS
 from tolstat.joint import Joint, Operation
 from tolstat.study import rewriting, selective
 from tolstat.study.file import OF_CASE, SECTIONS, StudyFile
-from tolstat.study.model import MAX_ROWS, Output, Sampling, Solver
+from tolstat.study.model import MAX_ROWS, Output, Sampling, Solver, Subset
 from tolstat.study.study import Case, Study
 from tolstat.study.tolerances.entry import known_of
 
@@ -208,3 +210,44 @@ def _histories(file: StudyFile, output: Output, solver: Solver) -> None:
     if "harmonics" in output.histories and output.harmonics > most:
         found = f"{steps} steps per revolution do not resolve {output.harmonics} harmonics"
         file.fault("output.harmonics", found, f"give at most {most}, or a larger solver.steps_per_rev")
+
+
+def subset_of(study: Study, sampling: Mapping[str, Any]) -> Study:
+    """Make the study of a subset simulation from the study whose tolerances it uses.
+
+    Parameters
+    ----------
+    study : Study
+        Study with any sampling method that draws joints; its histories are not stored.
+    sampling : mapping
+        Fields of `model.Subset` except those that are taken from the study.
+
+    Returns
+    -------
+    Study
+        Study whose ``sampling`` is a `model.Subset`; it can draw the joints of level 0, which are those of a random
+        campaign.
+
+    Raises
+    ------
+    InputError
+        When the study has no tolerances or does not store the load, and with every fault of `sampling`.
+    """
+    faults: list[Fault] = []
+    if not study.tolerances:
+        remedy = 'give a study with [tolerances] and sampling.method = "random"'
+        faults.append(Fault(str(study.path), "has no tolerances to draw joints from", remedy))
+    if study.sampling.is_matched:
+        found = "matches diameters by classes, which a subset simulation does not draw"
+        faults.append(study.fault("sampling.selective", found, "remove it"))
+    for load in (LOADS[name] for name in sampling["levels"]):
+        if not selected_results.holds(study.output.columns, load.name):
+            remedy = f"add {', '.join(load.columns)}"
+            faults.append(study.fault("output.results", f"leaves out {load.name}, which --limit needs", remedy))
+    own = study.sampling.model_dump(include=set(Subset.FROM_STUDY))
+    with gather(faults):
+        read = validate(Subset, own | {"n": sampling["per_level"]} | dict(sampling), "subset simulation")
+    if faults:
+        raise InputError(faults)
+    output = study.output.model_copy(update={"histories": "none"})
+    return replace(study, sampling=read, proposals=(), output=output)

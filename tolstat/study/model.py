@@ -11,9 +11,8 @@ from tolstat.analysis.clustered import LEAST
 from tolstat.common import selected_results, units
 from tolstat.common.columns import Column
 from tolstat.common.loads import Limit
-from tolstat.common.solver_options import from_names
 from tolstat.common.strict import Strict, refuse
-from tolstat.common.tables import Options
+from tolstat.common.tables import Options, from_names
 from tolstat.study import selection
 from tolstat.study.selective import SelectiveEntry
 from tolstat.study.tolerances.entry import Value

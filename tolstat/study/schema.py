@@ -24,7 +24,8 @@ from tolstat.joint import Joint, Operation
 from tolstat.joint.model import Assumed
 from tolstat.joint.reading import DEFAULT_JOINT
 from tolstat.study.axes import is_zone, vectors_of
-from tolstat.study.fatigue import LineEntry, Settings
+from tolstat.study.design import KEYS
+from tolstat.study.fatigue import LineEntry, Settings, StressPointEntry
 from tolstat.study.file import OF_CASE
 from tolstat.study.listing import CaseEntry, Range, VariantEntry
 from tolstat.study.model import Output, Sampling, Solver, SweepEntry
@@ -32,8 +33,6 @@ from tolstat.study.points import PointEntry
 from tolstat.study.proposal import MAX_SHIFT, MAX_WIDEN, ProposalEntry
 from tolstat.study.selection import TOLERANCED, UNITS
 from tolstat.study.sorting import MEASURABLE, RejectEntry
-from tolstat.study.stress_point import StressPointEntry
-from tolstat.study.swept import KEYS
 from tolstat.study.tolerances import fits
 from tolstat.study.tolerances.correlation import Correlation
 from tolstat.study.tolerances.kinds import KINDS as TOLERANCES

@@ -20,10 +20,10 @@ from tolstat.common.bisection import first
 from tolstat.common.late import special
 from tolstat.common.load_kinds import PINS
 from tolstat.common.strict import Strict, refuse
-from tolstat.study.tolerances.accepted import scores_among
 from tolstat.study.tolerances.distributions import Array, Distribution, probability
 from tolstat.study.tolerances.entry import Toleranced
 from tolstat.study.tolerances.reading import Tolerances
+from tolstat.study.tolerances.zone_laws import scores_among
 
 MAX_CLASSES = 20
 ROUNDING = 1e-8

@@ -24,18 +24,15 @@ from tolstat.study import mounting
 from tolstat.study.axes import Axis
 from tolstat.study.design import Design, flat
 from tolstat.study.fatigue import Fatigue
-from tolstat.study.freeze_design import Group
 from tolstat.study.model import Output, Sampling, Solver, SweepAxis
 from tolstat.study.mounting import Setting
 from tolstat.study.points import Point, limits_at, only_one
 from tolstat.study.proposal import Proposal
 from tolstat.study.sorting import Gauge
-from tolstat.study.swept import Swept
-from tolstat.study.tolerances.correlation import Copula
+from tolstat.study.tolerances.correlation import Copula, Group, Lot
 from tolstat.study.tolerances.distributions import Distribution
 from tolstat.study.tolerances.entry import KnownEntry, Toleranced, known_of
 from tolstat.study.tolerances.fits import Fit
-from tolstat.study.tolerances.lots import Lot
 
 
 @dataclass(frozen=True, repr=False)
@@ -140,7 +137,7 @@ class Study(Case):
         How many, and how they are drawn.
     sweep : tuple of SweepAxis
         Axes of a grid, the last varying fastest; empty unless ``sampling.method`` is ``sweep``.
-    swept : Swept, optional
+    swept : Design, optional
         The joints of a sweep of dimensions; None for other sweeps and methods.
     listed : Design, optional
         The joints listed one by one; None unless ``sampling.method`` is ``cases``.
@@ -173,7 +170,7 @@ class Study(Case):
     lots: Mapping[str, Lot] = field(default_factory=dict)
     proposals: tuple[Proposal, ...] = ()
     sweep: tuple[SweepAxis, ...] = ()
-    swept: Swept | None = None
+    swept: Design | None = None
     listed: Design | None = None
     limits: dict[str, float] = field(default_factory=dict)
     fatigue: Fatigue = field(default_factory=Fatigue)
@@ -224,20 +221,24 @@ class Study(Case):
         return sections
 
     @property
+    def _different(self) -> Design | None:
+        """Joints with dimensions of their own."""
+        return self.listed or self.swept
+
+    @property
     def joints(self) -> tuple[Joint, ...]:
         """Nominal joint of each variant."""
-        of = self.listed or self.swept
-        return of.joints if of else (self.joint,)
+        return self._different.joints if self._different else (self.joint,)
 
     @property
     def solvers(self) -> tuple[Solver, ...]:
         """Numerical settings of each of `joints`."""
-        return self.listed.solvers if self.listed else (self.solver,) * len(self.joints)
+        return self._different.solvers if self._different else (self.solver,)
 
     @property
     def operations(self) -> tuple[Operation, ...]:
         """Operating point of each of `joints`."""
-        return self.listed.operations if self.listed else (self.operation,) * len(self.joints)
+        return self._different.operations if self._different else (self.operation,)
 
     def at(self, name: str) -> Study:
         """Return the study at one of its operating points alone, with the limits that hold there.
@@ -256,8 +257,7 @@ class Study(Case):
     @property
     def variants(self) -> tuple[Variant, ...]:
         """Variant of each of `joints`; empty where all rows have the study's joint."""
-        of = self.listed or self.swept
-        return of.variants if of else ()
+        return self._different.variants if self._different else ()
 
     @property
     def case_names(self) -> tuple[str, ...]:
@@ -267,8 +267,7 @@ class Study(Case):
     @property
     def design(self) -> NDArray[np.void]:
         """Variant, case and group of each row, (rows,), dtype DESIGN; zeros where all rows have the study's joint."""
-        of = self.listed or self.swept
-        return of.table if of else np.broadcast_to(np.zeros(1, DESIGN), self.rows)
+        return self._different.table if self._different else np.broadcast_to(np.zeros(1, DESIGN), self.rows)
 
     def has_bonus(self, name: str) -> bool:
         """Whether `name` is a position with a bonus, or the diameter of such a feature or of one matched by classes."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from tolstat.common.late import integrate
 from tolstat.study.tolerances.distributions import Distribution, Normal
-from tolstat.study.tolerances.radial import Rayleigh
+from tolstat.study.tolerances.zone_laws import Rayleigh
 
 MIDPOINTS = 1000
 """Number of midpoints in probability, for the mean square on a band."""

@@ -18,9 +18,8 @@ from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, Wit
 from tolstat.common import json_schema, strict, units
 from tolstat.common.notation import PLUS_MINUS
 from tolstat.common.strict import refuse
-from tolstat.study.tolerances import iso2768
+from tolstat.study.tolerances import iso
 from tolstat.study.tolerances.distributions import Distribution
-from tolstat.study.tolerances.lots import LotEntry
 
 
 class Diameter(NamedTuple):
@@ -157,6 +156,16 @@ class ToleranceEntry(strict.Strict):
         return self
 
 
+class LotEntry(strict.Strict):
+    """Key ``lot`` of an entry: parts of one lot deviate together."""
+
+    share: Annotated[units.Number, Field(gt=0, lt=1)] = Field(examples=[0.3])
+    """share of the variance of the normal score that is between lots"""
+    shared: bool = Field(default=False, strict=True, examples=[True])
+    """whether all errors that the pattern selects have one score of the lot, so that they are correlated in each
+    joint; else each error has its own"""
+
+
 class SingleEntry(ToleranceEntry):
     """Entry for one error: one model for each distribution."""
 
@@ -270,7 +279,7 @@ class HalfBand(SingleEntry):
             raise refuse(f"ISO 2768 has no tolerance for {site.name}", "give plus_minus")
         kind = "angular" if site.unit == "rad" else "linear"
         try:
-            return iso2768.deviation(kind, self.iso2768, self.nominal)
+            return iso.deviation(kind, self.iso2768, self.nominal)
         except ValueError as error:
             raise refuse(f"nominal = {{nominal}}: {error}", "give plus_minus", "nominal") from error
 

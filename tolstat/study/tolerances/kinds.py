@@ -29,9 +29,8 @@ from tolstat.study.tolerances.entry import (
     Truncate,
     Value,
 )
-from tolstat.study.tolerances.measured import MeasuredEntry
-from tolstat.study.tolerances.radial import Rayleigh
-from tolstat.study.tolerances.scipy_law import PREFIX, ScipyEntry
+from tolstat.study.tolerances.external import PREFIX, MeasuredEntry, ScipyEntry
+from tolstat.study.tolerances.zone_laws import Rayleigh
 from tolstat.study.tolerances.zones import CoaxialityEntry, OrientationEntry, PositionEntry
 
 CPK = "capability index Cpk of the process: sigma is the distance from the mean to the nearer limit over 3 Cpk"

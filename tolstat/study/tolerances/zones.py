@@ -19,9 +19,7 @@ from tolstat.common import json_schema, notation, units
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.strict import dotted, refuse
 from tolstat.study import axes
-from tolstat.study.axes import ORIENTATIONS, PAIRS, Axis
-from tolstat.study.bonus import REJECT, Bonus
-from tolstat.study.tolerances.accepted import Accepted
+from tolstat.study.axes import ORIENTATIONS, PAIRS, REJECT, Axis, Bonus
 from tolstat.study.tolerances.distributions import Distribution, Normal, TruncatedNormal, Uniform, sigma_of
 from tolstat.study.tolerances.entry import (
     Meaning,
@@ -32,7 +30,7 @@ from tolstat.study.tolerances.entry import (
     ToleranceEntry,
     Truncate,
 )
-from tolstat.study.tolerances.radial import Disc, Rayleigh
+from tolstat.study.tolerances.zone_laws import Accepted, Disc, Rayleigh
 
 
 class Zone(NamedTuple):

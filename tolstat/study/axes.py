@@ -11,9 +11,9 @@ feature's t and z. Coaxiality is the slope of each feature relative to that line
 Maximum material requirement of a position: the zone grows as the pin gets thinner or the hole wider. A part is
 acceptable if its axis lies in the grown zone: its surface then stays within the virtual condition. What is drawn are
 the ends of the axis in the zone without bonus, independently of the diameter; `Bonus.shift` takes them to the grown
-zone of the part's own diameter. With the rule ``fills`` all offsets grow in proportion to the zone. With ``reject`` the process
-stays as it is, and each end keeps its probability under the condition that it is in the grown zone; the diameters of
-accepted parts then have a distribution of their own, `Bonus.accepted` times that of all parts.
+zone of the part's own diameter. With the rule ``fills`` all offsets grow in proportion to the zone. With ``reject`` the
+process stays as it is, and each end keeps its probability under the condition that it is in the grown zone; the
+diameters of accepted parts then have a distribution of their own, `Bonus.accepted` times that of all parts.
 """
 
 from __future__ import annotations

@@ -17,7 +17,7 @@ from tolstat.common.load_kinds import PINS
 from tolstat.common.tables import HOLES
 from tolstat.study import scaling
 from tolstat.study.axes import Bonus
-from tolstat.study.change import changed
+from tolstat.study.scaling import changed
 from tolstat.study.tolerances import meaning
 from tolstat.study.tolerances.distributions import Array, Distribution, Normal, Uniform
 from tolstat.study.tolerances.zone_laws import Accepted

@@ -14,7 +14,7 @@ from tolstat import joint, sampling, study
 from tolstat.campaign import plan
 from tolstat.common.errors import InputError
 from tolstat.study import scaling
-from tolstat.study.change import changed
+from tolstat.study.scaling import changed
 from tolstat.study.starter import joint_text
 from tolstat.study.tolerances import distributions, fits, iso
 

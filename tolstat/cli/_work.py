@@ -70,5 +70,5 @@ def print_study_notes(path: Path, study: Study) -> None:
     print_warnings(path, study.joints, study.variants)
     for fault in assumptions.warnings(study):
         warn(f"warning: {fault}")
-    if not study.sampling.has_replicates and (reason := without_interval(study.sampling.method)):
+    if study.sampling.replicates == 1 and (reason := without_interval(study.sampling.method)):
         warn(f"warning: {reason}")

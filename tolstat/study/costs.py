@@ -18,7 +18,7 @@ from pydantic import Field, model_validator
 
 from tolstat.common import strict, units
 from tolstat.common.errors import Fault, InputError, gather
-from tolstat.common.files import about_encoding, read_input
+from tolstat.common.files import read_input
 from tolstat.common.strict import Strict, refuse
 from tolstat.study import selection
 from tolstat.study.scaling import Tolerance
@@ -145,10 +145,8 @@ def of(tolerances: Sequence[Tolerance], path: Path | None = None) -> list[Cost]:
 
 def _read_csv(path: Path) -> dict[str, dict[str, Any]]:
     try:
-        rows = list(csv.DictReader(StringIO(read_input(path)), restval=""))
-    except UnicodeDecodeError as error:
-        raise InputError([Fault(str(path), *about_encoding(error))]) from error
-    except (OSError, csv.Error) as error:
+        rows = list(csv.DictReader(StringIO(strict.read_text(path)), restval=""))
+    except csv.Error as error:
         raise InputError([Fault(str(path), f"cannot be read: {error}", "give a TOML or CSV file")]) from error
     if not rows or "tolerance" not in rows[0]:
         raise InputError(

@@ -313,12 +313,16 @@ class StudyFile:
             return None
         return listing.Nominal(self.joint, self.operation, self.solver)
 
+    @property
+    def _listing(self) -> listing.Listing:
+        return listing.Listing(self.data, self._nominal, self.place, self.path.parent)
+
     @cached_property
     def listed(self) -> Design | None:
         """``[grid]``, ``[[case]]`` and ``[[variant]]``: joints listed one by one, variants of the joint."""
         with gather(self.faults):
             if self.sampling is not None and self.sampling.method == "cases":
-                return listing.read(self.data, self._nominal, self.place, self.path.parent)
+                return self._listing.design()
         return None
 
     @cached_property
@@ -326,9 +330,8 @@ class StudyFile:
         """Joints of a sweep of dimensions; None if it sweeps errors alone."""
         if self.sampling is None or self.sampling.method != "sweep" or self._nominal is None:
             return None
-        variants = listing.Variants(self._table("joint"), self._nominal, self.place, self.path.parent)
         with gather(self.faults):
-            return swept(self.sweep, self._nominal, variants.swept, self.sampling.first_sample, self.place)
+            return swept(self.sweep, self._nominal, self._listing.swept, self.sampling.first_sample, self.place)
         return None
 
     def model(self, section: str, model: type[ModelT], if_missing: str = "") -> ModelT | None:

@@ -112,182 +112,164 @@ class Listed(NamedTuple):
     run: list[int]
 
 
-def read(data: Mapping[str, Any], nominal: Nominal | None, place: str, folder: Path) -> Design | None:
-    """Read the three sections.
+class Listing:
+    """Joints that a study lists: variants of its joint.
 
     Parameters
     ----------
     data : mapping
         The study's file.
-    nominal : Nominal, optional
-        Joint, operating point and settings of the study; variants are not read if it is None.
+    nominal : Nominal
+        Joint, operating point and settings of the study.
     place : str
         File name shown in faults.
     folder : Path
         Folder that the path of a joint file is relative to.
-
-    Returns
-    -------
-    Design
-        None where there is no `nominal`.
-
-    Raises
-    ------
-    InputError
-        With every fault of the sections.
-    """
-    faults: list[Fault] = []
-    axes: list[Axis] = []
-    cases: dict[str, dict[str, float]] = {IDEAL: {}}
-    variants: list[Listed] = []
-    with gather(faults):
-        axes = list(_grid(data.get("grid", {}), place, faults))
-    with gather(faults):
-        cases |= _cases(data.get("case", []), axes, place, faults)
-    if nominal is not None:
-        with gather(faults):
-            variants = Variants(data["joint"], nominal, place, folder).read(data.get("variant", []), list(cases))
-            faults += _clashes(data.get("variant", []), axes, place)
-    points = tuple(_points(axes))
-    rows = len(points) * sum(len(one.run) for one in variants)
-    if rows > MAX_ROWS:
-        faults.append(Fault(f"{place}: variant", f"gives {rows} joints", f"give at most {MAX_ROWS}"))
-    if faults:
-        raise InputError(faults)
-    if nominal is None:
-        return None
-    names, joints, operations, solvers, runs = zip(*variants, strict=True)
-    return Design(names, joints, operations, solvers, cases, points, table(runs, len(points)))
-
-
-def _grid(section: Any, place: str, faults: list[Fault]) -> Iterator[Axis]:
-    if not isinstance(section, Mapping):
-        raise InputError([Fault(f"{place}: grid", "is not a table", "write [grid]")])
-    claims = Assignments(place)
-    for entry in selection.entries(section, "grid"):
-        with gather(faults):
-            names = selection.resolve(entry, UNITS, place)
-            claims.claim(entry, names)
-            yield Axis(entry, names, list(_values(entry, UNITS[names[0]], place, faults)))
-
-
-def _values(entry: Entry, unit: str, place: str, faults: list[Fault]) -> Iterator[float]:
-    if not isinstance(entry.value, list) or not entry.value:
-        where = f"{place}: {strict.dotted(entry.path)}"
-        raise InputError([Fault(where, f"{entry.value!r} is not a list of values", 'write ["0 deg", "15 deg"]')])
-    for number, value in enumerate(entry.value):
-        with gather(faults):
-            yield selection.quantity(Entry(entry.pattern, (*entry.path, number), value), unit, place)
-
-
-def _points(axes: list[Axis]) -> Iterator[dict[str, float]]:
-    """Points of the product grid, the last axis varying fastest; one empty point without axes."""
-    for values in product(*(axis.values for axis in axes)):
-        yield {name: value for axis, value in zip(axes, values, strict=True) for name in axis.names}
-
-
-def _cases(section: Any, axes: list[Axis], place: str, faults: list[Fault]) -> dict[str, dict[str, float]]:
-    """Errors of each case; empty for a case with faults, so that variants can refer to it."""
-    cases: dict[str, dict[str, float]] = {}
-    for number, item in enumerate(_tables(section, "case", place)):
-        name = item.get("name") if isinstance(item, Mapping) else None
-        if isinstance(name, str):
-            if name in cases or name == IDEAL:
-                remedy = "remove it: it is always run" if name == IDEAL else "give each case its own name"
-                faults.append(Fault(f"{place}: case[{number}].name", f"a case {name!r} exists already", remedy))
-            cases[name] = {}
-        with gather(faults):
-            entry = strict.validate(CaseEntry, item, place, prefix=("case", number))
-            claims = Assignments(place)
-            for axis in axes:
-                claims.claim(axis.entry, axis.names)
-            cases[entry.name] = selection.fixed_errors(entry.errors, ("case", number, "errors"), place, claims)
-    return cases
-
-
-def _clashes(section: list[Any], axes: list[Axis], place: str) -> list[Fault]:
-    """Keys of the operating point that a variant and the grid both give."""
-    taken = {name for axis in axes for name in axis.names}
-    return [
-        Fault(f"{place}: variant[{number}].operation.{key}", "is set by grid already", "remove one of the two")
-        for number, item in enumerate(section)
-        for key in item.get("operation", {})
-        if f"operation.{key}" in taken
-    ]
-
-
-class Variants:
-    """``[[variant]]``: joints made from the study's joint by the keys of each entry.
-
-    Parameters
-    ----------
-    study : mapping
-        ``[joint]`` of the study.
-    nominal : Nominal
-        Joint, operating point and settings of the study.
-    place, folder
-        As in `read`.
     """
 
-    def __init__(self, study: Mapping[str, Any], nominal: Nominal, place: str, folder: Path) -> None:
-        self._study = study
-        self._nominal = nominal
-        self._place = place
-        self._folder = folder
+    def __init__(self, data: Mapping[str, Any], nominal: Nominal | None, place: str, folder: Path) -> None:
+        self._data, self._nominal = data, nominal
+        self._place, self._folder = place, folder
 
-    def read(self, section: Any, cases: list[str]) -> list[Listed]:
+    def design(self) -> Design | None:
+        """Read ``[grid]``, ``[[case]]`` and ``[[variant]]``.
+
+        Returns
+        -------
+        Design
+            None where there is no nominal joint; variants are not read then.
+
+        Raises
+        ------
+        InputError
+            With every fault of the sections.
+        """
+        faults: list[Fault] = []
+        axes: list[Axis] = []
+        cases: dict[str, dict[str, float]] = {IDEAL: {}}
+        variants: list[Listed] = []
+        with gather(faults):
+            axes += self._grid(faults)
+        with gather(faults):
+            cases |= self._cases(axes, faults)
+        if self._nominal is not None:
+            with gather(faults):
+                variants = self._variants(self._nominal, list(cases))
+                faults += self._clashes(axes)
+        values = product(*(axis.values for axis in axes))  # one empty point without axes
+        points = tuple(
+            {name: value for axis, value in zip(axes, at, strict=True) for name in axis.names} for at in values
+        )
+        rows = len(points) * sum(len(variant.run) for variant in variants)
+        if rows > MAX_ROWS:
+            faults.append(self._fault(("variant",), f"gives {rows} joints", f"give at most {MAX_ROWS}"))
+        if faults:
+            raise InputError(faults)
+        if self._nominal is None:
+            return None
+        names, joints, operations, solvers, runs = zip(*variants, strict=True)
+        return Design(names, joints, operations, solvers, cases, points, table(runs, len(points)))
+
+    def swept(self, point: Mapping[str, Any]) -> tuple[Variant, Joint]:
+        """Variant at a point of a sweep, from dotted keys with values as a file writes them, and its joint."""
+        joint = self._joint(laid_over(self._data["joint"], nested(point)), ("sweep",))
+        return Variant("sweep", self._values(joint, list(point))), joint
+
+    def _grid(self, faults: list[Fault]) -> Iterator[Axis]:
+        section = self._data.get("grid", {})
+        if not isinstance(section, Mapping):
+            raise InputError([self._fault(("grid",), "is not a table", "write [grid]")])
+        claims = Assignments(self._place)
+        for entry in selection.entries(section, "grid"):
+            with gather(faults):
+                names = selection.resolve(entry, UNITS, self._place)
+                claims.claim(entry, names)
+                if not isinstance(entry.value, list) or not entry.value:
+                    found = f"{entry.value!r} is not a list of values"
+                    raise InputError([self._fault(entry.path, found, 'write ["0 deg", "15 deg"]')])
+                values = []
+                for number, value in enumerate(entry.value):
+                    with gather(faults):
+                        item = Entry(entry.pattern, (*entry.path, number), value)
+                        values.append(selection.quantity(item, UNITS[names[0]], self._place))
+                yield Axis(entry, names, values)
+
+    def _cases(self, axes: list[Axis], faults: list[Fault]) -> dict[str, dict[str, float]]:
+        """Errors of each case; empty for a case with faults, so that variants can refer to it."""
+        cases: dict[str, dict[str, float]] = {}
+        for number, item in enumerate(self._tables("case")):
+            name = item.get("name") if isinstance(item, Mapping) else None
+            if isinstance(name, str):
+                if name in cases or name == IDEAL:
+                    remedy = "remove it: it is always run" if name == IDEAL else "give each case its own name"
+                    faults.append(self._fault(("case", number, "name"), f"a case {name!r} exists already", remedy))
+                cases[name] = {}
+            with gather(faults):
+                entry = strict.validate(CaseEntry, item, self._place, prefix=("case", number))
+                claims = Assignments(self._place)
+                for axis in axes:
+                    claims.claim(axis.entry, axis.names)
+                section = ("case", number, "errors")
+                cases[entry.name] = selection.fixed_errors(entry.errors, section, self._place, claims)
+        return cases
+
+    def _clashes(self, axes: list[Axis]) -> list[Fault]:
+        """Keys of the operating point that a variant and the grid both give."""
+        taken = {name for axis in axes for name in axis.names}
+        return [
+            self._fault(("variant", number, "operation", key), "is set by grid already", "remove one of the two")
+            for number, item in enumerate(self._tables("variant"))
+            for key in item.get("operation", {})
+            if f"operation.{key}" in taken
+        ]
+
+    def _variants(self, nominal: Nominal, cases: list[str]) -> list[Listed]:
         """Variants in the order of the file, families expanded."""
-        everything = list(range(len(cases)))
-        entries = _tables(section, "variant", self._place)
+        every = list(range(len(cases)))
+        entries = self._tables("variant")
         if not entries:
-            return [Listed(Variant("joint", {}), *self._nominal, everything)]
+            return [Listed(Variant("joint", {}), *nominal, every)]
         faults: list[Fault] = []
         variants = []
         for number, item in enumerate(entries):
             with gather(faults):
                 at: Section = ("variant", number)
                 entry = strict.validate(VariantEntry, item, self._place, prefix=at)
-                run = everything if entry.cases is None else [0]
-                with gather(faults):
-                    run = sorted({*run, *self._numbers(entry.cases or [], cases, at)})
-                variants += self._expanded(entry, run, at)
+                unknown = [name for name in entry.cases or () if name not in cases]
+                faults += [
+                    self._fault((*at, "cases"), f"no case {name!r}", strict.did_you_mean(name, cases))
+                    for name in unknown
+                ]
+                run = every if entry.cases is None else sorted({0, *map(cases.index, set(entry.cases) - set(unknown))})
+                variants += self._expanded(entry, run, nominal, at)
         if faults:
             raise InputError(faults)
         return variants
 
-    def _numbers(self, names: list[str], cases: list[str], at: Section) -> list[int]:
-        where = f"{self._place}: {strict.dotted((*at, 'cases'))}"
-        unknown = [name for name in names if name not in cases]
-        if unknown:
-            raise InputError([Fault(where, f"no case {name!r}", strict.did_you_mean(name, cases)) for name in unknown])
-        return [cases.index(name) for name in names]
-
-    def _expanded(self, entry: VariantEntry, run: list[int], at: Section) -> list[Listed]:
-        keys = laid_over(self._study, entry.joint)
-        made = [self._loaded(keys, (*at, "joint"))]
+    def _expanded(self, entry: VariantEntry, run: list[int], nominal: Nominal, at: Section) -> list[Listed]:
+        keys = laid_over(self._data["joint"], entry.joint)
+        joints = [self._joint(keys, (*at, "joint"))]
         ranges = dict(_ranges(entry.vary, (*at, "vary"), self._place))
         if ranges:
             members = self._members(entry, keys, ranges, (*at, "vary"))
-            made = [self._loaded(laid_over(keys, own), (*at, "vary")) for own in members]
-        operation, solver = self._settings(entry, at)
-        own = {f"operation.{key}": getattr(operation, key) for key in entry.operation}
-        own |= {f"solver.{key}": getattr(solver, key) for key in entry.solver}
+            joints = [self._joint(laid_over(keys, member), (*at, "vary")) for member in members]
+        operation, solver = self._settings(entry, nominal, at)
+        values = {f"operation.{key}": getattr(operation, key) for key in entry.operation}
+        values |= {f"solver.{key}": getattr(solver, key) for key in entry.solver}
         written = [key for key, _ in flat(entry.joint)] + list(ranges)
-        return [
-            Listed(Variant(entry.name, self._values(joint, written) | own, entry.note), joint, operation, solver, run)
-            for joint in made
-        ]
+        variants = [Variant(entry.name, self._values(made, written) | values, entry.note) for made in joints]
+        return [Listed(*pair, operation, solver, run) for pair in zip(variants, joints, strict=True)]
 
-    def _settings(self, entry: VariantEntry, at: Section) -> tuple[Operation, Solver]:
+    def _settings(self, entry: VariantEntry, nominal: Nominal, at: Section) -> tuple[Operation, Solver]:
         """Operating point and numerical settings of a variant: those of the study, with keys replaced by the entry."""
         faults: list[Fault] = []
-        operation, solver = self._nominal.operation, self._nominal.solver
+        operation, solver = nominal.operation, nominal.solver
         with gather(faults):
             keys = operation.model_dump(mode="json", by_alias=True) | entry.operation
             operation = strict.validate(Operation, keys, self._place, prefix=(*at, "operation"))
         if entry.solver.get("fidelity") == "auto":
-            where = f"{self._place}: {strict.dotted((*at, 'solver', 'fidelity'))}"
-            faults.append(Fault(where, "'auto' cannot be set for one variant", "write it in [solver]"))
+            found = "'auto' cannot be set for one variant"
+            faults.append(self._fault((*at, "solver", "fidelity"), found, "write it in [solver]"))
         with gather(faults):
             keys = solver.model_dump(exclude_unset=True) | entry.solver
             solver = strict.validate(Solver, keys, self._place, prefix=(*at, "solver"))
@@ -301,49 +283,44 @@ class Variants:
         """Keys of each joint of a family, as a joint file writes them."""
         assert entry.points is not None
         ends = [{key: getattr(r, end) for key, r in ranges.items()} for end in ("start", "stop")]
-        start, stop = (self._loaded(laid_over(keys, nested(end)), at) for end in ends)
+        start, stop = (self._joint(laid_over(keys, nested(end)), at) for end in ends)
         low, high = dict(flat(start.model_dump())), dict(flat(stop.model_dump()))
         faults = []
         for key in ranges:
-            where = f"{self._place}: {strict.dotted(at)}.{key}"
             words = [end[key] for end in (low, high) if not isinstance(end[key], float)]
             if words:
-                faults.append(
-                    Fault(where, f"{words[0]!r} is not a quantity that can vary", "write one variant for each value")
-                )
+                found = f"{words[0]!r} is not a quantity that can vary"
+                faults.append(self._fault((*at, key), found, "write one variant for each value"))
             elif low[key] == high[key]:
-                faults.append(Fault(where, "from and to are equal", "write a constant value in joint"))
+                faults.append(self._fault((*at, key), "from and to are equal", "write a constant value in joint"))
         if faults:
             raise InputError(faults)
         text = dict(flat(start.model_dump(mode="json")))
-        shares = cube(entry.design, entry.points, len(ranges), entry.seed)
-        values = [
-            {key: low[key] + s * (high[key] - low[key]) for key, s in zip(ranges, row, strict=True)} for row in shares
-        ]
-        return [
-            nested({key: _written(value, text[key], ranges[key].start) for key, value in own.items()}) for own in values
-        ]
+        members = []
+        for shares in cube(entry.design, entry.points, len(ranges), entry.seed):
+            values = {key: low[key] + s * (high[key] - low[key]) for key, s in zip(ranges, shares, strict=True)}
+            members.append(nested({key: _written(values[key], text[key], ranges[key].start) for key in ranges}))
+        return members
 
-    def swept(self, point: Mapping[str, Any]) -> tuple[Variant, Joint]:
-        """Variant at a point of a sweep, from dotted keys with values as a file writes them, and its joint."""
-        joint = self._loaded(laid_over(self._study, nested(point)), ("sweep",))
-        return Variant("sweep", self._values(joint, list(point))), joint
-
-    def _loaded(self, keys: Mapping[str, Any], at: Section) -> Joint:
+    def _joint(self, keys: Mapping[str, Any], at: Section) -> Joint:
         overrides = {key: value for key, value in keys.items() if key != "base"}
         return joint.load(keys["base"], overrides, self._place, self._folder, strict.dotted(at))
 
     def _values(self, made: Joint, written: list[str]) -> dict[str, Any]:
         """Return the keys `written` and all others in which a joint differs from the study's, see `Variant.values`."""
+        assert self._nominal is not None
         nominal, values = (dict(flat(joint.given())) for joint in (self._nominal.joint, made))
         keys = [key for key in nominal | values if key not in TOLD]
         return {key: values.get(key) for key in keys if key in written or nominal.get(key) != values.get(key)}
 
+    def _tables(self, name: str) -> list[Any]:
+        section = self._data.get(name, [])
+        if not isinstance(section, list):
+            raise InputError([self._fault((name,), "is not a list of tables", f"write [[{name}]]")])
+        return section
 
-def _tables(section: Any, name: str, place: str) -> list[Any]:
-    if not isinstance(section, list):
-        raise InputError([Fault(f"{place}: {name}", "is not a list of tables", f"write [[{name}]]")])
-    return section
+    def _fault(self, path: Section, found: str, remedy: str) -> Fault:
+        return Fault(f"{self._place}: {strict.dotted(path)}", found, remedy)
 
 
 def _ranges(section: Mapping[str, Any], at: Section, place: str, before: str = "") -> Iterator[tuple[str, Range]]:
@@ -365,5 +342,5 @@ def _written(value: float, like: str | float, users: object) -> str | float:
     if not isinstance(like, str):
         return value
     unit = like.partition(" ")[2]
-    own, text = units.written(value, unit, users, 15), f"{value!r} {unit}"
-    return own if units.to_si(own, unit, DIAMETER) == units.to_si(text, unit) else text
+    as_user, text = units.written(value, unit, users, 15), f"{value!r} {unit}"
+    return as_user if units.to_si(as_user, unit, DIAMETER) == units.to_si(text, unit) else text

@@ -116,11 +116,6 @@ class Sampling(Strict):
     selective: SelectiveEntry | None = Field(default=None, examples=[{"classes": 3}])
     """pins and holes are measured, sorted in classes, and matched class to class"""
 
-    @property
-    def has_replicates(self) -> bool:
-        """Whether the joints are several sets, independent of each other."""
-        return self.replicates > 1
-
     @model_serializer(mode="wrap")
     def _without_foreign_keys(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
         """Leave out `groups` unless the method is ``pick_freeze``, and `replicates` unless there are several.
@@ -128,16 +123,13 @@ class Sampling(Strict):
         Identities of other methods do not have them, nor `joints_per_lot` where each joint is its own lot, nor
         `selective` of one class.
         """
-        data: dict[str, Any] = write(self)
-        if self.method != "pick_freeze":
-            data.pop("groups", None)
-        if self.replicates == 1:
-            data.pop("replicates", None)
-        if self.joints_per_lot == 1:
-            data.pop("joints_per_lot", None)
-        if not self.is_matched:
-            data.pop("selective", None)
-        return data
+        has_effect = {
+            "groups": self.method == "pick_freeze",
+            "replicates": self.replicates > 1,
+            "joints_per_lot": self.joints_per_lot > 1,
+            "selective": self.is_matched,
+        }
+        return {key: value for key, value in write(self).items() if has_effect.get(key, True)}
 
     @model_validator(mode="before")
     @classmethod
@@ -161,8 +153,12 @@ class Sampling(Strict):
             raise refuse(f"n = {self.n} is no multiple of replicates = {self.replicates}", f"give n = {least}")
         if self.is_matched and self.method != "random":
             raise refuse(f"selective is given with {self.method!r}", 'remove it, or write method = "random"')
-        if self.joints_per_lot > 1:
-            self._check_lots()
+        if self.joints_per_lot > 1 and self.method != "random":
+            raise refuse(f"joints_per_lot is given with {self.method!r}", 'remove it, or write method = "random"')
+        least = LEAST * self.joints_per_lot
+        if self.joints_per_lot > 1 and (self.n or 0) < least:
+            found = f"{self.n} joints, {self.joints_per_lot} a lot, are fewer than {LEAST} lots"
+            raise refuse(found, f"give n = {least} or more, or a smaller joints_per_lot")
         if self.method != "pick_freeze" and "groups" in self.model_fields_set:
             raise refuse(f"groups is given with {self.method!r}", 'remove it, or write method = "pick_freeze"')
         if self.method == "cases" and self.nominal_first:
@@ -175,14 +171,6 @@ class Sampling(Strict):
     def is_matched(self) -> bool:
         """Whether pins and holes are sorted in several classes."""
         return self.selective is not None and self.selective.classes > 1
-
-    def _check_lots(self) -> None:
-        if self.method != "random":
-            raise refuse(f"joints_per_lot is given with {self.method!r}", 'remove it, or write method = "random"')
-        least = LEAST * self.joints_per_lot
-        if (self.n or 0) < least:
-            found = f"{self.n} joints, {self.joints_per_lot} a lot, are fewer than {LEAST} lots"
-            raise refuse(found, f"give n = {least} or more, or a smaller joints_per_lot")
 
     @property
     def first_sample(self) -> int:

@@ -322,9 +322,10 @@ class Study(Case):
         Limits, lives of bearings, comments and the file's name do not belong to it. Two studies of equal identity have
         the same rows with the same results.
         """
+        points = {point.name: point.operation.model_dump() for point in self.points}
         parts: dict[str, Any] = {
             "joint": affecting_results(self.joint.given("json")),
-            "operation": self._operation_identity(),
+            "operation": points.get("", points),
             "solver": self.solver.model_dump(),
             "errors": self.errors,
             "tolerances": {name: d.describe() for name, d in self.tolerances.items()},
@@ -333,18 +334,12 @@ class Study(Case):
             "sweep": [[list(axis.names), axis.start, axis.stop, axis.points] for axis in self.sweep],
             "output": self.output.identity(),
         }
-        if self.axes:
-            parts["axes"] = {name: axis.describe() for name, axis in self.axes.items()}
-        if self.lots:
-            parts["lots"] = {name: list(lot) for name, lot in self.lots.items()}
-        if self.proposals:
-            parts["proposal"] = [proposal.identity() for proposal in self.proposals]
-        if self.groups:
-            parts["groups"] = [[group.label, list(group.names)] for group in self.groups]
-        if self.swept:
-            parts["swept"] = [variant.values for variant in self.swept.variants]
+        optional = {
+            "axes": {name: axis.describe() for name, axis in self.axes.items()},
+            "lots": {name: list(lot) for name, lot in self.lots.items()},
+            "proposal": [proposal.identity() for proposal in self.proposals],
+            "groups": [[group.label, list(group.names)] for group in self.groups],
+            "swept": [variant.values for variant in self.swept.variants] if self.swept else [],
+        }
+        parts |= {name: part for name, part in optional.items() if part}
         return dict(flat(parts | (self.listed.identity() if self.listed else {})))
-
-    def _operation_identity(self) -> dict[str, Any]:
-        named = {point.name: point.operation.model_dump() for point in self.points}
-        return named.get("", named)

@@ -94,21 +94,14 @@ class Meaning(NamedTuple):
     outside: float
 
 
-def _read(value: object, info: ValidationInfo) -> float:
-    """Read a quantity in the unit of the error that the entry is for."""
-    site: Site = (info.context or {})["site"]
-    return units.to_si(value, site.unit)
+def _reader(mark: str) -> BeforeValidator:
+    """What reads a quantity in the unit of the error that the entry is for; `mark`: sign that it may have."""
+    return BeforeValidator(lambda value, info: units.to_si(value, info.context["site"].unit, mark))
 
 
 OF_ERROR = WithJsonSchema(json_schema.quantity("error", units.EXAMPLES["m"]))
-Value = Annotated[float, BeforeValidator(_read), OF_ERROR]
+Value = Annotated[float, _reader(""), OF_ERROR]
 """Quantity in the unit of the error that the entry is for."""
-
-
-def _read_half_width(value: object, info: ValidationInfo) -> float:
-    """Read a quantity that may have the sign ±."""
-    site: Site = (info.context or {})["site"]
-    return units.to_si(value, site.unit, PLUS_MINUS)
 
 
 _NEARLY_ALL = np.array([1e-3, 1.0 - 1e-3])
@@ -123,7 +116,7 @@ def _not_negative(value: float) -> float:
 
 NotNegative = Annotated[Value, AfterValidator(_not_negative)]
 Positive = Annotated[Value, AfterValidator(units.positive)]
-HalfWidth = Annotated[float, BeforeValidator(_read_half_width), AfterValidator(units.positive), OF_ERROR]
+HalfWidth = Annotated[float, _reader(PLUS_MINUS), AfterValidator(units.positive), OF_ERROR]
 PositiveNumber = Annotated[units.Number, AfterValidator(units.positive)]
 Truncate = Annotated[
     bool, Field(strict=True, description="whether parts outside the band are sorted out", examples=[True])

@@ -52,10 +52,8 @@ class Tolerances(NamedTuple):
     @property
     def distributions(self) -> dict[str, Distribution]:
         """Distribution of each quantity that is drawn: of the diameters of pins and holes that are accepted."""
-        found = {name: own for entry in self.entries for name, own in entry.quantities.items()}
-        for bonus in self.rejecting:
-            found[bonus.diameter] = Accepted(found[bonus.diameter], bonus)
-        return found
+        made = {name: law for entry in self.entries for name, law in entry.quantities.items()}
+        return made | {bonus.diameter: Accepted(made[bonus.diameter], bonus) for bonus in self.rejecting}
 
     @property
     def lots(self) -> dict[str, Lot]:
@@ -92,46 +90,34 @@ def read(written: Iterable[tuple[Entry, list[str]]], nominal: Nominal, place: st
     shared = {name for name in every if _partners(name) & every}
     directions: dict[str, ToleranceEntry] = {}
     diameters: dict[str, Diameter] = {}
-    found: dict[int, Toleranced] = {}
+    read: dict[int, Toleranced] = {}
+    reach = math.nan if nominal.joint is None else nominal.joint.cross.R
     for number in sorted(range(len(table)), key=lambda i: _is_position(table[i][1])):  # what they depend on comes first
-        one, names = table[number]
+        item, names = table[number]
         models = []
         with gather(faults):
             for name in names:
-                site = site_of(name, nominal)
-                direction = next((directions[own] for own in _partners(name) if own in directions), None)
-                site = site._replace(shared=name in shared, direction=direction if _is_position([name]) else None)
-                site = site._replace(diameter=diameters.get(name) if _is_position([name]) else None)
-                models.append((site, entry(one.value, site, place, one.path)))
-                diameters |= _diameter(*models[-1])
-                directions |= {name: models[-1][1]} if name.endswith(ORIENTATIONS) else {}
+                site = Site(
+                    name, TOLERANCED[name], 1.0 if name in FACTORS else 0.0, nominal.folder, reach, name in shared
+                )
+                if _is_position([name]):
+                    direction = next((directions[zone] for zone in _partners(name) if zone in directions), None)
+                    site = site._replace(direction=direction, diameter=diameters.get(name))
+                model = entry(item.value, site, place, item.path)
+                models.append((site, model))
+                feature, _, key = name.partition(".")
+                if key == "diameter" and isinstance(model, SingleEntry):
+                    diameters[f"{feature}.position"] = Diameter(model.band(site), model.build(site))
+                if key in ORIENTATIONS:
+                    directions[name] = model
         if models and len(models) == len(names):
-            found[number] = Toleranced(one.pattern, one.value, tuple(models))
-    entries = tuple(found[number] for number in sorted(found))
+            read[number] = Toleranced(item.pattern, item.value, tuple(models))
+    entries = tuple(read[number] for number in sorted(read))
     axes: dict[str, Axis] = {}
     if nominal.joint is not None:
         with gather(faults):
             axes = axes_of(entries, nominal.joint.cross.R, place)
     return Tolerances(entries, axes)
-
-
-def site_of(name: str, nominal: Nominal) -> Site:
-    """What an entry for an error or zone is for."""
-    reach = math.nan if nominal.joint is None else nominal.joint.cross.R
-    return Site(name, TOLERANCED[name], nominal_value(name), nominal.folder, reach)
-
-
-def nominal_value(name: str) -> float:
-    """Value of an error in the nominal joint (SI)."""
-    return 1.0 if name in FACTORS else 0.0
-
-
-def _diameter(site: Site, model: ToleranceEntry) -> dict[str, Diameter]:
-    """Tolerance of a diameter, by the name of the position that its bonus is for; empty for other errors."""
-    feature, _, key = site.name.partition(".")
-    if key != "diameter" or not isinstance(model, SingleEntry):
-        return {}
-    return {f"{feature}.position": Diameter(model.band(site), model.build(site))}
 
 
 def _is_position(names: list[str]) -> bool:

@@ -229,8 +229,9 @@ class Axis:
 
     def describe(self) -> dict[str, Any]:
         """What determines the errors, besides what is drawn, as JSON values: what matters for the axis."""
-        bonus = {} if self.bonus is None else asdict(self.bonus)
-        return _finite(asdict(self) | bonus)
+        values = asdict(self) | ({} if self.bonus is None else asdict(self.bonus))
+        del values["name"], values["bonus"]
+        return {key: value for key, value in values.items() if isinstance(value, str) or math.isfinite(value)}
 
     def fill(self, table: Table, drawn: Mapping[str, Array]) -> None:
         """Set the errors.
@@ -302,12 +303,6 @@ class Axis:
         taken: Array = np.hypot(*slope) * self.over / (2.0 * self.room)
         left: Array = np.maximum(1.0 - taken, 1e-9)  # zero would lose where in the zone the middle is
         return left
-
-
-def _finite(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Values that are texts or finite numbers; not the axis' name."""
-    kept = {key: value for key, value in values.items() if key != "name" and isinstance(value, (str, float))}
-    return {key: value for key, value in kept.items() if isinstance(value, str) or math.isfinite(value)}
 
 
 def component(name: str, vector: Array) -> Array:

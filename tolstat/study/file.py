@@ -31,7 +31,7 @@ from tolstat.study.tolerances import fits, reading
 from tolstat.study.tolerances.correlation import Copula, Correlation, Group, assemble, correlated, groups
 from tolstat.study.tolerances.entry import Site
 from tolstat.study.tolerances.fits import Fit
-from tolstat.study.tolerances.reading import Nominal, Tolerances
+from tolstat.study.tolerances.reading import Tolerances
 
 ModelT = TypeVar("ModelT", bound=strict.Strict)
 
@@ -211,7 +211,7 @@ class StudyFile:
                     self._claims.claim(entry, selected)
                 units |= {name: TOLERANCED[name] for name in selected}
                 written.append((entry, selected))
-        read = reading.read(written, Nominal(self.joint, self.path.parent), self.place, self.faults)
+        read = reading.read(written, self.joint, self.path.parent, self.place, self.faults)
         drawn: dict[str, list[str]] = {}
         for quantity in read.distributions:
             drawn.setdefault(zone_of(quantity) if is_zone(quantity) else quantity, []).append(quantity)

@@ -95,16 +95,12 @@ def load_case(path: str | Path) -> Case:
         remedy = f"run it with: tolstat run {file.path}"
         raise InputError([Fault(file.place, "is a study, not a case of one joint", remedy)])
     file.fit = None
-    joint, operation = file.joint, file.model("operation", Operation, "add [operation]")
-    solver, errors = file.solver, file.errors
-    if solver is not None and solver.fidelity == "auto":
+    parts: list[Any] = [file.joint, file.model("operation", Operation, "add [operation]"), file.solver, file.errors]
+    if file.solver is not None and file.solver.fidelity == "auto":
         remedy = 'write "dynamic", "quasistatic" or "ideal"'
         file.fault("solver.fidelity", "'auto' needs the joints of a campaign, a case has one joint", remedy)
     file.finish()
-    assert joint is not None
-    assert operation is not None
-    assert solver is not None
-    case = Case(file.path, file.text, joint, operation, solver, errors)
+    case = Case(file.path, file.text, *parts)
     case.check_mounting()
     return case
 

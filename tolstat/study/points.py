@@ -40,13 +40,13 @@ class Point(NamedTuple):
     @property
     def in_words(self) -> str:
         """``"10 deg, 500 rpm, 100 N m"``; an axial force; of several points the share of the time if it is given."""
-        own = self.operation
-        said = f"{math.degrees(own.alpha):.4g} deg, {own.speed * 30 / math.pi:.4g} rpm, {own.torque:.4g} N m"
-        said += f", axial force {own.axial_force:.4g} N" if own.axial_force else ""
-        for name, given in (("speed", own.speed_orders), ("torque", own.torque_orders)):
-            said += f", {orders.in_words(given)} of {name}" if given else ""
-        said += f", {own.partner.in_words}" if own.partner else ""
-        return f"{said}, {self.share:.4g} of the time" if self.name and not math.isnan(self.share) else said
+        at = self.operation
+        words = f"{math.degrees(at.alpha):.4g} deg, {at.speed * 30 / math.pi:.4g} rpm, {at.torque:.4g} N m"
+        words += f", axial force {at.axial_force:.4g} N" if at.axial_force else ""
+        for name, given in (("speed", at.speed_orders), ("torque", at.torque_orders)):
+            words += f", {orders.in_words(given)} of {name}" if given else ""
+        words += f", {at.partner.in_words}" if at.partner else ""
+        return f"{words}, {self.share:.4g} of the time" if self.name and not math.isnan(self.share) else words
 
     @classmethod
     def of(cls, name: str, values: Mapping[str, Any]) -> Point:
@@ -170,12 +170,6 @@ def only_one(name: str, names: Sequence[str], place: str) -> None:
         raise InputError([Fault(place, found, f"give one of them: --point {names[0]}")])
 
 
-def joined(chosen: Iterable[str], names: Sequence[str]) -> str:
-    """Selection that names some points: empty for all of them."""
-    own = list(chosen)
-    return "" if len(own) == len(names) else "+".join(own)
-
-
 def limits_at(limits: Mapping[str, float], chosen: Sequence[str], names: Sequence[str]) -> dict[str, float]:
     """Limits that hold where only some of the operating points are looked at.
 
@@ -207,5 +201,6 @@ def limits_at(limits: Mapping[str, float], chosen: Sequence[str], names: Sequenc
 
 def at(load: str, chosen: Iterable[str], names: Sequence[str]) -> str:
     """Name of a load at some points: ``"cross1.F at cruise"``; that of the load where all points are chosen."""
-    selection = joined(chosen, names)
+    points = list(chosen)
+    selection = "" if len(points) == len(names) else "+".join(points)
     return f"{load}{loads.AT}{selection}" if selection else load

@@ -182,10 +182,9 @@ def rewritten(study: Study, entries: Mapping[str, Mapping[str, Any]], seed: int)
         if entry.pattern in entries and entry.path != fits.PATH:
             changes[entry.path] = dict.fromkeys(entry.value) | dict(entries[entry.pattern])
     diameters = {entry.pattern: entry.value for entry in every if entry.path == fits.PATH}
-    if (
-        study.fit is not None and diameters.keys() & entries.keys()
-    ):  # its zones have changed: state what a fit stands for
-        changes["tolerances",] = {fits.KEY: None} | {key: entries.get(key, own) for key, own in diameters.items()}
+    if study.fit is not None and diameters.keys() & entries.keys():
+        # the zones of a fit have changed: state what it stood for
+        changes["tolerances",] = {fits.KEY: None} | {key: entries.get(key, diameters[key]) for key in diameters}
         if "contact" in data["joint"]:
             changes["joint", "contact"] = dict(study.fit.diameters)
         else:
@@ -203,13 +202,6 @@ REPLACED_KEYS = {
 }
 """Keys of a tolerance entry that each key replaces."""
 EXAMPLE = 'write --set "pin*.offset_t.plus_minus=0.05 mm"'
-
-
-class _Setting(NamedTuple):
-    pattern: str
-    key: str
-    value: Any
-    text: str
 
 
 def changed(study: Study, settings: Sequence[str]) -> dict[str, Distribution]:
@@ -282,10 +274,11 @@ def rewritten_with(study: Study, settings: Sequence[str]) -> str:
     alike: dict[str, dict[str, Any]] = {}
     parted: list[Toleranced] = []
     for entry in study.entries:
-        own = [keys[site.name] for site, _ in entry.models]
-        if touched.keys() & {site.name for site, _ in entry.models}:
-            alike[entry.pattern] = own[0] if all(one == own[0] for one in own) else dict(entry.keys)
-            parted += [entry] * any(one != own[0] for one in own)
+        names = [site.name for site, _ in entry.models]
+        if touched.keys() & set(names):
+            first, *others = (keys[name] for name in names)
+            alike[entry.pattern] = first if all(other == first for other in others) else dict(entry.keys)
+            parted += [entry] * any(other != first for other in others)
     text = rewritten(study, alike, study.sampling.seed)
     paths = {entry.pattern: entry.path for entry in fits.entries(tomllib.loads(text)["tolerances"], None)}
     changes: dict[tuple[int | str, ...], dict[str, Any]] = {("tolerances",): {}}
@@ -304,14 +297,17 @@ def _keys(
     touched: dict[str, str] = {}
     for text in settings:
         with gather(faults):
-            setting = _parse(text)
-            names = selection.select(setting.pattern, keys)
+            path, equals, value = text.partition("=")
+            pattern, dot, key = path.strip().rpartition(".")
+            if not (equals and dot and pattern and key and value.strip()):
+                raise InputError([Fault(f"--set {text!r}", "is not a setting", EXAMPLE)])
+            names = selection.select(pattern, keys)
             if not names:
-                remedy = did_you_mean(setting.pattern, list(keys))
+                remedy = did_you_mean(pattern, list(keys))
                 raise InputError([Fault(f"--set {text!r}", "selects no error that has a tolerance", remedy)])
             for name in names:
-                kept = {k: v for k, v in keys[name].items() if k not in REPLACED_KEYS.get(setting.key, ())}
-                keys[name] = kept | {setting.key: setting.value}
+                kept = {k: v for k, v in keys[name].items() if k not in REPLACED_KEYS.get(key, ())}
+                keys[name] = kept | {key: rewriting.given(value)}
                 touched[name] = text
     return keys, touched
 
@@ -339,11 +335,3 @@ def _check_zone(study: Study, site: Site, new: ToleranceEntry, place: str) -> No
     if site.shared and isinstance(new, zones.PositionEntry) and new.build() != old.build():
         found = f"{site.name} cannot be changed: the axis has a zone of direction, too, which shares its room"
         raise InputError([Fault(place, found, "run a study of its own")])
-
-
-def _parse(text: str) -> _Setting:
-    path, equals, value = text.partition("=")
-    pattern, dot, key = path.strip().rpartition(".")
-    if not (equals and dot and pattern and key and value.strip()):
-        raise InputError([Fault(f"--set {text!r}", "is not a setting", EXAMPLE)])
-    return _Setting(pattern, key, rewriting.given(value), text)

@@ -19,7 +19,7 @@ from tolstat.common import units
 from tolstat.common.bisection import first
 from tolstat.common.late import special
 from tolstat.common.load_kinds import PINS
-from tolstat.common.strict import Strict, refuse
+from tolstat.common.strict import Strict
 from tolstat.study.tolerances.distributions import Array, Distribution, probability
 from tolstat.study.tolerances.entry import Toleranced
 from tolstat.study.tolerances.reading import Tolerances
@@ -32,18 +32,12 @@ LEAST = 1e-300
 """Smallest probability of a diameter."""
 
 
-def _not_negative(value: float) -> float:
-    if value < 0.0:
-        raise refuse("{input} is negative", "give the standard deviation of the gauge, or 0")
-    return value
-
-
 class SelectiveEntry(Strict):
     """Pins and holes are sorted by their measured diameters, and crosses and forks of equal class matched."""
 
     classes: int = Field(strict=True, ge=1, le=MAX_CLASSES, examples=[3])
     """number of classes; 1: not sorted"""
-    gauge: Annotated[units.Length, AfterValidator(_not_negative)] = Field(default=0.0, examples=["2 um"])
+    gauge: Annotated[units.Length, AfterValidator(units.not_negative)] = Field(default=0.0, examples=["2 um"])
     """standard deviation of the error with which a diameter is measured"""
     split: Literal["width", "count"] = Field(default="width", examples=["count"])
     """`width`: classes are equal parts of the tolerance bands, those at the ends are open; `count`: each class has as

@@ -62,7 +62,7 @@ class Distribution(ABC):
 
     @property
     def moments(self) -> Moments:
-        """Mean and standard deviation; by quadrature where a truncation leaves no closed form that keeps its digits."""
+        """Mean and standard deviation."""
         mean = self.expect(lambda x: x)
         return Moments(mean, math.sqrt(self.expect(lambda x: (x - mean) ** 2)))
 
@@ -185,11 +185,6 @@ class Uniform(Described):
         """See `Distribution.logpdf`."""
         return _within(self, x, np.full_like(x, -math.log(self.upper - self.lower)))
 
-    @property
-    def moments(self) -> Moments:
-        """See `Distribution.moments`."""
-        return Moments(0.5 * (self.lower + self.upper), (self.upper - self.lower) / math.sqrt(12.0))
-
 
 @dataclass(frozen=True)
 class Triangular(Described):
@@ -220,12 +215,6 @@ class Triangular(Described):
             rising, falling = (x - self.lower) / (self.peak - self.lower), (self.upper - x) / (self.upper - self.peak)
             height = np.log(np.where(x < self.peak, rising, np.where(x > self.peak, falling, 1.0)))
         return _within(self, x, height + math.log(2.0 / (self.upper - self.lower)))
-
-    @property
-    def moments(self) -> Moments:
-        """See `Distribution.moments`."""
-        rise, fall = self.peak - self.lower, self.upper - self.peak
-        return Moments((self.lower + self.upper + self.peak) / 3.0, math.sqrt((rise**2 + rise * fall + fall**2) / 18.0))
 
 
 @dataclass(frozen=True)
@@ -275,13 +264,6 @@ class Beta(Described):
         t = np.clip((x - self.lower) / width, 0.0, 1.0)
         power = special.xlogy(self.a - 1, t) + special.xlog1py(self.b - 1, -t)
         return _within(self, x, np.asarray(power - special.betaln(self.a, self.b) - math.log(width)))
-
-    @property
-    def moments(self) -> Moments:
-        """See `Distribution.moments`."""
-        width, both = self.upper - self.lower, self.a + self.b
-        deviation = width * math.sqrt(self.a * self.b / (both + 1.0)) / both
-        return Moments(self.lower + width * self.a / both, deviation)
 
 
 @dataclass(frozen=True)

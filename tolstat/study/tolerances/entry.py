@@ -108,13 +108,7 @@ _NEARLY_ALL = np.array([1e-3, 1.0 - 1e-3])
 """Probabilities between which an error of the operating point must be zero."""
 
 
-def _not_negative(value: float) -> float:
-    if value < 0.0:
-        raise refuse("is negative", "give a standard deviation; 0 for a gauge without error")
-    return value
-
-
-NotNegative = Annotated[Value, AfterValidator(_not_negative)]
+NotNegative = Annotated[Value, AfterValidator(units.not_negative)]
 Positive = Annotated[Value, AfterValidator(units.positive)]
 HalfWidth = Annotated[float, _reader(PLUS_MINUS), AfterValidator(units.positive), OF_ERROR]
 PositiveNumber = Annotated[units.Number, AfterValidator(units.positive)]

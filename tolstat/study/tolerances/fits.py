@@ -128,13 +128,8 @@ class Fit(NamedTuple):
             f"radial clearance {zones.least / 2:g} to {zones.largest / 2:g} um",
         ]
         if self.misfit > NEGLIGIBLE:
-            lines.append(f"fit: {percent(self.misfit_joints)} of the joints do not go together")
+            lines.append(f"fit: {percent(any_pair(self.misfit))} of the joints do not go together")
         return lines
-
-    @property
-    def misfit_joints(self) -> float:
-        """Share of joints of which at least one pair does not go together, if the diameters are independent."""
-        return _any_pair(self.misfit)
 
 
 def read(table: object, place: str) -> Fit | None:
@@ -198,7 +193,7 @@ def _refusal(entry: FitEntry, zones: iso.Zones, share: float, where: str) -> Fau
     article = "an" if zones.kind == "interference" else "a"
     found = (
         f"{entry.code} is {article} {zones.kind} fit, clearance {_signed(zones.least)} to {_signed(zones.largest)} um: "
-        f"{percent(_any_pair(share))} of the joints do not go together ({percent(share)} of the pairs)"
+        f"{percent(any_pair(share))} of the joints do not go together ({percent(share)} of the pairs)"
     )
     return Fault(where, found, "give a clearance fit, such as H7/g6, H7/f7 or H8/e8")
 
@@ -207,7 +202,8 @@ def _signed(value: float) -> str:
     return f"{value:+g}" if value else "0"
 
 
-def _any_pair(share: float) -> float:
+def any_pair(share: float) -> float:
+    """Share of joints of which at least one pair does not go together, if the diameters are independent."""
     return -math.expm1(PAIRS * math.log1p(-share)) if share < 1.0 else 1.0
 
 

@@ -20,21 +20,6 @@ from tolstat.study.tolerances.zone_laws import Accepted
 from tolstat.study.tolerances.zones import axes_of
 
 
-class Nominal(NamedTuple):
-    """What errors deviate from.
-
-    Attributes
-    ----------
-    joint : Joint, optional
-        None if it could not be read.
-    folder : Path
-        Folder of the study file.
-    """
-
-    joint: Joint | None
-    folder: Path
-
-
 class Tolerances(NamedTuple):
     """``[tolerances]`` as read.
 
@@ -66,15 +51,19 @@ class Tolerances(NamedTuple):
         return [axis.bonus for axis in self.axes.values() if axis.bonus is not None and axis.bonus.rule == REJECT]
 
 
-def read(written: Iterable[tuple[Entry, list[str]]], nominal: Nominal, place: str, faults: list[Fault]) -> Tolerances:
+def read(
+    written: Iterable[tuple[Entry, list[str]]], joint: Joint | None, folder: Path, place: str, faults: list[Fault]
+) -> Tolerances:
     """Read all entries.
 
     Parameters
     ----------
     written : iterable of (Entry, list of str)
         Entries of the file, and the errors and zones that each selects.
-    nominal : Nominal
-        What they deviate from.
+    joint : Joint, optional
+        Nominal joint; None if it could not be read.
+    folder : Path
+        Folder of the study file.
     place : str
         File name shown in faults.
     faults : list of Fault
@@ -91,15 +80,13 @@ def read(written: Iterable[tuple[Entry, list[str]]], nominal: Nominal, place: st
     directions: dict[str, ToleranceEntry] = {}
     diameters: dict[str, Diameter] = {}
     read: dict[int, Toleranced] = {}
-    reach = math.nan if nominal.joint is None else nominal.joint.cross.R
+    reach = math.nan if joint is None else joint.cross.R
     for number in sorted(range(len(table)), key=lambda i: _is_position(table[i][1])):  # what they depend on comes first
         item, names = table[number]
         models = []
         with gather(faults):
             for name in names:
-                site = Site(
-                    name, TOLERANCED[name], 1.0 if name in FACTORS else 0.0, nominal.folder, reach, name in shared
-                )
+                site = Site(name, TOLERANCED[name], 1.0 if name in FACTORS else 0.0, folder, reach, name in shared)
                 if _is_position([name]):
                     direction = next((directions[zone] for zone in _partners(name) if zone in directions), None)
                     site = site._replace(direction=direction, diameter=diameters.get(name))
@@ -114,9 +101,9 @@ def read(written: Iterable[tuple[Entry, list[str]]], nominal: Nominal, place: st
             read[number] = Toleranced(item.pattern, item.value, tuple(models))
     entries = tuple(read[number] for number in sorted(read))
     axes: dict[str, Axis] = {}
-    if nominal.joint is not None:
+    if joint is not None:
         with gather(faults):
-            axes = axes_of(entries, nominal.joint.cross.R, place)
+            axes = axes_of(entries, joint.cross.R, place)
     return Tolerances(entries, axes)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from tolstat.common.late import special
 from tolstat.study.axes import Bonus
-from tolstat.study.tolerances.distributions import Array, Described, Distribution, Moments, score
+from tolstat.study.tolerances.distributions import Array, Described, Distribution, score
 
 ROUNDING = 1.0 + 1e-9
 """A radius computed back from errors may exceed the zone's by rounding."""
@@ -70,11 +70,6 @@ class Disc(Described):
         inside = (x >= 0) & (x <= self.upper * ROUNDING)
         with np.errstate(divide="ignore"):
             return np.log(np.where(inside, 2.0 * x, 0.0)) - 2.0 * math.log(self.upper)
-
-    @property
-    def moments(self) -> Moments:
-        """See `Distribution.moments`."""
-        return Moments(self.upper / 1.5, self.upper / math.sqrt(18.0))
 
 
 def plane_scores(distribution: Distribution, vector: Array) -> Array:

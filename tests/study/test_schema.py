@@ -23,6 +23,7 @@ from tolstat.common.errors import InputError
 from tolstat.common.strict import Strict
 from tolstat.study import schema, starter
 from tolstat.study.model import Subset
+from tolstat.study.proposal import RANGES, ProposalEntry
 from tolstat.study.selection import TOLERANCED, Entry, resolve
 from tolstat.study.tolerances.entry import Site
 
@@ -227,6 +228,12 @@ def readable(field: FieldInfo, example: object) -> bool:
             adapter.validate_python(example, context={"site": Site("pin1.tilt_z", unit, 0.0, ROOT / "studies")})
             return True
     return False
+
+
+@pytest.mark.parametrize("key", list(RANGES))
+def test_a_proposal_states_the_ranges_of_its_keys(key: str) -> None:
+    low, high = RANGES[key]
+    assert f"from {low:g} to {high:.6g}" in schema.of_model(ProposalEntry)["properties"][key]["description"]
 
 
 SIDES = {"minimum": -1.0, "exclusiveMinimum": 0.0, "maximum": 1.0, "exclusiveMaximum": 0.0}

@@ -99,11 +99,11 @@ class StressPointEntry(Strict):
         bent = {pair: value for name, pair in ROUND.items() if (value := float(getattr(self, name)))}
         places = []
         for angle in 2.0 * np.pi * np.arange(PLACES if bent else 1) / PLACES:
-            own = factors.copy()
+            at_place = factors.copy()
             for (first, second), value in bent.items():
-                own[COMPONENTS.index(first)] += value * np.cos(angle)
-                own[COMPONENTS.index(second)] += value * np.sin(angle)
-            places.append(tuple(own.tolist()))
+                at_place[COMPONENTS.index(first)] += value * np.cos(angle)
+                at_place[COMPONENTS.index(second)] += value * np.sin(angle)
+            places.append(tuple(at_place.tolist()))
         return tuple(places)
 
     @property
@@ -158,8 +158,8 @@ def _stress_points(table: Mapping[str, Any], place: str) -> tuple[StressPoint, .
                 found = f"{entry.bushing!r} is not a bushing"
                 raise InputError([Fault(where, found, did_you_mean(entry.bushing, BUSHINGS))])
             for bushing in bushings:
-                own = name if len(bushings) == 1 else f"{name}, {bushing}"
-                points.append(StressPoint(own, bushing, entry.per_load, entry.line))
+                called = name if len(bushings) == 1 else f"{name}, {bushing}"
+                points.append(StressPoint(called, bushing, entry.per_load, entry.line))
     if faults:
         raise InputError(faults)
     return tuple(points)
@@ -283,15 +283,14 @@ class Fatigue:
         InputError
             When the service life has more starts than revolutions.
         """
-        found = self
+        within = self
         if not (self.required or math.isnan(hours)):
-            found = replace(self, revolutions=hours * hourly, required=True, hours=hours)
-        if found.starts > found.revolutions:
-            what = f"{found.starts:g} starts in {found.revolutions:g} revolutions"
-            raise InputError(
-                [Fault(f"{place}: fatigue.starts", what, "give at most one for each, or more revolutions")]
-            )
-        return found
+            within = replace(self, revolutions=hours * hourly, required=True, hours=hours)
+        if within.starts > within.revolutions:
+            found = f"{within.starts:g} starts in {within.revolutions:g} revolutions"
+            remedy = "give at most one for each, or more revolutions"
+            raise InputError([Fault(f"{place}: fatigue.starts", found, remedy)])
+        return within
 
     @property
     def service_life(self) -> str:
@@ -332,7 +331,13 @@ def read(table: object, place: str, names: Sequence[str] = ()) -> Fatigue:
         with gather(faults):
             names = resolve(entry, UNIT_OF_CHANNEL, place)
             claims.claim(entry, names)
-            lines |= dict.fromkeys(names, _line(entry, UNIT_OF_CHANNEL[names[0]], place))
+            line = strict.validate(LineEntry, entry.value, place, prefix=entry.path)
+            size = Entry(entry.pattern, (*entry.path, "S0"), line.S0)
+            value = quantity(size, UNIT_OF_CHANNEL[names[0]], place)
+            if value <= 0:
+                where = f"{place}: {strict.dotted(size.path)}"
+                raise InputError([Fault(where, f"{line.S0!r} is not positive", "give a range above zero")])
+            lines |= dict.fromkeys(names, (line.m, value, line.N0))
     with gather(faults):
         points = _stress_points(_inner(table, "point"), place)
     if faults:
@@ -365,13 +370,3 @@ def _inner(table: object, key: str) -> Mapping[str, Any]:
     """Table inside the section; empty where it has none, or something else that validation refuses."""
     inner = table.get(key, {}) if isinstance(table, Mapping) else {}
     return inner if isinstance(inner, Mapping) else {}
-
-
-def _line(entry: Entry, unit: str, place: str) -> tuple[float, float, float]:
-    read = strict.validate(LineEntry, entry.value, place, prefix=entry.path)
-    where = (*entry.path, "S0")
-    size = quantity(Entry(entry.pattern, where, read.S0), unit, place)
-    if size <= 0:
-        found = f"{read.S0!r} is not positive"
-        raise InputError([Fault(f"{place}: {strict.dotted(where)}", found, "give a range above zero")])
-    return read.m, size, read.N0

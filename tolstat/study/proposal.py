@@ -24,7 +24,7 @@ from pydantic import Field
 from tolstat.analysis import process
 from tolstat.analysis.process import LEAST_PARTS, MOST_PARTS, Known, Sums
 from tolstat.common.errors import Fault, InputError, gather
-from tolstat.common.strict import Strict, described, did_you_mean, dotted
+from tolstat.common.strict import Strict, did_you_mean, dotted
 from tolstat.common.units import Number
 from tolstat.study.axes import streams_of
 from tolstat.study.selection import entries, select
@@ -42,35 +42,17 @@ class ProposalEntry(Strict):
 
     share: Annotated[Number, Field(gt=0, lt=1)] = Field(examples=[0.3])
     """share of the joints drawn from it"""
-    widen: Annotated[
-        float | dict[str, Any],
-        described(
-            "factor on the standard deviation of all scores, or of those by name or pattern of errors, "
-            f"from {1 / MAX_WIDEN:g} to {MAX_WIDEN:g}",
-            1.5,
-            json_schema_extra={"x-table": "widen"},
-        ),
-    ] = 1.0
-    shift: Annotated[
-        dict[str, Any],
-        described(
-            "mean of the scores in standard deviations, by name or pattern of errors, "
-            f"from {-MAX_SHIFT:g} to {MAX_SHIFT:g}",
-            {"pin1.tilt_z": 2.0},
-            default_factory=dict,
-            json_schema_extra={"x-table": "shift"},
-        ),
-    ]
-    parts: Annotated[
-        dict[str, Any],
-        described(
-            "draws mean and deviation of the scores for each joint anew, as so many parts leave them "
-            f"open, by name or pattern of errors, from {LEAST_PARTS} to {MOST_PARTS}; those of one entry share them",
-            {"pin*.tilt_[tz]": 30},
-            default_factory=dict,
-            json_schema_extra={"x-table": "parts"},
-        ),
-    ]
+    widen: float | dict[str, Any] = Field(default=1.0, json_schema_extra={"x-table": "widen"}, examples=[1.5])
+    """factor on the standard deviation of all scores, or of those by name or pattern of errors, from 0.1 to 10"""
+    shift: dict[str, Any] = Field(
+        default_factory=dict, json_schema_extra={"x-table": "shift"}, examples=[{"pin1.tilt_z": 2.0}]
+    )
+    """mean of the scores in standard deviations, by name or pattern of errors, from -10 to 10"""
+    parts: dict[str, Any] = Field(
+        default_factory=dict, json_schema_extra={"x-table": "parts"}, examples=[{"pin*.tilt_[tz]": 30}]
+    )
+    """draws mean and deviation of the scores for each joint anew, as so many parts leave them open, by name or pattern
+    of errors, from 5 to 100000; those of one entry share them"""
 
 
 @dataclass(frozen=True)

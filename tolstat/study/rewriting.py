@@ -134,15 +134,15 @@ def with_keys(text: str, changes: Mapping[tuple[int | str, ...], Mapping[str, An
 
 def inline(table: Mapping[str, Any]) -> str:
     """Table in one line, with the tables in it."""
-    return f"{{ {', '.join(f'{key} = {_literal(value)}' for key, value in table.items())} }}"
+    return f"{{ {', '.join(f'{key} = {literal(value)}' for key, value in table.items())} }}"
 
 
-def _literal(value: Any) -> str:
-    """Value in one line."""
+def literal(value: Any) -> str:
+    """Return a value in one line, as TOML writes it."""
     if isinstance(value, Mapping):
         return inline(value)
     if isinstance(value, list) and any(isinstance(item, Mapping) for item in value):
-        return f"[{', '.join(map(_literal, value))}]"
+        return f"[{', '.join(map(literal, value))}]"
     return str(tomlkit.item(value).as_string())
 
 
@@ -155,5 +155,5 @@ def _put(table: Any, key: str, value: Any) -> None:
         comments = []
         while body and body[-1][0] is None:
             comments.append(body.pop())
-        table[key] = tomlkit.value(_literal(value)) if isinstance(value, Mapping | list) else value
+        table[key] = tomlkit.value(literal(value)) if isinstance(value, Mapping | list) else value
         body.extend(reversed(comments))

@@ -11,8 +11,10 @@ from typing import Any
 from tolstat.common import strict
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.files import atomic_write, data_dir
+from tolstat.study import rewriting
 from tolstat.study.schema import KINDS, schema
 
+HEADER = "#:schema ./{}.schema.json\n"
 OWN = "own"
 """Word for a joint file that is written with the study."""
 TEMPLATES = Path(__file__).parent / "templates"
@@ -67,12 +69,12 @@ def write(path: Path, joint: str) -> list[Path]:
 
 def _files(path: Path, joint: str) -> Iterator[tuple[Path, str]]:
     base = f"{path.stem}_joint.toml" if joint == OWN else joint
-    yield path, _header("study") + study_text(path, base, LIMITS.get(joint, LIMIT))
+    yield path, HEADER.format("study") + study_text(path, base, LIMITS.get(joint, LIMIT))
     if joint == OWN:
         text = "# The joint as designed. Keys behind a # may be left out; their values are those of another joint.\n"
-        yield path.with_name(base), _header("joint") + text + joint_text()
+        yield path.with_name(base), HEADER.format("joint") + text + joint_text()
     for kind in ("study", "joint") if joint == OWN else ("study",):
-        yield path.with_name(_schema_name(kind)), json.dumps(schema(kind), indent=1, ensure_ascii=False) + "\n"
+        yield path.with_name(f"{kind}.schema.json"), json.dumps(schema(kind), indent=1, ensure_ascii=False) + "\n"
 
 
 def study_text(path: Path, base: str, limits: tuple[str, str] = LIMIT) -> str:
@@ -82,14 +84,6 @@ def study_text(path: Path, base: str, limits: tuple[str, str] = LIMIT) -> str:
     for word, value in (words | {"STUDY.toml": path.name, "STUDY.h5": f"{path.stem}.h5"}).items():
         study = study.replace(word, value)
     return study
-
-
-def _schema_name(kind: str) -> str:
-    return f"{kind}.schema.json"
-
-
-def _header(kind: str) -> str:
-    return f"#:schema ./{_schema_name(kind)}\n"
 
 
 def _made(path: Path) -> bool:
@@ -121,9 +115,9 @@ def _table(part: Mapping[str, Any], values: Mapping[str, Any], name: str = "") -
         if own.get("type") == "object":
             inner.append(_table(own, values.get(key, {}), f"{name}.{key}" if name else key))
         elif key in values:
-            lines.append((f"{key} = {_toml(values[key])}", own))
+            lines.append((f"{key} = {rewriting.literal(values[key])}", own))
         else:
-            lines.append((f"# {key} = {_toml(own['examples'][0])}", own))
+            lines.append((f"# {key} = {rewriting.literal(own['examples'][0])}", own))
     width = max((len(line) for line, _ in lines if len(line) < WIDTH // 2), default=0)
     for line, own in lines:
         yield from _commented(line, own["description"], width)
@@ -137,12 +131,3 @@ def _commented(line: str, text: str, width: int) -> Iterator[str]:
     else:
         yield from textwrap.wrap(text, WIDTH, initial_indent="# ", subsequent_indent="# ")
         yield line
-
-
-def _toml(value: Any) -> str:
-    """Value of a joint file as TOML writes it."""
-    if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{key} = {_toml(inner)}" for key, inner in value.items()) + " }"
-    if isinstance(value, list):
-        return "[" + ", ".join(map(_toml, value)) + "]"
-    return json.dumps(value)

@@ -89,9 +89,9 @@ class ZoneEntry(ToleranceEntry):
         """Names of the quantities that the entry draws."""
 
     @property
-    @abstractmethod
     def band(self) -> float:
-        """Largest value that the zone allows to a quantity: radius in m, or slope."""
+        """Largest value that the zone allows to a quantity: slope, or radius in m."""
+        return self.zone.size / self.over
 
     def build(self) -> Distribution:
         """Return the distribution of each quantity: of a radius, for one plane of a component."""
@@ -100,10 +100,9 @@ class ZoneEntry(ToleranceEntry):
                 raise refuse("cp and truncate have no effect on a uniform distribution", "remove them")
             return Disc(self.band) if self.zone.round else Uniform(-self.band, self.band)
         sigma = sigma_of(-self.band, self.band, 0.0, 1.0 if self.cp is None else self.cp)
-        bounded = self.truncate is not False
         if self.zone.round:
-            return Rayleigh(sigma, self.band if bounded else None)
-        return TruncatedNormal(0.0, sigma, -self.band, self.band) if bounded else Normal(0.0, sigma)
+            return Rayleigh(sigma, self.band if self.bounded else None)
+        return TruncatedNormal(0.0, sigma, -self.band, self.band) if self.bounded else Normal(0.0, sigma)
 
     @property
     def bounded(self) -> bool:
@@ -212,11 +211,6 @@ class OrientationEntry(ZoneEntry):
     about: Literal["t", "z"] | None = Field(default=None, examples=["z"])
     """for two planes (`zone` without ⌀): axis of the rotation that they bound"""
 
-    @property
-    def band(self) -> float:
-        """See `ZoneEntry.band`."""
-        return self.zone.size / self.over
-
     def names(self, site: Site) -> tuple[str, ...]:
         """See `ZoneEntry.names`."""
         if self.zone.round and self.about is not None:
@@ -239,11 +233,6 @@ class OrientationEntry(ZoneEntry):
 
 class CoaxialityEntry(ZoneEntry):
     """Coaxiality of a pair: a cylinder around the common axis, for each of the two features."""
-
-    @property
-    def band(self) -> float:
-        """See `ZoneEntry.band`. The middle of each feature is on the common axis."""
-        return self.zone.size / self.over
 
     def names(self, site: Site) -> tuple[str, ...]:
         """See `ZoneEntry.names`."""

@@ -104,12 +104,12 @@ class Bonus:
     def mean_square(self, deviation: Array) -> Array:
         """Mean square of the radius of an end, m^2, for parts with this error of the diameter that are accepted."""
         growth = self.growth(deviation)
-        own = np.ones_like(growth) if self.rule == FILLS else growth
+        size = np.ones_like(growth) if self.rule == FILLS else growth
         if math.isinf(self.sigma):
-            square = 0.5 * (self.radius * np.minimum(own, 1.0)) ** 2
+            square = 0.5 * (self.radius * np.minimum(size, 1.0)) ** 2
         else:
-            half = 0.5 * (own * self.radius / self.sigma) ** 2
-            square = 2.0 * self.sigma**2 * (1.0 - half * np.exp(-half) / self.inside(own))
+            half = 0.5 * (size * self.radius / self.sigma) ** 2
+            square = 2.0 * self.sigma**2 * (1.0 - half * np.exp(-half) / self.inside(size))
         return square * growth**2 if self.rule == FILLS else square
 
 
@@ -145,11 +145,11 @@ def zone_of(name: str) -> str:
     return f"{feature}.{key.partition('_')[0]}"
 
 
-def compatible(one: str, other: str) -> bool:
+def compatible(first: str, other: str) -> bool:
     """Whether two zones are tolerances of one axis that complement each other, such as position and coaxiality."""
-    (a, _, key), (b, _, other_key) = one.partition("."), other.partition(".")
+    (a, _, key), (b, _, other_key) = first.partition("."), other.partition(".")
     roles = [next((r for r in ORIENTATIONS if k in ORIENTATIONS), k) for k in (key, other_key)]
-    known = is_zone(one) and is_zone(other) and "offset_radial" not in roles
+    known = is_zone(first) and is_zone(other) and "offset_radial" not in roles
     return known and a == b and roles[0] != roles[1]
 
 
@@ -167,7 +167,7 @@ def vectors_of(zone: str) -> tuple[str, ...]:
     if key == "position":
         return (zone, *(f"{feature}.{end}" for end in ends(feature)))
     if key == "coaxiality":
-        return tuple(f"{zone}_{own}" for own in PAIRS[feature])
+        return tuple(f"{zone}_{member}" for member in PAIRS[feature])
     return (zone, *(f"{zone}_{about}" for about in "tz")) if key in ORIENTATIONS else (zone,)
 
 
@@ -179,7 +179,7 @@ def columns_of(name: str) -> tuple[str, ...]:
     parts = ["offset_t", "offset_z"] if key == "offset_radial" else ["tilt_t", "tilt_z"]
     if feature in PAIRS or key.startswith("position"):
         parts = ["offset_t", "offset_z", "tilt_t", "tilt_z"]
-    return tuple(f"{own}.{part}" for own in PAIRS.get(feature, (feature,)) for part in parts)
+    return tuple(f"{member}.{part}" for member in PAIRS.get(feature, (feature,)) for part in parts)
 
 
 def streams_of(name: str) -> tuple[str, ...]:
@@ -189,12 +189,12 @@ def streams_of(name: str) -> tuple[str, ...]:
     feature, _, key = name.partition(".")
     first, second = PAIRS.get(feature, (feature, feature))
     if key.startswith("coaxiality"):
-        own, part = key.rpartition("_")[2], "tilt"
+        source, part = key.rpartition("_")[2], "tilt"
     elif key in ("offset_radial", "position") or key == ends(feature)[0]:
-        own, part = first, "offset"
+        source, part = first, "offset"
     else:
-        own, part = second, "offset" if feature in PAIRS else "tilt"
-    return tuple(f"{own}.{part}_{c}" for c in (key[-1] if is_component(name) else "tz"))
+        source, part = second, "offset" if feature in PAIRS else "tilt"
+    return tuple(f"{source}.{part}_{c}" for c in (key[-1] if is_component(name) else "tz"))
 
 
 def is_component(name: str) -> bool:
@@ -250,10 +250,10 @@ class Axis:
         if self.name not in PAIRS:
             _set(table, self.name, middle, slope)
             return
-        own = [drawn.get(f"coaxiality_{feature}") for feature in PAIRS[self.name]]
+        relatives = [drawn.get(f"coaxiality_{feature}") for feature in PAIRS[self.name]]
         zero = np.zeros((2, len(table)))
         common, tilt = zero if middle is None else middle, zero if slope is None else slope
-        for feature, relative, side in zip(PAIRS[self.name], own, (1.0, -1.0), strict=True):
+        for feature, relative, side in zip(PAIRS[self.name], relatives, (1.0, -1.0), strict=True):
             shift, turned = _as_seen(common + side * self.reach * tilt, tilt, side)
             _set(table, feature, shift, turned if relative is None else turned + relative)
 
@@ -263,15 +263,15 @@ class Axis:
             if key == "offset_radial":
                 return _offset(errors, self.name)
             slope = _slope(errors, self.name)
-            found = self._of_line(key, slope, lambda: _offset(errors, self.name))
-            return found if self.bonus is None else self.bonus.unshift(found, errors[self.bonus.diameter])
+            drawn = self._of_line(key, slope, lambda: _offset(errors, self.name))
+            return drawn if self.bonus is None else self.bonus.unshift(drawn, errors[self.bonus.diameter])
         first, second = PAIRS[self.name]
         near = _offset(errors, first)
         far, _ = _as_seen(_offset(errors, second), np.zeros((2, 1)), -1.0)
         slope = (near - far) / (2.0 * self.reach)
         if key.startswith("coaxiality"):
-            own = key.rpartition("_")[2]
-            return _slope(errors, own) - _as_seen(near, slope, 1.0 if own == first else -1.0)[1]
+            member = key.rpartition("_")[2]
+            return _slope(errors, member) - _as_seen(near, slope, 1.0 if member == first else -1.0)[1]
         return self._of_line(key, slope, lambda: 0.5 * (near + far))
 
     def _line(self, drawn: Mapping[str, Array]) -> tuple[Array | None, Array | None]:

@@ -118,7 +118,7 @@ def of(tolerances: Sequence[Tolerance], path: Path | None = None) -> list[Cost]:
         return [Cost(t.width, (CostEntry(),) * len(t.names)) for t in tolerances]
     table = _read_csv(path) if path.suffix == ".csv" else strict.read_toml(path)
     units_of = {name: t.site for t in tolerances for name in t.names}
-    found: dict[str, CostEntry] = {}
+    costs: dict[str, CostEntry] = {}
     faults: list[Fault] = []
     claims = selection.Assignments(str(path))
     known = {name: site.unit for name, site in units_of.items()}
@@ -128,12 +128,12 @@ def of(tolerances: Sequence[Tolerance], path: Path | None = None) -> list[Cost]:
             claims.claim(entry, names)
             context = {"site": units_of[names[0]]}
             cost = strict.validate(CostEntry, entry.value, str(path), prefix=entry.path, context=context)
-            found |= dict.fromkeys(names, cost)
+            costs |= dict.fromkeys(names, cost)
     if faults:
         toml = path.suffix != ".csv"
         raise InputError(strict.with_lines(faults, str(path), read_input(path)) if toml else faults)
     kept = CostEntry(cost=0.0, keep=True)
-    read = [Cost(t.width, tuple(found.get(name, kept) for name in t.names)) for t in tolerances]
+    read = [Cost(t.width, tuple(costs.get(name, kept) for name in t.names)) for t in tolerances]
     if faults := [
         Fault(f"{path}: {tolerance.pattern}", "costs more than a number can hold", "give a smaller cost, at or power")
         for tolerance, cost in zip(tolerances, read, strict=True)

@@ -240,9 +240,9 @@ def subset_of(study: Study, sampling: Mapping[str, Any]) -> Study:
         if not selected_results.holds(study.output.columns, load.name):
             remedy = f"add {', '.join(load.columns)}"
             faults.append(study.fault("output.results", f"leaves out {load.name}, which --limit needs", remedy))
-    own = study.sampling.model_dump(include=set(Subset.FROM_STUDY))
+    kept = study.sampling.model_dump(include=set(Subset.FROM_STUDY))
     with gather(faults):
-        read = validate(Subset, own | {"n": sampling["per_level"]} | dict(sampling), "subset simulation")
+        read = validate(Subset, kept | {"n": sampling["per_level"]} | dict(sampling), "subset simulation")
     if faults:
         raise InputError(faults)
     output = study.output.model_copy(update={"histories": "none"})

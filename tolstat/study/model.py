@@ -77,8 +77,8 @@ class Solver(Strict):
 
     def options(self) -> Options:
         """Return the settings for the kernel; ``auto``, which a campaign resolves, becomes ``dynamic``."""
-        own = self.model_dump(include=set(Options._fields))
-        return from_names(own | ({"fidelity": "dynamic"} if self.fidelity == "auto" else {}))
+        settings = self.model_dump(include=set(Options._fields))
+        return from_names(settings | ({"fidelity": "dynamic"} if self.fidelity == "auto" else {}))
 
 
 SamplingMethod = Literal["random", "sobol", "lhs", "sweep", "cases", "importance", "pick_freeze", "subset"]

@@ -54,17 +54,17 @@ def refusals(settings: Sequence[Setting], varied: Varied) -> Iterator[tuple[Path
     tuple
         Key path, what was found, remedy.
     """
-    if not any(own.joint.shaft.slides for own in settings):
-        paths = [(*own.path, "axial_force") for own in settings if own.operation.axial_force]
+    if not any(setting.joint.shaft.slides for setting in settings):
+        paths = [(*setting.path, "axial_force") for setting in settings if setting.operation.axial_force]
         remedy = 'write shaft.axial = "free" or a stiffness under [joint], or remove it'
         for path in dict.fromkeys([*paths, *((section, *FORCE.split(".")) for section in varied.get(FORCE, ()))]):
             yield path, "has no effect: the output shaft is rigid along its axis", remedy
     for key in ("speed", "torque"):
-        if not any(getattr(own.operation, f"{key}_orders") for own in settings):
+        if not any(getattr(setting.operation, f"{key}_orders") for setting in settings):
             remedy = f"write operation.{key} = {{ mean = ..., orders = [...] }}, or remove it"
             for section in varied.get(f"operation.{key}_swing", ()):
                 yield (section, "operation", f"{key}_swing"), f"has no effect: the {key} has no orders", remedy
-    if any(own.fidelity == "ideal" and own.moved(varied) for own in settings):
+    if any(setting.fidelity == "ideal" and setting.moved(varied) for setting in settings):
         yield ("solver", "fidelity"), *NO_CLOSED_FORM
 
 

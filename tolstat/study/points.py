@@ -51,12 +51,12 @@ class Point(NamedTuple):
     @classmethod
     def of(cls, name: str, values: Mapping[str, Any]) -> Point:
         """Return the point that has written these `values`."""
-        own = dict(values)
-        share = own.pop("share")
+        keys = dict(values)
+        share = keys.pop("share")
         for key, order in ORDERS.items():
-            own[key] = tuple(order.model_construct(**wave) for wave in own.get(key, ()))
-        own["partner"] = Partner.model_construct(**own["partner"]) if "partner" in own else None
-        return cls(name, Operation.model_construct(None, **own), math.nan if share is None else share)
+            keys[key] = tuple(order.model_construct(**wave) for wave in keys.get(key, ()))
+        keys["partner"] = Partner.model_construct(**keys["partner"]) if "partner" in keys else None
+        return cls(name, Operation.model_construct(None, **keys), math.nan if share is None else share)
 
     def values(self) -> dict[str, Any]:
         """JSON values of the point.
@@ -97,25 +97,25 @@ def read(section: Any, place: str) -> tuple[Point, ...]:
     if not isinstance(section, list):
         return (Point("", strict.validate(Operation, section, place, prefix=("operation",)), 1.0),)
     faults: list[Fault] = []
-    found: list[Point] = []
+    points: list[Point] = []
     for number, item in enumerate(section):
         try:
             entry = strict.validate(PointEntry, item, place, prefix=("operation", number))
         except InputError as error:
             faults += error.faults
             continue
-        if entry.name in [point.name for point in found]:
+        if entry.name in [point.name for point in points]:
             where = f"{place}: operation[{number}].name"
             faults.append(Fault(where, f"a point {entry.name!r} exists already", "give each point its own name"))
         operation = Operation.model_construct(**{key: getattr(entry, key) for key in Operation.model_fields})
-        found.append(Point(entry.name, operation, math.nan if entry.share is None else entry.share))
+        points.append(Point(entry.name, operation, math.nan if entry.share is None else entry.share))
     if not section:
         faults.append(Fault(f"{place}: operation", "has no operating point", "add one: [operation]"))
     elif not faults:
-        faults += _faults_of_shares(found, place)
+        faults += _faults_of_shares(points, place)
     if faults:
         raise InputError(faults)
-    return tuple(found)
+    return tuple(points)
 
 
 def _faults_of_shares(points: Sequence[Point], place: str) -> list[Fault]:
@@ -188,15 +188,15 @@ def limits_at(limits: Mapping[str, float], chosen: Sequence[str], names: Sequenc
         A limit that covers all the chosen points has the plain name of its load, the smallest if there are several;
         one that covers some of them keeps its name; others are left out.
     """
-    found: dict[str, float] = {}
+    at_points: dict[str, float] = {}
     for key, value in limits.items():
         load, selection = loads.split(key)
         where = set(names_of(selection, names, "limits"))
         if where >= set(chosen):
-            found[load] = min(value, found.get(load, value))
+            at_points[load] = min(value, at_points.get(load, value))
         elif where < set(chosen):
-            found[key] = value
-    return found
+            at_points[key] = value
+    return at_points
 
 
 def at(load: str, chosen: Iterable[str], names: Sequence[str]) -> str:

@@ -96,9 +96,9 @@ class Proposal:
 
     def identity(self) -> list[Any]:
         """JSON values: everything that determines the joints drawn."""
-        drawn: dict[str, Any] = {name: list(own) for name, own in self.scores.items()}
+        drawn: dict[str, Any] = {name: list(pair) for name, pair in self.scores.items()}
         if self.processes:
-            drawn["parts"] = [[one.parts, list(one.streams)] for one in self.processes]
+            drawn["parts"] = [[process.parts, list(process.streams)] for process in self.processes]
         return [self.share, drawn]
 
     def log_ratio(self, scores: Mapping[str, Array]) -> Array:
@@ -107,9 +107,9 @@ class Proposal:
         for name, (mean, deviation) in self.scores.items():
             z = scores[name]
             logs += 0.5 * z**2 - 0.5 * ((z - mean) / deviation) ** 2 - math.log(deviation)
-        for one in self.processes:
-            own = np.stack([scores[name] for name in one.streams])
-            logs += process.log_student(Sums(own.sum(axis=0), np.square(own).sum(axis=0)), one.known)
+        for drawn in self.processes:
+            stacked = np.stack([scores[name] for name in drawn.streams])
+            logs += process.log_student(Sums(stacked.sum(axis=0), np.square(stacked).sum(axis=0)), drawn.known)
         return logs
 
 
@@ -169,7 +169,7 @@ def resolve(
         with gather(faults):
             widths = dict.fromkeys(toleranced, _number(entry.widen, "widen", f"{place}: {dotted((*path, 'widen'))}"))
     parts: dict[str, float] = {}
-    for key, table, found in (("widen", widen, widths), ("shift", entry.shift, means), ("parts", entry.parts, parts)):
+    for key, table, numbers in (("widen", widen, widths), ("shift", entry.shift, means), ("parts", entry.parts, parts)):
         for item in entries(table, *path, key):
             where = f"{place}: {dotted(item.path)}"
             with gather(faults):
@@ -177,7 +177,7 @@ def resolve(
                 names = select(item.pattern, toleranced)
                 if not names:
                     raise InputError([Fault(where, "has no tolerance", did_you_mean(item.pattern, list(toleranced)))])
-                found |= dict.fromkeys(names, value)
+                numbers |= dict.fromkeys(names, value)
     scores = {
         streams_of(name)[0]: (means[name], widths[name])
         for name in toleranced

@@ -62,13 +62,13 @@ def limit_of(text: str, limits: Mapping[str, float], option: str, example: str) 
     if text.split() == ["all", "limits"]:
         remedy = f'write "{ANY_LIMIT}": a joint counts if it is above at least one'
         raise InputError([Fault(option, f"{text.strip()!r} is not a limit", remedy)])
-    found = _LIMIT.fullmatch(text)
-    if found is None and AT in text:
+    match = _LIMIT.fullmatch(text)
+    if match is None and AT in text:
         remedy = "name the load alone: at several operating points the largest counts, with --point that at one of them"
         raise InputError([Fault(option, f"{text.strip()!r} names an operating point", remedy)])
-    if found is None:
+    if match is None:
         raise InputError([Fault(option, f"{text.strip()!r} is not a limit", example)])
-    entry = Entry(found["load"], (found["load"],), found["level"])
+    entry = Entry(match["load"], (match["load"],), match["level"])
     if not set(entry.pattern) & set("*?[") and entry.pattern not in UNIT_OF_LOAD:
         remedy = did_you_mean(entry.pattern, list(UNIT_OF_LOAD))
         raise InputError([Fault(option, f"{entry.pattern!r} is not a load", remedy)])
@@ -99,17 +99,17 @@ def parse(text: str, what: str, option: str, example: str, limits: Mapping[str, 
     InputError
         With every fault of the statement.
     """
-    found = _STATEMENT.fullmatch(text)
-    if found is None or found["what"] != what:
+    match = _STATEMENT.fullmatch(text)
+    if match is None or match["what"] != what:
         raise InputError([Fault(option, f"{text!r} is not a rule", example)])
     faults: list[Fault] = []
     limit, bound = None, math.nan
     with gather(faults):
-        limit = limit_of(found["limit"], limits, option, example)
+        limit = limit_of(match["limit"], limits, option, example)
     with suppress(ValueError):
-        bound = float(found["bound"])
+        bound = float(match["bound"])
     if not 0.0 < bound < 1.0:
-        faults.append(Fault(option, f"{what} {found['bound']} is not between 0 and 1".strip(), example))
+        faults.append(Fault(option, f"{what} {match['bound']} is not between 0 and 1".strip(), example))
     if faults or limit is None:
         raise InputError(faults)
     return Statement(text.strip(), limit, bound)

@@ -115,16 +115,23 @@ def tolerances(study: Study) -> list[Tolerance]:
     direction has a zone, too: that zone must stay the smaller one, and bounds where the middle is; and positions with a
     bonus with their diameters.
     """
-    found = []
+    scalable = []
     for entry in study.entries:
         site, model = entry.models[0]
         names = tuple(entry.quantities)
-        own = not site.name.startswith(("operation.", "material."))
-        refined = any(one.shared and one.name.endswith(".position") for one, _ in entry.models)
-        refined |= any(study.has_bonus(one.name) for one, _ in entry.models)
-        if own and not refined and entry.keys["distribution"] in SCALED and not set(names) & set(study.copula.names):
-            found.append(Tolerance(entry.pattern, names, dict(entry.keys), site, width(entry.keys, site), mark(model)))
-    return found
+        of_parts = not site.name.startswith(("operation.", "material."))
+        refined = any(place.shared and place.name.endswith(".position") for place, _ in entry.models)
+        refined |= any(study.has_bonus(place.name) for place, _ in entry.models)
+        if (
+            of_parts
+            and not refined
+            and entry.keys["distribution"] in SCALED
+            and not set(names) & set(study.copula.names)
+        ):
+            scalable.append(
+                Tolerance(entry.pattern, names, dict(entry.keys), site, width(entry.keys, site), mark(model))
+            )
+    return scalable
 
 
 def mark(model: object) -> str:
@@ -229,7 +236,7 @@ def changed(study: Study, settings: Sequence[str]) -> dict[str, Distribution]:
     faults: list[Fault] = []
     entries, touched = _keys(study, settings, faults)
     sites = {site.name: site for entry in study.entries for site, _ in entry.models}
-    found = dict(study.tolerances)
+    distributions = dict(study.tolerances)
     reported: set[tuple[str, ...]] = set()
     read: dict[str, tuple[Site, ToleranceEntry]] = {}
     for name, text in touched.items():
@@ -238,7 +245,7 @@ def changed(study: Study, settings: Sequence[str]) -> dict[str, Distribution]:
             _check_bonus(study, name, place)
             read[name] = site, kinds.entry(entries[name], site, place, ("tolerances", name))
             _check_zone(study, site, read[name][1], place)
-            found |= read[name][1].quantities(site)
+            distributions |= read[name][1].quantities(site)
         except InputError as error:
             key = (text, *(fault.found for fault in error.faults))
             if key not in reported:  # report a fault once for all errors of a pattern
@@ -249,7 +256,7 @@ def changed(study: Study, settings: Sequence[str]) -> dict[str, Distribution]:
         zones.axes_of(new, study.joint.cross.R, "--set")
     if faults:
         raise InputError(faults)
-    return found
+    return distributions
 
 
 def rewritten_with(study: Study, settings: Sequence[str]) -> str:
@@ -325,7 +332,7 @@ def _check_zone(study: Study, site: Site, new: ToleranceEntry, place: str) -> No
     """Refuse changes of a zone for which the density of the errors is no function of radius and direction alone."""
     if not isinstance(new, zones.ZoneEntry):
         return
-    old: Any = next(model for entry in study.entries for one, model in entry.models if one.name == site.name)
+    old: Any = next(model for entry in study.entries for other, model in entry.models if other.name == site.name)
     changed_length = site.name.endswith(".position") and new.over != old.over
     if changed_length or new.quantities(site).keys() != old.quantities(site).keys():
         found = f"{site.name} gets another shape, not another size"

@@ -164,7 +164,7 @@ def _pure(part: Any) -> Any:
 
 def _numbers(low: float, high: float, kind: str = "number") -> Schema:
     """JSON schema of numbers by name of what is drawn: errors, and vectors of zones."""
-    drawn = [own for name in TOLERANCED for own in (vectors_of(name) if is_zone(name) else (name,))]
+    drawn = [quantity for name in TOLERANCED for quantity in (vectors_of(name) if is_zone(name) else (name,))]
     return _table("", {name: {"type": kind, "minimum": low, "maximum": high} for name in drawn})
 
 

@@ -200,17 +200,17 @@ class Assignments:
         for name in names:
             for column in self._columns(entry, name):
                 owners = self._owner.setdefault(column, [])
-                clashes |= {one.path: column for one, other in owners if not compatible(name, other)}
+                clashes |= {setter.path: column for setter, other in owners if not compatible(name, other)}
                 owners.append((entry, name))
                 for other in EXCLUDES.get(column, ()):
-                    for one, _ in self._owner.get(other, ())[:1]:
-                        both.setdefault(one.path, (column, other))
+                    for setter, _ in self._owner.get(other, ())[:1]:
+                        both.setdefault(setter.path, (column, other))
         if clashes or both:
             where = f"{self._place}: {dotted(entry.path)}"
             remedy = "remove one of the two, or narrow the pattern"
-            found = [f"{column} is set by {dotted(path)} already" for path, column in clashes.items()]
-            found += [f"{c} is given beside {other} of {dotted(path)}" for path, (c, other) in both.items()]
-            raise InputError([Fault(where, text, remedy) for text in found])
+            texts = [f"{column} is set by {dotted(path)} already" for path, column in clashes.items()]
+            texts += [f"{c} is given beside {other} of {dotted(path)}" for path, (c, other) in both.items()]
+            raise InputError([Fault(where, text, remedy) for text in texts])
 
     @staticmethod
     def _columns(entry: Entry, name: str) -> tuple[str, ...]:

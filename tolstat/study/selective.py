@@ -105,8 +105,8 @@ class Range(NamedTuple):
     def scores(self, u: Array) -> Array:
         """Score, among all parts, of the diameter that is exceeded with probability 1 - u in the range; both (n,)."""
         if self.gauge:
-            z, own, _ = _among(self)
-            return np.asarray(np.interp(special.ndtri(u), own, z))
+            z, among, _ = _among(self)
+            return np.asarray(np.interp(special.ndtri(u), among, z))
         low, high = self._ends
         return np.asarray(special.ndtri(np.clip(low + u * (high - low), LEAST, 1.0 - 2.0**-53)))
 
@@ -169,15 +169,15 @@ class Matching(NamedTuple):
         """
         upto = np.cumsum(self.matched) / self.matched.sum()
         number = np.searchsorted(upto[:-1], u_class, side="right")
-        found: dict[str, Array] = {}
+        scores: dict[str, Array] = {}
         for kind, near, within in zip(KINDS, self.near, self.within, strict=True):
             for c in np.unique(number):
                 here = np.flatnonzero(number == c)
                 drawn = _in_class([u[name][here] for name in kind.errors], near[c], within[c])
                 for name, z in zip(kind.errors, drawn, strict=True):
-                    found.setdefault(name, np.empty(len(number)))[here] = z
+                    scores.setdefault(name, np.empty(len(number)))[here] = z
         low, high = np.finfo(float).tiny, 1.0 - np.finfo(float).epsneg
-        return {name: np.clip(special.ndtr(z), low, high) for name, z in found.items()}
+        return {name: np.clip(special.ndtr(z), low, high) for name, z in scores.items()}
 
 
 def _in_class(u: list[Array], near: Range, within: Range) -> list[Array]:
@@ -188,25 +188,27 @@ def _in_class(u: list[Array], near: Range, within: Range) -> list[Array]:
     """
     low, inside = near.share, within.share
     either = Range(near.distribution, near.gauge, min(near.low, within.low), max(near.high, within.high))
-    found, decided = [], np.zeros(len(u[0]), dtype=bool)
-    for k, own in enumerate(u):
+    drawn, decided = [], np.zeros(len(u[0]), dtype=bool)
+    for k, probabilities in enumerate(u):
         left = len(u) - k
         q = inside * (low + inside) ** (left - 1) / ((low + inside) ** left - low**left)
-        hit = ~decided & (own >= 1.0 - q)
-        z = np.empty(len(own))
+        hit = ~decided & (probabilities >= 1.0 - q)
+        z = np.empty(len(probabilities))
         for of, here, v in (
-            (either, decided, own),
-            (within, hit, (own - (1.0 - q)) / q),
-            (near, ~decided & ~hit, own / max(1.0 - q, LEAST)),
+            (either, decided, probabilities),
+            (within, hit, (probabilities - (1.0 - q)) / q),
+            (near, ~decided & ~hit, probabilities / max(1.0 - q, LEAST)),
         ):
             if here.any():
                 z[here] = of.scores(np.clip(v[here], 2.0**-54, 1.0 - 2.0**-53))
         decided |= hit
-        found.append(z)
-    return found
+        drawn.append(z)
+    return drawn
 
 
-def matching(settings: SelectiveEntry, entries: Iterable[Toleranced], found: Mapping[str, Distribution]) -> Matching:
+def matching(
+    settings: SelectiveEntry, entries: Iterable[Toleranced], distributions: Mapping[str, Distribution]
+) -> Matching:
     """Classes of a study's diameters.
 
     Parameters
@@ -215,24 +217,24 @@ def matching(settings: SelectiveEntry, entries: Iterable[Toleranced], found: Map
         ``sampling.selective``.
     entries : iterable of Toleranced
         Entries of the study, for the bands of the diameters.
-    found : mapping of str to Distribution
+    distributions : mapping of str to Distribution
         Distribution of each quantity.
     """
     bands = _bands(entries)
     first = [kind.errors[0] for kind in KINDS]
-    diameters = tuple(_Diameters(found[name], bands.get(name)) for name in first)
+    diameters = tuple(_Diameters(distributions[name], bands.get(name)) for name in first)
     return _matching(settings.classes, settings.gauge, settings.split, diameters)
 
 
 @lru_cache(maxsize=32)
 def _matching(classes: int, gauge: float, split: str, diameters: tuple[_Diameters, ...]) -> Matching:
-    edges = np.array([_edges(classes, gauge, split, *own) for own in zip(KINDS, diameters, strict=True)])
+    edges = np.array([_edges(classes, gauge, split, *measured) for measured in zip(KINDS, diameters, strict=True)])
     near, within, shares = [], [], np.empty((len(KINDS), classes))
-    for number, (kind, own) in enumerate(zip(KINDS, diameters, strict=True)):
+    for number, (kind, measured) in enumerate(zip(KINDS, diameters, strict=True)):
         pairs = list(zip(edges[number][:-1].tolist(), edges[number][1:].tolist(), strict=True))
-        within.append(tuple(Range(own.distribution, gauge, low, high) for low, high in pairs))
+        within.append(tuple(Range(measured.distribution, gauge, low, high) for low, high in pairs))
         harmless = [(-np.inf, low) if kind.worst > 0 else (high, np.inf) for low, high in pairs]
-        near.append(tuple(Range(own.distribution, gauge, *ends) for ends in harmless))
+        near.append(tuple(Range(measured.distribution, gauge, *ends) for ends in harmless))
         for c in range(classes):
             low = 0.0 if harmless[c][0] == harmless[c][1] else near[-1][c].share
             count = len(kind.errors)
@@ -240,25 +242,27 @@ def _matching(classes: int, gauge: float, split: str, diameters: tuple[_Diameter
     return Matching(edges, shares, shares.min(axis=0), tuple(near), tuple(within))
 
 
-def _edges(classes: int, gauge: float, split: str, kind: Kind, own: _Diameters) -> NDArray[np.float64]:
+def _edges(classes: int, gauge: float, split: str, kind: Kind, measured: _Diameters) -> NDArray[np.float64]:
     """Edges of the classes of a kind, (classes + 1,)."""
     parts = np.arange(1, classes) / classes
     if split == "width":
-        assert own.band is not None
-        inner = own.band[0] + (own.band[1] - own.band[0]) * parts
+        assert measured.band is not None
+        inner = measured.band[0] + (measured.band[1] - measured.band[0]) * parts
     else:
         count = len(kind.errors)
         below = parts ** (1.0 / count) if kind.worst > 0 else 1.0 - (1.0 - parts) ** (1.0 / count)
-        inner = own.distribution.ppf(below)
+        inner = measured.distribution.ppf(below)
         if gauge:  # of the measured deviations
-            reach = own.distribution.ppf(np.array([1e-12, 1.0 - 1e-12])) + 9.0 * gauge * np.array([-1.0, 1.0])
-            upto = np.vectorize(lambda end: Range(own.distribution, gauge, -np.inf, float(end)).share, otypes=[float])
+            reach = measured.distribution.ppf(np.array([1e-12, 1.0 - 1e-12])) + 9.0 * gauge * np.array([-1.0, 1.0])
+            upto = np.vectorize(
+                lambda end: Range(measured.distribution, gauge, -np.inf, float(end)).share, otypes=[float]
+            )
             inner = first(lambda ends: upto(ends) >= below, reach[0], reach[1], halvings=40)
     return np.concatenate([[-np.inf], inner, [np.inf]])
 
 
 def _bands(entries: Iterable[Toleranced]) -> dict[str, tuple[float, float] | None]:
-    models: list[tuple[Any, Any]] = [own for entry in entries for own in entry.models if own[0].name in DIAMETERS]
+    models: list[tuple[Any, Any]] = [pair for entry in entries for pair in entry.models if pair[0].name in DIAMETERS]
     return {site.name: model.band(site) for site, model in models}
 
 

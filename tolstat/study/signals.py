@@ -73,7 +73,7 @@ def read(path: Path, needed: Sequence[str] = ()) -> dict[str, FloatArray]:
     faults: list[Fault] = []
     head, cells_of = lines[0] if lines else (1, [])
     columns: dict[str, tuple[int, float]] = {}
-    for place, cell in enumerate(cells_of):
+    for column, cell in enumerate(cells_of):
         match = _HEAD.fullmatch(cell)
         if match is None or match[1] not in UNITS:
             continue
@@ -81,9 +81,9 @@ def read(path: Path, needed: Sequence[str] = ()) -> dict[str, FloatArray]:
         if name in columns:
             faults.append(Fault(f"{path}:{head}: {name}", "is there twice", "rename one of the columns"))
         try:
-            columns[name] = place, units.to_si(f"1 {match[2] or ''}", UNITS[name])
+            columns[name] = column, units.to_si(f"1 {match[2] or ''}", UNITS[name])
         except PydanticCustomError:
-            columns[name] = place, math.nan
+            columns[name] = column, math.nan
             found = "has no unit" if not match[2] else f"[{match[2]}] is no unit of it"
             faults.append(Fault(f"{path}:{head}: {name}", found, f"write the header {name} [{HEADS[name]}]"))
     for name in needed:
@@ -91,9 +91,11 @@ def read(path: Path, needed: Sequence[str] = ()) -> dict[str, FloatArray]:
             remedy = f"add one with the header {name} [{HEADS[name]}]"
             faults.append(Fault(f"{path}:{head}", f"has no column {name}", remedy))
     numbers = [number for number, _ in lines[1:]]
-    values = {name: np.array([_number(cells, place) for _, cells in lines[1:]]) for name, (place, _) in columns.items()}
-    for name, own in values.items():
-        for row in np.flatnonzero(np.isnan(own)):
+    values = {
+        name: np.array([_number(cells, column) for _, cells in lines[1:]]) for name, (column, _) in columns.items()
+    }
+    for name, numbers_of in values.items():
+        for row in np.flatnonzero(np.isnan(numbers_of)):
             cells = lines[1 + row][1]
             found = repr(cells[columns[name][0]]) if columns[name][0] < len(cells) else "missing"
             faults.append(Fault(f"{path}:{numbers[row]}: {name}", f"{found} is no finite number", "give a number"))
@@ -246,15 +248,13 @@ def orders_of(path: Path, key: str) -> Orders:
     """
     signal = read(path, ["torque"] if key == "torque" else [])
     time, angle, speed = (signal.get(name) for name in ("time", "angle", "speed"))
-    fault = None
     if speed is not None and not speed.min() > 0:
-        fault = Fault(f"{path}: speed", "is not above zero everywhere", "give a part in which the shaft turns forwards")
-    elif angle is None and (time is None or speed is None):
-        fault = Fault(str(path), "has no angle", "add a column angle [deg], or time [s] and speed [rpm]")
-    elif key == "speed" and time is None and speed is None:
-        fault = Fault(str(path), "has no speed", "add a column speed [rpm] or time [s]")
-    if fault is not None:
-        raise InputError([fault])
+        remedy = "give a part in which the shaft turns forwards"
+        raise InputError([Fault(f"{path}: speed", "is not above zero everywhere", remedy)])
+    if angle is None and (time is None or speed is None):
+        raise InputError([Fault(str(path), "has no angle", "add a column angle [deg], or time [s] and speed [rpm]")])
+    if key == "speed" and time is None and speed is None:
+        raise InputError([Fault(str(path), "has no speed", "add a column speed [rpm] or time [s]")])
     if angle is None:
         angle = _integral(time, speed)
     if time is None:
@@ -294,22 +294,22 @@ def replaced(text: str, data: Mapping[str, Any], path: Path, faults: list[Fault]
     notes, known = [], dict[tuple[str, str], Orders]()
     none = np.zeros(0)
     stand_in = Orders(1.0, none.astype(int), none, none, math.nan, math.nan, 0)
-    for place, table in _files(data):
-        key = str(place[-1])
-        found, own = stand_in, list[Fault]()
-        with gather(own):
+    for path_of_key, table in _files(data):
+        key = str(path_of_key[-1])
+        orders_found, faults_of_key = stand_in, list[Fault]()
+        with gather(faults_of_key):
             if unknown := set(table) - {"file"}:
-                where = f"{path}: {dotted((*place, min(unknown)))}"
+                where = f"{path}: {dotted((*path_of_key, min(unknown)))}"
                 raise InputError([Fault(where, "is given beside a file", "remove one of the two")])
             if not isinstance(table["file"], str):
-                where = f"{path}: {dotted((*place, 'file'))}"
+                where = f"{path}: {dotted((*path_of_key, 'file'))}"
                 raise InputError([Fault(where, "is not a text", 'write file = "engine.csv"')])
             if (table["file"], key) not in known:
                 known[table["file"], key] = orders_of(path.parent / table["file"], key)
-            found = known[table["file"], key]
-            notes.append(f"{dotted(place)}: {_note(table['file'], found)}")
-        faults += [fault for fault in own if fault not in faults]
-        changes[place] = dict.fromkeys(table) | _written(key, found)
+            orders_found = known[table["file"], key]
+            notes.append(f"{dotted(path_of_key)}: {_note(table['file'], orders_found)}")
+        faults += [fault for fault in faults_of_key if fault not in faults]
+        changes[path_of_key] = dict.fromkeys(table) | _written(key, orders_found)
     with gather(faults):
         text = rewriting.with_keys(text, changes, str(path)) if changes else text
     return text, tuple(notes)
@@ -320,10 +320,10 @@ def _files(data: Mapping[str, Any]) -> Iterator[tuple[tuple[int | str, ...], Tab
     section = data.get("operation")
     each: list[tuple[tuple[int | str, ...], Any]] = [(("operation",), section)]
     if isinstance(section, list):
-        each = [(("operation", number), own) for number, own in enumerate(section)]
-    for path, own in each:
+        each = [(("operation", number), point) for number, point in enumerate(section)]
+    for path, point in each:
         for key in WRITTEN:
-            table = own.get(key) if isinstance(own, Mapping) else None
+            table = point.get(key) if isinstance(point, Mapping) else None
             if isinstance(table, dict) and "file" in table:
                 yield (*path, key), table
 
@@ -339,12 +339,12 @@ def _written(key: str, found: Orders) -> Table:
     return {"mean": units.written(found.mean, unit, f"1 {unit_of_mean}", 8)} | ({"orders": orders} if orders else {})
 
 
-def _note(file: str, found: Orders) -> str:
-    told = f"{len(found.numbers)} orders" + (f" up to {found.numbers[-1]}" if len(found.numbers) else "")
-    if math.isnan(found.left_out):
+def _note(file: str, orders: Orders) -> str:
+    what = f"{len(orders.numbers)} orders" + (f" up to {orders.numbers[-1]}" if len(orders.numbers) else "")
+    if math.isnan(orders.left_out):
         return f"{file} is constant"
-    if math.isnan(found.unrepeated):
+    if math.isnan(orders.unrepeated):
         repeats = "one revolution: what does not repeat is not known"
     else:
-        repeats = f"{found.turns} revolutions: {percent(found.unrepeated)} of the variance does not repeat"
-    return f"{told} of {file}, {repeats}, {percent(found.left_out)} is in orders left out"
+        repeats = f"{orders.turns} revolutions: {percent(orders.unrepeated)} of the variance does not repeat"
+    return f"{what} of {file}, {repeats}, {percent(orders.left_out)} is in orders left out"

@@ -109,18 +109,18 @@ def part_of(name: str) -> str:
 def of_parts(entries: Sequence[Toleranced]) -> list[Gauge]:
     """Gauges that scrap parts: those of the entries of ``[tolerances]``."""
     each = ((site, model.gauge_of(site)) for entry in entries for site, model in entry.models)
-    return [Gauge(site.name, *found) for site, found in each if found is not None]
+    return [Gauge(site.name, *band) for site, band in each if band is not None]
 
 
 def read(written: Sequence[Entry], folder: Path, place: str, faults: list[Fault]) -> tuple[Gauge, ...]:
     """Read ``[reject]``: what is measured of assembled joints; faults are added to `faults`."""
-    found: list[Gauge] = []
+    gauges: list[Gauge] = []
     for entry in written:
         with gather(faults):
             names = selection.resolve(entry, MEASURABLE, place)
             context: Mapping[str, Any] = {"site": Site(names[0], MEASURABLE[names[0]], 0.0, folder)}
-            own = strict.validate(RejectEntry, entry.value, place, prefix=entry.path, context=dict(context))
-            lower = -math.inf if own.below is None else own.below
-            upper = math.inf if own.above is None else own.above
-            found += [Gauge(name, lower, upper, own.gauge) for name in names]
-    return tuple(found)
+            limits = strict.validate(RejectEntry, entry.value, place, prefix=entry.path, context=dict(context))
+            lower = -math.inf if limits.below is None else limits.below
+            upper = math.inf if limits.above is None else limits.above
+            gauges += [Gauge(name, lower, upper, limits.gauge) for name in names]
+    return tuple(gauges)

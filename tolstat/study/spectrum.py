@@ -110,9 +110,9 @@ def duty_cycle(time: FloatArray, torque: FloatArray, speed: FloatArray, alpha: F
 
     seconds, turns = sums(np.where(turning, weight, 0.0)), sums(revolutions)
     size = (sums(revolutions * np.abs(torque) ** m) / turns) ** (1.0 / m)
-    place = np.full(label.max() + 1, -1)
-    place[order] = np.arange(len(order))
-    at = np.where(turning, place[label], -1)
+    number = np.full(label.max() + 1, -1)
+    number[order] = np.arange(len(order))
+    at = np.where(turning, number[label], -1)
     torques = np.sign(sums(revolutions * torque)) * size
     all_visits = _visits(at, revolutions)
     visits = _fewer(all_visits, torques)
@@ -146,13 +146,13 @@ def _cycles(values: FloatArray) -> tuple[NDArray[np.intp], FloatArray]:
     order = order[np.concatenate([[True], slope[1:] != slope[:-1], [True]])] if len(slope) else order
     stack: list[int] = []
     ends: list[tuple[int, int]] = []
-    for place in order.tolist():
-        stack.append(place)
-        while len(stack) > 2 and abs(values[place] - values[stack[-2]]) >= abs(values[stack[-2]] - values[stack[-3]]):
+    for sample in order.tolist():
+        stack.append(sample)
+        while len(stack) > 2 and abs(values[sample] - values[stack[-2]]) >= abs(values[stack[-2]] - values[stack[-3]]):
             ends.append((stack[-3], stack[-2]))
-            stack[-3:] = [place]
-    found = np.array(ends, np.intp).reshape(-1, 2)
-    return found, np.abs(values[found[:, 0]] - values[found[:, 1]])
+            stack[-3:] = [sample]
+    pairs = np.array(ends, np.intp).reshape(-1, 2)
+    return pairs, np.abs(values[pairs[:, 0]] - values[pairs[:, 1]])
 
 
 def _visits(at: NDArray[np.intp], revolutions: FloatArray) -> NDArray[np.intp]:
@@ -166,17 +166,17 @@ def _visits(at: NDArray[np.intp], revolutions: FloatArray) -> NDArray[np.intp]:
 def _fewer(visits: NDArray[np.intp], torques: FloatArray) -> NDArray[np.intp]:
     """Leave out visits until `VISITS` are left: turning points of the torque with changes above a rising threshold."""
     for change in np.append(-1.0, np.unique(np.abs(torques[:, None] - torques))):
-        found, up = list(visits[:1]), 0.0
+        kept, up = list(visits[:1]), 0.0
         for point in visits[1:]:
-            step = torques[point] - torques[found[-1]]
+            step = torques[point] - torques[kept[-1]]
             if change < 0 or (abs(step) > change and step * up <= 0):
-                found.append(point)
+                kept.append(point)
                 up = step
             elif step * up > 0:
-                found[-1] = point
-        if len(found) <= VISITS:
+                kept[-1] = point
+        if len(kept) <= VISITS:
             break
-    return np.array(found[:VISITS], np.intp)
+    return np.array(kept[:VISITS], np.intp)
 
 
 def read(path: Path, m: float) -> DutyCycle:
@@ -225,14 +225,14 @@ def text(cycle: DutyCycle, source: Path, path: Path, base: Path | None = None) -
         raise InputError([Fault(str(base), f"is not TOML: {error}", "give a study that tolstat plan reads")]) from error
     document.pop("operation", None)
     points = tomlkit.aot()
-    for place, name in enumerate(names(cycle)):
+    for number, name in enumerate(names(cycle)):
         point = tomlkit.table()
         values = {
             "name": name,
-            "share": float(f"{cycle.time[place] / cycle.time.sum():.9g}"),
-            "alpha": f"{math.degrees(cycle.alpha[place]):.6g} deg",
-            "speed": f"{cycle.speed[place] * 30 / math.pi:.6g} rpm",
-            "torque": f"{cycle.torque[place]:.6g} N*m",
+            "share": float(f"{cycle.time[number] / cycle.time.sum():.9g}"),
+            "alpha": f"{math.degrees(cycle.alpha[number]):.6g} deg",
+            "speed": f"{cycle.speed[number] * 30 / math.pi:.6g} rpm",
+            "torque": f"{cycle.torque[number]:.6g} N*m",
         }
         for key, value in values.items():
             point.add(key, value)

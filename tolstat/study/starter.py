@@ -109,18 +109,18 @@ def _table(part: Mapping[str, Any], values: Mapping[str, Any], name: str = "") -
         yield from textwrap.wrap(part.get("description", ""), WIDTH, initial_indent="# ", subsequent_indent="# ")
         yield f"[{name}]" if values else f"# [{name}]"
     lines, inner = [], []
-    for key, own in part["properties"].items():
+    for key, field in part["properties"].items():
         if key == "assumed":
             continue
-        if own.get("type") == "object":
-            inner.append(_table(own, values.get(key, {}), f"{name}.{key}" if name else key))
+        if field.get("type") == "object":
+            inner.append(_table(field, values.get(key, {}), f"{name}.{key}" if name else key))
         elif key in values:
-            lines.append((f"{key} = {rewriting.literal(values[key])}", own))
+            lines.append((f"{key} = {rewriting.literal(values[key])}", field))
         else:
-            lines.append((f"# {key} = {rewriting.literal(own['examples'][0])}", own))
+            lines.append((f"# {key} = {rewriting.literal(field['examples'][0])}", field))
     width = max((len(line) for line, _ in lines if len(line) < WIDTH // 2), default=0)
-    for line, own in lines:
-        yield from _commented(line, own["description"], width)
+    for line, field in lines:
+        yield from _commented(line, field["description"], width)
     for lines_of_table in inner:
         yield from lines_of_table
 

@@ -79,8 +79,8 @@ class Rescaled(Distribution):
 
     def describe(self) -> dict[str, Any]:
         """See `Distribution.describe`."""
-        own = {"middle": self.middle, "factor": self.factor}
-        return {"distribution": "rescaled", "every": self.every.describe(), **own}
+        parameters = {"middle": self.middle, "factor": self.factor}
+        return {"distribution": "rescaled", "every": self.every.describe(), **parameters}
 
 
 class Line(NamedTuple):
@@ -100,12 +100,12 @@ class Line(NamedTuple):
 
 def lines(study: Study) -> list[Line]:
     """Entries of ``[tolerances]`` that can be changed, in their order; the diameters of a fit are one of them."""
-    found: dict[str, tuple[str, ...]] = {}
+    names_of: dict[str, tuple[str, ...]] = {}
     for entry in study.entries:
         if _free(study, entry):
             label = _fit_label(study) if _is_of_fit(study, entry) else entry.pattern
-            found[label] = (*found.get(label, ()), *entry.quantities)
-    return [Line(label, names) for label, names in found.items()]
+            names_of[label] = (*names_of.get(label, ()), *entry.quantities)
+    return [Line(label, names) for label, names in names_of.items()]
 
 
 def features(study: Study) -> list[Line]:
@@ -138,7 +138,7 @@ def named(study: Study, texts: Sequence[str]) -> list[Line]:
     InputError
         With every fault of the texts.
     """
-    found, faults, known = [], list[Fault](), list(_drawn(study))
+    groups, faults, known = [], list[Fault](), list(_drawn(study))
     for text in texts:
         label, equals, patterns = (part.strip() for part in text.partition("="))
         names: dict[str, None] = {}
@@ -147,16 +147,16 @@ def named(study: Study, texts: Sequence[str]) -> list[Line]:
                 remedy = 'write --group "tilts = pin*.tilt_*, hole*.tilt_*"'
                 raise InputError([Fault(f"--group {text!r}", "is not a name with patterns", remedy)])
             for pattern in (one.strip() for one in patterns.split(",")):
-                own = selection.select(pattern, known)
-                if not own:
+                selected = selection.select(pattern, known)
+                if not selected:
                     entries = [line.label for line in lines(study)]
                     remedy = did_you_mean(pattern, [*entries, *known])
                     raise InputError([Fault(f"--group {text!r}", f"{pattern!r} selects no line", remedy)])
-                names |= dict.fromkeys(own)
-            found.append(Line(label, tuple(names)))
+                names |= dict.fromkeys(selected)
+            groups.append(Line(label, tuple(names)))
     if faults:
         raise InputError(faults)
-    return found
+    return groups
 
 
 def left_out(study: Study) -> list[str]:
@@ -181,15 +181,15 @@ def other_fits(fit: fits.Fit) -> dict[str, iso.Zones]:
     changes = [] if is_basis else [("hole", iso.HOLES)]
     changes += [("hole_grade", iso.GRADE_NAMES)]
     changes += [("shaft", iso.SHAFTS), ("shaft_grade", iso.GRADE_NAMES)] if is_basis else []
-    found = {}
+    fits_beside = {}
     for part, names in changes:
-        place = names.index(getattr(code, part))
-        for name in names[max(place - 1, 0) : place + 2]:
+        index = names.index(getattr(code, part))
+        for name in names[max(index - 1, 0) : index + 2]:
             other = code._replace(**{part: name})
             zones = iso.zones(other, fit.entry.size)
             if other != code and zones.least >= 0.0:
-                found[str(other)] = zones
-    return found
+                fits_beside[str(other)] = zones
+    return fits_beside
 
 
 def after(study: Study, line: Line, step: str) -> Study:
@@ -216,14 +216,14 @@ def changed(study: Study, line: Line, step: str) -> dict[str, Distribution]:
     step : str
         One of `STEPS`.
     """
-    drawn, found = _drawn(study), dict[str, Distribution]()
+    drawn, distributions = _drawn(study), dict[str, Distribution]()
     for name, factor in factors(study, line, step).items():
         _, site, model = drawn[name]
         band = model.band(site) if isinstance(model, SingleEntry) else None
         base = study.tolerances[name]
         middle = 0.0 if is_zone(name) else base.moments.mean if band is None else 0.5 * (band[0] + band[1])
-        found[name] = Rescaled(base, middle, factor)
-    return found
+        distributions[name] = Rescaled(base, middle, factor)
+    return distributions
 
 
 def factors(study: Study, line: Line, step: str) -> dict[str, float]:
@@ -263,23 +263,23 @@ def size(study: Study, line: Line) -> str:
     """Tolerance of a line, ``"±0.5 deg"``, or code of its fit; empty if its quantities have several."""
     if study.fit is not None and line.label == _fit_label(study):
         return study.fit.entry.code
-    found, drawn = set(), _drawn(study)
+    sizes, drawn = set(), _drawn(study)
     for entry, site, model in map(drawn.__getitem__, line.names):
         if entry.keys["distribution"] not in scaling.SCALED:
             return ""
         size = units.shown(scaling.width(entry.keys, site), site.unit)
-        found.add(scaling.marked(scaling.mark(model), size))
-    return found.pop() if len(found) == 1 else ""
+        sizes.add(scaling.marked(scaling.mark(model), size))
+    return sizes.pop() if len(sizes) == 1 else ""
 
 
 def _width(entry: Toleranced, site: Site, step: str) -> tuple[float, str]:
     """Factor of the width of a quantity after one of `STEPS`, and the step in words."""
     side = {FINER: -1, COARSER: 1}.get(step, 0)
-    own = entry.keys.get("iso2768")
-    if side and own in CLASSES and 0 <= CLASSES.index(own) + side < len(CLASSES):
-        other, kind = CLASSES[CLASSES.index(own) + side], "angular" if site.unit == "rad" else "linear"
+    grade = entry.keys.get("iso2768")
+    if side and grade in CLASSES and 0 <= CLASSES.index(grade) + side < len(CLASSES):
+        other, kind = CLASSES[CLASSES.index(grade) + side], "angular" if site.unit == "rad" else "linear"
         nominal = units.to_si(entry.keys["nominal"], "m")
-        old, new = (iso.deviation(kind, name, nominal) for name in (own, other))
+        old, new = (iso.deviation(kind, name, nominal) for name in (grade, other))
         if new != old:
             return new / old, f"class {other}"
     return FACTORS[step], f"× {FACTORS[step]:g}" if side else step
@@ -297,8 +297,8 @@ def _is_of_fit(study: Study, entry: Toleranced) -> bool:
 def _free(study: Study, entry: Toleranced) -> bool:
     """Whether an entry, or the fit that it belongs to, can be changed without regard to other entries."""
     is_of_fit = _is_of_fit(study, entry)
-    together = [one for one in study.entries if one is entry or (is_of_fit and _is_of_fit(study, one))]
-    return not any(site.shared or study.has_bonus(site.name) for one in together for site, _ in one.models)
+    together = [other for other in study.entries if other is entry or (is_of_fit and _is_of_fit(study, other))]
+    return not any(site.shared or study.has_bonus(site.name) for other in together for site, _ in other.models)
 
 
 def _drawn(study: Study) -> dict[str, tuple[Toleranced, Site, ToleranceEntry]]:

@@ -173,14 +173,14 @@ class Lot(NamedTuple):
 
 def of_entries(entries: Iterable[Toleranced]) -> dict[str, Lot]:
     """Lots of the errors, by name, in the order of the entries."""
-    found: dict[str, Lot] = {}
+    lots: dict[str, Lot] = {}
     for entry in entries:
         names = [site.name for site, _ in entry.models]
         for site, model in entry.models:
             lot = getattr(model, "lot", None)
             if lot is not None:
-                found[site.name] = Lot(lot.share, names[0] if lot.shared else site.name)
-    return found
+                lots[site.name] = Lot(lot.share, names[0] if lot.shared else site.name)
+    return lots
 
 
 def correlated(copula: Copula, lots: Mapping[str, Lot], place: str) -> Copula:
@@ -206,14 +206,14 @@ def correlated(copula: Copula, lots: Mapping[str, Lot], place: str) -> Copula:
         raise InputError([Fault(f"{place}: {dotted(('correlation',))}", f"{both[0]} has a lot already", remedy)])
     every = [lot.score for lot in lots.values()]
     names = [name for name, lot in lots.items() if every.count(lot.score) > 1]
-    own = np.eye(len(names))
-    for i, one in enumerate(names):
-        for j, other in enumerate(names):
-            if i != j and lots[one].score == lots[other].score:
-                own[i, j] = lots[one].share
+    shared = np.eye(len(names))
+    for i, first in enumerate(names):
+        for j, second in enumerate(names):
+            if i != j and lots[first].score == lots[second].score:
+                shared[i, j] = lots[first].share
     matrix = np.eye(len(copula.names) + len(names))
     matrix[: len(copula.names), : len(copula.names)] = copula.matrix
-    matrix[len(copula.names) :, len(copula.names) :] = own
+    matrix[len(copula.names) :, len(copula.names) :] = shared
     return Copula((*copula.names, *names), matrix)
 
 

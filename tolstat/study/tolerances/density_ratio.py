@@ -46,10 +46,10 @@ def exact(pairs: Iterable[tuple[Distribution, Distribution]]) -> Exact:
     return Exact(*(sum(parts) for parts in zip(Exact(), *(of_error(*pair) for pair in pairs), strict=True)))
 
 
-def unbounded(found: Distribution) -> bool:
+def unbounded(distribution: Distribution) -> bool:
     """Whether an end of the support is infinite, so that a wider distribution of the same kind has the same support."""
     with np.errstate(divide="ignore"):
-        return not np.isfinite(found.ppf(np.array([0.0, 1.0]))).all()
+        return not np.isfinite(distribution.ppf(np.array([0.0, 1.0]))).all()
 
 
 def of_error(new: Distribution, old: Distribution) -> Exact:
@@ -62,7 +62,9 @@ def of_error(new: Distribution, old: Distribution) -> Exact:
     if isinstance(new, Normal) and isinstance(old, Normal):
         square, largest = _of_normals(new.sigma / old.sigma, (new.mean - old.mean) / old.sigma)
     elif isinstance(new, Rayleigh) and isinstance(old, Rayleigh) and new.upper is None and old.upper is None:
-        square, largest = (2.0 * one for one in _of_normals(new.sigma / old.sigma))  # both coordinates are normal
+        square, largest = (
+            2.0 * of_coordinate for of_coordinate in _of_normals(new.sigma / old.sigma)
+        )  # both coordinates are normal
     else:
         square, largest = _integrated(new, old)
         if not unbounded(new):

@@ -173,21 +173,21 @@ class SingleEntry(ToleranceEntry):
 
     def quantities(self, site: Site) -> dict[str, Distribution]:
         """See `ToleranceEntry.quantities`."""
-        found = self.build(site)
+        distribution = self.build(site)
         if site.name.startswith("operation."):
-            low, high = found.ppf(_NEARLY_ALL)
+            low, high = distribution.ppf(_NEARLY_ALL)
             if not low <= site.center <= high:
                 values = " to ".join(units.shown(float(end), site.unit) for end in (low, high))
                 remedy = "give deviations from [operation], and change a value there that is another on average"
                 raise refuse(f"deviations of {values} leave out the operating point itself", remedy)
-        return {site.name: found}
+        return {site.name: distribution}
 
     def meaning(self, site: Site) -> list[Meaning]:
         """See `ToleranceEntry.meaning`."""
-        found = self.build(site)
+        distribution = self.build(site)
         band = self.band(site)
-        share = math.nan if band is None else found.outside(*band)
-        return [Meaning(self.number(site), (site.name,), site.unit, found.moments.deviation, share)]
+        share = math.nan if band is None else distribution.outside(*band)
+        return [Meaning(self.number(site), (site.name,), site.unit, distribution.moments.deviation, share)]
 
 
 class Toleranced(NamedTuple):

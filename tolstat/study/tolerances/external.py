@@ -84,8 +84,8 @@ class ScipyLaw(Distribution):
     def cdf(self, x: Array) -> Array:
         """See `Distribution.cdf`."""
         x, below = np.clip(x / self.unit, *self.ends), self.whole.cdf(self.ends[0])
-        own = self.whole.cdf(x) - below if below < 0.5 else self.whole.sf(self.ends[0]) - self.whole.sf(x)
-        return np.asarray(np.clip(own / self.share, 0.0, 1.0))
+        share = self.whole.cdf(x) - below if below < 0.5 else self.whole.sf(self.ends[0]) - self.whole.sf(x)
+        return np.asarray(np.clip(share / self.share, 0.0, 1.0))
 
     def logpdf(self, x: Array) -> Array:
         """See `Distribution.logpdf`."""

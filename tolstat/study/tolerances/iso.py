@@ -84,10 +84,10 @@ def parse(code: str) -> Code:
     ValueError
         For a code that the tables do not have; the text names what they have.
     """
-    found = _CODE.fullmatch(code)
-    if found is None:
+    match = _CODE.fullmatch(code)
+    if match is None:
         raise ValueError(f"{code!r} is not the class of a hole, a slash and the class of a shaft")
-    read = Code(*found.groups())
+    read = Code(*match.groups())
     for kind, letter, letters in (("hole", read.hole, HOLES), ("shaft", read.shaft, SHAFTS)):
         if letter not in letters:
             raise ValueError(f"the tables have no {kind} {letter}, only {', '.join(letters)}")
@@ -184,4 +184,4 @@ def deviation(kind: str, grade: str, nominal: float) -> float:
     (least, *_), (_, most, _) = table[0], table[-1]
     if not least * (1 - 1e-12) <= size <= most * (1 + 1e-12):
         raise ValueError(f"outside the table ({least:g} mm to {most:g} mm)")
-    return next(found for _, up_to, found in table if size <= up_to * (1 + 1e-12))
+    return next(value for _, up_to, value in table if size <= up_to * (1 + 1e-12))

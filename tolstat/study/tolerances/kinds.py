@@ -221,9 +221,9 @@ class RayleighEntry(HalfBand):
 
     def meaning(self, site: Site) -> list[Meaning]:
         """See `ToleranceEntry.meaning`."""
-        found, band = self.build(site), self.band(site)
-        share = math.nan if band is None else found.outside(*band)
-        sigma = math.sqrt(0.5 * found.moments.mean_square)
+        distribution, band = self.build(site), self.band(site)
+        share = math.nan if band is None else distribution.outside(*band)
+        sigma = math.sqrt(0.5 * distribution.moments.mean_square)
         return [Meaning(self.number(site), columns_of(site.name), site.unit, sigma, share)]
 
 

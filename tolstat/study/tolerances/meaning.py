@@ -37,10 +37,10 @@ def table(entries: Sequence[Toleranced]) -> pd.DataFrame:
     rows: dict[tuple[Any, ...], dict[str, None]] = {}
     for entry in entries:
         for site, model in entry.models:
-            for found in model.meaning(site):
-                sigma = float(f"{found.sigma:.6g}")
-                key = (entry.pattern, found.number, found.unit, sigma, f"{found.outside:.6g}")
-                rows.setdefault(key, {}).update(dict.fromkeys(name.partition(".")[2] for name in found.errors))
+            for meaning in model.meaning(site):
+                sigma = float(f"{meaning.sigma:.6g}")
+                key = (entry.pattern, meaning.number, meaning.unit, sigma, f"{meaning.outside:.6g}")
+                rows.setdefault(key, {}).update(dict.fromkeys(name.partition(".")[2] for name in meaning.errors))
     columns = ["entry", "number", "unit", "sigma", "outside", "errors"]
     cells = [(*key[:4], float(key[4]), _pattern(list(keys))) for key, keys in rows.items()]
     made = pd.DataFrame(cells, columns=columns)
@@ -64,10 +64,10 @@ def correlations(copula: Copula, tolerances: Mapping[str, Distribution]) -> pd.D
         ``pearson``, linear correlation of the errors themselves; ``spearman``, rank correlation.
     """
     rows: dict[tuple[float, float], list[str]] = {}
-    for (i, one), (j, other) in combinations(enumerate(copula.names), 2):
+    for (i, first), (j, second) in combinations(enumerate(copula.names), 2):
         if rho := float(copula.matrix[i, j]):
-            linear = pearson(tolerances[one], tolerances[other], rho)
-            rows.setdefault((rho, float(f"{linear:.4g}")), []).append(f"{one}, {other}")
+            linear = pearson(tolerances[first], tolerances[second], rho)
+            rows.setdefault((rho, float(f"{linear:.4g}")), []).append(f"{first}, {second}")
     cells = [
         (pairs[0], len(pairs), rho, linear, 6.0 / math.pi * math.asin(0.5 * rho))
         for (rho, linear), pairs in rows.items()
@@ -75,23 +75,23 @@ def correlations(copula: Copula, tolerances: Mapping[str, Distribution]) -> pd.D
     return pd.DataFrame(cells, columns=["errors", "pairs", "rho", "pearson", "spearman"])
 
 
-def pearson(one: Distribution, other: Distribution, rho: float) -> float:
+def pearson(first: Distribution, other: Distribution, rho: float) -> float:
     """Linear correlation of two errors whose normal scores have the correlation `rho`: smaller unless both are normal.
 
     Gauss–Hermite quadrature over both scores.
     """
-    if isinstance(one, Normal) and isinstance(other, Normal):
+    if isinstance(first, Normal) and isinstance(other, Normal):
         return rho
     z, weight = np.polynomial.hermite_e.hermegauss(NODES)
     weight = weight / weight.sum()
 
-    def values(found: Distribution, scores: Array) -> Array:
-        return found.ppf(np.clip(special.ndtr(scores), 2.0**-53, 1.0 - 2.0**-53)) - found.moments.mean
+    def values(distribution: Distribution, scores: Array) -> Array:
+        return distribution.ppf(np.clip(special.ndtr(scores), 2.0**-53, 1.0 - 2.0**-53)) - distribution.moments.mean
 
     second = rho * z[:, None] + math.sqrt(1.0 - rho**2) * z
     y = values(other, second.ravel()).reshape(second.shape)
-    covariance = float((weight * values(one, z)) @ y @ weight)
-    return covariance / (one.moments.deviation * other.moments.deviation)
+    covariance = float((weight * values(first, z)) @ y @ weight)
+    return covariance / (first.moments.deviation * other.moments.deviation)
 
 
 def _pattern(keys: Sequence[str]) -> str:

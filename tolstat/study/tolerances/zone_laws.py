@@ -128,10 +128,10 @@ def scores_among(every: Distribution, accepted: Callable[[Array], Array]) -> tup
     mass = weight * np.where(z[1:] <= 0.0, below, above)
     low, high = np.append(0.0, np.cumsum(mass)), np.append(np.cumsum(mass[::-1])[::-1], 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
-        own = np.where(low <= high, special.ndtri(low / low[-1]), -special.ndtri(high / low[-1]))
-    own = np.clip(own, -FAR, FAR)  # where no part is accepted on one side
-    own[[0, -1]] = np.minimum(own[1] - 1.0, -END), np.maximum(own[-2] + 1.0, END)
-    return z, own, float(low[-1])
+        among = np.where(low <= high, special.ndtri(low / low[-1]), -special.ndtri(high / low[-1]))
+    among = np.clip(among, -FAR, FAR)  # where no part is accepted on one side
+    among[[0, -1]] = np.minimum(among[1] - 1.0, -END), np.maximum(among[-2] + 1.0, END)
+    return z, among, float(low[-1])
 
 
 @dataclass(frozen=True)
@@ -160,14 +160,14 @@ class Accepted(Distribution):
 
     def ppf(self, u: Array) -> Array:
         """See `Distribution.ppf`."""
-        z, own, _ = self._table
-        among_all = special.ndtr(np.interp(special.ndtri(u), own, z))
+        z, among, _ = self._table
+        among_all = special.ndtr(np.interp(special.ndtri(u), among, z))
         return self.every.ppf(np.where((u > 0.0) & (u < 1.0), among_all, u))
 
     def cdf(self, x: Array) -> Array:
         """See `Distribution.cdf`."""
-        z, own, _ = self._table
-        return np.asarray(special.ndtr(np.interp(score(self.every, x), z, own)))
+        z, among, _ = self._table
+        return np.asarray(special.ndtr(np.interp(score(self.every, x), z, among)))
 
     def logpdf(self, x: Array) -> Array:
         """See `Distribution.logpdf`."""

@@ -194,8 +194,8 @@ class PositionEntry(ZoneEntry):
             middle, slope = end / math.sqrt(2.0), math.sqrt(2.0) * end / self.over
             share = 1.0 - (1.0 - share) ** 2
         offset = math.hypot(middle, site.reach * slope) if feature in PAIRS else middle
-        found = [Meaning(number, _columns(feature, "offset"), "m", offset, share)]
-        return found if site.shared else [*found, Meaning(number, _columns(feature, "tilt"), "rad", slope, share)]
+        meanings = [Meaning(number, _columns(feature, "offset"), "m", offset, share)]
+        return meanings if site.shared else [*meanings, Meaning(number, _columns(feature, "tilt"), "rad", slope, share)]
 
     def _room_left(self, direction: ZoneEntry) -> float:
         """Root mean square of the share of the zone's radius that the tilt leaves to the middle."""
@@ -224,11 +224,13 @@ class OrientationEntry(ZoneEntry):
         """See `ToleranceEntry.meaning`."""
         slope, share = self._deviation(), self._outside()
         feature = site.name.partition(".")[0]
-        found = [Meaning(self.number(), _columns(feature, "tilt", self.about or "tz"), "rad", slope, share)]
+        meanings = [Meaning(self.number(), _columns(feature, "tilt", self.about or "tz"), "rad", slope, share)]
         if feature in PAIRS and not site.shared:
             moved = {"t": "z", "z": "t"}[self.about] if self.about else "tz"
-            found.insert(0, Meaning(self.number(), _columns(feature, "offset", moved), "m", site.reach * slope, share))
-        return found
+            meanings.insert(
+                0, Meaning(self.number(), _columns(feature, "offset", moved), "m", site.reach * slope, share)
+            )
+        return meanings
 
 
 class CoaxialityEntry(ZoneEntry):
@@ -246,7 +248,7 @@ class CoaxialityEntry(ZoneEntry):
 
 
 def _columns(feature: str, kind: str, parts: str = "tz") -> tuple[str, ...]:
-    return tuple(f"{own}.{kind}_{part}" for own in PAIRS.get(feature, (feature,)) for part in parts)
+    return tuple(f"{member}.{kind}_{part}" for member in PAIRS.get(feature, (feature,)) for part in parts)
 
 
 def axes_of(entries: Sequence[Toleranced], reach: float, place: str) -> dict[str, Axis]:
@@ -275,21 +277,21 @@ def axes_of(entries: Sequence[Toleranced], reach: float, place: str) -> dict[str
                 zones.setdefault(feature, {})[key] = (model, dotted(("tolerances", entry.pattern)))
                 if isinstance(model, PositionEntry):
                     bonus[feature] = model.bonus(site)
-    found, faults = {}, []
-    for name, own in zones.items():
-        position = own.get("position", (None, ""))[0]
+    made, faults = {}, []
+    for name, of_axis in zones.items():
+        position = of_axis.get("position", (None, ""))[0]
         room, over = math.inf, math.nan
         if isinstance(position, PositionEntry):
             over = position.over
             for key in ORIENTATIONS:
-                if key in own:
-                    model, where = own[key]
+                if key in of_axis:
+                    model, where = of_axis[key]
                     room = position.band if position.bounded else math.inf
                     faults += _contradictions(model, position, f"{place}: {where}")
-        found[name] = Axis(name, over, room, reach if name in PAIRS else math.nan, bonus.get(name))
+        made[name] = Axis(name, over, room, reach if name in PAIRS else math.nan, bonus.get(name))
     if faults:
         raise InputError(list(dict.fromkeys(faults)))
-    return found
+    return made
 
 
 def short_axes(entries: Sequence[Toleranced], length: float) -> Iterator[tuple[str, str, str]]:

@@ -111,7 +111,7 @@ def test_faults():
         "has no band": {"entries": NORMAL.replace('lower = "-0.030 mm", upper = "0 mm"', 'std = "5 um"')},
         "depends on other parts": {"more": '[[correlation]]\nbetween = ["pin1.diameter", "pin1.tilt_z"]\nrho = 0.5\n'},
         "selective is given with 'sobol'": {"more": 'method = "sobol"\n'},
-        "is negative": {"gauge": "-2 um"},
+        "must not be negative": {"gauge": "-2 um"},
     }  # fmt: skip
     for said, given in faults.items():
         with pytest.raises(InputError, match=said):

@@ -328,15 +328,15 @@ def _files(data: Mapping[str, Any]) -> Iterator[tuple[tuple[int | str, ...], Tab
                 yield (*path, key), table
 
 
-def _written(key: str, found: Orders) -> Table:
+def _written(key: str, measured: Orders) -> Table:
     """Mean and orders as a study writes them."""
     unit, unit_of_mean, unit_of_order = WRITTEN[key]
-    amplitudes = found.amplitudes / found.mean * 100 if key == "speed" else found.amplitudes
+    amplitudes = measured.amplitudes / measured.mean * 100 if key == "speed" else measured.amplitudes
     orders = [
         {"n": int(n), "amplitude": f"{a:.6g} {unit_of_order}", "phase": f"{math.degrees(p):.6g} deg"}
-        for n, a, p in zip(found.numbers, amplitudes, found.phases, strict=True)
+        for n, a, p in zip(measured.numbers, amplitudes, measured.phases, strict=True)
     ]
-    return {"mean": units.written(found.mean, unit, f"1 {unit_of_mean}", 8)} | ({"orders": orders} if orders else {})
+    return {"mean": units.written(measured.mean, unit, f"1 {unit_of_mean}", 8)} | ({"orders": orders} if orders else {})
 
 
 def _note(file: str, orders: Orders) -> str:

@@ -94,7 +94,7 @@ def test_a_wide_gauge_sorts_less_and_neither_is_part_of_the_identity(tmp_path):
 @pytest.mark.parametrize(
     ("changed", "found"),
     [
-        (('gauge = "GAUGE"', 'gauge = "-1 um"'), "is negative"),
+        (('gauge = "GAUGE"', 'gauge = "-1 um"'), "must not be negative"),
         (('gauge = "GAUGE"', 'gauge = "1 um", truncate = true'), "none are left to scrap"),
         (('{ above = "0.05 mm" }', '{ gauge = "0.05 mm" }'), "rejects nothing"),
         (('{ above = "0.05 mm" }', '{ above = "0.05 mm", below = "0.06 mm" }'), "every joint is rejected"),

@@ -81,9 +81,15 @@ def complete(schema: dict[str, Any], model: type[BaseModel], signs: Mapping[Call
         if name in meanings:
             own.setdefault("description", meanings[name])
         own.pop("title", None)
-        _remove_null(own)
+        rest = [inner for inner in own.get("anyOf", []) if inner != {"type": "null"}]
+        if len(rest) == 1:
+            del own["anyOf"]
+            own |= rest[0] | own
+        elif rest:
+            own["anyOf"] = rest
         own |= _bounds(field, signs, own)
-        own |= _default(field)
+        if field.default_factory and (made := field.get_default(call_default_factory=True)):
+            own["default"] = made
         if own.get("default", 0) is None or isinstance(field.default, BaseModel):
             own.pop("default", None)
 
@@ -110,20 +116,6 @@ def _docstrings(module: str) -> dict[str, dict[str, str]]:
         for node in ast.parse(inspect.getsource(import_module(module))).body
         if isinstance(node, ast.ClassDef)
     }
-
-
-def _remove_null(own: dict[str, Any]) -> None:
-    rest = [inner for inner in own.get("anyOf", []) if inner != {"type": "null"}]
-    if len(rest) == 1:
-        del own["anyOf"]
-        own |= rest[0] | own
-    elif rest:
-        own["anyOf"] = rest
-
-
-def _default(field: FieldInfo) -> dict[str, Any]:
-    made = field.get_default(call_default_factory=True) if field.default_factory else None
-    return {"default": made} if made else {}
 
 
 def _bounds(field: FieldInfo, signs: Mapping[Callable[..., Any], str], own: Mapping[str, Any]) -> dict[str, Any]:

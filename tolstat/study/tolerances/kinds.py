@@ -70,33 +70,22 @@ class NormalEntry(Banded):
         if self.gauge is not None and self.truncate:
             raise refuse("gauge scraps parts, with truncate none are left to scrap", "remove one of them")
         self.gauge_of(site)
-        if self.std is not None:
-            return self._from_std(self.std, site)
-        lower, upper = self.needed_band(site)
-        mean = 0.5 * (lower + upper) if self.mean is None else self.mean
-        if not lower < mean < upper:
-            raise refuse("mean is outside the band, so that Cpk would not be positive", "give lower < mean < upper")
-        sigma = tolerance.sigma_of(lower, upper, mean, 1.0 if self.cpk is None else self.cpk)
-        if self.truncate:
-            return tolerance.TruncatedNormal(mean, sigma, lower, upper)
-        return tolerance.Normal(mean, sigma)
-
-    def _from_std(self, std: float, site: Site) -> tolerance.Normal | tolerance.TruncatedNormal:
-        band = self.band(site)
-        if self.cpk is not None:
+        band = self.needed_band(site) if self.std is None else self.band(site)
+        if self.std is not None and self.cpk is not None:
             raise refuse("std and cpk both define the standard deviation", "remove one of them")
-        if (self.truncate or self.gauge is not None) != (band is not None):
-            raise refuse(
-                "with std, a band and truncate or gauge need each other",
-                "give a band and truncate = true or a gauge, or neither",
-            )
-        middle = site.center if band is None else 0.5 * sum(band)
-        mean = middle if self.mean is None else self.mean
+        if self.std is not None and (self.truncate or self.gauge is not None) != (band is not None):
+            found = "with std, a band and truncate or gauge need each other"
+            raise refuse(found, "give a band and truncate = true or a gauge, or neither")
+        mean = self.mean
+        if mean is None:
+            mean = site.center if band is None else 0.5 * sum(band)
+        if band is not None and not band[0] < mean < band[1]:
+            why = ", so that Cpk would not be positive" if self.std is None else ""
+            raise refuse(f"mean is outside the band{why}", "give lower < mean < upper")
         if band is None:
-            return tolerance.Normal(mean, std)
-        if not band[0] < mean < band[1]:
-            raise refuse("mean is outside the band", "give lower < mean < upper")
-        return tolerance.TruncatedNormal(mean, std, *band) if self.truncate else tolerance.Normal(mean, std)
+            return tolerance.Normal(mean, self.std or 0.0)
+        sigma = self.std or tolerance.sigma_of(*band, mean, 1.0 if self.cpk is None else self.cpk)
+        return tolerance.TruncatedNormal(mean, sigma, *band) if self.truncate else tolerance.Normal(mean, sigma)
 
 
 class UniformEntry(Banded):
@@ -143,12 +132,16 @@ class LogNormalEntry(Banded):
         band = self.band(site)
         by_moments = self.mean is not None or self.std is not None
         if by_moments == (band is not None):
-            raise refuse(
-                "needs either a band or mean and std",
-                "give one of the two; mean and std are those of the error, not of its logarithm",
-            )
+            remedy = "give one of the two; mean and std are those of the error, not of its logarithm"
+            raise refuse("needs either a band or mean and std", remedy)
         if band is not None:
-            return self._from_band(*band)
+            if not band[0] > self.threshold:
+                raise refuse("the band is not above threshold", "give threshold < lower")
+            low, high = (math.log(end - self.threshold) for end in band)
+            mean = 0.5 * (low + high)
+            sigma = tolerance.sigma_of(low, high, mean, 1.0 if self.cpk is None else self.cpk)
+            log = tolerance.TruncatedNormal(mean, sigma, low, high) if self.truncate else tolerance.Normal(mean, sigma)
+            return tolerance.LogNormal(self.threshold, log)
         if self.mean is None or self.std is None:
             raise refuse("mean without std, or std without mean", "give both")
         if self.cpk is not None or self.truncate:
@@ -156,17 +149,8 @@ class LogNormalEntry(Banded):
         if not self.mean > self.threshold:
             raise refuse("mean is not above threshold", "give mean > threshold")
         variance = math.log1p((self.std / (self.mean - self.threshold)) ** 2)
-        log = tolerance.Normal(math.log(self.mean - self.threshold) - 0.5 * variance, math.sqrt(variance))
-        return tolerance.LogNormal(self.threshold, log)
-
-    def _from_band(self, lower: float, upper: float) -> tolerance.LogNormal:
-        if not lower > self.threshold:
-            raise refuse("the band is not above threshold", "give threshold < lower")
-        low, high = math.log(lower - self.threshold), math.log(upper - self.threshold)
-        mean = 0.5 * (low + high)
-        sigma = tolerance.sigma_of(low, high, mean, 1.0 if self.cpk is None else self.cpk)
-        log = tolerance.TruncatedNormal(mean, sigma, low, high) if self.truncate else tolerance.Normal(mean, sigma)
-        return tolerance.LogNormal(self.threshold, log)
+        normal = tolerance.Normal(math.log(self.mean - self.threshold) - 0.5 * variance, math.sqrt(variance))
+        return tolerance.LogNormal(self.threshold, normal)
 
 
 class BetaEntry(Banded):

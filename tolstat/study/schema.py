@@ -110,7 +110,7 @@ def _table(description: str, entries: Mapping[str, Schema], end: str = "") -> Sc
         names_of.setdefault(json.dumps(schema), []).append(name)
     wild = {"anyOf": _different(schema for name, schema in entries.items() if not is_zone(name))}
     nested = {
-        feature: halves.get("", _closed(halves, {f"^{WILD}$": wild}) if wild["anyOf"] else _closed(halves, {}))
+        feature: halves.get("") or _closed(halves, {f"^{WILD}$": wild} if wild["anyOf"] else None)
         for feature, halves in features.items()
     }
     patterns = {f"^(?:{_keys(names)}){end}$": json.loads(schema) for schema, names in names_of.items()}
@@ -119,14 +119,10 @@ def _table(description: str, entries: Mapping[str, Schema], end: str = "") -> Sc
     }
 
 
-def _closed(properties: Mapping[str, Schema], patterns: Mapping[str, Schema]) -> Schema:
+def _closed(properties: Mapping[str, Schema], patterns: Mapping[str, Schema] | None = None) -> Schema:
     """Schema of a table without other keys."""
-    return {
-        "type": "object",
-        "properties": dict(properties),
-        "patternProperties": dict(patterns),
-        "additionalProperties": False,
-    }
+    by_pattern = {"patternProperties": dict(patterns)} if patterns else {}
+    return {"type": "object", "properties": dict(properties), **by_pattern, "additionalProperties": False}
 
 
 def _different(schemas: Iterable[Schema]) -> list[Schema]:
@@ -271,7 +267,7 @@ def case() -> Schema:
 
 
 def _file(title: str, sections: Mapping[str, Schema], required: Iterable[str]) -> Schema:
-    return _closed(sections, {}) | {"title": title, "required": list(required)}
+    return {"title": title} | _closed(sections) | {"required": list(required)}
 
 
 KINDS: dict[str, Callable[[], Schema]] = {"study": study, "joint": joint, "case": case}

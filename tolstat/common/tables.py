@@ -121,8 +121,7 @@ class Method(IntEnum):
     """Time integration method."""
 
     BDF2 = 0
-    GENERALIZED_ALPHA = 1
-    TR_BDF2 = 2
+    TR_BDF2 = 1
 
 
 class Start(IntEnum):
@@ -164,9 +163,7 @@ class Options(NamedTuple):
     newton_tol: float = 1e-6
     newton_max_iter: int = 12
     max_halvings: int = 16
-    rho_inf: float = 0.8
     rtol: float = 0.0
-    atol: float = 0.0
     fidelity: int = int(Fidelity.DYNAMIC)
     peak_substeps: int = 16
     max_refinements: int = 3

@@ -100,7 +100,7 @@ class Sheet:
 Part = Sentence | Table | Panels | Reader | Sheet | Listing | Document
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Answer:
     """The answer to a question.
 
@@ -120,6 +120,10 @@ class Answer:
     title: str
     parts: Sequence[Part]
     facts: Mapping[str, Any] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        names = [f"{kind} {', '.join(held)}" for kind, held in (("frames", self.tables), ("facts", self.facts)) if held]
+        return f"<answer {self.name!r}: {'; '.join([self.title, *names])}>"
 
     @property
     def tables(self) -> dict[str, Table]:

@@ -1,5 +1,7 @@
 """The function of a study: a campaign's loads for its errors, its errors for its random numbers, to the last bit."""
 
+import multiprocessing
+
 import numpy as np
 import pytest
 
@@ -142,4 +144,8 @@ def test_loads_are_those_of_a_campaign(tmp_path, monkeypatch):
     assert np.isnan(alone[3:5]).all()
     monkeypatch.setattr(functions, "LEAST_SHARED", 2)
     both = tolstat.function(study, f.loads, workers=2)
-    assert both(x[::-1])[::-1].tobytes() == alone.tobytes()
+    with both:
+        assert both(x[::-1])[::-1].tobytes() == alone.tobytes()
+        assert multiprocessing.active_children()
+        assert both(x).tobytes() == alone.tobytes()
+    assert not multiprocessing.active_children()

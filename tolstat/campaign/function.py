@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from contextlib import closing
+from contextlib import ExitStack, closing
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,7 +45,7 @@ class Function:
 
     ``f(x)`` takes errors, (n, d), SI, in the order of `names`, and returns loads, (n, m), SI, in the order of `loads`;
     NaN where a joint has no valid one, and `status` says why. It equals what a campaign of the study stores for the
-    same errors, to the last bit.
+    same errors, to the last bit. Inside ``with f:`` worker processes stay from one call to the next.
 
     Attributes
     ----------
@@ -79,6 +79,14 @@ class Function:
         self.distributions = None if self.reason else dict(study.tolerances)
         self.status: NDArray[np.uint8] = np.zeros(0, np.uint8)
         self.simulated = 0
+        self._inside = ExitStack()
+
+    def __enter__(self) -> Self:
+        self._inside.enter_context(pool.kept_workers())
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._inside.close()
 
     def __repr__(self) -> str:
         return f"<function of {len(self.names)} errors, {len(self.loads)} loads, of study {self.study.name!r}>"

@@ -87,6 +87,13 @@ def test_the_prompt_shows_what_an_answer_has(answer: Answer) -> None:
 
 def test_a_notebook_shows_tables_pictures_and_facts(answer: Answer) -> None:
     shown = answer._repr_html_()
-    for piece in ("<h3>What is known</h3>", "<table", "<svg", "<dt>share</dt><dd>inf</dd>", "N: joints."):
+    for piece in (
+        "<h3>What is known</h3>",
+        "<table",
+        "<svg",
+        "<dt>share</dt><dd>inf</dd>",
+        "<dd>a, b</dd>",
+        "N: joints.",
+    ):
         assert piece in shown
     assert "<script" not in shown

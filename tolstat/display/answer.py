@@ -184,9 +184,12 @@ class Answer:
     def _repr_html_(self) -> str:
         from tolstat.display import html
 
-        items = [
-            (key.replace("_", " "), f"{x:.4g}" if isinstance(x, float) else str(x)) for key, x in self.facts.items()
-        ]
+        def words(value: Any) -> str:
+            if isinstance(value, list | tuple):
+                return ", ".join(map(words, value))
+            return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+        items = [(key.replace("_", " "), words(value)) for key, value in self.facts.items()]
         return html.fragment(self.title, [*self.blocks(), *([Facts(items)] if items else [])])
 
 

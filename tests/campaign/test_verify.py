@@ -18,8 +18,7 @@ from tolstat.campaign import checks, verify
 from tolstat.campaign import run as campaign
 from tolstat.common.errors import InputError, NotApplicable, StoreError
 from tolstat.common.load_kinds import LOAD_KINDS
-from tolstat.common.solver_options import from_names
-from tolstat.common.tables import Method, Options, Simulation, Start, Status
+from tolstat.common.tables import Method, Options, Simulation, Start, Status, from_names
 from tolstat.questions import accuracy as question
 from tolstat.questions.exceedance.answer import exceedance
 from tolstat.store import ResultFile, Writer, provenance, recorded, verification

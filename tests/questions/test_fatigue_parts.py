@@ -30,8 +30,7 @@ from tolstat.questions.fatigue.duty import ANY, Joints, members, settings_of
 from tolstat.questions.fatigue.parts import Stressed, Stresses, load_stresses
 from tolstat.solver import rainflow
 from tolstat.store import ResultFile
-from tolstat.study.fatigue import Fatigue, of_text
-from tolstat.study.stress_point import StressPoint
+from tolstat.study.fatigue import Fatigue, StressPoint, of_text
 
 STUDY = """
 [joint]

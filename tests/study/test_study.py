@@ -22,7 +22,7 @@ from tolstat.study import Study, load_case
 from tolstat.study import file as study_file
 from tolstat.study.model import Solver
 from tolstat.study.tolerances.distributions import Normal
-from tolstat.study.tolerances.radial import Rayleigh
+from tolstat.study.tolerances.zone_laws import Rayleigh
 
 STUDIES = ROOT / "studies"
 

@@ -16,8 +16,7 @@ from tolstat.campaign.block import Block, BlockWork, load_kernels, results_of, s
 from tolstat.campaign.cluster import map_on_cluster
 from tolstat.campaign.pool import Lost, Work
 from tolstat.common.cores import available_cores
-from tolstat.common.solver_options import from_names
-from tolstat.common.tables import Options, Simulation, Status, without_results
+from tolstat.common.tables import Options, Simulation, Status, from_names, without_results
 from tolstat.solver.compilation import is_compiled, warm_up
 from tolstat.solver.simulation import simulate_rows
 from tolstat.store import Reader

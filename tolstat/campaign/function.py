@@ -26,7 +26,7 @@ from tolstat.store.recorded import settings
 from tolstat.study import Study, axes
 from tolstat.study.selection import select, suggestion
 from tolstat.study.tolerances import distributions as law
-from tolstat.study.tolerances.scipy_law import ScipyLaw
+from tolstat.study.tolerances.external import ScipyLaw
 
 if TYPE_CHECKING:
     import openturns

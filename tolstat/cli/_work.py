@@ -19,7 +19,7 @@ from tolstat.common.errors import Fault
 from tolstat.common.tables import Variant
 from tolstat.joint import Joint
 from tolstat.solver import compilation
-from tolstat.study import Study, mounting, plausible
+from tolstat.study import Study, assumptions, mounting
 
 
 @contextmanager
@@ -68,7 +68,7 @@ def print_study_notes(path: Path, study: Study) -> None:
     if note := mounting.note(study.tolerances, axial, mounting.command(str(path), path.stem, study.joint)):
         say(f"note: {note}")
     print_warnings(path, study.joints, study.variants)
-    for fault in plausible.warnings(study):
+    for fault in assumptions.warnings(study):
         warn(f"warning: {fault}")
     if not study.sampling.has_replicates and (reason := without_interval(study.sampling.method)):
         warn(f"warning: {reason}")

@@ -35,7 +35,7 @@ from tolstat.study.rule import Statement
 from tolstat.study.scaling import Tolerance
 from tolstat.study.tolerances.density_ratio import Exact, of_error
 from tolstat.study.tolerances.distributions import Distribution, Normal
-from tolstat.study.tolerances.radial import Rayleigh
+from tolstat.study.tolerances.zone_laws import Rayleigh
 
 EXAMPLE = 'write --target "P(cross1.F > 700 N) < 0.001"'
 DIGITS = 3

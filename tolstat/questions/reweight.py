@@ -30,7 +30,7 @@ from tolstat.store import error_budget
 from tolstat.store.view import View
 from tolstat.study import Study
 from tolstat.study.axes import columns_of
-from tolstat.study.change import changed, rewritten
+from tolstat.study.scaling import changed, rewritten_with
 from tolstat.study.tolerances import density_ratio
 from tolstat.study.tolerances.distributions import Distribution, score
 
@@ -144,7 +144,7 @@ def reweight(
     title, columns = ("Shares above the limits", LIMITS) if view.limits else ("Quantiles", QUANTILES)
     again = "" if usable else f"fresh joints, same seeds: {_remedy(view, settings)}"
     words = (f"{len(names)} errors changed; {verdict}", error_budget.unknown(view), again)
-    notes, other = [Sentence(note) for note in words if note], Document(".toml", rewritten(view.study, settings))
+    notes, other = [Sentence(note) for note in words if note], Document(".toml", rewritten_with(view.study, settings))
     table = Table("loads", f"{title}, reweighted", columns, rows)
     return Answer("reweight", "Other tolerances", [table, *notes, other], facts | {"changed": names})
 

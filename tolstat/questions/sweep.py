@@ -21,8 +21,8 @@ from tolstat.display.style import lines, ticker
 from tolstat.questions.shares import inapplicable, rows_of
 from tolstat.store import recorded
 from tolstat.store.view import View
+from tolstat.study.design import KEYS
 from tolstat.study.selection import UNITS
-from tolstat.study.swept import KEYS
 
 MAX_LEGEND = 6
 """Maximum number of values of the second swept quantity in the legend."""

@@ -12,8 +12,7 @@ import h5py
 import numpy as np
 from pydantic import BaseModel, ConfigDict
 
-from tolstat.common.solver_options import to_names
-from tolstat.common.tables import HistorySpec, Options, Variant
+from tolstat.common.tables import HistorySpec, Options, Variant, to_names
 from tolstat.store.hdf5 import put_attributes, text
 from tolstat.store.provenance import git_commit, versions
 from tolstat.study import Study

@@ -29,7 +29,7 @@ from tolstat.questions.fatigue.loads import SHARES, Loading, channels, load_cycl
 from tolstat.questions.fatigue.parts import Stressed, load_stresses
 from tolstat.store.revolutions import held
 from tolstat.store.view import View
-from tolstat.study.stress_point import StressPoint
+from tolstat.study.fatigue import StressPoint
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

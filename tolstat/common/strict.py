@@ -308,9 +308,9 @@ def _example(model: type[BaseModel], location: Sequence[int | str], known: Mappi
     return f", for example {location[-1]} = {json.dumps(example, ensure_ascii=False)}"
 
 
-def described(meaning: str, example: Any, **bounds: Any) -> Any:
-    """Field of a key: its meaning, an example, and bounds as `pydantic.Field` has them."""
-    return Field(description=meaning, examples=[example], **bounds)
+def described(meaning: str, *examples: Any, **others: Any) -> Any:
+    """Field of a key: its meaning, examples, and bounds, defaults and the like as `pydantic.Field` has them."""
+    return Field(description=meaning, examples=list(examples) or None, **others)
 
 
 def whole(least: int, most: int, meaning: str, example: int) -> Any:

@@ -63,18 +63,9 @@ class Rule(NamedTuple):
         return any(all(get(joint, of) is not None for of in keys) for keys in self.enough or (self.follows,))
 
 
-def _beam(name: str, body: str) -> Rule:
+def _beam(body: str, modulus: str, section: str, length: str) -> Rule:
     """Rule of a stiffness of a bushing: that of a pin or arm as a beam along z, lumped at its end, eqs. (9)-(11)."""
-    length, about_x, about_y = ("l", "J", "J") if body == "pin" else ("l_f", "Jx", "Jy")
-    modulus, section = {
-        "k_x": ("G", "A"),
-        "k_y": ("G", "A"),
-        "k_z": ("E", "A"),
-        "k_bx": ("E", about_x),
-        "k_by": ("E", about_y),
-        "k_tz": ("G", "Jp"),
-    }[name]
-    is_shear = name in ("k_x", "k_y")
+    is_shear = (modulus, section) == ("G", "A")
 
     def value(joint: Any) -> float:
         part = getattr(joint, body)
@@ -196,18 +187,18 @@ DERIVED: dict[str, Rule] = {
     "hub.inertia": Rule(
         ("hub.mass", "pin.d", "cross.r_b"), f"{_CYLINDERS}, of this mass", _hub_inertia, "kg*m^2", stays=True
     ),
-    "bushing.cross.k_x": _beam("k_x", "pin"),
-    "bushing.cross.k_y": _beam("k_y", "pin"),
-    "bushing.cross.k_z": _beam("k_z", "pin"),
-    "bushing.cross.k_bx": _beam("k_bx", "pin"),
-    "bushing.cross.k_by": _beam("k_by", "pin"),
-    "bushing.cross.k_tz": _beam("k_tz", "pin"),
-    "bushing.fork.k_x": _beam("k_x", "arm"),
-    "bushing.fork.k_y": _beam("k_y", "arm"),
-    "bushing.fork.k_z": _beam("k_z", "arm"),
-    "bushing.fork.k_bx": _beam("k_bx", "arm"),
-    "bushing.fork.k_by": _beam("k_by", "arm"),
-    "bushing.fork.k_tz": _beam("k_tz", "arm"),
+    "bushing.cross.k_x": _beam("pin", "G", "A", "l"),
+    "bushing.cross.k_y": _beam("pin", "G", "A", "l"),
+    "bushing.cross.k_z": _beam("pin", "E", "A", "l"),
+    "bushing.cross.k_bx": _beam("pin", "E", "J", "l"),
+    "bushing.cross.k_by": _beam("pin", "E", "J", "l"),
+    "bushing.cross.k_tz": _beam("pin", "G", "Jp", "l"),
+    "bushing.fork.k_x": _beam("arm", "G", "A", "l_f"),
+    "bushing.fork.k_y": _beam("arm", "G", "A", "l_f"),
+    "bushing.fork.k_z": _beam("arm", "E", "A", "l_f"),
+    "bushing.fork.k_bx": _beam("arm", "E", "Jx", "l_f"),
+    "bushing.fork.k_by": _beam("arm", "E", "Jy", "l_f"),
+    "bushing.fork.k_tz": _beam("arm", "G", "Jp", "l_f"),
     "contact.D_P": Rule(
         ("pin.d",), "D_H - 2 clearance, or pin.d where D_H or clearance is left out", _pin_diameter, "m", stays=True
     ),
@@ -260,16 +251,10 @@ def replaced(given: Collection[str], held: Collection[str]) -> set[str]:
     """
     new = set(given).intersection(BEARING)
     hole, pin, clearance = BEARING
+    third = {clearance: pin, pin: clearance} if hole in held else {hole: clearance}
+    away = {third[key] for key in new & third.keys()}
     if len(new) > 1 or (new == {clearance} and "pin.d" in given):
         away = set(BEARING)
-    elif new == {clearance}:
-        away = {pin} if hole in held else set()
-    elif new == {pin}:
-        away = {clearance} if hole in held else set()
-    elif new == {hole}:
-        away = set() if hole in held else {clearance}
-    else:
-        away = set()
     for section, other in ((ROUND, RECTANGULAR), (RECTANGULAR, ROUND)):
         if set(section).intersection(given):
             away.update(other)

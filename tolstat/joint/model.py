@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import BaseModel, Field, ValidationInfo, field_validator
 
 from tolstat.common.errors import Fault
-from tolstat.common.strict import Strict, refuse
+from tolstat.common.strict import Strict, described, refuse
 from tolstat.joint import derived
 from tolstat.joint.bearing import Bearing
 from tolstat.joint.contact import COEFFICIENTS, LAWS, Contact
@@ -40,21 +40,17 @@ def affecting_results(given: Mapping[str, Any]) -> dict[str, Any]:
 class Assumed(Strict):
     """Keys of the joint whose values are assumed, and other values that they may have; affects no result."""
 
-    name: Annotated[str, Field(min_length=1, description="what is assumed, as a noun", examples=["contact law"])]
+    name: Annotated[str, described("what is assumed, as a noun", "contact law", min_length=1)]
     values: Annotated[
         tuple[Annotated[dict[str, Any], Field(min_length=1, json_schema_extra={"x-table": "keys"})], ...],
-        Field(
+        described(
+            "other values, each some keys of the joint, with those that follow from them and are to stay",
+            [{"contact": {"law": "sliced"}}, {"contact": {"law": "uniform"}}],
             min_length=1,
-            description="other values, each some keys of the joint, with those that follow from them and are to stay",
-            examples=[[{"contact": {"law": "sliced"}}, {"contact": {"law": "uniform"}}]],
         ),
     ]
-    because: Annotated[
-        str, Field(min_length=1, description="why the value is not known", examples=["no drawing gives it"])
-    ]
-    varied: Annotated[
-        bool, Field(strict=True, description="whether it is varied unless it is asked for by name", examples=[False])
-    ] = True
+    because: Annotated[str, described("why the value is not known", "no drawing gives it", min_length=1)]
+    varied: Annotated[bool, described("whether it is varied unless it is asked for by name", False, strict=True)] = True
 
 
 class Joint(Strict):
@@ -64,7 +60,7 @@ class Joint(Strict):
     """
 
     description: Annotated[
-        str, Field(description="text about the joint, copied to result files", examples=["gearbox A, drawing 4711"])
+        str, described("text about the joint, copied to result files", "gearbox A, drawing 4711")
     ] = ""
     material: Material
     pin: Pin
@@ -76,17 +72,17 @@ class Joint(Strict):
     contact: Contact
     bearing: Annotated[
         Bearing | None,
-        Field(
-            validate_default=True,
-            description='Needle bearing of each pin: with `law = "needles"` and `n_stations` of the contact, `needles` '
+        described(
+            'Needle bearing of each pin: with `law = "needles"` and `n_stations` of the contact, `needles` '
             "and `needle_length` say how stiff it is; other keys are for its rating life and affect no load",
+            validate_default=True,
         ),
     ] = None
     assumed: Annotated[
         tuple[Assumed, ...],
-        Field(
-            description="values of the joint that nobody measured, a table `[[assumed]]` each",
-            examples=[[{"name": "H", "values": [{"contact": {"H": 3.0}}], "because": "no drawing gives it"}]],
+        described(
+            "values of the joint that nobody measured, a table `[[assumed]]` each",
+            [{"name": "H", "values": [{"contact": {"H": 3.0}}], "because": "no drawing gives it"}],
         ),
     ] = ()
     _inherited: tuple[Fault, ...] = ()

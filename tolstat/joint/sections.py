@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Annotated, Any, get_args, get_origin
 
-from pydantic import AfterValidator, BaseModel, Field, ValidationInfo, field_validator
+from pydantic import AfterValidator, BaseModel, ValidationInfo, field_validator
 
 from tolstat.common import units
-from tolstat.common.strict import Strict, refuse
+from tolstat.common.strict import Strict, described, refuse
 from tolstat.joint.derived import DERIVED, PIN_CHI
 
 POSITIVE = AfterValidator(units.positive)
@@ -67,7 +67,7 @@ FOLLOWS: Any = None
 
 def follows(key: str, meaning: str, *examples: Any) -> Any:
     """Field of a key of `DERIVED`: its meaning, and the formula that it follows by."""
-    return Field(description=f"{meaning}; when left out: {DERIVED[key].formula}", examples=list(examples) or None)
+    return described(f"{meaning}; when left out: {DERIVED[key].formula}", *examples)
 
 
 def quantities(model: type[BaseModel], before: str = "") -> dict[str, str]:
@@ -89,12 +89,10 @@ def quantities(model: type[BaseModel], before: str = "") -> dict[str, str]:
 class Material(Strict):
     """Material of all parts."""
 
-    E: Annotated[Annotated[Stress, AfterValidator(_modulus)], Field(description="Young's modulus")]
-    nu: Annotated[
-        Annotated[units.Number, AfterValidator(_poisson)], Field(description="Poisson's ratio, from 0 to below 0.5")
-    ]
+    E: Annotated[Annotated[Stress, AfterValidator(_modulus)], described("Young's modulus")]
+    nu: Annotated[Annotated[units.Number, AfterValidator(_poisson)], described("Poisson's ratio, from 0 to below 0.5")]
     G: Annotated[Stress, follows("material.G", "shear modulus")] = FOLLOWS
-    rho: Annotated[Density, Field(description="density")]
+    rho: Annotated[Density, described("density")]
 
 
 class Pin(Strict):
@@ -102,13 +100,13 @@ class Pin(Strict):
 
     l: Annotated[  # noqa: E741
         Length,
-        Field(
-            description="length of the beam, from the hub to the middle of the contact; know it to 1 mm: the torque "
+        described(
+            "length of the beam, from the hub to the middle of the contact; know it to 1 mm: the torque "
             "of the bushing is the force times l, or up to l + z/2"
         ),
     ]
-    d: Annotated[Diameter, Field(description="diameter of the beam")]
-    chi: Annotated[Number, Field(description="shear factor of the section")] = PIN_CHI
+    d: Annotated[Diameter, described("diameter of the beam")]
+    chi: Annotated[Number, described("shear factor of the section")] = PIN_CHI
     A: Annotated[Area, follows("pin.A", "area of the section")] = FOLLOWS
     J: Annotated[AreaMoment, follows("pin.J", "area moment of the section")] = FOLLOWS
     Jp: Annotated[AreaMoment, follows("pin.Jp", "polar moment of the section")] = FOLLOWS
@@ -122,14 +120,10 @@ class Arm(Strict):
     A rectangular section needs only its `width` and `depth`, a round one `d`; for another give `A`, `Jx` and `Jy`.
     """
 
-    l_f: Annotated[Length, Field(description="length of the beam, from its fork to the hole's centre")]
-    width: Annotated[Length | None, Field(description="side of a rectangular section along t", examples=["58 mm"])] = (
-        None
-    )
-    depth: Annotated[
-        Length | None, Field(description="side of a rectangular section along e, the hole's axis", examples=["21 mm"])
-    ] = None
-    d: Annotated[Diameter | None, Field(description="diameter of a round section", examples=["40 mm"])] = None
+    l_f: Annotated[Length, described("length of the beam, from its fork to the hole's centre")]
+    width: Annotated[Length | None, described("side of a rectangular section along t", "58 mm")] = None
+    depth: Annotated[Length | None, described("side of a rectangular section along e, the hole's axis", "21 mm")] = None
+    d: Annotated[Diameter | None, described("diameter of a round section", "40 mm")] = None
     chi: Annotated[Number, follows("arm.chi", "shear factor of the section")] = FOLLOWS
     A: Annotated[Area, follows("arm.A", "area of the section")] = FOLLOWS
     Jx: Annotated[AreaMoment, follows("arm.Jx", "area moment about x, the local t")] = FOLLOWS
@@ -165,22 +159,20 @@ class Shaft(Strict):
     A shaft that is not rigid along its axis needs the mass that moves and the damping of its motion.
     """
 
-    Js: Annotated[Inertia, Field(description="inertia of the output shaft about its axis")]
-    mass: Annotated[
-        Mass | None, Field(description="mass that moves along the axis; needed unless `axial` is rigid")
-    ] = None
+    Js: Annotated[Inertia, described("inertia of the output shaft about its axis")]
+    mass: Annotated[Mass | None, described("mass that moves along the axis; needed unless `axial` is rigid")] = None
     axial_damping: Annotated[
         Annotated[units.Damping, NOT_NEGATIVE] | None,
-        Field(description="damping of the motion along the axis, as by grease; needed unless `axial` is rigid"),
+        described("damping of the motion along the axis, as by grease; needed unless `axial` is rigid"),
     ] = None
     axial: Annotated[
         float | str,
         units.Quantity("N/m", words=(RIGID, FREE)),
         POSITIVE,
-        Field(
-            description="what holds the shaft along its axis: `rigid`, nothing gives way; `free`, a spline or a loose "
+        described(
+            "what holds the shaft along its axis: `rigid`, nothing gives way; `free`, a spline or a loose "
             "bearing; or the stiffness of the bearings of both shafts in series",
-            examples=[FREE],
+            FREE,
         ),
     ] = RIGID
 
@@ -208,7 +200,7 @@ class Shaft(Strict):
 class Cross(Strict):
     """Main dimensions of the cross."""
 
-    R: Annotated[Length, Field(description="distance from the centre of the joint to the middle of pin and hole")]
+    R: Annotated[Length, described("distance from the centre of the joint to the middle of pin and hole")]
     r_b: Annotated[
         Length, follows("cross.r_b", "distance from the centre of the joint to the marker of a cross bushing")
     ] = FOLLOWS
@@ -239,9 +231,9 @@ class ArmBushing(Strict):
 class Bushing(Strict):
     """Bushings, the elasticity of pins and arms: three springs and three torsion springs each, eq. (8)."""
 
-    xi: Annotated[Ratio, Field(description="damping ratio: damping is 2 xi sqrt(k m), of rotations 2 xi sqrt(k J)")]
-    cross: Annotated[PinBushing, Field(description="Stiffness of a pin's bushing")] = PinBushing()
-    fork: Annotated[ArmBushing, Field(description="Stiffness of an arm's bushing")] = ArmBushing()
+    xi: Annotated[Ratio, described("damping ratio: damping is 2 xi sqrt(k m), of rotations 2 xi sqrt(k J)")]
+    cross: Annotated[PinBushing, described("Stiffness of a pin's bushing")] = PinBushing()
+    fork: Annotated[ArmBushing, described("Stiffness of an arm's bushing")] = ArmBushing()
 
 
 RIGID_SHAFTS = "shafts rigid along their axes"

@@ -95,11 +95,7 @@ def check_few(store: Writer) -> None:
 
 
 def check(
-    path: Path,
-    joints: int | str = 24,
-    seed: int | None = None,
-    workers: int = 1,
-    progress: Progress = no_progress,
+    path: Path, joints: int | str = 24, seed: int | None = None, workers: int = 1, progress: Progress = no_progress
 ) -> Verification:
     """Check joints of a study file (``.toml``) or of a result file; see `check_study` and `check_file`.
 
@@ -197,11 +193,7 @@ def nearest(store: Reader, limit: Limit, joints: int) -> NDArray[np.intp]:
 
 
 def check_near(
-    path: Path,
-    text: str,
-    joints: int | str = LEAST_NEAR,
-    workers: int = 1,
-    progress: Progress = no_progress,
+    path: Path, text: str, joints: int | str = LEAST_NEAR, workers: int = 1, progress: Progress = no_progress
 ) -> Verification:
     """Make the `QUICK_CHECKS` of the joints of a result file nearest to a limit, and add them to those that it holds.
 

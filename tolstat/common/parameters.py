@@ -49,12 +49,7 @@ PARAM_FIELDS = (
     Field("clearance", "m", "radial clearance c of each pin", shape=(4,)),
     Field("pin_point", "m", "P less the pin's reference point, in axes of C", shape=(4, 3)),
     Field("pin_axis", "1", "direction of the pin axis, in axes of C", shape=(4, 3)),
-    Field(
-        "hole_point",
-        "m",
-        "hole centre less the arm's reference point, in axes of the arm's frame",
-        shape=(4, 3),
-    ),
+    Field("hole_point", "m", "hole centre less the arm's reference point, in axes of the arm's frame", shape=(4, 3)),
     Field("hole_axis", "1", "direction of the hole axis, in axes of the arm's frame", shape=(4, 3)),
 )
 """Parameters of one joint for the kernel. Pin fields are indexed by pin, hole fields by arm (hole k: arm k)."""

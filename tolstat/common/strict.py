@@ -226,12 +226,7 @@ _REMEDIES = {
 
 
 def _fault(
-    e: Any,
-    model: type[BaseModel],
-    data: object,
-    place: str,
-    prefix: tuple[int | str, ...],
-    known: Mapping[str, Any],
+    e: Any, model: type[BaseModel], data: object, place: str, prefix: tuple[int | str, ...], known: Mapping[str, Any]
 ) -> Fault:
     path = dotted((*prefix, *e["loc"]))
     where = f"{place}: {path}" if path else place

@@ -298,8 +298,7 @@ class Quantity:
             return to_si(value, "1" if si else self.unit, self.mark)
 
         return core_schema.with_info_plain_validator_function(
-            read,
-            serialization=core_schema.plain_serializer_function_ser_schema(self.written, when_used="json"),
+            read, serialization=core_schema.plain_serializer_function_ser_schema(self.written, when_used="json")
         )
 
     def _word(self, value: str) -> str:

@@ -18,17 +18,7 @@ from tolstat.common.parameters import MAX_STATIONS
 from tolstat.common.strict import Strict, described, refuse
 from tolstat.joint.bearing import Bearing, fit_needles
 from tolstat.joint.material import Array
-from tolstat.joint.sections import (
-    FOLLOWS,
-    NOT_NEGATIVE,
-    Diameter,
-    Force,
-    Length,
-    Number,
-    Ratio,
-    Stiffness,
-    follows,
-)
+from tolstat.joint.sections import FOLLOWS, NOT_NEGATIVE, Diameter, Force, Length, Number, Ratio, Stiffness, follows
 
 QuadraticStiffness = Annotated[units.QuadraticStiffness, NOT_NEGATIVE]
 Damping = Annotated[units.Damping, NOT_NEGATIVE]

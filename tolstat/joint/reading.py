@@ -23,11 +23,7 @@ DEFAULT_JOINT = "cirelli2021"
 
 
 def load(
-    base: str | Path,
-    overrides: Mapping[str, Any],
-    place: str,
-    relative_to: Path | None = None,
-    section: str = "joint",
+    base: str | Path, overrides: Mapping[str, Any], place: str, relative_to: Path | None = None, section: str = "joint"
 ) -> Joint:
     """Read a joint file and merge a case's own keys over it.
 

@@ -19,9 +19,6 @@ from tolstat.common import json_schema, toml_lines, units
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.files import about_encoding, read_input
 
-MAX_DEPTH = 32
-"""Largest number of tables and lists inside each other in an input file."""
-
 
 class Strict(BaseModel):
     """Base of all input models: unknown keys are faults, values are immutable."""
@@ -49,16 +46,13 @@ def read_toml(path: Path, text: str | None = None) -> dict[str, Any]:
     """
     text = read_text(path) if text is None else text
     try:
-        data = tomllib.loads(text)
+        return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        line, said, remedy = toml_lines.of_syntax(error, text)
-        raise InputError([Fault(f"{path}:{line}", f"is not TOML: {said}", remedy)]) from error
-    except RecursionError:
-        data = None
-    if data is None or depth(data) > MAX_DEPTH:
-        found = f"has tables and lists nested deeper than {MAX_DEPTH}"
-        raise InputError([Fault(str(path), found, "no key needs more than a few: remove brackets")])
-    return data
+        line, cause, remedy = toml_lines.of_syntax(error, text)
+        raise InputError([Fault(f"{path}:{line}", f"is not TOML: {cause}", remedy)]) from error
+    except RecursionError as error:
+        remedy = "no key needs more than a few: remove brackets"
+        raise InputError([Fault(str(path), "has too many tables and lists inside each other", remedy)]) from error
 
 
 def read_text(path: Path) -> str:
@@ -81,27 +75,9 @@ def read_text(path: Path) -> str:
 
 
 def read_section(place: Path, text: str, name: str) -> dict[str, Any]:
-    """Read a section of a TOML text that a file holds; empty if there is none.
-
-    Raises
-    ------
-    InputError
-        When the text is not TOML, or the section is no table.
-    """
-    found = read_toml(place, text).get(name, {})
-    if not isinstance(found, dict):
-        remedy = "the file is damaged: run its study again into another one"
-        raise InputError([Fault(str(place), f"holds a study whose {name} is no table", remedy)])
-    return found
-
-
-def depth(data: object) -> int:
-    """Number of tables and lists inside each other."""
-    depth, level = 0, [data]
-    while level := [one for one in level if isinstance(one, (dict, list))]:
-        depth += 1
-        level = [one for holder in level for one in (holder.values() if isinstance(holder, dict) else holder)]
-    return depth
+    """Read a section of the TOML text of a study that a file holds; empty if there is none. Raises as `read_toml`."""
+    section: dict[str, Any] = read_toml(place, text).get(name, {})
+    return section
 
 
 def with_lines(faults: Sequence[Fault], place: str, text: str) -> list[Fault]:
@@ -193,19 +169,8 @@ def validate(
     try:
         return model.model_validate(data, context=context)
     except ValidationError as error:
-        raise InputError(faults(error, model, data, place, prefix, examples)) from error
-
-
-def faults(
-    error: ValidationError,
-    model: type[BaseModel],
-    data: object,
-    place: str,
-    prefix: tuple[int | str, ...] = (),
-    examples: Mapping[str, Any] | None = None,
-) -> list[Fault]:
-    """Translate pydantic's errors of `data` to faults with remedies; see `validate`."""
-    return [_fault(e, model, data, place, prefix, examples or {}) for e in error.errors(include_url=False)]
+        each = error.errors(include_url=False)
+        raise InputError([_fault(e, model, data, place, prefix, examples or {}) for e in each]) from error
 
 
 _REMEDIES = {

@@ -207,8 +207,6 @@ def _convert(quantity: Any, unit: str, value: str) -> float:
         if not (quantity.unitless or str(quantity.units) == "percent"):
             raise _fault(f"{value!r} has a unit where a pure number is expected", unit)
         return float(quantity.to("").magnitude)
-    if quantity.unitless:
-        raise _fault(f"{value!r} has no unit", unit)
     if unit == "rad/s":
         return _speed(quantity, value)
     if unit == "rad" and set(dict(quantity.unit_items())) - ANGLES:
@@ -231,21 +229,18 @@ def _speed(quantity: Any, value: str) -> float:
     A speed is an angle over a time, or revolutions over a time by name (rpm). 1/min and min^-1 mean revolutions, as on
     drawings (ISO 80000-3 gives them to the rotational frequency only). Hz and 1/s are units of both.
     """
-    units = dict(quantity.unit_items())
-    dimensions = {name: dict(registry().get_dimensionality(name)) for name in units}
-    of_time = [name for name, dimension in dimensions.items() if dimension == {"[time]": 1} and units[name] == -1]
-    of_angle = [name for name in units if name in ANGLES and units[name] == 1]
-    if len(units) == 1 and (set(units) <= _ROTATIONS and set(units.values()) == {1}):
-        return float(quantity.to("rad/s").magnitude)
-    if len(units) == 2 and of_time and of_angle:
-        return float(quantity.to("rad/s").magnitude)
-    if list(units) == of_time == ["minute"]:
-        return float(quantity.to("rad/s").magnitude) * 2.0 * math.pi
-    if quantity.dimensionality == {"[time]": -1} and not set(units) & ANGLES:
+    powers = dict(quantity.unit_items())
+    speed = float(quantity.to("rad/s").magnitude)
+    if list(powers) == ["minute"]:
+        return speed * 2.0 * math.pi
+    turning = [power for name, power in powers.items() if name in ANGLES | _ROTATIONS]
+    if not turning:
         number = _short(quantity.to("1/s").magnitude)
         remedy = f'write "{number} rev/s" or "{number} rad/s"'
         raise _fault(f"{value!r} is ambiguous: revolutions or radians", "rad/s", remedy)
-    raise _fault(f"{value!r} cannot be a value in rad/s", "rad/s")
+    if turning != [1] or sorted(powers.values()) not in ([1], [-1, 1]):
+        raise _fault(f"{value!r} cannot be a value in rad/s", "rad/s")
+    return speed
 
 
 def written(value: float, unit: str, like: object, digits: int = 12) -> str | float:
@@ -317,31 +312,22 @@ class Quantity:
         return json_schema.quantity(self.unit, EXAMPLES[self.unit], self.words)
 
 
-def _sign(must: str, remedy: str) -> PydanticCustomError:
-    # `strict` replaces {input} by the value as written
-    return PydanticCustomError("sign", "{found}", {"found": f"{{input}} {must}", "remedy": remedy})
+def _signed(holds: Callable[[float], bool], must: str, remedy: str) -> Callable[[ValueT], ValueT]:
+    """Validator of the sign of a quantity; a word in its place passes."""
+
+    def validate(value: ValueT) -> ValueT:
+        if isinstance(value, str) or holds(value):
+            return value
+        # `strict` replaces {input} by the value as written
+        raise PydanticCustomError("sign", "{found}", {"found": f"{{input}} {must}", "remedy": remedy})
+
+    return validate
 
 
-def positive(value: ValueT) -> ValueT:
-    """Validate a quantity that must be greater than zero; a word in its place passes."""
-    if not (isinstance(value, str) or value > 0):
-        raise _sign("must be positive", "give a value above zero")
-    return value
-
-
-def not_negative(value: float) -> float:
-    """Validate a quantity that must not be less than zero."""
-    if value < 0:
-        raise _sign("must not be negative", "give zero or a value above it")
-    return value
-
-
-def not_zero(value: float) -> float:
-    """Validate a quantity of either sign."""
-    if value == 0:
-        raise _sign("must not be zero", "give a value other than zero")
-    return value
-
+positive = _signed(lambda value: value > 0, "must be positive", "give a value above zero")
+not_negative = _signed(lambda value: value >= 0, "must not be negative", "give zero or a value above it")
+not_zero = _signed(lambda value: value != 0, "must not be zero", "give a value other than zero")
+"""Validators of quantities."""
 
 SIGNS: dict[Callable[..., Any], str] = {positive: "exclusiveMinimum", not_negative: "minimum"}
 """Keyword of JSON schema for each validator of a sign."""

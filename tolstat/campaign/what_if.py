@@ -19,9 +19,9 @@ from tolstat.common.counts import Counts
 from tolstat.common.loads import LOADS
 from tolstat.common.tables import VALID, Options, Status, worst_status
 from tolstat.joint import perturb
-from tolstat.store import Writer, what_if
+from tolstat.store import Reader, Writer, what_if
 from tolstat.store.hdf5 import store_error
-from tolstat.store.provenance import versions
+from tolstat.store.metadata import differing_code
 from tolstat.store.recorded import settings
 from tolstat.store.what_if import Altered
 from tolstat.study import Study, axes, widths
@@ -184,7 +184,7 @@ def simulate(
     """
     held = what_if.read(store)
     names = asked.names(study)
-    todo = [one._replace(numbers=own) for one in wanted if (own := missing(held, one, names))]
+    todo = [change._replace(numbers=lacking) for change in wanted if (lacking := missing(held, change, names))]
     table = _Table(todo, asked, names)
     every = _blocks(study, options_of(study, store), todo, asked.points)
     done = pool.map_blocks(work_beside(Options()), every, workers, stop)
@@ -205,9 +205,9 @@ def simulate(
     return held | new
 
 
-def check_code(store: Writer) -> None:
+def check_code(store: Reader) -> None:
     """Refuse a file whose joints another version of the code simulated; raises a StoreError."""
-    if any(store.versions.get(name) != versions()[name] for name in ("tolstat", "sources")):
+    if differing_code(store.versions):
         remedy = "use that version, or run the campaign again: tolstat run STUDY --out OTHER.h5"
         raise store_error(store.path, "was made by another version of the code", remedy)
 
@@ -222,11 +222,11 @@ class _Table:
         self.status = np.full((n, len(asked.points)), Status.PENDING, np.uint8)
 
     def put(self, block: Block, results: NDArray[np.void]) -> NDArray[np.uint8]:
-        place = block.slots, self.asked.points.index(block.point)
+        index = block.slots, self.asked.points.index(block.point)
         loads = np.column_stack([LOADS[name].of(results) for name in self.asked.loads])
-        self.loads[place] = np.where(np.isin(results["status"], VALID)[:, None], loads, np.nan)
-        self.status[place] = results["status"]
-        return np.asarray(self.status[place])
+        self.loads[index] = np.where(np.isin(results["status"], VALID)[:, None], loads, np.nan)
+        self.status[index] = results["status"]
+        return np.asarray(self.status[index])
 
     def sets(self, held: Mapping[str, Altered]) -> dict[str, Altered]:
         """Sets that have grown: of each, the joints before the first that is not done, behind those held."""
@@ -235,11 +235,11 @@ class _Table:
             here = slice(begin, begin + len(numbers))
             begin = here.stop
             waiting = np.flatnonzero((self.status[here] == Status.PENDING).any(axis=1))
-            own = slice(here.start, here.start + int(waiting[0]) if waiting.size else here.stop)
-            if own.stop > own.start:
-                name, states = what_if.key(about), list(self.status[own].T)
+            done = slice(here.start, here.start + int(waiting[0]) if waiting.size else here.stop)
+            if done.stop > done.start:
+                name, states = what_if.key(about), list(self.status[done].T)
                 status = worst_status(states)
-                loads, old = self.loads[own].reshape(-1, len(self.names)), held.get(name)
+                loads, old = self.loads[done].reshape(-1, len(self.names)), held.get(name)
                 grown[name] = Altered(about, numbers.start, self.names, loads, status)
                 if old is not None and (old.end, old.names) == (numbers.start, self.names):
                     joined = np.concatenate([old.loads, loads]), np.concatenate([old.status, status])

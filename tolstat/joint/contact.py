@@ -14,7 +14,7 @@ import numpy as np
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator
 
 from tolstat.common import units
-from tolstat.common.parameters import MAX_STATIONS
+from tolstat.common.fields import MAX_STATIONS
 from tolstat.common.strict import Strict, described, refuse
 from tolstat.joint.bearing import Bearing, fit_needles
 from tolstat.joint.material import Array

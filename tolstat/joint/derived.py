@@ -79,14 +79,14 @@ def _beam(body: str, modulus: str, section: str, length: str) -> Rule:
 
 def _section(name: str, unit: str, of_round: str, of_rectangular: str) -> Rule:
     """Rule of a property of the arms' section, that of a circle or that of a rectangle: `A`, `Jx` or `Jy`."""
-    place = ("A", "Jx", "Jy").index(name)
+    index = ("A", "Jx", "Jy").index(name)
 
     def value(joint: Any) -> float:
         arm = joint.arm
         if arm.d is None:
-            return material.rectangle(arm.width, arm.depth)[place]
+            return material.rectangle(arm.width, arm.depth)[index]
         A, J = material.circle(arm.d)
-        return (A, J, J)[place]
+        return (A, J, J)[index]
 
     formula = f"{of_rectangular}, of a round arm {of_round}"
     return Rule((*ROUND, *RECTANGULAR), formula, value, unit, enough=(ROUND, RECTANGULAR))

@@ -28,7 +28,7 @@ def affects_results(key: str, law: str | None = None) -> bool:
     """Whether a dotted key of a joint affects results of its simulation with a contact law; None: with any."""
     section, _, name = key.partition(".")
     laws = LAWS.values() if law is None else [LAWS[law]]
-    return section not in TOLD and (section != "bearing" or any(name in one.of_bearing for one in laws))
+    return section not in TOLD and (section != "bearing" or any(name in with_law.of_bearing for with_law in laws))
 
 
 def affecting_results(given: Mapping[str, Any]) -> dict[str, Any]:
@@ -94,8 +94,8 @@ class Joint(Strict):
         """Fill in the keys that follow from others; refuse a section that lacks one which does not."""
         name = str(info.field_name)
         section = derived.completed(name, value, info.data)
-        own = isinstance(section, Contact) and not LAWS[section.law].from_coefficients
-        exempt = [f"contact.{key}" for key in COEFFICIENTS] if own else []
+        without_coefficients = isinstance(section, Contact) and not LAWS[section.law].from_coefficients
+        exempt = [f"contact.{key}" for key in COEFFICIENTS] if without_coefficients else []
         lacking = derived.missing(name, section, info.data, exempt)
         if lacking:
             raise refuse(*_lacking(lacking, section))

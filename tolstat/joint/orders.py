@@ -16,7 +16,7 @@ from pydantic import AfterValidator, BeforeValidator, model_validator
 from pydantic_core import PydanticCustomError
 
 from tolstat.common import units
-from tolstat.common.parameters import MAX_ORDERS
+from tolstat.common.fields import MAX_ORDERS
 from tolstat.common.strict import Strict, described, refuse
 
 MAX_GIVEN = 16

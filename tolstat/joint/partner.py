@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pydantic import AfterValidator
 
 from tolstat.common import units
-from tolstat.common.parameters import MAX_ORDERS
+from tolstat.common.fields import MAX_ORDERS
 from tolstat.common.strict import Strict, described, refuse
 from tolstat.joint import ideal
 from tolstat.joint.material import Array
@@ -69,9 +69,9 @@ class Partner(Strict):
     @property
     def in_words(self) -> str:
         """``"behind a joint of 12 deg"``."""
-        place = "behind" if self.position == "before" else "before"
+        side = "behind" if self.position == "before" else "before"
         turned = f", offset {math.degrees(self.offset):.4g} deg" if self.offset else ""
-        return f"{place} a joint of {math.degrees(self.alpha):.4g} deg{turned}"
+        return f"{side} a joint of {math.degrees(self.alpha):.4g} deg{turned}"
 
     def torsion(self, speed: float, n: int) -> float:
         """Relative change of order `n` by torsion of the intermediate shaft at a speed (rad/s); NaN if not known.

@@ -10,8 +10,8 @@ from pydantic import AfterValidator, Field, GetJsonSchemaHandler, model_validato
 from pydantic_core import CoreSchema
 
 from tolstat.common import units
+from tolstat.common.fields import MAX_STATIONS
 from tolstat.common.load_kinds import PINS
-from tolstat.common.parameters import MAX_STATIONS
 from tolstat.common.strict import Strict, described
 from tolstat.common.tables import ERROR, FACTORS, HOLES, PARAM
 from tolstat.joint import material, orders

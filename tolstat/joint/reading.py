@@ -98,7 +98,7 @@ def _faults_of_file(path: Path, text: str) -> tuple[Fault, ...]:
 
 
 def faults_of_assumed(
-    entries: Sequence[Assumed], data: Mapping[str, Any], own: Mapping[str, Any], place: str
+    entries: Sequence[Assumed], data: Mapping[str, Any], of_study: Mapping[str, Any], place: str
 ) -> Iterator[Fault]:
     """Faults of assumptions whose values make no joint.
 
@@ -106,7 +106,7 @@ def faults_of_assumed(
     ----------
     entries : sequence of Assumed
         Tables ``[[assumed]]`` of one file.
-    data, own : mapping
+    data, of_study : mapping
         Keys of the joint, and those that the study sets, see `with_keys`.
     place : str
         File name shown in faults.
@@ -122,21 +122,21 @@ def faults_of_assumed(
                 if not affects_results(key):
                     yield Fault(f"{at}.{key}", "affects no result", "remove it")
             try:
-                with_keys(data, own, value, at)
+                with_keys(data, of_study, value, at)
             except InputError as error:
                 for fault in error.faults:
                     key = fault.place.removeprefix(f"{at}: ")
                     yield Fault(f"{at}.{key}" if key != fault.place else at, fault.found, fault.remedy)
 
 
-def with_keys(data: Mapping[str, Any], own: Mapping[str, Any], keys: Mapping[str, Any], place: str) -> Joint:
+def with_keys(data: Mapping[str, Any], of_study: Mapping[str, Any], keys: Mapping[str, Any], place: str) -> Joint:
     """Joint with some keys set beside those that a study sets, and all that follows from them computed anew.
 
     Parameters
     ----------
     data : mapping
         Keys of the joint as `Joint.given` returns them in mode ``json``; those of the study among them.
-    own, keys : mapping
+    of_study, keys : mapping
         Keys that the study sets, which stay; and the keys to set; nested, as a file writes them.
     place : str
         What stands before the key path in faults.
@@ -146,7 +146,7 @@ def with_keys(data: Mapping[str, Any], own: Mapping[str, Any], keys: Mapping[str
     InputError
         When the keys make no valid joint.
     """
-    return strict.validate(Joint, overridden(data, laid_over(own, keys)), place, examples=examples())
+    return strict.validate(Joint, overridden(data, laid_over(of_study, keys)), place, examples=examples())
 
 
 @cache
@@ -174,13 +174,13 @@ def _attributed(
     """Report the faults that the joint file has without overrides under its name, the others under `place`."""
     try:
         strict.validate(Joint, data, str(path), examples=examples())
-        own = {}
+        faults_of_file = {}
     except InputError as error:
-        own = {(f.place.removeprefix(f"{path}: "), f.found): f for f in error.faults}
+        faults_of_file = {(f.place.removeprefix(f"{path}: "), f.found): f for f in error.faults}
     attributed = []
     for f in faults:
         key = f.place.removeprefix(f"{place}: ")
-        attributed.append(own.get((key, f.found)) or Fault(f"{place}: {section}.{key}", f.found, f.remedy))
+        attributed.append(faults_of_file.get((key, f.found)) or Fault(f"{place}: {section}.{key}", f.found, f.remedy))
     return attributed
 
 

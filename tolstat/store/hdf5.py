@@ -121,16 +121,16 @@ def copy_open(file: h5py.File, path: Path) -> None:
             offset += len(chunk)
 
 
-def replace(path: Path, held: h5py.File, change: Callable[[h5py.File], None], growth: int = 0) -> h5py.File:
+def replace(path: Path, file: h5py.File, change: Callable[[h5py.File], None], growth: int = 0) -> h5py.File:
     """Change the structure of a file by way of a copy; a kill leaves either the old or the changed file.
 
-    No other process can write in between: `held` stays open and locked until the copy is locked and at `path`.
+    No other process can write in between: `file` stays open and locked until the copy is locked and at `path`.
 
     Parameters
     ----------
     path : Path
         The file.
-    held : h5py.File
+    file : h5py.File
         The same file, open for writing; closed afterwards.
     change : callable
         Called with the copy, open for writing.
@@ -142,15 +142,15 @@ def replace(path: Path, held: h5py.File, change: Callable[[h5py.File], None], gr
     h5py.File
         The file now at `path`, open for writing.
     """
-    check_disk_space(path, held.id.get_filesize() + growth)
+    check_disk_space(path, file.id.get_filesize() + growth)
     with ExitStack() as opened:
         with atomic_write(path) as temporary:
-            copy_open(held, temporary)
-            with open_hdf5(temporary, "r+") as file:
-                change(file)
+            copy_open(file, temporary)
+            with open_hdf5(temporary, "r+") as changed:
+                change(changed)
             copy = opened.enter_context(open_hdf5(temporary, "r+"))
         opened.pop_all()
-    held.close()
+    file.close()
     return copy
 
 

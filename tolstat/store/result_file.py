@@ -49,7 +49,7 @@ class ResultFile(Reader):
         if not self.is_open:
             return f"<result file {self.path.name!r}, closed>"
         joints = f"{self.n - self.first_sample} joints"
-        progress = [f"{one.point}: {one._progress()}" if one.point else one._progress() for one in self.each()]
+        progress = [f"{store.point}: " * bool(store.point) + store._progress() for store in self.each()]
         return f"<result file {self.path.name!r}: {joints} ({'; '.join(progress)})>"
 
     def _progress(self) -> str:

@@ -102,11 +102,11 @@ def read(store: Reader, slots: NDArray[np.intp], names: Sequence[str], max_angle
     angles = 2.0 * np.pi * np.arange(0, steps, every) / steps
     loads = {name: np.empty((len(slots), angles.size)) for name in names}
     apart = 0.0
-    for part, found, difference in of_components(store, slots, histories):
+    for part, histories_of_part, difference in of_components(store, slots, histories):
         apart = max(apart, difference)
-        thinned = {name: values[:, ::every] for name, values in found.items()}
-        for name, own in loads.items():
-            own[part] = CHANNELS[name].of(thinned)
+        thinned = {name: values[:, ::every] for name, values in histories_of_part.items()}
+        for name, values in loads.items():
+            values[part] = CHANNELS[name].of(thinned)
     return Revolutions(angles, loads, origin, apart)
 
 

@@ -132,17 +132,17 @@ def write(verifications: Sequence[tuple[Writer, Verification]], name: str = VERI
     verifications[0][0].replace(change)
 
 
-def _write(holder: h5py.Group, place: str, verification: Verification, columns: tuple[Column, ...]) -> None:
-    if place in holder:
-        del holder[place]
-    group = holder.create_group(place)
+def _write(holder: h5py.Group, name: str, verification: Verification, columns: tuple[Column, ...]) -> None:
+    if name in holder:
+        del holder[name]
+    group = holder.create_group(name)
     about = "joints of the campaign simulated again in other ways, to know its numerical error"
     names = " ".join(verification.checks)
     put_attributes(group, {"description": about, "seed": verification.seed, "checks": names})
     about = "rows of the joints in the campaign, counted from 0"
     rows = put_scale(group, "rows", verification.rows.astype("i8"), "1", about)
-    for name, check in verification.checks.items():
-        layout.create_table(group, name, columns, len(rows), [check.results], scale=rows)
+    for check_name, check in verification.checks.items():
+        layout.create_table(group, check_name, columns, len(rows), [check.results], scale=rows)
         options = json.dumps(check.options, allow_nan=False)
-        put_attributes(group[name], {"description": check.description, "options": options})
+        put_attributes(group[check_name], {"description": check.description, "options": options})
     put_attributes(group, {CHECKSUM: _checksum(group)})

@@ -91,8 +91,8 @@ class View:
         """Result of a function of this view that several ask for, computed once for each key; nobody may change it."""
         if key not in self._kept:
             self._kept[key] = compute()
-        found: T = self._kept[key]
-        return found
+        result: T = self._kept[key]
+        return result
 
     def at(self, selection: str) -> View:
         """View of one operating point, ``"cruise"``, or the worst of several, ``"cruise+start"``; ``""`` for all."""
@@ -124,7 +124,7 @@ class View:
 
     def _verified(self, group: str) -> Verification | None:
         """Verifications of all operating points; None if one of them has none."""
-        verifications = [held for part in self.parts if (held := verification.read(part.store, group)) is not None]
+        verifications = [each for part in self.parts if (each := verification.read(part.store, group)) is not None]
         return verification.together(verifications) if len(verifications) == len(self.parts) else None
 
     @cached_property

@@ -157,7 +157,7 @@ def rates(sides: tuple[Side, Side], lines: Lines, pose: Pose) -> Array:
 def close(sides: tuple[Side, Side], alpha: float, theta: Array, radius: float) -> Array:
     """Solve for the coordinates (k, 6) that close the loop, by Newton's method from the ideal joint; NaN on failure."""
     q = np.zeros((len(theta), 6))
-    q[:, 0] = ideal.cross_angle(theta, alpha)
+    q[:, 0] = np.arctan(np.tan(alpha) * np.sin(theta))  # tan(beta) = tan(alpha) sin(theta)
     q[:, 1] = np.arcsin(np.sin(alpha) * np.cos(theta))
     q[:, 2] = ideal.output_angle(theta, alpha)
     unit = np.array([1.0, 1.0, 1.0, radius, radius, radius])

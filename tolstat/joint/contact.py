@@ -254,29 +254,16 @@ class Contact(Strict):
             raise refuse("a pin of {D_P} does not fit into a hole of {D_H}", "give D_P <= D_H", "D_P", "D_H")
         return value
 
-    @field_validator(*COEFFICIENTS)
+    @field_validator(GIVEN, *COEFFICIENTS)
     @classmethod
-    def _without_stations(cls, value: object, info: ValidationInfo) -> object:
-        if value is not None and info.data.get("law") == GIVEN:
-            raise refuse('has no effect with law = "stations"', "remove it: each station has its own coefficients")
-        return value
-
-    @field_validator("stations")
-    @classmethod
-    def _of_their_law(cls, value: object, info: ValidationInfo) -> object:
-        law = info.data.get("law", GIVEN)  # an invalid law has a fault of its own
-        if value is not None and law != GIVEN:
-            raise refuse(f'has no effect with law = "{law}"', 'write law = "stations"')
-        return value
-
-    @field_validator(*dict.fromkeys(key for law in LAWS.values() for key in law.needs))
-    @classmethod
-    def _needed(cls, value: object, info: ValidationInfo) -> object:
-        law = info.data.get("law")
-        if value is None and law is not None and info.field_name in LAWS[law].needs:
-            raise refuse(
-                f'missing key, needed with law = "{law}"', f'add {info.field_name}, or write law = "{DEFAULT}"'
-            )
+    def _of_law(cls, value: object, info: ValidationInfo) -> object:
+        """Refuse a key that the law does not use, or needs and lacks; an invalid law has a fault of its own."""
+        law, key = info.data.get("law"), str(info.field_name)
+        if law is not None and value is None and key in LAWS[law].needs:
+            raise refuse(f'missing key, needed with law = "{law}"', f'add {key}, or write law = "{DEFAULT}"')
+        if law is not None and value is not None and (key == GIVEN) != (law == GIVEN):
+            remedy = 'write law = "stations"' if key == GIVEN else "remove it: each station has its own coefficients"
+            raise refuse(f'has no effect with law = "{law}"', remedy)
         return value
 
     @field_validator("k1p", "k2p")

@@ -52,11 +52,6 @@ def output_angle(theta: ArrayLike, alpha: ArrayLike) -> Array:
     return np.asarray(theta + np.arctan2(advance, np.cos(theta) ** 2 * np.cos(alpha) + np.sin(theta) ** 2))
 
 
-def cross_angle(theta: ArrayLike, alpha: float) -> Array:
-    """Rotation beta of the cross in the input fork, tan(beta) = tan(alpha) sin(theta), rad."""
-    return np.asarray(np.arctan(np.tan(alpha) * np.sin(theta)))
-
-
 def cross_couple(theta: ArrayLike, alpha: float, torque: float) -> Array:
     """Couple that the forks exert on the cross about its normal when the output carries a constant torque.
 

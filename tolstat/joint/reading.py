@@ -193,13 +193,7 @@ def _inherited(joint: Joint, data: Mapping[str, Any], over: Mapping[str, Any], p
         D_P = held.get("contact.D_P")
         if key == "pin.d" and D_P and math.isclose(units.to_si(D_P, "m", DIAMETER), expected, rel_tol=derived.WIDE):
             continue  # the joint file has pins of two diameters itself
-        inherited = held[key]
-        if isinstance(inherited, list):
-            each = zip(expected, inherited, strict=True)
-            value = f"[{', '.join(_written(number, key, like) for number, like in each)}]"
-            inherited = f"[{', '.join(inherited)}]"
-        else:
-            value = _written(expected, key, inherited)
+        inherited, value = _written(held[key], key, held[key]), _written(expected, key, held[key])
         remedy = f"give {instead}, from which it follows, or {key}" if instead else f"give {key}, this value or that"
         yield Fault(key, f"{inherited} is inherited from {path.stem}; {reason} {value}", remedy)
 
@@ -214,8 +208,11 @@ def _lowered(joint: Joint, written: object) -> Iterator[Fault]:
     yield Fault("contact.fit_load", found, f'write fit_load = "{text}", or give k1u and k2u')
 
 
-def _written(value: float, key: str, like: object) -> str:
-    return str(units.written(value, derived.UNITS[key], like, digits=3))
+def _written(value: Any, key: str, like: object) -> str:
+    """Text of a value as a file has it, or of an SI value in the unit of `like`; also of three values."""
+    if isinstance(like, list):
+        return f"[{', '.join(_written(*each) for each in zip(value, [key] * 3, like, strict=True))}]"
+    return value if isinstance(value, str) else str(units.written(value, derived.UNITS[key], like, digits=3))
 
 
 def varied(joint: Joint, values: Mapping[str, Any]) -> Joint:

@@ -34,7 +34,6 @@ from tolstat.store.reader import Reader
 from tolstat.store.recorded import recall
 from tolstat.store.verification import Verification
 from tolstat.store.what_if import Altered
-from tolstat.store.worst import FirstPass
 from tolstat.study import Study
 from tolstat.study.points import limits_at, names_of
 
@@ -147,10 +146,12 @@ class View:
             return None
         return frozen(self.store.origin()["weight"][self.store.first_sample :].copy())
 
-    @property
+    @cached_property
     def results(self) -> worst.Columns:
         """Columns `LOAD_FIELDS` of the results, (n, ...) each."""
-        return self._tables.results
+        if len(self.parts) > 1:
+            return worst.together([part.results for part in self.parts])
+        return worst.columns_of(self.store)
 
     def read_results(self, fields: Sequence[str]) -> NDArray[np.void]:
         """Read other fields of the results, (n,) table; they are not kept."""
@@ -161,31 +162,28 @@ class View:
         """Status of the joints, (n,)."""
         return self.results["status"]
 
-    @property
+    @cached_property
     def nominal(self) -> NDArray[np.void]:
         """The nominal joint, RESULT (1,); (0,) if the file has none or its results are not valid."""
-        return self._tables.nominal
+        return worst.nominal([part.store for part in self.parts])
 
     @property
     def nominal_slots(self) -> NDArray[np.intp]:
         """File slots of `nominal`, (1,) or (0,)."""
         return np.zeros(len(self.nominal), dtype=np.intp)
 
-    @property
+    @cached_property
     def first_without_load(self) -> NDArray[np.void]:
         """Complete results of the first `worst.MAX_LISTED` joints that failed or did not settle, RESULT (m,)."""
-        return self._tables.without_load
-
-    @property
-    def mode_share(self) -> FloatArray:
-        """Mean share of the revolution by pin and contact mode, (4, 4), over the valid joints; NaN if not kept."""
-        return self._tables.mode_share
+        return worst.without_load([part.status for part in self.parts], [part.store for part in self.parts])
 
     @cached_property
-    def _tables(self) -> FirstPass:
-        if len(self.parts) > 1:
-            return worst.of_points([part._tables for part in self.parts], [part.store for part in self.parts])
-        return worst.first_pass(self.store, self._weights)
+    def mode_share(self) -> FloatArray:
+        """Mean share of the revolution by pin and contact mode, (4, 4), over the valid joints; NaN if not kept.
+
+        Several operating points have none.
+        """
+        return np.full((4, 4), np.nan) if len(self.parts) > 1 else worst.mode_share(self.store, self._weights)
 
     def load(self, name: str) -> Sample:
         """Largest load over the revolution of every joint, by its name; ``"cross1.F at cruise"`` at that point only.

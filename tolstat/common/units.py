@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from functools import cache, lru_cache
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
-from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic import AfterValidator, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from tolstat.common import json_schema, notation
@@ -332,21 +332,22 @@ not_zero = _signed(lambda value: value != 0, "must not be zero", "give a value o
 SIGNS: dict[Callable[..., Any], str] = {positive: "exclusiveMinimum", not_negative: "minimum"}
 """Keyword of JSON schema for each validator of a sign."""
 
+POSITIVE, NOT_NEGATIVE = AfterValidator(positive), AfterValidator(not_negative)
 Length = Annotated[float, Quantity("m")]
-Diameter = Annotated[float, Quantity("m", DIAMETER)]
-Area = Annotated[float, Quantity("m^2")]
-AreaMoment = Annotated[float, Quantity("m^4")]
+Diameter = Annotated[float, Quantity("m", DIAMETER), POSITIVE]
+Area = Annotated[float, Quantity("m^2"), POSITIVE]
+AreaMoment = Annotated[float, Quantity("m^4"), POSITIVE]
 Angle = Annotated[float, Quantity("rad")]
 Speed = Annotated[float, Quantity("rad/s")]
 Force = Annotated[float, Quantity("N")]
 Torque = Annotated[float, Quantity("N*m")]
 Stress = Annotated[float, Quantity("Pa")]
-Time = Annotated[float, Quantity("s")]
-Mass = Annotated[float, Quantity("kg")]
-Inertia = Annotated[float, Quantity("kg*m^2")]
-Density = Annotated[float, Quantity("kg/m^3")]
+Time = Annotated[float, Quantity("s"), POSITIVE]
+Mass = Annotated[float, Quantity("kg"), POSITIVE]
+Inertia = Annotated[float, Quantity("kg*m^2"), POSITIVE]
+Density = Annotated[float, Quantity("kg/m^3"), POSITIVE]
 Stiffness = Annotated[float, Quantity("N/m")]
-RotaryStiffness = Annotated[float, Quantity("N*m/rad")]
-QuadraticStiffness = Annotated[float, Quantity("N/m^2")]
-Damping = Annotated[float, Quantity("N*s/m")]
+RotaryStiffness = Annotated[float, Quantity("N*m/rad"), POSITIVE]
+QuadraticStiffness = Annotated[float, Quantity("N/m^2"), NOT_NEGATIVE]
+Damping = Annotated[float, Quantity("N*s/m"), NOT_NEGATIVE]
 Number = Annotated[float, Quantity("1")]

@@ -17,9 +17,8 @@ from tolstat.common import units
 from tolstat.common.bisection import first
 from tolstat.common.strict import Strict, described, refuse
 from tolstat.joint.material import Array
-from tolstat.joint.sections import POSITIVE, Force, Length, Number
+from tolstat.joint.sections import Force, Length, Number
 
-Time = Annotated[units.Time, POSITIVE]
 FOR_LIFE = ("C", "needle_diameter", "pitch_diameter")
 """Keys without which a bearing has no rating life."""
 LEFT_OUT: Any = None
@@ -48,9 +47,9 @@ class Bearing(Strict):
     pitch_diameter: Annotated[
         Length, described("diameter of the circle of the needles' axes, needed for the life", "42 mm")
     ] = LEFT_OUT
-    required_life: Annotated[Time | None, described("life that all four bearings of a joint must reach", "5000 h")] = (
-        None
-    )
+    required_life: Annotated[
+        units.Time | None, described("life that all four bearings of a joint must reach", "5000 h")
+    ] = None
     reliability: Annotated[
         Annotated[units.Number, AfterValidator(_tabulated)],
         described("share of equal joints that reach their rating life", "95 %"),

@@ -16,12 +16,10 @@ from pydantic import AfterValidator, Field, ValidationInfo, field_validator
 from tolstat.common import units
 from tolstat.common.fields import MAX_STATIONS
 from tolstat.common.strict import Strict, described, refuse
+from tolstat.common.units import NOT_NEGATIVE, Damping, Diameter, QuadraticStiffness
 from tolstat.joint.bearing import Bearing, fit_needles
 from tolstat.joint.material import Array
-from tolstat.joint.sections import FOLLOWS, NOT_NEGATIVE, Diameter, Force, Length, Number, Ratio, Stiffness, follows
-
-QuadraticStiffness = Annotated[units.QuadraticStiffness, NOT_NEGATIVE]
-Damping = Annotated[units.Damping, NOT_NEGATIVE]
+from tolstat.joint.sections import FOLLOWS, Force, Length, Number, Ratio, Stiffness, follows
 
 
 class Stations(NamedTuple):

@@ -42,9 +42,7 @@ class Order(Strict):
 class TorqueOrder(Order):
     """Order of the resisting torque, amplitude cos(n phase + q)."""
 
-    amplitude: Annotated[
-        units.Torque, AfterValidator(units.positive), described("amplitude of the resisting torque", "40 N*m")
-    ]
+    amplitude: Annotated[units.Torque, units.POSITIVE, described("amplitude of the resisting torque", "40 N*m")]
 
 
 class SpeedOrder(Order):
@@ -52,7 +50,7 @@ class SpeedOrder(Order):
 
     amplitude: Annotated[
         units.Angle,
-        AfterValidator(units.positive),
+        units.POSITIVE,
         described('amplitude of the input angle, or of the speed as a share of it: "2 %"', "1 deg"),
     ]
 

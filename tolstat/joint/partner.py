@@ -57,12 +57,10 @@ class Partner(Strict):
     ] = 0.0
     inertia: Annotated[
         units.Inertia,
-        AfterValidator(units.positive),
         described("moment of inertia behind the second joint of the shaft", "0.02 kg*m^2"),
     ]
     stiffness: Annotated[
         units.RotaryStiffness | None,
-        AfterValidator(units.positive),
         described("torsional stiffness of the intermediate shaft", "2e4 N*m/rad"),
     ] = None
 

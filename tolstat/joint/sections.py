@@ -13,22 +13,13 @@ from pydantic import AfterValidator, BaseModel, ValidationInfo, field_validator
 
 from tolstat.common import units
 from tolstat.common.strict import Strict, described, refuse
+from tolstat.common.units import NOT_NEGATIVE, POSITIVE
 from tolstat.joint.derived import DERIVED, PIN_CHI
 
-POSITIVE = AfterValidator(units.positive)
-NOT_NEGATIVE = AfterValidator(units.not_negative)
-
 Length = Annotated[units.Length, POSITIVE]
-Diameter = Annotated[units.Diameter, POSITIVE]
-Area = Annotated[units.Area, POSITIVE]
-AreaMoment = Annotated[units.AreaMoment, POSITIVE]
 Stress = Annotated[units.Stress, POSITIVE]
-Mass = Annotated[units.Mass, POSITIVE]
-Inertia = Annotated[units.Inertia, POSITIVE]
-Density = Annotated[units.Density, POSITIVE]
-Force = Annotated[float, units.Quantity("N"), POSITIVE]
+Force = Annotated[units.Force, POSITIVE]
 Stiffness = Annotated[units.Stiffness, POSITIVE]
-RotaryStiffness = Annotated[units.RotaryStiffness, POSITIVE]
 Number = Annotated[units.Number, POSITIVE]
 Ratio = Annotated[units.Number, NOT_NEGATIVE]
 
@@ -55,7 +46,7 @@ def _body(inertia: tuple[float, float, float]) -> tuple[float, float, float]:
 
 LEAST_E = 1e9
 """Young's modulus (Pa) below that of any metal."""
-Triple = Annotated[tuple[Inertia, Inertia, Inertia], AfterValidator(_body)]
+Triple = Annotated[tuple[units.Inertia, units.Inertia, units.Inertia], AfterValidator(_body)]
 
 
 PIN_INERTIA = ["5.78e-5 kg*m^2", "6.42e-5 kg*m^2", "6.42e-5 kg*m^2"]
@@ -92,7 +83,7 @@ class Material(Strict):
     E: Annotated[Annotated[Stress, AfterValidator(_modulus)], described("Young's modulus")]
     nu: Annotated[Annotated[units.Number, AfterValidator(_poisson)], described("Poisson's ratio, from 0 to below 0.5")]
     G: Annotated[Stress, follows("material.G", "shear modulus")] = FOLLOWS
-    rho: Annotated[Density, described("density")]
+    rho: Annotated[units.Density, described("density")]
 
 
 class Pin(Strict):
@@ -105,12 +96,12 @@ class Pin(Strict):
             "of the bushing is the force times l, or up to l + z/2"
         ),
     ]
-    d: Annotated[Diameter, described("diameter of the beam")]
+    d: Annotated[units.Diameter, described("diameter of the beam")]
     chi: Annotated[Number, described("shear factor of the section")] = PIN_CHI
-    A: Annotated[Area, follows("pin.A", "area of the section")] = FOLLOWS
-    J: Annotated[AreaMoment, follows("pin.J", "area moment of the section")] = FOLLOWS
-    Jp: Annotated[AreaMoment, follows("pin.Jp", "polar moment of the section")] = FOLLOWS
-    mass: Annotated[Mass, follows("pin.mass", "mass")] = FOLLOWS
+    A: Annotated[units.Area, follows("pin.A", "area of the section")] = FOLLOWS
+    J: Annotated[units.AreaMoment, follows("pin.J", "area moment of the section")] = FOLLOWS
+    Jp: Annotated[units.AreaMoment, follows("pin.Jp", "polar moment of the section")] = FOLLOWS
+    mass: Annotated[units.Mass, follows("pin.mass", "mass")] = FOLLOWS
     inertia: Annotated[Triple, follows("pin.inertia", "moments of inertia about e, t, z", PIN_INERTIA)] = FOLLOWS
 
 
@@ -123,13 +114,13 @@ class Arm(Strict):
     l_f: Annotated[Length, described("length of the beam, from its fork to the hole's centre")]
     width: Annotated[Length | None, described("side of a rectangular section along t", "58 mm")] = None
     depth: Annotated[Length | None, described("side of a rectangular section along e, the hole's axis", "21 mm")] = None
-    d: Annotated[Diameter | None, described("diameter of a round section", "40 mm")] = None
+    d: Annotated[units.Diameter | None, described("diameter of a round section", "40 mm")] = None
     chi: Annotated[Number, follows("arm.chi", "shear factor of the section")] = FOLLOWS
-    A: Annotated[Area, follows("arm.A", "area of the section")] = FOLLOWS
-    Jx: Annotated[AreaMoment, follows("arm.Jx", "area moment about x, the local t")] = FOLLOWS
-    Jy: Annotated[AreaMoment, follows("arm.Jy", "area moment about y, the local e")] = FOLLOWS
-    Jp: Annotated[AreaMoment, follows("arm.Jp", "polar moment of the section")] = FOLLOWS
-    mass: Annotated[Mass, follows("arm.mass", "mass", "0.3516 kg")] = FOLLOWS
+    A: Annotated[units.Area, follows("arm.A", "area of the section")] = FOLLOWS
+    Jx: Annotated[units.AreaMoment, follows("arm.Jx", "area moment about x, the local t")] = FOLLOWS
+    Jy: Annotated[units.AreaMoment, follows("arm.Jy", "area moment about y, the local e")] = FOLLOWS
+    Jp: Annotated[units.AreaMoment, follows("arm.Jp", "polar moment of the section")] = FOLLOWS
+    mass: Annotated[units.Mass, follows("arm.mass", "mass", "0.3516 kg")] = FOLLOWS
     inertia: Annotated[Triple, follows("arm.inertia", "moments of inertia about e, t, z", ARM_INERTIA)] = FOLLOWS
 
     @field_validator("d")
@@ -145,7 +136,7 @@ class Arm(Strict):
 class Hub(Strict):
     """Middle of the cross, to which the four pins are attached."""
 
-    mass: Annotated[Mass, follows("hub.mass", "mass")] = FOLLOWS
+    mass: Annotated[units.Mass, follows("hub.mass", "mass")] = FOLLOWS
     inertia: Annotated[Triple, follows("hub.inertia", "moments of inertia about x, y, z of the cross")] = FOLLOWS
 
 
@@ -159,10 +150,12 @@ class Shaft(Strict):
     A shaft that is not rigid along its axis needs the mass that moves and the damping of its motion.
     """
 
-    Js: Annotated[Inertia, described("inertia of the output shaft about its axis")]
-    mass: Annotated[Mass | None, described("mass that moves along the axis; needed unless `axial` is rigid")] = None
+    Js: Annotated[units.Inertia, described("inertia of the output shaft about its axis")]
+    mass: Annotated[units.Mass | None, described("mass that moves along the axis; needed unless `axial` is rigid")] = (
+        None
+    )
     axial_damping: Annotated[
-        Annotated[units.Damping, NOT_NEGATIVE] | None,
+        units.Damping | None,
         described("damping of the motion along the axis, as by grease; needed unless `axial` is rigid"),
     ] = None
     axial: Annotated[
@@ -212,9 +205,9 @@ class PinBushing(Strict):
     k_x: Annotated[Stiffness, follows("bushing.cross.k_x", "shear along x")] = FOLLOWS
     k_y: Annotated[Stiffness, follows("bushing.cross.k_y", "shear along y")] = FOLLOWS
     k_z: Annotated[Stiffness, follows("bushing.cross.k_z", "tension")] = FOLLOWS
-    k_bx: Annotated[RotaryStiffness, follows("bushing.cross.k_bx", "bending about x")] = FOLLOWS
-    k_by: Annotated[RotaryStiffness, follows("bushing.cross.k_by", "bending about y")] = FOLLOWS
-    k_tz: Annotated[RotaryStiffness, follows("bushing.cross.k_tz", "torsion")] = FOLLOWS
+    k_bx: Annotated[units.RotaryStiffness, follows("bushing.cross.k_bx", "bending about x")] = FOLLOWS
+    k_by: Annotated[units.RotaryStiffness, follows("bushing.cross.k_by", "bending about y")] = FOLLOWS
+    k_tz: Annotated[units.RotaryStiffness, follows("bushing.cross.k_tz", "torsion")] = FOLLOWS
 
 
 class ArmBushing(Strict):
@@ -223,9 +216,9 @@ class ArmBushing(Strict):
     k_x: Annotated[Stiffness, follows("bushing.fork.k_x", "shear along x")] = FOLLOWS
     k_y: Annotated[Stiffness, follows("bushing.fork.k_y", "shear along y")] = FOLLOWS
     k_z: Annotated[Stiffness, follows("bushing.fork.k_z", "tension")] = FOLLOWS
-    k_bx: Annotated[RotaryStiffness, follows("bushing.fork.k_bx", "bending about x")] = FOLLOWS
-    k_by: Annotated[RotaryStiffness, follows("bushing.fork.k_by", "bending about y")] = FOLLOWS
-    k_tz: Annotated[RotaryStiffness, follows("bushing.fork.k_tz", "torsion")] = FOLLOWS
+    k_bx: Annotated[units.RotaryStiffness, follows("bushing.fork.k_bx", "bending about x")] = FOLLOWS
+    k_by: Annotated[units.RotaryStiffness, follows("bushing.fork.k_by", "bending about y")] = FOLLOWS
+    k_tz: Annotated[units.RotaryStiffness, follows("bushing.fork.k_tz", "torsion")] = FOLLOWS
 
 
 class Bushing(Strict):

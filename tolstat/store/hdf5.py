@@ -196,7 +196,7 @@ def text(attrs: h5py.AttributeManager, name: str) -> str:
     return value.decode("utf-8") if isinstance(value, bytes) else str(value)
 
 
-def pick(read: Callable[[slice], NDArray[Any]], slots: NDArray[np.intp]) -> NDArray[Any]:
-    """Read file slots, (m,) and ascending, of a table that is read by slices: one for each block of `TOGETHER`."""
-    runs = np.split(slots, np.flatnonzero(np.diff(slots // TOGETHER)) + 1)
+def pick(read: Callable[[slice], NDArray[Any]], slots: NDArray[np.intp], size: int = TOGETHER) -> NDArray[Any]:
+    """Read file slots, (m,) and ascending, of a table that is read by slices: one for each block of `size` rows."""
+    runs = np.split(slots, np.flatnonzero(np.diff(slots // size)) + 1)
     return np.concatenate([read(slice(int(run[0]), int(run[-1]) + 1))[run - run[0]] for run in runs])

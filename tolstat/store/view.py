@@ -27,9 +27,9 @@ from tolstat.common.draw_records import METHODS
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import ANY_LIMIT, LOADS, SHOWN_LOADS, FloatArray, Limit, split
 from tolstat.common.strict import did_you_mean
-from tolstat.common.tables import ERROR, Status
+from tolstat.common.tables import Status
 from tolstat.store import verification, what_if, worst
-from tolstat.store.hdf5 import BLOCK, store_error
+from tolstat.store.hdf5 import BLOCK, pick, store_error
 from tolstat.store.reader import Reader
 from tolstat.store.recorded import recall
 from tolstat.store.verification import Verification
@@ -325,17 +325,7 @@ class View:
         """
         if not samples.size or samples[-1] < len(self._first_errors):
             return self._first_errors[samples]
-        names = tuple(ERROR.names or ()) if columns is None else tuple(columns)
-        table = np.empty(len(samples), [(name, ERROR[name]) for name in names])
-        for first in range(0, self.n, BLOCK):
-            here = np.flatnonzero((samples >= first) & (samples < first + BLOCK))
-            if here.size:
-                # of a block, only the part that holds the samples is read
-                begin, end = int(samples[here[0]]), int(samples[here[-1]]) + 1
-                block = self._errors(begin, end, names)
-                for name in names:
-                    table[name][here] = block[name][samples[here] - begin]
-        return table
+        return pick(lambda slots: self.store.errors(slots, columns), self.slots(samples), BLOCK)
 
     def error_blocks(self, columns: Sequence[str]) -> Iterator[NDArray[np.void]]:
         """Yield the errors of all samples in consecutive blocks, with at least these columns."""

@@ -13,6 +13,7 @@ from types import NoneType
 from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, GetJsonSchemaHandler, ValidationError
+from pydantic.fields import FieldInfo
 from pydantic_core import CoreSchema, PydanticCustomError
 
 from tolstat.common import json_schema, toml_lines, units
@@ -203,7 +204,8 @@ def _fault(
             found, remedy = (text.replace(f"{{{key}}}", written) for text in (found, remedy))
         return Fault(where, found, remedy)
     if e["type"] == "extra_forbidden":
-        return Fault(where, "unknown key", did_you_mean(str(e["loc"][-1]), _keys_at(model, e["loc"][:-1])))
+        keys = [field.alias or name for name, field in _fields_around(model, e["loc"]).items()]
+        return Fault(where, "unknown key", did_you_mean(str(e["loc"][-1]), keys))
     if e["type"] == "missing":
         return Fault(where, "missing key", f"add {path}" + _example(model, e["loc"], known))
     if e["type"] in ("literal_error", "enum"):
@@ -236,32 +238,25 @@ def did_you_mean(word: str, allowed: Sequence[str]) -> str:
     return f"did you mean {spelt[close[0]]!r}?" if close else f"allowed here: {', '.join(allowed) or 'nothing'}"
 
 
-def _keys_at(model: type[BaseModel], location: Sequence[int | str]) -> list[str]:
-    """Names of the keys that `model` allows at a key path; empty where they are not known."""
-    fields = getattr(_model_at(model, location), "model_fields", {})
-    return [f.alias or name for name, f in fields.items()]
-
-
-def _model_at(model: type[BaseModel], location: Sequence[int | str]) -> Any:
-    """Annotation at a key path of `model`; None where it is not known."""
+def _fields_around(model: type[BaseModel], location: Sequence[int | str]) -> dict[str, FieldInfo]:
+    """Fields of the model around the key at a path of `model`, by name; empty where they are not known."""
     current: Any = model
-    for part in location:
-        fields = getattr(current, "model_fields", None)
+    for part in location[:-1]:
         if isinstance(part, int):
             current = next(iter(get_args(current)), None)
-        elif fields is None or part not in fields:
-            return None
+        elif part not in (fields := getattr(current, "model_fields", {})):
+            return {}
         else:
             current = fields[part].annotation
             if NoneType in get_args(current):  # a key that may be left out
                 current = get_args(current)[0]
-    return current
+    return getattr(current, "model_fields", {})
 
 
 def _example(model: type[BaseModel], location: Sequence[int | str], known: Mapping[str, Any]) -> str:
     """How a file writes the key at a path, as its field has it: `` = "22 mm"``; empty where no example is known."""
-    fields = getattr(_model_at(model, location[:-1]), "model_fields", {})
-    examples = next((field.examples for name, field in fields.items() if location[-1] in (name, field.alias)), None)
+    fields = _fields_around(model, location).items()
+    examples = next((field.examples for name, field in fields if location[-1] in (name, field.alias)), None)
     example = examples[0] if examples else known.get(dotted(location))
     if example is None or isinstance(example, (Mapping, list)):
         return ""

@@ -98,20 +98,16 @@ def _pin_diameter(joint: Any) -> float:
     return float(joint.pin.d if one_left_out else of.D_H - 2.0 * of.clearance)
 
 
-def _hub(joint: Any) -> tuple[float, tuple[float, float, float]] | None:
+def _hub(joint: Any) -> tuple[float | None, tuple[float, ...]]:
+    """Mass and inertia of the hub; None where its pins overlap."""
     if not 2.0 * joint.cross.r_b > joint.pin.d:
-        return None
+        return None, ()
     return material.crossed_cylinders(joint.material.rho, joint.pin.d, 2.0 * joint.cross.r_b)
 
 
-def _hub_mass(joint: Any) -> float | None:
-    hub = _hub(joint)
-    return None if hub is None else hub[0]
-
-
 def _hub_inertia(joint: Any) -> tuple[float, ...] | None:
-    hub = _hub(joint)
-    return None if hub is None else tuple(joint.hub.mass / hub[0] * moment for moment in hub[1])
+    mass, inertia = _hub(joint)
+    return None if mass is None else tuple(joint.hub.mass / mass * moment for moment in inertia)
 
 
 def fitted_load(steel: Any, contact: Any) -> float:
@@ -183,7 +179,7 @@ DERIVED: dict[str, Rule] = {
         "kg*m^2",
     ),
     "cross.r_b": Rule(("cross.R", "pin.l"), "R - pin.l", lambda j: j.cross.R - j.pin.l, "m"),
-    "hub.mass": Rule(("material.rho", "pin.d", "cross.r_b"), _CYLINDERS, _hub_mass, "kg", stays=True),
+    "hub.mass": Rule(("material.rho", "pin.d", "cross.r_b"), _CYLINDERS, lambda j: _hub(j)[0], "kg", stays=True),
     "hub.inertia": Rule(
         ("hub.mass", "pin.d", "cross.r_b"), f"{_CYLINDERS}, of this mass", _hub_inertia, "kg*m^2", stays=True
     ),
@@ -332,9 +328,8 @@ def expected(joint: Any, given: Set[str], changed: Set[str], stay: Set[str]) -> 
         Key to SI value, words that say what gives it, and the key that may be given instead, or nothing.
     """
     disagreeing: dict[str, Any] = {}
-    hub = _hub(joint)
-    if hub is not None and changed & {*DERIVED["hub.mass"].follows, "hub.mass"}:
-        mass, inertia = hub
+    mass, inertia = _hub(joint)
+    if mass is not None and changed & {*DERIVED["hub.mass"].follows, "hub.mass"}:
         ratio = joint.hub.mass / mass if "hub.mass" in changed else 1.0
         values = {"hub.mass": mass, "hub.inertia": tuple(ratio * moment for moment in inertia)}
         disagreeing |= {key: (value, f"{_CYLINDERS}, give", "") for key, value in values.items() if key in stay}

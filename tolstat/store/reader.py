@@ -111,6 +111,7 @@ class Reader:
         """Return the file at one of its operating points; both are closed together. `InputError` if it has no such."""
         only_one(point, list(self.points), str(self.path))
         other = copy(self)
+        other.__dict__.pop("loads", None)  # those that a `ResultFile` keeps are of another point
         other.point = point
         return other
 

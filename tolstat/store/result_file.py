@@ -39,12 +39,6 @@ OPERATING = {
 class ResultFile(Reader):
     """A result file that is open for reading, as `tolstat.open` gives it; close it, or use a ``with`` block."""
 
-    def at(self, point: str) -> ResultFile:
-        """Return the file at one of its operating points; both are closed together."""
-        other = super().at(point)
-        other.__dict__.pop("loads", None)
-        return other
-
     def __repr__(self) -> str:
         if not self.is_open:
             return f"<result file {self.path.name!r}, closed>"

@@ -27,6 +27,7 @@ MAX_FIXED_TEXT = 32_000
 """Largest size of a text stored as an attribute of fixed length, bytes: HDF5 allows some 64 kB."""
 RUN_AGAIN = "run the campaign again: tolstat run STUDY --out OTHER.h5"
 """Remedy for a file that cannot be repaired."""
+DAMAGED = "is damaged or no tolstat result file"
 DAMAGE_ERRORS = (KeyError, ValueError, TypeError, AttributeError, IndexError, RuntimeError, OSError)
 """Exceptions that h5py, or code that relies on what a file states, raises where the file is damaged."""
 
@@ -37,14 +38,14 @@ def store_error(path: Path, found: str, remedy: str) -> StoreError:
 
 
 @contextmanager
-def told_as_damage(path: Path) -> Iterator[None]:
+def told_as_damage(path: Path, found: str = DAMAGED, remedy: str = RUN_AGAIN) -> Iterator[None]:
     """Turn what a damaged file raises into one sentence."""
     try:
         yield
     except StoreError:
         raise
     except DAMAGE_ERRORS as error:
-        raise store_error(path, f"is damaged or no tolstat result file: {error}", RUN_AGAIN) from error
+        raise store_error(path, f"{found}: {error}", remedy) from error
 
 
 def open_hdf5(path: Path, mode: str) -> h5py.File:
@@ -92,7 +93,7 @@ def _not_opened(path: Path, mode: str, error: OSError) -> StoreError:
         return store_error(path, "cannot be opened: no permission", f"change its permissions: chmod u+rw {path}")
     if not h5py.is_hdf5(path):
         return store_error(path, "is not an HDF5 file", "give a result file made by tolstat run")
-    return store_error(path, f"is damaged or no tolstat result file: {error}", RUN_AGAIN)
+    return store_error(path, f"{DAMAGED}: {error}", RUN_AGAIN)
 
 
 def is_at(file: h5py.File, path: Path) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from tolstat.campaign.remedy import remedy
 from tolstat.common import loads
 from tolstat.common.channels import BUSHING_LOADS, SHAFT_LOADS, LoadHistory
 from tolstat.common.errors import Fault, InputError
+from tolstat.common.late import pandas as pd
 from tolstat.common.load_kinds import CONTACTS, PINS
 from tolstat.common.tables import Options, Simulation, Status
 from tolstat.joint import ideal, nominal_errors, perturb
@@ -22,11 +23,7 @@ from tolstat.solver.simulation import simulate_rows
 from tolstat.store import Reader
 from tolstat.store.metadata import differing, versions
 from tolstat.store.recorded import options_of, parameters
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from tolstat.study import Case
+from tolstat.study import Case
 
 
 class CaseResult(NamedTuple):
@@ -98,8 +95,6 @@ class CaseResult(NamedTuple):
         ``input.f_x`` … ``output.m_z`` (force and moment about O on the shafts, N and N m, in axes that do not turn) and
         ``pin1.mode`` …
         """
-        import pandas as pd
-
         histories = {name: values[0] for name, values in self.simulation.histories.items()}
         tau = histories["tau"].astype(float)
         theta = 2 * math.pi * np.arange(len(tau)) / len(tau)

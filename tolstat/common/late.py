@@ -20,8 +20,14 @@ class Late:
 
 
 if TYPE_CHECKING:
+    import pandas as pandas
+    import tomlkit as tomlkit
+    from scipy import integrate as integrate
+    from scipy import interpolate as interpolate
     from scipy import optimize as optimize
     from scipy import special as special
     from scipy import stats as stats
 else:
-    optimize, special, stats = (Late(f"scipy.{name}") for name in ("optimize", "special", "stats"))
+    pandas, tomlkit = Late("pandas"), Late("tomlkit")
+    modules = ("integrate", "interpolate", "optimize", "special", "stats")
+    integrate, interpolate, optimize, special, stats = (Late(f"scipy.{name}") for name in modules)

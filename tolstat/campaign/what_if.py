@@ -128,9 +128,9 @@ class Asked(NamedTuple):
         return tuple(at(load, [point], every) for point in self.points for load in self.loads)
 
 
-def missing(held: Mapping[str, Altered], wanted: Change, names: Sequence[str]) -> range:
-    """Joints of a change that the file lacks; all of them if those held begin later, or lack one of the loads."""
-    altered = held.get(what_if.key(wanted.about))
+def missing(in_file: Mapping[str, Altered], wanted: Change, names: Sequence[str]) -> range:
+    """Joints of a change that the file lacks; all of them if its own begin later, or lack one of the loads."""
+    altered = in_file.get(what_if.key(wanted.about))
     if altered is None or altered.first > wanted.numbers.start or not altered.holds(names):
         return wanted.numbers
     return range(max(altered.end, wanted.numbers.start), max(altered.end, wanted.numbers.stop))
@@ -182,9 +182,9 @@ def simulate(
     dict of str to Altered
         All sets that the file holds.
     """
-    held = what_if.read(store)
+    in_file = what_if.read(store)
     names = asked.names(study)
-    todo = [change._replace(numbers=lacking) for change in wanted if (lacking := missing(held, change, names))]
+    todo = [change._replace(numbers=lacking) for change in wanted if (lacking := missing(in_file, change, names))]
     table = _Table(todo, asked, names)
     every = _blocks(study, options_of(study, store), todo, asked.points)
     done = pool.map_blocks(work_beside(Options()), every, workers, stop)
@@ -196,13 +196,13 @@ def simulate(
                 counts = counts.after(table.put(block, results_of(block, result)))
                 progress(counts)
                 if time.monotonic() - saved > SAVE_S:
-                    what_if.write(store, table.sets(held))
+                    what_if.write(store, table.sets(in_file))
                     saved = time.monotonic()
     finally:
-        new = table.sets(held)
+        new = table.sets(in_file)
         if new:
             what_if.write(store, new)
-    return held | new
+    return in_file | new
 
 
 def check_code(store: Reader) -> None:
@@ -228,8 +228,8 @@ class _Table:
         self.status[index] = results["status"]
         return np.asarray(self.status[index])
 
-    def sets(self, held: Mapping[str, Altered]) -> dict[str, Altered]:
-        """Sets that have grown: of each, the joints before the first that is not done, behind those held."""
+    def sets(self, in_file: Mapping[str, Altered]) -> dict[str, Altered]:
+        """Sets that have grown: of each, the joints before the first that is not done, behind those in the file."""
         grown, begin = {}, 0
         for about, _, _, numbers in self.todo:
             here = slice(begin, begin + len(numbers))
@@ -239,7 +239,7 @@ class _Table:
             if done.stop > done.start:
                 name, states = what_if.key(about), list(self.status[done].T)
                 status = worst_status(states)
-                loads, old = self.loads[done].reshape(-1, len(self.names)), held.get(name)
+                loads, old = self.loads[done].reshape(-1, len(self.names)), in_file.get(name)
                 grown[name] = Altered(about, numbers.start, self.names, loads, status)
                 if old is not None and (old.end, old.names) == (numbers.start, self.names):
                     joined = np.concatenate([old.loads, loads]), np.concatenate([old.status, status])

@@ -228,33 +228,33 @@ DERIVED: dict[str, Rule] = {
 """Keys that follow from others, each after those that it follows from (but for a bearing's)."""
 
 
-def changed(given: Set[str], held: Collection[str]) -> set[str]:
-    """Keys with another value than before when a joint file with the keys `held` is overridden by the keys `given`.
+def changed(given: Set[str], in_file: Collection[str]) -> set[str]:
+    """Keys with another value than before when a joint file with the keys `in_file` is overridden by the keys `given`.
 
     They contain `given`; the others follow from them.
     """
     keys = set(given)
     for key, rule in DERIVED.items():
-        if key not in keys and not (rule.stays and key in held) and keys.intersection(rule.follows):
+        if key not in keys and not (rule.stays and key in in_file) and keys.intersection(rule.follows):
             keys.add(key)
     return keys
 
 
-def replaced(given: Collection[str], held: Collection[str]) -> set[str]:
-    """Keys among `held` that give way to `given` ones of the same bearing or section.
+def replaced(given: Collection[str], in_file: Collection[str]) -> set[str]:
+    """Keys among `in_file` that give way to `given` ones of the same bearing or section.
 
     Of a bearing two of three keys define it; the section of an arm is round or rectangular.
     """
     new = set(given).intersection(BEARING)
     hole, pin, clearance = BEARING
-    third = {clearance: pin, pin: clearance} if hole in held else {hole: clearance}
+    third = {clearance: pin, pin: clearance} if hole in in_file else {hole: clearance}
     away = {third[key] for key in new & third.keys()}
     if len(new) > 1 or (new == {clearance} and "pin.d" in given):
         away = set(BEARING)
     for section, other in ((ROUND, RECTANGULAR), (RECTANGULAR, ROUND)):
         if set(section).intersection(given):
             away.update(other)
-    return (away - set(given)).intersection(held)
+    return (away - set(given)).intersection(in_file)
 
 
 UNITS = {key: rule.unit for key, rule in DERIVED.items()} | {"pin.d": "m"}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
@@ -68,11 +68,11 @@ def load(
         if faults:
             raise InputError(faults)
     merged = leaves(overridden(data, overrides))
-    given, held = leaves(overrides), leaves(data)
-    gone = given.keys() | derived.replaced(given, held)
+    given, in_file = leaves(overrides).keys(), leaves(data)
+    gone = derived.replaced(given, in_file)
     joint.remember(
-        [*_inherited(joint, data, overrides, path), *_lowered(joint, merged.get("contact.fit_load"))],
-        {key: str(held[key]) for key in derived.BEARING if key in held and key in gone},
+        [*_inherited(joint, given, in_file, gone, path), *_lowered(joint, merged.get("contact.fit_load"))],
+        {key: str(in_file[key]) for key in derived.BEARING if key in in_file and key in given | gone},
     )
     return joint
 
@@ -184,16 +184,17 @@ def _attributed(
     return attributed
 
 
-def _inherited(joint: Joint, data: Mapping[str, Any], over: Mapping[str, Any], path: Path) -> Iterator[Fault]:
+def _inherited(
+    joint: Joint, given: Set[str], in_file: Mapping[str, Any], gone: Set[str], path: Path
+) -> Iterator[Fault]:
     """Warn of values of the joint file that an override leaves, although it gives keys that they follow from."""
-    given, held = leaves(over).keys(), leaves(data)
-    changed = derived.changed(given, held)
-    stay = held.keys() - changed - derived.replaced(given, held)
+    changed = derived.changed(given, in_file)
+    stay = in_file.keys() - changed - gone
     for key, (expected, reason, instead) in derived.expected(joint, given, changed, stay).items():
-        D_P = held.get("contact.D_P")
+        D_P = in_file.get("contact.D_P")
         if key == "pin.d" and D_P and math.isclose(units.to_si(D_P, "m", DIAMETER), expected, rel_tol=derived.WIDE):
             continue  # the joint file has pins of two diameters itself
-        inherited, value = _written(held[key], key, held[key]), _written(expected, key, held[key])
+        inherited, value = _written(in_file[key], key, in_file[key]), _written(expected, key, in_file[key])
         remedy = f"give {instead}, from which it follows, or {key}" if instead else f"give {key}, this value or that"
         yield Fault(key, f"{inherited} is inherited from {path.stem}; {reason} {value}", remedy)
 

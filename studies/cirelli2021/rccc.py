@@ -190,7 +190,7 @@ class Revolution(NamedTuple):
         Travel of the kept input pin out of its hole, of the output pin out of its hole (away from O), and of the output
         shaft along its axis away from O, m.
     couple : ndarray, shape (k,)
-        Modulus of the couple that passes through the cross, N m (ideal: `ideal.cross_couple`).
+        Modulus of the couple that passes through the cross, N m (ideal: T / sqrt(1 - (sin(alpha) cos(theta))^2)).
     driving_torque : ndarray, shape (k,)
         Torque that drives the input shaft, N m.
     reactions : ndarray, shape (k, 4, 6)

@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from studies.cirelli2021 import rccc, rccc_statics
 from tests.conftest import REFERENCE
+from tests.support.closed_forms import cross_couple, pin_force
 from tests.support.naive import ARM_AXES, ARM_OF_PIN, PIN_AXES, triad
 from tolstat.joint import Operation, ideal, nominal_errors
 
@@ -269,10 +270,10 @@ def test_no_pose_where_the_spherical_linkage_has_none(cirelli, errors):
 @pytest.mark.parametrize("alpha", [0.0, 15.0, 30.0])
 def test_ideal_joint_passes_the_couple_of_the_closed_form(cirelli, errors, alpha, input_pin, output_pin):
     found = rccc.solve(cirelli, AT, errors(alpha), THETA, input_pin=input_pin, output_pin=output_pin)
-    couple = ideal.cross_couple(THETA, np.radians(alpha), TORQUE)
+    couple = cross_couple(THETA, np.radians(alpha), TORQUE)
     assert_allclose(found.couple, couple, rtol=1e-12)
     shares = found.couple / (2 * cirelli.cross.R)
-    assert_allclose(shares, ideal.pin_force(THETA, np.radians(alpha), TORQUE, cirelli.cross.R), rtol=1e-12)
+    assert_allclose(shares, pin_force(THETA, np.radians(alpha), TORQUE, cirelli.cross.R), rtol=1e-12)
     assert_allclose(found.reactions[..., :3], 0, atol=1e-9)
     about_normal = np.zeros((73, 2, 6))
     about_normal[:, 0, 5], about_normal[:, 1, 5] = couple, -couple

@@ -21,7 +21,7 @@ from tolstat.common.load_kinds import LOAD_KINDS
 from tolstat.common.tables import Method, Options, Simulation, Start, Status, from_names
 from tolstat.questions import accuracy as question
 from tolstat.questions.exceedance.answer import exceedance
-from tolstat.store import ResultFile, Writer, provenance, recorded, verification
+from tolstat.store import ResultFile, Writer, metadata, recorded, verification
 from tolstat.store.verification import Check, Verification
 
 REAL = """
@@ -353,6 +353,6 @@ def test_what_cannot_be_verified_is_exit_code_2(tmp_path, monkeypatch):
     with pytest.raises(InputError, match="at least one"):
         verify.check(written(tmp_path), joints=-1)
     other = synthetic.store(tmp_path, name="other")
-    monkeypatch.setattr(provenance, "source_hash", lambda: "0")
+    monkeypatch.setattr(metadata, "source_hash", lambda: "0")
     with pytest.raises(StoreError, match="was made by another version of the code"):
         verify.check_file(other, 24)

@@ -25,7 +25,7 @@ from tolstat.questions.rare import answer as module
 from tolstat.questions.rare import simulation
 from tolstat.questions.rare.answer import rare, seed_row
 from tolstat.questions.rare.simulation import subset_study
-from tolstat.store import ResultFile, Writer, provenance
+from tolstat.store import ResultFile, Writer, metadata
 from tolstat.store.recorded import recall
 
 SEEDS = 500
@@ -347,7 +347,7 @@ def test_a_file_that_lacks_joints_is_resumed_by_its_own_command(whole):
 @pytest.mark.slow
 def test_a_finished_file_of_other_code_is_shown_and_an_unfinished_one_refused(whole, monkeypatch):
     plan, found, path = whole
-    monkeypatch.setattr(provenance, "source_hash", lambda: "other")
+    monkeypatch.setattr(metadata, "source_hash", lambda: "other")
     assert run_to_end(plan, path) == found
     done = CliRunner().invoke(app, ["rare", str(path)])
     assert done.exit_code == 0, done.stderr

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from tests.conftest import REFERENCE, REFERENCE_CASES, with_law
+from tests.support.closed_forms import pin_force
 from tolstat import joint, study
 from tolstat.campaign import replay
 from tolstat.campaign.remedy import Reason, remedy
@@ -104,12 +105,12 @@ def test_bent_ideal_joint_follows_the_closed_form(params, rpm):
     _, histories = full(par)
     theta = np.linspace(0, 2 * np.pi, 180, endpoint=False)
     outer = par.R[0] + 0.011
-    force = ideal.pin_force(theta, alpha, 100.0, outer)
+    force = pin_force(theta, alpha, 100.0, outer)
     assert force.min() == pytest.approx(596.5, abs=0.1)
     assert force.max() == pytest.approx(596.5 / np.cos(alpha), abs=0.2)
     arms = 2 * (par.arm_mass[0] * par.R[0] ** 2 + par.arm_inertia[0, 2])
     torque = 100.0 + (par.Js[0] + arms) * output_acceleration(theta, alpha, omega)
-    expected = ideal.pin_force(theta, alpha, 1.0, outer) * torque
+    expected = pin_force(theta, alpha, 1.0, outer) * torque
     total = histories["contact"][:, :, RESULTANT]
     np.testing.assert_allclose(total[:, :2].mean(axis=1), expected, rtol=3e-3)
     if rpm < 100:  # without noticeable inertia every pin stays between the bounds

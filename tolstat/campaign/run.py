@@ -29,7 +29,7 @@ from tolstat.solver.compilation import stage_name
 from tolstat.solver.simulation import Histories, history_specs
 from tolstat.store import Reader, Writer, metadata
 from tolstat.store.hdf5 import store_error
-from tolstat.store.provenance import differing_code
+from tolstat.store.metadata import differing_code
 from tolstat.store.recorded import differing_keys, perturbed, settings
 from tolstat.study import Study
 
@@ -235,8 +235,8 @@ def _write_blocks(
         store.at(block.point).write(block.slots, simulation)
         counts = counts.after(simulation.results["status"])
         if trouble:
-            place = f"row {store.rows[block.slots[0]]}" + (f" at {block.point}" if block.point else "")
-            tell(f"{place}: {Status.CRASHED.label}: {trouble}")
+            joint = f"row {store.rows[block.slots[0]]}" + (f" at {block.point}" if block.point else "")
+            tell(f"{joint}: {Status.CRASHED.label}: {trouble}")
         if progress:
             progress(counts)
     return counts
@@ -296,8 +296,8 @@ def _check_same(store: Reader, study: Study, rows: range) -> None:
     if len(differing) == 1 and differing[0].startswith("sampling.n:") and store.whole:
         raise _of_number(store, study.samples)
     if not differing and store.rows != rows:
-        held, asked = (f"{r.start}:{r.stop}" for r in (store.rows, rows))
-        raise store_error(store.path, f"holds rows {held}, not {asked}", f"give --rows {held}")
+        in_file, asked = (f"{r.start}:{r.stop}" for r in (store.rows, rows))
+        raise store_error(store.path, f"holds rows {in_file}, not {asked}", f"give --rows {in_file}")
     if differing:
         raise store_error(store.path, "\n    ".join([found, *differing]), remedy)
 

@@ -5,13 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from tolstat.campaign import run as campaign
 from tolstat.display.progress import Display, silent
-
-if TYPE_CHECKING:
-    from tolstat.study import Study
+from tolstat.study import Study
 
 
 @dataclass(frozen=True)

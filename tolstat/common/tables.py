@@ -15,9 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.fields import Field, dtype_of
+from tolstat.common.fields import PARAM_FIELDS, Field, dtype_of
 from tolstat.common.load_kinds import JOINT, LOAD_KINDS, OVER, PINS
-from tolstat.common.parameters import PARAM_FIELDS
 
 SCHEMA_VERSION = 11
 """Version of the result file: raise it with every change of its layout, and so of the fields of errors and results."""

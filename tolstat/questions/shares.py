@@ -59,6 +59,11 @@ def values(lower: str, upper: str) -> Cell:
     return lambda row: text.span_of(row[lower], row[upper], row["unit"])
 
 
+def above(row: Row) -> str:
+    """Cell of the joints above a limit, and of how many with a valid load."""
+    return f"{row['count']} of {row['n'] - row['n_failed'] - row['n_unsettled']}"
+
+
 def limit(row: Row) -> str:
     """Cell of the ``limit`` of a row; a dash for all limits together."""
     return "-" if row["load"] == ANY_LIMIT else text.value(row["limit"], row["unit"])

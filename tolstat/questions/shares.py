@@ -18,7 +18,7 @@ from tolstat.common.errors import Fault, NotApplicable, StoreError
 from tolstat.common.loads import ANY_LIMIT, FloatArray
 from tolstat.common.tables import Status
 from tolstat.display import text
-from tolstat.display.table import Row
+from tolstat.display.table import Column, Row, has
 from tolstat.store import error_budget, what_if
 from tolstat.store.view import View
 from tolstat.store.what_if import Altered
@@ -57,6 +57,22 @@ def value(key: str) -> Cell:
 def values(lower: str, upper: str) -> Cell:
     """Make a `Column.cell` of an interval of loads, in the row's ``unit``."""
     return lambda row: text.span_of(row[lower], row[upper], row["unit"])
+
+
+def estimated(
+    head: str, name: str, rank: int = 0, form: str = ".1f", ends: tuple[float, float] | None = None
+) -> Column:
+    """Column of an estimate between two `ends`, in per cent unless `form` has two digits, with its interval."""
+    factor = 1.0 if form.endswith("2f") else 100.0
+
+    def cell(row: Row) -> str:
+        if math.isnan(value := row.get(name, math.nan)):
+            return "-"
+        low, high = (factor * row[f"{name}{end}"] for end in ("_lower", "_upper"))
+        value = factor * (value if ends is None else min(max(value, ends[0]), ends[1])) + 0.0  # no -0
+        return f"{value:{form}}" + ("" if math.isnan(low) else f" ({text.ends(low, high, form)})")
+
+    return Column(head, cell, shown=has(name), rank=rank)
 
 
 def above(row: Row) -> str:

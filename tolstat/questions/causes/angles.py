@@ -21,7 +21,6 @@ from tolstat.display import drawing, style
 from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Part, Sentence, Table
 from tolstat.display.options import Load, Opt, Top
 from tolstat.display.text import ends
-from tolstat.questions.causes.indices import scattering
 from tolstat.questions.shares import Cell, check_sample, with_ends, word
 from tolstat.store import revolutions
 from tolstat.store.hdf5 import store_error
@@ -221,7 +220,7 @@ def against_angle(
     nominal, samples = evaluated(view, joints)
     histories = revolutions.read(view.store, np.concatenate([nominal, view.slots(samples)]), loads)
     errors = view.errors(samples, sampling.columns(view.study))
-    components = scattering(sampling.components(view.study, errors))
+    components = {n: x for n, x in sampling.components(view.study, errors).items() if np.ptp(x) > 0}
     x, names, iid = np.column_stack(list(components.values())), list(components), view.design.has_interval("index")
     each = []
     for name in loads:

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from functools import partial
 from shlex import quote
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from tolstat import sampling
+from tolstat.analysis import pick_freeze, ranks, sensitivity
+from tolstat.analysis.sample import Sample
 from tolstat.common.errors import Fault, InputError, NotApplicable, TolstatError
 from tolstat.common.forked import mapped
-from tolstat.common.loads import unit_text
+from tolstat.common.loads import ANY_LIMIT, FloatArray, unit_text
 from tolstat.common.tables import VALID
 from tolstat.display import drawing, style
 from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Part, Row, Rows, Sentence, Table, has
@@ -22,7 +25,6 @@ from tolstat.display.style import patches
 from tolstat.display.text import ends
 from tolstat.questions import shares
 from tolstat.questions.causes import lines
-from tolstat.questions.causes.indices import Indices, estimated, indices
 from tolstat.questions.causes.simulation import simulate as simulate
 from tolstat.store.view import View
 
@@ -32,6 +34,18 @@ SHOWN = 10
 """Number of errors shown for each load on the page."""
 JOINTS = 20_000
 """Maximum number of joints (the first ones) of which the page takes causes: more add little and take memory."""
+MIN_JOINTS = 200
+"""Minimum number of valid joints."""
+MAX_JOINTS = sensitivity.MOST
+"""Maximum number of joints (the first ones) for shares and ranks, and on either side of the tail: more add little, and
+a million joints with fifty errors do not fit into a gigabyte."""
+KINDS = ("first", "total", "srrc", "direction", "size")
+TAIL = KINDS[-2:]
+
+Parts = Mapping[str, NamedTuple]
+"""Estimates of all errors with their ends, by name of `KINDS`."""
+
+
 ALONE, IN_ALL = "alone (first order), 95 %", "in all (bounds of the total index)"
 BARS = (
     "Bars: share of a load's variance that vanishes when the error is removed (first-order index). "
@@ -39,6 +53,42 @@ BARS = (
 )
 GREY = "Grey: share that the error takes part in, alone or with others (bounds of the total index)."
 LOGARITHMS = "Where a few joints with large loads dominate the variance, it is that of the logarithm."
+
+
+class Indices(NamedTuple):
+    """What each error contributes to a load.
+
+    Attributes
+    ----------
+    facts : mapping
+        ``load``, ``unit``, ``logarithm``; ``joints`` (valid), ``used`` (of them for shares and ranks),
+        ``without_load``; ``level`` at which the tail begins, SI: the study's limit or, without one, the 90 % quantile;
+        ``above``: number of joints above it; ``std`` of the load or its logarithm; ``additive``: sum of the
+        first-order indices; ``r2`` of the rank regression, NaN for a pick-freeze design.
+    rows : sequence of mapping
+        One row per error that scatters (two per vector of a zone), the largest first-order index first: ``error``; with
+        ``_lower`` and ``_upper``: ``first``, ``total`` (NaN for correlated errors), ``srrc``, ``direction`` and
+        ``size``; the last two also with ``_p``, and NaN if too few joints are on either side of the level. For a
+        pick-freeze design, one row per group of errors, with ``first`` and ``total`` only.
+    """
+
+    facts: Mapping[str, Any]
+    rows: Rows
+
+    @property
+    def quantity(self) -> str:
+        """Name of the decomposed quantity: the load, or its logarithm."""
+        return f"log {self.facts['load']}" if self.facts["logarithm"] else str(self.facts["load"])
+
+    @property
+    def of_design(self) -> bool:
+        """Whether the joints are a pick-freeze design."""
+        return math.isnan(self.facts["r2"])
+
+    @property
+    def with_intervals(self) -> bool:
+        """Whether the samples are independent."""
+        return not all(math.isnan(row["first_lower"]) for row in self.rows)
 
 
 def causes(view: View, by: Load = None, top: Top = 12, logarithm: bool = False, costs: Costs = None) -> Answer:
@@ -76,7 +126,7 @@ def causes(view: View, by: Load = None, top: Top = 12, logarithm: bool = False, 
     Returns
     -------
     Answer
-        Table ``errors`` and facts, see `indices.indices`. Where the file has joints with other widths, first the tables
+        Table ``errors`` and facts, see `Indices`. Where the file has joints with other widths, first the tables
         of `lines.lines`, and a fact ``lines`` with its facts.
 
     Raises
@@ -158,14 +208,14 @@ def _table(name: str, of_errors: Indices, shown: int) -> Table:
     the larger error (``direction``) and the error farther from the middle (``size``), where ``*`` marks
     p < `SIGNIFICANT`.
     """
-    total = estimated("in all, %", "total", ends=(0.0, 1.0))
+    total = shares.estimated("in all, %", "total", ends=(0.0, 1.0))
     if not of_errors.of_design:  # given data yield bounds only
         total = Column("in all, %", _bounds, shown=_has_narrow_bounds, rank=3)
     columns = [
         Column("error", shares.word("error")),
-        estimated("alone, %", "first", ends=(0.0, 1.0)),
+        shares.estimated("alone, %", "first", ends=(0.0, 1.0)),
         total,
-        estimated("rank coefficient", "srrc", form="+.2f"),
+        shares.estimated("rank coefficient", "srrc", form="+.2f"),
         Column("tail: larger", partial(_tail, name="direction"), shown=has("direction"), rank=2),
         Column("tail: farther out", partial(_tail, name="size"), shown=has("size"), rank=1),
     ]
@@ -237,3 +287,108 @@ def _tornado(of_errors: Indices) -> Panel:
     title, size = f"{of_errors.quantity}: share of the variance by error", (4.9, drawing.rows_height(len(rows)) + 0.25)
     left, key = drawing.rows_left(names), f"tornado-{facts['load']}"
     return Panel(key, title, description, draw, size, left, drawing.legend_room(labels, left))
+
+
+def indices(
+    view: View, by: str, logarithm: bool = False, joints: int | None = None, confidence: float = 0.95
+) -> Indices:
+    """Estimate what each error contributes to a load.
+
+    Parameters
+    ----------
+    view : View
+        A campaign whose joints are drawn from tolerances, all of the same weight.
+    by : str
+        A load that can have a limit (``cross1.F``, ``pin2.contact``, ``psi``).
+    logarithm : bool
+        Decompose the variance of the load's logarithm: for a load whose variance a few joints dominate.
+    joints : int, optional
+        Number of samples to use, from the first; by default all. Of a pick-freeze design all are used.
+    confidence : float
+        Confidence level of all intervals.
+
+    Returns
+    -------
+    Indices
+
+    Raises
+    ------
+    InputError
+        When there is no such load, the study does not keep it, or `logarithm` is set and a value is not positive.
+    StoreError
+        When the file has too few valid joints, or joints that are not drawn from tolerances or differ in weight.
+    """
+    view.check_drawn()
+    view.check("index")
+    load = view.load(by)
+    if joints is not None and not view.study.groups:
+        load = load.only(np.arange(min(joints, view.n)))
+    estimate = _of_design if view.study.groups else _of_samples
+    names, parts, variance = estimate(view, load, logarithm, confidence)
+    first: Any = parts["first"]
+    regression: Any = parts.get("srrc")
+    valid, level = load.valid, shares.tail_level(load)
+    facts = {"load": load.name, "unit": load.unit, "logarithm": logarithm, "joints": valid.size}
+    facts |= {"used": min(valid.size, MAX_JOINTS) if regression else valid.size, "without_load": sum(load.unresolved)}
+    facts |= {"level": level, "above": int((valid > level).sum()), "std": math.sqrt(variance)}
+    facts |= {"additive": float(first.estimate.sum()), "r2": regression.r2 if regression else math.nan}
+    columns: dict[str, Any] = {"error": names}
+    for kind in KINDS:
+        estimates = parts[kind]._asdict() if kind in parts else {}
+        keys = {"": "estimate", "_lower": "lower", "_upper": "upper"} | ({"_p": "p"} if kind in TAIL else {})
+        for end, key in keys.items():
+            columns[f"{kind}{end}"] = np.broadcast_to(estimates.get(key, np.nan), len(names)).tolist()
+    return Indices(facts, sorted(shares.rows_of(columns), key=lambda row: -row["first"]))
+
+
+def _of_samples(view: View, load: Sample, logarithm: bool, confidence: float) -> tuple[list[str], Parts, float]:
+    """Names, estimates and variance from joints that are all drawn from the same tolerances."""
+    study, independent = view.study, view.design.has_interval("index")
+    samples = np.flatnonzero(load.is_valid)
+    values = load.values[samples]
+    needed = max(MIN_JOINTS, len(sampling.streams(study)) + 2 * ranks.GROUPS)
+    if values.size < needed:
+        what = "load on all limits" if load.name == ANY_LIMIT else load.name
+        raise shares.unusable(view, f"has {values.size} joints with a valid {what}", f"run {needed} joints or more")
+    if np.ptp(values) == 0:
+        same = f"has the same {load.name} in all joints: no error causes it"
+        raise shares.unusable(view, same, "name another load with --by")
+    columns = sampling.columns(study)
+    components = sampling.components(study, view.errors(samples[:MAX_JOINTS], columns))
+    names = [name for name, values_of_error in components.items() if np.ptp(values_of_error) > 0]
+    x = np.column_stack([components[name] for name in names])
+    response = (_logarithm(load.name, values) if logarithm else values)[:MAX_JOINTS]
+    parts: dict[str, NamedTuple] = {"srrc": ranks.regression(x, values[:MAX_JOINTS], confidence, independent)}
+    if study.copula.names or study.sampling.is_matched:
+        first = sensitivity.first_order(x, response, confidence, independent)
+    else:
+        first, parts["total"] = sensitivity.first_and_total(x, response, confidence, independent)
+    above = values > shares.tail_level(load)
+    if ranks.FEWEST <= above.sum() <= above.size - ranks.FEWEST:
+        chosen = np.sort(np.concatenate([np.flatnonzero(side)[:MAX_JOINTS] for side in (above, ~above)]))
+        scores = sampling.normal_scores(study, view.errors(samples[chosen], columns))
+        z = np.column_stack([scores[name] for name in names])
+        parts |= ranks.tail(z, above[chosen], confidence, independent)._asdict()
+    return names, parts | {"first": first}, float(first.variance)
+
+
+def _of_design(view: View, load: Sample, logarithm: bool, confidence: float) -> tuple[list[str], Parts, float]:
+    """Names of groups, their Sobol' indices and variance from a pick-freeze design."""
+    groups = view.study.groups
+    if not view.store.whole:
+        raise shares.unusable(view, "holds a slice of a design", "merge all slices first: tolstat merge")
+    values = _logarithm(load.name, load.values) if logarithm else load.values
+    points = values.reshape(-1, len(groups) + 2)
+    try:
+        index = pick_freeze.indices(points[:, 0], points[:, 1], points[:, 2:], confidence)
+    except ValueError as error:
+        remedy = f"run {pick_freeze.FEWEST} points or more; decompose the logarithm of a load with a long tail"
+        raise shares.unusable(view, str(error), remedy) from error
+    return [group.label for group in groups], {"first": index.first, "total": index.total}, float(index.variance)
+
+
+def _logarithm(name: str, values: FloatArray) -> FloatArray:
+    if np.nanmin(values, initial=np.inf) <= 0:
+        remedy = "decompose the variance of the load itself, not of its logarithm"
+        raise InputError([Fault(name, "is not positive in all joints", remedy)])
+    return np.asarray(np.log(values))

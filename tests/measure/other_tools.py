@@ -22,8 +22,8 @@ from tests.support.environment import ROOT
 from tolstat.analysis import binomial
 from tolstat.campaign.work import Work
 from tolstat.display.progress import silent
+from tolstat.questions import rare
 from tolstat.questions.causes import errors as causes
-from tolstat.questions.rare import simulation as rare
 from tolstat.study import Study, load
 
 MAIN = ROOT / "studies" / "iso2768_f.toml"

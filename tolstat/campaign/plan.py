@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.analysis import binomial
-from tolstat.analysis.independent import Independent
+from tolstat.analysis.design import Independent
 from tolstat.analysis.sample import Sample
 from tolstat.campaign import checks, verify
 from tolstat.campaign.run import choose_fidelity

@@ -10,7 +10,7 @@ from typing import Any
 
 import typer
 
-from tolstat.analysis.listed import without_interval
+from tolstat.analysis.design import without_interval
 from tolstat.campaign import run as campaign
 from tolstat.campaign.pool import WorkerDied
 from tolstat.campaign.work import Work

@@ -20,7 +20,6 @@ from tolstat.questions.assumptions.answer import bars
 from tolstat.questions.assumptions.variations import applicable
 from tolstat.questions.drawings.answer import place_of
 from tolstat.questions.exceedance import rows as exceedance
-from tolstat.questions.exceedance.answer import above
 from tolstat.questions.exceedance.rows import ends, share_of
 from tolstat.report.headline import headline, life_verdicts, tells_yield
 from tolstat.store.view import View
@@ -105,7 +104,7 @@ def _cards(view: View, found: Verdict | None) -> list[Card]:
         label = f"exceed {text.value(worst['level'], worst['unit'])} on {worst['load']}, the limit exceeded most"
         low, high = ends(worst)
         interval = "no interval" if np.isnan(low) else f"total interval {text.span(low, high)}"
-        cards.append(Card(share_of(worst), label, f"{above(worst)} joints with a valid load; {interval}"))
+        cards.append(Card(share_of(worst), label, f"{shares.above(worst)} joints with a valid load; {interval}"))
     return [*cards, *_basis(view)]
 
 

@@ -6,24 +6,22 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
-from tolstat.analysis.listed import without_interval
-from tolstat.campaign import run as campaign
-from tolstat.campaign.pool import WorkerDied
-from tolstat.campaign.work import Work
+from tolstat.cli._library import campaigns, compilation, listed, mounting, plausible, pool, works
 from tolstat.cli._talk import fail, progress, say, warn
 from tolstat.common.errors import Fault
-from tolstat.common.tables import Variant
-from tolstat.joint import Joint
-from tolstat.solver import compilation
-from tolstat.study import Study, mounting, plausible
+
+if TYPE_CHECKING:
+    from tolstat.common.tables import Variant
+    from tolstat.joint import Joint
+    from tolstat.study import Study
 
 
 @contextmanager
-def work(**settings: Any) -> Iterator[Work]:
+def work(**settings: Any) -> Iterator[works.Work]:
     """Work of one command with progress on standard error; `settings` are fields of `Work`.
 
     A simulation that is stopped, or loses its workers, says how far it came and ends with the exit code of that.
@@ -31,11 +29,11 @@ def work(**settings: Any) -> Iterator[Work]:
     compilation.announce()
     try:
         with progress() as shown:
-            yield Work(display=shown, tell=say, **settings)
-    except campaign.Interrupted as stop:
+            yield works.Work(display=shown, tell=say, **settings)
+    except campaigns.Interrupted as stop:
         fail(str(stop))
         raise typer.Exit(stop.exit_code) from stop
-    except WorkerDied as error:
+    except pool.WorkerDied as error:
         fail(f"error: {error}")
         raise typer.Exit(1) from error
 
@@ -46,11 +44,11 @@ def print_warnings(path: Path, joints: Iterable[Joint], variants: Iterable[Varia
     Of several joints with a warning about the same key the first is printed, and how many others there are.
     """
     places = [f"variant {variant.family!r}: joint" for variant in variants] or ["joint"]
-    found: dict[str, list[Fault]] = {}
+    faults: dict[str, list[Fault]] = {}
     for place, joint in zip(places, joints, strict=True):
         for fault in joint.warnings():
-            found.setdefault(fault.place, []).append(replace(fault, place=f"{place}.{fault.place}"))
-    for first, *others in found.values():
+            faults.setdefault(fault.place, []).append(replace(fault, place=f"{place}.{fault.place}"))
+    for first, *others in faults.values():
         more = f" (and {len(others)} more joints)" if others else ""
         warn(f"warning: {path}: {replace(first, found=first.found + more)}")
 
@@ -70,5 +68,5 @@ def print_study_notes(path: Path, study: Study) -> None:
     print_warnings(path, study.joints, study.variants)
     for fault in plausible.warnings(study):
         warn(f"warning: {fault}")
-    if not study.sampling.has_replicates and (reason := without_interval(study.sampling.method)):
+    if not study.sampling.has_replicates and (reason := listed.without_interval(study.sampling.method)):
         warn(f"warning: {reason}")

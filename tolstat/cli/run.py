@@ -7,30 +7,35 @@ from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from shlex import quote
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from tolstat import study
-from tolstat.campaign import extend as growth
-from tolstat.campaign import plan as plans
-from tolstat.campaign import run as campaign
-from tolstat.campaign import stop_rule
-from tolstat.campaign.remedy import parse_retry, reasons
-from tolstat.cli._output import print_json, show
+from tolstat.cli._library import (
+    assumptions,
+    campaigns,
+    compilation,
+    growth,
+    joints,
+    plans,
+    remedies,
+    reports,
+    rewriting,
+    stop_rule,
+    stores,
+    strict,
+    studies,
+    tables,
+)
+from tolstat.cli._output import deliver, print_json
 from tolstat.cli._talk import progress, say, wrapped
 from tolstat.cli._work import print_study_notes, work
-from tolstat.common import strict
 from tolstat.common.errors import Fault, InputError, gather
 from tolstat.common.files import check_target
-from tolstat.display import table
 from tolstat.display.options import AsJson, Joints, Opt, OtherStudy, Report, ResultPath, StudyPath, Wide, Workers
-from tolstat.questions.joints import CORRELATED, ENTRIES
-from tolstat.report import answer as reports
-from tolstat.solver import compilation
-from tolstat.store import ResultFile
-from tolstat.study import Study, rewriting
-from tolstat.study.assumptions import unselected
+
+if TYPE_CHECKING:
+    from tolstat.study import Study
 
 
 def plan(
@@ -38,7 +43,7 @@ def plan(
     *,
     n: Joints = None,
     workers: Workers = None,
-    pilot: Annotated[int, Opt("K", least=1)] = plans.PILOT,
+    pilot: Annotated[int | None, Opt("K", least=1)] = None,
     as_json: AsJson = False,
 ) -> None:
     """Predict time, memory and precision of a campaign.
@@ -52,21 +57,21 @@ def plan(
 
     Parameters
     ----------
-    pilot : int
-        Number of joints simulated for the prediction.
+    pilot : int, optional
+        Number of joints simulated for the prediction; default: 128, fewer if they take more than 20 s.
     """
-    loaded = study.load(study_file, n=n)
+    loaded = studies.load(study_file, n=n)
     print_study_notes(study_file, loaded)
     compilation.announce()
     with progress() as shown:
-        made = plans.plan(loaded, workers, pilot, shown.stage)
+        made = plans.plan(loaded, workers, pilot or plans.PILOT, shown.stage)
     if as_json:
         print_json(asdict(made) | {"seconds": made.seconds})
     else:
         typer.echo(wrapped("\n".join(_lines(made))))
-        for columns, rows in ((ENTRIES, made.tolerances), (CORRELATED, made.correlations)):
+        for columns, rows in ((joints.ENTRIES, made.tolerances), (joints.CORRELATED, made.correlations)):
             if rows:
-                typer.echo(f"\n{table.as_text(columns, rows)}")
+                typer.echo(f"\n{tables.as_text(columns, rows)}")
     say(f"next: tolstat run {quote(str(study_file))}" + ("" if n is None else f" --n {n}"))
 
 
@@ -138,12 +143,12 @@ def run(
         check_target(path)  # now, not when the pictures of the report are written
     with gather(faults):
         text = rewriting.with_settings(strict.read_text(study_file), changes) if changes else None
-        plan = study.load(study_file, n=n, text=text)
-        again = None if retry is None else parse_retry(retry, retried, plan)
+        plan = studies.load(study_file, n=n, text=text)
+        again = None if retry is None else remedies.parse_retry(retry, retried, plan)
     if faults:
         raise InputError(faults)
     print_study_notes(study_file, plan)
-    if exact := unselected(plan):
+    if exact := assumptions.unselected(plan):
         say(f"no tolerance, taken as exact: {', '.join(exact)}")
     where = {"workers": workers, "executor": executor, "scheduler": scheduler}
     simulate(plan, path, until=until, check=verify, rows=part, retry=again, **where)
@@ -230,7 +235,7 @@ def simulate(plan: Study, path: Path, until: str | None = None, **choices: Any) 
     outcome = None
     with work() as running:
         shown = running.display
-        run = partial(campaign.run, plan, path, progress=shown, tell=say, stage=shown.stage, **choices)
+        run = partial(campaigns.run, plan, path, progress=shown, tell=say, stage=shown.stage, **choices)
         if until is None:
             counts = run()
         else:
@@ -247,7 +252,7 @@ def simulate(plan: Study, path: Path, until: str | None = None, **choices: Any) 
             f"share above {look.estimate:.5f}{biased}; "
             "shares and intervals in the report are not corrected for the stop"
         )
-        with ResultFile.open(path) as store:
+        with stores.ResultFile.open(path) as store:
             counts = store.counts()
     say(f"{path}: {counts.done} {counts.counted}, {counts.shortfall}")
 
@@ -257,16 +262,16 @@ def conclude(path: Path, report: bool, wide: bool, study_file: str = "STUDY") ->
 
     `study_file` is the study file as the user gave it, with its settings.
     """
-    with ResultFile.open(path) as store:
+    with stores.ResultFile.open(path) as store:
         if report:
             with progress("report") as shown:
                 answer = reports.report(store.view())
                 shown.stage("files")
                 files = reports.write(answer, path)
-            show(answer, wide)
+            deliver(answer, wide)
             for file in files:
                 say(f"wrote {file}")
-        without_load = reasons(store, {one.point or "": one.status() for one in store.each()})
+        without_load = remedies.reasons(store, {one.point or "": one.status() for one in store.each()})
         for reason in without_load:
             say(reason.text)
         for options in dict.fromkeys(reason.retry for reason in without_load if reason.retry):

@@ -1,4 +1,4 @@
-"""Modules of other packages, imported when first used: `scipy.special` takes longer to import than tolstat."""
+"""Modules of other packages that few commands need or that import slowly, imported when first used."""
 
 from __future__ import annotations
 
@@ -20,8 +20,12 @@ class Late:
 
 
 if TYPE_CHECKING:
+    import tomlkit as tomlkit
+    import tomlkit.exceptions
+    import tomlkit.items
     from scipy import optimize as optimize
     from scipy import special as special
     from scipy import stats as stats
 else:
+    tomlkit = Late("tomlkit")
     optimize, special, stats = (Late(f"scipy.{name}") for name in ("optimize", "special", "stats"))

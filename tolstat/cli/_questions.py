@@ -23,8 +23,7 @@ from tolstat.common.files import check_target
 from tolstat.display import options
 from tolstat.questions import Question
 from tolstat.store import ResultFile, View
-from tolstat.study import Study
-from tolstat.study.points import names_of
+from tolstat.study import Study, points
 
 READS: dict[str, dict[str, Any]] = {
     "view": {"file": options.ResultPath},
@@ -140,7 +139,7 @@ def _simulated(asked: _Asked, source: Path, given: dict[str, Any]) -> list[Path]
     what: Any = source
     if is_study:
         what = study.load(source)
-        names_of(point, [own.name for own in what.points], str(source))
+        points.names_of(point, [own.name for own in what.points], str(source))
     settings = {"workers": given["workers"], "folder": folder, "study_file": given.get("study_file"), "point": point}
     with work(**settings) as running:
         return asked.simulate(what, running, **{p.name: given[p.name] for p in asked.simulated})  # type: ignore[misc]

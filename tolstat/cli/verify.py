@@ -8,8 +8,7 @@ from typing import Annotated
 from tolstat.cli._library import accuracy, answers, checks, numerical
 from tolstat.cli._output import deliver
 from tolstat.cli._talk import progress, say
-from tolstat.common.cores import available_cores
-from tolstat.common.files import atomic_write
+from tolstat.common import cores, files
 from tolstat.display.options import AsJson, Opt, Wide, Workers
 
 
@@ -50,7 +49,7 @@ def verify(
         Write the errors of each joint, check and load as CSV.
     """
     with progress("checks, then tight references") as shown:
-        count = workers or available_cores()
+        count = workers or cores.available_cores()
         if near is None:
             verification = checks.check(what, joints or 24, seed, count, progress=shown)
         else:
@@ -68,6 +67,6 @@ def verify(
     if out is not None:
         import pandas as pd
 
-        with atomic_write(out) as temporary:
+        with files.atomic_write(out) as temporary:
             pd.DataFrame(accuracy.joint_rows(verification)).to_csv(temporary, index=False, lineterminator="\n")
         say(f"wrote {out}")

@@ -14,9 +14,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from tolstat.common.errors import TolstatError
-from tolstat.display import drawing, style, text
+from tolstat.display import drawing, progress, style, text
 from tolstat.display.blocks import Artist, Axes, Block, Facts, Figure, Listing, Panel, Panels, Reader, Text
-from tolstat.display.progress import Tell, silent
 from tolstat.display.table import Column, Row, Rows, as_block, by_share, has, has_unresolved, of_shares, plain
 
 if TYPE_CHECKING:
@@ -220,7 +219,7 @@ class Asked:
     accepted: float = math.nan
     replay: int = 0
     notes: list[str] = field(default_factory=list)
-    stage: Tell = silent
+    stage: progress.Tell = progress.silent
     processes: int = 1
 
     @contextmanager

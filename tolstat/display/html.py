@@ -17,9 +17,8 @@ from markupsafe import Markup
 import tolstat
 from tolstat.common.files import atomic_write
 from tolstat.common.forked import mapped
-from tolstat.display import drawing, style
+from tolstat.display import drawing, style, unseen
 from tolstat.display.blocks import Block, Decision, Page, Panel, Panels
-from tolstat.display.unseen import visible
 
 TEMPLATES = Path(__file__).parent / "templates"
 
@@ -80,7 +79,7 @@ def _data(value: Any) -> Markup:
 
 
 def _shown(value: Any) -> Any:
-    return visible(value) if isinstance(value, str) and not isinstance(value, Markup) else value
+    return unseen.visible(value) if isinstance(value, str) and not isinstance(value, Markup) else value
 
 
 POLICY = (

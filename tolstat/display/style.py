@@ -11,10 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tolstat.common import load_kinds, loads
 from tolstat.common.files import atomic_write
 from tolstat.common.late import Late
-from tolstat.common.load_kinds import Kind
-from tolstat.common.loads import PANELS, QUANTITY
 
 if TYPE_CHECKING:
     import matplotlib.figure
@@ -120,7 +119,7 @@ def new_figure(**look: Any) -> Figure:
     return matplotlib.figure.Figure(**look)
 
 
-def panels(title: str, subtitle: str) -> tuple[Figure, list[tuple[str, Kind, Axes]]]:
+def panels(title: str, subtitle: str) -> tuple[Figure, list[tuple[str, load_kinds.Kind, Axes]]]:
     """Make a page of four panels: force and bending moment of the cross bushings above those of the fork bushings.
 
     Parameters
@@ -140,9 +139,9 @@ def panels(title: str, subtitle: str) -> tuple[Figure, list[tuple[str, Kind, Axe
     figure.subplots_adjust(left=0.085, right=0.975, top=0.82, bottom=0.125, hspace=0.42, wspace=0.16)
     figure.text(0.02, 0.972, title, fontsize=15, fontweight="bold", va="top")
     figure.text(0.02, 0.932, subtitle, fontsize=9.5, color="#444444", va="top", linespacing=1.45)
-    for (group, kind), ax in zip(PANELS, axes, strict=True):
-        ax.set_title(f"{group.capitalize()} bushings, {QUANTITY[kind.unit]}", pad=21)
-    return figure, [(group, kind, ax) for (group, kind), ax in zip(PANELS, axes, strict=True)]
+    for (group, kind), ax in zip(loads.PANELS, axes, strict=True):
+        ax.set_title(f"{group.capitalize()} bushings, {loads.QUANTITY[kind.unit]}", pad=21)
+    return figure, [(group, kind, ax) for (group, kind), ax in zip(loads.PANELS, axes, strict=True)]
 
 
 def share_axis(ax: Axes, low: float, which: str = "y", high: float = 1.0) -> None:

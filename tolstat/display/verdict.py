@@ -6,8 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
-from tolstat.display import text
-from tolstat.display.table import Row
+from tolstat.display import table, text
 
 WORDS = {
     "yes": "kept",
@@ -79,7 +78,7 @@ class Verdict(NamedTuple):
 def on_share(
     about: str,
     what: str,
-    row: Row,
+    row: table.Row,
     ends: tuple[float, float],
     accepted: float,
     needed: Callable[[float], float],

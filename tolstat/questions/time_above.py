@@ -14,10 +14,9 @@ from numpy.typing import NDArray
 from tolstat.analysis import binomial, cycles
 from tolstat.analysis.design import Design
 from tolstat.analysis.sample import CONFIDENCE, Sample
-from tolstat.common.channels import CHANNELS, histories_of
+from tolstat.common import channels, strict
 from tolstat.common.errors import Fault, InputError, gather
 from tolstat.common.loads import FloatArray
-from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import Status
 from tolstat.display import drawing, text
 from tolstat.display.answer import Answer, Axes, Column, Panel, Panels, Part, Row, Rows, Sentence, Table
@@ -118,15 +117,15 @@ def time_above(
 
 def _levels(view: View, by: Sequence[str], levels: Sequence[str]) -> dict[str, FloatArray]:
     """Levels of each load that is asked for, SI."""
-    names = list(by) or [name for name in view.limits if name in CHANNELS]
+    names = list(by) or [name for name in view.limits if name in channels.CHANNELS]
     faults = [
-        Fault("--by", f"{name!r} is no load over the input angle", did_you_mean(name, list(CHANNELS)))
+        Fault("--by", f"{name!r} is no load over the input angle", strict.did_you_mean(name, list(channels.CHANNELS)))
         for name in names
-        if name not in CHANNELS
+        if name not in channels.CHANNELS
     ]
     if not names:
         faults.append(Fault("--by", "the study limits no load over the input angle", "name one: --by cross1.F"))
-    units = {name: CHANNELS[name].unit for name in names if name in CHANNELS}
+    units = {name: channels.CHANNELS[name].unit for name in names if name in channels.CHANNELS}
     given: dict[str, list[float]] = {unit: [] for unit in units.values()}
     for level in levels if given else ():
         with gather(faults):
@@ -160,9 +159,9 @@ def _rows(
     ends = dict.fromkeys(levels, (np.inf, -np.inf))
     slots, design = view.slots(samples), view.design.only(samples)
     for part in revolutions.blocks(len(slots)):
-        loads = revolutions.loads(view.store, slots[part], histories_of(levels))
+        loads = revolutions.loads(view.store, slots[part], channels.histories_of(levels))
         for name, own in levels.items():
-            load = CHANNELS[name].of(loads)
+            load = channels.CHANNELS[name].of(loads)
             ends[name] = min(ends[name][0], float(load.min())), max(ends[name][1], float(load.max()))
             for k, level in enumerate(own):
                 times[name][part, k] = cycles.share_of_revolution_above(load, float(level))
@@ -173,7 +172,7 @@ def _row(name: str, level: float, time: FloatArray, design: Design) -> Row:
     """Share of the joints above a level, and their time above it, a share of a revolution, (m,)."""
     sample = Sample.of(time, np.full(time.size, Status.OK), design)
     above, known = sample.above(0.0, CONFIDENCE), design.has_interval("mean")
-    row = {"load": name, "unit": CHANNELS[name].unit, "level": float(level)}
+    row = {"load": name, "unit": channels.CHANNELS[name].unit, "level": float(level)}
     row |= with_ends("joints_above", (above.estimate, above.lower, above.upper))
     # a variable in [0, 1] has at most the variance of a Bernoulli variable with the same mean
     mean = binomial.clopper_pearson(time.sum(), time.size, CONFIDENCE) if known else (np.nan, np.nan)

@@ -13,15 +13,13 @@ from tolstat import questions
 from tolstat.campaign.stop_rule import BIASED
 from tolstat.common.errors import Fault, InputError, StoreError
 from tolstat.common.tables import Status
-from tolstat.display import text
+from tolstat.display import progress, text
 from tolstat.display.answer import Answer, Figure, Part, Sentence, Sheet, Table
-from tolstat.display.progress import silent
 from tolstat.joint.sections import mounting_and_law
 from tolstat.questions import accuracy, shares
 from tolstat.questions.cases import cases
 from tolstat.questions.exceedance import answer as exceedance
-from tolstat.questions.exceedance import curves
-from tolstat.questions.exceedance.rows import curve_rows, not_kept
+from tolstat.questions.exceedance import curves, rows
 from tolstat.questions.sweep import sweep
 from tolstat.report.headline import headline, life_verdicts, tells_yield
 from tolstat.solver import fidelity
@@ -106,7 +104,7 @@ def write(
     path: Path,
     out_dir: str | Path | None = None,
     point: str = "",
-    stage: Callable[[str], None] = silent,
+    stage: Callable[[str], None] = progress.silent,
 ) -> list[Path]:
     """Write the files of a report beside the result file `path`, or to a folder; see `write_report`."""
     folder = path.parent if out_dir is None else Path(out_dir)
@@ -126,7 +124,7 @@ def _tables(view: View, accepted: float) -> Iterator[Part]:
     if not view.shown_loads:
         yield Sentence("no largest load is kept; the results that are: tolstat export", "lead")
     for table in exceedance.quantile_tables(view):
-        yield Table("exceedance", "Exceedance curves", (), curve_rows(view))
+        yield Table("exceedance", "Exceedance curves", (), rows.curve_rows(view))
         yield replace(table, columns=()) if view.limits else table
     yield from exceedance.limit_tables(view, accepted)
 
@@ -154,7 +152,7 @@ def _notes(view: View) -> Iterator[Part]:
 def _run(view: View) -> Iterator[Part]:
     """Restrictions that come from how the campaign was run."""
     store = view.store
-    missing = "" if store.case_names else not_kept(view)
+    missing = "" if store.case_names else rows.not_kept(view)
     for note in (missing, stopped(view), fidelity.sentence(store.options, store.fidelity)):
         if note:
             yield Sentence(note)

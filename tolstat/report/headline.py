@@ -23,8 +23,7 @@ from tolstat.questions.causes import lines
 from tolstat.questions.exceedance import rows as exceedance
 from tolstat.questions.exceedance.rows import ends, share_of, unresolved_matter, verdict
 from tolstat.questions.fatigue import answer as fatigue
-from tolstat.store import known_parts
-from tolstat.store.points import point_of
+from tolstat.store import known_parts, points
 from tolstat.store.view import View
 
 
@@ -178,7 +177,7 @@ def _limit(view: View, row: Row) -> str:
     """Limit in words: ``1500 N on cross1.F (most often at start)`` where it holds at several operating points."""
     said = f"{text.value(row['level'], row['unit'])} on {row['load']}"
     several = row["count"] and len(view.narrowed(row["load"])[0].points) > 1
-    return f"{said} (most often at {point_of(view, row['load'])})" if several else said
+    return f"{said} (most often at {points.point_of(view, row['load'])})" if several else said
 
 
 def _most_often(view: View, records: Sequence[Row], worst: Row) -> str:

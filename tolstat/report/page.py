@@ -10,30 +10,23 @@ from typing import Any
 import numpy as np
 
 from tolstat import questions
-from tolstat.common import notation, units
+from tolstat.common import notation, strict, units
 from tolstat.common.errors import Fault, NotApplicable, StoreError, TolstatError
-from tolstat.common.strict import validate
 from tolstat.common.tables import SCHEMA_VERSION
-from tolstat.display import text
+from tolstat.display import progress, text
 from tolstat.display.answer import Asked
 from tolstat.display.blocks import Facts, Listing, Page, Panels, Section, Text
-from tolstat.display.progress import silent
-from tolstat.display.text import capital, sentence
-from tolstat.joint import Joint, load
-from tolstat.joint.derived import DERIVED, UNITS
-from tolstat.joint.model import TOLD
+from tolstat.joint import Joint, derived, load, model
 from tolstat.joint.overrides import leaves
 from tolstat.joint.reading import DEFAULT_JOINT, examples
 from tolstat.joint.sections import mounting_and_law, quantities
 from tolstat.questions.assumptions.variations import AXIAL, LAW
-from tolstat.questions.causes import worst
-from tolstat.questions.causes.lines import lines_on_page
+from tolstat.questions.causes import lines, worst
 from tolstat.report import verdict
 from tolstat.report.answer import stopped
 from tolstat.solver import fidelity
 from tolstat.store import Reader, recorded, viewed
 from tolstat.store.points import point_of
-from tolstat.store.recorded import joint_of
 from tolstat.store.view import View
 from tolstat.study.assumptions import assumptions, unselected
 
@@ -46,7 +39,7 @@ def write_page(
     out: str | Path,
     accepted: float = np.nan,
     replay: int = REPLAYED,
-    stage: Callable[[str], None] = silent,
+    stage: Callable[[str], None] = progress.silent,
     point: str = "",
     processes: int = 1,
     full: bool = False,
@@ -130,7 +123,7 @@ def compose_brief(view: View, asked: Asked) -> Page:
     asked.notes.extend(_notes(view))
     sections = [verdict.section(view, asked)]
     with asked.noting("nothing on the lines of the drawing"), suppress(NotApplicable):
-        answer = lines_on_page(view, asked)
+        answer = lines.lines_on_page(view, asked)
         blocks = [block for block in answer.blocks() if isinstance(block, Text | Panels)]
         sections.append(Section("lines", answer.title, blocks[:2]))
     return _page(view, sections)
@@ -142,10 +135,10 @@ def _page(
     store = view.store
     return Page(
         view.name,
-        joint_of(store, 0).description,
+        recorded.joint_of(store, 0).description,
         scene(view),
         sections,
-        f"{sentence(view.head())} Sampling {store.sampling['method']}, seed {store.sampling['seed']}; "
+        f"{text.sentence(view.head())} Sampling {store.sampling['method']}, seed {store.sampling['seed']}; "
         f"begun {store.created}; tolstat {store.versions.get('tolstat', 'of unknown version')}; "
         f"result file {view.path.name}.",
         listings,
@@ -203,7 +196,7 @@ def scene(view: View) -> tuple[str, str]:
     of_bearing = assumed is not None and any(key.startswith("bearing.") for key in assumed)
     first = f"{at}{_mark(assumed, False)}; {bearing}{_mark(assumed, of_bearing)}."
     second = f"{mounting}{_mark(assumed, AXIAL in (assumed or ()))}; {law}{_mark(assumed, LAW in (assumed or ()))}."
-    return capital(first), capital(second)
+    return text.capital(first), text.capital(second)
 
 
 def exact(view: View) -> str:
@@ -218,7 +211,7 @@ def _mark(assumed: set[str] | None, is_assumed: bool) -> str:
     return "" if assumed is None else " (assumed)" if is_assumed else " (given)"
 
 
-UNIT = UNITS | quantities(Joint)
+UNIT = derived.UNITS | quantities(Joint)
 DIGITS = 5
 
 
@@ -230,12 +223,12 @@ def joint_values(store: Reader) -> Listing:
     InputError
         When this version cannot read the joint in the file.
     """
-    joint = validate(Joint, store.joint, f"{store.path}: joint")
+    joint = strict.validate(Joint, store.joint, f"{store.path}: joint")
     given, own, default = leaves(joint.given()), _values(joint), _values(load(DEFAULT_JOINT, {}, DEFAULT_JOINT))
     rows = [
-        (key, value, default.get(key, "-"), "given" if key in given else DERIVED[key].formula)
+        (key, value, default.get(key, "-"), "given" if key in given else derived.DERIVED[key].formula)
         for key, value in own.items()
-        if value != default.get(key) and (key in given or key in DERIVED)
+        if value != default.get(key) and (key in given or key in derived.DERIVED)
     ]
     title = f"The joint: values that differ from {DEFAULT_JOINT}"
     if not rows:
@@ -245,7 +238,7 @@ def joint_values(store: Reader) -> Listing:
 
 def _values(joint: Joint) -> dict[str, str]:
     """Values by dotted key, in the unit in which a joint file has them."""
-    found = leaves(joint.model_dump(exclude=set(TOLD)))
+    found = leaves(joint.model_dump(exclude=set(model.TOLD)))
     return {key: _written(key, value) for key, value in found.items() if value is not None}
 
 

@@ -9,15 +9,12 @@ import numpy as np
 from tolstat.common.draw_records import METHODS
 from tolstat.common.loads import load_of
 from tolstat.common.tables import VALID
-from tolstat.display import text
+from tolstat.display import table, text
 from tolstat.display.answer import Asked
 from tolstat.display.blocks import Card, Decision, Section, Table, Text
-from tolstat.display.table import Column, as_block, has
 from tolstat.display.verdict import WORDS, Verdict
 from tolstat.questions import accuracy, shares
-from tolstat.questions.assumptions import sentences
-from tolstat.questions.assumptions.answer import bars
-from tolstat.questions.assumptions.variations import applicable
+from tolstat.questions.assumptions import answer, sentences, variations
 from tolstat.questions.drawings.answer import place_of
 from tolstat.questions.exceedance import rows as exceedance
 from tolstat.questions.exceedance.answer import above
@@ -31,14 +28,14 @@ def section(view: View, asked: Asked) -> Section:
     found = headline(view, asked.accepted)
     load = found.load if found else next(iter(view.leading), "")
     lives = [_card(own) for own in life_verdicts(view, asked.accepted, asked.replay)]
-    standing = applicable(view, asked.accepted)
+    standing = variations.applicable(view, asked.accepted)
     below = [sentences.still(standing), sentences.shop(view)] if standing and standing.rows else []
     head = Decision(
         question_of(view.store.study_text),
         lives if found is None and lives else [_card(found) if found else _without_verdict(view), *lives],
         _cards(view, found),
         place_of(view, load, asked),
-        bars(standing) if standing and standing.rows else None,
+        answer.bars(standing) if standing and standing.rows else None,
         [own for own in below if own],
     )
     notes = (Text(f"{note[0].upper()}{note[1:]}.", small=True) for note in asked.notes)
@@ -57,14 +54,14 @@ def _points(view: View) -> list[Table]:
             found = shares.together(shares.good(part), len(part.limits))
             row |= {"kept": found.value if found.decides else WORDS["none"]}
         rows.append(row)
-    return [as_block("Operating points", POINTS, rows)]
+    return [table.as_block("Operating points", POINTS, rows)]
 
 
 POINTS = (
-    Column("point", lambda row: str(row["point"])),
-    Column("misalignment, speed, torque", lambda row: str(row["operation"])),
-    Column("of the time", lambda row: text.percent(row["share"]), shown=has("share")),
-    Column("keep all limits there", lambda row: str(row.get("kept", WORDS["none"])), shown=has("kept")),
+    table.Column("point", lambda row: str(row["point"])),
+    table.Column("misalignment, speed, torque", lambda row: str(row["operation"])),
+    table.Column("of the time", lambda row: text.percent(row["share"]), shown=table.has("share")),
+    table.Column("keep all limits there", lambda row: str(row.get("kept", WORDS["none"])), shown=table.has("kept")),
 )
 """Columns of the table of operating points."""
 

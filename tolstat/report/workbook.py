@@ -12,8 +12,7 @@ from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import load_of
 from tolstat.display.text import cell
 from tolstat.questions.exceedance.rows import limit_rows
-from tolstat.store import Reader
-from tolstat.store.result_file import described
+from tolstat.store import Reader, result_file
 from tolstat.store.view import View
 
 if TYPE_CHECKING:
@@ -56,7 +55,7 @@ def write(store: Reader, frame: pd.DataFrame, path: Path) -> None:
     """
     from openpyxl import Workbook
 
-    columns = described(store)
+    columns = result_file.described(store)
     meanings = {name: column.description for name, column in columns.items()}
     units = [(name, unit, meanings.get(name, "")) for name, unit in frame.attrs["units"].items()]
     sheets = {

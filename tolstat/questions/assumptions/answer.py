@@ -19,13 +19,10 @@ from tolstat.campaign.what_if import Change
 from tolstat.campaign.work import Work
 from tolstat.common.cores import available_cores
 from tolstat.common.errors import Fault, InputError, NotApplicable, gather
-from tolstat.display import drawing, style, text
+from tolstat.display import drawing, progress, style, text
 from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Part, Row, Rows, Sentence, Table
 from tolstat.display.options import Accepted, Opt
-from tolstat.display.progress import clock
-from tolstat.display.style import markers
 from tolstat.questions.assumptions import sentences, variations
-from tolstat.questions.assumptions.sentences import KEPT
 from tolstat.questions.assumptions.variations import Standing, Variation, applicable, evaluate
 from tolstat.questions.shares import inapplicable, own_joints, unusable
 from tolstat.solver.compilation import warm_up
@@ -49,7 +46,7 @@ COLUMNS = (
     Column("change, %", partial(_interval, name="change", form="+.1f")),
     Column(
         "verdict",
-        lambda row: KEPT.get(row["side"]) or str(row["side"]),
+        lambda row: sentences.KEPT.get(row["side"]) or str(row["side"]),
         shown=lambda rows: any(r["side"] for r in rows),
         words=True,
         rank=1,
@@ -165,7 +162,7 @@ def bars(found: Standing) -> Panel:
 
 
 def _label(row: Any) -> str:
-    words = f"{row['label']}: {KEPT[row['side']]}" if row["turns"] else str(row["label"])
+    words = f"{row['label']}: {sentences.KEPT[row['side']]}" if row["turns"] else str(row["label"])
     return words.replace(" (", "\n(") if len(words) > _LONGEST else words
 
 
@@ -183,14 +180,14 @@ def _bars(ax: Axes, found: Standing, rows: Rows, labels: list[str]) -> None:
     ax.axvline(drawn, color=style.INK, lw=1.0)
     if not np.isnan(lower):
         ax.plot([max(lower, floor), max(upper, floor)], [0, 0], color=style.INK, lw=1.6)
-    ax.plot(drawn, 0, "o" if share >= floor else markers.CARETLEFT, color=style.INK, ms=6.0, clip_on=False)
+    ax.plot(drawn, 0, "o" if share >= floor else style.markers.CARETLEFT, color=style.INK, ms=6.0, clip_on=False)
     for place, row in enumerate(rows, 1):
         own = max(row["share"], floor)
         ax.barh(place, own - drawn, 0.62, left=drawn, color=style.COLOURS[row["change"] > 0.0], zorder=2)
         low, top = (max(row[f"share_{end}"], floor) for end in ("lower", "upper"))
         ax.plot([low, top], [place, place], color=style.INK, lw=1.2, zorder=3)
         if row["share_lower"] < floor:
-            ax.plot(floor, place, marker=markers.CARETLEFT, color=style.INK, ms=5.0, zorder=4, clip_on=False)
+            ax.plot(floor, place, marker=style.markers.CARETLEFT, color=style.INK, ms=5.0, zorder=4, clip_on=False)
     if accepted > 0.0:
         ax.axvline(accepted, **_ACCEPTED)
         words: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 8.0, "backgroundcolor": "white"}
@@ -330,7 +327,7 @@ class _Run:
             warm_up()
             options = sets.options_of(study, self._store)
             self._seconds = sets.seconds_per_joint(study, options, PILOT, self._asked.points) / self._workers
-        cost, where = clock(self._seconds * lacking), ", ".join(self._asked.points)
+        cost, where = progress.clock(self._seconds * lacking), ", ".join(self._asked.points)
         where = f" at {where}" if where else ""
         self._work.tell(f"{lacking} joints to simulate{where}, about {cost} on {self._workers} processes")
         self._work.display.stage("variations")

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from tolstat.analysis import binomial
-from tolstat.display import text
-from tolstat.display.table import Row
+from tolstat.display import table, text
 from tolstat.questions.assumptions.variations import ALL, AXIAL, SHAFT, Standing, widths
 from tolstat.store.view import View
 from tolstat.study.widths import COARSER, HALF
@@ -170,12 +169,12 @@ def values(found: Standing) -> dict[str, Any]:
     }
 
 
-def _end(found: Standing, which: Any) -> Row | None:
+def _end(found: Standing, which: Any) -> table.Row | None:
     known = [row for row in found.rows if not np.isnan(row["share"])]
     return which(known, key=lambda row: row["share"]) if known else None
 
 
-def _most(word: str, rows: list[Row]) -> str:
+def _most(word: str, rows: list[table.Row]) -> str:
     """``open in 2: H 3 (9.1 %), law sliced (8 %)``."""
     shown = ", ".join(f"{row['label']} ({text.percent(row['share'])})" for row in rows[:_NAMED])
     return f"{word} in {len(rows)}: {shown}{', ...' if len(rows) > _NAMED else ''}"

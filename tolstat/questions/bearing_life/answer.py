@@ -15,7 +15,6 @@ from tolstat.common.errors import NotApplicable
 from tolstat.common.tables import VALID
 from tolstat.display import style, text
 from tolstat.display.answer import Answer, Asked, Axes, Panel, Panels, Part, Sentence, Table
-from tolstat.display.style import ticker
 from tolstat.display.table import Column, Row, Rows, by_share, has, has_unresolved, of_shares
 from tolstat.display.verdict import Verdict, on_share
 from tolstat.questions import shares
@@ -282,9 +281,9 @@ def _draw(ax: Axes, lives: Lives) -> None:
     ax.step(x, drawn["estimate"], where="pre", color=style.COLOURS[0])
     ax.set_xscale("log")
     style.share_axis(ax, floor)
-    ax.xaxis.set_major_locator(ticker.LogLocator(subs=(1.0, 2.0, 5.0)))
-    ax.xaxis.set_major_formatter(ticker.FuncFormatter(lambda value, _: text.number(value)))
-    ax.xaxis.set_minor_formatter(ticker.NullFormatter())
+    ax.xaxis.set_major_locator(style.ticker.LogLocator(subs=(1.0, 2.0, 5.0)))
+    ax.xaxis.set_major_formatter(style.ticker.FuncFormatter(lambda value, _: text.number(value)))
+    ax.xaxis.set_minor_formatter(style.ticker.NullFormatter())
     ax.set(xlabel=f"life {lives.bearing.symbol} of the joint [h]", ylabel="share of joints with a shorter life")
     nominal = float(lives.nominal_hours[-1])
     if math.isfinite(nominal):

@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tolstat.analysis import accuracy
-from tolstat.analysis.rating_life import FRETTING, basic_life, system_life, turns_per_revolution
+from tolstat.analysis import accuracy, rating_life
 from tolstat.analysis.sample import Sample, total_interval
 from tolstat.common.errors import Fault, NotApplicable, StoreError
 from tolstat.common.load_kinds import PINS
@@ -18,8 +17,7 @@ from tolstat.common.tables import LIFE_EXPONENT, VALID, Mode
 from tolstat.display.table import Rows
 from tolstat.joint import Bearing
 from tolstat.joint.bearing import FOR_LIFE
-from tolstat.store import points
-from tolstat.store.recorded import joint_of, operating_points
+from tolstat.store import points, recorded
 from tolstat.store.view import View
 
 JOINT = "joint"
@@ -123,19 +121,19 @@ def lives_of(view: View) -> Lives:
     view.check("quantile")
     bearing, duty, stores = _bearing(view), points.shares_of_time(view), [part.store for part in view.parts]
     loads = np.stack([store.results(slice(None), ("equivalent_load",))["equivalent_load"] for store in stores])
-    operation = [operating_points(store) for store in stores]
+    operation = [recorded.operating_points(store) for store in stores]
     swings, speeds = (np.abs([own[name] for own in operation]) for name in ("alpha", "speed"))  # (points, rows)
     critical = bearing.critical_amplitude
-    hourly = duty[:, None] * speeds / (2.0 * np.pi) * turns_per_revolution(swings, critical) * HOUR
+    hourly = duty[:, None] * speeds / (2.0 * np.pi) * rating_life.turns_per_revolution(swings, critical) * HOUR
     turns = hourly.sum(axis=0)
     with np.errstate(divide="ignore", invalid="ignore"):
         weights = np.where(turns > 0.0, hourly / turns, duty[:, None])[:, :, None]
         largest = loads.max(axis=0)
         relative = np.where(largest > 0.0, loads / largest, 0.0 * loads)
         load = largest * (weights * relative**LIFE_EXPONENT).sum(axis=0) ** (1.0 / LIFE_EXPONENT)
-        pins = bearing.factor * basic_life(load, bearing.C) / turns[:, None]
-    hours = np.column_stack([pins, system_life(pins)])
-    small = [swings < part * critical * (1.0 - 1e-9) for part in (1.0, FRETTING)]
+        pins = bearing.factor * rating_life.basic_life(load, bearing.C) / turns[:, None]
+    hours = np.column_stack([pins, rating_life.system_life(pins)])
+    small = [swings < part * critical * (1.0 - 1e-9) for part in (1.0, rating_life.FRETTING)]
     unrated = np.asarray(small[1].all(axis=0))
     hours[unrated] = np.nan
     skip, valid, has_nominal = view.store.first_sample, np.isin(view.status, VALID), len(view.nominal) > 0
@@ -160,7 +158,7 @@ def lives_of(view: View) -> Lives:
 
 def bearing_of(view: View) -> Bearing | None:
     """Section ``[bearing]`` of the joint of a file, or of the study that is read in place of the one in it."""
-    return (view.study.joint if view.study_path else joint_of(view.store, 0)).bearing
+    return (view.study.joint if view.study_path else recorded.joint_of(view.store, 0)).bearing
 
 
 def _bearing(view: View) -> Bearing:

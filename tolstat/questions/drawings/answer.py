@@ -20,9 +20,7 @@ from tolstat.display import drawing, text
 from tolstat.display.answer import Answer, Asked, Figure, Panel, Panels, Part, Rows, Sentence
 from tolstat.joint import Joint, Operation
 from tolstat.questions.drawings import views
-from tolstat.store import ResultFile
-from tolstat.store.points import point_of
-from tolstat.store.recorded import joint_of, operation_of
+from tolstat.store import ResultFile, points, recorded
 from tolstat.store.view import View
 
 LEGEND = (
@@ -67,7 +65,7 @@ def place_of(view: View, load: str, asked: Asked) -> Panel | None:
             if own.limit is not None:
                 often = "most often above" if own.above(own.limit).count else "nearest to"
                 title = f"{place.name or load}: {often} its limit"
-            title += f", at {point_of(view, load)}" if len(view.points) > 1 else ""
+            title += f", at {points.point_of(view, load)}" if len(view.points) > 1 else ""
         panel = _joint(view, [place.name], load)[place.view == "side"]
         return replace(panel, key="joint-worst", title=title)
     return None
@@ -75,8 +73,8 @@ def place_of(view: View, load: str, asked: Asked) -> Panel | None:
 
 def _joint(view: View, marked: Collection[str], load: str) -> tuple[Panel, Panel]:
     """Drawings of the joint at the operating point at which a load matters most; at the first one without a load."""
-    point = point_of(view, load) if load else view.points[0]
-    front, side = views.views(joint_of(view.store, 0), view.at(point).store.operation.alpha, marked)
+    point = points.point_of(view, load) if load else view.points[0]
+    front, side = views.views(recorded.joint_of(view.store, 0), view.at(point).store.operation.alpha, marked)
     return front, replace(side, title=f"{side.title}, at {point}") if point else side
 
 
@@ -95,7 +93,7 @@ def drawings(view: View) -> Answer:
         of the joints with the largest leading loads, enlarged.
     """
     marked = sorted({load_of(name).place.name for name in view.leading} - {""})
-    kinds = views.kinds_of_errors(joint_of(view.store, 0))
+    kinds = views.kinds_of_errors(recorded.joint_of(view.store, 0))
     parts: list[Part] = [Panels([*_joint(view, marked, next(iter(view.leading), "")), kinds]), Sentence(LEGEND)]
     if view.method != "sweep" and (worst := _worst(view)):
         parts += [Panels(worst), Sentence(WORST)]
@@ -112,7 +110,7 @@ def _worst(view: View) -> list[Panel]:
         loads.setdefault(sample, []).append(f"{name} {text.value(float(values[sample]), load.unit)}")
     panels = []
     for sample, words in loads.items():
-        joint, row = joint_of(view.store, int(view.slots(sample))), int(view.rows(sample))
+        joint, row = recorded.joint_of(view.store, int(view.slots(sample))), int(view.rows(sample))
         errors, title = view.errors(np.array([sample])), f"Row {row}: {', '.join(words)}"
         panels.append(views.errors_of(joint, errors, title, f"drawn-{row}"))
     return panels
@@ -159,8 +157,8 @@ def read(
                 raise InputError([Fault(str(path), found, remedy)])
             at, slot = store.each()[0], 0 if row is None else store.slot(row)
             joint, own, point, title = (
-                joint_of(store, slot),
-                operation_of(at, slot).alpha,
+                recorded.joint_of(store, slot),
+                recorded.operation_of(at, slot).alpha,
                 at.point or "",
                 store.study_name,
             )

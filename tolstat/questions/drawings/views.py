@@ -18,8 +18,7 @@ from tolstat.common.tables import HOLES
 from tolstat.display.answer import Axes, Panel, Rows
 from tolstat.display.drawing import WIDTH
 from tolstat.display.style import COLOURS, INK, patches
-from tolstat.joint import Joint, Operation, nominal_errors, perturb
-from tolstat.joint.perturbation import ARM_TRIADS, PIN_TRIADS
+from tolstat.joint import Joint, Operation, nominal_errors, perturb, perturbation
 from tolstat.kernel.mechanics.topology import ARM_OF_PIN
 
 Array = NDArray[np.float64]
@@ -97,7 +96,7 @@ def pairs(joint: Joint, errors: NDArray[np.void]) -> list[Pair]:
     par = perturb(joint, Operation.model_construct(alpha=0.0, speed=1.0, torque=0.0), errors)[0]
     found = []
     for i, arm in enumerate(ARM_OF_PIN):
-        t, u = PIN_TRIADS[i], ARM_TRIADS[arm]
+        t, u = perturbation.PIN_TRIADS[i], perturbation.ARM_TRIADS[arm]
         thick = joint.contact.D_P + float(errors[f"{PINS[i]}.diameter"][0])
         pin = Feature(PINS[i], thick, t @ par["pin_point"][i], t @ par["pin_axis"][i])
         wide = thick + 2.0 * float(par["clearance"][i])
@@ -205,7 +204,7 @@ def _front(ax: Axes, joint: Joint, marked: Collection[str]) -> None:
     _frame(ax, 1.4 * end, -1.66 * end, 1.37 * end)
     _pins(ax, joint, range(4), FRONT, "front")
     _centre_line(ax, -1.08 * end * X, 1.08 * end * X)
-    for k, e in enumerate(PIN_TRIADS[:, 0] @ FRONT.T, 1):
+    for k, e in enumerate(perturbation.PIN_TRIADS[:, 0] @ FRONT.T, 1):
         offset = (12.0 if r_b < 0.35 * end else -12.0) * e
         _bushing(ax, r_b * e, f"cross{k}")
         _label(ax, r_b * e, f"cross{k}", offset, rotation=90 * (k > 2), bbox=ON_CROSS)
@@ -228,7 +227,7 @@ def _pins(ax: Axes, joint: Joint, pins: Iterable[int], view: Array, key: str) ->
     _strip(ax, (-root * X, root * X), (-root, root), CROSS)
     _centre_line(ax, -1.08 * end * Y, 1.08 * end * Y)
     for k in pins:
-        e, arm, name = view @ PIN_TRIADS[k, 0], ARM_OF_PIN[k], f"{key}.pin{k + 1}"
+        e, arm, name = view @ perturbation.PIN_TRIADS[k, 0], ARM_OF_PIN[k], f"{key}.pin{k + 1}"
         upright, colour = abs(e[1]) > 0.5, INPUT if arm < 2 else OUTPUT
         _strip(ax, (min(root, low) * e, low * e), (-neck, neck), CROSS)
         _strip(ax, (low * e, end * e), (-pin, pin), CROSS, gid=name)
@@ -238,7 +237,7 @@ def _pins(ax: Axes, joint: Joint, pins: Iterable[int], view: Array, key: str) ->
         middle, beside = joint.cross.R * e, eye * (X if upright else Y)
         _label(ax, middle, f"pin {k + 1}", rotation=90 * (not upright), bbox=ON_CROSS)
         _label(ax, middle + beside, f"arm {arm + 1}", (22.0, 0.0) if upright else (0.0, 7.0))
-        _triad(ax, 1.08 * end * e, PIN_TRIADS[k], view, name)
+        _triad(ax, 1.08 * end * e, perturbation.PIN_TRIADS[k], view, name)
 
 
 def _side(ax: Axes, joint: Joint, alpha: float, marked: Collection[str]) -> None:

@@ -9,24 +9,20 @@ from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
-from tolstat.analysis.binomial import needed
-from tolstat.analysis.prediction import DELIVERY
-from tolstat.analysis.strength import Line
+from tolstat.analysis import binomial, prediction, strength
 from tolstat.common.channels import CHANNELS
 from tolstat.common.errors import NotApplicable
 from tolstat.common.loads import unit_text
 from tolstat.common.tables import Status
-from tolstat.display import drawing, style, text
+from tolstat.display import drawing, style, text, verdict
 from tolstat.display.answer import Answer, Asked, Part, Sentence, Table
 from tolstat.display.blocks import Panel, Panels
 from tolstat.display.options import Delivery, Loads, Opt
 from tolstat.display.style import ticker
 from tolstat.display.table import Column, Row, Rows, by_share, of_shares
-from tolstat.display.verdict import Verdict, on_share
 from tolstat.questions.fatigue import loads, parts
 from tolstat.questions.fatigue.duty import ANY, Joints, members, section, settings_of
 from tolstat.questions.fatigue.loads import SHARES, Loading, channels, load_cycles
-from tolstat.questions.fatigue.parts import Stressed, load_stresses
 from tolstat.store.revolutions import held
 from tolstat.store.view import View
 from tolstat.study.stress_point import StressPoint
@@ -106,7 +102,7 @@ def fatigue(
     shares: Annotated[list[float] | None, Opt("S", name="share")] = None,
     by: Loads = None,
     joints: Annotated[int | None, Opt("N", least=1)] = None,
-    delivery: Delivery = DELIVERY,
+    delivery: Delivery = prediction.DELIVERY,
 ) -> Answer:
     """Compute failures of parts, equivalent loads and damage.
 
@@ -154,7 +150,7 @@ def fatigue(
     found: list[Part] = []
     duty: Sequence[tuple[str, float]] = ()
     if has_points:
-        stressed = load_stresses(views, shares or None, joints)
+        stressed = parts.load_stresses(views, shares or None, joints)
         duty, found = stressed.duty, _of_parts(stressed, delivery)
     if by or has_cycles or not has_points:
         loading = load_cycles(views, shares or None, channels(by) if by else None, joints)
@@ -172,19 +168,19 @@ def fatigue_on_page(view: View, asked: Asked) -> Answer:
         with asked.noting("load cycles are left out"):
             joints = JOINTS if held(view.store) else min(asked.replay, JOINTS)
             if section(view).points and joints:
-                found += _of_parts(load_stresses([view], samples=joints), DELIVERY)
+                found += _of_parts(parts.load_stresses([view], samples=joints), prediction.DELIVERY)
             if view.store.history_specs:
                 loading = load_cycles([view], samples=JOINTS)
                 rows = loads.equivalent_loads(loading)
                 leading = loads.leading(rows)
                 seen = sorted((row for row in rows if row["channel"] in leading), key=lambda r: (r["channel"], r["m"]))
-                found += _of_loads(loading, rows, seen, DELIVERY)
+                found += _of_loads(loading, rows, seen, prediction.DELIVERY)
     if not found:
         raise NotApplicable
     return Answer("fatigue", "Fatigue", found)
 
 
-def life_verdicts(view: View, accepted: float = math.nan, samples: int = JOINTS) -> list[Verdict]:
+def life_verdicts(view: View, accepted: float = math.nan, samples: int = JOINTS) -> list[verdict.Verdict]:
     """Verdict on failures of the parts in the service life, and on damage sums of loads; none if no life is required.
 
     Parameters
@@ -209,7 +205,7 @@ def life_verdicts(view: View, accepted: float = math.nan, samples: int = JOINTS)
         return []
     found = []
     if has_points and (held(store) or samples):
-        stressed = load_stresses([view], samples=JOINTS if held(store) else min(samples, JOINTS))
+        stressed = parts.load_stresses([view], samples=JOINTS if held(store) else min(samples, JOINTS))
         row = parts.failures_over_life(stressed, [stressed.settings.revolutions])[0]._asdict()
         found.append(_verdict("failures of parts", "have a failed part", row, stressed, accepted))
     if has_lines:
@@ -219,13 +215,13 @@ def life_verdicts(view: View, accepted: float = math.nan, samples: int = JOINTS)
     return found
 
 
-def _verdict(about: str, what: str, row: Row, joints: Joints, accepted: float) -> Verdict:
+def _verdict(about: str, what: str, row: Row, joints: Joints, accepted: float) -> verdict.Verdict:
     """Verdict from the share in a row: `analysis.strength.Failures`, or `analysis.estimates.Exceedance`."""
     share, without = row["estimate"], row["n_failed"] + row["n_unsettled"]
 
     def joints_needed(end: float) -> float:
         if "count" in row:
-            return needed(end, accepted)
+            return binomial.needed(end, accepted)
         # an interval of a mean narrows with the root of the number of joints, and faster where the share is small
         distance = row["upper"] - share if share < accepted else share - row["lower"]
         return float(np.ceil(row["n"] * (distance / (accepted - end)) ** 2))
@@ -234,12 +230,12 @@ def _verdict(about: str, what: str, row: Row, joints: Joints, accepted: float) -
     undecided = f"{without} of {row['n']} joints have no load that repeats" if lost else ""
     what, ends = f"{what} within {joints.settings.service_life}", (row["outer_lower"], row["outer_upper"])
     reason = joints.design.without_interval("mean")
-    found = on_share(about, what, row, ends, accepted, joints_needed, reason, undecided)
+    found = verdict.on_share(about, what, row, ends, accepted, joints_needed, reason, undecided)
     first = f"{about}: of the first {row['n']} of {joints.total} joints"
     return found._replace(notes=(first,) if joints.total > joints.status.size else ())
 
 
-def _of_parts(stressed: Stressed, delivery: int) -> list[Part]:
+def _of_parts(stressed: parts.Stressed, delivery: int) -> list[Part]:
     rows = parts.part_failures(stressed, delivery)
     panel = Panel(
         "failures-over-life",
@@ -273,7 +269,7 @@ def _of_loads(loading: Loading, rows: Rows, seen: Rows, delivery: int) -> list[P
     return [*found, *map(Sentence, _notes_on_loads(loading, rows))]
 
 
-def _notes_on_parts(stressed: Stressed, rows: Rows) -> Iterator[str]:
+def _notes_on_parts(stressed: parts.Stressed, rows: Rows) -> Iterator[str]:
     """Number of joints, meaning of the columns, restrictions."""
     settings, n = stressed.settings, stressed.status.size
     starts = f" with {settings.starts:g} starts" if settings.starts else ""
@@ -308,7 +304,7 @@ def _notes_on_loads(loading: Loading, rows: Rows) -> Iterator[str]:
 
 def _lines(points: Sequence[StressPoint]) -> Iterator[str]:
     """One sentence for each S–N line, with the names of its points."""
-    names: dict[Line, list[str]] = {}
+    names: dict[strength.Line, list[str]] = {}
     for point in points:
         names.setdefault(point.line, []).append(point.name)
     for line, own in names.items():
@@ -319,7 +315,7 @@ def _lines(points: Sequence[StressPoint]) -> Iterator[str]:
         yield f"S–N line{where}: {knee}{scatter}{mean}, damage sum {line.D_c:g}"
 
 
-def _draw_failures(ax: Axes, stressed: Stressed, life: float) -> None:
+def _draw_failures(ax: Axes, stressed: parts.Stressed, life: float) -> None:
     """Draw the share of the joints with a failed part against revolutions, with its band and the service life."""
     service = stressed.settings.revolutions
     first, last = sorted([service, life if math.isfinite(life) and life > 0 else service])

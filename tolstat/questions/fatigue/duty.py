@@ -15,8 +15,7 @@ from tolstat.common.loads import FloatArray
 from tolstat.common.tables import ERROR_FIELDS, Status, worst_status
 from tolstat.display.text import percent
 from tolstat.solver import rainflow
-from tolstat.store import points
-from tolstat.store.recorded import joint_of
+from tolstat.store import points, recorded
 from tolstat.store.view import View
 from tolstat.study.fatigue import Fatigue, of_text
 
@@ -159,7 +158,7 @@ def joints_of(views: Sequence[View], shares: Sequence[float], samples: int | Non
 def settings_of(views: Sequence[View], shares: Sequence[float]) -> Fatigue:
     """Section ``[fatigue]`` of the first of the `members`, with the service life in revolutions over the duty cycle."""
     first = views[0]
-    bearing = (first.study.joint if first.study_path else joint_of(first.store, 0)).bearing
+    bearing = (first.study.joint if first.study_path else recorded.joint_of(first.store, 0)).bearing
     hours = np.nan if bearing is None or bearing.required_life is None else bearing.required_life / HOUR
     turn = sum(share * 2.0 * np.pi / abs(view.store.operation.speed) for view, share in zip(views, shares, strict=True))
     return section(first).within(hours, HOUR / turn, str(first.path))

@@ -11,21 +11,16 @@ from numpy.typing import NDArray
 
 from tolstat.analysis import cycles, prediction
 from tolstat.analysis.cycles import Cycles
-from tolstat.analysis.prediction import DELIVERY
 from tolstat.analysis.sample import Sample
+from tolstat.common import load_kinds, loads, strict
 from tolstat.common.channels import BUSHING_LOADS, CHANNELS, LoadHistory, channels_of, histories_of
 from tolstat.common.errors import Fault, InputError, StoreError
-from tolstat.common.load_kinds import PLACES
-from tolstat.common.loads import PANELS, FloatArray
-from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import SIMULATED, Status
 from tolstat.display.table import Row, Rows
 from tolstat.questions.fatigue import duty
 from tolstat.questions.fatigue.duty import ANY, CONFIDENCE, Joints, only
 from tolstat.solver import rainflow
-from tolstat.store import revolutions
-from tolstat.store.hdf5 import RUN_AGAIN
-from tolstat.store.reader import Reader
+from tolstat.store import hdf5, reader, revolutions
 from tolstat.store.view import View
 from tolstat.study.selection import select
 
@@ -47,7 +42,7 @@ def channels(patterns: Sequence[str]) -> tuple[str, ...]:
     """
     found = {pattern: select(pattern, CHANNELS) for pattern in patterns}
     faults = [
-        Fault(f"channel {pattern!r}", "selects nothing", did_you_mean(pattern, list(CHANNELS)[:8]))
+        Fault(f"channel {pattern!r}", "selects nothing", strict.did_you_mean(pattern, list(CHANNELS)[:8]))
         for pattern, names in found.items()
         if not names
     ]
@@ -56,7 +51,7 @@ def channels(patterns: Sequence[str]) -> tuple[str, ...]:
     return tuple(name for name in CHANNELS if any(name in names for names in found.values()))
 
 
-def cycles_of(store: Reader, slots: NDArray[np.intp], names: Sequence[str] | None = None) -> Cycles:
+def cycles_of(store: reader.Reader, slots: NDArray[np.intp], names: Sequence[str] | None = None) -> Cycles:
     """Rainflow cycles of joints over one revolution.
 
     Cycles stored by the workers (``histories = "cycles"``) are read. Otherwise they are counted now, from the load
@@ -90,7 +85,7 @@ def cycles_of(store: Reader, slots: NDArray[np.intp], names: Sequence[str] | Non
     place = [order.index(name) for name in names]
     lacking = [name for h in histories if (name := f"{h.prefix}cycles") not in store.history_specs]
     if lacking and "cycles" in store.history_specs and not revolutions.held(store, histories):
-        raise StoreError(str(Fault(str(store.path), f"holds no {', '.join(lacking)}", RUN_AGAIN)))
+        raise StoreError(str(Fault(str(store.path), f"holds no {', '.join(lacking)}", hdf5.RUN_AGAIN)))
     table = np.empty((len(slots), len(names), rainflow.KEPT, 2), np.float32)
     number = np.empty((len(slots), len(names)))
     for part in revolutions.blocks(len(slots)):
@@ -105,7 +100,7 @@ def cycles_of(store: Reader, slots: NDArray[np.intp], names: Sequence[str] | Non
 
 
 def _count(
-    store: Reader, slots: NDArray[np.intp], histories: Sequence[LoadHistory]
+    store: reader.Reader, slots: NDArray[np.intp], histories: Sequence[LoadHistory]
 ) -> tuple[NDArray[Any], NDArray[Any]]:
     """Cycles of a few joints, and their numbers, as `rainflow.count` gives them; history after history."""
     names = [[f"{history.prefix}{name}" for history in histories] for name in ("cycles", "cycle_count")]
@@ -225,14 +220,14 @@ def equivalent_loads(loading: Loading) -> Rows:
     return rows
 
 
-def _quantiles(head: Row, values: FloatArray, loading: Loading) -> Rows:
+def _quantiles(head: Row, values: loads.FloatArray, loading: Loading) -> Rows:
     """A row for each of `SHARES` of the joints: the head, and the quantile of their values."""
     sample = Sample.of(values, loading.status, loading.design)
     found = [sample.quantile(share, CONFIDENCE)._asdict() for share in SHARES]
     return [{**head, **own, "confidence": CONFIDENCE} for own in found]
 
 
-def damages(loading: Loading, delivery: int = DELIVERY) -> Rows:
+def damages(loading: Loading, delivery: int = prediction.DELIVERY) -> Rows:
     """Share of the joints whose damage sum in the service life exceeds 1, for each channel that has an S–N line.
 
     Returns
@@ -312,8 +307,8 @@ def leading(rows: Rows) -> list[str]:
     """
     names, found = most_loaded(rows), []
     candidates = [row for row in rows if row["share"] == SHARES[-1] and row["channel"] in names]
-    for group, kind in PANELS:
+    for group, kind in loads.PANELS:
         here = [row for row in candidates if CHANNELS[row["channel"]].kind == kind]
-        here = [row for row in here if PLACES[CHANNELS[row["channel"]].place].group == group]
+        here = [row for row in here if load_kinds.PLACES[CHANNELS[row["channel"]].place].group == group]
         found += [max(here, key=lambda row: float(row["estimate"]))["channel"]] if here else []
     return found

@@ -11,20 +11,15 @@ from numpy.typing import NDArray
 
 from tolstat.analysis import prediction, strength
 from tolstat.analysis.cycles import Cycles, duty_cycle
-from tolstat.analysis.prediction import DELIVERY
 from tolstat.analysis.sample import Sample
-from tolstat.analysis.strength import Collective, Failures, Line
-from tolstat.common.bisection import first
-from tolstat.common.channels import BUSHING_LOADS
+from tolstat.common import bisection, channels
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import FloatArray
 from tolstat.common.tables import FAILED, Status
 from tolstat.display.table import Rows
 from tolstat.questions.fatigue import duty
-from tolstat.questions.fatigue.duty import ANY, CONFIDENCE, Joints, only
 from tolstat.solver import rainflow
-from tolstat.store import revolutions
-from tolstat.store.reader import Reader
+from tolstat.store import reader, revolutions
 from tolstat.store.view import View
 from tolstat.study.fatigue import Fatigue
 from tolstat.study.stress_point import StressPoint
@@ -56,7 +51,7 @@ class Stresses(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Stressed(Joints):
+class Stressed(duty.Joints):
     """Stresses of joints.
 
     Attributes
@@ -115,7 +110,7 @@ def load_stresses(views: Sequence[View], shares: Sequence[float] | None = None, 
     return Stressed(**vars(joints), own=whole.rows(slice(1, None)), nominal=whole.rows(slice(both)), apart=apart)
 
 
-def stresses_of(store: Reader, slots: NDArray[np.intp], points: Sequence[StressPoint]) -> tuple[Stresses, float]:
+def stresses_of(store: reader.Reader, slots: NDArray[np.intp], points: Sequence[StressPoint]) -> tuple[Stresses, float]:
     """Stresses of settled joints over one revolution, and `Revolutions.apart`.
 
     Parameters
@@ -131,8 +126,8 @@ def stresses_of(store: Reader, slots: NDArray[np.intp], points: Sequence[StressP
     low, high = np.zeros((2, len(slots), len(places)))
     counted: list[tuple[FloatArray, FloatArray]] = []
     apart = 0.0
-    for part, found, difference in revolutions.of_components(store, slots, [BUSHING_LOADS]):
-        apart, loads = max(apart, difference), found[BUSHING_LOADS.name]
+    for part, found, difference in revolutions.of_components(store, slots, [channels.BUSHING_LOADS]):
+        apart, loads = max(apart, difference), found[channels.BUSHING_LOADS.name]
         signals, noise = zip(*(_signal(loads, *place) for place in places), strict=True)
         low[part], high[part] = (np.stack([end(s, axis=1) for s in signals], axis=1) for end in (np.min, np.max))
         for joint in range(len(loads)):
@@ -148,7 +143,7 @@ def stresses_of(store: Reader, slots: NDArray[np.intp], points: Sequence[StressP
 
 def _signal(loads: NDArray[np.floating], point: StressPoint, factors: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Stress over the revolution, (m, samples), and the range up to which cycles may be numerical noise, (m,), Pa."""
-    own = loads[:, :, BUSHING_LOADS.places.index(point.bushing)].astype(float)
+    own = loads[:, :, channels.BUSHING_LOADS.places.index(point.bushing)].astype(float)
     return own @ factors, rainflow.GATE * np.max(np.abs(own) @ np.abs(factors), axis=1)
 
 
@@ -168,11 +163,11 @@ def _spread(part: Stresses, rows: NDArray[np.intp], n: int) -> Stresses:
 class Evaluated(NamedTuple):
     """Stress cycles of the joints at one point in the service life, and its S–N line."""
 
-    collective: Collective
-    line: Line
+    collective: strength.Collective
+    line: strength.Line
 
 
-def part_failures(stressed: Stressed, delivery: int = DELIVERY) -> Rows:
+def part_failures(stressed: Stressed, delivery: int = prediction.DELIVERY) -> Rows:
     """Damage, life and probability of failure at each point of the parts.
 
     Parameters
@@ -197,27 +192,27 @@ def part_failures(stressed: Stressed, delivery: int = DELIVERY) -> Rows:
     heads = [_damage(stressed, p, own[p], nominal[p]) for p in range(len(own))]
     groups = [slice(p, p + 1) for p in range(len(own))]
     if len(own) > 1:
-        heads.append({"point": ANY, "bushing": ""} | dict.fromkeys(list(heads[0])[2:], np.nan))
+        heads.append({"point": duty.ANY, "bushing": ""} | dict.fromkeys(list(heads[0])[2:], np.nan))
         groups.append(slice(None))
     rows = []
     for head, group in zip(heads, groups, strict=True):
-        wide = failures(stressed, own[group], confidence=prediction.half(CONFIDENCE))
-        following = prediction.of_share(wide.outer_lower, wide.outer_upper, delivery, CONFIDENCE)
+        wide = failures(stressed, own[group], confidence=prediction.half(duty.CONFIDENCE))
+        following = prediction.of_share(wide.outer_lower, wide.outer_upper, delivery, duty.CONFIDENCE)
         head |= prediction.columns(following, delivery) | _life(stressed, own[group])
-        head |= {"nominal_failures": only(_chances(nominal[group]))} | failures(stressed, own[group])._asdict()
-        rows.append(head | {"confidence": CONFIDENCE})
+        head |= {"nominal_failures": duty.only(_chances(nominal[group]))} | failures(stressed, own[group])._asdict()
+        rows.append(head | {"confidence": duty.CONFIDENCE})
     return rows
 
 
-def failures_over_life(stressed: Stressed, revolutions: Sequence[float]) -> list[Failures]:
+def failures_over_life(stressed: Stressed, revolutions: Sequence[float]) -> list[strength.Failures]:
     """Share of the joints with a failed part at any point after numbers of revolutions."""
     points = evaluated(stressed.own, stressed.settings)
     return [failures(stressed, points, number / stressed.settings.revolutions) for number in revolutions]
 
 
 def failures(
-    stressed: Stressed, points: Sequence[Evaluated], lives: float = 1.0, confidence: float = CONFIDENCE
-) -> Failures:
+    stressed: Stressed, points: Sequence[Evaluated], lives: float = 1.0, confidence: float = duty.CONFIDENCE
+) -> strength.Failures:
     """Share of the joints of which a part has failed at any of some points after so many service lives.
 
     Joints that are not settled, or never repeat, have no stresses.
@@ -252,7 +247,7 @@ def evaluated(stresses: Stresses, settings: Fatigue) -> list[Evaluated]:
     return found
 
 
-def _in_service(stresses: Stresses, place: int, line: Line, settings: Fatigue) -> Collective:
+def _in_service(stresses: Stresses, place: int, line: strength.Line, settings: Fatigue) -> strength.Collective:
     """Cycles of the joints at one place in the service life.
 
     A start goes from the unstressed joint to the extremes of the revolution and back; its cycle, between the extremes
@@ -276,7 +271,7 @@ def _damage(stressed: Stressed, p: int, own: Evaluated, nominal: Evaluated) -> d
     point = stressed.settings.points[p]
     sample = Sample.of(strength.damage_at(*own), stressed.status, stressed.design)
     head = {"point": point.name, "bushing": point.bushing, **point.line._asdict()}
-    head["nominal"] = only(strength.damage_at(*nominal))
+    head["nominal"] = duty.only(strength.damage_at(*nominal))
     return head | {name: sample.quantile(share).estimate for name, share in (("median", 0.5), ("upper_99", 0.99))}
 
 
@@ -299,4 +294,4 @@ def _reaches(share: Callable[[float], float]) -> float:
         return 0.0
     if share(np.exp(longest)) < SHARE:
         return np.inf
-    return float(np.exp(first(lambda log: share(float(np.exp(log))) >= SHARE, -longest, longest, 30)))
+    return float(np.exp(bisection.first(lambda log: share(float(np.exp(log))) >= SHARE, -longest, longest, 30)))

@@ -89,8 +89,7 @@ def _without_pictures(monkeypatch):
 @pytest.fixture(autouse=True)
 def _without_assumptions(monkeypatch):
     """Verdicts from the joints as drawn; what they stand on is the subject of another file."""
-    for module in ("headline", "verdict"):
-        monkeypatch.setattr(f"tolstat.report.{module}.applicable", lambda view, accepted: None)
+    monkeypatch.setattr("tolstat.questions.assumptions.variations.applicable", lambda view, accepted: None)
 
 
 def everywhere(path, accepted):

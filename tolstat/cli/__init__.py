@@ -1,6 +1,6 @@
 """The application ``tolstat``: its help, and its commands, each imported when it is used.
 
-Functions of questions come from `_questions`, those of the other commands from files of this package.
+Functions of questions are made by `_command`, those of the other commands from files of this package.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import typer
 from typer.core import TyperArgument, TyperCommand, TyperGroup
 
 from tolstat import __version__
-from tolstat.cli._command import check_memory, command_of, exit_codes
+from tolstat.cli import _command
 from tolstat.common.cores import limit_threads
 from tolstat.questions import QUESTIONS
 
@@ -65,9 +65,10 @@ EPILOG = (
 def function_of(name: str) -> Callable[..., None]:
     """Import the function of a command."""
     if name in ("run", "extend"):
-        check_memory()  # before libraries are loaded
-    file: Any = import_module(f"tolstat.cli.{'_questions' if name in ASKED else FILES.get(name, name)}")
-    function: Callable[..., None] = file.function_of(ASKED[name]) if name in ASKED else getattr(file, name)
+        _command.check_memory()  # before libraries are loaded
+    if name in ASKED:
+        return _command.function_of(ASKED[name])
+    function: Callable[..., None] = getattr(import_module(f"tolstat.cli.{FILES.get(name, name)}"), name)
     return function
 
 
@@ -85,8 +86,8 @@ class _Commands(TyperGroup):
         if self._completes and cmd_name in LISTED:
             return TyperCommand(cmd_name, help=LISTED[cmd_name])
         if cmd_name in LISTED and cmd_name not in self.commands:
-            with exit_codes():
-                function = command_of(function_of(cmd_name))
+            with _command.exit_codes():
+                function = _command.command_of(function_of(cmd_name))
             alone = typer.Typer(rich_markup_mode=None, pretty_exceptions_enable=False, add_completion=False)
             alone.command(cmd_name, context_settings=CONTEXT)(function)
             self.commands[cmd_name] = made = typer.main.get_command(alone)

@@ -51,6 +51,7 @@ if TYPE_CHECKING:
     from tolstat.study import assumptions as assumptions
     from tolstat.study import mounting as mounting
     from tolstat.study import plausible as plausible
+    from tolstat.study import points as points
     from tolstat.study import rewriting as rewriting
     from tolstat.study import schema as schemas
     from tolstat.study import spectrum as spectra
@@ -77,7 +78,7 @@ else:
     recorded, result_files, revolutions, verification, what_if = (
         Late(f"tolstat.store.{name}") for name in ("recorded", "result_file", "revolutions", "verification", "what_if")
     )
-    assumptions, mounting, plausible, rewriting, schemas, spectra, starter = (
+    assumptions, mounting, plausible, points, rewriting, schemas, spectra, starter = (
         Late(f"tolstat.study.{name}")
-        for name in ("assumptions", "mounting", "plausible", "rewriting", "schema", "spectrum", "starter")
+        for name in ("assumptions", "mounting", "plausible", "points", "rewriting", "schema", "spectrum", "starter")
     )

@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from tolstat.cli._talk import WIDTH, say
+from tolstat.cli._shared import WIDTH, say
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.files import docs_dir
 from tolstat.common.strict import did_you_mean

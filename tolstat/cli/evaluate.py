@@ -10,9 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from tolstat.cli._library import functions, load_units, np, records, strict, studies, texts, units
-from tolstat.cli._output import write
-from tolstat.cli._talk import say
-from tolstat.cli._work import work
+from tolstat.cli._shared import say, work, write
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.files import check_target
 from tolstat.display.options import Opt, SimulatedPath, Workers

@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Annotated, TextIO
 import typer
 
 from tolstat.cli._library import causes, pylife, reports, result_files, stores, texts, workbook
-from tolstat.cli._output import json_of, write
-from tolstat.cli._talk import progress, say
+from tolstat.cli._shared import json_of, progress, say, write
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.files import atomic_write
 from tolstat.display.options import Accepted, Opt, Point, ResultPath

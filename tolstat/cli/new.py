@@ -9,8 +9,7 @@ from typing import Annotated
 import typer
 
 from tolstat.cli._library import np, schemas, spectra, starter, strict, studies, texts
-from tolstat.cli._output import json_of
-from tolstat.cli._talk import say
+from tolstat.cli._shared import json_of, say
 from tolstat.common.errors import Fault, InputError
 from tolstat.display.options import Opt
 

@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import Annotated
 
 from tolstat.cli._library import compilation, draw_records, pages, recorded, reports, revolutions, stores
-from tolstat.cli._output import deliver
-from tolstat.cli._talk import progress, say
+from tolstat.cli._shared import deliver, progress, say
 from tolstat.common.cores import available_cores
 from tolstat.common.files import check_target
 from tolstat.display.options import Accepted, AsJson, Opt, Point, ResultPath, Wide

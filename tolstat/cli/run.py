@@ -27,9 +27,7 @@ from tolstat.cli._library import (
     studies,
     tables,
 )
-from tolstat.cli._output import deliver, print_json
-from tolstat.cli._talk import progress, say, wrapped
-from tolstat.cli._work import print_study_notes, work
+from tolstat.cli._shared import deliver, print_json, print_study_notes, progress, say, work, wrapped
 from tolstat.common.errors import Fault, InputError, gather
 from tolstat.common.files import check_target
 from tolstat.display.options import AsJson, Joints, Opt, OtherStudy, Report, ResultPath, StudyPath, Wide, Workers

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from tolstat.cli._library import drawings, style, tables, views
-from tolstat.cli._talk import say
+from tolstat.cli._shared import say
 from tolstat.common.errors import Fault, InputError, gather
 from tolstat.common.files import check_target
 from tolstat.display.options import Opt

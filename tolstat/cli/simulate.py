@@ -8,9 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tolstat.cli._library import compilation, load_units, records, replays, sections, stores, studies, texts
-from tolstat.cli._output import print_json
-from tolstat.cli._talk import progress, say, warn
-from tolstat.cli._work import print_warnings
+from tolstat.cli._shared import print_json, print_warnings, progress, say, warn
 from tolstat.common.files import atomic_write
 from tolstat.display.options import AsJson, Opt, Point, ResultPath, Trace
 

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from tolstat.cli._library import np, records, remedies, stores, tables, texts, verification, what_if
-from tolstat.cli._output import print_json, print_table
-from tolstat.cli._talk import progress, wrapped
+from tolstat.cli._shared import print_json, print_table, progress, wrapped
 from tolstat.common.errors import Fault, StoreError
 from tolstat.display.options import AsJson, ResultPath, Wide
 from tolstat.display.progress import clock

@@ -6,8 +6,7 @@ from pathlib import Path
 from typing import Annotated
 
 from tolstat.cli._library import accuracy, answers, checks, numerical
-from tolstat.cli._output import deliver
-from tolstat.cli._talk import progress, say
+from tolstat.cli._shared import deliver, progress, say
 from tolstat.common import cores, files
 from tolstat.display.options import AsJson, Opt, Wide, Workers
 

@@ -16,8 +16,8 @@ from tolstat.display import text
 from tolstat.display.table import Row
 from tolstat.display.verdict import WORDS, Verdict
 from tolstat.questions import joints, shares
-from tolstat.questions.assumptions import sentences
-from tolstat.questions.assumptions.variations import Standing, applicable
+from tolstat.questions.assumptions import sentences, variations
+from tolstat.questions.assumptions.variations import Standing
 from tolstat.questions.bearing_life import answer as bearing_life
 from tolstat.questions.causes import lines
 from tolstat.questions.exceedance import rows as exceedance
@@ -48,7 +48,7 @@ def headline(view: View, accepted: float = np.nan) -> Verdict | None:
     if not counts.done:
         return Verdict("none", WORDS["none"], "no joint has been simulated", _pending(view))
     records = exceedance.limit_rows(view)
-    standing = applicable(view, accepted)
+    standing = variations.applicable(view, accepted)
     found = _yield(view, records, standing) if np.isnan(accepted) else _judged(view, records, accepted, standing)
     if standing is not None and found.answer != "none":
         more = sentences.more(standing, view.path.name)

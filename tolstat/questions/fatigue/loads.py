@@ -292,12 +292,11 @@ def most_loaded(rows: Rows) -> list[str]:
     exponents = sorted({row["m"] for row in rows})
     last = [row for row in rows if row["share"] == SHARES[-1] and row["m"] == exponents[len(exponents) // 2]]
     valid = [row for row in last if not np.isnan(row["estimate"])]
-    found: dict[tuple[str, str], Row] = {}
+    largest: dict[tuple[str, str], Row] = {}
     for row in [row for row in valid if not CHANNELS[row["channel"]].is_modulus] or valid:
         key = CHANNELS[row["channel"]].place, CHANNELS[row["channel"]].kind.key
-        if key not in found or row["estimate"] > found[key]["estimate"]:
-            found[key] = row
-    return [row["channel"] for row in found.values()]
+        largest[key] = max(largest.get(key, row), row, key=lambda row: float(row["estimate"]))
+    return [row["channel"] for row in largest.values()]
 
 
 def leading(rows: Rows) -> list[str]:
@@ -305,10 +304,10 @@ def leading(rows: Rows) -> list[str]:
 
     Candidates are the channels `most_loaded` of the table; all exponents count.
     """
-    names, found = most_loaded(rows), []
+    names, chosen = most_loaded(rows), []
     candidates = [row for row in rows if row["share"] == SHARES[-1] and row["channel"] in names]
     for group, kind in loads.PANELS:
         here = [row for row in candidates if CHANNELS[row["channel"]].kind == kind]
         here = [row for row in here if load_kinds.PLACES[CHANNELS[row["channel"]].place].group == group]
-        found += [max(here, key=lambda row: float(row["estimate"]))["channel"]] if here else []
-    return found
+        chosen += [max(here, key=lambda row: float(row["estimate"]))["channel"]] if here else []
+    return chosen

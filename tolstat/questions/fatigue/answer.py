@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import numpy as np
 
@@ -15,8 +15,7 @@ from tolstat.common.errors import NotApplicable
 from tolstat.common.loads import unit_text
 from tolstat.common.tables import Status
 from tolstat.display import drawing, style, text, verdict
-from tolstat.display.answer import Answer, Asked, Part, Sentence, Table
-from tolstat.display.blocks import Panel, Panels
+from tolstat.display.answer import Answer, Asked, Axes, Panel, Panels, Part, Sentence, Table
 from tolstat.display.options import Delivery, Loads, Opt
 from tolstat.display.style import ticker
 from tolstat.display.table import Column, Row, Rows, by_share, of_shares
@@ -26,9 +25,6 @@ from tolstat.questions.fatigue.loads import SHARES, Loading, channels, load_cycl
 from tolstat.store.revolutions import held
 from tolstat.store.view import View
 from tolstat.study.stress_point import StressPoint
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 JOINTS = 5000
 """Maximum number of samples, the first ones, whose cycles the page evaluates: more add little and take memory."""
@@ -199,20 +195,20 @@ def life_verdicts(view: View, accepted: float = math.nan, samples: int = JOINTS)
     StoreError
         When a file holds joints that are no sample of a production.
     """
-    own, store = section(view), view.store
-    has_points, has_lines = bool(own.points), bool(own.lines and store.history_specs)
+    settings, store = section(view), view.store
+    has_points, has_lines = bool(settings.points), bool(settings.lines and store.history_specs)
     if not (has_points or has_lines) or not settings_of(*members([view], None)).required:
         return []
-    found = []
+    verdicts = []
     if has_points and (held(store) or samples):
         stressed = parts.load_stresses([view], samples=JOINTS if held(store) else min(samples, JOINTS))
         row = parts.failures_over_life(stressed, [stressed.settings.revolutions])[0]._asdict()
-        found.append(_verdict("failures of parts", "have a failed part", row, stressed, accepted))
+        verdicts.append(_verdict("failures of parts", "have a failed part", row, stressed, accepted))
     if has_lines:
-        loading = load_cycles([view], names=tuple(own.lines), samples=JOINTS)
+        loading = load_cycles([view], names=tuple(settings.lines), samples=JOINTS)
         sums = loads.damages(loading)[-1]
-        found.append(_verdict("damage by loads", "have a damage sum above 1", sums, loading, accepted))
-    return found
+        verdicts.append(_verdict("damage by loads", "have a damage sum above 1", sums, loading, accepted))
+    return verdicts
 
 
 def _verdict(about: str, what: str, row: Row, joints: Joints, accepted: float) -> verdict.Verdict:
@@ -230,9 +226,9 @@ def _verdict(about: str, what: str, row: Row, joints: Joints, accepted: float) -
     undecided = f"{without} of {row['n']} joints have no load that repeats" if lost else ""
     what, ends = f"{what} within {joints.settings.service_life}", (row["outer_lower"], row["outer_upper"])
     reason = joints.design.without_interval("mean")
-    found = verdict.on_share(about, what, row, ends, accepted, joints_needed, reason, undecided)
+    judged = verdict.on_share(about, what, row, ends, accepted, joints_needed, reason, undecided)
     first = f"{about}: of the first {row['n']} of {joints.total} joints"
-    return found._replace(notes=(first,) if joints.total > joints.status.size else ())
+    return judged._replace(notes=(first,) if joints.total > joints.status.size else ())
 
 
 def _of_parts(stressed: parts.Stressed, delivery: int) -> list[Part]:

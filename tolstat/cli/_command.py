@@ -56,17 +56,17 @@ def exit_codes() -> Iterator[None]:
 
 def command_of(function: Callable[..., None]) -> Callable[..., None]:
     """Make the function of a command: with the options of `_shared.session`, and values with a unit as text."""
-    own, common = _parameters(function), _parameters(session)
+    parameters_of_function, common = _parameters(function), _parameters(session)
 
     def run(**given: Any) -> None:
         shared = {name: given.pop(name) for name in common}
         with exit_codes(), session(**shared), exit_codes():  # those inside are written to the log, too
-            function(**_values(own, given))
+            function(**_values(parameters_of_function, given))
 
     made: Any = run
     made.__name__, made.__doc__ = function.__name__, prose(inspect.getdoc(function) or "")
     texts = entries(inspect.getdoc(session) or "") | entries(inspect.getdoc(function) or "")
-    parameters = [*own.values(), *common.values()]
+    parameters = [*parameters_of_function.values(), *common.values()]
     made.__signature__ = Signature([_typed(p, texts.get(p.name)) for p in parameters])
     made.__annotations__ = {p.name: p.annotation for p in made.__signature__.parameters.values()}
     return run
@@ -199,9 +199,14 @@ READS: dict[str, dict[str, Any]] = {
 def function_of(question: Question) -> Callable[..., None]:
     """Make the function of a command that answers a question."""
     answer_of, simulate = question.functions()
-    views, own, simulated, only_simulated = list[Parameter](), list[Parameter](), list[Parameter](), list[Parameter]()
+    views, options_of_answer, simulated, only_simulated = (
+        list[Parameter](),
+        list[Parameter](),
+        list[Parameter](),
+        list[Parameter](),
+    )
     for parameter in _parameters(answer_of).values():
-        (views if parameter.annotation is stores.View else own).append(parameter)
+        (views if parameter.annotation is stores.View else options_of_answer).append(parameter)
     several, takes_study, into_file = views[0].kind is Parameter.VAR_POSITIONAL, False, False
     if simulate is not None:
         source, _, *simulated = _parameters(simulate).values()
@@ -237,7 +242,7 @@ def function_of(question: Question) -> Callable[..., None]:
             point = "" if is_study and len(opened[0].points) == 1 else point  # the one that was simulated
             seen = [store.view(study_file).at(point) for store in opened]
             with progress(question.name):
-                answer = answer_of(*seen, **{p.name: given[p.name] for p in own})
+                answer = answer_of(*seen, **{p.name: given[p.name] for p in options_of_answer})
             deliver(answer, given["wide"], given["as_json"])
             if out is not None:
                 with progress("files"):
@@ -249,7 +254,7 @@ def function_of(question: Question) -> Callable[..., None]:
     made: Any = run
     made.__name__, made.__doc__ = question.name, prose(inspect.getdoc(answer_of) or "")
     parameters = [_parameter(name, kind, Parameter.empty) for name, kind in READS[reads].items()]
-    for p in (*own, *only_simulated):
+    for p in (*options_of_answer, *only_simulated):
         base, opt = opt_of(p)
         parameters.append(_parameter(p.name, Annotated[base, opt._replace(help=texts[p.name])], p.default))
     for name, (annotation, default, applies) in {

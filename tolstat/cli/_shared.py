@@ -97,10 +97,10 @@ def session(
     OSError
         When the log cannot be written.
     """
-    own = _Stderr()
-    LOG.handlers = [own]
+    terminal = _Stderr()
+    LOG.handlers = [terminal]
     LOG.setLevel(logging.DEBUG)
-    own.setLevel(logging.WARNING if quiet else logging.DEBUG if verbose else logging.INFO)
+    terminal.setLevel(logging.WARNING if quiet else logging.DEBUG if verbose else logging.INFO)
     try:
         if quiet and verbose:
             raise InputError([Fault("--quiet", "cannot be combined with --verbose", "remove one of them")])
@@ -112,7 +112,7 @@ def session(
     finally:
         for handler in LOG.handlers[1:]:
             handler.close()
-        LOG.handlers = [own]
+        LOG.handlers = [terminal]
 
 
 def _log_file(path: Path) -> logging.Handler:

@@ -254,7 +254,7 @@ def conclude(path: Path, report: bool, wide: bool, study_file: str = "STUDY") ->
             deliver(answer, wide)
             for file in files:
                 say(f"wrote {file}")
-        without_load = library.remedies.reasons(store, {one.point or "": one.status() for one in store.each()})
+        without_load = library.remedies.reasons(store, {at.point or "": at.status() for at in store.each()})
         for reason in without_load:
             say(reason.text)
         for options in dict.fromkeys(reason.retry for reason in without_load if reason.retry):

@@ -125,8 +125,8 @@ def _inline(drawn: str, panel: Panel) -> str:
     spaces = 'xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink"'
     head = f'<svg {spaces} {box[0]} role="img" aria-labelledby="{panel.key}-title {panel.key}-desc">'
     title, description = (escape(unseen.visible(words)) for words in (panel.title, panel.description))
-    said = f'<title id="{panel.key}-title">{title}</title><desc id="{panel.key}-desc">{description}</desc>'
-    return head + said + body[body.index(">") + 1 :].strip()
+    texts = f'<title id="{panel.key}-title">{title}</title><desc id="{panel.key}-desc">{description}</desc>'
+    return head + texts + body[body.index(">") + 1 :].strip()
 
 
 def rows(ax: Axes, labels: list[str]) -> None:

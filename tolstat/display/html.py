@@ -57,7 +57,7 @@ def figures(blocks: Sequence[Block], processes: int) -> Callable[[Panel], dict[s
 
 def grouped(words: str) -> str:
     """Group the digits of whole numbers from 10 000 on by narrow spaces."""
-    return re.sub(r"(?<![\w.])\d{5,}(?!\w)", lambda found: f"{int(found[0]):,}".replace(",", "\u202f"), words)
+    return re.sub(r"(?<![\w.])\d{5,}(?!\w)", lambda number: f"{int(number[0]):,}".replace(",", "\u202f"), words)
 
 
 def bound(words: str) -> str:
@@ -69,7 +69,7 @@ def bound(words: str) -> str:
 def _panels(block: Block) -> Sequence[Panel]:
     if isinstance(block, Panels):
         return block.panels
-    return [own for own in (block.chart, block.picture) if own] if isinstance(block, Decision) else []
+    return [panel for panel in (block.chart, block.picture) if panel] if isinstance(block, Decision) else []
 
 
 def _data(value: Any) -> Markup:

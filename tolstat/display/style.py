@@ -97,7 +97,9 @@ def with_variables(svg: str) -> str:
     """
     names = {colour: f"var(--{name})" for colour, (name, _) in _schemes().items()}
     svg = re.sub(r' fill="(#[0-9a-f]{6})"', r' style="fill: \1"', svg)
-    return re.sub(r'style="[^"]+"', lambda own: re.sub("#[0-9a-f]{6}", lambda m: names.get(m[0], m[0]), own[0]), svg)
+    return re.sub(
+        r'style="[^"]+"', lambda attribute: re.sub("#[0-9a-f]{6}", lambda m: names.get(m[0], m[0]), attribute[0]), svg
+    )
 
 
 def style_sheet() -> str:

@@ -71,7 +71,7 @@ def align(rows: Sequence[Sequence[str]], words: Sequence[bool] = ()) -> str:
     widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
     lines = []
     for row in rows:
-        cells = (c.ljust(w) if own else c.rjust(w) for c, w, own in zip(row, widths, left, strict=True))
+        cells = (c.ljust(w) if is_left else c.rjust(w) for c, w, is_left in zip(row, widths, left, strict=True))
         lines.append("  ".join(cells).rstrip())
     return "\n".join(lines)
 

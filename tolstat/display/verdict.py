@@ -68,10 +68,10 @@ class Verdict(NamedTuple):
 
     def values(self) -> dict[str, Any]:
         """JSON values: the answer of the joints as drawn in words, null without one, the sentence, other attributes."""
-        found: dict[str, Any] = {"about": self.about, "answer": WORDS.get(self.answer), "stands_on": self.stands_on}
-        found |= {"sentence": self.sentence, "share": self.share, "lower": self.lower, "upper": self.upper}
+        values: dict[str, Any] = {"about": self.about, "answer": WORDS.get(self.answer), "stands_on": self.stands_on}
+        values |= {"sentence": self.sentence, "share": self.share, "lower": self.lower, "upper": self.upper}
         others = ("stands_on",) if self.about else ("about", "share", "lower", "upper")
-        shown = {key: value for key, value in found.items() if key not in others}
+        shown = {key: value for key, value in values.items() if key not in others}
         return {**text.plain(shown), "notes": list(self.notes)}
 
 

@@ -213,9 +213,9 @@ def _points(orbit: Orbit) -> Rows:
 
 def _which(orbits: Sequence[Orbit]) -> Iterator[str]:
     """Words on which joints the orbits of each shaft are of."""
-    for (shaft, point), own in _by_shaft(orbits).items():
-        place = f"{shaft} shaft{f' at {point}' if point else ''}"
-        yield f"{place} {', '.join(f'{orbit.label} row {orbit.row}' for orbit in own)}"
+    for (shaft, point), group in _by_shaft(orbits).items():
+        where = f"{shaft} shaft{f' at {point}' if point else ''}"
+        yield f"{where} {', '.join(f'{orbit.label} row {orbit.row}' for orbit in group)}"
 
 
 def _by_shaft(orbits: Sequence[Orbit]) -> dict[tuple[str, str], list[Orbit]]:
@@ -227,21 +227,21 @@ def _by_shaft(orbits: Sequence[Orbit]) -> dict[tuple[str, str], list[Orbit]]:
 def _amplitude_panels(rows: Rows) -> Iterator[Panel]:
     """Pictures of the amplitude over the order, one of each quantity."""
     for name in dict.fromkeys(row["quantity"] for row in rows):
-        own = [row for row in rows if row["quantity"] == name]
-        most, shaft = max(own, key=lambda row: float(row["qmedian"])), name.rpartition(".")[0]
+        amplitudes = [row for row in rows if row["quantity"] == name]
+        most, shaft = max(amplitudes, key=lambda row: float(row["qmedian"])), name.rpartition(".")[0]
         title = f"{text.capital(most['noun'])}{f', {shaft} shaft' if shaft else ''}".replace("Psi", "Ψ")
         words = f"The median of the joints is largest at order {most['order']}, {value('qmedian')(most)}."
-        draw, room = partial(_bars, rows=own), drawing.legend_room(AMPLITUDES)
+        draw, room = partial(_bars, rows=amplitudes), drawing.legend_room(AMPLITUDES)
         yield Panel(f"amplitude-{name}", title, words, draw, (drawing.WIDTH, 2.7), top=room)
 
 
 def _orbit_panels(orbits: Sequence[Orbit]) -> Iterator[Panel]:
     """Pictures of the lateral force on each shaft."""
-    for (shaft, point), own in _by_shaft(orbits).items():
+    for (shaft, point), group in _by_shaft(orbits).items():
         title = f"Lateral force on the {shaft} shaft over one revolution{f', at {point}' if point else ''}"
         words = "Orbit of the force in axes that do not turn, of the nominal joint and of two others. "
-        words += " ".join(f"{orbit.label}: up to {text.value(orbit.largest, 'N')}." for orbit in own)
-        draw, room = partial(_draw_orbits, orbits=own), drawing.legend_room([orbit.label for orbit in own])
+        words += " ".join(f"{orbit.label}: up to {text.value(orbit.largest, 'N')}." for orbit in group)
+        draw, room = partial(_draw_orbits, orbits=group), drawing.legend_room([orbit.label for orbit in group])
         yield Panel(f"orbit-{shaft}", title, words, draw, (drawing.WIDTH, 4.6), top=room)
 
 

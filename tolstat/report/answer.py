@@ -46,17 +46,17 @@ def report(view: View, accepted: float = math.nan) -> Answer:
     store = view.store
     stands_on = [Sentence(text.sentence(mounting_and_law(*recorded.mountings(store))), "lead")]
     if store.case_names or view.method == "sweep":
-        found = cases(view) if store.case_names else sweep(view)
+        joints = cases(view) if store.case_names else sweep(view)
         notes = [] if store.case_names else [*_notes(view)]
-        return Answer("report", view.name, [*stands_on, *found.parts, *notes, *_run(view)])
+        return Answer("report", view.name, [*stands_on, *joints.parts, *notes, *_run(view)])
     verdict = headline(view, accepted)
     lead = [Sentence(text.sentence(verdict.sentence), "lead")] if verdict else []
     causes = [Sentence(note) for note in verdict.notes] if verdict else []
     facts: dict[str, Any] = {"verdict": verdict.values()} if verdict else {}
     if lives := life_verdicts(view, accepted):
-        facts["lives"] = [own.values() for own in lives]
-        lead += [Sentence(text.sentence(own.sentence), "lead") for own in lives]
-        causes += [Sentence(text.sentence(note)) for own in lives for note in own.notes]
+        facts["lives"] = [life.values() for life in lives]
+        lead += [Sentence(text.sentence(life.sentence), "lead") for life in lives]
+        causes += [Sentence(text.sentence(note)) for life in lives for note in life.notes]
     parts = [*lead, *stands_on, *_tables(view, accepted), *_yield(view, bool(verdict and verdict.answer))]
     return Answer("report", view.name, [*parts, *causes, *_notes(view), *_run(view)], facts)
 
@@ -113,8 +113,8 @@ def write(
         folder.mkdir(parents=True, exist_ok=True)
         return made.write(folder / (f"{path.stem}_{point}" if point else path.stem))
     except OSError as error:
-        found = f"cannot be written to: {error.strerror or error}"
-        raise InputError([Fault(str(folder), found, "give another folder with --out")]) from error
+        problem = f"cannot be written to: {error.strerror or error}"
+        raise InputError([Fault(str(folder), problem, "give another folder with --out")]) from error
 
 
 def _tables(view: View, accepted: float) -> Iterator[Part]:
@@ -218,7 +218,7 @@ def statistics(view: View, accepted: float = math.nan) -> dict[str, Any]:
         "joints": {status.label: count for status in Status if (count := view.count(status))},
     }
     if lives := life_verdicts(view, accepted, samples=0):
-        head["lives"] = [own.values() for own in lives]
+        head["lives"] = [life.values() for life in lives]
     provenance = {
         "created": store.created,
         "git_commit": store.git_commit,
@@ -226,9 +226,9 @@ def statistics(view: View, accepted: float = math.nan) -> dict[str, Any]:
         "sampling": store.sampling,
         "stop": store.stop,
     }
-    found = questions.statistics(view)
+    answers = questions.statistics(view)
     stands_on = {
         "joint": mounting_and_law(*recorded.mountings(store)),
         "fidelity": fidelity.sentence(store.options, store.fidelity),
     }
-    return head | found | stands_on | {"provenance": provenance}
+    return head | answers | stands_on | {"provenance": provenance}

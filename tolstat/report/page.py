@@ -194,12 +194,12 @@ def scene(view: View) -> tuple[str, str]:
     mounting, law = mounting_and_law(axial, laws).split("; ")
     assumed: set[str] | None = None  # where the study can no longer be read
     with suppress(TolstatError):
-        assumed = {key for own in assumptions(view.study) for value in own.values for key in value}
+        assumed = {key for assumption in assumptions(view.study) for value in assumption.values for key in value}
 
     def marked(words: str, key: str) -> str:
         if assumed is None:
             return words
-        return f"{words} ({'assumed' if any(own.startswith(key) for own in assumed) else 'given'})"
+        return f"{words} ({'assumed' if any(assumption.startswith(key) for assumption in assumed) else 'given'})"
 
     first = f"{marked(at, 'operation.')}; {marked(bearing, 'bearing.')}."
     second = f"{marked(mounting, variations.AXIAL)}; {marked(law, variations.LAW)}."

@@ -36,8 +36,8 @@ def check(store: Reader, option: str) -> None:
         remedy = "install it with: pip install openpyxl, or use --csv OUT"
         raise InputError([Fault(option, "openpyxl is not installed", remedy)])
     if store.n > MAX_ROWS:
-        found = f"{store.path} has {store.n} joints, a sheet of Excel has {MAX_ROWS} rows"
-        raise InputError([Fault(option, found, "use --parquet OUT or --csv OUT")])
+        too_many = f"{store.path} has {store.n} joints, a sheet of Excel has {MAX_ROWS} rows"
+        raise InputError([Fault(option, too_many, "use --parquet OUT or --csv OUT")])
 
 
 def write(store: Reader, frame: pd.DataFrame, path: Path) -> None:

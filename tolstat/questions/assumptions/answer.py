@@ -171,8 +171,8 @@ def _bars(ax: Axes, standing: Standing, labels: list[str]) -> None:
         ax.plot([max(lower, floor), max(upper, floor)], [0, 0], color=style.INK, lw=1.6)
     ax.plot(drawn, 0, "o" if share >= floor else style.markers.CARETLEFT, color=style.INK, ms=6.0, clip_on=False)
     for y, row in enumerate(rows, 1):
-        own, low, top = (max(row[f"share{end}"], floor) for end in ("", "_lower", "_upper"))
-        ax.barh(y, own - drawn, 0.62, left=drawn, color=style.COLOURS[row["change"] > 0.0], zorder=2)
+        share_shown, low, top = (max(row[f"share{end}"], floor) for end in ("", "_lower", "_upper"))
+        ax.barh(y, share_shown - drawn, 0.62, left=drawn, color=style.COLOURS[row["change"] > 0.0], zorder=2)
         ax.plot([low, top], [y, y], color=style.INK, lw=1.2, zorder=3)
         if row["share_lower"] < floor:
             ax.plot(floor, y, marker=style.markers.CARETLEFT, color=style.INK, ms=5.0, zorder=4, clip_on=False)

@@ -111,7 +111,7 @@ def still(standing: Standing) -> str:
     parts = []
     if standing.still:
         parts.append(f"Moves nothing that {standing.n} joints show: {', '.join(standing.still)}.")
-    parts += [f"Not varied: {own.name} ({own.because})." for own in standing.fixed]
+    parts += [f"Not varied: {assumption.name} ({assumption.because})." for assumption in standing.fixed]
     if standing.given:
         parts.append(f"Given by the study: {_listed(standing.given)}.")
     return " ".join(parts)

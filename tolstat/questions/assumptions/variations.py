@@ -238,10 +238,10 @@ def all_together(view: View) -> list[Variation]:
 def singles(study: Study) -> list[Variation]:
     """Variations of one assumption each: every value of those that are varied."""
     return [
-        Variation(own.name, label_of(own.name, keys), keys, own.because)
-        for own in assumptions(study)
-        if own.varied
-        for keys in own.values
+        Variation(assumption.name, label_of(assumption.name, keys), keys, assumption.because)
+        for assumption in assumptions(study)
+        if assumption.varied
+        for keys in assumption.values
     ]
 
 

@@ -122,7 +122,7 @@ def lives_of(view: View) -> Lives:
     bearing, duty, stores = _bearing(view), points.shares_of_time(view), [part.store for part in view.parts]
     loads = np.stack([store.results(slice(None), ("equivalent_load",))["equivalent_load"] for store in stores])
     operation = [recorded.operating_points(store) for store in stores]
-    swings, speeds = (np.abs([own[name] for own in operation]) for name in ("alpha", "speed"))  # (points, rows)
+    swings, speeds = (np.abs([rows[name] for rows in operation]) for name in ("alpha", "speed"))  # (points, rows)
     critical = bearing.critical_amplitude
     hourly = duty[:, None] * speeds / (2.0 * np.pi) * rating_life.turns_per_revolution(swings, critical) * HOUR
     turns = hourly.sum(axis=0)
@@ -138,8 +138,8 @@ def lives_of(view: View) -> Lives:
     hours[unrated] = np.nan
     skip, valid, has_nominal = view.store.first_sample, np.isin(view.status, VALID), len(view.nominal) > 0
     short, fretting = (
-        {name: int(n) for name, n in zip(view.points, (own[:, skip:] & valid).sum(axis=1), strict=True) if n}
-        for own in small
+        {name: int(n) for name, n in zip(view.points, (joints[:, skip:] & valid).sum(axis=1), strict=True) if n}
+        for joints in small
     )
     return Lives(
         view=view,
@@ -163,17 +163,17 @@ def bearing_of(view: View) -> Bearing | None:
 
 def _bearing(view: View) -> Bearing:
     """Section ``[bearing]`` of the joint of a file, with all that a life needs."""
-    bearing, place = bearing_of(view), str(view.path)
+    bearing, file = bearing_of(view), str(view.path)
     again = "then repeat tolstat run: no joint is simulated again"
     if bearing is None:
         remedy = f"add the section [bearing] to the joint file or [joint.bearing] to the study, {again}"
-        raise NotApplicable(str(Fault(place, "holds a joint without bearings", remedy)))
+        raise NotApplicable(str(Fault(file, "holds a joint without bearings", remedy)))
     if lacking := bearing.lacking(FOR_LIFE):
-        found = f"holds bearings without {', '.join(lacking)}, which a rating life needs"
-        raise StoreError(str(Fault(place, found, f"add to [bearing] of the joint, {again}")))
+        incomplete = f"holds bearings without {', '.join(lacking)}, which a rating life needs"
+        raise StoreError(str(Fault(file, incomplete, f"add to [bearing] of the joint, {again}")))
     if sum(column.field == "equivalent_load" for column in view.columns) < len(PINS):
         remedy = 'add "pin*.equivalent_load" to [output] results of the study'
-        raise StoreError(str(Fault(place, "does not keep the equivalent loads of the bearings", remedy)))
+        raise StoreError(str(Fault(file, "does not keep the equivalent loads of the bearings", remedy)))
     return bearing
 
 
@@ -281,10 +281,10 @@ def contact_rows(view: View) -> Rows:
     spent = np.tensordot(points.shares_of_revolutions(view), np.stack(modes), 1)
     rows = []
     for place in (*PINS, ANY):
-        own = spent[:, [PINS.index(place)]] if place in PINS else spent
+        shares = spent[:, [PINS.index(place)]] if place in PINS else spent
         row: dict[str, Any] = {"place": place}
         for name, mode in LOADED.items():
-            found = Sample.of(own[:, :, mode].max(axis=1), view.status, view.design).above(MOSTLY, CONFIDENCE)
-            row |= {name: found.estimate, f"{name}_lower": found.lower, f"{name}_upper": found.upper}
+            above = Sample.of(shares[:, :, mode].max(axis=1), view.status, view.design).above(MOSTLY, CONFIDENCE)
+            row |= {name: above.estimate, f"{name}_lower": above.lower, f"{name}_upper": above.upper}
         rows.append(row)
     return rows

@@ -94,14 +94,14 @@ def pairs(joint: Joint, errors: NDArray[np.void]) -> list[Pair]:
         Its errors.
     """
     par = perturb(joint, Operation.model_construct(alpha=0.0, speed=1.0, torque=0.0), errors)[0]
-    found = []
+    pairs_of_joint = []
     for i, arm in enumerate(ARM_OF_PIN):
         t, u = perturbation.PIN_TRIADS[i], perturbation.ARM_TRIADS[arm]
         thick = joint.contact.D_P + float(errors[f"{PINS[i]}.diameter"][0])
         pin = Feature(PINS[i], thick, t @ par["pin_point"][i], t @ par["pin_axis"][i])
         wide = thick + 2.0 * float(par["clearance"][i])
-        found.append((pin, Feature(HOLES[arm], wide, u @ par["hole_point"][arm], u @ par["hole_axis"][arm])))
-    return found
+        pairs_of_joint.append((pin, Feature(HOLES[arm], wide, u @ par["hole_point"][arm], u @ par["hole_axis"][arm])))
+    return pairs_of_joint
 
 
 def positive(joint: Joint, kind: str) -> Pair:

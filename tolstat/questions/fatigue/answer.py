@@ -143,37 +143,37 @@ def fatigue(
     """
     has_points = bool(section(views[0]).points)
     has_cycles = all(part.store.history_specs for view in views for part in view.parts)
-    found: list[Part] = []
+    shown_parts: list[Part] = []
     duty: Sequence[tuple[str, float]] = ()
     if has_points:
         stressed = parts.load_stresses(views, shares or None, joints)
-        duty, found = stressed.duty, _of_parts(stressed, delivery)
+        duty, shown_parts = stressed.duty, _of_parts(stressed, delivery)
     if by or has_cycles or not has_points:
         loading = load_cycles(views, shares or None, channels(by) if by else None, joints)
         rows = loads.equivalent_loads(loading)
         shown = [] if by else loads.most_loaded(rows)
         seen = [row for row in rows if not shown or row["channel"] in shown]
-        duty, found = loading.duty, [*found, *_of_loads(loading, rows, seen, delivery)]
-    return Answer("fatigue", "Fatigue", found, {"duty": dict(duty)} if len(duty) > 1 else {})
+        duty, shown_parts = loading.duty, [*shown_parts, *_of_loads(loading, rows, seen, delivery)]
+    return Answer("fatigue", "Fatigue", shown_parts, {"duty": dict(duty)} if len(duty) > 1 else {})
 
 
 def fatigue_on_page(view: View, asked: Asked) -> Answer:
     """Fatigue of the first joints, with the leading loads; without histories, of those that are simulated again."""
-    found: list[Part] = []
+    shown_parts: list[Part] = []
     if view.method != "sweep" and view.count(Status.OK):
         with asked.noting("load cycles are left out"):
             joints = JOINTS if held(view.store) else min(asked.replay, JOINTS)
             if section(view).points and joints:
-                found += _of_parts(parts.load_stresses([view], samples=joints), prediction.DELIVERY)
+                shown_parts += _of_parts(parts.load_stresses([view], samples=joints), prediction.DELIVERY)
             if view.store.history_specs:
                 loading = load_cycles([view], samples=JOINTS)
                 rows = loads.equivalent_loads(loading)
                 leading = loads.leading(rows)
                 seen = sorted((row for row in rows if row["channel"] in leading), key=lambda r: (r["channel"], r["m"]))
-                found += _of_loads(loading, rows, seen, prediction.DELIVERY)
-    if not found:
+                shown_parts += _of_loads(loading, rows, seen, prediction.DELIVERY)
+    if not shown_parts:
         raise NotApplicable
-    return Answer("fatigue", "Fatigue", found)
+    return Answer("fatigue", "Fatigue", shown_parts)
 
 
 def life_verdicts(view: View, accepted: float = math.nan, samples: int = JOINTS) -> list[verdict.Verdict]:
@@ -257,12 +257,12 @@ def _of_loads(loading: Loading, rows: Rows, seen: Rows, delivery: int) -> list[P
         )
         for channel in loads.leading(rows)
     ]
-    found: list[Part] = [Panels(panels)] if panels else []
-    found.append(Table("loads", "Damage-equivalent loads", LOADS, rows, seen=by_share(seen, "channel", "m")))
+    shown_parts: list[Part] = [Panels(panels)] if panels else []
+    shown_parts.append(Table("loads", "Damage-equivalent loads", LOADS, rows, seen=by_share(seen, "channel", "m")))
     if damages := loads.damages(loading, delivery):
         title = "Damage sum of the service life, and share of the joints where it exceeds 1"
-        found.append(Table("damages", title, DAMAGES, damages, {"S0": "N or N*m"}))
-    return [*found, *map(Sentence, _notes_on_loads(loading, rows))]
+        shown_parts.append(Table("damages", title, DAMAGES, damages, {"S0": "N or N*m"}))
+    return [*shown_parts, *map(Sentence, _notes_on_loads(loading, rows))]
 
 
 def _notes_on_parts(stressed: parts.Stressed, rows: Rows) -> Iterator[str]:
@@ -303,8 +303,8 @@ def _lines(points: Sequence[StressPoint]) -> Iterator[str]:
     names: dict[strength.Line, list[str]] = {}
     for point in points:
         names.setdefault(point.line, []).append(point.name)
-    for line, own in names.items():
-        where = f" of {'; '.join(own)}" if len(names) > 1 else ""
+    for line, points_of_line in names.items():
+        where = f" of {'; '.join(points_of_line)}" if len(names) > 1 else ""
         scatter = f", T_S = {line.T_S:.3g}" if line.T_S > 1 else ""
         mean = f", M = {line.M:g} (R = {line.R:g})" if line.M > 0 else ""
         knee = f"range of {line.S_D / 1e6:.4g} MPa at {line.N_D:g} cycles, k = {line.k:g}, {line.k_2:g} below"
@@ -317,7 +317,9 @@ def _draw_failures(ax: Axes, stressed: parts.Stressed, life: float) -> None:
     first, last = sorted([service, life if math.isfinite(life) and life > 0 else service])
     numbers = np.geomspace(first / 10**DECADES, last * 10**DECADES, POINTS)
     curve, has_band = parts.failures_over_life(stressed, numbers.tolist()), stressed.design.has_interval("mean")
-    lower, share, upper = np.array([(own.outer_lower, own.estimate, own.outer_upper) for own in curve]).T
+    lower, share, upper = np.array(
+        [(failures.outer_lower, failures.estimate, failures.outer_upper) for failures in curve]
+    ).T
     if has_band:
         ax.fill_between(numbers, lower, upper, color=style.COLOURS[0], alpha=0.2, lw=0)
     ax.plot(numbers, share, color=style.COLOURS[0])
@@ -340,9 +342,10 @@ def _draw_spectrum(ax: Axes, loading: Loading, channel: str) -> None:
     x = np.concatenate([[0.7 * numbers[0]], numbers])
     handles = []
     for share, colour, dash in zip(SHARES, style.COLOURS, style.DASHES, strict=False):
-        own = [row for row in rows if row["share"] == share]
+        rows_of_share = [row for row in rows if row["share"] == share]
         lower, estimate, upper, nominal = (  # the first value twice, so that the curve begins at the left edge
-            np.array([row[key] for row in (own[0], *own)]) for key in ("lower", "estimate", "upper", "nominal")
+            np.array([row[key] for row in (rows_of_share[0], *rows_of_share)])
+            for key in ("lower", "estimate", "upper", "nominal")
         )
         if np.isfinite(lower).any():
             top = np.where(np.isfinite(upper), upper, estimate)  # too few joints: the upper end is infinite

@@ -75,8 +75,8 @@ class Joints:
     def visits(self) -> list[int]:
         """Points of `duty` in the order of their visits; empty where the study gives no sequence of several of them."""
         names = [name for name, _ in self.duty]
-        found = [names.index(name) for name in self.settings.visits if name in names]
-        return found if len(set(found)) > 1 else []
+        visited = [names.index(name) for name in self.settings.visits if name in names]
+        return visited if len(set(visited)) > 1 else []
 
     def transitions(self, low: FloatArray, high: FloatArray) -> Transitions | None:
         """Cycles that the sequence of operating points closes beside those at each of them.
@@ -93,8 +93,8 @@ class Joints:
         """
         if not self.visits:
             return None
-        levels = (own.reshape(-1, len(self.duty)) for own in (low, high))
-        ranges, means, numbers = (own.reshape(*low.shape[:2], -1) for own in rainflow.between(self.visits, *levels))
+        levels = (table.reshape(-1, len(self.duty)) for table in (low, high))
+        ranges, means, numbers = (table.reshape(*low.shape[:2], -1) for table in rainflow.between(self.visits, *levels))
         return Transitions(ranges, means, numbers / self.settings.turns)
 
 
@@ -126,15 +126,15 @@ def members(views: Sequence[View], shares: Sequence[float] | None) -> tuple[Sequ
         views, shares = views[0].parts, points.shares_of_revolutions(views[0]).tolist()
     shares = [1.0] if shares is None else shares
     if len(shares) != len(views) or min(shares, default=0.0) <= 0 or abs(sum(shares) - 1) > 1e-6:
-        found = f"{list(shares)} for {len(views)} files"
-        raise InputError([Fault("shares", found, "give a positive share for each file; their sum is 1")])
+        given = f"{list(shares)} for {len(views)} files"
+        raise InputError([Fault("shares", given, "give a positive share for each file; their sum is 1")])
     names, first = [column.name for column in ERROR_FIELDS], views[0]
     for view in views:
         view.check("mean")
     for view in views[1:]:
         if view.n != first.n or not all(
-            np.array_equal(own[name], other[name])
-            for own, other in zip(view.error_blocks(names), first.error_blocks(names), strict=True)
+            np.array_equal(errors[name], other[name])
+            for errors, other in zip(view.error_blocks(names), first.error_blocks(names), strict=True)
             for name in names
         ):
             remedy = "run both studies with the same tolerances, sampling.n and sampling.seed"

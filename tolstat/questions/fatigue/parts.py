@@ -101,12 +101,12 @@ def load_stresses(views: Sequence[View], shares: Sequence[float] | None = None, 
     both = int(all((view.nominal["status"] == Status.OK).any() for view in views))
     rows = np.append(np.zeros(both, np.intp), 1 + np.flatnonzero(joints.valid))
     slots = [np.append(view.nominal_slots[:both], view.slots(rows[both:] - 1)) for view in views]
-    found = [stresses_of(view.store, own, joints.settings.points) for view, own in zip(views, slots, strict=True)]
-    parts = [_spread(own, rows, 1 + joints.status.size) for own, _ in found]
+    settled = [stresses_of(view.store, those, joints.settings.points) for view, those in zip(views, slots, strict=True)]
+    parts = [_spread(stresses, rows, 1 + joints.status.size) for stresses, _ in settled]
     low, high = (np.stack([getattr(part, end) for part in parts], axis=2) for end in ("low", "high"))
     mixed = duty_cycle([part.cycles for part in parts], shares, joints.transitions(low, high))
     whole = Stresses(mixed, low.min(axis=2), high.max(axis=2))
-    apart = max(difference for _, difference in found)
+    apart = max(difference for _, difference in settled)
     return Stressed(**vars(joints), own=whole.rows(slice(1, None)), nominal=whole.rows(slice(both)), apart=apart)
 
 
@@ -126,16 +126,16 @@ def stresses_of(store: reader.Reader, slots: NDArray[np.intp], points: Sequence[
     low, high = np.zeros((2, len(slots), len(places)))
     counted: list[tuple[FloatArray, FloatArray]] = []
     apart = 0.0
-    for part, found, difference in revolutions.of_components(store, slots, [channels.BUSHING_LOADS]):
-        apart, loads = max(apart, difference), found[channels.BUSHING_LOADS.name]
+    for part, components, difference in revolutions.of_components(store, slots, [channels.BUSHING_LOADS]):
+        apart, loads = max(apart, difference), components[channels.BUSHING_LOADS.name]
         signals, noise = zip(*(_signal(loads, *place) for place in places), strict=True)
         low[part], high[part] = (np.stack([end(s, axis=1) for s in signals], axis=1) for end in (np.min, np.max))
         for joint in range(len(loads)):
             counted += [rainflow.periodic(s[joint], gate[joint]) for s, gate in zip(signals, noise, strict=True)]
     number = np.array([len(ranges) for ranges, _ in counted], float).reshape(low.shape)
     table = np.zeros((2, len(counted), max(1, int(number.max(initial=0.0)))))
-    for i, own in enumerate(counted):
-        table[:, i, : len(own[0])] = own
+    for i, joint_cycles in enumerate(counted):
+        table[:, i, : len(joint_cycles[0])] = joint_cycles
     names = tuple(point.name for point, _ in places)
     ranges, means = table.reshape(2, *low.shape, -1)
     return Stresses(Cycles.of_revolution(names, ranges, means, number), low, high), apart
@@ -143,8 +143,8 @@ def stresses_of(store: reader.Reader, slots: NDArray[np.intp], points: Sequence[
 
 def _signal(loads: NDArray[np.floating], point: StressPoint, factors: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Stress over the revolution, (m, samples), and the range up to which cycles may be numerical noise, (m,), Pa."""
-    own = loads[:, :, channels.BUSHING_LOADS.places.index(point.bushing)].astype(float)
-    return own @ factors, rainflow.GATE * np.max(np.abs(own) @ np.abs(factors), axis=1)
+    at_bushing = loads[:, :, channels.BUSHING_LOADS.places.index(point.bushing)].astype(float)
+    return at_bushing @ factors, rainflow.GATE * np.max(np.abs(at_bushing) @ np.abs(factors), axis=1)
 
 
 def _spread(part: Stresses, rows: NDArray[np.intp], n: int) -> Stresses:
@@ -188,18 +188,18 @@ def part_failures(stressed: Stressed, delivery: int = prediction.DELIVERY) -> Ro
         joint); the fields of `analysis.strength.Failures`, ``confidence``, ``next_lower`` and
         ``next_upper`` (prediction interval for the failures in the next delivery).
     """
-    own, nominal = (evaluated(stresses, stressed.settings) for stresses in (stressed.own, stressed.nominal))
-    heads = [_damage(stressed, p, own[p], nominal[p]) for p in range(len(own))]
-    groups = [slice(p, p + 1) for p in range(len(own))]
-    if len(own) > 1:
+    points, nominal = (evaluated(stresses, stressed.settings) for stresses in (stressed.own, stressed.nominal))
+    heads = [_damage(stressed, p, points[p], nominal[p]) for p in range(len(points))]
+    groups = [slice(p, p + 1) for p in range(len(points))]
+    if len(points) > 1:
         heads.append({"point": duty.ANY, "bushing": ""} | dict.fromkeys(list(heads[0])[2:], np.nan))
         groups.append(slice(None))
     rows = []
     for head, group in zip(heads, groups, strict=True):
-        wide = failures(stressed, own[group], confidence=prediction.half(duty.CONFIDENCE))
+        wide = failures(stressed, points[group], confidence=prediction.half(duty.CONFIDENCE))
         following = prediction.of_share(wide.outer_lower, wide.outer_upper, delivery, duty.CONFIDENCE)
-        head |= prediction.columns(following, delivery) | _life(stressed, own[group])
-        head |= {"nominal_failures": duty.only(_chances(nominal[group]))} | failures(stressed, own[group])._asdict()
+        head |= prediction.columns(following, delivery) | _life(stressed, points[group])
+        head |= {"nominal_failures": duty.only(_chances(nominal[group]))} | failures(stressed, points[group])._asdict()
         rows.append(head | {"confidence": duty.CONFIDENCE})
     return rows
 
@@ -238,13 +238,13 @@ def evaluated(stresses: Stresses, settings: Fatigue) -> list[Evaluated]:
 
     Of several places around a section each joint has those of the one at which it fails first.
     """
-    found, begin = [], 0
+    collectives, begin = [], 0
     for point in settings.points:
         end = begin + len(point.per_load)
         places = [_in_service(stresses, place, point.line, settings) for place in range(begin, end)]
-        found.append(Evaluated(strength.weakest(places, point.line), point.line))
+        collectives.append(Evaluated(strength.weakest(places, point.line), point.line))
         begin = end
-    return found
+    return collectives
 
 
 def _in_service(stresses: Stresses, place: int, line: strength.Line, settings: Fatigue) -> strength.Collective:
@@ -266,10 +266,10 @@ def _in_service(stresses: Stresses, place: int, line: strength.Line, settings: F
     return strength.sort_out(strength.at_ratio(ranges, means, line.M, line.R), numbers, line)
 
 
-def _damage(stressed: Stressed, p: int, own: Evaluated, nominal: Evaluated) -> dict[str, Any]:
+def _damage(stressed: Stressed, p: int, joints: Evaluated, nominal: Evaluated) -> dict[str, Any]:
     """Damage sums at a point, of the nominal joint and over the joints."""
     point = stressed.settings.points[p]
-    sample = Sample.of(strength.damage_at(*own), stressed.status, stressed.design)
+    sample = Sample.of(strength.damage_at(*joints), stressed.status, stressed.design)
     head = {"point": point.name, "bushing": point.bushing, **point.line._asdict()}
     head["nominal"] = duty.only(strength.damage_at(*nominal))
     return head | {name: sample.quantile(share).estimate for name, share in (("median", 0.5), ("upper_99", 0.99))}

@@ -23,7 +23,7 @@ from tolstat.display.blocks import Block, Decision, Page, Panel, Panels
 TEMPLATES = Path(__file__).parent / "templates"
 
 _TORQUE = re.compile(r"\bN m\b")
-_BEFORE_UNIT = re.compile(r"(?<=\d) (?=(?:k?N|mm|[µu]m|m?rad|deg|rpm|rad/s|[MG]Pa|ms|min|[smh])\b|[%°])")
+_INSIDE = re.compile(r"(?<=\d) (?=(?:k?N|mm|[µu]m|m?rad|deg|rpm|rad/s|[MG]Pa|ms|min|[smh])\b|[%°])|(?<=<) (?=\d)")
 
 
 def environment(figure: Callable[[Panel], dict[str, Any]]) -> jinja2.Environment:
@@ -61,8 +61,8 @@ def grouped(words: str) -> str:
 
 
 def bound(words: str) -> str:
-    """Keep numbers with their units, and intervals, on one line: no-break spaces in them."""
-    words = _BEFORE_UNIT.sub("\u00a0", _TORQUE.sub("N\u00a0m", words))
+    """Keep numbers with their signs and units, and intervals, on one line: no-break spaces in them."""
+    words = _INSIDE.sub("\u00a0", _TORQUE.sub("N\u00a0m", words))
     return words.replace(" .. ", "\u00a0..\u00a0")
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +13,7 @@ from tolstat.campaign.stop_rule import BIASED
 from tolstat.common.errors import Fault, InputError, StoreError
 from tolstat.common.tables import Status
 from tolstat.display import progress, text
-from tolstat.display.answer import Answer, Figure, Part, Sentence, Sheet, Table
+from tolstat.display.answer import Answer, Part, Sentence, Sheet, Table
 from tolstat.joint.sections import mounting_and_law
 from tolstat.questions import accuracy, shares
 from tolstat.questions.cases import cases
@@ -49,15 +48,18 @@ def report(view: View, accepted: float = math.nan) -> Answer:
         joints = cases(view) if store.case_names else sweep(view)
         notes = [] if store.case_names else [*_notes(view)]
         return Answer("report", view.name, [*stands_on, *joints.parts, *notes, *_run(view)])
-    verdict = headline(view, accepted)
-    lead = [Sentence(text.sentence(verdict.sentence), "lead")] if verdict else []
-    causes = [Sentence(note) for note in verdict.notes] if verdict else []
+    verdict, lives = headline(view, accepted), life_verdicts(view, accepted)
     facts: dict[str, Any] = {"verdict": verdict.values()} if verdict else {}
-    if lives := life_verdicts(view, accepted):
+    if lives:
         facts["lives"] = [life.values() for life in lives]
-        lead += [Sentence(text.sentence(life.sentence), "lead") for life in lives]
-        causes += [Sentence(text.sentence(note)) for life in lives for note in life.notes]
-    parts = [*lead, *stands_on, *_tables(view, accepted), *_yield(view, bool(verdict and verdict.answer))]
+    verdicts = [*([verdict] if verdict else []), *lives]
+    parts: list[Part] = [Sentence(text.sentence(each.sentence), "lead") for each in verdicts]
+    parts += [*stands_on, *_tables(view, accepted)]
+    if verdict and verdict.answer and tells_yield(view):
+        kept = shares.together(shares.good(view), len(view.limits))
+        parts.append(Sentence(f"Yield: {kept.value} {kept.words}.", "lead"))
+    causes = [Sentence(note) for note in verdict.notes] if verdict else []
+    causes += [Sentence(text.sentence(note)) for life in lives for note in life.notes]
     return Answer("report", view.name, [*parts, *causes, *_notes(view), *_run(view)], facts)
 
 
@@ -120,24 +122,13 @@ def write(
 def _tables(view: View, accepted: float) -> Iterator[Part]:
     """Tables for people, limits or else quantiles; the other ones and the curves as numbers, and their picture."""
     if view.bushing_loads:
-        yield Sheet("exceedance", partial(_sheet, view))
+        yield Sheet("exceedance", lambda: curves.sheet(view, f"{view.head()}\n{exceedance.note(view)}"))
     if not view.shown_loads:
         yield Sentence("no largest load is kept; the results that are: tolstat export", "lead")
     for table in exceedance.quantile_tables(view):
         yield Table("exceedance", "Exceedance curves", (), rows.curve_rows(view))
         yield replace(table, columns=()) if view.limits else table
     yield from exceedance.limit_tables(view, accepted)
-
-
-def _sheet(view: View) -> Figure:
-    return curves.sheet(view, f"{view.head()}\n{exceedance.note(view)}")
-
-
-def _yield(view: View, judged: bool) -> Iterator[Part]:
-    """Share of the joints that keep all limits, unless the verdict says it."""
-    if judged and tells_yield(view):
-        kept = shares.together(shares.good(view), len(view.limits))
-        yield Sentence(f"Yield: {kept.value} {kept.words}.", "lead")
 
 
 def _notes(view: View) -> Iterator[Part]:

@@ -10,13 +10,13 @@ import numpy as np
 
 from tolstat.analysis import accuracy, rating_life
 from tolstat.analysis.sample import Sample, total_interval
-from tolstat.common.errors import Fault, NotApplicable, StoreError
 from tolstat.common.load_kinds import PINS
 from tolstat.common.loads import FloatArray
 from tolstat.common.tables import LIFE_EXPONENT, VALID, Mode
 from tolstat.display.table import Rows
 from tolstat.joint import Bearing
 from tolstat.joint.bearing import FOR_LIFE
+from tolstat.questions.shares import inapplicable, unusable, with_ends
 from tolstat.store import points, recorded
 from tolstat.store.view import View
 
@@ -163,17 +163,16 @@ def bearing_of(view: View) -> Bearing | None:
 
 def _bearing(view: View) -> Bearing:
     """Section ``[bearing]`` of the joint of a file, with all that a life needs."""
-    bearing, file = bearing_of(view), str(view.path)
-    again = "then repeat tolstat run: no joint is simulated again"
+    bearing, again = bearing_of(view), "then repeat tolstat run: no joint is simulated again"
     if bearing is None:
         remedy = f"add the section [bearing] to the joint file or [joint.bearing] to the study, {again}"
-        raise NotApplicable(str(Fault(file, "holds a joint without bearings", remedy)))
+        raise inapplicable(view, "holds a joint without bearings", remedy)
     if lacking := bearing.lacking(FOR_LIFE):
         incomplete = f"holds bearings without {', '.join(lacking)}, which a rating life needs"
-        raise StoreError(str(Fault(file, incomplete, f"add to [bearing] of the joint, {again}")))
+        raise unusable(view, incomplete, f"add to [bearing] of the joint, {again}")
     if sum(column.field == "equivalent_load" for column in view.columns) < len(PINS):
         remedy = 'add "pin*.equivalent_load" to [output] results of the study'
-        raise StoreError(str(Fault(file, "does not keep the equivalent loads of the bearings", remedy)))
+        raise unusable(view, "does not keep the equivalent loads of the bearings", remedy)
     return bearing
 
 
@@ -219,7 +218,7 @@ def life_rows(lives: Lives) -> Rows:
             row = {"place": rate.name, "share": share, "nominal": life(rate.nominal), "estimate": life(q.estimate)}
             row |= {"lower": life(q.upper), "upper": life(q.lower)}
             row |= {"bound_lower": life(q.bound_upper), "bound_upper": life(q.bound_lower)}
-            row |= {"rating": rating(q.estimate), "rating_lower": rating(q.lower), "rating_upper": rating(q.upper)}
+            row |= with_ends("rating", map(rating, (q.estimate, q.lower, q.upper)))
             row |= {"n": q.n, "n_failed": q.n_failed, "n_unsettled": q.n_unsettled, "confidence": CONFIDENCE}
             rows.append(row)
     return rows
@@ -280,11 +279,11 @@ def contact_rows(view: View) -> Rows:
     modes = [part.read_results(("mode_share",))["mode_share"] for part in view.parts]
     spent = np.tensordot(points.shares_of_revolutions(view), np.stack(modes), 1)
     rows = []
-    for place in (*PINS, ANY):
-        shares = spent[:, [PINS.index(place)]] if place in PINS else spent
-        row: dict[str, Any] = {"place": place}
+    for pins in (*((pin,) for pin in PINS), PINS):
+        row: dict[str, Any] = {"place": pins[0] if len(pins) == 1 else ANY}
         for name, mode in LOADED.items():
-            above = Sample.of(shares[:, :, mode].max(axis=1), view.status, view.design).above(MOSTLY, CONFIDENCE)
-            row |= {name: above.estimate, f"{name}_lower": above.lower, f"{name}_upper": above.upper}
+            longest = spent[:, [PINS.index(pin) for pin in pins], mode].max(axis=1)
+            above = Sample.of(longest, view.status, view.design).above(MOSTLY, CONFIDENCE)
+            row |= with_ends(name, (above.estimate, above.lower, above.upper))
         rows.append(row)
     return rows

@@ -154,18 +154,11 @@ def kinds_of_errors(joint: Joint) -> Panel:
     """What a positive error of each kind means, on pin 1 and hole 4."""
     description = "; ".join(f"{kind}: {meaning}" for kind, meaning in MEANINGS.items())
     solid: Look = {"edgecolor": COLOURS[0]}
-    dashed: Look = {
-        "edgecolor": SOFT,
-        "linestyle": (0.0, (4.0, 2.0)),
-        "linewidth": 0.9,
-        "facecolor": "none",
-        "hatch": None,
-    }
-    cells: list[Cell] = []
-    ideal = pairs(joint, nominal_errors(1))[0]
+    dashed: Look = {"edgecolor": SOFT, "linestyle": (0.0, (4.0, 2.0)), "linewidth": 0.9, "facecolor": "none"}
+    cells, ideal = list[Cell](), pairs(joint, nominal_errors(1))[0]
     for kind, meaning in MEANINGS.items():
         view = SIDE if kind in ("offset_z", "tilt_t") else ALONG_Z
-        both = {f"{kind}.moved": (positive(joint, kind), solid), f"{kind}.ideal": (ideal, dashed)}
+        both = {f"{kind}.moved": (positive(joint, kind), solid), f"{kind}.ideal": (ideal, dashed | {"hatch": None})}
         cells.append((kind, meaning, view, both))
     draw = partial(_cells, joint=joint, cells=cells, factor=1.0)
     return Panel("error-kinds", "What a positive error means", description, draw, (WIDTH, 3 * HEIGHT), bare=True)

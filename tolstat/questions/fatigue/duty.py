@@ -117,12 +117,10 @@ def members(views: Sequence[View], shares: Sequence[float] | None) -> tuple[Sequ
         When a file holds joints that are no sample of a production.
     """
     if any(len(view.parts) > 1 for view in views):
-        for wrong, remedy in (
-            (len(views) > 1, "give this file alone, or files with one operating point each"),
-            (shares is not None, "leave --share out: the study gives share in [[operation]]"),
-        ):
-            if wrong:
-                raise InputError([Fault(str(views[0].path), "has several operating points", remedy)])
+        remedy = "" if shares is None else "leave --share out: the study gives share in [[operation]]"
+        remedy = "give this file alone, or files with one operating point each" if len(views) > 1 else remedy
+        if remedy:
+            raise InputError([Fault(str(views[0].path), "has several operating points", remedy)])
         views, shares = views[0].parts, points.shares_of_revolutions(views[0]).tolist()
     shares = [1.0] if shares is None else shares
     if len(shares) != len(views) or min(shares, default=0.0) <= 0 or abs(sum(shares) - 1) > 1e-6:

@@ -87,15 +87,17 @@ def export(
     for message, applies in wrong.items():
         if applies:
             raise typer.BadParameter(message)
-    if parquet is not None and find_spec("pyarrow") is None:
-        remedy = "install it with: pip install pyarrow, or use --csv OUT"
-        raise InputError([Fault("--parquet", "pyarrow is not installed", remedy)])
+    for option, target, package in (("--parquet", parquet, "pyarrow"), ("--xlsx", xlsx, "openpyxl")):
+        if target is not None and find_spec(package) is None:
+            remedy = f"install it with: pip install {package}, or use --csv OUT"
+            raise InputError([Fault(option, f"{package} is not installed", remedy)])
     with progress("export"), stores.ResultFile.open(file) as opened:
         view = opened.view().at(point or "")
         store = view.store
         number = f"{store.n - (0 if nominal else store.first_sample)} joints"
-        if xlsx is not None:
-            workbook.check(store, "--xlsx")
+        if xlsx is not None and store.n > workbook.MAX_ROWS:
+            too_many = f"{store.path} has {store.n} joints, a sheet of Excel has {workbook.MAX_ROWS} rows"
+            raise InputError([Fault("--xlsx", too_many, "use --parquet OUT or --csv OUT")])
         if cycles is not None:
             table = pylife.table(view, nominal=nominal)
             write(cycles, lambda out: table.to_csv(out, index=False, lineterminator="\n"))

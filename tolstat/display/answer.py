@@ -169,7 +169,7 @@ class Answer:
                 files.append(text.csv(text.columns_of(part.rows), stem, part.name))
             elif isinstance(part, Panels) and not sheets:
                 for panel in part.panels:
-                    files += drawing.save(panel, stem.with_name(f"{stem.name}_{panel.key}"))
+                    files += style.save(drawing.sheet([panel]), stem.with_name(f"{stem.name}_{panel.key}"))
             elif isinstance(part, Sheet):
                 files += style.save(part.draw(), stem.with_name(f"{stem.name}_{part.name}"))
             elif isinstance(part, Document):

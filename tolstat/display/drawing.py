@@ -7,7 +7,6 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from html import escape
-from pathlib import Path
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -76,11 +75,6 @@ def svg(panel: Panel) -> tuple[str, tuple[float, ...]]:
     box, height = ax.get_window_extent(), figure.bbox.height
     frame = (box.x0, box.x1, height - box.y1, height - box.y0, *ax.get_xlim())
     return _inline(buffer.getvalue(), panel), frame
-
-
-def save(panel: Panel, stem: Path) -> list[Path]:
-    """Write a panel as PNG and SVG with its title above it; returns the files written."""
-    return style.save(sheet([panel]), stem)
 
 
 def sheet(panels: Sequence[Panel], title: str = "", notes: Sequence[str] = (), columns: int = 1) -> Figure:

@@ -156,15 +156,13 @@ def share_axis(ax: Axes, low: float, which: str = "y", high: float = 1.0) -> Non
     if high < 100.0 * low:
         axis.set_major_locator(ticker.LogLocator(subs=(1.0, 2.0, 5.0)))
     axis.set_major_formatter(ticker.FuncFormatter(lambda x, _: f"{100.0 * x:g} %"))
-    axis.set_minor_locator(_near_view(*sorted(axis.get_view_interval())))
+    view_low, view_high = sorted(axis.get_view_interval())
+    decades = np.arange(np.floor(np.log10(view_low)), np.ceil(np.log10(view_high)))
+    marks = np.outer(10.0**decades, np.arange(2.0, 10.0)).ravel()  # those beyond the view would be made but not drawn
+    axis.set_minor_locator(
+        ticker.FixedLocator(marks[(marks > 0.999 * view_low) & (marks < 1.001 * view_high)].tolist())
+    )
     axis.set_minor_formatter(ticker.NullFormatter())
-
-
-def _near_view(low: float, high: float) -> ticker.FixedLocator:
-    """Minor marks of a logarithmic axis in the view: those up to a decade beyond it would be made but not drawn."""
-    decades = np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)))
-    marks = np.outer(10.0**decades, np.arange(2.0, 10.0)).ravel()
-    return ticker.FixedLocator(marks[(marks > 0.999 * low) & (marks < 1.001 * high)].tolist())
 
 
 def mark(ax: Axes, x: float, y: float, colour: str) -> None:

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import math
-from importlib.util import find_spec
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import load_of
 from tolstat.display.text import cell
 from tolstat.questions.exceedance.rows import limit_rows
@@ -22,22 +20,6 @@ MAX_ROWS = 1_048_575
 """Number of joints that a sheet of Excel can hold below its heading."""
 LIMITS = ("load", "limit", "unit", "above", "joints", "share", "lower", "upper", "confidence", "nominal")
 """Columns of the sheet ``limits``."""
-
-
-def check(store: Reader, option: str) -> None:
-    """Check that a workbook of a campaign can be written.
-
-    Raises
-    ------
-    InputError
-        When openpyxl is not installed, or the campaign has more joints than a sheet has rows.
-    """
-    if find_spec("openpyxl") is None:
-        remedy = "install it with: pip install openpyxl, or use --csv OUT"
-        raise InputError([Fault(option, "openpyxl is not installed", remedy)])
-    if store.n > MAX_ROWS:
-        too_many = f"{store.path} has {store.n} joints, a sheet of Excel has {MAX_ROWS} rows"
-        raise InputError([Fault(option, too_many, "use --parquet OUT or --csv OUT")])
 
 
 def write(store: Reader, frame: pd.DataFrame, path: Path) -> None:

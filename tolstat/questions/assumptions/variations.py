@@ -305,7 +305,8 @@ def _drawn(view: View) -> Estimate:
 
 
 def _row(variation: Variation, joints: _Joints, loads: FloatArray, confidence: float) -> dict[str, Any]:
-    row: dict[str, Any] = variation._asdict() | {"keys": keys_in_words(variation.keys)}
+    keys = ", ".join(f"{key} = {_written(value)}" for key, value in variation.keys.items())  # as a joint file has them
+    row: dict[str, Any] = variation._asdict() | {"keys": keys}
     row |= {"n": len(loads), "n_failed": int(np.isnan(loads).sum())}
     share, change = joints.share(loads, confidence), (np.nan,) * 3
     with suppress(ValueError):  # no joint has a load both as drawn and with the other values
@@ -342,11 +343,6 @@ def label_of(name: str, values: Mapping[str, Any]) -> str:
         return f"{name} {_written(value)}"
     symbol = f"{last} {_written(value)}"
     return symbol if len(name) > _LONGEST else f"{name} ({symbol})"
-
-
-def keys_in_words(values: Mapping[str, Any]) -> str:
-    """Keys of the joint with their values, as a joint file has them."""
-    return ", ".join(f"{key} = {_written(value)}" for key, value in values.items())
 
 
 def _written(value: Any) -> str:

@@ -24,7 +24,7 @@ from typing import Annotated, Any, get_args, get_origin
 
 import typer
 
-from tolstat.cli._library import points, stores, studies
+from tolstat.cli._library import points, stores, studies, units
 from tolstat.cli._shared import deliver, fail, progress, say, session, work
 from tolstat.common.errors import Fault, InputError, TolstatError, gather
 from tolstat.common.files import check_target, reason
@@ -107,18 +107,14 @@ def quantity(text: str, opt: Opt, flag: str) -> float:
     InputError
         When the text is no such value, or not between the limits of the option.
     """
-    from pydantic_core import PydanticCustomError
-
-    from tolstat.common.units import EXAMPLES, to_si
-
     unit = opt.unit or "1"
     try:
-        value = to_si(text, unit)
-    except PydanticCustomError:
+        value = units.to_si(text, unit)
+    except ValueError:
         value = float("nan")
     low, high = 0.0 if opt.least is None else opt.least, float("inf") if opt.most is None else opt.most
     if not low < value < high:
-        remedy = f"write {flag} " + (SHARES if unit == "1" else f'"{EXAMPLES[unit]}"')
+        remedy = f"write {flag} " + (SHARES if unit == "1" else f'"{units.EXAMPLES[unit]}"')
         raise InputError([Fault(flag, f"{text!r} is not {WHAT.get(unit, f'a value in {unit}')}", remedy)])
     return value
 

@@ -8,6 +8,7 @@ from typing import Annotated
 from tolstat.cli._library import accuracy, answers, checks, numerical
 from tolstat.cli._shared import deliver, progress, say
 from tolstat.common import cores, files
+from tolstat.common.late import pandas as pd
 from tolstat.display.options import AsJson, Opt, Wide, Workers
 
 
@@ -64,8 +65,6 @@ def verify(
     facts |= {"checks": {name: check.description for name, check in verification.checks.items()}}
     deliver(answers.Answer("verify", "Numerical error", parts, facts), wide, as_json)
     if out is not None:
-        import pandas as pd
-
         with files.atomic_write(out) as temporary:
             pd.DataFrame(accuracy.joint_rows(verification)).to_csv(temporary, index=False, lineterminator="\n")
         say(f"wrote {out}")

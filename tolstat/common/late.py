@@ -20,6 +20,7 @@ class Late:
 
 
 if TYPE_CHECKING:
+    import pandas as pandas
     import tomlkit as tomlkit
     import tomlkit.exceptions
     import tomlkit.items
@@ -27,5 +28,5 @@ if TYPE_CHECKING:
     from scipy import special as special
     from scipy import stats as stats
 else:
-    tomlkit = Late("tomlkit")
+    pandas, tomlkit = Late("pandas"), Late("tomlkit")
     optimize, special, stats = (Late(f"scipy.{name}") for name in ("optimize", "special", "stats"))

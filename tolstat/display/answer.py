@@ -11,15 +11,13 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 from tolstat.common.errors import TolstatError
+from tolstat.common.late import pandas as pd
 from tolstat.display import drawing, progress, style, text
 from tolstat.display.blocks import Artist, Axes, Block, Facts, Figure, Listing, Panel, Panels, Reader, Text
 from tolstat.display.table import Column, Row, Rows, as_block, by_share, has, has_unresolved, of_shares, plain
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 __all__ = ["Answer", "Artist", "Asked", "Axes", "Column", "Document", "Figure", "Listing", "Panel", "Panels", "Part"]
 __all__ += ["Reader", "Row", "Rows", "Sentence", "Sheet", "Table", "Text", "by_share", "has"]
@@ -133,8 +131,6 @@ class Answer:
         KeyError
             When there is no table of this name.
         """
-        import pandas as pd
-
         return pd.DataFrame(list(self.tables[name].rows))
 
     def values(self) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from tolstat import questions
 from tolstat.common import draw_records, loads, notation, strict, units
 from tolstat.common.errors import Fault, NotApplicable, StoreError, TolstatError
 from tolstat.common.tables import SCHEMA_VERSION, VALID
-from tolstat.display import progress, table, text
+from tolstat.display import html, progress, table, text
 from tolstat.display.answer import Asked
 from tolstat.display.blocks import Card, Decision, Facts, Listing, Page, Panels, Section, Table, Text
 from tolstat.display.verdict import WORDS, Verdict
@@ -96,8 +96,6 @@ def write_page(
         asked = Asked(view.path, accepted, replay, stage=stage, processes=processes)
         made = compose_brief(view.at(point), asked) if brief else compose(view.at(point), asked, full)
         stage("page: pictures")  # drawn from the view
-        from tolstat.display import html
-
         html.write(made, Path(out), processes)
     return Path(out)
 

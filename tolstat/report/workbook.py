@@ -5,16 +5,14 @@ from __future__ import annotations
 import math
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from tolstat.common.late import pandas as pd
 from tolstat.common.loads import load_of
 from tolstat.display.text import cell
 from tolstat.questions.exceedance.rows import limit_rows
 from tolstat.store import Reader, result_file
 from tolstat.store.view import View
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 MAX_ROWS = 1_048_575
 """Number of joints that a sheet of Excel can hold below its heading."""

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from tolstat.common.channels import CHANNELS
+from tolstat.common.late import pandas as pd
 from tolstat.questions.fatigue.loads import cycles_of
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from tolstat.store.view import View
+from tolstat.store.view import View
 
 INTERVALS = ("range", "mean")
 
@@ -65,8 +62,6 @@ def table(
     nominal: bool = False,
 ) -> pd.DataFrame:
     """Flat table of `pylife_series`: ``joint``, ``channel``, ``unit``, ends of range and mean, ``cycles``."""
-    import pandas as pd
-
     if bins < 1:
         raise ValueError(f"{bins} classes: at least 1 expected")
     first = 0 if nominal else view.store.first_sample
@@ -93,8 +88,6 @@ def table(
 
 def from_table(table: pd.DataFrame) -> pd.Series[float]:
     """Series of a flat table, as `table` makes it or ``pandas.read_csv`` reads it."""
-    import pandas as pd
-
     levels = [
         pd.IntervalIndex.from_arrays(table[f"{name}_left"], table[f"{name}_right"], closed="left") for name in INTERVALS
     ]

@@ -16,6 +16,7 @@ from __future__ import annotations
 import errno
 import inspect
 import re
+import resource
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from inspect import Parameter, Signature
@@ -164,11 +165,6 @@ def _values(parameters: Mapping[str, Parameter], given: dict[str, Any]) -> dict[
     return given
 
 
-try:
-    import resource
-except ImportError:  # Windows
-    resource = None  # type: ignore[assignment]
-
 DISK = {
     *(errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES, errno.EPERM),
     *(errno.EISDIR, errno.ENOTDIR, errno.ENAMETOOLONG),
@@ -211,8 +207,6 @@ def _memory(found: str) -> Fault:
 
 def _limit_mb() -> int:
     """Address space that this process may use, MB; 0 if it is not limited."""
-    if resource is None:
-        return 0
     soft, _ = resource.getrlimit(resource.RLIMIT_AS)
     return 0 if soft == resource.RLIM_INFINITY else soft // 10**6
 

@@ -120,8 +120,8 @@ class Display:
         seconds = self._now() - self._begun_at
         if self._counts is None:
             return f"{self._name}, {clock(seconds)}"
-        own = text(self._counts, self._start, seconds, self._ends_at - self._now())
-        return own if self._name == JOINTS else f"{self._name}: {own}"
+        counts = text(self._counts, self._start, seconds, self._ends_at - self._now())
+        return counts if self._name == JOINTS else f"{self._name}: {counts}"
 
     def _begin(self) -> None:
         """Show that a stage has begun."""

@@ -17,7 +17,7 @@ import tolstat
 from tests.support.synthetic import store as store_of
 from tolstat.analysis import strength
 from tolstat.analysis.cycles import Cycles
-from tolstat.analysis.independent import Independent
+from tolstat.analysis.design import Independent
 from tolstat.common.errors import InputError, NotApplicable
 from tolstat.common.load_kinds import BUSHINGS
 from tolstat.common.tables import Status

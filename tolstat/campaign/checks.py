@@ -124,7 +124,7 @@ def _references(
     params: NDArray[np.void], options: Sequence[Options], workers: int, progress: Progress
 ) -> NDArray[np.void]:
     """Compute the reference of each joint, (m,) table RESULT; each process computes one joint at a time."""
-    joints: list[Single] = [(i, params[i : i + 1], one) for i, one in enumerate(options)]
+    joints: list[Single] = [(i, params[i : i + 1], of_joint) for i, of_joint in enumerate(options)]
     work: Work[Single, NDArray[np.void] | Lost] = Work(_reference)
     done = pool.map_blocks(work, joints, min(workers, len(joints)))
     results, counts = without_results(len(joints), Status.CRASHED), Counts(len(joints), 0, 0, 0)

@@ -7,11 +7,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tolstat.campaign import run as campaign
+from tolstat.common.late import Late
 from tolstat.display.progress import Display, silent
 
 if TYPE_CHECKING:
+    from tolstat.campaign import run as campaign
     from tolstat.study import Study
+else:
+    campaign = Late("tolstat.campaign.run")  # of a question that simulates, `--help` reads this file
 
 
 @dataclass(frozen=True)

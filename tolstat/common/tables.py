@@ -15,9 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.fields import Field, dtype_of
+from tolstat.common.fields import PARAM_FIELDS, Field, dtype_of
 from tolstat.common.load_kinds import JOINT, LOAD_KINDS, OVER, PINS
-from tolstat.common.parameters import PARAM_FIELDS
 
 SCHEMA_VERSION = 11
 """Version of the result file: raise it with every change of its layout, and so of the fields of errors and results."""
@@ -121,8 +120,7 @@ class Method(IntEnum):
     """Time integration method."""
 
     BDF2 = 0
-    GENERALIZED_ALPHA = 1
-    TR_BDF2 = 2
+    TR_BDF2 = 1
 
 
 class Start(IntEnum):
@@ -164,9 +162,7 @@ class Options(NamedTuple):
     newton_tol: float = 1e-6
     newton_max_iter: int = 12
     max_halvings: int = 16
-    rho_inf: float = 0.8
     rtol: float = 0.0
-    atol: float = 0.0
     fidelity: int = int(Fidelity.DYNAMIC)
     peak_substeps: int = 16
     max_refinements: int = 3

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from functools import cache, lru_cache
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
-from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic import AfterValidator, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from tolstat.common import json_schema, notation
@@ -233,8 +233,6 @@ def _convert(quantity: Any, unit: str, value: str) -> float:
         if not (quantity.unitless or str(quantity.units) == "percent"):
             raise _fault(f"{value!r} has a unit where a pure number is expected", unit)
         return float(quantity.to("").magnitude)
-    if quantity.unitless:
-        raise _fault(f"{value!r} has no unit", unit)
     if unit == "rad/s":
         return _speed(quantity, value)
     if unit == "rad" and set(dict(quantity.unit_items())) - ANGLES:
@@ -257,21 +255,18 @@ def _speed(quantity: Any, value: str) -> float:
     A speed is an angle over a time, or revolutions over a time by name (rpm). 1/min and min^-1 mean revolutions, as on
     drawings (ISO 80000-3 gives them to the rotational frequency only). Hz and 1/s are units of both.
     """
-    units = dict(quantity.unit_items())
-    dimensions = {name: dict(registry().get_dimensionality(name)) for name in units}
-    of_time = [name for name, dimension in dimensions.items() if dimension == {"[time]": 1} and units[name] == -1]
-    of_angle = [name for name in units if name in ANGLES and units[name] == 1]
-    if len(units) == 1 and (set(units) <= _ROTATIONS and set(units.values()) == {1}):
-        return float(quantity.to("rad/s").magnitude)
-    if len(units) == 2 and of_time and of_angle:
-        return float(quantity.to("rad/s").magnitude)
-    if list(units) == of_time == ["minute"]:
-        return float(quantity.to("rad/s").magnitude) * 2.0 * math.pi
-    if quantity.dimensionality == {"[time]": -1} and not set(units) & ANGLES:
+    powers = dict(quantity.unit_items())
+    speed = float(quantity.to("rad/s").magnitude)
+    if list(powers) == ["minute"]:
+        return speed * 2.0 * math.pi
+    turning = [power for name, power in powers.items() if name in ANGLES | _ROTATIONS]
+    if not turning:
         number = _short(quantity.to("1/s").magnitude)
         remedy = f'write "{number} rev/s" or "{number} rad/s"'
         raise _fault(f"{value!r} is ambiguous: revolutions or radians", "rad/s", remedy)
-    raise _fault(f"{value!r} cannot be a value in rad/s", "rad/s")
+    if turning != [1] or sorted(powers.values()) not in ([1], [-1, 1]):
+        raise _fault(f"{value!r} cannot be a value in rad/s", "rad/s")
+    return speed
 
 
 def written(value: float, unit: str, like: object, digits: int = 12) -> str | float:
@@ -324,8 +319,7 @@ class Quantity:
             return to_si(value, "1" if si else self.unit, self.mark)
 
         return core_schema.with_info_plain_validator_function(
-            read,
-            serialization=core_schema.plain_serializer_function_ser_schema(self.written, when_used="json"),
+            read, serialization=core_schema.plain_serializer_function_ser_schema(self.written, when_used="json")
         )
 
     def _word(self, value: str) -> str:
@@ -344,50 +338,42 @@ class Quantity:
         return json_schema.quantity(self.unit, EXAMPLES[self.unit], self.words)
 
 
-def _sign(must: str, remedy: str) -> PydanticCustomError:
-    # `strict` replaces {input} by the value as written
-    return PydanticCustomError("sign", "{found}", {"found": f"{{input}} {must}", "remedy": remedy})
+def _signed(holds: Callable[[float], bool], must: str, remedy: str) -> Callable[[ValueT], ValueT]:
+    """Validator of the sign of a quantity; a word in its place passes."""
+
+    def validate(value: ValueT) -> ValueT:
+        if isinstance(value, str) or holds(value):
+            return value
+        # `strict` replaces {input} by the value as written
+        raise PydanticCustomError("sign", "{found}", {"found": f"{{input}} {must}", "remedy": remedy})
+
+    return validate
 
 
-def positive(value: ValueT) -> ValueT:
-    """Validate a quantity that must be greater than zero; a word in its place passes."""
-    if not (isinstance(value, str) or value > 0):
-        raise _sign("must be positive", "give a value above zero")
-    return value
-
-
-def not_negative(value: float) -> float:
-    """Validate a quantity that must not be less than zero."""
-    if value < 0:
-        raise _sign("must not be negative", "give zero or a value above it")
-    return value
-
-
-def not_zero(value: float) -> float:
-    """Validate a quantity of either sign."""
-    if value == 0:
-        raise _sign("must not be zero", "give a value other than zero")
-    return value
-
+positive = _signed(lambda value: value > 0, "must be positive", "give a value above zero")
+not_negative = _signed(lambda value: value >= 0, "must not be negative", "give zero or a value above it")
+not_zero = _signed(lambda value: value != 0, "must not be zero", "give a value other than zero")
+"""Validators of quantities."""
 
 SIGNS: dict[Callable[..., Any], str] = {positive: "exclusiveMinimum", not_negative: "minimum"}
 """Keyword of JSON schema for each validator of a sign."""
 
+POSITIVE, NOT_NEGATIVE = AfterValidator(positive), AfterValidator(not_negative)
 Length = Annotated[float, Quantity("m")]
-Diameter = Annotated[float, Quantity("m", DIAMETER)]
-Area = Annotated[float, Quantity("m^2")]
-AreaMoment = Annotated[float, Quantity("m^4")]
+Diameter = Annotated[float, Quantity("m", DIAMETER), POSITIVE]
+Area = Annotated[float, Quantity("m^2"), POSITIVE]
+AreaMoment = Annotated[float, Quantity("m^4"), POSITIVE]
 Angle = Annotated[float, Quantity("rad")]
 Speed = Annotated[float, Quantity("rad/s")]
 Force = Annotated[float, Quantity("N")]
 Torque = Annotated[float, Quantity("N*m")]
 Stress = Annotated[float, Quantity("Pa")]
-Time = Annotated[float, Quantity("s")]
-Mass = Annotated[float, Quantity("kg")]
-Inertia = Annotated[float, Quantity("kg*m^2")]
-Density = Annotated[float, Quantity("kg/m^3")]
+Time = Annotated[float, Quantity("s"), POSITIVE]
+Mass = Annotated[float, Quantity("kg"), POSITIVE]
+Inertia = Annotated[float, Quantity("kg*m^2"), POSITIVE]
+Density = Annotated[float, Quantity("kg/m^3"), POSITIVE]
 Stiffness = Annotated[float, Quantity("N/m")]
-RotaryStiffness = Annotated[float, Quantity("N*m/rad")]
-QuadraticStiffness = Annotated[float, Quantity("N/m^2")]
-Damping = Annotated[float, Quantity("N*s/m")]
+RotaryStiffness = Annotated[float, Quantity("N*m/rad"), POSITIVE]
+QuadraticStiffness = Annotated[float, Quantity("N/m^2"), NOT_NEGATIVE]
+Damping = Annotated[float, Quantity("N*s/m"), NOT_NEGATIVE]
 Number = Annotated[float, Quantity("1")]

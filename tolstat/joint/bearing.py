@@ -7,19 +7,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
+from functools import cache
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
-from pydantic import AfterValidator, Field, ValidationInfo, field_validator
+from pydantic import AfterValidator, ValidationInfo, field_validator
 
 from tolstat.analysis.rating_life import A1, critical_amplitude
 from tolstat.common import units
 from tolstat.common.bisection import first
-from tolstat.common.strict import Strict, refuse
+from tolstat.common.strict import Strict, described, refuse
 from tolstat.joint.material import Array
-from tolstat.joint.sections import POSITIVE, Force, Length, Number
+from tolstat.joint.sections import Force, Length, Number
 
-Time = Annotated[units.Time, POSITIVE]
 FOR_LIFE = ("C", "needle_diameter", "pitch_diameter")
 """Keys without which a bearing has no rating life."""
 LEFT_OUT: Any = None
@@ -39,33 +39,24 @@ class Bearing(Strict):
     With the contact law `needles` its `needles` and `needle_length` say how stiff it is; the other keys affect no load.
     """
 
-    needles: Annotated[int, Field(strict=True, ge=3, le=1000, description="needles of one bearing", examples=[32])]
-    needle_length: Annotated[
-        Length, Field(description="length of a needle, needed with law `needles`", examples=["22 mm"])
-    ] = LEFT_OUT
+    needles: Annotated[int, described("needles of one bearing", 32, strict=True, ge=3, le=1000)]
+    needle_length: Annotated[Length, described("length of a needle, needed with law `needles`", "22 mm")] = LEFT_OUT
     C: Annotated[
-        Force,
-        Field(
-            description="basic dynamic load rating of one bearing (ISO 281), needed for the life", examples=["30 kN"]
-        ),
+        Force, described("basic dynamic load rating of one bearing (ISO 281), needed for the life", "30 kN")
     ] = LEFT_OUT
-    needle_diameter: Annotated[
-        Length, Field(description="diameter of a needle, needed for the life", examples=["4 mm"])
-    ] = LEFT_OUT
+    needle_diameter: Annotated[Length, described("diameter of a needle, needed for the life", "4 mm")] = LEFT_OUT
     pitch_diameter: Annotated[
-        Length,
-        Field(description="diameter of the circle of the needles' axes, needed for the life", examples=["42 mm"]),
+        Length, described("diameter of the circle of the needles' axes, needed for the life", "42 mm")
     ] = LEFT_OUT
     required_life: Annotated[
-        Time | None, Field(description="life that all four bearings of a joint must reach", examples=["5000 h"])
+        units.Time | None, described("life that all four bearings of a joint must reach", "5000 h")
     ] = None
     reliability: Annotated[
         Annotated[units.Number, AfterValidator(_tabulated)],
-        Field(description="share of equal joints that reach their rating life", examples=["95 %"]),
+        described("share of equal joints that reach their rating life", "95 %"),
     ] = 0.9
     a_iso: Annotated[
-        Number | None,
-        Field(description="life modification factor for lubrication and contamination (ISO 281)", examples=[0.8]),
+        Number | None, described("life modification factor for lubrication and contamination (ISO 281)", 0.8)
     ] = None
 
     @field_validator("pitch_diameter")
@@ -104,9 +95,8 @@ RANGE = 100.0
 """Largest load of the fit over the smallest."""
 LEAST = 0.1
 """Smallest clearance of the fit, in units of the displacement at the largest load: without clearance b is free."""
-_x, _w = np.polynomial.legendre.leggauss(24)
-NODES, WEIGHTS = 0.5 * (_x + 1.0), 0.5 * _w
-"""Gauss-Legendre quadrature from 0 to 1; over the loaded needles it is exact to 2e-7."""
+POINTS = 24
+"""Number of points of the quadrature over the loaded needles: exact to 2e-7."""
 NARROW = 1e-6
 """Width of the interval of log b at which its search ends."""
 
@@ -149,10 +139,18 @@ def needle_force(delta: Array, clearance: float, needles: int, length: float) ->
         Force (N) along the displacement.
     """
     last = 2.0 * np.arcsin(np.sqrt(0.5 * delta / (clearance + delta)))[:, None]  # the last needle that is loaded
-    phi = last * NODES
+    nodes, weights = _quadrature()
+    phi = last * nodes
     pressed = delta[:, None] - 2.0 * (clearance + delta)[:, None] * np.sin(0.5 * phi) ** 2
     load = 35948.0 * (1e3 * length) ** (8.0 / 9.0) * (1e3 * np.maximum(pressed, 0.0)) ** (10.0 / 9.0)
-    return np.asarray(needles / math.pi * last[:, 0] * ((load * np.cos(phi)) @ WEIGHTS))
+    return np.asarray(needles / math.pi * last[:, 0] * ((load * np.cos(phi)) @ weights))
+
+
+@cache  # at the first use: numpy.polynomial takes long to import
+def _quadrature() -> tuple[Array, Array]:
+    """Nodes and weights of the Gauss-Legendre quadrature from 0 to 1."""
+    x, weights = np.polynomial.legendre.leggauss(POINTS)
+    return 0.5 * (x + 1.0), 0.5 * weights
 
 
 def formula(delta: Array, clearance: float, k3: float, b: float) -> Array:

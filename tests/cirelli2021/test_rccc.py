@@ -7,9 +7,11 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
+from studies.cirelli2021 import rccc, rccc_statics
 from tests.conftest import REFERENCE
+from tests.support.closed_forms import cross_couple, pin_force
 from tests.support.naive import ARM_AXES, ARM_OF_PIN, PIN_AXES, triad
-from tolstat.joint import Operation, ideal, nominal_errors, rccc
+from tolstat.joint import Operation, ideal, nominal_errors
 
 THETA = np.linspace(0, 2 * np.pi, 73) + 0.03
 TORQUE = 100.0
@@ -71,14 +73,14 @@ def twists(joint, row, theta, h=1e-5, **kept):
 
 
 def test_kutzbach_counts_as_the_paper_does():
-    assert rccc.kutzbach(4, [1, 1, 1, 1]) == -2
-    assert rccc.kutzbach(4, [1, 2, 2, 2]) == 1
+    assert rccc_statics.kutzbach(4, [1, 1, 1, 1]) == -2
+    assert rccc_statics.kutzbach(4, [1, 2, 2, 2]) == 1
 
 
 @pytest.mark.parametrize("alpha", [0.0, 15.0, 40.0])
 def test_ideal_revolute_joint_turns_because_its_constraints_are_dependent(cirelli, errors, alpha):
     lines = rccc.solve(cirelli, AT, errors(alpha), THETA).lines
-    revolute, cylindrical = rccc.mobility(lines, "RRRR"), rccc.mobility(lines, "RCCC")
+    revolute, cylindrical = rccc_statics.mobility(lines, "RRRR"), rccc_statics.mobility(lines, "RCCC")
     assert (revolute.kutzbach, revolute.equations) == (-2, 20)
     assert_array_equal([revolute.rank, revolute.dof, revolute.redundant], np.outer([17, 1, 3], np.ones(73)))
     assert (cylindrical.kutzbach, cylindrical.equations) == (1, 17)
@@ -90,8 +92,8 @@ def test_ideal_revolute_joint_turns_because_its_constraints_are_dependent(cirell
 @pytest.mark.parametrize("seed", range(3))
 def test_errors_lock_the_revolute_joint_and_leave_the_rccc_linkage_its_freedom(cirelli, errors, seed):
     lines = rccc.solve(cirelli, AT, errors(seed=seed), THETA).lines
-    assert_array_equal(rccc.mobility(lines, "RRRR").dof, 0)
-    assert_array_equal(rccc.mobility(lines).dof, 1)
+    assert_array_equal(rccc_statics.mobility(lines, "RRRR").dof, 0)
+    assert_array_equal(rccc_statics.mobility(lines).dof, 1)
 
 
 @pytest.mark.parametrize(
@@ -108,8 +110,8 @@ def test_rigid_revolute_pairs_lock_where_an_error_makes_axes_miss_each_other(cir
     for name in names:
         size = 1e-4 if "offset" in name else np.radians(0.5)
         lines = rccc.solve(cirelli, AT, errors(**{name: size}), [1.0]).lines
-        assert rccc.mobility(lines, "RRRR").dof == [freedoms], name
-        assert rccc.mobility(lines).dof == [1], name
+        assert rccc_statics.mobility(lines, "RRRR").dof == [freedoms], name
+        assert rccc_statics.mobility(lines).dof == [1], name
 
 
 @pytest.mark.parametrize(("pairs", "seed"), [("RRRR", None), ("RRRR", 4), ("RCCC", None), ("RCCC", 4), ("RCCR", 4)])
@@ -121,14 +123,14 @@ def test_freedoms_are_those_of_the_loop_of_screws(cirelli, errors, pairs, seed):
         screws = [[*u, *np.cross(p, u)] for p, u in zip(points, axes, strict=True)]
         screws += [[0, 0, 0, *u] for u, kind in zip(axes, pairs, strict=True) if kind == "C"]
         dof.append(len(screws) - np.linalg.matrix_rank(screws, tol=1e-9))
-    assert_array_equal(rccc.mobility(lines, pairs).dof, dof)
+    assert_array_equal(rccc_statics.mobility(lines, pairs).dof, dof)
 
 
 @pytest.mark.parametrize("pairs", ["RCC", "RCCP", ""])
 def test_unknown_pairs_are_refused(cirelli, errors, pairs):
     lines = rccc.solve(cirelli, AT, errors(), [0.0]).lines
     with pytest.raises(ValueError, match="four letters"):
-        rccc.mobility(lines, pairs)
+        rccc_statics.mobility(lines, pairs)
 
 
 # --- closure and speed ratio ----------------------------------------------------------------------------
@@ -254,7 +256,7 @@ def test_no_pose_where_the_spherical_linkage_has_none(cirelli, errors):
     assert_array_equal(closes, np.abs(d) <= 1)
     away = np.abs(np.exp(1j * (found.output_angle - branches)) - 1).min(axis=0)
     assert away[closes].max() < 1e-6
-    assert_array_equal(rccc.mobility(found.lines).dof, np.where(closes, 1, -1))
+    assert_array_equal(rccc_statics.mobility(found.lines).dof, np.where(closes, 1, -1))
     for name in ("psi", "couple", "driving_torque", "reactions"):
         value = np.isfinite(getattr(found, name)).reshape(400, -1)
         assert_array_equal(value.all(axis=1), closes, err_msg=name)
@@ -268,10 +270,10 @@ def test_no_pose_where_the_spherical_linkage_has_none(cirelli, errors):
 @pytest.mark.parametrize("alpha", [0.0, 15.0, 30.0])
 def test_ideal_joint_passes_the_couple_of_the_closed_form(cirelli, errors, alpha, input_pin, output_pin):
     found = rccc.solve(cirelli, AT, errors(alpha), THETA, input_pin=input_pin, output_pin=output_pin)
-    couple = ideal.cross_couple(THETA, np.radians(alpha), TORQUE)
+    couple = cross_couple(THETA, np.radians(alpha), TORQUE)
     assert_allclose(found.couple, couple, rtol=1e-12)
     shares = found.couple / (2 * cirelli.cross.R)
-    assert_allclose(shares, ideal.pin_force(THETA, np.radians(alpha), TORQUE, cirelli.cross.R), rtol=1e-12)
+    assert_allclose(shares, pin_force(THETA, np.radians(alpha), TORQUE, cirelli.cross.R), rtol=1e-12)
     assert_allclose(found.reactions[..., :3], 0, atol=1e-9)
     about_normal = np.zeros((73, 2, 6))
     about_normal[:, 0, 5], about_normal[:, 1, 5] = couple, -couple
@@ -296,7 +298,7 @@ def loaded(cirelli, errors):
     row = errors(20.0, seed=7)
     found = rccc.solve(cirelli, AT, row, THETA, input_pin=4, output_pin=2)
     external = np.random.default_rng(8).normal(0, [[[300.0] * 3 + [20.0] * 3]], (73, 3, 6))
-    return row, found, external, rccc.react(found.lines, external)
+    return row, found, external, rccc_statics.react(found.lines, external)
 
 
 def test_every_link_and_the_whole_linkage_are_in_equilibrium(loaded):
@@ -333,7 +335,7 @@ def test_motion_is_the_one_that_the_constraints_leave(cirelli, errors):
     row = errors(20.0, seed=9)
     moving = twists(cirelli, row, THETA)
     moving[..., :3] /= cirelli.cross.R
-    jacobian = rccc.constraint_jacobian(rccc.solve(cirelli, AT, row, THETA).lines)
+    jacobian = rccc_statics.constraint_jacobian(rccc.solve(cirelli, AT, row, THETA).lines)
     assert_allclose(np.einsum("kij,kj->ki", jacobian, moving.reshape(-1, 18)), 0, atol=1e-7)
 
 
@@ -355,7 +357,7 @@ def test_elastic_reference_joints_carry_the_couple_of_the_linkage(cirelli, error
     slope = -np.cos(alpha) * np.sin(alpha) ** 2 * np.sin(2 * theta) / (1 - (np.sin(alpha) * np.cos(theta)) ** 2) ** 2
     external = np.zeros((180, 3, 6))
     external[:, 2, 3:] = -(TORQUE + about_shaft * omega**2 * slope)[:, None] * linkage.lines.axis[:, 3]
-    passed = rccc.react(linkage.lines, external).at_centre[:, 2, 3:]
+    passed = rccc_statics.react(linkage.lines, external).at_centre[:, 2, 3:]
     in_cross = np.einsum("kji,kj->ki", linkage.pose.attitude[:, 1], passed)
     assert_allclose(couple, in_cross, atol=0.01 * TORQUE)  # what the hub passes to the pins goes to the output fork
 

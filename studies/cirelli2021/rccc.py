@@ -1,4 +1,30 @@
-"""The RCCC linkage over a revolution: angles, slides, speed ratio and reactions from one row of errors.
+"""The Cardan joint as an RCCC linkage: with manufacturing errors, but rigid and without clearance.
+
+Cirelli et al. (2021), section 1, replace the overconstrained joint by a linkage of four links, one revolute and three
+cylindrical pairs. The paper does not say which pair is which. Here the links and pairs are
+
+    frame -R- input fork -C- cross -C- output fork -C- frame
+
+(as in Ciornei et al., IOP Conf. Ser.: Mater. Sci. Eng. 477, 2019, 012037), because (1) the paper turns revolute
+joints into cylindrical ones and keeps one revolute pair, which must be the bearing of the input shaft: this shaft is
+driven and its bearing is rigid (`docs/model.md`), so the bearing holds the linkage along its axis; (2) pins slide
+freely along their holes, so both pairs of the cross are cylindrical; (3) the output shaft must then be free to slide:
+if it were held too, the linkage would be overconstrained by one, and errors would lock it.
+
+Of the two opposite pins in each fork one is kept as the pair, the other is left out as redundant. Parameters select
+the kept pins: pin 3 (in arm 1) or 4 (in arm 2) on the input side, pin 1 (in arm 4) or 2 (in arm 3) on the output side.
+By default pins 3 and 1 are kept; the paper's errors are those of pin 1 and the hole of arm 4. Errors of a pin or hole
+left out have no effect; neither have diameters.
+
+    revolution = rccc.solve(joint, operation, errors[i], theta)
+    revolution.psi, revolution.output_angle, revolution.reactions
+    rccc_statics.mobility(revolution.lines, "RRRR").dof
+
+Three cylindrical pairs whose axes are not parallel to one plane transmit no force, so a torque reaches the output as a
+couple alone, normal to both axes of the cross. The shafts' rotation depends on tilts alone, and only on those that
+change a right angle between neighbouring axes (a pin about z, a hole about t); the other tilts shift the output angle
+by a constant or do not change it, and position errors only make the pairs slide. All other effects of errors in a real
+joint come from the pins left out here.
 
 The loop is cut at the output fork. The pose of the output fork through input fork and cross must equal its pose on the
 output shaft. Newton's method solves these six equations for three angles and three slides, at all input angles at once.
@@ -13,10 +39,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
+from studies.cirelli2021.rccc_statics import INPUT_PIN, OUTPUT_PIN, Lines, output_load, react
 from tolstat.joint import Joint, Operation, ideal, perturb
 from tolstat.joint.material import Array
 from tolstat.joint.perturbation import PIN_TRIADS
-from tolstat.joint.rccc.statics import INPUT_PIN, OUTPUT_PIN, Lines, output_load, react
 from tolstat.kernel.mechanics.topology import ARM_OF_PIN
 
 CLOSED = 1e-12
@@ -131,7 +157,7 @@ def rates(sides: tuple[Side, Side], lines: Lines, pose: Pose) -> Array:
 def close(sides: tuple[Side, Side], alpha: float, theta: Array, radius: float) -> Array:
     """Solve for the coordinates (k, 6) that close the loop, by Newton's method from the ideal joint; NaN on failure."""
     q = np.zeros((len(theta), 6))
-    q[:, 0] = ideal.cross_angle(theta, alpha)
+    q[:, 0] = np.arctan(np.tan(alpha) * np.sin(theta))  # tan(beta) = tan(alpha) sin(theta)
     q[:, 1] = np.arcsin(np.sin(alpha) * np.cos(theta))
     q[:, 2] = ideal.output_angle(theta, alpha)
     unit = np.array([1.0, 1.0, 1.0, radius, radius, radius])
@@ -164,7 +190,7 @@ class Revolution(NamedTuple):
         Travel of the kept input pin out of its hole, of the output pin out of its hole (away from O), and of the output
         shaft along its axis away from O, m.
     couple : ndarray, shape (k,)
-        Modulus of the couple that passes through the cross, N m (ideal: `ideal.cross_couple`).
+        Modulus of the couple that passes through the cross, N m (ideal: T / sqrt(1 - (sin(alpha) cos(theta))^2)).
     driving_torque : ndarray, shape (k,)
         Torque that drives the input shaft, N m.
     reactions : ndarray, shape (k, 4, 6)

@@ -119,6 +119,7 @@ def _point(contact: Contact, bearing: Bearing | None) -> Stations:
 
 
 def _weighted(s: Array, weight: Array, k1: float, k2: float) -> Stations:
+    """Stations that share the coefficients by their weights."""
     return Stations(s, k1 * weight, k2 * weight, 0.0 * weight, weight)
 
 

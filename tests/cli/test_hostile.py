@@ -15,7 +15,7 @@ import pytest
 
 from tests.support import corruption, synthetic
 from tests.support.environment import environment
-from tolstat.cli import _talk
+from tolstat.cli import _shared
 from tolstat.display import text
 from tolstat.store import metadata
 
@@ -51,8 +51,8 @@ def test_exports_hold_no_formulas(tmp_path: Path) -> None:
 
 
 def test_standard_error_moves_no_cursor(capsys: pytest.CaptureFixture[str]) -> None:
-    with _talk.session(quiet=False, verbose=False, log=None):
-        _talk.say("a\x1b[2J\x9b1m\u202eb\rc\nd")
+    with _shared.session(quiet=False, verbose=False, log=None):
+        _shared.say("a\x1b[2J\x9b1m\u202eb\rc\nd")
     assert capsys.readouterr().err == "a[U+001B][2J[U+009B]1m[U+202E]b[U+000D]c\nd\n"
 
 

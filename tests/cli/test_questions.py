@@ -12,7 +12,7 @@ import pytest
 from tests.support import synthetic
 from tolstat import sampling
 from tolstat.campaign.work import Work
-from tolstat.cli import _questions
+from tolstat.cli import _command
 from tolstat.cli._command import command_of, entries, prose, quantity
 from tolstat.common.errors import InputError
 from tolstat.display.answer import Answer
@@ -52,7 +52,7 @@ def test_help_is_the_prose_and_each_entry_of_the_docstring() -> None:
 
 @pytest.mark.parametrize("question", OF_QUESTIONS, ids=lambda question: question.name)
 def test_every_option_of_a_question_is_explained_in_its_docstring(question: Question) -> None:
-    function = _questions.function_of(question)
+    function = _command.function_of(question)
     parameters = inspect.signature(function).parameters.values()
     assert [p.name for p in parameters if not p.annotation.__metadata__[0].help] == []
     assert (function.__doc__ or "").partition("\n")[0] == question.summary
@@ -90,7 +90,7 @@ def test_options_have_the_name_limits_and_defaults_of_the_signature(monkeypatch:
 
     question = Question("known", "Read", "Know it.")
     monkeypatch.setattr(Question, "functions", lambda self: (known, None))
-    parameters = inspect.signature(command_of(_questions.function_of(question))).parameters
+    parameters = inspect.signature(command_of(_command.function_of(question))).parameters
     own = ["file", "number", "accepted", "point", "study_file", "out", "wide", "as_json"]
     assert list(parameters) == [*own, "quiet", "verbose", "log"]
     number, accepted = parameters["number"], parameters["accepted"]
@@ -125,7 +125,7 @@ def test_a_study_is_simulated_whole_and_read_at_the_point_asked_for(
     monkeypatch.setattr(Question, "functions", lambda self: (known, simulate))
     monkeypatch.setattr("tolstat.solver.compilation.announce", lambda: None)
     given = {"source": tmp_path / "two.toml", "point": point or None, "workers": None, "out": None, "wide": False}
-    run = _questions.function_of(question)
+    run = _command.function_of(question)
     if shown is None:
         with pytest.raises(InputError, match="valley"):
             run(**given, study_file=None, as_json=True)

@@ -89,8 +89,7 @@ def _without_pictures(monkeypatch):
 @pytest.fixture(autouse=True)
 def _without_assumptions(monkeypatch):
     """Verdicts from the joints as drawn; what they stand on is the subject of another file."""
-    for module in ("headline", "verdict"):
-        monkeypatch.setattr(f"tolstat.report.{module}.applicable", lambda view, accepted: None)
+    monkeypatch.setattr("tolstat.questions.assumptions.variations.applicable", lambda view, accepted: None)
 
 
 def everywhere(path, accepted):
@@ -259,11 +258,10 @@ def test_a_share_that_joints_without_a_result_decide_is_shown_as_its_interval(fa
 def test_joints_that_would_decide_count_those_without_a_result():
     made = view(failed=2, limits={"cross1.F": 2000.0})
     row = exceedance.limit_rows(made)[0]
-    said = headline.deciding(row, 0.02)
-    assert said == f"{needed(2 / 200, 0.02):.0f} joints would decide it"
+    assert headline._deciding(row, 0.02) == f"{needed(2 / 200, 0.02):.0f} joints would decide it"
     assert needed(2 / 200, 0.02) > needed(0.0, 0.02)
     near = exceedance.limit_rows(view(failed=1, limits={"cross1.F": 2000.0}))[0]
-    assert headline.deciding(near, 0.003) == "no number of joints would decide it"
+    assert headline._deciding(near, 0.003) == "no number of joints would decide it"
 
 
 def test_the_command_line_takes_an_accepted_share(tmp_path):

@@ -14,7 +14,7 @@ from tolstat.display import text
 from tolstat.display.answer import Asked
 from tolstat.display.blocks import Decision
 from tolstat.questions.bearing_life import answer as bearing_life
-from tolstat.report import verdict
+from tolstat.report import page
 from tolstat.report.headline import life_verdicts
 from tolstat.store import ResultFile
 
@@ -27,7 +27,7 @@ def test_report_json_and_page_give_the_same_verdict(tmp_path, study, place):
     with ResultFile.open(path) as store:
         (found,) = life_verdicts(store.view(), 0.1)
         assert (found,) == tuple(bearing_life.life_verdicts(store.view(), 0.1))
-        section = verdict.section(store.view(), Asked(path, 0.1))
+        section = page.decision(store.view(), Asked(path, 0.1))
         assert tolstat.statistics(store.view(), 0.1)["lives"] == [found.values()]
     done = call("report", path, "--accept", "10 %")
     assert text.sentence(found.sentence) in " ".join(done.stdout.split())

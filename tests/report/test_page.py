@@ -248,6 +248,7 @@ def test_a_number_stays_with_its_unit_and_an_interval_on_one_line():
     assert bound("60 N m in 3 % (1 .. 4 %), 5 joints") == (
         "60\u00a0N\u00a0m in 3\u00a0% (1\u00a0..\u00a04\u00a0%), 5 joints"
     )
+    assert bound("< 1e-07 %") == "<\u00a01e-07\u00a0%"
     assert bound("0.1 mm 5 min of 5 minutes N") == "0.1\u00a0mm 5\u00a0min of 5 minutes N"
 
 

@@ -67,7 +67,7 @@ def halves(case):
     par = joint.perturb(case.joint, case.operation, errors).view(np.recarray)
     options = case.solver.options()
     left = np.full(1, iterations_allowed(options.steps_per_rev, options.max_revs))
-    ((_, samples),) = simulation.simulate_alone(par, options, left, True, np.zeros(1, RESULT).view(np.recarray))
+    ((_, samples),) = simulation.simulate_together(par, options, left, True, np.zeros(1, RESULT).view(np.recarray))
     work, found = make_work(), np.zeros((len(samples), 4, 2))
     outer = np.sign(par.station_s[0, : par.n_stations[0]]) / 2 + 0.5
     for k, sample in enumerate(samples):
@@ -341,8 +341,9 @@ PROBE = """
 import numpy as np
 from tolstat import joint
 from tolstat.kernel.mechanics import dynamics
-from tolstat.kernel.revolution import simulate
-from tolstat.common.tables import KERNEL_RESULT, Options
+from tolstat.kernel.mechanics.work import make_work
+from tolstat.solver import simulation
+from tolstat.common.tables import RESULT, Options
 operation = joint.Operation.model_construct(alpha=0.3, speed=50.0, torque=100.0)
 par = joint.perturb(joint.load("cirelli2021", {}, "test", None), operation, joint.nominal_errors(1))
 par = par.view(np.recarray)
@@ -363,7 +364,7 @@ def python(code, **environment):
 
 ACCELERATION = """
 q, out = np.linspace(-1e-4, 2e-4, 56), np.empty(56)
-dynamics.acceleration(0.01, q, q, par[0], Options(), simulate.make_work(), out)
+dynamics.acceleration(0.01, q, q, par[0], Options(), make_work(), out)
 print(out.tolist())
 """
 
@@ -379,13 +380,13 @@ def test_nothing_is_allocated_per_step():
     code = """
 from numba.core.runtime import _nrt_python, rtsys
 _nrt_python.memsys_enable_stats()
-alone = simulate.make_scratch(Options())
-out = np.zeros(1, KERNEL_RESULT).view(np.recarray)
+out = np.zeros(1, RESULT).view(np.recarray)
 counts = []
 for revolutions in (2, 2, 4):
-    before = rtsys.get_allocation_stats().alloc
     options = Options(max_revs=revolutions, settle_tol=1e-12)
-    simulate.simulate_joint(par[0], options, 10**6, alone, out[0])
+    simulation.lanes(options, 1)
+    before = rtsys.get_allocation_stats().alloc
+    list(simulation.simulate_together(par, options, np.full(1, 10**6), False, out))
     counts.append(rtsys.get_allocation_stats().alloc - before)
     assert out[0].steps > 150 * revolutions
 print(counts)

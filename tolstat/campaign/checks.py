@@ -12,8 +12,17 @@ from tolstat.campaign import pool
 from tolstat.campaign.blocks import simulate_beside
 from tolstat.campaign.pool import Lost, Work, kept_workers
 from tolstat.common.counts import Counts
-from tolstat.common.solver_options import to_names
-from tolstat.common.tables import RESULT, Fidelity, Method, Options, Simulation, Start, Status, without_results
+from tolstat.common.tables import (
+    RESULT,
+    Fidelity,
+    Method,
+    Options,
+    Simulation,
+    Start,
+    Status,
+    to_names,
+    without_results,
+)
 from tolstat.solver.reference import reference_rows
 from tolstat.store.verification import Check
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.analysis import binomial
-from tolstat.analysis.independent import Independent
+from tolstat.analysis.design import Independent
 from tolstat.analysis.sample import Sample
 from tolstat.campaign import checks, verify
 from tolstat.campaign.run import choose_fidelity
@@ -30,7 +30,7 @@ from tolstat.solver.compilation import stage_name, warm_up
 from tolstat.solver.simulation import history_specs, simulate_rows
 from tolstat.store import layout, metadata, worst
 from tolstat.store.recorded import perturbed, settings, variants
-from tolstat.study import Study, assumptions, swept
+from tolstat.study import Study, assumptions, design
 from tolstat.study.points import names_of
 from tolstat.study.tolerances import meaning
 
@@ -258,7 +258,7 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT, stage: Te
         reversals=_reversals(np.concatenate([*at.values()]), np.concatenate([*results.values()])),
         assembly=_assembly(study, iid),
         fit=fit_in_words(study),
-        sweep=swept.meaning(study.sweep, study.joint),
+        sweep=design.meaning(study.sweep, study.joint),
         tolerances=text.plain(meaning.table(study.entries).to_dict("records")),
         exact=list(assumptions.unselected(study)),
         correlations=text.plain(meaning.correlations(study.copula, study.tolerances).to_dict("records")),

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from tolstat.common import strict
 from tolstat.common.errors import Fault, InputError, gather
-from tolstat.common.solver_options import to_names
 from tolstat.common.tables import (
     FAILED,
     MAX_ITERATIONS,
@@ -24,6 +23,7 @@ from tolstat.common.tables import (
     Options,
     Status,
     iterations_allowed,
+    to_names,
 )
 from tolstat.joint.ideal import NO_CLOSED_FORM
 from tolstat.solver import fidelity

@@ -5,10 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from tolstat.campaign import run as campaign
+from tolstat.common.late import Late
 from tolstat.display.progress import Display, silent
-from tolstat.study import Study
+
+if TYPE_CHECKING:
+    from tolstat.campaign import run as campaign
+    from tolstat.study import Study
+else:
+    campaign = Late("tolstat.campaign.run")  # of a question that simulates, `--help` reads this file
 
 
 @dataclass(frozen=True)

@@ -1,17 +1,21 @@
-"""The command line: functions of questions come from `_questions`, the others are one file each."""
+"""The application ``tolstat``: its help, and its commands, each imported when it is used.
+
+Functions of questions are made by `_command`, those of the other commands from files of this package.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from importlib import import_module
-from typing import Any
+from typing import Annotated, Any
 
-from tolstat.cli._app import LISTED, Listed, app, main
-from tolstat.cli._command import check_memory
-from tolstat.questions import QUESTIONS, Question
+import typer
+from typer.core import TyperArgument, TyperCommand, TyperGroup
 
-__all__ = ["LISTED", "PLAIN", "app", "main"]
+from tolstat import __version__
+from tolstat.cli import _command
+from tolstat.common.cores import limit_threads
+from tolstat.questions import QUESTIONS
 
 PLAIN = {
     "Plan": {
@@ -40,22 +44,109 @@ PLAIN = {
     },
 }
 """Commands that are no question, by heading of the help: functions of this package, and their first lines."""
-FILES = {"schema": "new", "plan": "run", "extend": "run", "merge": "run", "replay": "simulate"}
+FILES = {"schema": "new", "spectrum": "new", "plan": "run", "extend": "run", "merge": "run"}
+FILES |= {"replay": "simulate", "cache": "docs"}
 """Files of commands that have none of their own name."""
+ASKED = {question.name.replace("_", "-"): question for question in QUESTIONS if question.heading}
+"""Questions by the names of their commands."""
+HEADINGS = {
+    heading: plain | {name: question.summary for name, question in ASKED.items() if question.heading == heading}
+    for heading, plain in PLAIN.items()
+}
+LISTED = {name: summary for commands in HEADINGS.values() for name, summary in commands.items()}
+"""First line of the help of each command, in the order of the help."""
+CONTEXT = {"help_option_names": ["-h", "--help"]}
+EPILOG = (
+    "Exit codes: 0 success, 1 internal error (replay: results differ), 2 input that cannot be used, "
+    "128 + N stopped by signal N (130 after Ctrl-C)."
+)
 
 
-def _function(name: str, question: Question | None = None) -> Callable[..., None]:
+def function_of(name: str) -> Callable[..., None]:
+    """Import the function of a command."""
     if name in ("run", "extend"):
-        check_memory()  # before libraries are loaded
-    file: Any = import_module(f"tolstat.cli.{FILES.get(name, name) if question is None else '_questions'}")
-    function: Callable[..., None] = getattr(file, name) if question is None else file.function_of(question)
+        _command.check_memory()  # before libraries are loaded
+    if name in ASKED:
+        return _command.function_of(ASKED[name])
+    function: Callable[..., None] = getattr(import_module(f"tolstat.cli.{FILES.get(name, name)}"), name)
     return function
 
 
-for heading, commands in PLAIN.items():
-    for name, summary in commands.items():
-        LISTED[name] = Listed(heading, summary, partial(_function, name))
-    for question in QUESTIONS:
-        if question.heading == heading:
-            name = question.name.replace("_", "-")
-            LISTED[name] = Listed(heading, question.summary, partial(_function, name, question))
+class _Commands(TyperGroup):
+    """Commands under their headings; each is imported when it is used."""
+
+    _completes = False
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """Names of all commands."""
+        return list(LISTED)
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """A command by its name; None if there is none."""
+        if self._completes and cmd_name in LISTED:
+            return TyperCommand(cmd_name, help=LISTED[cmd_name])
+        if cmd_name in LISTED and cmd_name not in self.commands:
+            with _command.exit_codes():
+                function = _command.command_of(function_of(cmd_name))
+            alone = typer.Typer(rich_markup_mode=None, pretty_exceptions_enable=False, add_completion=False)
+            alone.command(cmd_name, context_settings=CONTEXT)(function)
+            self.commands[cmd_name] = made = typer.main.get_command(alone)
+            for argument in made.params:
+                if isinstance(argument, TyperArgument):  # help says FILE alone, without a type of Python behind it
+                    argument.display_type_rich = lambda ctx: None  # type: ignore[method-assign]
+        return self.commands.get(cmd_name)
+
+    def shell_complete(self, ctx: Any, incomplete: str) -> list[Any]:
+        """Names that begin so, with their summaries: none of the commands is imported."""
+        self._completes = True
+        try:
+            return super().shell_complete(ctx, incomplete)
+        finally:
+            self._completes = False
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write the commands, one heading after the other."""
+        width = max(map(len, LISTED))
+        for heading, commands in HEADINGS.items():
+            with formatter.section(heading):
+                formatter.write_dl([(f"{name:{width}}", summary) for name, summary in commands.items()])
+
+
+app = typer.Typer(
+    name="tolstat",
+    cls=_Commands,
+    epilog=EPILOG,
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    context_settings=CONTEXT,
+)
+
+
+def main() -> None:
+    """Run the command line; the entry point of ``tolstat`` and ``python -m tolstat``."""
+    limit_threads()
+    app(prog_name="tolstat")
+
+
+def _version(asked: bool) -> None:
+    if asked:
+        typer.echo(f"tolstat {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and exit.")
+    ] = False,
+) -> None:
+    """Monte Carlo tolerance analysis of Cardan joints: which share of the joints exceeds a load.
+
+    \b
+    For the first time:
+      tolstat new shaft                         a study to edit
+      tolstat plan shaft.toml                   its time, memory and precision
+      tolstat run shaft.toml                    simulate it, and print the report
+      tolstat report shaft.h5 --out shaft.html  the page
+    """  # noqa: D301

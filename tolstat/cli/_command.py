@@ -3,6 +3,10 @@
 Parameters that can be given by position are arguments, keyword-only ones are options; what a type does not say of them
 is their `Opt`. A parameter that is true by default can be switched off: ``--report / --no-report``.
 
+The first parameters of a question say what its command reads: a `View` is FILE, two are A and B, ``*views`` are several
+files. Where the question's file has a function ``simulate(source, work, ...)``, its first parameter says what is
+simulated: a `Study` is STUDY, whose campaigns the answer is about, a path is FILE, behind ``--run``; it may be either.
+
 Exit codes: 0 success (failed and unsettled joints are results); 1 internal error, dead worker processes, or results
 that `replay` does not reproduce; 2 input that cannot be used; 128 + N stopped by signal N (130 after Ctrl-C).
 """
@@ -12,18 +16,22 @@ from __future__ import annotations
 import errno
 import inspect
 import re
+import resource
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from inspect import Parameter, Signature
 from pathlib import Path
 from typing import Annotated, Any, get_args, get_origin
 
 import typer
 
-from tolstat.cli._talk import fail, session
+from tolstat.cli._library import points, stores, studies, units
+from tolstat.cli._shared import deliver, fail, progress, say, session, work
 from tolstat.common.errors import Fault, InputError, TolstatError, gather
 from tolstat.common.files import check_target, reason
+from tolstat.display import options
 from tolstat.display.options import Opt
+from tolstat.questions import Question
 
 WHAT = {"1": "a share between 0 and 1", "s": "a time above zero"}
 """What a value with a unit is, by its unit."""
@@ -48,18 +56,18 @@ def exit_codes() -> Iterator[None]:
 
 
 def command_of(function: Callable[..., None]) -> Callable[..., None]:
-    """Make the function of a command: with the options of `_talk.session`, and values with a unit as text."""
-    own, common = _parameters(function), _parameters(session)
+    """Make the function of a command: with the options of `_shared.session`, and values with a unit as text."""
+    parameters_of_function, common = _parameters(function), _parameters(session)
 
     def run(**given: Any) -> None:
         shared = {name: given.pop(name) for name in common}
         with exit_codes(), session(**shared), exit_codes():  # those inside are written to the log, too
-            function(**_values(own, given))
+            function(**_values(parameters_of_function, given))
 
     made: Any = run
     made.__name__, made.__doc__ = function.__name__, prose(inspect.getdoc(function) or "")
     texts = entries(inspect.getdoc(session) or "") | entries(inspect.getdoc(function) or "")
-    parameters = [*own.values(), *common.values()]
+    parameters = [*parameters_of_function.values(), *common.values()]
     made.__signature__ = Signature([_typed(p, texts.get(p.name)) for p in parameters])
     made.__annotations__ = {p.name: p.annotation for p in made.__signature__.parameters.values()}
     return run
@@ -100,18 +108,14 @@ def quantity(text: str, opt: Opt, flag: str) -> float:
     InputError
         When the text is no such value, or not between the limits of the option.
     """
-    from pydantic_core import PydanticCustomError
-
-    from tolstat.common.units import EXAMPLES, to_si
-
     unit = opt.unit or "1"
     try:
-        value = to_si(text, unit)
-    except PydanticCustomError:
+        value = units.to_si(text, unit)
+    except ValueError:
         value = float("nan")
     low, high = 0.0 if opt.least is None else opt.least, float("inf") if opt.most is None else opt.most
     if not low < value < high:
-        remedy = f"write {flag} " + (SHARES if unit == "1" else f'"{EXAMPLES[unit]}"')
+        remedy = f"write {flag} " + (SHARES if unit == "1" else f'"{units.EXAMPLES[unit]}"')
         raise InputError([Fault(flag, f"{text!r} is not {WHAT.get(unit, f'a value in {unit}')}", remedy)])
     return value
 
@@ -161,11 +165,6 @@ def _values(parameters: Mapping[str, Parameter], given: dict[str, Any]) -> dict[
     return given
 
 
-try:
-    import resource
-except ImportError:  # Windows
-    resource = None  # type: ignore[assignment]
-
 DISK = {
     *(errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES, errno.EPERM),
     *(errno.EISDIR, errno.ENOTDIR, errno.ENAMETOOLONG),
@@ -208,7 +207,97 @@ def _memory(found: str) -> Fault:
 
 def _limit_mb() -> int:
     """Address space that this process may use, MB; 0 if it is not limited."""
-    if resource is None:
-        return 0
     soft, _ = resource.getrlimit(resource.RLIMIT_AS)
     return 0 if soft == resource.RLIM_INFINITY else soft // 10**6
+
+
+READS: dict[str, dict[str, Any]] = {
+    "view": {"file": options.ResultPath},
+    "views": {"files": options.PointPaths},
+    "pair": {"a": options.FirstPath, "b": options.SecondPath},
+    "study": {"source": options.SimulatedPath},
+    "either": {"source": options.EitherPath},
+}
+"""Arguments of a command by what its question reads."""
+
+
+def function_of(question: Question) -> Callable[..., None]:
+    """Make the function of a command that answers a question."""
+    answer_of, simulate = question.functions()
+    views, options_of_answer, simulated, only_simulated = (
+        list[Parameter](),
+        list[Parameter](),
+        list[Parameter](),
+        list[Parameter](),
+    )
+    for parameter in _parameters(answer_of).values():
+        (views if parameter.annotation is stores.View else options_of_answer).append(parameter)
+    several, takes_study, into_file = views[0].kind is Parameter.VAR_POSITIONAL, False, False
+    if simulate is not None:
+        source, _, *simulated = _parameters(simulate).values()
+        only_simulated = [p for p in simulated if p.name not in _parameters(answer_of)]
+        takes_study, into_file = source.annotation is not Path, source.annotation is not studies.Study
+    reads = "pair" if len(views) == 2 else "views" if several else "view"
+    if takes_study:
+        reads = "study" if several else "either"
+
+    def run(**given: Any) -> None:
+        named = [given[name] for name in READS[reads]]
+        sources: list[Path] = named[0] if reads == "views" else named
+        stem = f"{'_'.join(path.stem for path in sources[:2])}_{question.name}"
+        point, study_file, out = given.get("point") or "", given.get("study_file"), given["out"]
+        if out is not None:
+            check_target(out / stem)
+        is_study = simulate is not None and sources[0].suffix == ".toml"
+        if simulate is not None and (is_study or given.get("run")):
+            what: Any = sources[0]
+            if is_study:
+                what = studies.load(sources[0])
+                points.names_of(point, [at.name for at in what.points], str(sources[0]))
+            settings = {"workers": given["workers"], "folder": out or Path(), "study_file": study_file, "point": point}
+            with work(**settings) as running:
+                sources = simulate(what, running, **{p.name: given[p.name] for p in simulated})
+        elif used := [flag_of(p) for p in only_simulated if given[p.name] not in (None, p.default)]:
+            ways = {"add --run": into_file, "give a study (TOML)": takes_study}
+            remedy = ", or ".join(way for way, is_open in ways.items() if is_open)
+            holds = f"about a simulation, and {sources[0]} holds its joints already"
+            raise InputError([Fault(", ".join(used), f"{'are' if len(used) > 1 else 'is'} {holds}", remedy)])
+        with ExitStack() as stack:
+            opened = [stack.enter_context(stores.ResultFile.open(path)) for path in sources]
+            point = "" if is_study and len(opened[0].points) == 1 else point  # the one that was simulated
+            seen = [store.view(study_file).at(point) for store in opened]
+            with progress(question.name):
+                answer = answer_of(*seen, **{p.name: given[p.name] for p in options_of_answer})
+            deliver(answer, given["wide"], given["as_json"])
+            if out is not None:
+                with progress("files"):
+                    files = answer.write(out / stem)
+                for path in files:
+                    say(f"wrote {path}")
+
+    texts = entries(inspect.getdoc(simulate) or "") | entries(inspect.getdoc(answer_of) or "")
+    made: Any = run
+    made.__name__, made.__doc__ = question.name, prose(inspect.getdoc(answer_of) or "")
+    parameters = [_parameter(name, kind, Parameter.empty) for name, kind in READS[reads].items()]
+    for p in (*options_of_answer, *only_simulated):
+        base, opt = opt_of(p)
+        parameters.append(_parameter(p.name, Annotated[base, opt._replace(help=texts[p.name])], p.default))
+    for name, (annotation, default, applies) in {
+        "point": (options.Point, None, reads != "pair"),
+        "study_file": (options.OtherStudy, None, reads not in ("pair", "study")),
+        "run": (options.Run, False, into_file),
+        "workers": (options.Workers, None, simulate is not None),
+        "out": (options.Results if takes_study else options.Folder, None, True),
+        "wide": (options.Wide, False, True),
+        "as_json": (options.AsJson, False, True),
+    }.items():
+        if applies:
+            parameters.append(_parameter(name, annotation, default))
+    made.__signature__ = Signature(parameters)
+    return run
+
+
+def _parameter(name: str, annotation: Any, default: Any) -> Parameter:
+    is_argument = any(name in arguments for arguments in READS.values())
+    kind = Parameter.POSITIONAL_OR_KEYWORD if is_argument else Parameter.KEYWORD_ONLY
+    return Parameter(name, kind, default=default, annotation=annotation)

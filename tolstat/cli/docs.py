@@ -1,4 +1,4 @@
-"""``tolstat docs``: a page of the documents in the terminal, or the documentation site of a clone."""
+"""``tolstat docs`` and ``cache``: documents in the terminal or a browser, and compiled kernels."""
 
 from __future__ import annotations
 
@@ -11,11 +11,12 @@ from typing import Annotated
 
 import typer
 
-from tolstat.cli._talk import WIDTH, say
+from tolstat.cli._shared import WIDTH, say
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.files import docs_dir
 from tolstat.common.strict import did_you_mean
 from tolstat.display.options import Opt
+from tolstat.kernel.simd import cache_folder
 
 BUILT = Path("build", "docs", "docs", "index.html")
 """First page of the built site, from the root of a clone."""
@@ -52,7 +53,12 @@ def docs(page: Annotated[str | None, Opt("PAGE")] = None) -> None:
     clone = next((folder for folder in folders if all((folder / mark).is_file() for mark in marks)), None)
     if clone is None:
         say("pages of the installed package; the site with all pages and pictures is built from a clone")
-        typer.echo(_titled())
+        width = max(map(len, pages()))
+        for name, file in pages().items():
+            lines = _plain(file.read_text(encoding="utf-8")).splitlines()
+            title = next(line for line in lines if line.startswith("# "))[2:]
+            indent = " " * (width + 2)
+            typer.echo(textwrap.fill(title, WIDTH, initial_indent=f"{name:{width}}  ", subsequent_indent=indent))
         say("next: tolstat docs study")
         return
     built = clone / BUILT
@@ -105,13 +111,24 @@ def _plain(text: str) -> str:
     return re.sub(r"```\{code-cell\}\n(?::tags: .*\n)?", "```\n", text)
 
 
-def _titled() -> str:
-    """Names of the pages, and their titles, on lines that a terminal shows whole."""
-    found = {}
-    for name, file in pages().items():
-        found[name] = next(line for line in _plain(file.read_text(encoding="utf-8")).splitlines() if line[:2] == "# ")
-    width = max(map(len, found))
-    return "\n".join(
-        textwrap.fill(title[2:], WIDTH, initial_indent=f"{name:{width}}  ", subsequent_indent=" " * (width + 2))
-        for name, title in found.items()
-    )
+def cache(*, clear: bool = False) -> None:
+    """Show where compiled kernels are kept, or remove them.
+
+    Prints the folders with compiled kernels, one for each version of tolstat and Numba that was used, and their sizes.
+    Kernels are compiled at the first use, about half a minute; a file that is damaged is compiled anew by itself. The
+    environment variable NUMBA_CACHE_DIR names another folder for them.
+
+    Example: tolstat cache
+
+    Parameters
+    ----------
+    clear : bool
+        Remove the compiled kernels of all versions.
+    """
+    if clear:
+        say(f"removed {cache_folder.clear() / 1e6:.1f} MB of compiled kernels")
+        return
+    for folder in cache_folder.folders():
+        files, size = cache_folder.size(folder)
+        typer.echo(f"{folder}: {files} kernels, {size / 1e6:.1f} MB")
+    say(f"in use: {cache_folder.CACHE_DIRECTORY}")

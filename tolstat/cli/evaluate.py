@@ -4,28 +4,19 @@ from __future__ import annotations
 
 import csv
 import math
-import sys
 from collections.abc import Mapping
 from io import StringIO
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
-from numpy.typing import NDArray
-from pydantic_core import PydanticCustomError
-
-from tolstat.campaign.function import function
-from tolstat.cli._talk import say
-from tolstat.cli._work import work
-from tolstat.common import units
+from tolstat.cli._library import functions, load_units, np, records, strict, studies, texts, units
+from tolstat.cli._shared import say, work, write
 from tolstat.common.errors import Fault, InputError
-from tolstat.common.files import atomic_write, check_target
-from tolstat.common.loads import UNIT_OF_LOAD
-from tolstat.common.strict import read_text
-from tolstat.common.tables import ERROR_FIELDS, VALID, Status
+from tolstat.common.files import check_target
 from tolstat.display.options import Opt, SimulatedPath, Workers
-from tolstat.display.text import csv_rows
-from tolstat.study import load
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 MAX_FAULTS = 20
 """Most faults of a table that a message lists."""
@@ -65,21 +56,16 @@ def evaluate(
     """
     if out != "-":
         check_target(Path(out), errors)
-    f = function(load(study), loads, point=point, workers=workers)
-    names = f.cube_names if uniform else f.names
-    si = {field.name: field.unit for field in ERROR_FIELDS}
-    given = read_table(errors, {name: "1" if uniform else si[name] for name in names})
+    f = functions.function(studies.load(study), loads, point=point, workers=workers)
+    si = {field.name: "1" if uniform else field.unit for field in records.ERROR_FIELDS}
+    given = read_table(errors, {name: si.get(name, "1") for name in (f.cube_names if uniform else f.names)})
     with work(workers=workers) as shown:
         shown.display.stage("simulation")
         y = f(f.uniform(given) if uniform else given)
-    head = [["status", *f.loads], ["", *(UNIT_OF_LOAD[name] for name in f.loads)]]
-    rows = csv_rows([[Status(number).label for number in f.status], *y.T.tolist()])
-    if out == "-":
-        csv.writer(sys.stdout, lineterminator="\n").writerows([*head, *rows])
-    else:
-        with atomic_write(Path(out)) as temporary, temporary.open("w", encoding="utf-8", newline="") as stream:
-            csv.writer(stream, lineterminator="\n").writerows([*head, *rows])
-    without = int((~np.isin(f.status, VALID)).sum())
+    head = [["status", *f.loads], ["", *(load_units.UNIT_OF_LOAD[name] for name in f.loads)]]
+    rows = texts.csv_rows([[records.Status(number).label for number in f.status], *y.T.tolist()])
+    write(out, lambda stream: csv.writer(stream, lineterminator="\n").writerows([*head, *rows]))
+    without = int((~np.isin(f.status, records.VALID)).sum())
     say(f"{'' if out == '-' else f'wrote {out}: '}{len(y)} joints, {without} of them without a valid load")
 
 
@@ -103,46 +89,45 @@ def read_table(path: Path, names: Mapping[str, str]) -> NDArray[np.float64]:
     InputError
         With the faults of the file: columns that it lacks or has twice, units, cells that are no finite numbers.
     """
-    lines = csv.reader(StringIO(read_text(path), newline=""))
+    lines = csv.reader(StringIO(strict.read_text(path), newline=""))
     rows = [(lines.line_num, [cell.strip() for cell in row]) for row in lines if any(cell.strip() for cell in row)]
     head = rows.pop(0)[1] if rows else []
-    faults = [
-        Fault(
-            f"{path}:1", f"{'no' if name not in head else 'more than one'} column {name!r}", "give one for each error"
-        )
-        for name in names
-        if head.count(name) != 1
-    ]
-    kept = {name: head.index(name) for name in names if name in head}
-    for number, cells in rows:
+    faults = []
+    for name in names:
+        if head.count(name) != 1:
+            number = "more than one" if name in head else "no"
+            faults.append(Fault(f"{path}:1", f"{number} column {name!r}", "give one for each error"))
+    columns = {name: head.index(name) for name in names if name in head}
+    for line, cells in rows:
         if len(cells) != len(head):
-            found = f"has {len(cells)} cells, the first line {len(head)}"
-            faults.append(Fault(f"{path}:{number}", found, "give a cell for each column"))
-    whole = [(number, cells) for number, cells in rows if len(cells) == len(head)]
-    factors = dict.fromkeys(kept, 1.0)
-    if whole and any(not is_number(whole[0][1][column]) for column in kept.values()):
-        number, cells = whole.pop(0)
-        for name, column in kept.items():
+            length = f"has {len(cells)} cells, the first line {len(head)}"
+            faults.append(Fault(f"{path}:{line}", length, "give a cell for each column"))
+    rows = [(line, cells) for line, cells in rows if len(cells) == len(head)]
+    factors = dict.fromkeys(columns, 1.0)
+    if rows and not all(is_number(rows[0][1][column]) for column in columns.values()):
+        line, cells = rows.pop(0)
+        for name, column in columns.items():
             unit = cells[column]
             try:
                 factors[name] = units.to_si(f"1 {unit}" if unit not in ("", "1") else 1.0, names[name])
-            except PydanticCustomError:
-                place = f"{path}:{number}: {name}"
-                faults.append(Fault(place, f"{unit!r} is no unit of it", f"write {names[name]}, or another such unit"))
-    if not whole and not faults:
+            except ValueError:
+                remedy = f"write {names[name]}, or another such unit"
+                faults.append(Fault(f"{path}:{line}: {name}", f"{unit!r} is no unit of it", remedy))
+    if not rows and not faults:
         faults.append(Fault(str(path), "has no joints", "give a row of numbers for each"))
-    table = np.empty((len(whole), len(names)))
-    for i, (number, cells) in enumerate(whole):
-        for j, (name, column) in enumerate(kept.items()):
+    table = np.empty((len(rows), len(names)))
+    for i, (line, cells) in enumerate(rows):
+        for j, (name, column) in enumerate(columns.items()):
             if is_number(cells[column]):
                 table[i, j] = factors[name] * float(cells[column])
             else:
-                found = f"{cells[column]!r} is no finite number"
-                faults.append(Fault(f"{path}:{number}: {name}", found, "give the error of this joint"))
+                problem = f"{cells[column]!r} is no finite number"
+                faults.append(Fault(f"{path}:{line}: {name}", problem, "give the error of this joint"))
+    if len(faults) > MAX_FAULTS:
+        rest = Fault(str(path), f"and {len(faults) - MAX_FAULTS} more faults", "mend these first")
+        raise InputError([*faults[:MAX_FAULTS], rest])
     if faults:
-        more = len(faults) - MAX_FAULTS
-        rest = [Fault(str(path), f"and {more} more faults", "mend these first")] if more > 0 else []
-        raise InputError([*faults[:MAX_FAULTS], *rest])
+        raise InputError(faults)
     return table
 
 

@@ -4,27 +4,21 @@ from __future__ import annotations
 
 import csv
 import math
-import sys
-from collections.abc import Callable
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Annotated, TextIO
+from typing import TYPE_CHECKING, Annotated, TextIO
 
 import typer
 
-from tolstat.cli._output import json_of
-from tolstat.cli._talk import progress, say
+from tolstat.cli._library import causes, pylife, reports, result_files, stores, texts, workbook
+from tolstat.cli._shared import json_of, progress, say, write
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.files import atomic_write
 from tolstat.display.options import Accepted, Opt, Point, ResultPath
-from tolstat.display.text import csv_rows
-from tolstat.questions.causes.errors import causes
-from tolstat.questions.fatigue import pylife
-from tolstat.report import workbook
-from tolstat.report.answer import statistics as statistics_of
-from tolstat.store import Reader, ResultFile
-from tolstat.store.result_file import in_blocks, to_pandas
+
+if TYPE_CHECKING:
+    from tolstat.store import Reader
 
 Target = Annotated[str | None, Opt("OUT", writes=True)]
 
@@ -93,51 +87,51 @@ def export(
     for message, applies in wrong.items():
         if applies:
             raise typer.BadParameter(message)
-    if parquet is not None and find_spec("pyarrow") is None:
-        remedy = "install it with: pip install pyarrow, or use --csv OUT"
-        raise InputError([Fault("--parquet", "pyarrow is not installed", remedy)])
-    with progress("export"), ResultFile.open(file) as opened:
+    for option, target, package in (("--parquet", parquet, "pyarrow"), ("--xlsx", xlsx, "openpyxl")):
+        if target is not None and find_spec(package) is None:
+            remedy = f"install it with: pip install {package}, or use --csv OUT"
+            raise InputError([Fault(option, f"{package} is not installed", remedy)])
+    with progress("export"), stores.ResultFile.open(file) as opened:
         view = opened.view().at(point or "")
         store = view.store
         number = f"{store.n - (0 if nominal else store.first_sample)} joints"
-        if xlsx is not None:
-            workbook.check(store, "--xlsx")
+        if xlsx is not None and store.n > workbook.MAX_ROWS:
+            too_many = f"{store.path} has {store.n} joints, a sheet of Excel has {workbook.MAX_ROWS} rows"
+            raise InputError([Fault("--xlsx", too_many, "use --parquet OUT or --csv OUT")])
         if cycles is not None:
             table = pylife.table(view, nominal=nominal)
-            write = partial(table.to_csv, index=False, lineterminator="\n")
-            _write(cycles, write, f"cycles of {table['joint'].nunique()} joints")
+            write(cycles, lambda out: table.to_csv(out, index=False, lineterminator="\n"))
+            _tell(cycles, f"cycles of {table['joint'].nunique()} joints")
         if statistics is not None:
-            values = statistics_of(view, accepted=accepted)
-            values["causes"] = {load: causes(view, load).values() for load in by or ()}
-            _write(statistics, lambda out: out.write(json_of(values) + "\n"), "all statistics")
+            values = reports.statistics(view, accepted=accepted)
+            values["causes"] = {load: causes.causes(view, load).values() for load in by or ()}
+            write(statistics, lambda out: out.write(json_of(values) + "\n"))
+            _tell(statistics, "all statistics")
         if joints is not None:
-            _write(joints, partial(_write_csv, store, nominal, joints == "-"), number)
+            if joints == "-":
+                list(result_files.in_blocks(store, nominal))  # damage is found before anything is printed
+            write(joints, partial(_write_csv, store, nominal))
+            _tell(joints, number)
         if parquet is None and xlsx is None:
             return
-        frame = to_pandas(store, nominal)
+        frame = result_files.to_pandas(store, nominal)
         writers = {xlsx: partial(workbook.write, store, frame), parquet: partial(frame.to_parquet, engine="pyarrow")}
-        for name, write in writers.items():
+        for name, write_file in writers.items():
             if name is not None:
                 with atomic_write(Path(name)) as temporary:
-                    write(temporary)
-                say(f"wrote {name}: {number}")
+                    write_file(temporary)
+                _tell(name, number)
 
 
-def _write(target: str, write: Callable[[TextIO], object], content: str) -> None:
-    if target == "-":
-        write(sys.stdout)
-        return
-    with atomic_write(Path(target)) as temporary, temporary.open("w", encoding="utf-8", newline="") as stream:
-        write(stream)
-    say(f"wrote {target}: {content}")
+def _tell(target: str, content: str) -> None:
+    if target != "-":
+        say(f"wrote {target}: {content}")
 
 
-def _write_csv(store: Reader, nominal: bool, is_printed: bool, stream: TextIO) -> None:
-    """Write errors and results block by block; damage is found before anything is printed."""
-    for _ in in_blocks(store, nominal) if is_printed else ():
-        pass
+def _write_csv(store: Reader, nominal: bool, stream: TextIO) -> None:
+    """Write errors and results block by block."""
     out = csv.writer(stream, lineterminator="\n")
-    for k, frame in enumerate(in_blocks(store, nominal)):
+    for k, frame in enumerate(result_files.in_blocks(store, nominal)):
         if k == 0:
             out.writerows([["row", *frame.columns], ["1", *frame.attrs["units"].values()]])
-        out.writerows(csv_rows([frame.index.tolist(), *(frame[name].tolist() for name in frame)]))
+        out.writerows(texts.csv_rows([frame.index.tolist(), *(frame[name].tolist() for name in frame)]))

@@ -6,16 +6,11 @@ import math
 from pathlib import Path
 from typing import Annotated
 
-from tolstat.cli._output import print_json, show
-from tolstat.cli._talk import progress, say
+from tolstat.cli._library import compilation, draw_records, pages, recorded, reports, revolutions, stores
+from tolstat.cli._shared import deliver, progress, say
 from tolstat.common.cores import available_cores
-from tolstat.common.draw_records import DRAWN
 from tolstat.common.files import check_target
 from tolstat.display.options import Accepted, AsJson, Opt, Point, ResultPath, Wide
-from tolstat.report import answer as reports
-from tolstat.report import page
-from tolstat.solver import compilation
-from tolstat.store import recorded, revolutions, viewed
 
 PAGES = (".html", ".htm")
 
@@ -57,15 +52,14 @@ def report(
     if out is not None and out.suffix.lower() in PAGES:
         _page(file, out, accepted, again, point or "", full, brief)
         return
-    with viewed(file) as view:
+    with stores.viewed(file) as view:
         if out is not None:
             check_target(out / file.stem)
         with progress("report"):
             answer = reports.report(view.at(point or ""), accepted)
+        deliver(answer, wide, as_json)
         if as_json:
-            print_json(answer.values())
             return
-        show(answer, wide)
         if note := recorded.note_on_mounting(view.store):
             say(f"note: {note}")
         with progress("files") as shown:
@@ -76,16 +70,16 @@ def report(
 
 def _page(file: Path, out: Path, accepted: float, again: int | None, point: str, full: bool, brief: bool) -> None:
     check_target(out, file)
-    with viewed(file) as view:
-        held = bool(revolutions.held(view.store))
+    with stores.viewed(file) as view:
+        has_histories = bool(revolutions.held(view.store))
         if again is None:
             with progress("reading the file"):
                 done = view.counts.done == view.counts.total
-            again = page.REPLAYED if held or done else 0
+            again = pages.REPLAYED if has_histories or done else 0
             if not again:
                 say(f"{file} has pending joints: the page shows the others, and none over the input angle (--replay)")
-        if again and view.method in DRAWN and not held:
+        if again and view.method in draw_records.DRAWN and not has_histories:
             compilation.announce()
         with progress("page") as shown:
-            page.write_page(view, out, accepted, again, shown.stage, point, available_cores(), full, brief)
+            pages.write_page(view, out, accepted, again, shown.stage, point, available_cores(), full, brief)
     say(f"wrote {out}")

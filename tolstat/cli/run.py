@@ -7,30 +7,18 @@ from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from shlex import quote
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from tolstat import study
-from tolstat.campaign import extend as growth
-from tolstat.campaign import plan as plans
-from tolstat.campaign import run as campaign
-from tolstat.campaign import stop_rule
-from tolstat.campaign.remedy import parse_retry, reasons
-from tolstat.cli._output import print_json, show
-from tolstat.cli._talk import progress, say, wrapped
-from tolstat.cli._work import print_study_notes, work
-from tolstat.common import strict
+from tolstat.cli import _library as library
+from tolstat.cli._shared import deliver, print_json, print_study_notes, progress, say, work, wrapped
 from tolstat.common.errors import Fault, InputError, gather
 from tolstat.common.files import check_target
-from tolstat.display import table
 from tolstat.display.options import AsJson, Joints, Opt, OtherStudy, Report, ResultPath, StudyPath, Wide, Workers
-from tolstat.questions.joints import CORRELATED, ENTRIES
-from tolstat.report import answer as reports
-from tolstat.solver import compilation
-from tolstat.store import ResultFile
-from tolstat.study import Study, rewriting
-from tolstat.study.assumptions import unselected
+
+if TYPE_CHECKING:
+    from tolstat.study import Study
 
 
 def plan(
@@ -38,7 +26,7 @@ def plan(
     *,
     n: Joints = None,
     workers: Workers = None,
-    pilot: Annotated[int, Opt("K", least=1)] = plans.PILOT,
+    pilot: Annotated[int | None, Opt("K", least=1)] = None,
     as_json: AsJson = False,
 ) -> None:
     """Predict time, memory and precision of a campaign.
@@ -52,21 +40,22 @@ def plan(
 
     Parameters
     ----------
-    pilot : int
-        Number of joints simulated for the prediction.
+    pilot : int, optional
+        Number of joints simulated for the prediction; default: 128, fewer if they take more than 20 s.
     """
-    loaded = study.load(study_file, n=n)
+    loaded = library.studies.load(study_file, n=n)
     print_study_notes(study_file, loaded)
-    compilation.announce()
+    library.compilation.announce()
     with progress() as shown:
-        made = plans.plan(loaded, workers, pilot, shown.stage)
+        made = library.plans.plan(loaded, workers, pilot or library.plans.PILOT, shown.stage)
     if as_json:
         print_json(asdict(made) | {"seconds": made.seconds})
     else:
         typer.echo(wrapped("\n".join(_lines(made))))
-        for columns, rows in ((ENTRIES, made.tolerances), (CORRELATED, made.correlations)):
+        meanings = {library.joints.ENTRIES: made.tolerances, library.joints.CORRELATED: made.correlations}
+        for columns, rows in meanings.items():
             if rows:
-                typer.echo(f"\n{table.as_text(columns, rows)}")
+                typer.echo(f"\n{library.tables.as_text(columns, rows)}")
     say(f"next: tolstat run {quote(str(study_file))}" + ("" if n is None else f" --n {n}"))
 
 
@@ -137,13 +126,13 @@ def run(
     with gather(faults):
         check_target(path)  # now, not when the pictures of the report are written
     with gather(faults):
-        text = rewriting.with_settings(strict.read_text(study_file), changes) if changes else None
-        plan = study.load(study_file, n=n, text=text)
-        again = None if retry is None else parse_retry(retry, retried, plan)
+        text = library.rewriting.with_settings(library.strict.read_text(study_file), changes) if changes else None
+        plan = library.studies.load(study_file, n=n, text=text)
+        again = None if retry is None else library.remedies.parse_retry(retry, retried, plan)
     if faults:
         raise InputError(faults)
     print_study_notes(study_file, plan)
-    if exact := unselected(plan):
+    if exact := library.assumptions.unselected(plan):
         say(f"no tolerance, taken as exact: {', '.join(exact)}")
     where = {"workers": workers, "executor": executor, "scheduler": scheduler}
     simulate(plan, path, until=until, check=verify, rows=part, retry=again, **where)
@@ -175,7 +164,7 @@ def extend(
         New number of joints, without the nominal joint.
     """
     with progress("drawing the errors"):
-        plan = growth.extend(file, n, study_file)
+        plan = library.growth.extend(file, n, study_file)
     say(f"{file}: extended to {n} joints")
     simulate(plan, file, workers=workers)
     conclude(file, report, wide)
@@ -199,7 +188,7 @@ def merge(files: Annotated[list[Path], Opt("SLICE")], *, out: Annotated[Path, Op
         Result file to create; must not exist.
     """
     with progress("merging"):
-        merged = growth.merge(files, out)
+        merged = library.growth.merge(files, out)
     counts = merged.counts
     pending = counts.total - counts.done
     say(f"{out}: {counts.done} {counts.counted}, {counts.shortfall}")
@@ -227,27 +216,26 @@ def parse_rows(text: str) -> range:
 
 def simulate(plan: Study, path: Path, until: str | None = None, **choices: Any) -> None:
     """Simulate a campaign with progress on standard error; `choices` go to `campaign.run`."""
-    outcome = None
     with work() as running:
         shown = running.display
-        run = partial(campaign.run, plan, path, progress=shown, tell=say, stage=shown.stage, **choices)
+        run = partial(library.campaigns.run, plan, path, progress=shown, tell=say, stage=shown.stage, **choices)
         if until is None:
             counts = run()
         else:
-            rule = stop_rule.parse(until, plan.limits)
-            outcome = stop_rule.run_until(plan, path, rule, lambda row: run(until_row=row))
-    if outcome is not None:
+            rule = library.stop_rule.parse(until, plan.limits)
+            outcome = library.stop_rule.run_until(plan, path, rule, lambda row: run(until_row=row))
+    if until is not None:
         look, end = outcome.look, "reached" if outcome.reached else "not reached"
-        biased = f", {stop_rule.BIASED}: go by the interval" if outcome.reached else ""
+        biased = f", {library.stop_rule.BIASED}: go by the interval" if outcome.reached else ""
         say(
             f"{rule.text}: {end} with {look.joints} joints, {look.above} above, "
             f"{look.n_unresolved} failed or not settled\n"
-            f"{100 * stop_rule.CONFIDENCE:.0f} % interval {look.lower:.5f} to {look.upper:.5f}, valid after any number "
-            "of looks (failed and unsettled joints: below at its lower end, above at its upper end)\n"
+            f"{100 * library.stop_rule.CONFIDENCE:.0f} % interval {look.lower:.5f} to {look.upper:.5f}, valid after "
+            "any number of looks (failed and unsettled joints: below at its lower end, above at its upper end)\n"
             f"share above {look.estimate:.5f}{biased}; "
             "shares and intervals in the report are not corrected for the stop"
         )
-        with ResultFile.open(path) as store:
+        with library.stores.ResultFile.open(path) as store:
             counts = store.counts()
     say(f"{path}: {counts.done} {counts.counted}, {counts.shortfall}")
 
@@ -257,16 +245,16 @@ def conclude(path: Path, report: bool, wide: bool, study_file: str = "STUDY") ->
 
     `study_file` is the study file as the user gave it, with its settings.
     """
-    with ResultFile.open(path) as store:
+    with library.stores.ResultFile.open(path) as store:
         if report:
             with progress("report") as shown:
-                answer = reports.report(store.view())
+                answer = library.reports.report(store.view())
                 shown.stage("files")
-                files = reports.write(answer, path)
-            show(answer, wide)
+                files = library.reports.write(answer, path)
+            deliver(answer, wide)
             for file in files:
                 say(f"wrote {file}")
-        without_load = reasons(store, {one.point or "": one.status() for one in store.each()})
+        without_load = library.remedies.reasons(store, {at.point or "": at.status() for at in store.each()})
         for reason in without_load:
             say(reason.text)
         for options in dict.fromkeys(reason.retry for reason in without_load if reason.retry):
@@ -276,7 +264,7 @@ def conclude(path: Path, report: bool, wide: bool, study_file: str = "STUDY") ->
         say(f"next: tolstat {following if store.whole else f'merge {source} OTHER_SLICES --out WHOLE.h5'}")
 
 
-def _lines(made: plans.Plan) -> Iterator[str]:
+def _lines(made: library.plans.Plan) -> Iterator[str]:
     yield f"joints: {made.rows}" + (f", each at {', '.join(made.points)}" if all(made.points) else "")
     yield f"random numbers a joint: {made.dimensions}"
     yield f"pilot: {made.pilot} joints, {made.failed} failed, {made.unsettled} not settled"
@@ -313,8 +301,8 @@ def _lines(made: plans.Plan) -> Iterator[str]:
 
 def _duration(seconds: float) -> str:
     units = (("d", 86400.0), ("h", 3600.0), ("min", 60.0))
-    long = next((f"{seconds / size:.3g} {unit}" for unit, size in units if seconds >= 2 * size), f"{seconds:.2g} s")
-    return "less than 1 s" if seconds < 1 else long
+    short = f"{seconds:.2g} s" if seconds >= 1 else "less than 1 s"
+    return next((f"{seconds / size:.3g} {unit}" for unit, size in units if seconds >= 2 * size), short)
 
 
 def _size(size: int) -> str:

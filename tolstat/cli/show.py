@@ -7,13 +7,11 @@ from typing import Annotated
 
 import typer
 
-from tolstat.cli._talk import say
+from tolstat.cli._library import drawings, style, tables, views
+from tolstat.cli._shared import say
 from tolstat.common.errors import Fault, InputError, gather
 from tolstat.common.files import check_target
-from tolstat.display import style
 from tolstat.display.options import Opt
-from tolstat.display.table import as_text, plain
-from tolstat.questions.drawings import answer, views
 
 FORMATS = (".svg", ".png", ".pdf")
 
@@ -59,13 +57,13 @@ def show(
         check_target(target)
     if faults:
         raise InputError(faults)
-    joint, own_alpha, title, own_errors = answer.read(source, row, alpha)
+    joint, own_alpha, title, own_errors = drawings.read(source, row, alpha)
     if errors:
-        figure, rows = answer.draw_errors(joint), answer.meanings()
+        figure, rows = drawings.draw_errors(joint), drawings.meanings()
     elif own_errors is not None:
-        figure, rows = answer.draw_row(joint, own_errors, title), views.numbers(joint, own_errors)
+        figure, rows = drawings.draw_row(joint, own_errors, title), views.numbers(joint, own_errors)
     else:
-        figure, rows = answer.draw_joint(joint, own_alpha, title, columns), answer.lengths(joint, own_alpha)
+        figure, rows = drawings.draw_joint(joint, own_alpha, title, columns), drawings.lengths(joint, own_alpha)
     (path,) = style.save(figure, target.with_suffix(""), (target.suffix.lower(),))
-    typer.echo(as_text(plain(rows), rows))
+    typer.echo(tables.as_text(tables.plain(rows), rows))
     say(f"wrote {path}")

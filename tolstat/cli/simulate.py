@@ -3,34 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tolstat import study
-from tolstat.campaign import replay as replays
-from tolstat.campaign.replay import CaseResult, Replay
-from tolstat.cli._output import print_json
-from tolstat.cli._talk import progress, say, warn
-from tolstat.cli._work import print_warnings
+from tolstat.cli._library import compilation, load_units, records, replays, sections, stores, studies, texts
+from tolstat.cli._shared import print_json, print_warnings, progress, say, warn
 from tolstat.common.files import atomic_write
-from tolstat.common.loads import unit_text
-from tolstat.common.tables import STATUS_TEXT, Status
-from tolstat.display import table
 from tolstat.display.options import AsJson, Opt, Point, ResultPath, Trace
-from tolstat.display.table import Column, has
-from tolstat.joint.sections import mounting_and_law
-from tolstat.solver import compilation
-from tolstat.store import ResultFile
 
-LARGEST = (
-    Column("load", lambda row: str(row["load"])),
-    Column("unit", lambda row: unit_text(row["unit"])),
-    Column("this joint", lambda row: _number(row["joint"])),
-    Column("without errors", lambda row: _number(row["without_errors"]), shown=has("without_errors")),
-    Column("change", lambda row: _per_cent(row["change"]), shown=has("without_errors")),
-)
-"""Columns of the largest loads of a joint, beside those of the joint without errors."""
+if TYPE_CHECKING:
+    from tolstat.campaign.replay import CaseResult, Replay
 
 
 def simulate(case: Annotated[Path, Opt("CASE")], *, out: Trace = None, as_json: AsJson = False) -> None:
@@ -47,9 +30,9 @@ def simulate(case: Annotated[Path, Opt("CASE")], *, out: Trace = None, as_json: 
     case : Path
         Case file (TOML): one joint with its errors.
     """
-    loaded = study.load_case(case)
+    loaded = studies.load_case(case)
     print_warnings(case, [loaded.joint])
-    say(f"{loaded.name}: {mounting_and_law([loaded.joint.shaft.axial], [loaded.joint.contact.law])}")
+    say(f"{loaded.name}: {sections.mounting_and_law([loaded.joint.shaft.axial], [loaded.joint.contact.law])}")
     compilation.announce()
     with progress("simulation"):
         result = replays.simulate_case(loaded)
@@ -80,7 +63,7 @@ def replay(
         Operating point, such as cruise; needed if FILE has several.
     """
     compilation.announce()
-    with progress("simulation"), ResultFile.open(file) as store:
+    with progress("simulation"), stores.ResultFile.open(file) as store:
         again = replays.replay(store.at(point) if point else store, row)
     facts = {"row": row, "equal": not again.differences, "differing": [d.name for d in again.differences]}
     _deliver(again.result, facts, out, as_json)
@@ -95,26 +78,27 @@ def _deliver(result: CaseResult, facts: dict[str, Any], out: Path | None, as_jso
     if as_json:
         print_json(summary)
     else:
-        rows = [{"load": name} | load for name, load in summary["max"].items()]
         lines = [f"{name}: {value}" for name, value in summary.items() if name != "max"]
-        typer.echo("\n".join([*lines, table.as_text(LARGEST, rows, None)]))
-    state = Status[str(summary["status"]).upper()]
-    if state != Status.OK:
-        warn(f"warning: {state.label}: {STATUS_TEXT[state]}\n  hint: {result.remedy()}")
+        typer.echo("\n".join([*lines, texts.align(_largest(summary["max"]))]))
+    state = records.Status[str(summary["status"]).upper()]
+    if state != records.Status.OK:
+        warn(f"warning: {state.label}: {records.STATUS_TEXT[state]}\n  hint: {result.remedy()}")
     if out is not None:
         with atomic_write(out) as temporary:
             result.to_pandas().to_csv(temporary, index=False, lineterminator="\n")
         say(f"wrote {out}")
 
 
-def _number(load: float | None) -> str:
-    return "-" if load is None else f"{load:.5g}"
-
-
-def _per_cent(change: float | None) -> str:
-    if change is None:
-        return "-"
-    return "0.0 %" if abs(change) < 5e-4 else f"{100 * change:+.1f} %"
+def _largest(largest: dict[str, dict[str, Any]]) -> list[list[str]]:
+    """Cells of the largest loads of a joint, beside those of the joint without errors, if it was simulated."""
+    rows = [["load", "unit", "this joint", "without errors", "change"]]
+    for name, load in largest.items():
+        values = ("-" if value is None else f"{value:.5g}" for value in (load["joint"], load.get("without_errors")))
+        change = load.get("change")
+        change = "-" if change is None else "0.0 %" if abs(change) < 5e-4 else f"{100 * change:+.1f} %"
+        rows.append([name, load_units.unit_text(load["unit"]), *values, change])
+    known = any(load.get("without_errors") is not None for load in largest.values())
+    return rows if known else [row[:3] for row in rows]
 
 
 def _verdict(again: Replay) -> str:

@@ -4,31 +4,20 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import typer
-from numpy.typing import NDArray
 
-from tolstat.campaign.remedy import reasons
-from tolstat.cli._output import print_json, print_table
-from tolstat.cli._talk import progress, wrapped
+from tolstat.cli._library import np, records, remedies, stores, tables, texts, verification, what_if
+from tolstat.cli._shared import print_json, print_table, progress, wrapped
 from tolstat.common.errors import Fault, StoreError
-from tolstat.common.tables import Status, worst_status
-from tolstat.display import text
 from tolstat.display.options import AsJson, ResultPath, Wide
 from tolstat.display.progress import clock
-from tolstat.display.table import Column
-from tolstat.display.text import plain
-from tolstat.store import ResultFile, View, verification, what_if
 
-SHARES = (
-    Column("load > limit", lambda row: text.limit({**row, "level": row["limit"]})),
-    Column("above", lambda row: f"{row['above']} of {row['of']}"),
-    Column("share", lambda row: text.percent(row["estimate"])),
-    Column("95 % interval", lambda row: text.span(row["lower"], row["upper"])),
-)
-"""Columns of the shares above the limits so far."""
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from tolstat.store import ResultFile, View
 
 
 def status(file: ResultPath, *, check: bool = False, wide: Wide = False, as_json: AsJson = False) -> None:
@@ -49,34 +38,45 @@ def status(file: ResultPath, *, check: bool = False, wide: Wide = False, as_json
     check : bool
         Compare all that is in the file with its checksums; exit code 2 if damaged.
     """
-    with progress("reading the file"), ResultFile.open(file) as store:
-        states = {one.point or "": one.status() for one in store.each()}
+    with progress("reading the file"), stores.ResultFile.open(file) as store:
+        states = {at.point or "": at.status() for at in store.each()}
         facts, shares = _facts(store, states), _shares(store.view())
         if check:
             facts["checked"] = _checked(store)
-        why = reasons(store, states)
+        reasons = remedies.reasons(store, states)
     if as_json:
-        causes = {f"{r.status.label} at {r.point}" if r.point else r.status.label: r for r in why}
-        remedies = {name: {"row": r.row, "remedy": r.remedy} for name, r in causes.items()}
-        print_json(plain(facts | {"exceedance": shares, "causes": remedies}))
+        causes = {f"{r.status.label} at {r.point}" if r.point else r.status.label: r for r in reasons}
+        hints = {name: {"row": reason.row, "remedy": reason.remedy} for name, reason in causes.items()}
+        print_json(texts.plain(facts | {"exceedance": shares, "causes": hints}))
         return
-    typer.echo("\n".join([*_lines(facts), *(wrapped(reason.text) for reason in why)]))
+    typer.echo("\n".join([*_lines(facts), *(wrapped(reason.text) for reason in reasons)]))
     if shares:
+        columns = (
+            tables.Column("load > limit", lambda row: texts.limit({**row, "level": row["limit"]})),
+            tables.Column("above", lambda row: f"{row['above']} of {row['of']}"),
+            tables.Column("share", lambda row: texts.percent(row["estimate"])),
+            tables.Column("95 % interval", lambda row: texts.span(row["lower"], row["upper"])),
+        )
         typer.echo()
-        print_table(SHARES, shares, wide)
+        print_table(columns, shares, wide)
 
 
 def _facts(store: ResultFile, states: dict[str, NDArray[np.uint8]]) -> dict[str, Any]:
     """Study, counts by status, in all and by point, and the pace of the run under way; `states` by point."""
     facts: dict[str, Any] = {"study": store.study_name, "joints": store.n}
-    facts |= _counts(worst_status(list(states.values())))
-    if len(states) > 1:
-        facts["points"] = {point: {k: n for k, n in _counts(own).items() if n} for point, own in states.items()}
-    each = store.each()
-    pending = sum(np.count_nonzero(own == Status.PENDING) for own in states.values())
-    written = sum(np.count_nonzero(one.column("results", "status", slice(None)) == Status.PENDING) for one in each)
-    again = sum(np.count_nonzero(one.attempt()) for one in each)
-    condition = {"damaged": pending - written, "simulated_again": again}
+    facts |= _counts(records.worst_status(list(states.values())))
+    counts = {point: _counts(status) for point, status in states.items()}
+    if len(counts) > 1:
+        facts["points"] = {
+            point: {k: n for k, n in number_by_status.items() if n} for point, number_by_status in counts.items()
+        }
+    points, pending = (
+        store.each(),
+        sum(number_by_status[records.Status.PENDING.label] for number_by_status in counts.values()),
+    )
+    stored = sum(_counts(at.column("results", "status", slice(None)))[records.Status.PENDING.label] for at in points)
+    again = sum(int(np.count_nonzero(at.attempt())) for at in points)
+    condition = {"damaged": pending - stored, "simulated_again": again}
     facts |= {name: number for name, number in condition.items() if number}
     session = store.session()
     facts["running"] = session is not None
@@ -87,7 +87,7 @@ def _facts(store: ResultFile, states: dict[str, NDArray[np.uint8]]) -> dict[str,
 
 
 def _counts(states: NDArray[np.uint8]) -> dict[str, int]:
-    return {state.label: int(np.count_nonzero(states == state)) for state in Status}
+    return {state.label: int(np.count_nonzero(states == state)) for state in records.Status}
 
 
 def _shares(view: View) -> list[dict[str, Any]]:
@@ -96,9 +96,9 @@ def _shares(view: View) -> list[dict[str, Any]]:
     for load in view.loads([] if view.method == "subset" else list(view.limits)):
         share = load.above(view.limits[load.name])
         if share.n:
-            above = {"above": share.count, "of": share.n - share.n_failed - share.n_unsettled}
-            numbers = {key: float(f"{getattr(share, key):.3g}") for key in ("estimate", "lower", "upper")}
-            rows.append({"load": load.name, "limit": load.limit, "unit": load.unit} | above | numbers)
+            row = {"load": load.name, "limit": load.limit, "unit": load.unit, "above": share.count}
+            row["of"] = share.n - share.n_failed - share.n_unsettled
+            rows.append(row | {key: float(f"{getattr(share, key):.3g}") for key in ("estimate", "lower", "upper")})
     return rows
 
 
@@ -132,7 +132,7 @@ def _checked(store: ResultFile) -> bool:
     if faults:
         remedy = "simulate joints with damaged results again: tolstat run STUDY; for damaged errors restore a copy"
         raise StoreError(str(Fault(str(store.path), "\n    ".join(["is damaged:", *faults]), remedy)))
-    for one in store.each():
+    for at in store.each():
         for name in (verification.VERIFY, verification.NEAR):
-            verification.read(one, name)
+            verification.read(at, name)
     return integrity.checked

@@ -5,15 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from tolstat.analysis.accuracy import LEAST_NEAR
-from tolstat.campaign.verify import check, check_near
-from tolstat.cli._output import deliver
-from tolstat.cli._talk import progress, say
-from tolstat.common.cores import available_cores
-from tolstat.common.files import atomic_write
-from tolstat.display.answer import Answer, Sentence, Table
+from tolstat.cli._library import accuracy, answers, checks, numerical
+from tolstat.cli._shared import deliver, progress, say
+from tolstat.common import cores, files
+from tolstat.common.late import pandas as pd
 from tolstat.display.options import AsJson, Opt, Wide, Workers
-from tolstat.questions import accuracy
 
 
 def verify(
@@ -53,20 +49,22 @@ def verify(
         Write the errors of each joint, check and load as CSV.
     """
     with progress("checks, then tight references") as shown:
-        count = workers or available_cores()
+        count = workers or cores.available_cores()
         if near is None:
-            found = check(what, joints or 24, seed, count, progress=shown)
+            verification = checks.check(what, joints or 24, seed, count, progress=shown)
         else:
-            found = check_near(what, near, joints or LEAST_NEAR, count, shown)
+            verification = checks.check_near(what, near, joints or numerical.LEAST_NEAR, count, shown)
     units = dict.fromkeys(("median", "usual", "worst"), "1")
-    kinds = Table("kinds", "By kind of load", accuracy.ERRORS, accuracy.error_rows(found), units)
-    loads = Table("loads", "By load", (), accuracy.error_rows(found, by_kind=False), units)
-    checks = {name: check.description for name, check in found.checks.items()}
-    facts = {"rows": found.rows, "seed": found.seed, "checks": checks}
-    deliver(Answer("verify", "Numerical error", [kinds, loads, Sentence(accuracy.note(found))], facts), wide, as_json)
+    rows, by_load = accuracy.error_rows(verification), accuracy.error_rows(verification, by_kind=False)
+    parts: list[answers.Part] = [
+        answers.Table("kinds", "By kind of load", accuracy.ERRORS, rows, units),
+        answers.Table("loads", "By load", (), by_load, units),
+        answers.Sentence(accuracy.note(verification)),
+    ]
+    facts = {"rows": verification.rows, "seed": verification.seed}
+    facts |= {"checks": {name: check.description for name, check in verification.checks.items()}}
+    deliver(answers.Answer("verify", "Numerical error", parts, facts), wide, as_json)
     if out is not None:
-        import pandas as pd
-
-        with atomic_write(out) as temporary:
-            pd.DataFrame(accuracy.joint_rows(found)).to_csv(temporary, index=False, lineterminator="\n")
+        with files.atomic_write(out) as temporary:
+            pd.DataFrame(accuracy.joint_rows(verification)).to_csv(temporary, index=False, lineterminator="\n")
         say(f"wrote {out}")

@@ -1,4 +1,4 @@
-"""Modules of other packages, imported when first used: `scipy.special` takes longer to import than tolstat."""
+"""Modules of other packages that few commands need or that import slowly, imported when first used."""
 
 from __future__ import annotations
 
@@ -22,6 +22,8 @@ class Late:
 if TYPE_CHECKING:
     import pandas as pandas
     import tomlkit as tomlkit
+    import tomlkit.exceptions
+    import tomlkit.items
     from scipy import integrate as integrate
     from scipy import interpolate as interpolate
     from scipy import optimize as optimize

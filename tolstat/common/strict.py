@@ -30,7 +30,7 @@ class Strict(BaseModel):
     def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         """Return the JSON schema with bounds of quantities, see `json_schema.complete`."""
         schema = handler(core)
-        json_schema.complete(handler.resolve_ref_schema(schema), cls.model_fields, units.SIGNS)
+        json_schema.complete(handler.resolve_ref_schema(schema), cls, units.SIGNS)
         return schema
 
 

@@ -11,16 +11,13 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 from tolstat.common.errors import TolstatError
-from tolstat.display import drawing, style, text
+from tolstat.common.late import pandas as pd
+from tolstat.display import drawing, progress, style, text
 from tolstat.display.blocks import Artist, Axes, Block, Facts, Figure, Listing, Panel, Panels, Reader, Text
-from tolstat.display.progress import Tell, silent
 from tolstat.display.table import Column, Row, Rows, as_block, by_share, has, has_unresolved, of_shares, plain
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 __all__ = ["Answer", "Artist", "Asked", "Axes", "Column", "Document", "Figure", "Listing", "Panel", "Panels", "Part"]
 __all__ += ["Reader", "Row", "Rows", "Sentence", "Sheet", "Table", "Text", "by_share", "has"]
@@ -100,7 +97,7 @@ class Sheet:
 Part = Sentence | Table | Panels | Reader | Sheet | Listing | Document
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Answer:
     """The answer to a question.
 
@@ -121,6 +118,10 @@ class Answer:
     parts: Sequence[Part]
     facts: Mapping[str, Any] = field(default_factory=dict)
 
+    def __repr__(self) -> str:
+        names = [f"{kind} {', '.join(held)}" for kind, held in (("frames", self.tables), ("facts", self.facts)) if held]
+        return f"<answer {self.name!r}: {'; '.join([self.title, *names])}>"
+
     @property
     def tables(self) -> dict[str, Table]:
         """Tables by name."""
@@ -134,8 +135,6 @@ class Answer:
         KeyError
             When there is no table of this name.
         """
-        import pandas as pd
-
         return pd.DataFrame(list(self.tables[name].rows))
 
     def values(self) -> dict[str, Any]:
@@ -170,7 +169,7 @@ class Answer:
                 files.append(text.csv(text.columns_of(part.rows), stem, part.name))
             elif isinstance(part, Panels) and not sheets:
                 for panel in part.panels:
-                    files += drawing.save(panel, stem.with_name(f"{stem.name}_{panel.key}"))
+                    files += style.save(drawing.sheet([panel]), stem.with_name(f"{stem.name}_{panel.key}"))
             elif isinstance(part, Sheet):
                 files += style.save(part.draw(), stem.with_name(f"{stem.name}_{part.name}"))
             elif isinstance(part, Document):
@@ -180,9 +179,12 @@ class Answer:
     def _repr_html_(self) -> str:
         from tolstat.display import html
 
-        items = [
-            (key.replace("_", " "), f"{x:.4g}" if isinstance(x, float) else str(x)) for key, x in self.facts.items()
-        ]
+        def words(value: Any) -> str:
+            if isinstance(value, list | tuple):
+                return ", ".join(map(words, value))
+            return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+        items = [(key.replace("_", " "), words(value)) for key, value in self.facts.items()]
         return html.fragment(self.title, [*self.blocks(), *([Facts(items)] if items else [])])
 
 
@@ -220,7 +222,7 @@ class Asked:
     accepted: float = math.nan
     replay: int = 0
     notes: list[str] = field(default_factory=list)
-    stage: Tell = silent
+    stage: progress.Tell = progress.silent
     processes: int = 1
 
     @contextmanager

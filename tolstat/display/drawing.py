@@ -7,16 +7,13 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from html import escape
-from pathlib import Path
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any, Literal
 
 from numpy.typing import ArrayLike
 
-from tolstat.display import style, text
+from tolstat.display import style, text, unseen
 from tolstat.display.blocks import Panel
-from tolstat.display.style import ticker
-from tolstat.display.unseen import visible
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -80,11 +77,6 @@ def svg(panel: Panel) -> tuple[str, tuple[float, ...]]:
     return _inline(buffer.getvalue(), panel), frame
 
 
-def save(panel: Panel, stem: Path) -> list[Path]:
-    """Write a panel as PNG and SVG with its title above it; returns the files written."""
-    return style.save(sheet([panel]), stem)
-
-
 def sheet(panels: Sequence[Panel], title: str = "", notes: Sequence[str] = (), columns: int = 1) -> Figure:
     """Put panels with their titles on one sheet, `columns` side by side, below a headline and above small print."""
     heights = [panel.size[1] + TITLE for panel in panels[::columns]]
@@ -111,7 +103,7 @@ def switched(artist: Artist, name: str) -> None:
 
 def _inline(drawn: str, panel: Panel) -> str:
     """Body of an SVG file as an element of the page, whose style sheet has fonts, joins and colours of all pictures."""
-    body = style.with_variables(visible(drawn[drawn.index("<svg") :]))
+    body = style.with_variables(unseen.visible(drawn[drawn.index("<svg") :]))
     body = re.sub(r"<metadata>.*?</metadata>|<style.*?</style>", "", body, flags=re.DOTALL)
     body = body.replace("font-family: 'DejaVu Sans'; ", "")
     body = re.sub(r'<path d="[^"]*" style="fill: none"/>', "", body)  # background of figure and axes
@@ -126,9 +118,9 @@ def _inline(drawn: str, panel: Panel) -> str:
     assert box is not None
     spaces = 'xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink"'
     head = f'<svg {spaces} {box[0]} role="img" aria-labelledby="{panel.key}-title {panel.key}-desc">'
-    title, description = (escape(visible(words)) for words in (panel.title, panel.description))
-    said = f'<title id="{panel.key}-title">{title}</title><desc id="{panel.key}-desc">{description}</desc>'
-    return head + said + body[body.index(">") + 1 :].strip()
+    title, description = (escape(unseen.visible(words)) for words in (panel.title, panel.description))
+    texts = f'<title id="{panel.key}-title">{title}</title><desc id="{panel.key}-desc">{description}</desc>'
+    return head + texts + body[body.index(">") + 1 :].strip()
 
 
 def rows(ax: Axes, labels: list[str]) -> None:
@@ -189,7 +181,7 @@ def loads_axis(axis: Axis, typical: float, unit: str) -> str:
     """Let an axis of loads show the multiple of their unit that a load has, see `text.multiple`; return its text."""
     size, name = text.multiple(typical, unit)
     if size != 1.0:
-        axis.set_major_formatter(ticker.FuncFormatter(lambda x, _: f"{x / size:g}"))
+        axis.set_major_formatter(style.ticker.FuncFormatter(lambda x, _: f"{x / size:g}"))
     return name
 
 
@@ -198,9 +190,9 @@ def log_loads(ax: Axes, low: float, high: float, typical: float, unit: str) -> s
     size, name = text.multiple(typical, unit)
     ax.set_xscale("log")
     ax.set_xlim(low, high)
-    ax.xaxis.set_major_locator(ticker.LogLocator(subs=(1.0, 2.0, 5.0) if high < 200.0 * low else (1.0,)))
-    ax.xaxis.set_major_formatter(ticker.FuncFormatter(lambda x, _: f"{x / size:g}"))
-    ax.xaxis.set_minor_formatter(ticker.NullFormatter())
+    ax.xaxis.set_major_locator(style.ticker.LogLocator(subs=(1.0, 2.0, 5.0) if high < 200.0 * low else (1.0,)))
+    ax.xaxis.set_major_formatter(style.ticker.FuncFormatter(lambda x, _: f"{x / size:g}"))
+    ax.xaxis.set_minor_formatter(style.ticker.NullFormatter())
     return name
 
 

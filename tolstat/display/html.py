@@ -17,14 +17,13 @@ from markupsafe import Markup
 import tolstat
 from tolstat.common.files import atomic_write
 from tolstat.common.forked import mapped
-from tolstat.display import drawing, style
+from tolstat.display import drawing, style, unseen
 from tolstat.display.blocks import Block, Decision, Page, Panel, Panels
-from tolstat.display.unseen import visible
 
 TEMPLATES = Path(__file__).parent / "templates"
 
 _TORQUE = re.compile(r"\bN m\b")
-_BEFORE_UNIT = re.compile(r"(?<=\d) (?=(?:k?N|mm|[µu]m|m?rad|deg|rpm|rad/s|[MG]Pa|ms|min|[smh])\b|[%°])")
+_INSIDE = re.compile(r"(?<=\d) (?=(?:k?N|mm|[µu]m|m?rad|deg|rpm|rad/s|[MG]Pa|ms|min|[smh])\b|[%°])|(?<=<) (?=\d)")
 
 
 def environment(figure: Callable[[Panel], dict[str, Any]]) -> jinja2.Environment:
@@ -58,19 +57,19 @@ def figures(blocks: Sequence[Block], processes: int) -> Callable[[Panel], dict[s
 
 def grouped(words: str) -> str:
     """Group the digits of whole numbers from 10 000 on by narrow spaces."""
-    return re.sub(r"(?<![\w.])\d{5,}(?!\w)", lambda found: f"{int(found[0]):,}".replace(",", "\u202f"), words)
+    return re.sub(r"(?<![\w.])\d{5,}(?!\w)", lambda number: f"{int(number[0]):,}".replace(",", "\u202f"), words)
 
 
 def bound(words: str) -> str:
-    """Keep numbers with their units, and intervals, on one line: no-break spaces in them."""
-    words = _BEFORE_UNIT.sub("\u00a0", _TORQUE.sub("N\u00a0m", words))
+    """Keep numbers with their signs and units, and intervals, on one line: no-break spaces in them."""
+    words = _INSIDE.sub("\u00a0", _TORQUE.sub("N\u00a0m", words))
     return words.replace(" .. ", "\u00a0..\u00a0")
 
 
 def _panels(block: Block) -> Sequence[Panel]:
     if isinstance(block, Panels):
         return block.panels
-    return [own for own in (block.chart, block.picture) if own] if isinstance(block, Decision) else []
+    return [panel for panel in (block.chart, block.picture) if panel] if isinstance(block, Decision) else []
 
 
 def _data(value: Any) -> Markup:
@@ -80,7 +79,7 @@ def _data(value: Any) -> Markup:
 
 
 def _shown(value: Any) -> Any:
-    return visible(value) if isinstance(value, str) and not isinstance(value, Markup) else value
+    return unseen.visible(value) if isinstance(value, str) and not isinstance(value, Markup) else value
 
 
 POLICY = (

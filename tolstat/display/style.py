@@ -11,10 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tolstat.common import load_kinds, loads
 from tolstat.common.files import atomic_write
 from tolstat.common.late import Late
-from tolstat.common.load_kinds import Kind
-from tolstat.common.loads import PANELS, QUANTITY
 
 if TYPE_CHECKING:
     import matplotlib.figure
@@ -98,7 +97,9 @@ def with_variables(svg: str) -> str:
     """
     names = {colour: f"var(--{name})" for colour, (name, _) in _schemes().items()}
     svg = re.sub(r' fill="(#[0-9a-f]{6})"', r' style="fill: \1"', svg)
-    return re.sub(r'style="[^"]+"', lambda own: re.sub("#[0-9a-f]{6}", lambda m: names.get(m[0], m[0]), own[0]), svg)
+    return re.sub(
+        r'style="[^"]+"', lambda attribute: re.sub("#[0-9a-f]{6}", lambda m: names.get(m[0], m[0]), attribute[0]), svg
+    )
 
 
 def style_sheet() -> str:
@@ -120,7 +121,7 @@ def new_figure(**look: Any) -> Figure:
     return matplotlib.figure.Figure(**look)
 
 
-def panels(title: str, subtitle: str) -> tuple[Figure, list[tuple[str, Kind, Axes]]]:
+def panels(title: str, subtitle: str) -> tuple[Figure, list[tuple[str, load_kinds.Kind, Axes]]]:
     """Make a page of four panels: force and bending moment of the cross bushings above those of the fork bushings.
 
     Parameters
@@ -140,9 +141,9 @@ def panels(title: str, subtitle: str) -> tuple[Figure, list[tuple[str, Kind, Axe
     figure.subplots_adjust(left=0.085, right=0.975, top=0.82, bottom=0.125, hspace=0.42, wspace=0.16)
     figure.text(0.02, 0.972, title, fontsize=15, fontweight="bold", va="top")
     figure.text(0.02, 0.932, subtitle, fontsize=9.5, color="#444444", va="top", linespacing=1.45)
-    for (group, kind), ax in zip(PANELS, axes, strict=True):
-        ax.set_title(f"{group.capitalize()} bushings, {QUANTITY[kind.unit]}", pad=21)
-    return figure, [(group, kind, ax) for (group, kind), ax in zip(PANELS, axes, strict=True)]
+    for (group, kind), ax in zip(loads.PANELS, axes, strict=True):
+        ax.set_title(f"{group.capitalize()} bushings, {loads.QUANTITY[kind.unit]}", pad=21)
+    return figure, [(group, kind, ax) for (group, kind), ax in zip(loads.PANELS, axes, strict=True)]
 
 
 def share_axis(ax: Axes, low: float, which: str = "y", high: float = 1.0) -> None:
@@ -155,15 +156,13 @@ def share_axis(ax: Axes, low: float, which: str = "y", high: float = 1.0) -> Non
     if high < 100.0 * low:
         axis.set_major_locator(ticker.LogLocator(subs=(1.0, 2.0, 5.0)))
     axis.set_major_formatter(ticker.FuncFormatter(lambda x, _: f"{100.0 * x:g} %"))
-    axis.set_minor_locator(_near_view(*sorted(axis.get_view_interval())))
+    view_low, view_high = sorted(axis.get_view_interval())
+    decades = np.arange(np.floor(np.log10(view_low)), np.ceil(np.log10(view_high)))
+    marks = np.outer(10.0**decades, np.arange(2.0, 10.0)).ravel()  # those beyond the view would be made but not drawn
+    axis.set_minor_locator(
+        ticker.FixedLocator(marks[(marks > 0.999 * view_low) & (marks < 1.001 * view_high)].tolist())
+    )
     axis.set_minor_formatter(ticker.NullFormatter())
-
-
-def _near_view(low: float, high: float) -> ticker.FixedLocator:
-    """Minor marks of a logarithmic axis in the view: those up to a decade beyond it would be made but not drawn."""
-    decades = np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)))
-    marks = np.outer(10.0**decades, np.arange(2.0, 10.0)).ravel()
-    return ticker.FixedLocator(marks[(marks > 0.999 * low) & (marks < 1.001 * high)].tolist())
 
 
 def mark(ax: Axes, x: float, y: float, colour: str) -> None:

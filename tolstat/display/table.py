@@ -57,10 +57,10 @@ class Column(NamedTuple):
 
 def by_share(rows: Rows, *keys: str) -> Rows:
     """Rows with the same values of `keys` as one: these values, and each row by its ``share``."""
-    found: dict[tuple[Any, ...], dict[Any, Any]] = {}
+    grouped: dict[tuple[Any, ...], dict[Any, Any]] = {}
     for row in rows:
-        found.setdefault(tuple(row[key] for key in keys), {key: row[key] for key in keys})[row["share"]] = row
-    return list(found.values())
+        grouped.setdefault(tuple(row[key] for key in keys), {key: row[key] for key in keys})[row["share"]] = row
+    return list(grouped.values())
 
 
 def of_shares(shares: Sequence[float], head: str, cell: Callable[[Row], str], rank: int = 0) -> list[Column]:
@@ -115,4 +115,4 @@ def as_block(title: str, columns: Sequence[Column], rows: Rows, verdicts: Sequen
     """Block of the page with a table; see `blocks.Table`."""
     used = [column for column in columns if column.shown(rows)]
     head, *body = cells(used, rows)
-    return Table(title, head, body, frozenset({0} | {i for i, own in enumerate(used) if own.words}), verdicts)
+    return Table(title, head, body, frozenset({0} | {i for i, column in enumerate(used) if column.words}), verdicts)

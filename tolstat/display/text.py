@@ -8,8 +8,7 @@ from csv import writer
 from pathlib import Path
 from typing import Any
 
-from tolstat.common.files import atomic_write
-from tolstat.common.loads import ANY_LIMIT, unit_text
+from tolstat.common import files, loads
 
 LEAST_SHARE = 1e-9
 """Smallest share that is shown: one joint in a billion is beyond what any campaign tells."""
@@ -35,7 +34,7 @@ def cell(value: Any) -> Any:
 def csv(columns: Mapping[str, Sequence[Any]], stem: Path, what: str) -> Path:
     """Write columns as ``STEM_what.csv``, NaN as an empty cell; return its path."""
     path = stem.with_name(f"{stem.name}_{what}.csv")
-    with atomic_write(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as stream:
+    with files.atomic_write(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as stream:
         out = writer(stream, lineterminator="\n")
         out.writerow(columns)
         out.writerows(csv_rows(columns.values()))
@@ -44,7 +43,7 @@ def csv(columns: Mapping[str, Sequence[Any]], stem: Path, what: str) -> Path:
 
 def write(content: str, path: Path) -> Path:
     """Write a text file; returns its path."""
-    with atomic_write(path) as temporary:
+    with files.atomic_write(path) as temporary:
         temporary.write_text(content, encoding="utf-8")
     return path
 
@@ -72,7 +71,7 @@ def align(rows: Sequence[Sequence[str]], words: Sequence[bool] = ()) -> str:
     widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
     lines = []
     for row in rows:
-        cells = (c.ljust(w) if own else c.rjust(w) for c, w, own in zip(row, widths, left, strict=True))
+        cells = (c.ljust(w) if is_left else c.rjust(w) for c, w, is_left in zip(row, widths, left, strict=True))
         lines.append("  ".join(cells).rstrip())
     return "\n".join(lines)
 
@@ -80,7 +79,7 @@ def align(rows: Sequence[Sequence[str]], words: Sequence[bool] = ()) -> str:
 def multiple(largest: float, unit: str) -> tuple[float, str]:
     """Multiple of a unit for values up to `largest`: its size and text; kN and kN m from 1e4 N and N m on."""
     kilo = unit in ("N", "N*m") and abs(largest) >= 1e4
-    return (1e3, f"k{unit_text(unit)}") if kilo else (1.0, unit_text(unit))
+    return (1e3, f"k{loads.unit_text(unit)}") if kilo else (1.0, loads.unit_text(unit))
 
 
 def value(x: float, unit: str) -> str:
@@ -94,7 +93,7 @@ def value(x: float, unit: str) -> str:
 def limit(row: Mapping[Any, Any]) -> str:
     """Words for a row with ``load``, ``level`` and ``unit``: ``cross1.F > 1500 N``, ``any limit``."""
     name = row["load"]
-    return ANY_LIMIT if name == ANY_LIMIT else f"{name} > {value(row['level'], row['unit'])}"
+    return loads.ANY_LIMIT if name == loads.ANY_LIMIT else f"{name} > {value(row['level'], row['unit'])}"
 
 
 def number(x: float) -> str:

@@ -13,4 +13,4 @@ _UNSEEN = re.compile(
 
 def visible(words: str) -> str:
     """Show characters that cannot be seen or change the direction of text by their code, ``[U+202E]``."""
-    return _UNSEEN.sub(lambda found: f"[U+{ord(found[0]):04X}]", words)
+    return _UNSEEN.sub(lambda character: f"[U+{ord(character[0]):04X}]", words)

@@ -6,8 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
-from tolstat.display import text
-from tolstat.display.table import Row
+from tolstat.display import table, text
 
 WORDS = {
     "yes": "kept",
@@ -69,17 +68,17 @@ class Verdict(NamedTuple):
 
     def values(self) -> dict[str, Any]:
         """JSON values: the answer of the joints as drawn in words, null without one, the sentence, other attributes."""
-        found: dict[str, Any] = {"about": self.about, "answer": WORDS.get(self.answer), "stands_on": self.stands_on}
-        found |= {"sentence": self.sentence, "share": self.share, "lower": self.lower, "upper": self.upper}
+        values: dict[str, Any] = {"about": self.about, "answer": WORDS.get(self.answer), "stands_on": self.stands_on}
+        values |= {"sentence": self.sentence, "share": self.share, "lower": self.lower, "upper": self.upper}
         others = ("stands_on",) if self.about else ("about", "share", "lower", "upper")
-        shown = {key: value for key, value in found.items() if key not in others}
+        shown = {key: value for key, value in values.items() if key not in others}
         return {**text.plain(shown), "notes": list(self.notes)}
 
 
 def on_share(
     about: str,
     what: str,
-    row: Row,
+    row: table.Row,
     ends: tuple[float, float],
     accepted: float,
     needed: Callable[[float], float],

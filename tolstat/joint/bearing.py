@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
+from functools import cache
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -94,9 +95,8 @@ RANGE = 100.0
 """Largest load of the fit over the smallest."""
 LEAST = 0.1
 """Smallest clearance of the fit, in units of the displacement at the largest load: without clearance b is free."""
-_x, _w = np.polynomial.legendre.leggauss(24)
-NODES, WEIGHTS = 0.5 * (_x + 1.0), 0.5 * _w
-"""Gauss-Legendre quadrature from 0 to 1; over the loaded needles it is exact to 2e-7."""
+POINTS = 24
+"""Number of points of the quadrature over the loaded needles: exact to 2e-7."""
 NARROW = 1e-6
 """Width of the interval of log b at which its search ends."""
 
@@ -139,10 +139,18 @@ def needle_force(delta: Array, clearance: float, needles: int, length: float) ->
         Force (N) along the displacement.
     """
     last = 2.0 * np.arcsin(np.sqrt(0.5 * delta / (clearance + delta)))[:, None]  # the last needle that is loaded
-    phi = last * NODES
+    nodes, weights = _quadrature()
+    phi = last * nodes
     pressed = delta[:, None] - 2.0 * (clearance + delta)[:, None] * np.sin(0.5 * phi) ** 2
     load = 35948.0 * (1e3 * length) ** (8.0 / 9.0) * (1e3 * np.maximum(pressed, 0.0)) ** (10.0 / 9.0)
-    return np.asarray(needles / math.pi * last[:, 0] * ((load * np.cos(phi)) @ WEIGHTS))
+    return np.asarray(needles / math.pi * last[:, 0] * ((load * np.cos(phi)) @ weights))
+
+
+@cache  # at the first use: numpy.polynomial takes long to import
+def _quadrature() -> tuple[Array, Array]:
+    """Nodes and weights of the Gauss-Legendre quadrature from 0 to 1."""
+    x, weights = np.polynomial.legendre.leggauss(POINTS)
+    return 0.5 * (x + 1.0), 0.5 * weights
 
 
 def formula(delta: Array, clearance: float, k3: float, b: float) -> Array:

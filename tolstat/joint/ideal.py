@@ -165,16 +165,16 @@ def loads(theta: ArrayLike, par: NDArray[np.void]) -> tuple[Array, Array]:
     InputError
         See `check`.
     """
-    from tolstat.common.tables import Options
     from tolstat.kernel.mechanics.ideal_loads import ideal_loads
-    from tolstat.kernel.revolution.simulate import make_scratch
+    from tolstat.kernel.mechanics.topology import N_DOF
+    from tolstat.kernel.mechanics.work import WORK
 
     check(par)
     angles = np.atleast_1d(np.asarray(theta, float))
     row: Any = par.view(np.recarray)[0]
-    work, state, *_ = make_scratch(Options())
+    work, at_rest = np.zeros(1, WORK).view(np.recarray)[0], np.zeros(N_DOF)
     load, contact = np.empty((angles.size, 8, 6)), np.empty((angles.size, 4))
     for i, angle in enumerate(angles):
-        ideal_loads(angle, row, state, work)
+        ideal_loads(angle, at_rest, row, work)
         load[i], contact[i] = work.load, work.contact[:, 0]
     return load, contact

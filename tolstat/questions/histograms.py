@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from tolstat.analysis.sample import Sample
+from tolstat.common.errors import TolstatError
 from tolstat.common.loads import FloatArray
 from tolstat.common.tables import VALID
 from tolstat.common.units import DISPLAY_UNITS
 from tolstat.display import drawing, style, text
-from tolstat.display.answer import Answer, Asked, Axes, Panel, Panels, Part, Sentence
-from tolstat.display.style import ticker
+from tolstat.display.answer import Answer, Axes, Panel, Panels, Part, Sentence
 from tolstat.questions.shares import inapplicable
 from tolstat.store.view import View
 from tolstat.study import axes
@@ -79,18 +80,22 @@ def histograms(view: View) -> Answer:
     ------
     NotApplicable
         When the joints are no sample of a production, or there are none.
-    InputError, StoreError
-        When the study cannot be read.
     """
-    return _answer(view, drawn(view))
-
-
-def histograms_on_page(view: View, asked: Asked) -> Answer:
-    """As `histograms`; the loads alone if the study cannot be read."""
-    found: list[Drawn] = []
-    with asked.noting("no histograms of errors"):
-        found = drawn(view)
-    return _answer(view, found)
+    parts: list[Part] = []
+    if view.sampled and view.leading and view.count(*VALID):
+        parts.append(Panels([_load_panel(load) for load in view.loads(view.leading)]))
+    errors: list[Drawn] = []
+    with suppress(TolstatError):  # a study that can no longer be read
+        errors = drawn(view)
+    if errors:
+        words = "Small pictures: all errors that an entry of the tolerances sets, in one histogram; between the dashed "
+        words += f"lines its tolerance band.{f' The first {JOINTS} joints.' if view.n > JOINTS else ''}"
+        pictures = Panels([_drawn_panel(histogram, k, errors) for k, histogram in enumerate(errors)], small=True)
+        parts += [pictures, Sentence(f"{words} {view.design.counting}".rstrip())]
+    if not parts:
+        remedy = "give the result file of a study with [tolerances] whose joints are drawn at random"
+        raise inapplicable(view, "holds no errors or loads of a random sample", remedy)
+    return Answer("histograms", "What was drawn, and the loads that came of it", parts)
 
 
 def drawn(view: View) -> list[Drawn]:
@@ -104,23 +109,28 @@ def drawn(view: View) -> list[Drawn]:
     InputError, StoreError
         When the study cannot be read.
     """
-    found: dict[tuple[Any, ...], dict[str, None]] = {}
+    errors_of: dict[tuple[Any, ...], dict[str, None]] = {}
     entries_of: dict[str, list[str]] = {}
     for entry in view.study.entries if view.sampled and view.n else ():
         for site, model in entry.models:
             band, meanings = model.band(site) if isinstance(model, SingleEntry) else None, model.meaning(site)
+            moved = set()
             for meaning in meanings:
                 key = (entry.pattern, meaning.number, meaning.unit, band)
-                found.setdefault(key, {}).update(dict.fromkeys(meaning.errors))
-            for name in _moved(site.name, [name for meaning in meanings for name in meaning.errors]):
+                errors_of.setdefault(key, {}).update(dict.fromkeys(meaning.errors))
+                moved |= {*meaning.errors}
+            feature, _, kind = site.name.partition(".")
+            if feature in axes.PAIRS and kind in axes.ORIENTATIONS:  # the tilt of a pair's axis moves both its features
+                moved |= {*axes.columns_of(site.name)}
+            for name in moved:
                 entries_of.setdefault(name, []).append(entry.pattern)
-    if not found:
+    if not errors_of:
         return []
     samples = np.arange(min(view.n, JOINTS))
-    table = view.errors(samples, sorted({name for names in found.values() for name in names}))
+    table = view.errors(samples, sorted({name for names in errors_of.values() for name in names}))
     weights = view.design.counts_as(view.n)[: len(samples)]
     histograms = []
-    for (pattern, number, unit, band), names in found.items():
+    for (pattern, number, unit, band), names in errors_of.items():
         others = dict.fromkeys(other for name in names for other in entries_of[name] if other != pattern)
         counted = _counted(np.concatenate([table[name] for name in names]), np.tile(weights, len(names)), band)
         histograms.append(Drawn(pattern, number, tuple(names), unit, band, counted[0], tuple(others), *counted[1:]))
@@ -145,13 +155,6 @@ def of_load(load: Sample) -> tuple[FloatArray, FloatArray]:
     return edges, _shares(values, edges, weights)
 
 
-def _moved(zone: str, errors: Sequence[str]) -> set[str]:
-    """Errors that a tolerance moves: beside those that it sets, the tilt of a pair's axis moves both its features."""
-    feature, _, key = zone.partition(".")
-    tilts_pair = feature in axes.PAIRS and key in axes.ORIENTATIONS
-    return {*errors, *(axes.columns_of(zone) if tilts_pair else ())}
-
-
 def _counted(
     values: FloatArray, weights: FloatArray, band: tuple[float, float] | None
 ) -> tuple[float, FloatArray, FloatArray]:
@@ -165,21 +168,6 @@ def _counted(
 
 def _shares(values: FloatArray, edges: FloatArray, weights: FloatArray) -> FloatArray:
     return np.asarray(np.histogram(values, edges, weights=weights)[0] / weights.sum())
-
-
-def _answer(view: View, found: Sequence[Drawn]) -> Answer:
-    parts: list[Part] = []
-    if view.sampled and view.leading and view.count(*VALID):
-        parts.append(Panels([_load_panel(load) for load in view.loads(view.leading)]))
-    if found:
-        words = "Small pictures: all errors that an entry of the tolerances sets, in one histogram; between the dashed "
-        words += f"lines its tolerance band.{f' The first {JOINTS} joints.' if view.n > JOINTS else ''}"
-        pictures = Panels([_drawn_panel(own, k, found) for k, own in enumerate(found)], small=True)
-        parts += [pictures, Sentence(f"{words} {view.design.counting}".rstrip())]
-    if not parts:
-        remedy = "give the result file of a study with [tolerances] whose joints are drawn at random"
-        raise inapplicable(view, "holds no errors or loads of a random sample", remedy)
-    return Answer("histograms", "What was drawn, and the loads that came of it", parts)
 
 
 def _load_panel(load: Sample) -> Panel:
@@ -197,14 +185,14 @@ def _draw_load(ax: Axes, load: Sample) -> None:
     if load.limit is not None and 0.5 * low <= load.limit <= 2.0 * high:
         low, high = min(low, load.limit), max(high, load.limit)
         ax.axvline(load.limit, color=style.INK, lw=1.4, ls=(0.0, (8.0, 3.0)))
-        words, place = f"limit {text.value(load.limit, load.unit)}", (load.limit, 1.015)
-        ax.annotate(words, place, xycoords=ax.get_xaxis_transform(), ha="center", va="bottom")
+        words, at = f"limit {text.value(load.limit, load.unit)}", (load.limit, 1.015)
+        ax.annotate(words, at, xycoords=ax.get_xaxis_transform(), ha="center", va="bottom")
     if load.long_tailed:
         unit = drawing.log_loads(ax, 0.95 * low, 1.05 * high, load.limit or high, load.unit)
     else:
         margin = 0.03 * (high - low)
         ax.set_xlim(low - margin, high + margin)
-        ax.xaxis.set_major_locator(ticker.MaxNLocator(6))
+        ax.xaxis.set_major_locator(style.ticker.MaxNLocator(6))
         unit = drawing.loads_axis(ax.xaxis, load.limit or high, load.unit)
     left, right = ax.get_xlim()
     if left <= load.nominal <= right:
@@ -212,27 +200,27 @@ def _draw_load(ax: Axes, load: Sample) -> None:
     ax.set(xlabel=f"{load.name} [{unit or '1'}], largest over the revolution", ylabel="share of the joints [%]")
 
 
-def _drawn_panel(found: Drawn, k: int, every: Sequence[Drawn]) -> Panel:
+def _drawn_panel(drawn: Drawn, k: int, every: Sequence[Drawn]) -> Panel:
     """One picture; of several with one entry each says whether it is of offsets or of tilts."""
-    kinds = dict.fromkeys(name.partition(".")[2].partition("_")[0] for name in found.errors)
-    kind = f", {' and '.join(kinds)}" if sum(own.entry == found.entry for own in every) > 1 else ""
-    outside = "" if found.band is None else f"; {text.percent(found.outside)} outside"
-    others = f"; includes {' and '.join(found.others)}" if found.others else ""
-    title = f"{found.entry}{kind}: {found.number}{outside}{others}"
-    words, draw = f"Histogram of {', '.join(found.errors)}", partial(_draw_errors, found=found)
+    kinds = dict.fromkeys(name.partition(".")[2].partition("_")[0] for name in drawn.errors)
+    kind = f", {' and '.join(kinds)}" if sum(other.entry == drawn.entry for other in every) > 1 else ""
+    outside = "" if drawn.band is None else f"; {text.percent(drawn.outside)} outside"
+    others = f"; includes {' and '.join(drawn.others)}" if drawn.others else ""
+    title = f"{drawn.entry}{kind}: {drawn.number}{outside}{others}"
+    words, draw = f"Histogram of {', '.join(drawn.errors)}", partial(_draw_errors, drawn=drawn)
     return Panel(f"drawn-errors-{k}", title, words, draw, (2.5, 1.4), 0.15, 0.06)
 
 
-def _draw_errors(ax: Axes, found: Drawn) -> None:
-    unit, factor = DISPLAY_UNITS.get(found.unit, (found.unit, 1.0))
-    _bars(ax, factor * found.edges, found.share)
-    ends = factor * np.array(found.band or ())
+def _draw_errors(ax: Axes, drawn: Drawn) -> None:
+    unit, factor = DISPLAY_UNITS.get(drawn.unit, (drawn.unit, 1.0))
+    _bars(ax, factor * drawn.edges, drawn.share)
+    ends = factor * np.array(drawn.band or ())
     for end in ends:
         ax.axvline(end, color=style.INK, lw=1.0, ls=(0.0, (4.0, 2.0)))
     ax.set_yticks([])
     ax.spines["left"].set_visible(False)
-    if found.band is None:
-        ax.xaxis.set_major_locator(ticker.MaxNLocator(3))
+    if drawn.band is None:
+        ax.xaxis.set_major_locator(style.ticker.MaxNLocator(3))
     else:
         marks = (ends[0], ends.mean(), ends[1])
         ax.set_xticks(marks, [f"{x:.3g}" for x in marks])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from functools import partial
 
 import numpy as np
@@ -9,11 +10,11 @@ import numpy as np
 from tolstat import sampling
 from tolstat.analysis import ranks
 from tolstat.campaign.remedy import remedy
-from tolstat.common import units
-from tolstat.common.load_kinds import PINS
+from tolstat.common import load_kinds, units
+from tolstat.common.errors import TolstatError
 from tolstat.common.tables import FAILED, STATUS_TEXT, UNSETTLED, Mode, Status
 from tolstat.display import drawing, style, text
-from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Part, Rows, Sentence, Table
+from tolstat.display.answer import Answer, Axes, Column, Panel, Panels, Part, Rows, Sentence, Table, plain
 from tolstat.questions.shares import inapplicable, rows_of, share, word
 from tolstat.store.view import View
 from tolstat.study.tolerances import meaning
@@ -30,12 +31,6 @@ COLOURS = ("#E6E6E6", style.COLOURS[3], style.COLOURS[1], style.COLOURS[0])
 MODE_WORDS = {mode.name.lower(): mode.name.lower().replace("_", " ") for mode in Mode}
 MODES = (Column("pin", word("pin")), *(Column(words, share(key)) for key, words in MODE_WORDS.items()))
 """Columns of the table ``modes``."""
-STATES = (
-    Column("status", word("status")),
-    Column("joints", word("joints")),
-    Column("meaning", word("meaning"), words=True),
-)
-"""Columns of the table ``states``."""
 FIRST = (
     Column("row", word("row")),
     Column("status", word("status"), words=True),
@@ -81,7 +76,7 @@ def modes(view: View) -> Answer:
     if not np.isfinite(view.mode_share).any():
         remedy = 'add "pin*.share_*" to [output] results of the study, if it has a list'
         raise inapplicable(view, "has no contact modes of valid joints", remedy)
-    rows = rows_of({"pin": PINS} | dict(zip(MODE_WORDS, view.mode_share.T.tolist(), strict=True)))
+    rows = rows_of({"pin": load_kinds.PINS} | dict(zip(MODE_WORDS, view.mode_share.T.tolist(), strict=True)))
     lines = [f"{row['pin']}: " + ", ".join(f"{column.head} {column.cell(row)}" for column in MODES[1:]) for row in rows]
     draw, size = partial(_draw_modes, rows=rows), (drawing.WIDTH, 2.0)
     panel = Panel("modes", "Contact modes", "; ".join(lines), draw, size, 0.6, 0.28)
@@ -109,18 +104,26 @@ def failed(view: View) -> Answer:
     ------
     NotApplicable
         When all joints that were simulated have valid loads.
-    InputError, StoreError
-        When the study cannot be read.
     """
-    return _failed(view, their_errors(view))
-
-
-def failed_on_page(view: View, asked: Asked) -> Answer:
-    """As `failed`; without the comparison if the study cannot be read."""
-    rows: Rows = []
-    with asked.noting("errors of failed and unsettled joints are not compared"):
-        rows = their_errors(view)
-    return _failed(view, rows)
+    joints = without_load(view)
+    if not joints:
+        remedy = "all joints that were simulated have valid loads"
+        raise inapplicable(view, "holds no failed or unsettled joints", remedy)
+    counts = {status: view.count(status) for status in Status}
+    states = [{"status": s.label, "joints": n, "meaning": STATUS_TEXT[s]} for s, n in counts.items() if n]
+    parts: list[Part] = [Table("states", "Number of joints by status", plain(states), states)]
+    compared: Rows = []
+    words = "Their errors are not compared with those of the others, which takes ten joints or more on either side, "
+    words += "drawn from the tolerances with equal weight."
+    with suppress(TolstatError):
+        compared = their_errors(view)
+    if compared:
+        parts.append(Panels([_errors_panel(compared[:MOST_ERRORS])]))
+        marked = [row["error"] for row in compared if min(row["direction_p"], row["size_p"]) < SIGNIFICANT]
+        words = f"Beyond chance {TEST}: {', '.join(marked)}."
+        words = words if marked else f"No error plays a part beyond chance {TEST}."
+    first = Table("first", "The first of them", FIRST, joints)
+    return Answer("failed", "Failed and unsettled joints", [*parts, Sentence(words), first])
 
 
 def tolerances(view: View) -> Answer:
@@ -189,37 +192,18 @@ def their_errors(view: View) -> Rows:
     if view.method == "sweep" or view.design.refuses("difference") or view.study.groups:
         return []
     scores = sampling.normal_scores(view.study, view.errors(samples))
-    scores = {name: own for name, own in scores.items() if np.ptp(own) > 0}
-    found = ranks.tail(np.column_stack(list(scores.values())), bad, iid=view.design.has_interval("difference"))
+    scores = {name: column for name, column in scores.items() if np.ptp(column) > 0}
+    tail = ranks.tail(np.column_stack(list(scores.values())), bad, iid=view.design.has_interval("difference"))
     columns = {"error": np.array(list(scores))}
-    for key, part in found._asdict().items():
+    for key, part in tail._asdict().items():
         columns |= {key: part.estimate, f"{key}_lower": part.lower, f"{key}_upper": part.upper, f"{key}_p": part.p}
-    far = np.maximum(abs(found.direction.estimate - 0.5), abs(found.size.estimate - 0.5))
+    far = np.maximum(abs(tail.direction.estimate - 0.5), abs(tail.size.estimate - 0.5))
     order = np.argsort(-far, kind="stable")
     return rows_of({key: values[order].tolist() for key, values in columns.items()})
 
 
-def _failed(view: View, compared: Rows) -> Answer:
-    joints = without_load(view)
-    if not joints:
-        remedy = "all joints that were simulated have valid loads"
-        raise inapplicable(view, "holds no failed or unsettled joints", remedy)
-    counts = {status: view.count(status) for status in Status}
-    states = [{"status": s.label, "joints": n, "meaning": STATUS_TEXT[s]} for s, n in counts.items() if n]
-    parts: list[Part] = [Table("states", "Number of joints by status", STATES, states)]
-    words = "Their errors are not compared with those of the others, which takes ten joints or more on either side, "
-    words += "drawn from the tolerances with equal weight."
-    if compared:
-        parts.append(Panels([_errors_panel(compared[:MOST_ERRORS])]))
-        marked = [row["error"] for row in compared if min(row["direction_p"], row["size_p"]) < SIGNIFICANT]
-        words = f"Beyond chance {TEST}: {', '.join(marked)}."
-        words = words if marked else f"No error plays a part beyond chance {TEST}."
-    first = Table("first", "The first of them", FIRST, joints)
-    return Answer("failed", "Failed and unsettled joints", [*parts, Sentence(words), first])
-
-
 def _draw_modes(ax: Axes, rows: Rows) -> None:
-    drawing.rows(ax, list(PINS))
+    drawing.rows(ax, list(load_kinds.PINS))
     left = np.zeros(4)
     for (key, words), colour in zip(MODE_WORDS.items(), COLOURS, strict=True):
         share = 100.0 * np.array([row[key] for row in rows])
@@ -243,10 +227,10 @@ def _draw_errors(ax: Axes, rows: Rows) -> None:
     drawing.rows(ax, [row["error"] for row in rows])
     for (key, label), marker, off, colour in zip(COMPARED.items(), "oD", (-0.16, 0.16), style.COLOURS, strict=False):
         y = np.arange(len(rows)) + off
-        own, lower, upper = (np.array([row[f"{key}{end}"] for row in rows]) for end in ("", "_lower", "_upper"))
+        estimate, lower, upper = (np.array([row[f"{key}{end}"] for row in rows]) for end in ("", "_lower", "_upper"))
         if np.isfinite(lower).any():
             ax.hlines(y, lower, upper, color=colour, lw=1.4)
-        ax.plot(own, y, marker, ms=4.5, color=colour, ls="", label=label)
+        ax.plot(estimate, y, marker, ms=4.5, color=colour, ls="", label=label)
     ax.axvline(0.5, color=style.INK, lw=0.9)
     ax.set(xlim=(0.0, 1.0), xlabel="probability that the joint without a valid load has the error that is …")
     drawing.legend_above(ax, *ax.get_legend_handles_labels())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -16,7 +17,7 @@ from tolstat.common.tables import VALID
 from tolstat.display import drawing, style, text
 from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Part, Row, Rows, Sentence, Table, has
 from tolstat.display.style import lines, patches, ticker
-from tolstat.questions.shares import unusable, value, values, word
+from tolstat.questions.shares import unusable, value, values, with_ends, word
 from tolstat.store import revolutions
 from tolstat.store.points import point_of
 from tolstat.store.view import View
@@ -143,16 +144,16 @@ def orders(view: View, orbits: bool = False) -> Answer:
         notes[0] += "; 95 % intervals"
     else:
         notes.append("no intervals: the joints are not independent")
-    found, origin, apart = _orbits(view) if orbits else ([], "", 0.0)
-    if found:
+    read, origin, apart = _orbits(view) if orbits else ([], "", 0.0)
+    if read:
         facts |= {"origin": origin, "apart": apart}
-        points, units = [row for orbit in found for row in _points(orbit)], {"theta": "rad", "f_x": "N", "f_y": "N"}
+        points, units = [row for orbit in read for row in _points(orbit)], {"theta": "rad", "f_x": "N", "f_y": "N"}
         parts.append(Table("orbits", "Lateral force over one revolution", (), points, units))
-        notes.append(f"orbits: {'; '.join(_which(found))}; nearest in the largest lateral force; {ORIGIN[origin]}")
+        notes.append(f"orbits: {'; '.join(_which(read))}; nearest in the largest lateral force; {ORIGIN[origin]}")
     if apart:
         words = f"largest loads of these joints differ by up to {apart:.1e} (relative) from the stored ones"
         notes.append(f"{words}, which another machine or version computed")
-    drawn = Panels([*_amplitude_panels(rows), *_orbit_panels(found)])
+    drawn = Panels([*_amplitude_panels(rows), *_orbit_panels(read)])
     return Answer("orders", "Orders of what the shafts carry", [drawn, *parts, *map(Sentence, notes)], facts)
 
 
@@ -160,8 +161,8 @@ def orders_on_page(view: View, asked: Asked) -> Answer:
     """Orders where the study asks for loads of the shafts; orbits where the page shows histories at all."""
     if not (view.sampled and view.count(*VALID) and are_asked(view)):
         raise NotApplicable
-    found = orders(view, orbits=asked.replay > 0)
-    return Answer(found.name, found.title, [Sentence(INTRODUCTION, "lead"), *found.parts], found.facts)
+    answer = orders(view, orbits=asked.replay > 0)
+    return replace(answer, parts=[Sentence(INTRODUCTION, "lead"), *answer.parts])
 
 
 def are_asked(view: View) -> bool:
@@ -177,14 +178,14 @@ def _amplitude(view: View, name: str) -> Row:
     row = {"quantity": quantity, "noun": LOADS[name].kind.noun, "order": int(order), "load": name, "unit": load.unit}
     row["nominal"] = load.nominal
     for key, share in SHARES.items():
-        found = load.quantile(share)
-        row |= {key: found.estimate, f"{key}_lower": max(found.lower, 0.0), f"{key}_upper": found.upper}
+        amplitude = load.quantile(share)
+        row |= with_ends(key, (amplitude.estimate, max(amplitude.lower, 0.0), amplitude.upper))
     return row
 
 
 def _orbits(view: View) -> tuple[list[Orbit], str, float]:
     """Orbits of each shaft whose lateral force is kept, their source, and how far from the stored values."""
-    found, origin, apart = [], "", 0.0
+    orbits, origin, apart = list[Orbit](), "", 0.0
     for shaft in SHAFTS:
         name = f"{shaft}.lateral"
         if name not in view.kept_loads or not view.load(name).valid.size:
@@ -196,11 +197,11 @@ def _orbits(view: View) -> tuple[list[Orbit], str, float]:
             slots |= {near: int(at.slots(np.nanargmin(away)))} if np.isfinite(away).any() else {}
         names, samples = [f"{shaft}.f_x", f"{shaft}.f_y"], int(at.store.options["steps_per_rev"])
         for near, slot in slots.items():
-            read = revolutions.read(at.store, np.array([slot]), names, samples)
-            force = np.column_stack([read.loads[component][0] for component in names])
-            origin, apart = read.origin, max(apart, read.apart)
-            found.append(Orbit(shaft, near, int(at.store.row(slot)), at.points[0], force))
-    return found, origin, apart
+            turn = revolutions.read(at.store, np.array([slot]), names, samples)
+            force = np.column_stack([turn.loads[component][0] for component in names])
+            origin, apart = turn.origin, max(apart, turn.apart)
+            orbits.append(Orbit(shaft, near, int(at.store.row(slot)), at.points[0], force))
+    return orbits, origin, apart
 
 
 def _points(orbit: Orbit) -> Rows:
@@ -212,9 +213,9 @@ def _points(orbit: Orbit) -> Rows:
 
 def _which(orbits: Sequence[Orbit]) -> Iterator[str]:
     """Words on which joints the orbits of each shaft are of."""
-    for (shaft, point), own in _by_shaft(orbits).items():
-        place = f"{shaft} shaft{f' at {point}' if point else ''}"
-        yield f"{place} {', '.join(f'{orbit.label} row {orbit.row}' for orbit in own)}"
+    for (shaft, point), group in _by_shaft(orbits).items():
+        where = f"{shaft} shaft{f' at {point}' if point else ''}"
+        yield f"{where} {', '.join(f'{orbit.label} row {orbit.row}' for orbit in group)}"
 
 
 def _by_shaft(orbits: Sequence[Orbit]) -> dict[tuple[str, str], list[Orbit]]:
@@ -226,25 +227,21 @@ def _by_shaft(orbits: Sequence[Orbit]) -> dict[tuple[str, str], list[Orbit]]:
 def _amplitude_panels(rows: Rows) -> Iterator[Panel]:
     """Pictures of the amplitude over the order, one of each quantity."""
     for name in dict.fromkeys(row["quantity"] for row in rows):
-        own = [row for row in rows if row["quantity"] == name]
-        most, noun, (place, _, _) = (
-            max(own, key=lambda row: float(row["qmedian"])),
-            own[0]["noun"],
-            name.rpartition("."),
-        )
-        title = f"{noun[0].upper()}{noun[1:]}{f', {place} shaft' if place else ''}".replace("Psi", "Ψ")
+        amplitudes = [row for row in rows if row["quantity"] == name]
+        most, shaft = max(amplitudes, key=lambda row: float(row["qmedian"])), name.rpartition(".")[0]
+        title = f"{text.capital(most['noun'])}{f', {shaft} shaft' if shaft else ''}".replace("Psi", "Ψ")
         words = f"The median of the joints is largest at order {most['order']}, {value('qmedian')(most)}."
-        draw, room = partial(_bars, rows=own), drawing.legend_room(AMPLITUDES)
+        draw, room = partial(_bars, rows=amplitudes), drawing.legend_room(AMPLITUDES)
         yield Panel(f"amplitude-{name}", title, words, draw, (drawing.WIDTH, 2.7), top=room)
 
 
 def _orbit_panels(orbits: Sequence[Orbit]) -> Iterator[Panel]:
     """Pictures of the lateral force on each shaft."""
-    for (shaft, point), own in _by_shaft(orbits).items():
+    for (shaft, point), group in _by_shaft(orbits).items():
         title = f"Lateral force on the {shaft} shaft over one revolution{f', at {point}' if point else ''}"
         words = "Orbit of the force in axes that do not turn, of the nominal joint and of two others. "
-        words += " ".join(f"{orbit.label}: up to {text.value(orbit.largest, 'N')}." for orbit in own)
-        draw, room = partial(_draw_orbits, orbits=own), drawing.legend_room([orbit.label for orbit in own])
+        words += " ".join(f"{orbit.label}: up to {text.value(orbit.largest, 'N')}." for orbit in group)
+        draw, room = partial(_draw_orbits, orbits=group), drawing.legend_room([orbit.label for orbit in group])
         yield Panel(f"orbit-{shaft}", title, words, draw, (drawing.WIDTH, 4.6), top=room)
 
 

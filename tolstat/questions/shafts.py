@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tolstat import sampling
 from tolstat.analysis import binomial
-from tolstat.analysis.independent import Independent
+from tolstat.analysis.design import Independent
 from tolstat.analysis.sensitivity import FEWEST, MOST, first_order
-from tolstat.common.errors import Fault, NotApplicable
 from tolstat.common.load_kinds import ORDERS
 from tolstat.common.loads import ANY_LIMIT
 from tolstat.display import text
-from tolstat.display.answer import Answer, Part, Sentence, Table
-from tolstat.display.table import Column, Row, Rows
+from tolstat.display.answer import Answer, Column, Part, Row, Rows, Sentence, Table
 from tolstat.joint import nominal_errors, perturb
 from tolstat.joint.partner import output_motion
+from tolstat.questions.shares import inapplicable, limit, share, shares, word
 from tolstat.store.recorded import joint_of
 from tolstat.store.view import View
 
@@ -26,21 +25,21 @@ QUANTILES = (0.5, 0.95)
 """Shares of the shafts below whose values the unevenness of the output is given."""
 
 LIMITS = (
-    Column("load", lambda row: str(row["load"])),
-    Column("limit", lambda row: "-" if row["load"] == ANY_LIMIT else text.value(row["limit"], row["unit"])),
-    Column("first joint", lambda row: text.percent(row["first"]), rank=2),
-    Column("second joint", lambda row: text.percent(row["second"]), rank=1),
+    Column("load", word("load")),
+    Column("limit", limit),
+    Column("first joint", share("first"), rank=2),
+    Column("second joint", share("second"), rank=1),
     Column("shafts above", lambda row: f"{row['count']} of {row['n']}"),
-    Column("share", lambda row: text.percent(row["estimate"])),
-    Column("95 % interval", lambda row: text.span(row["lower"], row["upper"])),
+    Column("share", share("estimate")),
+    Column("95 % interval", shares("lower", "upper")),
 )
 """Columns of the table ``shafts``."""
 CAUSES = (
-    Column("line of the drawing", lambda row: str(row["line"]), words=True),
-    Column("as first joint", lambda row: text.percent(row["first"]), rank=2),
-    Column("as second", lambda row: text.percent(row["second"]), rank=1),
-    Column("both", lambda row: text.percent(row["estimate"])),
-    Column("95 % interval", lambda row: text.span(row["lower"], row["upper"])),
+    Column("line of the drawing", word("line"), words=True),
+    Column("as first joint", share("first"), rank=2),
+    Column("as second", share("second"), rank=1),
+    Column("both", share("estimate")),
+    Column("95 % interval", shares("lower", "upper")),
 )
 """Columns of the table ``causes``."""
 OUTPUT = (
@@ -57,18 +56,6 @@ class Shafts(NamedTuple):
 
     first: View
     second: View
-
-    def above(self, name: str) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """Shafts with a joint surely above its limit on a load, and with one that may be above it, (n,) each."""
-        sure, possible = [], []
-        for view, shift in ((self.first, 0), (self.second, -1)):
-            if name != ANY_LIMIT and name not in view.limits:
-                continue
-            load = view.load(name)
-            assert load.limit is not None
-            sure.append(np.roll(load.lower.values > load.limit, shift))
-            possible.append(np.roll(load.upper.values > load.limit, shift))
-        return np.logical_or.reduce(sure), np.logical_or.reduce(possible)
 
     def sum_of(self, name: str) -> NDArray[np.float64]:
         """Sum of a load of both joints, of the shafts with two valid joints."""
@@ -139,32 +126,33 @@ def shafts(view: View) -> Answer:
 
 def _places(view: View) -> Shafts:
     """The views of the first and of the second joint."""
-    found: dict[str, View] = {}
-    for part in view.parts:
-        if partner := part.store.operation.partner:
-            found[partner.position] = part
-    if len(found) < 2 or not view.sampled:
+    at = {partner.position: part for part in view.parts if (partner := part.store.operation.partner)}
+    if len(at) < 2 or not view.sampled:
         remedy = 'give the file of a study with two operating points, with partner.position "after" and "before"'
-        raise NotApplicable(str(Fault(str(view.path), "holds no drive shaft of two joints", remedy)))
-    return Shafts(found["after"], found["before"])
+        raise inapplicable(view, "holds no drive shaft of two joints", remedy)
+    return Shafts(at["after"], at["before"])
 
 
 def _limit(pair: Shafts, name: str) -> Row:
-    sure, possible = pair.above(name)
-    at = {"first": pair.first, "second": pair.second}
-    loads = {place: view.load(name) for place, view in at.items() if name == ANY_LIMIT or name in view.limits}
-    done = [np.roll(~np.isnan(load.upper.values), -1 if place == "second" else 0) for place, load in loads.items()]
-    known = np.logical_and.reduce(done)
-    n, count, most = int(known.sum()), int(sure[known].sum()), int(possible[known].sum())
-    some = next(iter(loads.values()))
-    row = {"load": name, "unit": some.unit, "limit": some.limit}
-    row |= dict.fromkeys(at, np.nan)
-    row |= {place: load.above(load.limit or 0.0).estimate for place, load in loads.items()}
-    row |= {"n": n, "count": count, "estimate": count / n if n else np.nan}
+    """Row of the table ``shafts`` for a limit: shafts with a joint surely above it, and with one that may be."""
+    loads = {
+        place: view.load(name) for place, view in pair._asdict().items() if name == ANY_LIMIT or name in view.limits
+    }
+    sure, possible, known = [], [], []
+    row: dict[str, Any] = dict.fromkeys(("load", "unit", "limit", "first", "second"), np.nan)
+    for place, load in loads.items():
+        level, shift = load.limit or 0.0, -1 if place == "second" else 0
+        sure.append(np.roll(load.lower.values > level, shift))
+        possible.append(np.roll(load.upper.values > level, shift))
+        known.append(np.roll(~np.isnan(load.upper.values), shift))
+        row[place] = load.above(level).estimate
+    some, done = next(iter(loads.values())), np.logical_and.reduce(known)
+    n, count, most = (int(x[done].sum()) for x in (done, np.logical_or.reduce(sure), np.logical_or.reduce(possible)))
+    row |= {"load": name, "unit": some.unit, "limit": some.limit, "n": n, "count": count}
     lower = upper = np.nan
     if isinstance(pair.first.design, Independent) and n:
         lower, upper = interval(count, most, n)
-    return row | {"lower": lower, "upper": upper}
+    return row | {"estimate": count / n if n else np.nan, "lower": lower, "upper": upper}
 
 
 def _causes(pair: Shafts) -> Rows:
@@ -185,28 +173,27 @@ def _causes(pair: Shafts) -> Rows:
     above = [load.values[rows] > (load.limit or 0.0) for load, rows in zip(loads, samples, strict=True)]
     if study.copula.names or study.sampling.is_matched or min(map(len, samples)) < FEWEST:
         return []
-    weights = shares_of_variance(*(float(own.mean()) for own in above))
+    weights = shares_of_variance(*(float(flags.mean()) for flags in above))
     if not sum(weights) > 0:
         return []
     parts: dict[str, tuple[float, ...]] = {}
     wide: dict[str, float] = {}
     for place, view in enumerate(pair):
-        weight = weights[place]
+        weight, independent = weights[place], isinstance(view.design, Independent)
         errors = sampling.components(study, view.errors(samples[place], sampling.columns(study)))
-        errors = {name: own for name, own in errors.items() if np.ptp(own) > 0}
-        independent = isinstance(view.design, Independent)
-        found = first_order(np.column_stack(list(errors.values())), above[place].astype(float), iid=independent)
+        errors = {name: column for name, column in errors.items() if np.ptp(column) > 0}
+        index = first_order(np.column_stack(list(errors.values())), above[place].astype(float), iid=independent)
         for entry in study.entries:
             here = [name in entry.quantities or name[:-2] in entry.quantities for name in errors]
-            own = weight * np.nan_to_num(found.estimate[here])
-            half = weight * (found.upper - found.estimate)[here] if weight else np.zeros(1)
-            parts[entry.pattern] = (*parts.get(entry.pattern, ()), float(own.sum()))
+            caused = weight * np.nan_to_num(index.estimate[here])
+            half = weight * (index.upper - index.estimate)[here] if weight else np.zeros(1)
+            parts[entry.pattern] = (*parts.get(entry.pattern, ()), float(caused.sum()))
             wide[entry.pattern] = wide.get(entry.pattern, 0.0) + float((half**2).sum())
     rows = []
     for line, (first, second) in parts.items():
-        ends = {"estimate": first + second, "lower": max(0.0, first + second - wide[line] ** 0.5)}
-        ends |= {"upper": min(1.0, first + second + wide[line] ** 0.5)}
-        rows.append({"line": line, "first": first, "second": second} | ends)
+        both, half_width = first + second, wide[line] ** 0.5
+        row = {"line": line, "first": first, "second": second, "estimate": both}
+        rows.append(row | {"lower": max(0.0, both - half_width), "upper": min(1.0, both + half_width)})
     return sorted(rows, key=lambda row: -float(row["estimate"]))
 
 
@@ -247,7 +234,7 @@ def _output(pair: Shafts) -> Rows:
 def _bounded(quantity: str, unit: str, ideal: float, added: NDArray[np.float64]) -> Row:
     row = {"quantity": quantity, "unit": unit, "ideal": ideal}
     quantiles = np.quantile(added, QUANTILES) if added.size else (np.nan,) * len(QUANTILES)
-    return row | {f"at_most_{100 * share:g}": ideal + float(q) for share, q in zip(QUANTILES, quantiles, strict=True)}
+    return row | {f"at_most_{100 * part:g}": ideal + float(q) for part, q in zip(QUANTILES, quantiles, strict=True)}
 
 
 def _value(row: Row, key: str) -> str:

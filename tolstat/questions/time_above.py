@@ -14,10 +14,9 @@ from numpy.typing import NDArray
 from tolstat.analysis import binomial, cycles
 from tolstat.analysis.design import Design
 from tolstat.analysis.sample import CONFIDENCE, Sample
-from tolstat.common.channels import CHANNELS, histories_of
+from tolstat.common import channels, strict
 from tolstat.common.errors import Fault, InputError, gather
 from tolstat.common.loads import FloatArray
-from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import Status
 from tolstat.display import drawing, text
 from tolstat.display.answer import Answer, Axes, Column, Panel, Panels, Part, Row, Rows, Sentence, Table
@@ -39,8 +38,8 @@ LINES = {"time": "mean joint", "time_50": "median joint", "time_90": "90 % below
 
 def _share(name: str) -> Cell:
     def cell(row: Row) -> str:
-        own, low, high = (100.0 * row[name + end] for end in ("", "_lower", "_upper"))
-        return f"{own:.3g} %" if math.isnan(low) else f"{own:.3g} ({low:.3g} .. {high:.3g}) %"
+        share, low, high = (100.0 * row[name + end] for end in ("", "_lower", "_upper"))
+        return f"{share:.3g} %" if math.isnan(low) else f"{share:.3g} ({low:.3g} .. {high:.3g}) %"
 
     return cell
 
@@ -118,29 +117,29 @@ def time_above(
 
 def _levels(view: View, by: Sequence[str], levels: Sequence[str]) -> dict[str, FloatArray]:
     """Levels of each load that is asked for, SI."""
-    names = list(by) or [name for name in view.limits if name in CHANNELS]
+    names = list(by) or [name for name in view.limits if name in channels.CHANNELS]
     faults = [
-        Fault("--by", f"{name!r} is no load over the input angle", did_you_mean(name, list(CHANNELS)))
+        Fault("--by", f"{name!r} is no load over the input angle", strict.did_you_mean(name, list(channels.CHANNELS)))
         for name in names
-        if name not in CHANNELS
+        if name not in channels.CHANNELS
     ]
     if not names:
         faults.append(Fault("--by", "the study limits no load over the input angle", "name one: --by cross1.F"))
-    units = {name: CHANNELS[name].unit for name in names if name in CHANNELS}
+    units = {name: channels.CHANNELS[name].unit for name in names if name in channels.CHANNELS}
     given: dict[str, list[float]] = {unit: [] for unit in units.values()}
     for level in levels if given else ():
         with gather(faults):
             unit, value = _level(level, sorted(given))
             given[unit].append(value)
-    found = {}
+    levels_of = {}
     for name, unit in units.items():
-        own = given[unit] or ([view.limits[name]] if name in view.limits and not levels else [])
-        if not own and not faults:
+        values = given[unit] or ([view.limits[name]] if name in view.limits and not levels else [])
+        if not values and not faults:
             faults.append(Fault("--level", f"{name} has neither a level nor a limit", 'give one: --level "700 N"'))
-        found[name] = np.array(own, dtype=float)
+        levels_of[name] = np.array(values, dtype=float)
     if faults:
         raise InputError(faults)
-    return found
+    return levels_of
 
 
 def _level(level: str, units: Sequence[str]) -> tuple[str, float]:
@@ -156,24 +155,25 @@ def _rows(
     view: View, samples: NDArray[np.intp], levels: Mapping[str, FloatArray]
 ) -> tuple[list[Row], dict[str, tuple[float, float]]]:
     """One row per load and level, from settled joints, and smallest and largest value of each load."""
-    times = {name: np.empty((len(samples), len(own))) for name, own in levels.items()}
+    times = {name: np.empty((len(samples), len(values))) for name, values in levels.items()}
     ends = dict.fromkeys(levels, (np.inf, -np.inf))
     slots, design = view.slots(samples), view.design.only(samples)
     for part in revolutions.blocks(len(slots)):
-        loads = revolutions.loads(view.store, slots[part], histories_of(levels))
-        for name, own in levels.items():
-            load = CHANNELS[name].of(loads)
+        loads = revolutions.loads(view.store, slots[part], channels.histories_of(levels))
+        for name, values in levels.items():
+            load = channels.CHANNELS[name].of(loads)
             ends[name] = min(ends[name][0], float(load.min())), max(ends[name][1], float(load.max()))
-            for k, level in enumerate(own):
+            for k, level in enumerate(values):
                 times[name][part, k] = cycles.share_of_revolution_above(load, float(level))
-    return [_row(name, *own, design) for name in levels for own in zip(levels[name], times[name].T, strict=True)], ends
+    pairs = {name: zip(levels[name], times[name].T, strict=True) for name in levels}
+    return [_row(name, level, time, design) for name in levels for level, time in pairs[name]], ends
 
 
 def _row(name: str, level: float, time: FloatArray, design: Design) -> Row:
     """Share of the joints above a level, and their time above it, a share of a revolution, (m,)."""
     sample = Sample.of(time, np.full(time.size, Status.OK), design)
     above, known = sample.above(0.0, CONFIDENCE), design.has_interval("mean")
-    row = {"load": name, "unit": CHANNELS[name].unit, "level": float(level)}
+    row = {"load": name, "unit": channels.CHANNELS[name].unit, "level": float(level)}
     row |= with_ends("joints_above", (above.estimate, above.lower, above.upper))
     # a variable in [0, 1] has at most the variance of a Bernoulli variable with the same mean
     mean = binomial.clopper_pearson(time.sum(), time.size, CONFIDENCE) if known else (np.nan, np.nan)
@@ -186,23 +186,23 @@ def _row(name: str, level: float, time: FloatArray, design: Design) -> Row:
 
 def _panels(name: str, rows: Rows, levels: FloatArray) -> Iterator[Panel]:
     """Curves of one load over the level: share of the joints, and of the revolution."""
-    own = text.columns_of([row for row in rows if row["load"] == name])
+    columns = text.columns_of([row for row in rows if row["load"] == name])
     words = "Share over the level, with its 95 % interval where the joints give one; the levels asked for are marked."
     for key, title, labels in (
         ("joints", "joints that exceed a level", {"joints_above": ""}),
         ("time", "time above a level", LINES),
     ):
-        draw = partial(_curves, own=own, labels=labels, levels=levels)
+        draw = partial(_curves, columns=columns, labels=labels, levels=levels)
         room = drawing.legend_room(list(labels.values())) if len(labels) > 1 else Panel.top
         yield Panel(f"{key}-{name}", f"{name}: {title}", words, draw, (drawing.WIDTH, 3.4), top=room)
 
 
-def _curves(ax: Axes, own: Mapping[str, Any], labels: Mapping[str, str], levels: FloatArray) -> None:
+def _curves(ax: Axes, columns: Mapping[str, Any], labels: Mapping[str, str], levels: FloatArray) -> None:
     """Draw curves over the level, the first with its interval; with a legend if there are several."""
-    x, ends = np.array(own["level"]), ("", "_lower", "_upper")
-    curves = [[100.0 * np.array(own[f"{name}{end}"]) for end in ends] for name in labels]
+    x, ends = np.array(columns["level"]), ("", "_lower", "_upper")
+    curves = [[100.0 * np.array(columns[f"{name}{end}"]) for end in ends] for name in labels]
     handles = drawing.curves(ax, x, curves, levels, bands=int(np.isfinite(curves[0][1]).all()))
-    unit = drawing.loads_axis(ax.xaxis, float(np.abs(x).max()), own["unit"][0])
+    unit = drawing.loads_axis(ax.xaxis, float(np.abs(x).max()), columns["unit"][0])
     ax.set(xlabel=f"level [{unit}]", ylim=(0.0, None))
     ax.set_ylabel("time above, % of a revolution" if len(labels) > 1 else "joints that exceed the level, %")
     if len(labels) > 1:

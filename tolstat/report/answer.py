@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,15 +12,13 @@ from tolstat import questions
 from tolstat.campaign.stop_rule import BIASED
 from tolstat.common.errors import Fault, InputError, StoreError
 from tolstat.common.tables import Status
-from tolstat.display import text
-from tolstat.display.answer import Answer, Figure, Part, Sentence, Sheet, Table
-from tolstat.display.progress import silent
+from tolstat.display import progress, text
+from tolstat.display.answer import Answer, Part, Sentence, Sheet, Table
 from tolstat.joint.sections import mounting_and_law
 from tolstat.questions import accuracy, shares
 from tolstat.questions.cases import cases
 from tolstat.questions.exceedance import answer as exceedance
-from tolstat.questions.exceedance import curves
-from tolstat.questions.exceedance.rows import curve_rows, not_kept
+from tolstat.questions.exceedance import curves, rows
 from tolstat.questions.sweep import sweep
 from tolstat.report.headline import headline, life_verdicts, tells_yield
 from tolstat.solver import fidelity
@@ -48,18 +45,21 @@ def report(view: View, accepted: float = math.nan) -> Answer:
     store = view.store
     stands_on = [Sentence(text.sentence(mounting_and_law(*recorded.mountings(store))), "lead")]
     if store.case_names or view.method == "sweep":
-        found = cases(view) if store.case_names else sweep(view)
+        joints = cases(view) if store.case_names else sweep(view)
         notes = [] if store.case_names else [*_notes(view)]
-        return Answer("report", view.name, [*stands_on, *found.parts, *notes, *_run(view)])
-    verdict = headline(view, accepted)
-    lead = [Sentence(text.sentence(verdict.sentence), "lead")] if verdict else []
-    causes = [Sentence(note) for note in verdict.notes] if verdict else []
+        return Answer("report", view.name, [*stands_on, *joints.parts, *notes, *_run(view)])
+    verdict, lives = headline(view, accepted), life_verdicts(view, accepted)
     facts: dict[str, Any] = {"verdict": verdict.values()} if verdict else {}
-    if lives := life_verdicts(view, accepted):
-        facts["lives"] = [own.values() for own in lives]
-        lead += [Sentence(text.sentence(own.sentence), "lead") for own in lives]
-        causes += [Sentence(text.sentence(note)) for own in lives for note in own.notes]
-    parts = [*lead, *stands_on, *_tables(view, accepted), *_yield(view, bool(verdict and verdict.answer))]
+    if lives:
+        facts["lives"] = [life.values() for life in lives]
+    verdicts = [*([verdict] if verdict else []), *lives]
+    parts: list[Part] = [Sentence(text.sentence(each.sentence), "lead") for each in verdicts]
+    parts += [*stands_on, *_tables(view, accepted)]
+    if verdict and verdict.answer and tells_yield(view):
+        kept = shares.together(shares.good(view), len(view.limits))
+        parts.append(Sentence(f"Yield: {kept.value} {kept.words}.", "lead"))
+    causes = [Sentence(note) for note in verdict.notes] if verdict else []
+    causes += [Sentence(text.sentence(note)) for life in lives for note in life.notes]
     return Answer("report", view.name, [*parts, *causes, *_notes(view), *_run(view)], facts)
 
 
@@ -106,7 +106,7 @@ def write(
     path: Path,
     out_dir: str | Path | None = None,
     point: str = "",
-    stage: Callable[[str], None] = silent,
+    stage: Callable[[str], None] = progress.silent,
 ) -> list[Path]:
     """Write the files of a report beside the result file `path`, or to a folder; see `write_report`."""
     folder = path.parent if out_dir is None else Path(out_dir)
@@ -115,31 +115,20 @@ def write(
         folder.mkdir(parents=True, exist_ok=True)
         return made.write(folder / (f"{path.stem}_{point}" if point else path.stem))
     except OSError as error:
-        found = f"cannot be written to: {error.strerror or error}"
-        raise InputError([Fault(str(folder), found, "give another folder with --out")]) from error
+        problem = f"cannot be written to: {error.strerror or error}"
+        raise InputError([Fault(str(folder), problem, "give another folder with --out")]) from error
 
 
 def _tables(view: View, accepted: float) -> Iterator[Part]:
     """Tables for people, limits or else quantiles; the other ones and the curves as numbers, and their picture."""
     if view.bushing_loads:
-        yield Sheet("exceedance", partial(_sheet, view))
+        yield Sheet("exceedance", lambda: curves.sheet(view, f"{view.head()}\n{exceedance.note(view)}"))
     if not view.shown_loads:
         yield Sentence("no largest load is kept; the results that are: tolstat export", "lead")
     for table in exceedance.quantile_tables(view):
-        yield Table("exceedance", "Exceedance curves", (), curve_rows(view))
+        yield Table("exceedance", "Exceedance curves", (), rows.curve_rows(view))
         yield replace(table, columns=()) if view.limits else table
     yield from exceedance.limit_tables(view, accepted)
-
-
-def _sheet(view: View) -> Figure:
-    return curves.sheet(view, f"{view.head()}\n{exceedance.note(view)}")
-
-
-def _yield(view: View, judged: bool) -> Iterator[Part]:
-    """Share of the joints that keep all limits, unless the verdict says it."""
-    if judged and tells_yield(view):
-        kept = shares.together(shares.good(view), len(view.limits))
-        yield Sentence(f"Yield: {kept.value} {kept.words}.", "lead")
 
 
 def _notes(view: View) -> Iterator[Part]:
@@ -154,7 +143,7 @@ def _notes(view: View) -> Iterator[Part]:
 def _run(view: View) -> Iterator[Part]:
     """Restrictions that come from how the campaign was run."""
     store = view.store
-    missing = "" if store.case_names else not_kept(view)
+    missing = "" if store.case_names else rows.not_kept(view)
     for note in (missing, stopped(view), fidelity.sentence(store.options, store.fidelity)):
         if note:
             yield Sentence(note)
@@ -220,7 +209,7 @@ def statistics(view: View, accepted: float = math.nan) -> dict[str, Any]:
         "joints": {status.label: count for status in Status if (count := view.count(status))},
     }
     if lives := life_verdicts(view, accepted, samples=0):
-        head["lives"] = [own.values() for own in lives]
+        head["lives"] = [life.values() for life in lives]
     provenance = {
         "created": store.created,
         "git_commit": store.git_commit,
@@ -228,9 +217,9 @@ def statistics(view: View, accepted: float = math.nan) -> dict[str, Any]:
         "sampling": store.sampling,
         "stop": store.stop,
     }
-    found = questions.statistics(view)
+    answers = questions.statistics(view)
     stands_on = {
         "joint": mounting_and_law(*recorded.mountings(store)),
         "fidelity": fidelity.sentence(store.options, store.fidelity),
     }
-    return head | found | stands_on | {"provenance": provenance}
+    return head | answers | stands_on | {"provenance": provenance}

@@ -16,15 +16,14 @@ from tolstat.display import text
 from tolstat.display.table import Row
 from tolstat.display.verdict import WORDS, Verdict
 from tolstat.questions import joints, shares
-from tolstat.questions.assumptions import sentences
-from tolstat.questions.assumptions.variations import Standing, applicable
+from tolstat.questions.assumptions import sentences, variations
+from tolstat.questions.assumptions.variations import Standing
 from tolstat.questions.bearing_life import answer as bearing_life
 from tolstat.questions.causes import lines
 from tolstat.questions.exceedance import rows as exceedance
 from tolstat.questions.exceedance.rows import ends, share_of, unresolved_matter, verdict
 from tolstat.questions.fatigue import answer as fatigue
-from tolstat.store import known_parts
-from tolstat.store.points import point_of
+from tolstat.store import known_parts, points
 from tolstat.store.view import View
 
 
@@ -49,46 +48,38 @@ def headline(view: View, accepted: float = np.nan) -> Verdict | None:
     if not counts.done:
         return Verdict("none", WORDS["none"], "no joint has been simulated", _pending(view))
     records = exceedance.limit_rows(view)
-    standing = applicable(view, accepted)
-    found = _yield(view, records, standing) if np.isnan(accepted) else _judged(view, records, accepted, standing)
-    if standing is not None and found.answer != "none":
+    standing = variations.applicable(view, accepted)
+    judged = _yield(view, records, standing) if np.isnan(accepted) else _judged(view, records, accepted, standing)
+    if standing is not None and judged.answer != "none":
         more = sentences.more(standing, view.path.name)
-        found = found._replace(stands_on=sentences.values(standing), notes=(*found.notes, *([more] if more else [])))
+        judged = judged._replace(stands_on=sentences.values(standing), notes=(*judged.notes, *filter(None, [more])))
     unresolved = _causes(view) if unresolved_matter(_decisive(view, records)) else ()
-    return found._replace(notes=(*unresolved, *found.notes, *_pending(view)))
+    return judged._replace(notes=(*unresolved, *judged.notes, *_pending(view)))
 
 
-def deciding(row: Row, accepted: float) -> str:
-    """Words on the number of simulated joints that would decide an open verdict; empty if it is not open."""
-    if verdict(row, accepted) != "open" or "both_lower" in row:
-        return ""
-    return f"{_needed(row, accepted)} would decide it"
-
-
-def _needed(row: Row, accepted: float) -> str:
-    """Number of simulated joints, those without a valid load included, whose interval excludes the accepted share."""
+def _deciding(row: Row, accepted: float) -> str:
+    """Words on the number of simulated joints whose interval excludes the accepted share, those without a load too."""
     low, high = row["bound_lower"], row["bound_upper"]
     if not np.isnan(row["numerical_lower"]):
         part = (row["n_failed"] + row["n_unsettled"]) / row["n"]
         low = min(low, row["numerical_lower"] * (1.0 - part))
         high = max(high, row["numerical_upper"] * (1.0 - part) + part)
     if low <= accepted <= high:
-        return "no number of joints"
+        return "no number of joints would decide it"
     joints = binomial.needed(high if high < accepted else low, accepted)
-    return f"{text.number(joints)} joints" if joints < 1e7 else "more than 1e7 joints"
+    return f"{f'{text.number(joints)} joints' if joints < 1e7 else 'more than 1e7 joints'} would decide it"
 
 
 def _judged(view: View, records: Sequence[Row], accepted: float, standing: Standing | None) -> Verdict:
     row, worst = _decisive(view, records), exceedance.most_exceeded(view, records)
-    several = len(records) > 1
-    answers = [verdict(own, accepted) for own in records]
+    several, answers = len(records) > 1, [verdict(record, accepted) for record in records]
     answer = verdict(row, accepted)
     alone = several and answer == "none" and "no" in answers  # the joints above one limit are too many already
     if alone:
-        broken = [own for own, said in zip(records, answers, strict=True) if said == "no"]
-        answer, row, standing = "no", exceedance.most_exceeded(view, broken), None
-        worst = row
-    numbers = ", ".join(f"{answers.count(own)} {word}" for own, word in WORDS.items() if own in answers)
+        broken = [record for record, judged in zip(records, answers, strict=True) if judged == "no"]
+        row = worst = exceedance.most_exceeded(view, broken)
+        answer, standing = "no", None
+    numbers = ", ".join(f"{answers.count(key)} {word}" for key, word in WORDS.items() if key in answers)
     notes: tuple[str, ...] = (f"of {len(records)} limits, each by itself: {numbers}",) if several else ()
     if answer == "open" and row.get("parts_lower", np.nan) <= accepted < row.get("parts_upper", np.nan):
         parts = text.span(row["parts_lower"], row["parts_upper"])
@@ -113,29 +104,23 @@ def _sentence(view: View, row: Row, accepted: float, answer: str, standing: Stan
     most, share, limit = text.percent(accepted), share_of(row), _words(view, row)
     exceed = "" if row["load"] == ANY_LIMIT else f" exceed {limit}"
     interval = "total interval" if unresolved_matter(row) else text.span(*ends(row))
+    value, words = WORDS[answer], f"{share}{exceed} ({interval}); {most} is accepted"
     behind = ""
     if standing is not None and (turned := sentences.turned(standing)) != ("", ""):
-        value, said = turned
+        value, words = turned
     elif answer == "no":
-        value, said = WORDS[answer], f"{share}{exceed} ({interval}); {most} is accepted"
         behind = sentences.least(standing) if standing else ""
     elif answer == "searched":
-        missed = text.percent(row["unsearched_upper"])
-        value, said = WORDS[answer], f"at most {most} exceed {limit} if the proposals reach every way to it "
-        said += f"({text.span(*ends(row))}); whatever they miss, at most {missed}"
+        words = f"at most {most} exceed {limit} if the proposals reach every way to it ({text.span(*ends(row))}); "
+        words += f"whatever they miss, at most {text.percent(row['unsearched_upper'])}"
     elif answer == "yes":
-        own = f"{share}, {interval}"
-        value, said = (
-            WORDS[answer],
-            f"at most {most} exceed {limit} ({own}){sentences.also(standing) if standing else ''}",
-        )
+        words = f"at most {most} exceed {limit} ({share}, {interval}){sentences.also(standing) if standing else ''}"
     else:
-        value, said = WORDS[answer], f"{share}{exceed} ({interval}); {most} is accepted"
-        decide = deciding(row, accepted) if view.design.has_interval("index") else ""
-        said += f"; {decide}" if decide else ""
+        if view.design.has_interval("index") and "both_lower" not in row:
+            words += f"; {_deciding(row, accepted)}"
         behind = sentences.decided(standing) if standing else ""
-    said += f". {behind}" if behind else ""
-    return value, said + _not_varied(view, standing)
+    words += f". {behind}" if behind else ""
+    return value, words + _not_varied(view, standing)
 
 
 def _not_varied(view: View, standing: Standing | None) -> str:
@@ -176,9 +161,9 @@ def _words(view: View, row: Row) -> str:
 
 def _limit(view: View, row: Row) -> str:
     """Limit in words: ``1500 N on cross1.F (most often at start)`` where it holds at several operating points."""
-    said = f"{text.value(row['level'], row['unit'])} on {row['load']}"
+    limit = f"{text.value(row['level'], row['unit'])} on {row['load']}"
     several = row["count"] and len(view.narrowed(row["load"])[0].points) > 1
-    return f"{said} (most often at {point_of(view, row['load'])})" if several else said
+    return f"{limit} (most often at {points.point_of(view, row['load'])})" if several else limit
 
 
 def _most_often(view: View, records: Sequence[Row], worst: Row) -> str:
@@ -195,7 +180,7 @@ def _yield(view: View, records: Sequence[Row], standing: Standing | None) -> Ver
     if view.design.refuses("index") or known_parts.of(view) is not None:
         row, worst = _decisive(view, records), exceedance.most_exceeded(view, records)
         if np.isnan(row["estimate"]):
-            known = [own for own in records if not np.isnan(own["estimate"])]
+            known = [record for record in records if not np.isnan(record["estimate"])]
             if len(records) == 1 or not known or _undecided(known):
                 return Verdict("none", WORDS["none"], _reason(view, [row]), notes)
             notes += (_untold(view, records),)
@@ -206,16 +191,16 @@ def _yield(view: View, records: Sequence[Row], standing: Standing | None) -> Ver
         missed = row["unsearched_upper"]
         missed = "" if np.isnan(missed) else f"; whatever the proposals miss, at most {text.percent(missed)}"
         most = ", the limit exceeded most" if row is worst else ""
-        said = f"of the joints exceed {_words(view, row)}{most} ({interval}{missed})"
+        words = f"of the joints exceed {_words(view, row)}{most} ({interval}{missed})"
         if row["load"] == ANY_LIMIT and worst["count"] and not np.isnan(worst["estimate"]):
-            said += _most_often(view, records, worst)
-        return Verdict("", share_of(row), said, notes, worst["load"])
-    found = shares.together(shares.good(view), len(view.limits))
-    if not found.decides:
+            words += _most_often(view, records, worst)
+        return Verdict("", share_of(row), words, notes, worst["load"])
+    kept = shares.together(shares.good(view), len(view.limits))
+    if not kept.decides:
         return Verdict("none", WORDS["none"], _reason(view, [_decisive(view, records)]), notes)
     behind = [sentences.reach(standing) if standing else "", text.capital(_without_errors(view))]
-    words = ". ".join([found.words + _not_varied(view, standing), *filter(None, behind)])
-    return Verdict("", found.value, words, notes, exceedance.most_exceeded(view, records)["load"])
+    words = ". ".join([kept.words + _not_varied(view, standing), *filter(None, behind)])
+    return Verdict("", kept.value, words, notes, exceedance.most_exceeded(view, records)["load"])
 
 
 def _undecided(records: Sequence[Row]) -> bool:
@@ -232,8 +217,8 @@ def _reason(view: View, records: Sequence[Row]) -> str:
     known = known_parts.of(view)
     if known is not None and np.isnan(ends(records[0])[0]):
         unsupported = text.percent(records[0]["unsupported"])
-        found = f"the joints do not support {unsupported} of the processes that the measured parts leave open"
-        return f"{found}. {known.remedy}"
+        reason = f"the joints do not support {unsupported} of the processes that the measured parts leave open"
+        return f"{reason}. {known.remedy}"
     if any(map(unresolved_matter, records)):
         what = "valid result" if view.count(*UNSETTLED) else "result"
         return f"{text.percent(lost / n)} of the joints have no {what} ({lost} of {n})"
@@ -244,11 +229,11 @@ def _reason(view: View, records: Sequence[Row]) -> str:
 
 def _causes(view: View) -> Iterator[str]:
     """Most frequent status of the joints without a valid load, its meaning, and the remedy for the first of them."""
-    states = sorted((s for s in (*FAILED, *UNSETTLED) if view.count(s)), key=lambda s: -view.count(s))
-    for state in states[:1]:
-        said = f"{view.count(state)} {state.label}: {STATUS_TEXT[state]}"
+    state = max((*FAILED, *UNSETTLED), key=view.count)
+    if view.count(state):
+        words = f"{view.count(state)} {state.label}: {STATUS_TEXT[state]}"
         first = next((joint for joint in joints.without_load(view) if joint["status"] == state.label), None)
-        yield f"{said}. Row {first['row']}: {first['remedy']}" if first else said
+        yield f"{words}. Row {first['row']}: {first['remedy']}" if first else words
 
 
 def _pending(view: View) -> tuple[str, ...]:
@@ -276,12 +261,12 @@ def life_verdicts(view: View, accepted: float = math.nan, samples: int | None = 
         return []
     if samples is None:
         samples = SAMPLES if view.counts.done == view.counts.total else 0
-    found: list[Verdict] = []
+    judged: list[Verdict] = []
     of_parts = partial(fatigue.life_verdicts, samples=samples)
     for about, verdicts in (("bearing life", bearing_life.life_verdicts), ("failures of parts", of_parts)):
         try:
-            found += verdicts(view, accepted)
+            judged += verdicts(view, accepted)
         except TolstatError as error:
             reason = str(error).splitlines()[0].replace(str(view.path), view.path.name)
-            found.append(Verdict("none", "No verdict", f"{about}: {reason}", about=about))
-    return found
+            judged.append(Verdict("none", "No verdict", f"{about}: {reason}", about=about))
+    return judged

@@ -2,38 +2,35 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from tolstat import questions
-from tolstat.common import notation, units
+from tolstat.common import draw_records, loads, notation, strict, units
 from tolstat.common.errors import Fault, NotApplicable, StoreError, TolstatError
-from tolstat.common.strict import validate
-from tolstat.common.tables import SCHEMA_VERSION
-from tolstat.display import text
+from tolstat.common.tables import SCHEMA_VERSION, VALID
+from tolstat.display import html, progress, table, text
 from tolstat.display.answer import Asked
-from tolstat.display.blocks import Facts, Listing, Page, Panels, Section, Text
-from tolstat.display.progress import silent
-from tolstat.display.text import capital, sentence
-from tolstat.joint import Joint, load
-from tolstat.joint.derived import DERIVED, UNITS
-from tolstat.joint.model import TOLD
+from tolstat.display.blocks import Card, Decision, Facts, Listing, Page, Panels, Section, Table, Text
+from tolstat.display.verdict import WORDS, Verdict
+from tolstat.joint import Joint, derived, load, model
 from tolstat.joint.overrides import leaves
 from tolstat.joint.reading import DEFAULT_JOINT, examples
 from tolstat.joint.sections import mounting_and_law, quantities
-from tolstat.questions.assumptions.variations import AXIAL, LAW
-from tolstat.questions.causes import worst
-from tolstat.questions.causes.lines import lines_on_page
-from tolstat.report import verdict
+from tolstat.questions import accuracy, shares
+from tolstat.questions.assumptions import answer, sentences, variations
+from tolstat.questions.causes import lines, worst
+from tolstat.questions.drawings.answer import place_of
+from tolstat.questions.exceedance import rows as exceedance
 from tolstat.report.answer import stopped
+from tolstat.report.headline import headline, life_verdicts, tells_yield
 from tolstat.solver import fidelity
 from tolstat.store import Reader, recorded, viewed
 from tolstat.store.points import point_of
-from tolstat.store.recorded import joint_of
 from tolstat.store.view import View
 from tolstat.study.assumptions import assumptions, unselected
 
@@ -46,7 +43,7 @@ def write_page(
     out: str | Path,
     accepted: float = np.nan,
     replay: int = REPLAYED,
-    stage: Callable[[str], None] = silent,
+    stage: Callable[[str], None] = progress.silent,
     point: str = "",
     processes: int = 1,
     full: bool = False,
@@ -98,8 +95,6 @@ def write_page(
         asked = Asked(view.path, accepted, replay, stage=stage, processes=processes)
         made = compose_brief(view.at(point), asked) if brief else compose(view.at(point), asked, full)
         stage("page: pictures")  # drawn from the view
-        from tolstat.display import html
-
         html.write(made, Path(out), processes)
     return Path(out)
 
@@ -122,15 +117,15 @@ def compose(view: View, asked: Asked, full: bool = False) -> Page:
         joint_values(view.store),
         Listing("The study as it was run", view.store.study_text),
     )
-    return _page(view, [verdict.section(view, asked), *sections], listings, full)
+    return _page(view, [decision(view, asked), *sections], listings, full)
 
 
 def compose_brief(view: View, asked: Asked) -> Page:
     """Compose the page that prints on one sheet: verdict with its drawing, and the line of the drawing to change."""
     asked.notes.extend(_notes(view))
-    sections = [verdict.section(view, asked)]
+    sections = [decision(view, asked)]
     with asked.noting("nothing on the lines of the drawing"), suppress(NotApplicable):
-        answer = lines_on_page(view, asked)
+        answer = lines.lines_on_page(view, asked)
         blocks = [block for block in answer.blocks() if isinstance(block, Text | Panels)]
         sections.append(Section("lines", answer.title, blocks[:2]))
     return _page(view, sections)
@@ -142,10 +137,10 @@ def _page(
     store = view.store
     return Page(
         view.name,
-        joint_of(store, 0).description,
+        recorded.joint_of(store, 0).description,
         scene(view),
         sections,
-        f"{sentence(view.head())} Sampling {store.sampling['method']}, seed {store.sampling['seed']}; "
+        f"{text.sentence(view.head())} Sampling {store.sampling['method']}, seed {store.sampling['seed']}; "
         f"begun {store.created}; tolstat {store.versions.get('tolstat', 'of unknown version')}; "
         f"result file {view.path.name}.",
         listings,
@@ -183,10 +178,6 @@ def _facts(store: Reader) -> Iterator[tuple[str, str]]:
         yield f"Retry {k}", ", ".join(f"{name} {value}" for name, value in retry.get("settings", {}).items())
 
 
-NEEDLES = "needles"
-"""Contact law of needle bearings."""
-
-
 def scene(view: View) -> tuple[str, str]:
     """Operating point and bearing, mounting and contact law, each with ``given`` or ``assumed``.
 
@@ -195,15 +186,21 @@ def scene(view: View) -> tuple[str, str]:
     points = [view.store.points[name] for name in view.points]
     at = points[0].in_words if len(points) == 1 else f"{len(points)} operating points"
     axial, laws = recorded.mountings(view.store)
-    bearing = "needle bearings" if set(laws) == {NEEDLES} else "plain bearings" if NEEDLES not in laws else "bearings"
+    bearing = "bearings" if len({law == "needles" for law in laws}) > 1 else "plain bearings"
+    bearing = "needle bearings" if set(laws) == {"needles"} else bearing
     mounting, law = mounting_and_law(axial, laws).split("; ")
     assumed: set[str] | None = None  # where the study can no longer be read
     with suppress(TolstatError):
-        assumed = {key for own in assumptions(view.study) for value in own.values for key in value}
-    of_bearing = assumed is not None and any(key.startswith("bearing.") for key in assumed)
-    first = f"{at}{_mark(assumed, False)}; {bearing}{_mark(assumed, of_bearing)}."
-    second = f"{mounting}{_mark(assumed, AXIAL in (assumed or ()))}; {law}{_mark(assumed, LAW in (assumed or ()))}."
-    return capital(first), capital(second)
+        assumed = {key for assumption in assumptions(view.study) for value in assumption.values for key in value}
+
+    def marked(words: str, key: str) -> str:
+        if assumed is None:
+            return words
+        return f"{words} ({'assumed' if any(assumption.startswith(key) for assumption in assumed) else 'given'})"
+
+    first = f"{marked(at, 'operation.')}; {marked(bearing, 'bearing.')}."
+    second = f"{marked(mounting, variations.AXIAL)}; {marked(law, variations.LAW)}."
+    return text.capital(first), text.capital(second)
 
 
 def exact(view: View) -> str:
@@ -214,14 +211,6 @@ def exact(view: View) -> str:
     return ""
 
 
-def _mark(assumed: set[str] | None, is_assumed: bool) -> str:
-    return "" if assumed is None else " (assumed)" if is_assumed else " (given)"
-
-
-UNIT = UNITS | quantities(Joint)
-DIGITS = 5
-
-
 def joint_values(store: Reader) -> Listing:
     """Table of the values that differ from those of `DEFAULT_JOINT`, with the formula of those that were not given.
 
@@ -230,12 +219,13 @@ def joint_values(store: Reader) -> Listing:
     InputError
         When this version cannot read the joint in the file.
     """
-    joint = validate(Joint, store.joint, f"{store.path}: joint")
-    given, own, default = leaves(joint.given()), _values(joint), _values(load(DEFAULT_JOINT, {}, DEFAULT_JOINT))
+    joint = strict.validate(Joint, store.joint, f"{store.path}: joint")
+    given, values = leaves(joint.given()), _values(joint)
+    default = _values(load(DEFAULT_JOINT, {}, DEFAULT_JOINT))
     rows = [
-        (key, value, default.get(key, "-"), "given" if key in given else DERIVED[key].formula)
-        for key, value in own.items()
-        if value != default.get(key) and (key in given or key in DERIVED)
+        (key, value, default.get(key, "-"), "given" if key in given else derived.DERIVED[key].formula)
+        for key, value in values.items()
+        if value != default.get(key) and (key in given or key in derived.DERIVED)
     ]
     title = f"The joint: values that differ from {DEFAULT_JOINT}"
     if not rows:
@@ -245,19 +235,112 @@ def joint_values(store: Reader) -> Listing:
 
 def _values(joint: Joint) -> dict[str, str]:
     """Values by dotted key, in the unit in which a joint file has them."""
-    found = leaves(joint.model_dump(exclude=set(TOLD)))
-    return {key: _written(key, value) for key, value in found.items() if value is not None}
+    values: dict[str, str] = {}
+    units_of = derived.UNITS | quantities(Joint)
+    for key, value in leaves(joint.model_dump(exclude=set(model.TOLD))).items():
+        if isinstance(value, (float, tuple)):
+            unit = units_of.get(key, "1")
+            like = examples().get(key, units.EXAMPLES[unit])
+            like = like[0] if isinstance(like, list) else like
+            written = [str(units.written(number, unit, like)) for number in np.atleast_1d(value).tolist()]
+            numbers = [number for number in map(notation.read, written) if number is not None]
+            digits = ", ".join(f"{number.number:.5g}" for number in numbers)
+            values[key] = f"{digits} {numbers[-1].unit if numbers else ''}".rstrip()
+        elif value is not None:
+            values[key] = str(value)
+    return values
 
 
-def _written(key: str, value: Any) -> str:
-    if not isinstance(value, (float, tuple)):
-        return str(value)
-    unit = UNIT.get(key, "1")
-    like = examples().get(key, units.EXAMPLES[unit])
-    numbers, name = [], ""
-    for one in value if isinstance(value, tuple) else (value,):
-        read = notation.read(str(units.written(one, unit, like[0] if isinstance(like, list) else like)))
-        if read is not None:
-            numbers.append(f"{read.number:.{DIGITS}g}")
-            name = read.unit
-    return f"{', '.join(numbers)} {name}".rstrip()
+def decision(view: View, asked: Asked) -> Section:
+    """Decide on the limits: question, verdicts, what they stand on, drawing with the worst bushing marked, numbers."""
+    verdict = headline(view, asked.accepted)
+    leading = verdict.load if verdict else next(iter(view.leading), "")
+    lives = [_card(life) for life in life_verdicts(view, asked.accepted, asked.replay)]
+    standing = variations.applicable(view, asked.accepted)
+    below = [sentences.still(standing), sentences.shop(view)] if standing and standing.rows else []
+    head = Decision(
+        question_of(view.store.study_text),
+        lives if verdict is None and lives else [_card(verdict) if verdict else _without_verdict(view), *lives],
+        _cards(view, verdict),
+        place_of(view, leading, asked),
+        answer.bars(standing) if standing and standing.rows else None,
+        [line for line in below if line],
+    )
+    notes = (Text(f"{text.capital(note)}.", small=True) for note in asked.notes)
+    return Section("verdict", "Verdict", [head, *_points(view), *notes])
+
+
+def _points(view: View) -> list[Table]:
+    """Operating points, and of the joints that keep all limits there; none of a file with one point."""
+    if len(view.parts) == 1:
+        return []
+    rows = []
+    for part in view.parts:
+        point = part.store.points[part.points[0]]
+        row = {"point": point.name, "operation": point._replace(share=np.nan).in_words, "share": point.share}
+        if part.sampled and part.limits and tells_yield(part):
+            together = shares.together(shares.good(part), len(part.limits))
+            row |= {"kept": together.value if together.decides else WORDS["none"]}
+        rows.append(row)
+    columns = (
+        table.Column("point", shares.word("point")),
+        table.Column("misalignment, speed, torque", shares.word("operation")),
+        table.Column("of the time", shares.share("share"), shown=table.has("share")),
+        table.Column("keep all limits there", lambda row: row.get("kept", WORDS["none"]), shown=table.has("kept")),
+    )
+    return [table.as_block("Operating points", columns, rows)]
+
+
+def question_of(study: str) -> str:
+    """Question of a study: the paragraph ``# Question: ...`` of its opening comment; empty if there is none."""
+    opening = re.match(r"(?:#.*\n?)*", study)
+    comment = "\n".join(line.lstrip("#").strip() for line in (opening[0] if opening else "").splitlines())
+    question = re.search(r"^Question:\s*(.*?)(?=^\w[\w ]*:|\Z)", comment, flags=re.DOTALL | re.MULTILINE)
+    return " ".join(question[1].split()) if question else ""
+
+
+def _card(verdict: Verdict) -> Card:
+    return Card(verdict.value, verdict.words, " ".join(map(text.sentence, verdict.notes)), verdict.shade)
+
+
+def _without_verdict(view: View) -> Card:
+    why = (
+        "The study sets no limits" if view.sampled else f"Joints of a {draw_records.METHODS[view.method]} are no sample"
+    )
+    return Card("", f"{why}, so there is no verdict.", "")
+
+
+def _cards(view: View, verdict: Verdict | None) -> list[Card]:
+    """Unless the verdict says it, the yield and the limit exceeded most; next delivery, number of joints, errors."""
+    cards = []
+    if verdict is not None and tells_yield(view):
+        row = shares.good(view)
+        if verdict.answer:
+            together = shares.together(row, len(view.limits))
+            cards.append(Card(together.value, together.words, "Yield"))
+        if predicted := shares.delivered(row, len(view.limits)):
+            interval = text.ends(row["next_lower"], row["next_upper"], ".0f")
+            cards.append(Card(interval, predicted, "95 % prediction interval"))
+    if verdict is not None and verdict.load and verdict.load not in verdict.words:
+        most = next(row for row in exceedance.limit_rows(view) if row["load"] == verdict.load)
+        label = f"exceed {text.value(most['level'], most['unit'])} on {most['load']}, the limit exceeded most"
+        low, high = exceedance.ends(most)
+        interval = "no interval" if np.isnan(low) else f"total interval {text.span(low, high)}"
+        note = f"{shares.above(most)} joints with a valid load; {interval}"
+        cards.append(Card(exceedance.share_of(most), label, note))
+    return [*cards, *_basis(view)]
+
+
+def _basis(view: View) -> list[Card]:
+    counts = view.counts
+    pending = counts.total - counts.done
+    note = counts.shortfall + (f", {pending} still pending" if pending else "")
+    whole = view.count(*VALID) == counts.total
+    cards = [Card(str(counts.done), "joints simulated", note, "" if whole else "open")]
+    kinds = {loads.load_of(name).kind.key for name in view.leading}
+    usual = {k: error for k, error in view.numerical_error.items() if k in kinds and not np.isnan(error)}
+    if usual and view.verification:
+        kind = max(usual, key=lambda name: usual[name])
+        label = f"numerical error of the largest loads ({kind})"
+        cards.append(Card(accuracy.in_percent(usual[kind]), label, accuracy.basis(view.verification)))
+    return cards

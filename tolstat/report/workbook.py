@@ -3,42 +3,21 @@
 from __future__ import annotations
 
 import math
-from importlib.util import find_spec
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from tolstat.common.errors import Fault, InputError
+from tolstat.common.late import pandas as pd
 from tolstat.common.loads import load_of
 from tolstat.display.text import cell
 from tolstat.questions.exceedance.rows import limit_rows
-from tolstat.store import Reader
-from tolstat.store.result_file import described
+from tolstat.store import Reader, result_file
 from tolstat.store.view import View
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 MAX_ROWS = 1_048_575
 """Number of joints that a sheet of Excel can hold below its heading."""
 LIMITS = ("load", "limit", "unit", "above", "joints", "share", "lower", "upper", "confidence", "nominal")
 """Columns of the sheet ``limits``."""
-
-
-def check(store: Reader, option: str) -> None:
-    """Check that a workbook of a campaign can be written.
-
-    Raises
-    ------
-    InputError
-        When openpyxl is not installed, or the campaign has more joints than a sheet has rows.
-    """
-    if find_spec("openpyxl") is None:
-        remedy = "install it with: pip install openpyxl, or use --csv OUT"
-        raise InputError([Fault(option, "openpyxl is not installed", remedy)])
-    if store.n > MAX_ROWS:
-        found = f"{store.path} has {store.n} joints, a sheet of Excel has {MAX_ROWS} rows"
-        raise InputError([Fault(option, found, "use --parquet OUT or --csv OUT")])
 
 
 def write(store: Reader, frame: pd.DataFrame, path: Path) -> None:
@@ -56,7 +35,7 @@ def write(store: Reader, frame: pd.DataFrame, path: Path) -> None:
     """
     from openpyxl import Workbook
 
-    columns = described(store)
+    columns = result_file.described(store)
     meanings = {name: column.description for name, column in columns.items()}
     units = [(name, unit, meanings.get(name, "")) for name, unit in frame.attrs["units"].items()]
     sheets = {

@@ -17,10 +17,9 @@ from tolstat.common.tables import Status
 from tolstat.store import error_budget
 from tolstat.store.recorded import mentions
 from tolstat.store.view import View
-from tolstat.study import known
 from tolstat.study.axes import streams_of
-from tolstat.study.known import KnownEntry
 from tolstat.study.tolerances.distributions import score
+from tolstat.study.tolerances.entry import KnownEntry
 
 KEYS = ("known_from", "law")
 """Keys of an entry of ``[tolerances]`` that is known from measured parts."""
@@ -34,7 +33,7 @@ def of(view: View) -> KnownParts | None:
 def _of(view: View) -> KnownParts | None:
     if not (view.sampled and view.limits and mentions(view.store, KEYS, "tolerances")):
         return None
-    entries = known.of(view.study.entries)
+    entries = view.study.known
     return KnownParts(view, entries) if entries else None
 
 

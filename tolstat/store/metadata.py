@@ -20,8 +20,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict
 
 import tolstat
-from tolstat.common.solver_options import to_names
-from tolstat.common.tables import HistorySpec, Options, Variant
+from tolstat.common.tables import HistorySpec, Options, Variant, to_names
 from tolstat.store.hdf5 import put_attributes, text
 from tolstat.study import Study
 

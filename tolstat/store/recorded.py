@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.common.errors import Fault, InputError
-from tolstat.common.solver_options import from_names
 from tolstat.common.strict import read_section, validate
-from tolstat.common.tables import PARAM, Options
+from tolstat.common.tables import PARAM, Options, from_names
 from tolstat.joint import MEANS, Joint, Operation, operating, perturb, varied
 from tolstat.joint.derived import get
 from tolstat.joint.overrides import nested
@@ -22,8 +21,8 @@ from tolstat.solver import fidelity
 from tolstat.store.hdf5 import store_error
 from tolstat.store.reader import Reader
 from tolstat.study import Study, load, mounting, subset_of
+from tolstat.study.design import KEYS
 from tolstat.study.model import Solver
-from tolstat.study.swept import KEYS
 
 _OPERATION = tuple(f"operation.{name}" for name in MEANS)
 

@@ -11,11 +11,8 @@ from functools import reduce
 from operator import getitem
 from typing import Any
 
-import tomlkit
-from tomlkit.exceptions import TOMLKitError
-from tomlkit.items import InlineTable, Table
-
 from tolstat.common.errors import Fault, InputError
+from tolstat.common.late import tomlkit
 
 SETTABLE = ("joint", "operation", "sampling", "output")
 """Sections whose keys `with_settings` sets; a setting of the solver is one of ``run --retry``."""
@@ -64,7 +61,7 @@ def as_text(sections: Mapping[str, Any]) -> str:
     """
     try:
         return tomlkit.dumps(sections)
-    except (TOMLKitError, TypeError, ValueError) as error:
+    except (tomlkit.exceptions.TOMLKitError, TypeError, ValueError) as error:
         found = f"a value cannot be written to a study: {error}"
         raise InputError(
             [Fault("study", found, "give texts, numbers, true or false, lists and dictionaries")]
@@ -121,7 +118,7 @@ def with_keys(text: str, changes: Mapping[tuple[int | str, ...], Mapping[str, An
     """
     try:
         document: Any = tomlkit.parse(text)
-    except TOMLKitError:
+    except tomlkit.exceptions.TOMLKitError:
         document = None
     if document is None or document.as_string() != text:
         remedy = "write tables such as [a.b] and [a.c], or two [[a]], below each other, with no other table between"
@@ -130,7 +127,7 @@ def with_keys(text: str, changes: Mapping[tuple[int | str, ...], Mapping[str, An
         for key, value in values.items():
             _put(reduce(getitem, path, document), key, value)
         table = reduce(getitem, path, document)
-        if isinstance(table, InlineTable):  # where keys were added or removed, tomlkit leaves uneven blanks
+        if isinstance(table, tomlkit.items.InlineTable):  # tomlkit leaves uneven blanks in it
             reduce(getitem, path[:-1], document)[path[-1]] = tomlkit.value(inline(table))
     return str(document.as_string())
 
@@ -154,7 +151,7 @@ def _put(table: Any, key: str, value: Any) -> None:
     if value is None:
         table.pop(key, None)
     elif table.get(key) != value:
-        body = table.value.body if isinstance(table, Table) and key not in table else []
+        body = table.value.body if isinstance(table, tomlkit.items.Table) and key not in table else []
         comments = []
         while body and body[-1][0] is None:
             comments.append(body.pop())

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from shlex import quote
@@ -19,13 +20,10 @@ from tolstat.campaign.what_if import Change
 from tolstat.campaign.work import Work
 from tolstat.common.cores import available_cores
 from tolstat.common.errors import Fault, InputError, NotApplicable, gather
-from tolstat.display import drawing, style, text
-from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Part, Row, Rows, Sentence, Table
+from tolstat.display import drawing, progress, style, text
+from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Row, Sentence, Table
 from tolstat.display.options import Accepted, Opt
-from tolstat.display.progress import clock
-from tolstat.display.style import markers
 from tolstat.questions.assumptions import sentences, variations
-from tolstat.questions.assumptions.sentences import KEPT
 from tolstat.questions.assumptions.variations import Standing, Variation, applicable, evaluate
 from tolstat.questions.shares import inapplicable, own_joints, unusable
 from tolstat.solver.compilation import warm_up
@@ -49,7 +47,7 @@ COLUMNS = (
     Column("change, %", partial(_interval, name="change", form="+.1f")),
     Column(
         "verdict",
-        lambda row: KEPT.get(row["side"]) or str(row["side"]),
+        lambda row: sentences.KEPT.get(row["side"]) or str(row["side"]),
         shown=lambda rows: any(r["side"] for r in rows),
         words=True,
         rank=1,
@@ -91,55 +89,44 @@ def assumptions(view: View, accepted: Accepted = math.nan) -> Answer:
     StoreError
         When the joints are not those of one joint, not drawn from tolerances, differ in weight, or have no limits.
     """
-    found = evaluate(view, accepted)
-    if not found.rows:
+    standing = evaluate(view, accepted)
+    if not standing.rows:
         remedy = f"simulate them: tolstat assumptions {quote(str(view.path))} --run"
         raise inapplicable(view, "holds no joints with other values of what is assumed", remedy)
-    return Answer("assumptions", TITLE, [*_parts(view, found), *map(Sentence, _notes(found, view))], _facts(found))
+    share, lower, upper = standing.drawn
+    lead = f"As drawn {text.percent(share)} of the joints exceed a limit ({text.span(lower, upper)})."
+    if any(verdict := sentences.turned(standing)):
+        lead += f" {text.sentence(', '.join(verdict))}"
+    answer = _answer(view, standing)
+    below = [Sentence(line, "lead") for line in (sentences.still(standing), sentences.shop(view)) if line]
+    table, *notes = answer.parts
+    return replace(answer, parts=[Sentence(lead, "lead"), Panels([bars(standing)]), table, *below, *notes])
 
 
 def assumptions_on_page(view: View, asked: Asked) -> Answer:
     """Table of the variations; their picture is beside the verdict."""
-    found = applicable(view, asked.accepted)
-    if found is None or not found.rows:
+    standing = applicable(view, asked.accepted)
+    if standing is None or not standing.rows:
         raise NotApplicable
-    parts = [part for part in _parts(view, found) if isinstance(part, Table)]
-    return Answer("assumptions", TITLE, [*parts, *map(Sentence, _notes(found, view))], _facts(found))
+    return _answer(view, standing)
 
 
-def _parts(view: View, found: Standing) -> list[Part]:
-    share, lower, upper = found.drawn
-    lead = f"As drawn {text.percent(share)} of the joints exceed a limit ({text.span(lower, upper)})."
-    if any(verdict := sentences.turned(found)):
-        lead += f" {text.sentence(', '.join(verdict))}"
-    most = max(row["n"] for row in found.rows)
-    each = f"{found.n} joints of each" if most == found.n else f"{found.n} joints of each, {most} of those left open"
+def _answer(view: View, standing: Standing) -> Answer:
+    """Table, notes and facts."""
+    most = max(row["n"] for row in standing.rows)
+    each = f"{standing.n} joints of each" + (f", {most} of those left open" if most > standing.n else "")
     title = f"Share above a limit with other values, and its change; {each}"
-    below = [sentences.still(found), sentences.shop(view)]
-    return [
-        Sentence(lead, "lead"),
-        Panels([bars(found)]),
-        Table("assumptions", title, COLUMNS, found.rows, _UNITS),
-        *(Sentence(own, "lead") for own in below if own),
-    ]
-
-
-def _notes(found: Standing, view: View) -> Iterator[str]:
-    n = len(found.rows)
-    yield (
-        f"intervals of {100.0 * found.confidence:.4g} % (95 % for all {n} variations together), without the numerical "
-        "error; a verdict turns if the interval of the share lies on the other side of the accepted share, and that of "
-        "the change excludes zero"
+    intervals = (
+        f"intervals of {100.0 * standing.confidence:.4g} % (95 % for all {len(standing.rows)} variations together), "
+        "without the numerical error; a verdict turns if the interval of the share lies on the other side of the "
+        "accepted share, and that of the change excludes zero"
     )
-    for note in (sentences.not_varied(found, view.path.name), sentences.more(found, view.path.name)):
-        if note:
-            yield note
-
-
-def _facts(found: Standing) -> dict[str, object]:
-    share, lower, upper = found.drawn
-    about = {"n": found.n, "confidence": found.confidence, "share": share, "lower": lower, "upper": upper}
-    return about | {"stands_on": sentences.values(found)}
+    notes = (intervals, sentences.not_varied(standing, view.path.name), sentences.more(standing, view.path.name))
+    table = Table("assumptions", title, COLUMNS, standing.rows, _UNITS)
+    facts: dict[str, Any] = {"n": standing.n, "confidence": standing.confidence}
+    facts |= dict(zip(("share", "lower", "upper"), standing.drawn, strict=True))
+    facts |= {"stands_on": sentences.values(standing)}
+    return Answer("assumptions", TITLE, [table, *map(Sentence, filter(None, notes))], facts)
 
 
 DRAWN = "as drawn"
@@ -149,32 +136,31 @@ _ACCEPTED: dict[str, Any] = {"color": style.COLOURS[2], "lw": 1.4, "ls": (0.0, (
 """Style of the accepted share."""
 
 
-def bars(found: Standing) -> Panel:
+def bars(standing: Standing) -> Panel:
     """Share as drawn, then with each value that moves it, on one axis with the accepted share."""
-    rows = found.moving
-    said = "; ".join(f"{row['label']} {text.percent(row['share'])}" for row in rows)
+    rows = standing.moving
+    moving = "; ".join(f"{row['label']} {text.percent(row['share'])}" for row in rows)
     labels = [DRAWN, *map(_label, rows)]
     return Panel(
         "assumptions",
         "Share of the joints above a limit, with other values of what is assumed",
-        f"As drawn {text.percent(found.drawn[0])}. {said or 'Nothing that is assumed moves it'}",
-        partial(_bars, found=found, rows=rows, labels=labels),
+        f"As drawn {text.percent(standing.drawn[0])}. {moving or 'Nothing that is assumed moves it'}",
+        partial(_bars, standing=standing, labels=labels),
         (drawing.WIDTH, 0.27 * (len(labels) + 1) + drawing.BOTTOM + 0.3),
         drawing.rows_left([part for label in labels for part in label.split("\n")]),
     )
 
 
 def _label(row: Any) -> str:
-    words = f"{row['label']}: {KEPT[row['side']]}" if row["turns"] else str(row["label"])
+    words = f"{row['label']}: {sentences.KEPT[row['side']]}" if row["turns"] else str(row["label"])
     return words.replace(" (", "\n(") if len(words) > _LONGEST else words
 
 
-def _bars(ax: Axes, found: Standing, rows: Rows, labels: list[str]) -> None:
-    share, lower, upper = found.drawn
-    accepted = found.accepted
+def _bars(ax: Axes, standing: Standing, labels: list[str]) -> None:
+    (share, lower, upper), accepted, rows = standing.drawn, standing.accepted, standing.moving
     ends = [lower, upper, *(row[f"share{end}"] for row in rows for end in ("", "_lower", "_upper"))]
     shown = np.array([share, accepted, *ends])
-    known = shown[shown >= 0.5 / max(found.n, 1)]
+    known = shown[shown >= 0.5 / max(standing.n, 1)]
     floor, high = 0.6 * float(known.min(initial=0.1)), min(1.2 * float(known.max(initial=0.1)), 1.0)
     drawing.rows(ax, labels)
     ax.set_ylim(len(labels) - 0.4, -1.3)  # a row above, for the accepted share in words
@@ -183,14 +169,13 @@ def _bars(ax: Axes, found: Standing, rows: Rows, labels: list[str]) -> None:
     ax.axvline(drawn, color=style.INK, lw=1.0)
     if not np.isnan(lower):
         ax.plot([max(lower, floor), max(upper, floor)], [0, 0], color=style.INK, lw=1.6)
-    ax.plot(drawn, 0, "o" if share >= floor else markers.CARETLEFT, color=style.INK, ms=6.0, clip_on=False)
-    for place, row in enumerate(rows, 1):
-        own = max(row["share"], floor)
-        ax.barh(place, own - drawn, 0.62, left=drawn, color=style.COLOURS[row["change"] > 0.0], zorder=2)
-        low, top = (max(row[f"share_{end}"], floor) for end in ("lower", "upper"))
-        ax.plot([low, top], [place, place], color=style.INK, lw=1.2, zorder=3)
+    ax.plot(drawn, 0, "o" if share >= floor else style.markers.CARETLEFT, color=style.INK, ms=6.0, clip_on=False)
+    for y, row in enumerate(rows, 1):
+        share_shown, low, top = (max(row[f"share{end}"], floor) for end in ("", "_lower", "_upper"))
+        ax.barh(y, share_shown - drawn, 0.62, left=drawn, color=style.COLOURS[row["change"] > 0.0], zorder=2)
+        ax.plot([low, top], [y, y], color=style.INK, lw=1.2, zorder=3)
         if row["share_lower"] < floor:
-            ax.plot(floor, place, marker=markers.CARETLEFT, color=style.INK, ms=5.0, zorder=4, clip_on=False)
+            ax.plot(floor, y, marker=style.markers.CARETLEFT, color=style.INK, ms=5.0, zorder=4, clip_on=False)
     if accepted > 0.0:
         ax.axvline(accepted, **_ACCEPTED)
         words: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 8.0, "backgroundcolor": "white"}
@@ -245,7 +230,11 @@ def simulate(
     """
     with Writer.open(path) as store, kept_workers():
         view = View(store)
-        _check(view, store)
+        variations.check(view)
+        if not variations.joints_of(view):
+            remedy = f"run its study: tolstat run {store.study_name}.toml"
+            raise unusable(view, "has no simulated joint to compare with", remedy)
+        sets.check_code(store)
         run = _Run(store, view, work, joints)
         singles = variations.singles(view.study)
         if not singles:
@@ -261,22 +250,13 @@ def simulate(
     return [path]
 
 
-def _check(view: View, store: Writer) -> None:
-    """Refuse a file that the question does not apply to, that has no joints yet, or that the code cannot continue."""
-    variations.check(view)
-    if not variations.joints_of(view):
-        remedy = f"run its study: tolstat run {store.study_name}.toml"
-        raise unusable(view, "has no simulated joint to compare with", remedy)
-    sets.check_code(store)
-
-
 def _further(view: View, accepted: float, n: int) -> tuple[list[Variation], int]:
     """Variations that would turn the verdict if more joints, at most `FURTHER` times `n`, decided them; that number."""
     standing = evaluate(view, accepted)
     second = (1.0 + standing.confidence) / 2.0
     needed = {row["label"]: MARGIN * binomial.needed(row["share"], accepted, second) for row in standing.undecided}
     numbers = {label: number for label, number in needed.items() if number <= FURTHER * n}
-    every = {own.label: own for own in (*variations.singles(view.study), *variations.all_together(view))}
+    every = {each.label: each for each in (*variations.singles(view.study), *variations.all_together(view))}
     return [every[label] for label in numbers], math.ceil(max(numbers.values(), default=n))
 
 
@@ -312,26 +292,26 @@ class _Run:
         """Simulate what the file lacks of the first joints of some variations: `n` of each unless a number is given."""
         n = number or self.n
         if number:
-            self._more = f", {number} of {', '.join(own.label for own in wanted)}"
+            self._more = f", {number} of {', '.join(variation.label for variation in wanted)}"
         study, changes, faults = self._view.study, list[Change](), list[Fault]()
-        for own in wanted:
+        for variation in wanted:
             with gather(faults):
-                changes.append(sets.with_joint(study, own.keys, range(n)))
+                changes.append(sets.with_joint(study, variation.keys, range(n)))
         if faults:
             raise InputError(faults)
-        self._variations |= {own.label for own in wanted}
+        self._variations |= {variation.label for variation in wanted}
         if (first := own_joints(self._view)) < n:
             changes.insert(0, sets.as_drawn(study, range(first, n)))
-        held, names = what_if.read(self._store), self._asked.names(study)
-        lacking = sum(len(sets.missing(held, change, names)) for change in changes)
+        in_file, names = what_if.read(self._store), self._asked.names(study)
+        lacking = sum(len(sets.missing(in_file, change, names)) for change in changes)
         if not lacking:
             return
         if not self._seconds:
             warm_up()
             options = sets.options_of(study, self._store)
             self._seconds = sets.seconds_per_joint(study, options, PILOT, self._asked.points) / self._workers
-        cost, where = clock(self._seconds * lacking), ", ".join(self._asked.points)
-        where = f" at {where}" if where else ""
+        cost, points = progress.clock(self._seconds * lacking), ", ".join(self._asked.points)
+        where = f" at {points}" if points else ""
         self._work.tell(f"{lacking} joints to simulate{where}, about {cost} on {self._workers} processes")
         self._work.display.stage("variations")
         sets.simulate(study, self._store, changes, self._asked, self._workers, lambda: False, self._work.display)

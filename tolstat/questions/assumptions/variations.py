@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -155,28 +155,26 @@ def evaluate(view: View, accepted: float = np.nan) -> Standing:
 def _evaluate(view: View, accepted: float) -> Standing:
     check(view)
     study, joints = view.study, _Joints(view)
-    held = [(own, joints.held(own.keys)) for own in singles(study)]
-    missing = dict.fromkeys(own.name for own, loads in held if loads is None)
-    pairs = [(own, loads) for own, loads in held if loads is not None]
+    missing = tuple(dict.fromkeys(each.name for each in singles(study) if joints.held(each.keys) is None))
+    simulated = joints.simulated(singles(study))
     if not missing:
-        for own in of_all(study, joints.base, joints.level, pairs):
-            if (loads := joints.held(own.keys)) is None:
-                missing[ALL] = None
-            else:
-                pairs.append((own, loads))
-    looks = 2 if len({len(loads) for _, loads in pairs}) > 1 else 1
-    confidence = 1.0 - 0.05 / max(looks * len(pairs), 1)
+        every = all_together(view)
+        together_in_file = joints.simulated(every)
+        simulated += together_in_file
+        missing = (ALL,) if len(together_in_file) < len(every) else ()
+    looks = 2 if len({len(loads) for _, loads in simulated}) > 1 else 1
+    confidence = 1.0 - 0.05 / max(looks * len(simulated), 1)
     drawn = _drawn(view)
     side = side_of(drawn[1:], accepted)
-    rows = [_row(own, joints, loads, confidence) for own, loads in pairs]
+    rows = [_row(variation, joints, loads, confidence) for variation, loads in simulated]
     for row in rows:
         row["side"] = side_of((row["share_lower"], row["share_upper"]), accepted)
         row["turns"] = row["moves"] and {row["side"], side} == {"yes", "no"}
-    names = tuple(dict.fromkeys(own.name for own, _ in pairs))
+    names = tuple(dict.fromkeys(variation.name for variation, _ in simulated))
     rows.sort(key=lambda row: -abs(np.nan_to_num(row["change"])))
-    fixed = tuple(own for own in assumptions(study) if not own.varied)
-    n = min((len(loads) for _, loads in pairs), default=0)
-    return Standing(n, confidence, accepted, drawn, side, rows, names, tuple(missing), fixed, given(study))
+    fixed = tuple(assumption for assumption in assumptions(study) if not assumption.varied)
+    n = min((len(loads) for _, loads in simulated), default=0)
+    return Standing(n, confidence, accepted, drawn, side, rows, names, missing, fixed, given(study))
 
 
 def applicable(view: View, accepted: float = np.nan) -> Standing | None:
@@ -216,55 +214,35 @@ def points_of(view: View) -> tuple[str, ...]:
 
 
 def all_together(view: View) -> list[Variation]:
-    """Variations of all assumptions together, of a file that holds those of each assumption."""
-    joints = _Joints(view)
-    held = [(own, loads) for own in singles(view.study) if (loads := joints.held(own.keys)) is not None]
-    return list(of_all(view.study, joints.base, joints.level, held))
+    """Variations of all assumptions at their better, and at their worse values, of a file that holds those of each.
+
+    There is none where fewer than two assumptions have a better, or a worse, value than as drawn, or values exclude
+    each other.
+    """
+    study, joints, variations = view.study, _Joints(view), list[Variation]()
+    for label, sign in ((BETTER, 1.0), (WORSE, -1.0)):
+        best: dict[str, tuple[float, Variation]] = {}
+        for variation, loads in joints.simulated(singles(study)):
+            effect = sign * (_share(loads, joints.level) - _share(joints.base[: len(loads)], joints.level))
+            if effect < best.get(variation.name, (0.0, variation))[0]:
+                best[variation.name] = effect, variation
+        chosen = [variation for _, variation in best.values()]
+        if len(chosen) > 1:
+            with suppress(InputError):
+                keys = together(study, [variation.keys for variation in chosen])
+                because = ", ".join(variation.label for variation in chosen)
+                variations.append(Variation(ALL, label, keys, because))
+    return variations
 
 
 def singles(study: Study) -> list[Variation]:
     """Variations of one assumption each: every value of those that are varied."""
     return [
-        Variation(own.name, label_of(own.name, keys), keys, own.because)
-        for own in assumptions(study)
-        if own.varied
-        for keys in own.values
+        Variation(assumption.name, label_of(assumption.name, keys), keys, assumption.because)
+        for assumption in assumptions(study)
+        if assumption.varied
+        for keys in assumption.values
     ]
-
-
-def of_all(
-    study: Study, base: FloatArray, level: float, held: Sequence[tuple[Variation, FloatArray]]
-) -> Iterator[Variation]:
-    """Variations of all assumptions at their better, and at their worse values.
-
-    Parameters
-    ----------
-    study : Study
-        The study.
-    base : ndarray, shape (n,)
-        Load of the joints as drawn, NaN without a valid one.
-    level : float
-        Limit of the load.
-    held : sequence of (Variation, ndarray)
-        Each variation of one assumption, with the load of its joints.
-
-    Yields
-    ------
-    Variation
-        Not where fewer than two assumptions have a better, or a worse, value than as drawn, or values exclude each
-        other.
-    """
-    for label, sign in ((BETTER, 1.0), (WORSE, -1.0)):
-        best: dict[str, tuple[float, Variation]] = {}
-        for own, loads in held:
-            effect = sign * (_share(loads, level) - _share(base[: len(loads)], level))
-            if effect < best.get(own.name, (0.0, own))[0]:
-                best[own.name] = effect, own
-        chosen = [own for _, own in best.values()]
-        if len(chosen) > 1:
-            with suppress(InputError):
-                keys = together(study, [own.keys for own in chosen])
-                yield Variation(ALL, label, keys, ", ".join(own.label for own in chosen))
 
 
 def widths(view: View) -> dict[str, list[tuple[str, float, str]]]:
@@ -272,17 +250,16 @@ def widths(view: View) -> dict[str, list[tuple[str, float, str]]]:
 
     Of fewer joints than are known as drawn, it is the share of all as drawn plus the change, as `causes` gives it.
     """
-    found: dict[str, list[tuple[str, float, str]]] = {}
+    shares: dict[str, list[tuple[str, float, str]]] = {}
     entries = {line.label for line in lines(view.study)}
     joints = _Joints(view)
-    for one in view.altered.values():
-        about = one.about
+    for about in (altered.about for altered in view.altered.values()):
         if about["kind"] == sets.WIDTH and about["label"] in entries and (loads := joints.read(about)) is not None:
             base = joints.base[: len(loads)]
             change = _share(loads[: len(base)], joints.level) - _share(base, joints.level)
             share = _share(joints.base, joints.level) + change
-            found.setdefault(about["step"], []).append((about["label"], max(share, 0.0), about["words"]))
-    return found
+            shares.setdefault(about["step"], []).append((about["label"], max(share, 0.0), about["words"]))
+    return shares
 
 
 def side_of(interval: Sequence[float], accepted: float) -> str:
@@ -306,10 +283,14 @@ class _Joints(ChangedJoints):
         loads = None if loads is None else loads[: len(self.base)]
         return None if loads is None or len(loads) < self._least or not len(loads) else loads
 
+    def simulated(self, variations: Sequence[Variation]) -> list[tuple[Variation, FloatArray]]:
+        """Variations that the file has enough joints of, each with the load of its joints."""
+        return [(each, loads) for each in variations if (loads := self.held(each.keys)) is not None]
+
     def read(self, about: Mapping[str, Any]) -> FloatArray | None:
         """Load of the joints of a change, NaN without a valid one; None where the file lacks it."""
-        one = self._held.get(kept.key(about))
-        return None if one is None or one.first or not self.holds(one) else self.of(one)
+        altered = self._held.get(kept.key(about))
+        return None if altered is None or altered.first or not self.holds(altered) else self.of(altered)
 
 
 def _drawn(view: View) -> Estimate:
@@ -323,9 +304,10 @@ def _drawn(view: View) -> Estimate:
     return load.above(load.limit).estimate, low, high
 
 
-def _row(own: Variation, joints: _Joints, loads: FloatArray, confidence: float) -> dict[str, Any]:
-    row: dict[str, Any] = {"name": own.name, "label": own.label, "keys": keys_in_words(own.keys)}
-    row |= {"because": own.because, "n": len(loads), "n_failed": int(np.isnan(loads).sum())}
+def _row(variation: Variation, joints: _Joints, loads: FloatArray, confidence: float) -> dict[str, Any]:
+    keys = ", ".join(f"{key} = {_written(value)}" for key, value in variation.keys.items())  # as a joint file has them
+    row: dict[str, Any] = variation._asdict() | {"keys": keys}
+    row |= {"n": len(loads), "n_failed": int(np.isnan(loads).sum())}
     share, change = joints.share(loads, confidence), (np.nan,) * 3
     with suppress(ValueError):  # no joint has a load both as drawn and with the other values
         change = joints.difference(joints.base, loads, confidence)
@@ -361,11 +343,6 @@ def label_of(name: str, values: Mapping[str, Any]) -> str:
         return f"{name} {_written(value)}"
     symbol = f"{last} {_written(value)}"
     return symbol if len(name) > _LONGEST else f"{name} ({symbol})"
-
-
-def keys_in_words(values: Mapping[str, Any]) -> str:
-    """Keys of the joint with their values, as a joint file has them."""
-    return ", ".join(f"{key} = {_written(value)}" for key, value in values.items())
 
 
 def _written(value: Any) -> str:

@@ -15,7 +15,6 @@ from tolstat.common.errors import NotApplicable
 from tolstat.common.tables import VALID
 from tolstat.display import style, text
 from tolstat.display.answer import Answer, Asked, Axes, Panel, Panels, Part, Sentence, Table
-from tolstat.display.style import ticker
 from tolstat.display.table import Column, Row, Rows, by_share, has, has_unresolved, of_shares
 from tolstat.display.verdict import Verdict, on_share
 from tolstat.questions import shares
@@ -113,23 +112,20 @@ def bearing_life(view: View) -> Answer:
         See `lives.lives_of`.
     """
     lives = rating.lives_of(view)
-    found, below, contacts = rating.life_rows(lives), rating.below_rows(lives), rating.contact_rows(view)
-    first, *others = _verdict(lives, below, found)
+    reached, below, contacts = rating.life_rows(lives), rating.below_rows(lives), rating.contact_rows(view)
+    first, *others = _verdict(lives, below, reached)
     parts: list[Part] = [Sentence(text.sentence(first), "lead"), *map(Sentence, others)]
     rate = lives.rate(JOINT)
     if rate.valid.size and rate.valid[0] > 0.0:
-        said = f"Share of the joints whose bearings fail before a time, against that time. {text.sentence(first)}"
-        parts.append(Panels([Panel("lives", "Life of the joints", said, partial(_draw, lives=lives), (6.4, 3.5))]))
+        words = f"Share of the joints whose bearings fail before a time, against that time. {text.sentence(first)}"
+        parts.append(Panels([Panel("lives", "Life of the joints", words, partial(_draw, lives=lives), (6.4, 3.5))]))
     if lives.unrated < lives.valid:
         title = f"Life {lives.bearing.symbol} that a share of the joints reaches"
-        parts.append(Table("lives", title, LIVES, found, UNITS, by_share(found, "place")))
+        parts.append(Table("lives", title, LIVES, reached, UNITS, by_share(reached, "place")))
         title = f"Joints that do not reach the required {_hours(lives.required)}"
         parts += [Table("below_required", title, BELOW, below, {"required": "h"})] if below else []
-    loads, title = (
-        rating.load_rows(lives),
-        "Dynamic equivalent load P of a bearing, which a share of the joints stays below",
-    )
-    units = {"nominal_load": "N", "load": "N"}
+    loads, units = rating.load_rows(lives), {"nominal_load": "N", "load": "N"}
+    title = "Dynamic equivalent load P of a bearing, which a share of the joints stays below"
     parts.append(Table("loads", title, LOADS, loads, units, by_share(loads, "place")))
     if contacts:
         title = "Joints in which a bearing is loaded so for more than half of a revolution"
@@ -146,7 +142,7 @@ def bearing_life_on_page(view: View, asked: Asked) -> Answer:
     return bearing_life(view)
 
 
-def _verdict(lives: Lives, below: Rows, found: Rows) -> list[str]:
+def _verdict(lives: Lives, below: Rows, reached: Rows) -> list[str]:
     """Sentences on the required life, or on why there is none to judge; the first is the answer."""
     if lives.valid and lives.unrated == lives.valid:
         return [f"no rating: {_why_unrated(lives, 'every joint')}"]
@@ -155,17 +151,17 @@ def _verdict(lives: Lives, below: Rows, found: Rows) -> list[str]:
     row, required = below[-1], f"the required {_hours(lives.required)}"
     if _undecided(row):
         return [f"no verdict: {_without(row)}; below {required} are {_bounds(row)}"]
-    low, high = row["total_lower"], row["total_upper"]
-    interval = "" if math.isnan(low) else f" (total interval {text.span(low, high)})"
-    said = [f"{text.percent(row['estimate'])} of the joints{interval} do not reach {required}"]
-    said += [f"{_without(row)}: {_bounds(row)}"] if row["n_failed"] + row["n_unsettled"] else []
-    best = found[-1]  # all four bearings, the largest share
-    low, high = (best[f"rating_{end}"] / 1e3 for end in ("lower", "upper"))
+    interval = text.span(row["total_lower"], row["total_upper"])
+    total = "" if interval == "-" else f" (total interval {interval})"
+    sentences = [f"{text.percent(row['estimate'])} of the joints{total} do not reach {required}"]
+    sentences += [f"{_without(row)}: {_bounds(row)}"] if has_unresolved([row]) else []
+    best = reached[-1]  # all four bearings, the largest share
+    rate, low, high = (best[f"rating{end}"] / 1e3 for end in ("", "_lower", "_upper"))
     ends = f" (95 % interval {text.number(low)} .. {FEW if math.isinf(high) else f'{text.number(high)} kN'})"
-    if best["rating"] > 0.0:
-        better = f"C = {text.number(best['rating'] / 1e3)} kN{'' if math.isnan(low) else ends}"
-        said.append(f"{100.0 * best['share']:g} % of the joints reach it with {better}")
-    return said
+    if rate > 0.0:
+        better = f"C = {text.number(rate)} kN{'' if math.isnan(low) else ends}"
+        sentences.append(f"{100.0 * best['share']:g} % of the joints reach it with {better}")
+    return sentences
 
 
 def _without(row: Row) -> str:
@@ -202,8 +198,8 @@ def life_verdicts(view: View, accepted: float = math.nan) -> list[Verdict]:
         undecided = f"{_without(row)}; shorter than required are {_bounds(row)}"
     what, ends = f"have a bearing life below {_hours(lives.required)}", (row["total_lower"], row["total_upper"])
     reason = lives.view.design.without_interval("share")
-    found = on_share("bearing life", what, row, ends, accepted, lambda end: needed(end, accepted), reason, undecided)
-    return [found._replace(notes=tuple(_at_points(lives)))]
+    judged = on_share("bearing life", what, row, ends, accepted, lambda end: needed(end, accepted), reason, undecided)
+    return [judged._replace(notes=tuple(_at_points(lives)))]
 
 
 def _why_unrated(lives: Lives, joints: str) -> str:
@@ -282,9 +278,9 @@ def _draw(ax: Axes, lives: Lives) -> None:
     ax.step(x, drawn["estimate"], where="pre", color=style.COLOURS[0])
     ax.set_xscale("log")
     style.share_axis(ax, floor)
-    ax.xaxis.set_major_locator(ticker.LogLocator(subs=(1.0, 2.0, 5.0)))
-    ax.xaxis.set_major_formatter(ticker.FuncFormatter(lambda value, _: text.number(value)))
-    ax.xaxis.set_minor_formatter(ticker.NullFormatter())
+    ax.xaxis.set_major_locator(style.ticker.LogLocator(subs=(1.0, 2.0, 5.0)))
+    ax.xaxis.set_major_formatter(style.ticker.FuncFormatter(lambda value, _: text.number(value)))
+    ax.xaxis.set_minor_formatter(style.ticker.NullFormatter())
     ax.set(xlabel=f"life {lives.bearing.symbol} of the joint [h]", ylabel="share of joints with a shorter life")
     nominal = float(lives.nominal_hours[-1])
     if math.isfinite(nominal):

@@ -8,18 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from tolstat.analysis import accuracy
-from tolstat.analysis.rating_life import FRETTING, basic_life, system_life, turns_per_revolution
+from tolstat.analysis import accuracy, rating_life
 from tolstat.analysis.sample import Sample, total_interval
-from tolstat.common.errors import Fault, NotApplicable, StoreError
 from tolstat.common.load_kinds import PINS
 from tolstat.common.loads import FloatArray
 from tolstat.common.tables import LIFE_EXPONENT, VALID, Mode
 from tolstat.display.table import Rows
 from tolstat.joint import Bearing
 from tolstat.joint.bearing import FOR_LIFE
-from tolstat.store import points
-from tolstat.store.recorded import joint_of, operating_points
+from tolstat.questions.shares import inapplicable, unusable, with_ends
+from tolstat.store import points, recorded
 from tolstat.store.view import View
 
 JOINT = "joint"
@@ -123,25 +121,25 @@ def lives_of(view: View) -> Lives:
     view.check("quantile")
     bearing, duty, stores = _bearing(view), points.shares_of_time(view), [part.store for part in view.parts]
     loads = np.stack([store.results(slice(None), ("equivalent_load",))["equivalent_load"] for store in stores])
-    operation = [operating_points(store) for store in stores]
-    swings, speeds = (np.abs([own[name] for own in operation]) for name in ("alpha", "speed"))  # (points, rows)
+    operation = [recorded.operating_points(store) for store in stores]
+    swings, speeds = (np.abs([rows[name] for rows in operation]) for name in ("alpha", "speed"))  # (points, rows)
     critical = bearing.critical_amplitude
-    hourly = duty[:, None] * speeds / (2.0 * np.pi) * turns_per_revolution(swings, critical) * HOUR
+    hourly = duty[:, None] * speeds / (2.0 * np.pi) * rating_life.turns_per_revolution(swings, critical) * HOUR
     turns = hourly.sum(axis=0)
     with np.errstate(divide="ignore", invalid="ignore"):
         weights = np.where(turns > 0.0, hourly / turns, duty[:, None])[:, :, None]
         largest = loads.max(axis=0)
         relative = np.where(largest > 0.0, loads / largest, 0.0 * loads)
         load = largest * (weights * relative**LIFE_EXPONENT).sum(axis=0) ** (1.0 / LIFE_EXPONENT)
-        pins = bearing.factor * basic_life(load, bearing.C) / turns[:, None]
-    hours = np.column_stack([pins, system_life(pins)])
-    small = [swings < part * critical * (1.0 - 1e-9) for part in (1.0, FRETTING)]
+        pins = bearing.factor * rating_life.basic_life(load, bearing.C) / turns[:, None]
+    hours = np.column_stack([pins, rating_life.system_life(pins)])
+    small = [swings < part * critical * (1.0 - 1e-9) for part in (1.0, rating_life.FRETTING)]
     unrated = np.asarray(small[1].all(axis=0))
     hours[unrated] = np.nan
     skip, valid, has_nominal = view.store.first_sample, np.isin(view.status, VALID), len(view.nominal) > 0
     short, fretting = (
-        {name: int(n) for name, n in zip(view.points, (own[:, skip:] & valid).sum(axis=1), strict=True) if n}
-        for own in small
+        {name: int(n) for name, n in zip(view.points, (joints[:, skip:] & valid).sum(axis=1), strict=True) if n}
+        for joints in small
     )
     return Lives(
         view=view,
@@ -160,22 +158,21 @@ def lives_of(view: View) -> Lives:
 
 def bearing_of(view: View) -> Bearing | None:
     """Section ``[bearing]`` of the joint of a file, or of the study that is read in place of the one in it."""
-    return (view.study.joint if view.study_path else joint_of(view.store, 0)).bearing
+    return (view.study.joint if view.study_path else recorded.joint_of(view.store, 0)).bearing
 
 
 def _bearing(view: View) -> Bearing:
     """Section ``[bearing]`` of the joint of a file, with all that a life needs."""
-    bearing, place = bearing_of(view), str(view.path)
-    again = "then repeat tolstat run: no joint is simulated again"
+    bearing, again = bearing_of(view), "then repeat tolstat run: no joint is simulated again"
     if bearing is None:
         remedy = f"add the section [bearing] to the joint file or [joint.bearing] to the study, {again}"
-        raise NotApplicable(str(Fault(place, "holds a joint without bearings", remedy)))
+        raise inapplicable(view, "holds a joint without bearings", remedy)
     if lacking := bearing.lacking(FOR_LIFE):
-        found = f"holds bearings without {', '.join(lacking)}, which a rating life needs"
-        raise StoreError(str(Fault(place, found, f"add to [bearing] of the joint, {again}")))
+        incomplete = f"holds bearings without {', '.join(lacking)}, which a rating life needs"
+        raise unusable(view, incomplete, f"add to [bearing] of the joint, {again}")
     if sum(column.field == "equivalent_load" for column in view.columns) < len(PINS):
         remedy = 'add "pin*.equivalent_load" to [output] results of the study'
-        raise StoreError(str(Fault(place, "does not keep the equivalent loads of the bearings", remedy)))
+        raise unusable(view, "does not keep the equivalent loads of the bearings", remedy)
     return bearing
 
 
@@ -221,7 +218,7 @@ def life_rows(lives: Lives) -> Rows:
             row = {"place": rate.name, "share": share, "nominal": life(rate.nominal), "estimate": life(q.estimate)}
             row |= {"lower": life(q.upper), "upper": life(q.lower)}
             row |= {"bound_lower": life(q.bound_upper), "bound_upper": life(q.bound_lower)}
-            row |= {"rating": rating(q.estimate), "rating_lower": rating(q.lower), "rating_upper": rating(q.upper)}
+            row |= with_ends("rating", map(rating, (q.estimate, q.lower, q.upper)))
             row |= {"n": q.n, "n_failed": q.n_failed, "n_unsettled": q.n_unsettled, "confidence": CONFIDENCE}
             rows.append(row)
     return rows
@@ -282,11 +279,11 @@ def contact_rows(view: View) -> Rows:
     modes = [part.read_results(("mode_share",))["mode_share"] for part in view.parts]
     spent = np.tensordot(points.shares_of_revolutions(view), np.stack(modes), 1)
     rows = []
-    for place in (*PINS, ANY):
-        own = spent[:, [PINS.index(place)]] if place in PINS else spent
-        row: dict[str, Any] = {"place": place}
+    for pins in (*((pin,) for pin in PINS), PINS):
+        row: dict[str, Any] = {"place": pins[0] if len(pins) == 1 else ANY}
         for name, mode in LOADED.items():
-            found = Sample.of(own[:, :, mode].max(axis=1), view.status, view.design).above(MOSTLY, CONFIDENCE)
-            row |= {name: found.estimate, f"{name}_lower": found.lower, f"{name}_upper": found.upper}
+            longest = spent[:, [PINS.index(pin) for pin in pins], mode].max(axis=1)
+            above = Sample.of(longest, view.status, view.design).above(MOSTLY, CONFIDENCE)
+            row |= with_ends(name, (above.estimate, above.lower, above.upper))
         rows.append(row)
     return rows

@@ -20,9 +20,7 @@ from tolstat.display import drawing, text
 from tolstat.display.answer import Answer, Asked, Figure, Panel, Panels, Part, Rows, Sentence
 from tolstat.joint import Joint, Operation
 from tolstat.questions.drawings import views
-from tolstat.store import ResultFile
-from tolstat.store.points import point_of
-from tolstat.store.recorded import joint_of, operation_of
+from tolstat.store import ResultFile, points, recorded
 from tolstat.store.view import View
 
 LEGEND = (
@@ -63,11 +61,11 @@ def place_of(view: View, load: str, asked: Asked) -> Panel | None:
     with asked.noting("the joint is not drawn"):
         place, title = load_of(load).place if load else PLACES[""], "The joint"
         if load:
-            own, title = view.load(load), f"{place.name or load}: the largest loads"
-            if own.limit is not None:
-                often = "most often above" if own.above(own.limit).count else "nearest to"
-                title = f"{place.name or load}: {often} its limit"
-            title += f", at {point_of(view, load)}" if len(view.points) > 1 else ""
+            sample, which = view.load(load), "the largest loads"
+            if sample.limit is not None:
+                which = f"{'most often above' if sample.above(sample.limit).count else 'nearest to'} its limit"
+            title = f"{place.name or load}: {which}"
+            title += f", at {points.point_of(view, load)}" if len(view.points) > 1 else ""
         panel = _joint(view, [place.name], load)[place.view == "side"]
         return replace(panel, key="joint-worst", title=title)
     return None
@@ -75,8 +73,8 @@ def place_of(view: View, load: str, asked: Asked) -> Panel | None:
 
 def _joint(view: View, marked: Collection[str], load: str) -> tuple[Panel, Panel]:
     """Drawings of the joint at the operating point at which a load matters most; at the first one without a load."""
-    point = point_of(view, load) if load else view.points[0]
-    front, side = views.views(joint_of(view.store, 0), view.at(point).store.operation.alpha, marked)
+    point = points.point_of(view, load) if load else view.points[0]
+    front, side = views.views(recorded.joint_of(view.store, 0), view.at(point).store.operation.alpha, marked)
     return front, replace(side, title=f"{side.title}, at {point}") if point else side
 
 
@@ -95,7 +93,7 @@ def drawings(view: View) -> Answer:
         of the joints with the largest leading loads, enlarged.
     """
     marked = sorted({load_of(name).place.name for name in view.leading} - {""})
-    kinds = views.kinds_of_errors(joint_of(view.store, 0))
+    kinds = views.kinds_of_errors(recorded.joint_of(view.store, 0))
     parts: list[Part] = [Panels([*_joint(view, marked, next(iter(view.leading), "")), kinds]), Sentence(LEGEND)]
     if view.method != "sweep" and (worst := _worst(view)):
         parts += [Panels(worst), Sentence(WORST)]
@@ -112,7 +110,7 @@ def _worst(view: View) -> list[Panel]:
         loads.setdefault(sample, []).append(f"{name} {text.value(float(values[sample]), load.unit)}")
     panels = []
     for sample, words in loads.items():
-        joint, row = joint_of(view.store, int(view.slots(sample))), int(view.rows(sample))
+        joint, row = recorded.joint_of(view.store, int(view.slots(sample))), int(view.rows(sample))
         errors, title = view.errors(np.array([sample])), f"Row {row}: {', '.join(words)}"
         panels.append(views.errors_of(joint, errors, title, f"drawn-{row}"))
     return panels
@@ -148,37 +146,30 @@ def read(
     InputError, StoreError
         When there is no such joint, row or misalignment, or a file cannot be read.
     """
-    path, errors = Path(source), None
+    path, errors, point = Path(source), None, ""
     given = validate(Operation, {"alpha": alpha or "15 deg", "speed": "1 rpm", "torque": "1 N*m"}, "--alpha").alpha
-    own, point, title = given, "", path.stem
     if path.is_file() and path.suffix != ".toml":
         with ResultFile.open(path) as store:
             if row is not None and row not in store.rows:
-                found = f"has rows {store.rows[0]} to {store.rows[-1]}, not {row}"
+                holds = f"has rows {store.rows[0]} to {store.rows[-1]}, not {row}"
                 remedy = f"give one of these rows, for example --row {store.rows[0]}"
-                raise InputError([Fault(str(path), found, remedy)])
-            at, slot = store.each()[0], 0 if row is None else store.slot(row)
-            joint, own, point, title = (
-                joint_of(store, slot),
-                operation_of(at, slot).alpha,
-                at.point or "",
-                store.study_name,
-            )
-            if row is not None:
-                errors, title, point = store.errors(slice(slot, slot + 1)), f"{title}, row {row}", ""
+                raise InputError([Fault(str(path), holds, remedy)])
+            first, slot, title = store.each()[0], 0 if row is None else store.slot(row), store.study_name
+            joint, own_alpha = recorded.joint_of(store, slot), recorded.operation_of(first, slot).alpha
+            if row is None:
+                point = first.point or ""
+            else:
+                errors, title = store.errors(slice(slot, slot + 1)), f"{title}, row {row}"
     elif row is not None:
         raise InputError([Fault(str(source), "has no rows, which --row asks for", "give a result file: FILE.h5")])
     elif path.suffix == ".toml" and not {"joint", "operation"}.isdisjoint(data := read_toml(path)):
         case = study.load(path) if "sampling" in data else study.load_case(path)
-        joint, own, point = (
-            case.joint,
-            case.operation.alpha,
-            case.points[0].name if isinstance(case, study.Study) else "",
-        )
+        joint, own_alpha, title = case.joint, case.operation.alpha, path.stem
+        point = case.points[0].name if isinstance(case, study.Study) else ""
     else:
-        joint = joints.load(source, {}, str(source))
+        joint, own_alpha = joints.load(source, {}, str(source)), given
         title = joint.description or path.stem
-    return joint, given if alpha else own, f"{title}, at {point}" if point else title, errors
+    return joint, given if alpha else own_alpha, f"{title}, at {point}" if point else title, errors
 
 
 def draw_joint(joint: Joint, alpha: float, title: str = "", columns: int = 2) -> Figure:
@@ -241,9 +232,9 @@ def lengths(joint: Joint, alpha: float) -> Rows:
         ("arm.depth", arm.depth, "side of an arm's section along e"),
         ("arm.d", arm.d, "diameter of a round arm"),
     ]
-    found = [(name, f"{1e3 * x:.5g} mm", meaning) for name, x, meaning in rows if x is not None]
-    found.append(("operation.alpha", f"{np.degrees(alpha):.5g} deg", "misalignment of the shafts"))
-    return [dict(zip(("dimension", "value", "meaning"), row, strict=True)) for row in found]
+    shown = [(name, f"{1e3 * x:.5g} mm", meaning) for name, x, meaning in rows if x is not None]
+    shown.append(("operation.alpha", f"{np.degrees(alpha):.5g} deg", "misalignment of the shafts"))
+    return [{"dimension": name, "value": value, "meaning": meaning} for name, value, meaning in shown]
 
 
 def meanings() -> Rows:

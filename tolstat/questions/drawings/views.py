@@ -18,8 +18,7 @@ from tolstat.common.tables import HOLES
 from tolstat.display.answer import Axes, Panel, Rows
 from tolstat.display.drawing import WIDTH
 from tolstat.display.style import COLOURS, INK, patches
-from tolstat.joint import Joint, Operation, nominal_errors, perturb
-from tolstat.joint.perturbation import ARM_TRIADS, PIN_TRIADS
+from tolstat.joint import Joint, Operation, nominal_errors, perturb, perturbation
 from tolstat.kernel.mechanics.topology import ARM_OF_PIN
 
 Array = NDArray[np.float64]
@@ -95,14 +94,14 @@ def pairs(joint: Joint, errors: NDArray[np.void]) -> list[Pair]:
         Its errors.
     """
     par = perturb(joint, Operation.model_construct(alpha=0.0, speed=1.0, torque=0.0), errors)[0]
-    found = []
+    pairs_of_joint = []
     for i, arm in enumerate(ARM_OF_PIN):
-        t, u = PIN_TRIADS[i], ARM_TRIADS[arm]
+        t, u = perturbation.PIN_TRIADS[i], perturbation.ARM_TRIADS[arm]
         thick = joint.contact.D_P + float(errors[f"{PINS[i]}.diameter"][0])
         pin = Feature(PINS[i], thick, t @ par["pin_point"][i], t @ par["pin_axis"][i])
         wide = thick + 2.0 * float(par["clearance"][i])
-        found.append((pin, Feature(HOLES[arm], wide, u @ par["hole_point"][arm], u @ par["hole_axis"][arm])))
-    return found
+        pairs_of_joint.append((pin, Feature(HOLES[arm], wide, u @ par["hole_point"][arm], u @ par["hole_axis"][arm])))
+    return pairs_of_joint
 
 
 def positive(joint: Joint, kind: str) -> Pair:
@@ -155,18 +154,11 @@ def kinds_of_errors(joint: Joint) -> Panel:
     """What a positive error of each kind means, on pin 1 and hole 4."""
     description = "; ".join(f"{kind}: {meaning}" for kind, meaning in MEANINGS.items())
     solid: Look = {"edgecolor": COLOURS[0]}
-    dashed: Look = {
-        "edgecolor": SOFT,
-        "linestyle": (0.0, (4.0, 2.0)),
-        "linewidth": 0.9,
-        "facecolor": "none",
-        "hatch": None,
-    }
-    cells: list[Cell] = []
-    ideal = pairs(joint, nominal_errors(1))[0]
+    dashed: Look = {"edgecolor": SOFT, "linestyle": (0.0, (4.0, 2.0)), "linewidth": 0.9, "facecolor": "none"}
+    cells, ideal = list[Cell](), pairs(joint, nominal_errors(1))[0]
     for kind, meaning in MEANINGS.items():
         view = SIDE if kind in ("offset_z", "tilt_t") else ALONG_Z
-        both = {f"{kind}.moved": (positive(joint, kind), solid), f"{kind}.ideal": (ideal, dashed)}
+        both = {f"{kind}.moved": (positive(joint, kind), solid), f"{kind}.ideal": (ideal, dashed | {"hatch": None})}
         cells.append((kind, meaning, view, both))
     draw = partial(_cells, joint=joint, cells=cells, factor=1.0)
     return Panel("error-kinds", "What a positive error means", description, draw, (WIDTH, 3 * HEIGHT), bare=True)
@@ -205,7 +197,7 @@ def _front(ax: Axes, joint: Joint, marked: Collection[str]) -> None:
     _frame(ax, 1.4 * end, -1.66 * end, 1.37 * end)
     _pins(ax, joint, range(4), FRONT, "front")
     _centre_line(ax, -1.08 * end * X, 1.08 * end * X)
-    for k, e in enumerate(PIN_TRIADS[:, 0] @ FRONT.T, 1):
+    for k, e in enumerate(perturbation.PIN_TRIADS[:, 0] @ FRONT.T, 1):
         offset = (12.0 if r_b < 0.35 * end else -12.0) * e
         _bushing(ax, r_b * e, f"cross{k}")
         _label(ax, r_b * e, f"cross{k}", offset, rotation=90 * (k > 2), bbox=ON_CROSS)
@@ -228,7 +220,7 @@ def _pins(ax: Axes, joint: Joint, pins: Iterable[int], view: Array, key: str) ->
     _strip(ax, (-root * X, root * X), (-root, root), CROSS)
     _centre_line(ax, -1.08 * end * Y, 1.08 * end * Y)
     for k in pins:
-        e, arm, name = view @ PIN_TRIADS[k, 0], ARM_OF_PIN[k], f"{key}.pin{k + 1}"
+        e, arm, name = view @ perturbation.PIN_TRIADS[k, 0], ARM_OF_PIN[k], f"{key}.pin{k + 1}"
         upright, colour = abs(e[1]) > 0.5, INPUT if arm < 2 else OUTPUT
         _strip(ax, (min(root, low) * e, low * e), (-neck, neck), CROSS)
         _strip(ax, (low * e, end * e), (-pin, pin), CROSS, gid=name)
@@ -238,7 +230,7 @@ def _pins(ax: Axes, joint: Joint, pins: Iterable[int], view: Array, key: str) ->
         middle, beside = joint.cross.R * e, eye * (X if upright else Y)
         _label(ax, middle, f"pin {k + 1}", rotation=90 * (not upright), bbox=ON_CROSS)
         _label(ax, middle + beside, f"arm {arm + 1}", (22.0, 0.0) if upright else (0.0, 7.0))
-        _triad(ax, 1.08 * end * e, PIN_TRIADS[k], view, name)
+        _triad(ax, 1.08 * end * e, perturbation.PIN_TRIADS[k], view, name)
 
 
 def _side(ax: Axes, joint: Joint, alpha: float, marked: Collection[str]) -> None:

@@ -5,34 +5,26 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import numpy as np
 
-from tolstat.analysis.binomial import needed
-from tolstat.analysis.prediction import DELIVERY
-from tolstat.analysis.strength import Line
+from tolstat.analysis import binomial, prediction, strength
 from tolstat.common.channels import CHANNELS
 from tolstat.common.errors import NotApplicable
 from tolstat.common.loads import unit_text
 from tolstat.common.tables import Status
-from tolstat.display import drawing, style, text
-from tolstat.display.answer import Answer, Asked, Part, Sentence, Table
-from tolstat.display.blocks import Panel, Panels
+from tolstat.display import drawing, style, text, verdict
+from tolstat.display.answer import Answer, Asked, Axes, Panel, Panels, Part, Sentence, Table
 from tolstat.display.options import Delivery, Loads, Opt
 from tolstat.display.style import ticker
 from tolstat.display.table import Column, Row, Rows, by_share, of_shares
-from tolstat.display.verdict import Verdict, on_share
 from tolstat.questions.fatigue import loads, parts
 from tolstat.questions.fatigue.duty import ANY, Joints, members, section, settings_of
 from tolstat.questions.fatigue.loads import SHARES, Loading, channels, load_cycles
-from tolstat.questions.fatigue.parts import Stressed, load_stresses
 from tolstat.store.revolutions import held
 from tolstat.store.view import View
-from tolstat.study.stress_point import StressPoint
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+from tolstat.study.fatigue import StressPoint
 
 JOINTS = 5000
 """Maximum number of samples, the first ones, whose cycles the page evaluates: more add little and take memory."""
@@ -106,7 +98,7 @@ def fatigue(
     shares: Annotated[list[float] | None, Opt("S", name="share")] = None,
     by: Loads = None,
     joints: Annotated[int | None, Opt("N", least=1)] = None,
-    delivery: Delivery = DELIVERY,
+    delivery: Delivery = prediction.DELIVERY,
 ) -> Answer:
     """Compute failures of parts, equivalent loads and damage.
 
@@ -151,40 +143,40 @@ def fatigue(
     """
     has_points = bool(section(views[0]).points)
     has_cycles = all(part.store.history_specs for view in views for part in view.parts)
-    found: list[Part] = []
+    shown_parts: list[Part] = []
     duty: Sequence[tuple[str, float]] = ()
     if has_points:
-        stressed = load_stresses(views, shares or None, joints)
-        duty, found = stressed.duty, _of_parts(stressed, delivery)
+        stressed = parts.load_stresses(views, shares or None, joints)
+        duty, shown_parts = stressed.duty, _of_parts(stressed, delivery)
     if by or has_cycles or not has_points:
         loading = load_cycles(views, shares or None, channels(by) if by else None, joints)
         rows = loads.equivalent_loads(loading)
         shown = [] if by else loads.most_loaded(rows)
         seen = [row for row in rows if not shown or row["channel"] in shown]
-        duty, found = loading.duty, [*found, *_of_loads(loading, rows, seen, delivery)]
-    return Answer("fatigue", "Fatigue", found, {"duty": dict(duty)} if len(duty) > 1 else {})
+        duty, shown_parts = loading.duty, [*shown_parts, *_of_loads(loading, rows, seen, delivery)]
+    return Answer("fatigue", "Fatigue", shown_parts, {"duty": dict(duty)} if len(duty) > 1 else {})
 
 
 def fatigue_on_page(view: View, asked: Asked) -> Answer:
     """Fatigue of the first joints, with the leading loads; without histories, of those that are simulated again."""
-    found: list[Part] = []
+    shown_parts: list[Part] = []
     if view.method != "sweep" and view.count(Status.OK):
         with asked.noting("load cycles are left out"):
             joints = JOINTS if held(view.store) else min(asked.replay, JOINTS)
             if section(view).points and joints:
-                found += _of_parts(load_stresses([view], samples=joints), DELIVERY)
+                shown_parts += _of_parts(parts.load_stresses([view], samples=joints), prediction.DELIVERY)
             if view.store.history_specs:
                 loading = load_cycles([view], samples=JOINTS)
                 rows = loads.equivalent_loads(loading)
                 leading = loads.leading(rows)
                 seen = sorted((row for row in rows if row["channel"] in leading), key=lambda r: (r["channel"], r["m"]))
-                found += _of_loads(loading, rows, seen, DELIVERY)
-    if not found:
+                shown_parts += _of_loads(loading, rows, seen, prediction.DELIVERY)
+    if not shown_parts:
         raise NotApplicable
-    return Answer("fatigue", "Fatigue", found)
+    return Answer("fatigue", "Fatigue", shown_parts)
 
 
-def life_verdicts(view: View, accepted: float = math.nan, samples: int = JOINTS) -> list[Verdict]:
+def life_verdicts(view: View, accepted: float = math.nan, samples: int = JOINTS) -> list[verdict.Verdict]:
     """Verdict on failures of the parts in the service life, and on damage sums of loads; none if no life is required.
 
     Parameters
@@ -203,29 +195,29 @@ def life_verdicts(view: View, accepted: float = math.nan, samples: int = JOINTS)
     StoreError
         When a file holds joints that are no sample of a production.
     """
-    own, store = section(view), view.store
-    has_points, has_lines = bool(own.points), bool(own.lines and store.history_specs)
+    settings, store = section(view), view.store
+    has_points, has_lines = bool(settings.points), bool(settings.lines and store.history_specs)
     if not (has_points or has_lines) or not settings_of(*members([view], None)).required:
         return []
-    found = []
+    verdicts = []
     if has_points and (held(store) or samples):
-        stressed = load_stresses([view], samples=JOINTS if held(store) else min(samples, JOINTS))
+        stressed = parts.load_stresses([view], samples=JOINTS if held(store) else min(samples, JOINTS))
         row = parts.failures_over_life(stressed, [stressed.settings.revolutions])[0]._asdict()
-        found.append(_verdict("failures of parts", "have a failed part", row, stressed, accepted))
+        verdicts.append(_verdict("failures of parts", "have a failed part", row, stressed, accepted))
     if has_lines:
-        loading = load_cycles([view], names=tuple(own.lines), samples=JOINTS)
+        loading = load_cycles([view], names=tuple(settings.lines), samples=JOINTS)
         sums = loads.damages(loading)[-1]
-        found.append(_verdict("damage by loads", "have a damage sum above 1", sums, loading, accepted))
-    return found
+        verdicts.append(_verdict("damage by loads", "have a damage sum above 1", sums, loading, accepted))
+    return verdicts
 
 
-def _verdict(about: str, what: str, row: Row, joints: Joints, accepted: float) -> Verdict:
+def _verdict(about: str, what: str, row: Row, joints: Joints, accepted: float) -> verdict.Verdict:
     """Verdict from the share in a row: `analysis.strength.Failures`, or `analysis.estimates.Exceedance`."""
     share, without = row["estimate"], row["n_failed"] + row["n_unsettled"]
 
     def joints_needed(end: float) -> float:
         if "count" in row:
-            return needed(end, accepted)
+            return binomial.needed(end, accepted)
         # an interval of a mean narrows with the root of the number of joints, and faster where the share is small
         distance = row["upper"] - share if share < accepted else share - row["lower"]
         return float(np.ceil(row["n"] * (distance / (accepted - end)) ** 2))
@@ -234,12 +226,12 @@ def _verdict(about: str, what: str, row: Row, joints: Joints, accepted: float) -
     undecided = f"{without} of {row['n']} joints have no load that repeats" if lost else ""
     what, ends = f"{what} within {joints.settings.service_life}", (row["outer_lower"], row["outer_upper"])
     reason = joints.design.without_interval("mean")
-    found = on_share(about, what, row, ends, accepted, joints_needed, reason, undecided)
+    judged = verdict.on_share(about, what, row, ends, accepted, joints_needed, reason, undecided)
     first = f"{about}: of the first {row['n']} of {joints.total} joints"
-    return found._replace(notes=(first,) if joints.total > joints.status.size else ())
+    return judged._replace(notes=(first,) if joints.total > joints.status.size else ())
 
 
-def _of_parts(stressed: Stressed, delivery: int) -> list[Part]:
+def _of_parts(stressed: parts.Stressed, delivery: int) -> list[Part]:
     rows = parts.part_failures(stressed, delivery)
     panel = Panel(
         "failures-over-life",
@@ -265,15 +257,15 @@ def _of_loads(loading: Loading, rows: Rows, seen: Rows, delivery: int) -> list[P
         )
         for channel in loads.leading(rows)
     ]
-    found: list[Part] = [Panels(panels)] if panels else []
-    found.append(Table("loads", "Damage-equivalent loads", LOADS, rows, seen=by_share(seen, "channel", "m")))
+    shown_parts: list[Part] = [Panels(panels)] if panels else []
+    shown_parts.append(Table("loads", "Damage-equivalent loads", LOADS, rows, seen=by_share(seen, "channel", "m")))
     if damages := loads.damages(loading, delivery):
         title = "Damage sum of the service life, and share of the joints where it exceeds 1"
-        found.append(Table("damages", title, DAMAGES, damages, {"S0": "N or N*m"}))
-    return [*found, *map(Sentence, _notes_on_loads(loading, rows))]
+        shown_parts.append(Table("damages", title, DAMAGES, damages, {"S0": "N or N*m"}))
+    return [*shown_parts, *map(Sentence, _notes_on_loads(loading, rows))]
 
 
-def _notes_on_parts(stressed: Stressed, rows: Rows) -> Iterator[str]:
+def _notes_on_parts(stressed: parts.Stressed, rows: Rows) -> Iterator[str]:
     """Number of joints, meaning of the columns, restrictions."""
     settings, n = stressed.settings, stressed.status.size
     starts = f" with {settings.starts:g} starts" if settings.starts else ""
@@ -308,24 +300,26 @@ def _notes_on_loads(loading: Loading, rows: Rows) -> Iterator[str]:
 
 def _lines(points: Sequence[StressPoint]) -> Iterator[str]:
     """One sentence for each S–N line, with the names of its points."""
-    names: dict[Line, list[str]] = {}
+    names: dict[strength.Line, list[str]] = {}
     for point in points:
         names.setdefault(point.line, []).append(point.name)
-    for line, own in names.items():
-        where = f" of {'; '.join(own)}" if len(names) > 1 else ""
+    for line, points_of_line in names.items():
+        where = f" of {'; '.join(points_of_line)}" if len(names) > 1 else ""
         scatter = f", T_S = {line.T_S:.3g}" if line.T_S > 1 else ""
         mean = f", M = {line.M:g} (R = {line.R:g})" if line.M > 0 else ""
         knee = f"range of {line.S_D / 1e6:.4g} MPa at {line.N_D:g} cycles, k = {line.k:g}, {line.k_2:g} below"
         yield f"S–N line{where}: {knee}{scatter}{mean}, damage sum {line.D_c:g}"
 
 
-def _draw_failures(ax: Axes, stressed: Stressed, life: float) -> None:
+def _draw_failures(ax: Axes, stressed: parts.Stressed, life: float) -> None:
     """Draw the share of the joints with a failed part against revolutions, with its band and the service life."""
     service = stressed.settings.revolutions
     first, last = sorted([service, life if math.isfinite(life) and life > 0 else service])
     numbers = np.geomspace(first / 10**DECADES, last * 10**DECADES, POINTS)
     curve, has_band = parts.failures_over_life(stressed, numbers.tolist()), stressed.design.has_interval("mean")
-    lower, share, upper = np.array([(own.outer_lower, own.estimate, own.outer_upper) for own in curve]).T
+    lower, share, upper = np.array(
+        [(failures.outer_lower, failures.estimate, failures.outer_upper) for failures in curve]
+    ).T
     if has_band:
         ax.fill_between(numbers, lower, upper, color=style.COLOURS[0], alpha=0.2, lw=0)
     ax.plot(numbers, share, color=style.COLOURS[0])
@@ -348,9 +342,10 @@ def _draw_spectrum(ax: Axes, loading: Loading, channel: str) -> None:
     x = np.concatenate([[0.7 * numbers[0]], numbers])
     handles = []
     for share, colour, dash in zip(SHARES, style.COLOURS, style.DASHES, strict=False):
-        own = [row for row in rows if row["share"] == share]
+        rows_of_share = [row for row in rows if row["share"] == share]
         lower, estimate, upper, nominal = (  # the first value twice, so that the curve begins at the left edge
-            np.array([row[key] for row in (own[0], *own)]) for key in ("lower", "estimate", "upper", "nominal")
+            np.array([row[key] for row in (rows_of_share[0], *rows_of_share)])
+            for key in ("lower", "estimate", "upper", "nominal")
         )
         if np.isfinite(lower).any():
             top = np.where(np.isfinite(upper), upper, estimate)  # too few joints: the upper end is infinite

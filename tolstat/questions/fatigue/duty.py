@@ -15,8 +15,7 @@ from tolstat.common.loads import FloatArray
 from tolstat.common.tables import ERROR_FIELDS, Status, worst_status
 from tolstat.display.text import percent
 from tolstat.solver import rainflow
-from tolstat.store import points
-from tolstat.store.recorded import joint_of
+from tolstat.store import points, recorded
 from tolstat.store.view import View
 from tolstat.study.fatigue import Fatigue, of_text
 
@@ -76,8 +75,8 @@ class Joints:
     def visits(self) -> list[int]:
         """Points of `duty` in the order of their visits; empty where the study gives no sequence of several of them."""
         names = [name for name, _ in self.duty]
-        found = [names.index(name) for name in self.settings.visits if name in names]
-        return found if len(set(found)) > 1 else []
+        visited = [names.index(name) for name in self.settings.visits if name in names]
+        return visited if len(set(visited)) > 1 else []
 
     def transitions(self, low: FloatArray, high: FloatArray) -> Transitions | None:
         """Cycles that the sequence of operating points closes beside those at each of them.
@@ -94,8 +93,8 @@ class Joints:
         """
         if not self.visits:
             return None
-        levels = (own.reshape(-1, len(self.duty)) for own in (low, high))
-        ranges, means, numbers = (own.reshape(*low.shape[:2], -1) for own in rainflow.between(self.visits, *levels))
+        levels = (table.reshape(-1, len(self.duty)) for table in (low, high))
+        ranges, means, numbers = (table.reshape(*low.shape[:2], -1) for table in rainflow.between(self.visits, *levels))
         return Transitions(ranges, means, numbers / self.settings.turns)
 
 
@@ -118,24 +117,22 @@ def members(views: Sequence[View], shares: Sequence[float] | None) -> tuple[Sequ
         When a file holds joints that are no sample of a production.
     """
     if any(len(view.parts) > 1 for view in views):
-        for wrong, remedy in (
-            (len(views) > 1, "give this file alone, or files with one operating point each"),
-            (shares is not None, "leave --share out: the study gives share in [[operation]]"),
-        ):
-            if wrong:
-                raise InputError([Fault(str(views[0].path), "has several operating points", remedy)])
+        remedy = "" if shares is None else "leave --share out: the study gives share in [[operation]]"
+        remedy = "give this file alone, or files with one operating point each" if len(views) > 1 else remedy
+        if remedy:
+            raise InputError([Fault(str(views[0].path), "has several operating points", remedy)])
         views, shares = views[0].parts, points.shares_of_revolutions(views[0]).tolist()
     shares = [1.0] if shares is None else shares
     if len(shares) != len(views) or min(shares, default=0.0) <= 0 or abs(sum(shares) - 1) > 1e-6:
-        found = f"{list(shares)} for {len(views)} files"
-        raise InputError([Fault("shares", found, "give a positive share for each file; their sum is 1")])
+        given = f"{list(shares)} for {len(views)} files"
+        raise InputError([Fault("shares", given, "give a positive share for each file; their sum is 1")])
     names, first = [column.name for column in ERROR_FIELDS], views[0]
     for view in views:
         view.check("mean")
     for view in views[1:]:
         if view.n != first.n or not all(
-            np.array_equal(own[name], other[name])
-            for own, other in zip(view.error_blocks(names), first.error_blocks(names), strict=True)
+            np.array_equal(errors[name], other[name])
+            for errors, other in zip(view.error_blocks(names), first.error_blocks(names), strict=True)
             for name in names
         ):
             remedy = "run both studies with the same tolerances, sampling.n and sampling.seed"
@@ -159,7 +156,7 @@ def joints_of(views: Sequence[View], shares: Sequence[float], samples: int | Non
 def settings_of(views: Sequence[View], shares: Sequence[float]) -> Fatigue:
     """Section ``[fatigue]`` of the first of the `members`, with the service life in revolutions over the duty cycle."""
     first = views[0]
-    bearing = (first.study.joint if first.study_path else joint_of(first.store, 0)).bearing
+    bearing = (first.study.joint if first.study_path else recorded.joint_of(first.store, 0)).bearing
     hours = np.nan if bearing is None or bearing.required_life is None else bearing.required_life / HOUR
     turn = sum(share * 2.0 * np.pi / abs(view.store.operation.speed) for view, share in zip(views, shares, strict=True))
     return section(first).within(hours, HOUR / turn, str(first.path))

@@ -11,21 +11,16 @@ from numpy.typing import NDArray
 
 from tolstat.analysis import cycles, prediction
 from tolstat.analysis.cycles import Cycles
-from tolstat.analysis.prediction import DELIVERY
 from tolstat.analysis.sample import Sample
+from tolstat.common import load_kinds, loads, strict
 from tolstat.common.channels import BUSHING_LOADS, CHANNELS, LoadHistory, channels_of, histories_of
 from tolstat.common.errors import Fault, InputError, StoreError
-from tolstat.common.load_kinds import PLACES
-from tolstat.common.loads import PANELS, FloatArray
-from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import SIMULATED, Status
 from tolstat.display.table import Row, Rows
 from tolstat.questions.fatigue import duty
 from tolstat.questions.fatigue.duty import ANY, CONFIDENCE, Joints, only
 from tolstat.solver import rainflow
-from tolstat.store import revolutions
-from tolstat.store.hdf5 import RUN_AGAIN
-from tolstat.store.reader import Reader
+from tolstat.store import hdf5, reader, revolutions
 from tolstat.store.view import View
 from tolstat.study.selection import select
 
@@ -45,18 +40,18 @@ def channels(patterns: Sequence[str]) -> tuple[str, ...]:
     InputError
         With every pattern that selects nothing.
     """
-    found = {pattern: select(pattern, CHANNELS) for pattern in patterns}
+    selected = {pattern: select(pattern, CHANNELS) for pattern in patterns}
     faults = [
-        Fault(f"channel {pattern!r}", "selects nothing", did_you_mean(pattern, list(CHANNELS)[:8]))
-        for pattern, names in found.items()
+        Fault(f"channel {pattern!r}", "selects nothing", strict.did_you_mean(pattern, list(CHANNELS)[:8]))
+        for pattern, names in selected.items()
         if not names
     ]
     if faults:
         raise InputError(faults)
-    return tuple(name for name in CHANNELS if any(name in names for names in found.values()))
+    return tuple(name for name in CHANNELS if any(name in names for names in selected.values()))
 
 
-def cycles_of(store: Reader, slots: NDArray[np.intp], names: Sequence[str] | None = None) -> Cycles:
+def cycles_of(store: reader.Reader, slots: NDArray[np.intp], names: Sequence[str] | None = None) -> Cycles:
     """Rainflow cycles of joints over one revolution.
 
     Cycles stored by the workers (``histories = "cycles"``) are read. Otherwise they are counted now, from the load
@@ -87,15 +82,15 @@ def cycles_of(store: Reader, slots: NDArray[np.intp], names: Sequence[str] | Non
     names = SHOWN if names is None else tuple(names)
     histories = histories_of(names)
     order = [channel.name for history in histories for channel in channels_of(history)]
-    place = [order.index(name) for name in names]
+    columns = [order.index(name) for name in names]
     lacking = [name for h in histories if (name := f"{h.prefix}cycles") not in store.history_specs]
     if lacking and "cycles" in store.history_specs and not revolutions.held(store, histories):
-        raise StoreError(str(Fault(str(store.path), f"holds no {', '.join(lacking)}", RUN_AGAIN)))
+        raise StoreError(str(Fault(str(store.path), f"holds no {', '.join(lacking)}", hdf5.RUN_AGAIN)))
     table = np.empty((len(slots), len(names), rainflow.KEPT, 2), np.float32)
     number = np.empty((len(slots), len(names)))
     for part in revolutions.blocks(len(slots)):
         counted, counts = _count(store, slots[part], histories)
-        table[part], number[part] = counted[:, place], counts[:, place]
+        table[part], number[part] = counted[:, columns], counts[:, columns]
     status = store.status(slice(int(slots.max(initial=-1)) + 1))[slots]
     without = ~np.isin(status, SIMULATED)
     table[without], number[without] = np.nan, np.nan
@@ -105,17 +100,17 @@ def cycles_of(store: Reader, slots: NDArray[np.intp], names: Sequence[str] | Non
 
 
 def _count(
-    store: Reader, slots: NDArray[np.intp], histories: Sequence[LoadHistory]
+    store: reader.Reader, slots: NDArray[np.intp], histories: Sequence[LoadHistory]
 ) -> tuple[NDArray[Any], NDArray[Any]]:
     """Cycles of a few joints, and their numbers, as `rainflow.count` gives them; history after history."""
     names = [[f"{history.prefix}{name}" for history in histories] for name in ("cycles", "cycle_count")]
     if set(names[0]) <= set(store.history_specs):
-        counted = {name: store.histories(name, slots) for own in names for name in own}
+        counted = {name: store.histories(name, slots) for group in names for name in group}
     else:
-        found = revolutions.loads(store, slots, [BUSHING_LOADS, *(h for h in histories if h != BUSHING_LOADS)])
-        joints = [rainflow.count({name: own[i] for name, own in found.items()}) for i in range(len(slots))]
-        counted = {name: np.stack([joint[name] for joint in joints]) for own in names for name in own}
-    cycles, counts = (np.concatenate([counted[name] for name in own], axis=1) for own in names)
+        turns = revolutions.loads(store, slots, [BUSHING_LOADS, *(h for h in histories if h != BUSHING_LOADS)])
+        joints = [rainflow.count({name: group[i] for name, group in turns.items()}) for i in range(len(slots))]
+        counted = {name: np.stack([joint[name] for joint in joints]) for group in names for name in group}
+    cycles, counts = (np.concatenate([counted[name] for name in group], axis=1) for group in names)
     return cycles, counts
 
 
@@ -176,16 +171,15 @@ def load_cycles(
         parts.append((whole.rows(slice(first, None)), whole.rows(slice(settled))))
     # the nominal joint of a duty cycle has settled at all operating points, or it has no row
     rows = slice(min(len(nominal.number) for _, nominal in parts))
-    own = _mixed(joints, [own for own, _ in parts], shares)
-    return Loading(
-        **vars(joints), cycles=own, nominal=_mixed(joints, [nominal.rows(rows) for _, nominal in parts], shares)
-    )
+    mixed = _mixed(joints, [samples for samples, _ in parts], shares)
+    nominal = _mixed(joints, [nominal.rows(rows) for _, nominal in parts], shares)
+    return Loading(**vars(joints), cycles=mixed, nominal=nominal)
 
 
 def _mixed(joints: Joints, parts: Sequence[Cycles], shares: Sequence[float]) -> Cycles:
     """Cycles over the duty cycle; those between points of loads whose largest cycle at each point is known."""
     sizes, middles = (
-        np.stack([own[..., 0] for own in each], axis=2).astype(float)
+        np.stack([values[..., 0] for values in each], axis=2).astype(float)
         for each in ([part.ranges for part in parts], [part.means for part in parts])
     )
     sizes[sizes == 0] = np.nan  # a constant load: its level is not kept
@@ -214,8 +208,8 @@ def equivalent_loads(loading: Loading) -> Rows:
     settings, rows = loading.settings, list[Row]()
     for m in settings.exponents:
         values, nominal = (
-            cycles.equivalent_load(own, m, settings.revolutions, settings.reference_cycles)
-            for own in (loading.cycles, loading.nominal)
+            cycles.equivalent_load(counted, m, settings.revolutions, settings.reference_cycles)
+            for counted in (loading.cycles, loading.nominal)
         )
         lacking = cycles.truncation_bound(loading.cycles, m)
         for c, channel in enumerate(loading.cycles.channels):
@@ -225,14 +219,14 @@ def equivalent_loads(loading: Loading) -> Rows:
     return rows
 
 
-def _quantiles(head: Row, values: FloatArray, loading: Loading) -> Rows:
+def _quantiles(head: Row, values: loads.FloatArray, loading: Loading) -> Rows:
     """A row for each of `SHARES` of the joints: the head, and the quantile of their values."""
     sample = Sample.of(values, loading.status, loading.design)
-    found = [sample.quantile(share, CONFIDENCE)._asdict() for share in SHARES]
-    return [{**head, **own, "confidence": CONFIDENCE} for own in found]
+    quantiles = [sample.quantile(share, CONFIDENCE)._asdict() for share in SHARES]
+    return [{**head, **quantile, "confidence": CONFIDENCE} for quantile in quantiles]
 
 
-def damages(loading: Loading, delivery: int = DELIVERY) -> Rows:
+def damages(loading: Loading, delivery: int = prediction.DELIVERY) -> Rows:
     """Share of the joints whose damage sum in the service life exceeds 1, for each channel that has an S–N line.
 
     Returns
@@ -255,8 +249,8 @@ def damages(loading: Loading, delivery: int = DELIVERY) -> Rows:
     if len(sums) > 1:
         sums[ANY] = [np.maximum.reduce(every) for every in zip(*sums.values(), strict=True)]
     rows = []
-    for channel, (own, nominal) in sums.items():
-        sample = Sample.of(own, loading.status, loading.design)
+    for channel, (damage, nominal) in sums.items():
+        sample = Sample.of(damage, loading.status, loading.design)
         row = {"channel": channel, **cycles.Line(*lines.get(channel, [np.nan] * 3))._asdict(), "nominal": only(nominal)}
         row |= {"median": sample.quantile(0.5).estimate} | asdict(sample.above(1.0, CONFIDENCE))
         row |= prediction.columns(sample.delivery(1.0, delivery, CONFIDENCE), delivery) | {"confidence": CONFIDENCE}
@@ -280,11 +274,11 @@ def spectrum(loading: Loading, channel: str) -> Rows:
     steps = steps[np.take_along_axis(part.ranges[:, 0], order, axis=1) > 0]
     numbers = np.unique(np.append(steps.round(9), 1.0))  # at which the spectra of the joints have steps
     numbers = numbers[np.linspace(0, numbers.size - 1, min(numbers.size, MAX_NUMBERS)).round().astype(int)]
-    values, nominal = (cycles.spectrum(own.of(channel), numbers)[:, 0] for own in (loading.cycles, loading.nominal))
+    values, nominal = (cycles.spectrum(each.of(channel), numbers)[:, 0] for each in (loading.cycles, loading.nominal))
     head, rows = {"channel": channel, "unit": CHANNELS[channel].unit}, list[Row]()
-    for number, own, ideal in zip(numbers, values.T, nominal.T, strict=True):
+    for number, ranges, ideal in zip(numbers, values.T, nominal.T, strict=True):
         count = {"nominal": only(ideal), "cycles": number * loading.settings.revolutions}
-        rows += _quantiles(head | count, own, loading)
+        rows += _quantiles(head | count, ranges, loading)
     return rows
 
 
@@ -297,12 +291,11 @@ def most_loaded(rows: Rows) -> list[str]:
     exponents = sorted({row["m"] for row in rows})
     last = [row for row in rows if row["share"] == SHARES[-1] and row["m"] == exponents[len(exponents) // 2]]
     valid = [row for row in last if not np.isnan(row["estimate"])]
-    found: dict[tuple[str, str], Row] = {}
+    largest: dict[tuple[str, str], Row] = {}
     for row in [row for row in valid if not CHANNELS[row["channel"]].is_modulus] or valid:
         key = CHANNELS[row["channel"]].place, CHANNELS[row["channel"]].kind.key
-        if key not in found or row["estimate"] > found[key]["estimate"]:
-            found[key] = row
-    return [row["channel"] for row in found.values()]
+        largest[key] = max(largest.get(key, row), row, key=lambda row: float(row["estimate"]))
+    return [row["channel"] for row in largest.values()]
 
 
 def leading(rows: Rows) -> list[str]:
@@ -310,10 +303,10 @@ def leading(rows: Rows) -> list[str]:
 
     Candidates are the channels `most_loaded` of the table; all exponents count.
     """
-    names, found = most_loaded(rows), []
+    names, chosen = most_loaded(rows), []
     candidates = [row for row in rows if row["share"] == SHARES[-1] and row["channel"] in names]
-    for group, kind in PANELS:
+    for group, kind in loads.PANELS:
         here = [row for row in candidates if CHANNELS[row["channel"]].kind == kind]
-        here = [row for row in here if PLACES[CHANNELS[row["channel"]].place].group == group]
-        found += [max(here, key=lambda row: float(row["estimate"]))["channel"]] if here else []
-    return found
+        here = [row for row in here if load_kinds.PLACES[CHANNELS[row["channel"]].place].group == group]
+        chosen += [max(here, key=lambda row: float(row["estimate"]))["channel"]] if here else []
+    return chosen

@@ -11,23 +11,17 @@ from numpy.typing import NDArray
 
 from tolstat.analysis import prediction, strength
 from tolstat.analysis.cycles import Cycles, duty_cycle
-from tolstat.analysis.prediction import DELIVERY
 from tolstat.analysis.sample import Sample
-from tolstat.analysis.strength import Collective, Failures, Line
-from tolstat.common.bisection import first
-from tolstat.common.channels import BUSHING_LOADS
+from tolstat.common import bisection, channels
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import FloatArray
 from tolstat.common.tables import FAILED, Status
 from tolstat.display.table import Rows
 from tolstat.questions.fatigue import duty
-from tolstat.questions.fatigue.duty import ANY, CONFIDENCE, Joints, only
 from tolstat.solver import rainflow
-from tolstat.store import revolutions
-from tolstat.store.reader import Reader
+from tolstat.store import reader, revolutions
 from tolstat.store.view import View
-from tolstat.study.fatigue import Fatigue
-from tolstat.study.stress_point import StressPoint
+from tolstat.study.fatigue import Fatigue, StressPoint
 
 SHARE = 0.1
 """Share of the parts that have failed at the end of the life given, B10."""
@@ -56,7 +50,7 @@ class Stresses(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Stressed(Joints):
+class Stressed(duty.Joints):
     """Stresses of joints.
 
     Attributes
@@ -106,16 +100,16 @@ def load_stresses(views: Sequence[View], shares: Sequence[float] | None = None, 
     both = int(all((view.nominal["status"] == Status.OK).any() for view in views))
     rows = np.append(np.zeros(both, np.intp), 1 + np.flatnonzero(joints.valid))
     slots = [np.append(view.nominal_slots[:both], view.slots(rows[both:] - 1)) for view in views]
-    found = [stresses_of(view.store, own, joints.settings.points) for view, own in zip(views, slots, strict=True)]
-    parts = [_spread(own, rows, 1 + joints.status.size) for own, _ in found]
+    settled = [stresses_of(view.store, those, joints.settings.points) for view, those in zip(views, slots, strict=True)]
+    parts = [_spread(stresses, rows, 1 + joints.status.size) for stresses, _ in settled]
     low, high = (np.stack([getattr(part, end) for part in parts], axis=2) for end in ("low", "high"))
     mixed = duty_cycle([part.cycles for part in parts], shares, joints.transitions(low, high))
     whole = Stresses(mixed, low.min(axis=2), high.max(axis=2))
-    apart = max(difference for _, difference in found)
+    apart = max(difference for _, difference in settled)
     return Stressed(**vars(joints), own=whole.rows(slice(1, None)), nominal=whole.rows(slice(both)), apart=apart)
 
 
-def stresses_of(store: Reader, slots: NDArray[np.intp], points: Sequence[StressPoint]) -> tuple[Stresses, float]:
+def stresses_of(store: reader.Reader, slots: NDArray[np.intp], points: Sequence[StressPoint]) -> tuple[Stresses, float]:
     """Stresses of settled joints over one revolution, and `Revolutions.apart`.
 
     Parameters
@@ -131,16 +125,16 @@ def stresses_of(store: Reader, slots: NDArray[np.intp], points: Sequence[StressP
     low, high = np.zeros((2, len(slots), len(places)))
     counted: list[tuple[FloatArray, FloatArray]] = []
     apart = 0.0
-    for part, found, difference in revolutions.of_components(store, slots, [BUSHING_LOADS]):
-        apart, loads = max(apart, difference), found[BUSHING_LOADS.name]
+    for part, components, difference in revolutions.of_components(store, slots, [channels.BUSHING_LOADS]):
+        apart, loads = max(apart, difference), components[channels.BUSHING_LOADS.name]
         signals, noise = zip(*(_signal(loads, *place) for place in places), strict=True)
         low[part], high[part] = (np.stack([end(s, axis=1) for s in signals], axis=1) for end in (np.min, np.max))
         for joint in range(len(loads)):
             counted += [rainflow.periodic(s[joint], gate[joint]) for s, gate in zip(signals, noise, strict=True)]
     number = np.array([len(ranges) for ranges, _ in counted], float).reshape(low.shape)
     table = np.zeros((2, len(counted), max(1, int(number.max(initial=0.0)))))
-    for i, own in enumerate(counted):
-        table[:, i, : len(own[0])] = own
+    for i, joint_cycles in enumerate(counted):
+        table[:, i, : len(joint_cycles[0])] = joint_cycles
     names = tuple(point.name for point, _ in places)
     ranges, means = table.reshape(2, *low.shape, -1)
     return Stresses(Cycles.of_revolution(names, ranges, means, number), low, high), apart
@@ -148,8 +142,8 @@ def stresses_of(store: Reader, slots: NDArray[np.intp], points: Sequence[StressP
 
 def _signal(loads: NDArray[np.floating], point: StressPoint, factors: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Stress over the revolution, (m, samples), and the range up to which cycles may be numerical noise, (m,), Pa."""
-    own = loads[:, :, BUSHING_LOADS.places.index(point.bushing)].astype(float)
-    return own @ factors, rainflow.GATE * np.max(np.abs(own) @ np.abs(factors), axis=1)
+    at_bushing = loads[:, :, channels.BUSHING_LOADS.places.index(point.bushing)].astype(float)
+    return at_bushing @ factors, rainflow.GATE * np.max(np.abs(at_bushing) @ np.abs(factors), axis=1)
 
 
 def _spread(part: Stresses, rows: NDArray[np.intp], n: int) -> Stresses:
@@ -168,11 +162,11 @@ def _spread(part: Stresses, rows: NDArray[np.intp], n: int) -> Stresses:
 class Evaluated(NamedTuple):
     """Stress cycles of the joints at one point in the service life, and its S–N line."""
 
-    collective: Collective
-    line: Line
+    collective: strength.Collective
+    line: strength.Line
 
 
-def part_failures(stressed: Stressed, delivery: int = DELIVERY) -> Rows:
+def part_failures(stressed: Stressed, delivery: int = prediction.DELIVERY) -> Rows:
     """Damage, life and probability of failure at each point of the parts.
 
     Parameters
@@ -193,31 +187,31 @@ def part_failures(stressed: Stressed, delivery: int = DELIVERY) -> Rows:
         joint); the fields of `analysis.strength.Failures`, ``confidence``, ``next_lower`` and
         ``next_upper`` (prediction interval for the failures in the next delivery).
     """
-    own, nominal = (evaluated(stresses, stressed.settings) for stresses in (stressed.own, stressed.nominal))
-    heads = [_damage(stressed, p, own[p], nominal[p]) for p in range(len(own))]
-    groups = [slice(p, p + 1) for p in range(len(own))]
-    if len(own) > 1:
-        heads.append({"point": ANY, "bushing": ""} | dict.fromkeys(list(heads[0])[2:], np.nan))
+    points, nominal = (evaluated(stresses, stressed.settings) for stresses in (stressed.own, stressed.nominal))
+    heads = [_damage(stressed, p, points[p], nominal[p]) for p in range(len(points))]
+    groups = [slice(p, p + 1) for p in range(len(points))]
+    if len(points) > 1:
+        heads.append({"point": duty.ANY, "bushing": ""} | dict.fromkeys(list(heads[0])[2:], np.nan))
         groups.append(slice(None))
     rows = []
     for head, group in zip(heads, groups, strict=True):
-        wide = failures(stressed, own[group], confidence=prediction.half(CONFIDENCE))
-        following = prediction.of_share(wide.outer_lower, wide.outer_upper, delivery, CONFIDENCE)
-        head |= prediction.columns(following, delivery) | _life(stressed, own[group])
-        head |= {"nominal_failures": only(_chances(nominal[group]))} | failures(stressed, own[group])._asdict()
-        rows.append(head | {"confidence": CONFIDENCE})
+        wide = failures(stressed, points[group], confidence=prediction.half(duty.CONFIDENCE))
+        following = prediction.of_share(wide.outer_lower, wide.outer_upper, delivery, duty.CONFIDENCE)
+        head |= prediction.columns(following, delivery) | _life(stressed, points[group])
+        head |= {"nominal_failures": duty.only(_chances(nominal[group]))} | failures(stressed, points[group])._asdict()
+        rows.append(head | {"confidence": duty.CONFIDENCE})
     return rows
 
 
-def failures_over_life(stressed: Stressed, revolutions: Sequence[float]) -> list[Failures]:
+def failures_over_life(stressed: Stressed, revolutions: Sequence[float]) -> list[strength.Failures]:
     """Share of the joints with a failed part at any point after numbers of revolutions."""
     points = evaluated(stressed.own, stressed.settings)
     return [failures(stressed, points, number / stressed.settings.revolutions) for number in revolutions]
 
 
 def failures(
-    stressed: Stressed, points: Sequence[Evaluated], lives: float = 1.0, confidence: float = CONFIDENCE
-) -> Failures:
+    stressed: Stressed, points: Sequence[Evaluated], lives: float = 1.0, confidence: float = duty.CONFIDENCE
+) -> strength.Failures:
     """Share of the joints of which a part has failed at any of some points after so many service lives.
 
     Joints that are not settled, or never repeat, have no stresses.
@@ -243,16 +237,16 @@ def evaluated(stresses: Stresses, settings: Fatigue) -> list[Evaluated]:
 
     Of several places around a section each joint has those of the one at which it fails first.
     """
-    found, begin = [], 0
+    collectives, begin = [], 0
     for point in settings.points:
         end = begin + len(point.per_load)
         places = [_in_service(stresses, place, point.line, settings) for place in range(begin, end)]
-        found.append(Evaluated(strength.weakest(places, point.line), point.line))
+        collectives.append(Evaluated(strength.weakest(places, point.line), point.line))
         begin = end
-    return found
+    return collectives
 
 
-def _in_service(stresses: Stresses, place: int, line: Line, settings: Fatigue) -> Collective:
+def _in_service(stresses: Stresses, place: int, line: strength.Line, settings: Fatigue) -> strength.Collective:
     """Cycles of the joints at one place in the service life.
 
     A start goes from the unstressed joint to the extremes of the revolution and back; its cycle, between the extremes
@@ -271,12 +265,12 @@ def _in_service(stresses: Stresses, place: int, line: Line, settings: Fatigue) -
     return strength.sort_out(strength.at_ratio(ranges, means, line.M, line.R), numbers, line)
 
 
-def _damage(stressed: Stressed, p: int, own: Evaluated, nominal: Evaluated) -> dict[str, Any]:
+def _damage(stressed: Stressed, p: int, joints: Evaluated, nominal: Evaluated) -> dict[str, Any]:
     """Damage sums at a point, of the nominal joint and over the joints."""
     point = stressed.settings.points[p]
-    sample = Sample.of(strength.damage_at(*own), stressed.status, stressed.design)
+    sample = Sample.of(strength.damage_at(*joints), stressed.status, stressed.design)
     head = {"point": point.name, "bushing": point.bushing, **point.line._asdict()}
-    head["nominal"] = only(strength.damage_at(*nominal))
+    head["nominal"] = duty.only(strength.damage_at(*nominal))
     return head | {name: sample.quantile(share).estimate for name, share in (("median", 0.5), ("upper_99", 0.99))}
 
 
@@ -299,4 +293,4 @@ def _reaches(share: Callable[[float], float]) -> float:
         return 0.0
     if share(np.exp(longest)) < SHARE:
         return np.inf
-    return float(np.exp(first(lambda log: share(float(np.exp(log))) >= SHARE, -longest, longest, 30)))
+    return float(np.exp(bisection.first(lambda log: share(float(np.exp(log))) >= SHARE, -longest, longest, 30)))

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from tolstat.common.channels import CHANNELS
+from tolstat.common.late import pandas as pd
 from tolstat.questions.fatigue.loads import cycles_of
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from tolstat.store.view import View
+from tolstat.store.view import View
 
 INTERVALS = ("range", "mean")
 
@@ -65,27 +62,25 @@ def table(
     nominal: bool = False,
 ) -> pd.DataFrame:
     """Flat table of `pylife_series`: ``joint``, ``channel``, ``unit``, ends of range and mean, ``cycles``."""
-    import pandas as pd
-
     if bins < 1:
         raise ValueError(f"{bins} classes: at least 1 expected")
     first = 0 if nominal else view.store.first_sample
     cycles = cycles_of(view.store, np.arange(first, view.store.n), channels)
-    joint, channel, place = np.nonzero(cycles.ranges > 0)  # leaves out NaN
+    joint, channel, cycle = np.nonzero(cycles.ranges > 0)  # leaves out NaN
     units = np.array([CHANNELS[name].unit for name in cycles.channels], dtype=object)[channel]
     columns: dict[str, Any] = {"joint": np.array(view.store.rows[first:])[joint], "channel": channel, "unit": units}
     for name, values in (("range", cycles.ranges), ("mean", cycles.means)):
         ends = np.zeros((2, len(joint)))
         for kind in (units != "N", units == "N"):
-            own = values[joint, channel, place][kind].astype(float)
-            low, high = 0.0 if name == "range" else own.min(initial=np.inf), own.max(initial=-np.inf)
+            sizes = values[joint, channel, cycle][kind].astype(float)
+            low, high = 0.0 if name == "range" else sizes.min(initial=np.inf), sizes.max(initial=-np.inf)
             if low <= high:  # the last edge is above the largest value
                 edges = np.linspace(low, high + 1e-6 * max(high - low, abs(high), 1e-300), bins + 1)
-                here = np.searchsorted(edges, own, side="right") - 1
+                here = np.searchsorted(edges, sizes, side="right") - 1
                 ends[:, kind] = edges[here], edges[here + 1]
         columns |= dict(zip((f"{name}_left", f"{name}_right"), ends, strict=True))
     keys = ["joint", "channel", *(f"{name}_{side}" for name in INTERVALS for side in ("left", "right"))]
-    frame = pd.DataFrame(columns | {"cycles": cycles.repeats[joint, channel, place] * revolutions})
+    frame = pd.DataFrame(columns | {"cycles": cycles.repeats[joint, channel, cycle] * revolutions})
     classes = frame.groupby([*keys[:2], "unit", *keys[2:]])[["cycles"]].sum().reset_index()
     classes["channel"] = np.array(cycles.channels, dtype=object)[classes["channel"]]
     return classes
@@ -93,8 +88,6 @@ def table(
 
 def from_table(table: pd.DataFrame) -> pd.Series[float]:
     """Series of a flat table, as `table` makes it or ``pandas.read_csv`` reads it."""
-    import pandas as pd
-
     levels = [
         pd.IntervalIndex.from_arrays(table[f"{name}_left"], table[f"{name}_right"], closed="left") for name in INTERVALS
     ]

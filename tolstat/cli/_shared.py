@@ -1,0 +1,237 @@
+"""What commands share: messages on standard error and in a log file, answers on standard output, simulations."""
+
+from __future__ import annotations
+
+import json
+import logging
+import sys
+import textwrap
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager, nullcontext, redirect_stdout
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, TextIO
+
+import typer
+
+from tolstat import __version__
+from tolstat.cli._library import answers, assumptions, campaigns, compilation, designs, mounting, pool, tables, works
+from tolstat.common.errors import Fault, InputError
+from tolstat.common.files import atomic_write, make_parent
+from tolstat.display.options import Opt
+from tolstat.display.progress import Display, display
+from tolstat.display.unseen import visible
+
+if TYPE_CHECKING:
+    from tolstat.common.tables import Variant
+    from tolstat.display.answer import Answer, Column, Rows
+    from tolstat.joint import Joint
+    from tolstat.study import Study
+
+WIDTH = 80
+"""Maximum length of a line of prose, characters."""
+LOG = logging.getLogger("tolstat")
+LOG.propagate = False
+say, warn, fail = LOG.info, LOG.warning, LOG.error
+"""Tell a message; a warning; why the command ends early. The last two are told with --quiet, too."""
+
+
+class _Stderr(logging.Handler):
+    """Prints messages on the standard error of the moment: above the bar while one is shown."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        text = for_terminal(record.getMessage())
+        print(wrapped(text) if record.levelno == logging.INFO else text, file=sys.stderr, flush=True)
+
+
+def for_terminal(text: str) -> str:
+    """Text without characters that move the cursor, change colours or the title: names of a file may hold them."""
+    return visible(text).replace("\r", "[U+000D]")
+
+
+class _Terminal:
+    """Standard output on a terminal: what is written passes `for_terminal`. Into files and pipes goes what is there."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+
+    def write(self, text: str) -> int:
+        return self._stream.write(for_terminal(text))
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+
+def wrapped(text: str) -> str:
+    """Break lines of prose above `WIDTH` characters; those with a long path or a command to type stay whole."""
+    return "\n".join(_broken(line) if len(line) > WIDTH else line for line in text.split("\n"))
+
+
+def _broken(line: str) -> str:
+    if ": tolstat " in line or max(map(len, line.split())) > WIDTH // 2:
+        return line
+    indent = " " * (len(line) - len(line.lstrip()) + 4)
+    return textwrap.fill(line, WIDTH, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
+
+
+@contextmanager
+def session(
+    *, quiet: bool = False, verbose: bool = False, log: Annotated[Path | None, Opt("FILE")] = None
+) -> Iterator[None]:
+    """Tell messages as the options of a command ask; every command has these options.
+
+    Parameters
+    ----------
+    quiet : bool
+        Print warnings and errors only on standard error.
+    verbose : bool
+        Print each stage and its time on standard error.
+    log : Path, optional
+        Append messages with times to FILE, created if missing.
+
+    Raises
+    ------
+    InputError
+        When it is to be quiet and verbose.
+    OSError
+        When the log cannot be written.
+    """
+    terminal = _Stderr()
+    LOG.handlers = [terminal]
+    LOG.setLevel(logging.DEBUG)
+    terminal.setLevel(logging.WARNING if quiet else logging.DEBUG if verbose else logging.INFO)
+    try:
+        if quiet and verbose:
+            raise InputError([Fault("--quiet", "cannot be combined with --verbose", "remove one of them")])
+        if log is not None:
+            LOG.addHandler(_log_file(log))
+        LOG.debug("tolstat %s: %s", __version__, " ".join(sys.argv[1:]))
+        with redirect_stdout(_Terminal(sys.stdout)) if sys.stdout.isatty() else nullcontext():
+            yield
+    finally:
+        for handler in LOG.handlers[1:]:
+            handler.close()
+        LOG.handlers = [terminal]
+
+
+def _log_file(path: Path) -> logging.Handler:
+    make_parent(path)
+    handler = logging.FileHandler(path, encoding="utf-8")
+    form = logging.Formatter("%(asctime)s %(levelname)s %(message)s", "%Y-%m-%dT%H:%M:%SZ")
+    form.converter = time.gmtime
+    handler.setFormatter(form)
+    return handler
+
+
+@contextmanager
+def progress(first: str = "") -> Iterator[Display]:
+    """Show progress on standard error, with the stage `first` to begin with; see `display.progress.Display`."""
+    quiet = bool(LOG.handlers) and LOG.handlers[0].level > logging.INFO
+    with display(say, LOG.debug, quiet) as shown:
+        if first:
+            shown.stage(first)
+        yield shown
+
+
+def deliver(answer: Answer, wide: bool, as_json: bool = False) -> None:
+    """Print an answer as JSON, or its tables and leading sentences, and on standard error its notes and warnings."""
+    if as_json:
+        print_json(answer.values())
+        return
+    first = True
+    for part in answer.parts:
+        if isinstance(part, answers.Table) and part.columns:
+            if not first:
+                typer.echo(f"\n{part.title}")
+            print_table(part.columns, part.for_people, wide)
+            first = False
+        elif isinstance(part, answers.Listing):
+            typer.echo(f"\n{part.title}\n{part.text}")
+        elif isinstance(part, answers.Sentence):
+            if part.place == "lead":
+                typer.echo(part.text if wide else textwrap.fill(part.text, WIDTH))
+                first = False
+            elif part.place == "warning":
+                warn(wrapped(f"warning: {part.text}"))
+            else:
+                say(part.text)
+
+
+def print_table(columns: Sequence[Column], rows: Rows, wide: bool) -> None:
+    """Print a table on standard output, and on standard error the columns left out to fit the line."""
+    text, missing = tables.fitted(columns, rows, None if wide else tables.WIDTH)
+    typer.echo(text)
+    if missing:
+        say(missing)
+
+
+def json_of(values: Any) -> str:
+    """Format plain values as JSON."""
+    return json.dumps(values, indent=2, allow_nan=False)
+
+
+def print_json(values: Any) -> None:
+    """Print plain values as JSON on standard output."""
+    typer.echo(json_of(values))
+
+
+def write(target: str, content: Callable[[TextIO], object]) -> None:
+    """Write a file as `content` does, or standard output where `target` is ``-``."""
+    if target == "-":
+        content(sys.stdout)
+        return
+    with atomic_write(Path(target)) as temporary, temporary.open("w", encoding="utf-8", newline="") as stream:
+        content(stream)
+
+
+@contextmanager
+def work(**settings: Any) -> Iterator[works.Work]:
+    """Work of one command with progress on standard error; `settings` are fields of `Work`.
+
+    A simulation that is stopped, or loses its workers, says how far it came and ends with the exit code of that.
+    """
+    compilation.announce()
+    try:
+        with progress() as shown:
+            yield works.Work(display=shown, tell=say, **settings)
+    except campaigns.Interrupted as stop:
+        fail(str(stop))
+        raise typer.Exit(stop.exit_code) from stop
+    except pool.WorkerDied as error:
+        fail(f"error: {error}")
+        raise typer.Exit(1) from error
+
+
+def print_warnings(path: Path, joints: Iterable[Joint], variants: Iterable[Variant] = ()) -> None:
+    """Print the warnings of the joint of a case or study, or of the joints of its `variants`; see `Joint.warnings`.
+
+    Of several joints with a warning about the same key the first is printed, and how many others there are.
+    """
+    places = [f"variant {variant.family!r}: joint" for variant in variants] or ["joint"]
+    faults: dict[str, list[Fault]] = {}
+    for place, joint in zip(places, joints, strict=True):
+        for fault in joint.warnings():
+            faults.setdefault(fault.place, []).append(replace(fault, place=f"{place}.{fault.place}"))
+    for first, *others in faults.values():
+        more = f" (and {len(others)} more joints)" if others else ""
+        warn(f"warning: {path}: {replace(first, found=first.found + more)}")
+
+
+def print_study_notes(path: Path, study: Study) -> None:
+    """Print what a study stands on, and its warnings.
+
+    These are mounting and contact law; measured signals; warnings of its joints, of values that are probably not meant,
+    shares without an interval, and a note where rigid shafts meet errors along them.
+    """
+    say(f"{study.name}: {study.joint_in_words}")
+    for note in study.signals:
+        say(f"note: {note}")
+    axial = [joint.shaft.axial for joint in study.joints]
+    if note := mounting.note(study.tolerances, axial, mounting.command(str(path), path.stem, study.joint)):
+        say(f"note: {note}")
+    print_warnings(path, study.joints, study.variants)
+    for fault in assumptions.warnings(study):
+        warn(f"warning: {fault}")
+    if not study.sampling.has_replicates and (reason := designs.without_interval(study.sampling.method)):
+        warn(f"warning: {reason}")

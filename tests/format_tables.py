@@ -13,7 +13,6 @@ from pathlib import Path
 from tests import study_reference
 from tolstat.common import draw_records, tables
 from tolstat.common.columns import DESIGN_COLUMNS, ERROR_COLUMNS, LEDGER_COLUMNS, RESULT_COLUMNS, Column
-from tolstat.joint.contact import LAWS
 from tolstat.joint.derived import DERIVED
 from tolstat.store import layout
 from tolstat.store.layout import SESSION
@@ -70,15 +69,6 @@ def status_table() -> str:
     return "\n".join(lines + [f"| {s.value} | `{s.label}` | {tables.STATUS_TEXT[s]} |" for s in tables.Status])
 
 
-def law_table() -> str:
-    """Markdown table of the contact laws, a line for each kind of station."""
-    lines = ["| law | stations at s | coefficients of a station | weight |", "|---|---|---|---|"]
-    for name, law in LAWS.items():
-        for i, row in enumerate(law.rows):
-            lines.append(" | ".join(["|" if i else f"| `{name}`", *row]) + " |")
-    return "\n".join(lines)
-
-
 def derived_table() -> str:
     """Markdown table of the keys of a joint that follow from others."""
     lines = ["| key | follows from | formula |", "|---|---|---|"]
@@ -107,7 +97,7 @@ def documents() -> dict[Path, str]:
     page = {"errors": field_table(ERROR_COLUMNS), "results": field_table(RESULT_COLUMNS)}
     return {
         FORMAT: updated(FORMAT.read_text(encoding="utf-8"), content),
-        MODEL: updated(MODEL.read_text(encoding="utf-8"), {"laws": law_table(), "derived": derived_table()}),
+        MODEL: updated(MODEL.read_text(encoding="utf-8"), {"derived": derived_table()}),
         STUDY: updated(STUDY.read_text(encoding="utf-8"), study_reference.tables()),
         SCHEMA: PAGE.format(version=tables.SCHEMA_VERSION, **page),
     }

@@ -68,7 +68,7 @@ def told():
 @pytest.fixture(scope="module")
 def coarse(plan, told):
     """Joints at 12 steps a revolution, where the steps' error is large; two processes share the references."""
-    return verify.check_study(plan, joints=6, workers=2, progress=told.append)
+    return verify.check_study(plan, 6, make=partial(verify.ALL, workers=2, progress=told.append))
 
 
 def force_and_torque(base, other):
@@ -141,8 +141,9 @@ def test_all_joints_are_those_that_settled_and_the_one_without_errors(tmp_path):
     campaign.run(study.load(written(tmp_path), n=4), tmp_path / "a.h5", workers=1, check=False)
     with damage.rewritten(tmp_path / "a.h5") as file:
         file["results/status"][2] = Status.NOT_SETTLED
-    assert verify.check_file(tmp_path / "a.h5", None, names=("newton",)).rows.tolist() == [0, 1, 3, 4]
-    assert verify.check_file(tmp_path / "a.h5", 9, names=("newton",)).rows.tolist() == [1, 3, 4]
+    newton = partial(verify.ALL, names=("newton",))
+    assert verify.check_file(tmp_path / "a.h5", None, make=newton).rows.tolist() == [0, 1, 3, 4]
+    assert verify.check_file(tmp_path / "a.h5", 9, make=newton).rows.tolist() == [1, 3, 4]
 
 
 def test_errors_are_relative_to_the_largest_of_the_kind():
@@ -195,8 +196,7 @@ def test_a_slice_keeps_the_rows_of_the_campaign(tmp_path, monkeypatch):
         store.write(np.arange(10), Simulation(results, {}))
         solve = lambda slots, *_, **__: Simulation(results[slots], {})  # noqa: E731
         monkeypatch.setattr(verify, "parameters", lambda store, slots: slots)
-        monkeypatch.setattr(verify, "run_checks", partial(checks.run_checks, simulate=solve))
-        checked = verify.check_campaign(store, ("newton",), 3, 7, 1, checks.no_progress)
+        checked = verify.check_campaign(store, 3, 7, partial(checks.run_checks, names=("newton",), simulate=solve))
         verification.write([(store, checked)])
     with ResultFile.open(tmp_path / "b.h5") as store:
         found = verification.read(store)
@@ -323,7 +323,8 @@ def test_lower_fidelity_is_measured_against_the_dynamic_joint(tmp_path):
     text = REAL.replace("steps_per_rev = 12", 'fidelity = "quasistatic"\nsteps_per_rev = 180').replace(
         "500 rpm", "1000 rpm"
     )
-    found = verify.check_study(study.load(written(tmp_path, text)), joints=1, names=(*checks.QUICK_CHECKS, "reference"))
+    without_method = partial(verify.ALL, names=(*checks.QUICK_CHECKS, "reference"))
+    found = verify.check_study(study.load(written(tmp_path, text)), joints=1, make=without_method)
     true = force_and_torque(found.base, found.checks["reference"].results)
     seen = force_and_torque(found.base, found.checks["fidelity"].results)
     assert true.min() > 5e-4  # the inertia of bodies that deviate from the ideal motion

@@ -10,7 +10,7 @@ import sys
 import pytest
 
 from tests.support.environment import environment
-from tolstat.common.forked import CAN_FORK, Forked, mapped
+from tolstat.common.cores import CAN_FORK, Forked, mapped
 
 
 @pytest.mark.parametrize("processes", [1, 2, 3, 9])
@@ -57,7 +57,7 @@ def test_no_process_outlives_one_that_is_killed() -> None:
 
 KILLED = """
 import os, signal
-from tolstat.common.forked import Forked
+from tolstat.common.cores import Forked
 others = [Forked(lambda: bytes(10**6)) for _ in range(2)]
 assert all(other._end.poll(60) for other in others)
 os.kill(os.getpid(), signal.SIGKILL)

@@ -17,7 +17,7 @@ from tolstat.common.errors import InputError
 from tolstat.common.strict import validate
 from tolstat.joint import Joint, derived, material
 from tolstat.joint.derived import BEARING, DERIVED, get
-from tolstat.joint.overrides import leaves, nested
+from tolstat.joint.model import leaves, nested
 from tolstat.joint.sections import quantities
 
 FILE = files.data_dir() / "joints" / "cirelli2021.toml"

@@ -18,6 +18,7 @@ from tolstat.common.load_kinds import PINS
 from tolstat.common.strict import validate
 from tolstat.common.tables import ERROR_FIELDS, HOLES, PARAM
 from tolstat.joint import Joint, Operation, material
+from tolstat.joint.contact import LAWS
 from tolstat.joint.perturbation import ARM_TRIADS, PIN_TRIADS
 from tolstat.kernel.mechanics.topology import ARM_OF_PIN
 
@@ -433,3 +434,8 @@ def test_sliced_law_has_gauss_points_the_outermost_first(operation, n):
     assert w.sum() == pytest.approx(2.0)
     if n > 1:
         assert (w * s**2).sum() == pytest.approx(2 * (11 * MM) ** 2 / 3)  # mean square over the length, twice
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_each_contact_law_has_a_line_in_the_table_of_the_model(law):
+    assert f"\n| `{law}` | " in (files.docs_dir() / "model.md").read_text(encoding="utf-8")

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -14,15 +15,18 @@ from tolstat.campaign.what_if import check_code
 from tolstat.common import selected_results
 from tolstat.common.errors import Fault, InputError, gather
 from tolstat.common.loads import LOADS, Limit, load_of, split
-from tolstat.common.tables import Status
+from tolstat.common.tables import Options, Status
 from tolstat.sampling import draw
 from tolstat.solver import compilation
 from tolstat.store import Reader, Writer, verification
 from tolstat.store.hdf5 import pick, store_error
 from tolstat.store.recorded import options_of, parameters, perturbed, variants
-from tolstat.store.verification import Verification
+from tolstat.store.verification import Check, Verification
 from tolstat.study import Study, load, rule
 
+Make = Callable[[NDArray[np.void], Sequence[Options]], dict[str, Check]]
+"""Function that simulates joints again, see `run_checks`."""
+ALL: Make = partial(run_checks, names=ALL_CHECKS)
 EXAMPLE = 'write --near "cross1.F > 700 N", or --near "any limit"'
 JOINTS_PER_CHECKED, MAX_CHECKED = 400, 16
 """At the end of a run one joint in 400 is checked, at least one and at most 16: some 2 % of the run's time."""
@@ -36,21 +40,19 @@ def choose(rows: NDArray[np.intp], joints: int | None, seed: int) -> NDArray[np.
     return np.sort(rng.choice(rows, min(joints, len(rows)), replace=False))
 
 
-def check_campaign(
-    store: Reader, names: Iterable[str], joints: int | None, seed: int, workers: int, progress: Progress
-) -> Verification | None:
+def check_campaign(store: Reader, joints: int | None, seed: int, make: Make) -> Verification | None:
     """Check settled joints of a campaign.
 
     Parameters
     ----------
     store : Reader
         Result file of the campaign.
-    names, workers, progress
-        As in `run_checks`.
     joints : int or None
         Number of joints; None for all, including the nominal joint.
     seed : int
         Seed of the random choice.
+    make : callable
+        Parameters of joints and solver options of each -> checks, see `run_checks`.
 
     Returns
     -------
@@ -61,15 +63,12 @@ def check_campaign(
     if joints is not None and len(settled) > 1:
         settled = settled[settled >= store.first_sample]  # the nominal joint is not in the statistics either
     slots = choose(settled, joints, seed)
-    return check_slots(store, slots, names, seed, workers, progress) if slots.size else None
+    return check_slots(store, slots, seed, make) if slots.size else None
 
 
-def check_slots(
-    store: Reader, slots: NDArray[np.intp], names: Iterable[str], seed: int, workers: int, progress: Progress
-) -> Verification:
+def check_slots(store: Reader, slots: NDArray[np.intp], seed: int, make: Make) -> Verification:
     """Check the joints in file slots, (m,) ascending; parameters otherwise as in `check_campaign`."""
-    options = [options_of(store, slot) for slot in slots.tolist()]
-    checks = run_checks(parameters(store, slots), options, names, workers=workers, progress=progress)
+    checks = make(parameters(store, slots), [options_of(store, slot) for slot in slots.tolist()])
     for check in checks.values():
         selected_results.blank_others(check.results, store.columns)
     return Verification(seed, store.row(slots), pick(store.results, slots), checks)
@@ -88,7 +87,7 @@ def check_few(store: Writer) -> None:
     seed, made = int(store.sampling["seed"]), []
     for at_point in store.each() if store.whole else ():
         if at_point.complete and verification.read(at_point) is None:
-            verified = check_campaign(at_point, QUICK_CHECKS, few(at_point.n), seed, 1, no_progress)
+            verified = check_campaign(at_point, few(at_point.n), seed, partial(run_checks, names=QUICK_CHECKS))
             made += [(at_point, verified)] if verified else []
     if made:
         verification.write(made)
@@ -114,19 +113,11 @@ def check(
             study = load(path)
     if faults:
         raise InputError(faults)
-    if path.suffix != ".toml":
-        return check_file(path, number, seed, ALL_CHECKS, workers, progress)
-    return check_study(study, number, seed, ALL_CHECKS, workers, progress)
+    make = partial(run_checks, names=ALL_CHECKS, workers=workers, progress=progress)
+    return check_study(study, number, seed, make) if path.suffix == ".toml" else check_file(path, number, seed, make)
 
 
-def check_file(
-    path: Path,
-    joints: int | None,
-    seed: int | None = None,
-    names: Iterable[str] = ALL_CHECKS,
-    workers: int = 1,
-    progress: Progress = no_progress,
-) -> Verification:
+def check_file(path: Path, joints: int | None, seed: int | None = None, make: Make = ALL) -> Verification:
     """Check joints of a result file and store the checks in it, replacing an earlier verification.
 
     Parameters
@@ -137,10 +128,8 @@ def check_file(
         Number of joints; None for all settled joints, including the nominal joint.
     seed : int, optional
         Seed of the random choice; the campaign's own seed without it.
-    names : iterable of str
-        Names from `ALL_CHECKS`.
-    workers, progress
-        As in `run_checks`.
+    make : callable
+        As in `check_campaign`.
 
     Returns
     -------
@@ -158,7 +147,7 @@ def check_file(
             raise store_error(path, "has no settled joint", f"run the campaign first: tolstat run STUDY --out {path}")
         compilation.announce()
         for at_point in store.each():
-            if verified := check_campaign(at_point, names, joints, seed, workers, progress):
+            if verified := check_campaign(at_point, joints, seed, make):
                 verification.write([(at_point, verified)])
         return _stored(store, verification.VERIFY)
 
@@ -199,7 +188,7 @@ def check_near(
     joints : int
         Number of joints for each load of the limit, at least `LEAST_NEAR`.
     workers, progress
-        As in `check_file`.
+        As in `run_checks`.
 
     Returns
     -------
@@ -234,7 +223,8 @@ def check_near(
             before = verification.read(at_point, verification.NEAR)
             new = slots if before is None else slots[~np.isin(at_point.row(slots), before.rows)]
             if new.size:
-                made = check_slots(at_point, new, QUICK_CHECKS, 0, workers, progress)
+                make = partial(run_checks, names=QUICK_CHECKS, workers=workers, progress=progress)
+                made = check_slots(at_point, new, 0, make)
                 verification.write([(at_point, made if before is None else _merged(before, made))], verification.NEAR)
         return _stored(store, verification.NEAR)
 
@@ -247,14 +237,7 @@ def _merged(*both: Verification) -> Verification:
     return merged._replace(rows=merged.rows[order], base=merged.base[order], checks=checks)
 
 
-def check_study(
-    study: Study,
-    joints: int | None = 24,
-    seed: int | None = None,
-    names: Iterable[str] = ALL_CHECKS,
-    workers: int = 1,
-    progress: Progress = no_progress,
-) -> Verification:
+def check_study(study: Study, joints: int | None = 24, seed: int | None = None, make: Make = ALL) -> Verification:
     """Check joints of a study that has not been run: simulate them with its own settings and for each check.
 
     Parameters and returns as `check_file`; the joints returned include those that do not settle. Of several operating
@@ -277,7 +260,7 @@ def check_study(
     for point in study.points:
         params = perturbed(study.at(point.name), rows, errors)
         base = simulate_each(params, options)
-        checks = run_checks(params, options, names, workers=workers, progress=progress)
+        checks = make(params, options)
         for results in (base, *(check.results for check in checks.values())):
             selected_results.blank_others(results, study.output.columns)
         each.append(Verification(seed, rows, base, checks))

@@ -31,7 +31,8 @@ class Column(NamedTuple):
         return values
 
 
-def _flat(fields: tuple[Field, ...]) -> tuple[Column, ...]:
+def flat(fields: tuple[Field, ...]) -> tuple[Column, ...]:
+    """Columns of fields."""
     return tuple(
         Column(name, f.unit, f.description, f.dtype, f.name, index)
         for f in fields
@@ -39,7 +40,7 @@ def _flat(fields: tuple[Field, ...]) -> tuple[Column, ...]:
     )
 
 
-DESIGN_COLUMNS = _flat(DESIGN_FIELDS)
-LEDGER_COLUMNS = _flat(LEDGER_FIELDS)
-ERROR_COLUMNS = _flat(ERROR_FIELDS)
-RESULT_COLUMNS = _flat(RESULT_FIELDS)
+DESIGN_COLUMNS = flat(DESIGN_FIELDS)
+LEDGER_COLUMNS = flat(LEDGER_FIELDS)
+ERROR_COLUMNS = flat(ERROR_FIELDS)
+RESULT_COLUMNS = flat(RESULT_FIELDS)

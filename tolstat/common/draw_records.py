@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from tolstat.common.columns import Column
+from tolstat.common.columns import Column, flat
 from tolstat.common.fields import Field, dtype_of
 
 IMPORTANCE_FIELDS = (
@@ -46,8 +46,7 @@ def columns(sampling: Mapping[str, Any]) -> tuple[Column, ...]:
     sampling : mapping
         The attribute ``sampling`` of a result file.
     """
-    fields = FIELDS.get(sampling["method"], ())
-    return tuple(Column(f.name, f.unit, f.description, f.dtype, f.name, ()) for f in fields)
+    return flat(FIELDS.get(sampling["method"], ()))
 
 
 def dtype(sampling: Mapping[str, Any]) -> np.dtype[np.void]:

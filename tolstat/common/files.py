@@ -22,17 +22,19 @@ WIDE = 64
 
 
 def data_dir() -> Path:
-    """Directory of the data that comes with the package: inside it in an installed wheel, beside it in a checkout."""
-    package = Path(__file__).parent.parent
-    inside = package / "data"
-    return inside if inside.is_dir() else package.parent / "data"
+    """Directory of the data that comes with the package."""
+    return _delivered("data")
 
 
 def docs_dir() -> Path:
-    """Directory of the pages for users, as text: inside the package in an installed wheel, beside it in a checkout."""
+    """Directory of the pages for users, as text."""
+    return _delivered("docs")
+
+
+def _delivered(name: str) -> Path:
+    """Directory that is inside the package in an installed wheel, and beside it in a checkout."""
     package = Path(__file__).parent.parent
-    inside = package / "docs"
-    return inside if inside.is_dir() else package.parent / "docs"
+    return package / name if (package / name).is_dir() else package.parent / name
 
 
 def reason(error: OSError) -> str:

@@ -15,8 +15,8 @@ import jinja2
 from markupsafe import Markup
 
 import tolstat
+from tolstat.common.cores import mapped
 from tolstat.common.files import atomic_write
-from tolstat.common.forked import mapped
 from tolstat.display import drawing, style, unseen
 from tolstat.display.blocks import Block, Decision, Page, Panel, Panels
 

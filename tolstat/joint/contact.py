@@ -80,8 +80,6 @@ class Law(NamedTuple):
     ----------
     stations : callable
         Sections contact and bearing -> stations, at the material's nominal Young's modulus.
-    rows : tuple of tuple of str
-        Lines of the table of laws in docs/model.md: where stations are, their coefficients, their weight.
     needs : tuple of str
         Keys of the contact section that the law needs, without those of the coefficients.
     of_bearing : tuple of str
@@ -93,7 +91,6 @@ class Law(NamedTuple):
     """
 
     stations: Callable[[Contact, Bearing | None], Stations]
-    rows: tuple[tuple[str, str, str], ...]
     needs: tuple[str, ...] = ()
     of_bearing: tuple[str, ...] = ()
     from_coefficients: bool = True
@@ -119,6 +116,7 @@ def _point(contact: Contact, bearing: Bearing | None) -> Stations:
 
 
 def _weighted(s: Array, weight: Array, k1: float, k2: float) -> Stations:
+    """Stations that share the coefficients by their weights."""
     return Stations(s, k1 * weight, k2 * weight, 0.0 * weight, weight)
 
 
@@ -153,31 +151,12 @@ def _given(contact: Contact, bearing: Bearing | None) -> Stations:
 
 DEFAULT, GIVEN = "mode", "stations"
 LAWS = {
-    DEFAULT: Law(
-        _mode,
-        (("pin ends, ±z/2", "k1p, k2p", "1"), ("middle, 0", "k1u − 2 k1p, k2u − 2 k2p, neither below 0", "0")),
-        middle=True,
-    ),
-    "uniform": Law(_uniform, (("pin ends", "k1u/2, k2u/2", "1"),)),
-    "point": Law(_point, (("pin ends", "k1p, k2p", "1"),)),
-    "sliced": Law(
-        _sliced,
-        (("n Gauss–Legendre points on z, weights w_j that sum to 2", "w_j k1u/2, w_j k2u/2", "w_j"),),
-        needs=("n_stations",),
-    ),
-    "needles": Law(
-        _needles,
-        (("n Gauss–Legendre points on `bearing.needle_length`, weights w_j that sum to 2", "w_j k3/2; b", "w_j"),),
-        needs=("n_stations", "fit_load"),
-        of_bearing=("needles", "needle_length"),
-        from_coefficients=False,
-    ),
-    GIVEN: Law(
-        _given,
-        (("`contact.stations`: 1 to 16 of one's own", "as given", "as given"),),
-        needs=("stations",),
-        from_coefficients=False,
-    ),
+    DEFAULT: Law(_mode, middle=True),
+    "uniform": Law(_uniform),
+    "point": Law(_point),
+    "sliced": Law(_sliced, ("n_stations",)),
+    "needles": Law(_needles, ("n_stations", "fit_load"), ("needles", "needle_length"), from_coefficients=False),
+    GIVEN: Law(_given, ("stations",), from_coefficients=False),
 }
 """Registry of the contact laws, by the word for ``contact.law``."""
 PREDEFINED = tuple(name for name in LAWS if name != GIVEN)

@@ -1,9 +1,9 @@
-"""The nominal joint: what a joint file holds; `reading` reads it."""
+"""The nominal joint: what a joint file holds, and keys that a case, study or variant has in place of its own."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -13,10 +13,9 @@ from tolstat.common.errors import Fault
 from tolstat.common.strict import Strict, described, refuse
 from tolstat.joint import derived
 from tolstat.joint.bearing import Bearing
-from tolstat.joint.contact import COEFFICIENTS, LAWS, Contact
+from tolstat.joint.contact import COEFFICIENTS, LAWS, Contact, keys_valid_for
 from tolstat.joint.derived import DERIVED
 from tolstat.joint.material import Array
-from tolstat.joint.overrides import leaves
 from tolstat.joint.sections import Arm, Bushing, Cross, Hub, Material, Pin, Shaft
 
 TOLD = ("description", "assumed")
@@ -231,3 +230,57 @@ def _left_out(way: tuple[str, ...], keys: list[str], section: BaseModel) -> list
     """Names of the keys of `way`, without `keys`, that a section has but that are not given."""
     names = [of.partition(".")[2] for of in way if of not in keys]
     return [name for name in names if name in type(section).model_fields and derived.get(section, name) is None]
+
+
+def overridden(data: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
+    """Replace keys of a joint file by those of `over`; remove what follows from these and is not in `over`, too."""
+    given = leaves(over).keys()
+    outdated = derived.changed(given, leaves(data)) - given
+    return laid_over(_without(data, outdated), over)
+
+
+def laid_over(below: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
+    """Replace keys of a joint by those of `over`, and remove those of another contact law or a third of a bearing."""
+    contact, new = below.get("contact"), over.get("contact")
+    if isinstance(contact, Mapping) and isinstance(new, Mapping) and "law" in new:
+        below = {**below, "contact": keys_valid_for(contact, new["law"])}
+    return merged(_without(below, derived.replaced(leaves(over), leaves(below))), over)
+
+
+def merged(data: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
+    """Replace keys of `data` by those of `over`, table by table."""
+    result = dict(data)
+    for key, value in over.items():
+        below = result.get(key)
+        if isinstance(below, Mapping) and isinstance(value, Mapping):
+            value = merged(below, value)
+        result[key] = value
+    return result
+
+
+def leaves(table: Mapping[str, Any], before: str = "") -> dict[str, Any]:
+    """Values of a joint by dotted key."""
+    values: dict[str, Any] = {}
+    for key, value in table.items():
+        values |= leaves(value, f"{before}{key}.") if isinstance(value, Mapping) else {f"{before}{key}": value}
+    return values
+
+
+def nested(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Nested tables from dotted keys: the inverse of `leaves`."""
+    result: dict[str, Any] = {}
+    for key, value in values.items():
+        *tables, name = key.split(".")
+        inner: Any = value if not tables else {name: value}
+        for part in reversed(tables[1:]):
+            inner = {part: inner}
+        result = merged(result, {tables[0] if tables else name: inner})
+    return result
+
+
+def _without(table: Mapping[str, Any], away: Collection[str], before: str = "") -> dict[str, Any]:
+    return {
+        key: _without(value, away, f"{before}{key}.") if isinstance(value, Mapping) else value
+        for key, value in table.items()
+        if f"{before}{key}" not in away
+    }

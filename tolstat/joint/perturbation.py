@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from typing import Annotated, Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from pydantic_core import CoreSchema
 from tolstat.common import units
 from tolstat.common.fields import MAX_STATIONS
 from tolstat.common.load_kinds import PINS
+from tolstat.common.loads import split
 from tolstat.common.strict import Strict, described
 from tolstat.common.tables import ERROR, FACTORS, HOLES, PARAM
 from tolstat.joint import material, orders
@@ -235,3 +237,32 @@ def _clearance(contact: Contact, hole: Array, pin: Array, deviation: Array) -> A
     clearance = 0.5 * ((contact.D_H + hole) - (contact.D_P + pin)) + deviation
     clearance[np.abs(clearance) < 4.0 * np.finfo(float).eps * contact.D_H] = 0.0
     return np.asarray(clearance)
+
+
+PIN_OF_LOAD = {
+    name: pin
+    for pin, arm in enumerate(ARM_OF_PIN, 1)
+    for name in (f"cross{pin}.F", f"fork{arm + 1}.F", f"pin{pin}.contact")
+}
+"""Pin of each load that is its force; the three of a pin differ by the inertia of its lumped bodies alone."""
+
+
+def one_force(rows: Iterable[Mapping[str, Any]], level: str, size: str) -> list[dict[str, Any]]:
+    """Rows of limits for people: one for all loads that are the same force and have the same limit.
+
+    Parameters
+    ----------
+    rows : iterable of mapping
+        Rows with ``load``, the key `level` of the limit, and the key `size`.
+    level, size : str
+        Of the rows of one force, that of the largest `size` is shown, with the names of all in ``load``.
+    """
+    by_force: dict[Any, list[Mapping[str, Any]]] = {}
+    for row in rows:
+        name, points = split(row["load"])
+        force = (PIN_OF_LOAD[name], points, row[level]) if name in PIN_OF_LOAD else row["load"]
+        by_force.setdefault(force, []).append(row)
+    return [
+        {**max(same, key=lambda row: row[size]), "load": ", ".join(row["load"] for row in same)}
+        for same in by_force.values()
+    ]

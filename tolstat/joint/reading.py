@@ -15,8 +15,7 @@ from tolstat.common.files import data_dir
 from tolstat.common.notation import DIAMETER
 from tolstat.common.strict import validate
 from tolstat.joint import derived
-from tolstat.joint.model import Assumed, Joint, affects_results
-from tolstat.joint.overrides import laid_over, leaves, nested, overridden
+from tolstat.joint.model import Assumed, Joint, affects_results, laid_over, leaves, nested, overridden
 
 DEFAULT_JOINT = "cirelli2021"
 """Joint in ``data/joints`` whose values are the examples of the keys of a joint."""

@@ -12,8 +12,8 @@ import numpy as np
 from tolstat.analysis import binomial, extreme
 from tolstat.analysis import capability as indices
 from tolstat.analysis.prediction import DELIVERY
+from tolstat.common.cores import mapped
 from tolstat.common.errors import Fault, InputError, NotApplicable
-from tolstat.common.forked import mapped
 from tolstat.common.loads import ANY_LIMIT
 from tolstat.common.tables import VALID
 from tolstat.display import text

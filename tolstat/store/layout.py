@@ -218,6 +218,7 @@ def create_table(
 
 
 def _linked(holder: h5py.Group, name: str, links: Iterable[str] = LINKED) -> h5py.Group:
+    """Create a group with links to datasets of the file."""
     group = holder.create_group(name)
     for link in links:
         group[link.rpartition("/")[2]] = holder.file[link]

@@ -15,7 +15,7 @@ from tolstat.common.strict import read_section, validate
 from tolstat.common.tables import PARAM, Options, from_names
 from tolstat.joint import MEANS, Joint, Operation, operating, perturb, varied
 from tolstat.joint.derived import get
-from tolstat.joint.overrides import nested
+from tolstat.joint.model import nested
 from tolstat.joint.sections import RIGID
 from tolstat.solver import fidelity
 from tolstat.store.hdf5 import store_error

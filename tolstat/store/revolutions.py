@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.common.channels import BUSHING_LOADS, CHANNELS, LOAD_HISTORIES, MEASURING, LoadHistory, histories_of
-from tolstat.common.forked import Forked, begun, in_order
+from tolstat.common.cores import Forked, begun, in_order
 from tolstat.common.loads import FloatArray
 from tolstat.joint import perturb
 from tolstat.solver import compilation

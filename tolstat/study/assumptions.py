@@ -15,7 +15,7 @@ from tolstat.common.tables import HOLES
 from tolstat.joint import derived
 from tolstat.joint.contact import keys_valid_for
 from tolstat.joint.derived import get
-from tolstat.joint.overrides import leaves, merged, nested
+from tolstat.joint.model import leaves, merged, nested
 from tolstat.joint.reading import with_keys
 from tolstat.study.selection import EXCLUDES, UNITS
 from tolstat.study.study import Study

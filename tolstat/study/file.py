@@ -15,8 +15,7 @@ from tolstat.common.loads import UNIT_OF_LOAD, split
 from tolstat.common.strict import read_toml
 from tolstat.joint import Joint, Operation
 from tolstat.joint.derived import BEARING
-from tolstat.joint.model import Assumed
-from tolstat.joint.overrides import leaves, merged
+from tolstat.joint.model import Assumed, leaves, merged
 from tolstat.joint.reading import faults_of_assumed, is_joint
 from tolstat.study import fatigue, listing, points, proposal, selection, signals, sorting
 from tolstat.study.axes import is_zone, zone_of

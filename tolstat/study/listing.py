@@ -16,8 +16,7 @@ from tolstat.common.notation import DIAMETER
 from tolstat.common.strict import Strict, refuse
 from tolstat.common.tables import Variant
 from tolstat.joint import Joint, Operation
-from tolstat.joint.model import TOLD
-from tolstat.joint.overrides import laid_over, nested
+from tolstat.joint.model import TOLD, laid_over, nested
 from tolstat.study import selection
 from tolstat.study.design import IDEAL, Design, cube, flat, table
 from tolstat.study.model import MAX_ROWS, Solver

@@ -14,8 +14,8 @@ import numpy as np
 from tolstat import sampling
 from tolstat.analysis import pick_freeze, ranks, sensitivity
 from tolstat.analysis.sample import Sample
+from tolstat.common.cores import mapped
 from tolstat.common.errors import Fault, InputError, NotApplicable, TolstatError
-from tolstat.common.forked import mapped
 from tolstat.common.loads import ANY_LIMIT, FloatArray, unit_text
 from tolstat.common.tables import VALID
 from tolstat.display import drawing, style

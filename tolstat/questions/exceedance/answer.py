@@ -13,7 +13,7 @@ from tolstat.display.answer import Answer, Asked, Panels, Part, Sentence, Table,
 from tolstat.display.options import Accepted
 from tolstat.display.table import Column, Row, by_share, has, has_unresolved
 from tolstat.display.verdict import WORDS
-from tolstat.joint.arms import one_force
+from tolstat.joint.perturbation import one_force
 from tolstat.questions import shares
 from tolstat.questions.exceedance import rows as of
 from tolstat.questions.exceedance.curves import forest_panel, leading_panel, reader

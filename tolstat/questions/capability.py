@@ -110,8 +110,8 @@ def capability(
     try:
         rare = [row for load in view.limits for row in return_rows(view, load, one_in)]
     except ValueError as error:
-        found, _, remedy = str(error).partition(": ")
-        raise InputError([Fault("--one-in", found, remedy)]) from error
+        reason, _, remedy = str(error).partition(": ")
+        raise InputError([Fault("--one-in", reason, remedy)]) from error
     parts += [Table("one_in", RARE, RETURNS, rare), *notes]
     if refused := shares.grouped((row["load"], row["refusal"]) for row in rare if row["refusal"]):
         warning = f"{refused}: not extrapolated; tolstat rare, a subset simulation, needs no tail"
@@ -127,10 +127,10 @@ def capability_on_page(view: View, asked: Asked) -> Answer:
     if known_parts.of(view) is not None:
         parts.append(Sentence("for the tolerances as stated: what measured parts leave open is not in these"))
     tails = [partial(_rare_loads, view, name) for name in view.leading]
-    found = dict(zip(view.leading, mapped(tails, min(asked.processes, 2)), strict=True))
-    if rows := [row for own in found.values() if not isinstance(own, str) for row in own]:
+    by_load = dict(zip(view.leading, mapped(tails, min(asked.processes, 2)), strict=True))
+    if rows := [row for rare in by_load.values() if not isinstance(rare, str) for row in rare]:
         parts.append(Table("one_in", f"{RARE}, from a generalised Pareto tail", RETURNS, rows))
-    if reasons := shares.grouped((name, own) for name, own in found.items() if isinstance(own, str)):
+    if reasons := shares.grouped((name, rare) for name, rare in by_load.items() if isinstance(rare, str)):
         parts.append(Sentence(f"Rare loads. {reasons}."))
     if not parts:
         raise NotApplicable

@@ -201,14 +201,14 @@ def without_interval(method: str) -> str:
 
 
 def or_independent(
-    found: Estimate[FloatArray], x: Column, levels: FloatArray, confidence: float
+    estimate: Estimate[FloatArray], x: Column, levels: FloatArray, confidence: float
 ) -> Estimate[FloatArray]:
     """Let intervals contain Clopper and Pearson's, too, where fewer than `FEW` joints are on a side of a level."""
     count = x.above(levels)
     low, high = clopper_pearson(count, x.n, confidence)
     few = np.minimum(count, x.n - count) < FEW
-    lower = np.where(few, np.minimum(found.lower, low), found.lower)
-    return Estimate(found.estimate, lower, np.where(few, np.maximum(found.upper, high), found.upper))
+    lower = np.where(few, np.minimum(estimate.lower, low), estimate.lower)
+    return Estimate(estimate.estimate, lower, np.where(few, np.maximum(estimate.upper, high), estimate.upper))
 
 
 def counts_by_group(x: Column, groups: NDArray[np.intp], levels: ArrayLike) -> tuple[FloatArray, FloatArray]:

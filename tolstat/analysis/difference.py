@@ -111,15 +111,15 @@ def shares(a: Sample, b: Sample, levels: ArrayLike, paired: bool, confidence: fl
     _valid(a, b, paired)
     level = np.atleast_1d(np.asarray(levels, dtype=float))
     kind = _pairs if paired else _apart
-    found, least, most = (
+    fields, least, most = (
         kind(x, y, a.design, b.design, level, confidence)
         for x, y in ((a.value, b.value), (a.upper, b.lower), (a.lower, b.upper))
     )
     p = np.full(level.shape, np.nan)
     if paired and _have_interval(a.design, b.design, "difference"):
-        only_a, only_b = found[3:5]
+        only_a, only_b = fields[3:5]
         p = np.minimum(2.0 * special.bdtr(np.minimum(only_a, only_b) + 0.0, np.maximum(only_a + only_b, 1), 0.5), 1.0)
-    return ShareDifference._make((*found, p, least[5], most[5], least[6], most[7]))
+    return ShareDifference._make((*fields, p, least[5], most[5], least[6], most[7]))
 
 
 def quantiles(a: Sample, b: Sample, share: float, paired: bool, confidence: float = 0.95) -> Difference:

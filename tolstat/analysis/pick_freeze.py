@@ -109,7 +109,7 @@ def of_event(a: ArrayLike, b: ArrayLike, ab: ArrayLike, confidence: float = 0.95
     counts = valid.sum(axis=0)
     up, down = (valid & ((mixed - x[:, None]) == sign) for sign in (1.0, -1.0))
     with_b = (y == 1.0)[:, None]
-    cells = np.array([(way & own).sum(axis=0) for way in (up, down) for own in (with_b, ~with_b)])
+    cells = np.array([(way & of_b).sum(axis=0) for way in (up, down) for of_b in (with_b, ~with_b)])
     signs = np.array([1.0 - share, -share, share - 1.0, share])[:, None]
     low, high = (float(end) for end in clopper_pearson(share * 2 * len(x), 2 * len(x), confidence))
     of_ends = low * (1.0 - low), high * (1.0 - high)

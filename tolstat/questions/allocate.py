@@ -360,7 +360,7 @@ def _limit(view: View, judged: _Judged, checked: NDArray[np.intp], ratios: Ratio
     share, (lower, upper), predicted = shares.reweighted(samples, ratios, 0.5, delivery)
     row = {"limit": name, "target": target, "before": float(above[0].mean()), "estimate": share.estimate}
     row |= {"lower": lower, "upper": upper} | predicted
-    return row | {"ess": share.ess, "usable": share.support.usable, "numerical": len(above) > 1}
+    return row | {"ess": share.support.ess, "usable": share.support.usable, "numerical": len(above) > 1}
 
 
 def _tolerances(request: _Request, entries: Entries) -> list[dict[str, Any]]:

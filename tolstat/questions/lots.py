@@ -165,7 +165,7 @@ def lots(
 
     @cache
     def predicted(*counts: int) -> Delivery:
-        return clustered.law_of(counts, n).delivery(delivery, from_lots)
+        return clustered.delivery(counts, n, delivery, from_lots)
 
     rows, counts = [], {}
     for sample in view.loads([*view.limits, ANY_LIMIT]):
@@ -238,7 +238,7 @@ def _panel(row: Row, above: Integers, n: Integers, size: int) -> Panel:
         share = np.sort(above / n)
         top = max(2, int(np.ceil(size * min(1.0, share[-1] * 1.15 + 1.0 / size))))
         at, x = np.arange(top + 1), np.arange(top + 2) / size
-        expected = np.cumsum(clustered.law_of(above, n).delivery(size).probability)[at]
+        expected = np.cumsum(clustered.delivery(above, n, size).probability)[at]
         alone = special.bdtr(at, size, above.sum() / n.sum())
         for cdf, colour, dash in ((alone, style.FAINT, style.DASHES[2]), (expected, style.COLOURS[1], style.DASHES[1])):
             ax.step(x, 100.0 * np.append(cdf, cdf[-1]), where="post", color=colour, ls=dash)

@@ -251,7 +251,7 @@ def _share_above(view: View, load: Sample, done: NDArray[np.intp], ratios: Ratio
     row = {"load": load.name, "unit": load.unit, "level": level, "before": before}
     row |= {key: getattr(share, key) for key in GIVEN}
     row["total_lower"], row["total_upper"] = total if known else (np.nan, np.nan)
-    return row | predicted | {"ess": share.ess} | share.support._asdict()
+    return row | predicted | share.support._asdict()
 
 
 def _quantile(load: Sample, ratios: Ratios, share: float) -> dict[str, Any]:

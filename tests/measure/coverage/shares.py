@@ -187,7 +187,7 @@ def _of_lots(law: _Lots, share: float, number: int) -> Experiment:
     def once(rng: Rng) -> list[Found]:
         sample = sample_of(law.draw(rng, number, JOINTS, share).ravel(), design)
         above, joints = design.counts(sample.value, [level])
-        ends = clustered.law_of(above[:, 0], joints).delivery(DELIVERY).ends()
+        ends = clustered.delivery(above[:, 0], joints, DELIVERY).ends()
         truth = float((law.draw(rng, 1, DELIVERY, share) > level).sum())
         return [*judged(sample), Found(*ends, truth)]
 

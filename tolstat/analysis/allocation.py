@@ -97,10 +97,8 @@ def search(problem: Problem) -> Choice:
         The factors, and the constraint that they meet.
     """
     share = max(REGION, reweight.LEAST_ESS / len(problem.above))
-    choice = _within(problem, share)
-    while not problem.usable(choice.factors) and share < 0.9:
+    while not problem.usable((choice := _within(problem, share)).factors) and share < 0.9:
         share = min(1.5 * share, 0.9)
-        choice = _within(problem, share)
     return choice
 
 

@@ -172,12 +172,11 @@ def limit_rows(view: View, confidence: float = 0.95, delivery: int = DELIVERY) -
     rows = []
     for load in view.loads([*view.limits, ANY_LIMIT]):
         row = dict(shares.good(view, load.name, confidence, delivery))
-        c = indices.of_sample(load, row["limit"], confidence)
-        names = [f"{key}{end}" for key in ("cpk", "cpk_normal") for end in ("", "_lower", "_upper")]
-        row |= {key: getattr(c, key) for key in (*names, "normal_p", "needed")}
+        index = indices.of_sample(load, row["limit"], confidence)
+        both = shares.with_ends("cpk", index.cpk) | shares.with_ends("cpk_normal", index.cpk_normal)
         if binomial.unresolved_matter(row["count"], row["n"], row["n_failed"] + row["n_unsettled"]):
-            row |= dict.fromkeys(names, np.nan)
-        rows.append(row)
+            both = dict.fromkeys(both, np.nan)
+        rows.append(row | both | {"normal_p": index.normal_p, "needed": index.needed})
     return rows
 
 

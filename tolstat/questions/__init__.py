@@ -52,8 +52,8 @@ class Question(NamedTuple):
 
     def functions(self) -> tuple[Callable[..., Answer], Callable[..., list[Path]] | None]:
         """The function that answers the question, and the one that simulates for it, if any."""
-        found = self._module()
-        return getattr(found, self.name), getattr(found, "simulate", None)
+        module = self._module()
+        return getattr(module, self.name), getattr(module, "simulate", None)
 
     def on_page(self, view: View, asked: Asked) -> Answer:
         """Answer that the page shows.
@@ -63,9 +63,9 @@ class Question(NamedTuple):
         NotApplicable
             When the page shows none.
         """
-        found = self._module()
-        own = getattr(found, f"{self.name}_on_page", None)
-        answer: Answer = own(view, asked) if own else getattr(found, self.name)(view)
+        module = self._module()
+        on_page = getattr(module, f"{self.name}_on_page", None)
+        answer: Answer = on_page(view, asked) if on_page else getattr(module, self.name)(view)
         return answer
 
     def _module(self) -> Any:
@@ -112,7 +112,7 @@ PUBLIC = {question.name: f"tolstat.questions.{question.file or question.name}" f
 
 def sections(view: View, asked: Asked) -> list[Section]:
     """Sections of the page, in the order of `QUESTIONS`; questions that the file cannot answer have none."""
-    found: list[Section] = []
+    shown: list[Section] = []
     for question in QUESTIONS:
         if question.page:
             asked.stage(f"page: {question.name}")
@@ -120,8 +120,8 @@ def sections(view: View, asked: Asked) -> list[Section]:
                 answer = question.on_page(view, asked)
                 key = question.name.replace("_", "-")
                 blocks = [_without_folder(block, view.path) for block in answer.blocks()]
-                found.append(Section(key, answer.title, blocks, question.page == "folded"))
-    return found
+                shown.append(Section(key, answer.title, blocks, question.page == "folded"))
+    return shown
 
 
 def _without_folder(block: Block, path: Path) -> Block:
@@ -133,10 +133,10 @@ def _without_folder(block: Block, path: Path) -> Block:
 
 def statistics(view: View) -> dict[str, Any]:
     """JSON values of the questions that are counted, by name; null where one does not apply, or is refused."""
-    found: dict[str, Any] = {}
+    values: dict[str, Any] = {}
     for question in QUESTIONS:
         if question.counted:
-            found[question.name] = None
+            values[question.name] = None
             with suppress(StoreError):
-                found[question.name] = question.functions()[0](view).values()
-    return found
+                values[question.name] = question.functions()[0](view).values()
+    return values

@@ -170,8 +170,13 @@ def readings(view: View) -> dict[str, Any]:
     for load in view.loads(list(dict.fromkeys((*view.shown_loads, *view.limits)))):
         if not load.valid.size:
             continue
-        x = _round_levels(float(load.valid[0]), float(load.valid[-1]), load.limit)
-        start = load.limit if load.limit is not None else load.quantile(0.9).estimate
+        marked = [] if load.limit is None else [load.limit]
+        low, high = (float(end([*load.valid[[0, -1]], *marked])) for end in (min, max))
+        raw = max(high - low, 1e-3 * abs(high), 1e-12) / READER_LEVELS
+        power = 10.0 ** np.floor(np.log10(raw))
+        step = power * next(multiple for multiple in (1, 2, 5, 10) if multiple * power >= raw)
+        x = np.union1d(step * np.arange(np.floor(low / step), np.ceil(high / step) + 1), marked)
+        start = load.quantile(0.9).estimate if load.limit is None else load.limit
         table = load.curve(x)
         curves[load.name] = {
             "unit": unit_text(load.unit),
@@ -185,15 +190,6 @@ def readings(view: View) -> dict[str, Any]:
             **{end: [float(f"{v:.3g}") for v in table[end]] for end in ends},
         }
     return curves
-
-
-def _round_levels(low: float, high: float, limit: float | None) -> NDArray[np.float64]:
-    low, high = (low, high) if limit is None else (min(low, limit), max(high, limit))
-    raw = max(high - low, 1e-3 * abs(high), 1e-12) / READER_LEVELS
-    power = 10.0 ** np.floor(np.log10(raw))
-    step = power * next(m for m in (1, 2, 5, 10) if m * power >= raw)
-    marks = step * np.arange(np.floor(low / step), np.ceil(high / step) + 1)
-    return np.unique(marks if limit is None else np.append(marks, limit))
 
 
 def not_kept(view: View) -> str:

@@ -236,7 +236,7 @@ class ChangedJoints:
         A campaign whose joints are drawn from tolerances.
     by : str
         A load, or ``"any limit"``.
-    held : mapping
+    altered : mapping
         Changes by their digest, as `View.altered`.
 
     Attributes
@@ -249,13 +249,13 @@ class ChangedJoints:
         Load of the joints as drawn, from sample 0 on, NaN without a valid one: the campaign's, then fresh ones.
     """
 
-    def __init__(self, view: View, by: str, held: Mapping[str, Altered]) -> None:
-        self.load, self._study, self._held = view.load(by), view.study, held
+    def __init__(self, view: View, by: str, altered: Mapping[str, Altered]) -> None:
+        self.load, self._study, self._held = view.load(by), view.study, altered
         self.level = tail_level(self.load)
         levels = view.limits if by == ANY_LIMIT else {by: 1.0}
         self._parts = [(names_at_points(view, name), level) for name, level in levels.items()]
         n = own_joints(view)
-        self.base, more = self.load.values[:n], held.get(what_if.key(sets.as_drawn(view.study, range(0)).about))
+        self.base, more = self.load.values[:n], altered.get(what_if.key(sets.as_drawn(view.study, range(0)).about))
         if more is not None and self.holds(more) and more.first <= n < more.end:
             self.base = np.concatenate([self.base, self.of(more)[n - more.first :]])
 

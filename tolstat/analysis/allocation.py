@@ -151,10 +151,8 @@ def _minimise(
 ) -> FloatArray:
     low, high = np.log(problem.lower), np.log(problem.upper)
     settings: Any = {"method": "SLSQP", "options": {"maxiter": 60, "ftol": 1e-5, "eps": 1e-4}}
-    settings |= {
-        "bounds": optimize.Bounds(low, np.maximum(high, low + 1e-9)),
-        "constraints": {"type": "ineq", "fun": room},
-    }
+    constraint = {"type": "ineq", "fun": room}
+    settings |= {"bounds": optimize.Bounds(low, np.maximum(high, low + 1e-9)), "constraints": constraint}
     result = optimize.minimize(what, np.clip(start, low, high), **settings)
     return np.asarray(np.clip(result.x, low, high), dtype=float)
 

@@ -175,10 +175,8 @@ def over_revolution(
             over_all[0, i] = variance @ share / whole
             influence_over_all = (influence @ variance + square @ (share - over_all[0, i])) / whole
             over_all[1, i] = _error(influence_over_all, alike * _chance(over_all[0, i], fit.degrees, n)) * overall
-    return (
-        _with_ends(local[0], local[1], variance, confidence, iid),
-        _with_ends(over_all[0], over_all[1], np.asarray(variance.mean()), confidence, iid),
-    )
+    at_angles = _with_ends(local[0], local[1], variance, confidence, iid)
+    return at_angles, _with_ends(over_all[0], over_all[1], np.asarray(variance.mean()), confidence, iid)
 
 
 def first_and_total(x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: bool = True) -> tuple[FirstOrder, Total]:

@@ -288,14 +288,9 @@ class Sample:
         value = self.values[joints]
         lower, upper = (end.values[joints] for end in (self.lower, self.upper))
         inexact = np.flatnonzero((lower != value) & ~np.isnan(lower) | (upper != value) & ~np.isnan(upper))
-        return replace(
-            self,
-            value=Column(value),
-            inexact=Inexact(inexact, lower[inexact], upper[inexact]),
-            status=self.status[joints],
-            design=self.design.only(joints),
-            parts=tuple(part.only(joints) for part in self.parts),
-        )
+        parts, ends = tuple(part.only(joints) for part in self.parts), Inexact(inexact, lower[inexact], upper[inexact])
+        some = replace(self, value=Column(value), inexact=ends, status=self.status[joints])
+        return replace(some, design=self.design.only(joints), parts=parts)
 
 
 def is_valid(load: FloatArray, status: NDArray[np.uint8]) -> Mask:
@@ -330,16 +325,10 @@ def largest_of(name: str, parts: Sequence[Sample], of_ratios: bool = False) -> S
     """
     whole = replace(parts[0], parts=tuple(parts), of_ratios=of_ratios)
     value, inexact = largest((load.value, load.inexact) for load in whole.each())
-    return replace(
-        next(whole.each()),
-        name=name,
-        nominal=max(part.nominal / (part.limit or 1.0) if of_ratios else part.nominal for part in parts),
-        value=value,
-        inexact=inexact,
-        status=worst_status([part.status for part in parts]),
-        parts=whole.parts,
-        of_ratios=of_ratios,
-    )
+    nominal = max(part.nominal / (part.limit or 1.0) if of_ratios else part.nominal for part in parts)
+    load = replace(next(whole.each()), name=name, nominal=nominal, value=value, inexact=inexact)
+    status = worst_status([part.status for part in parts])
+    return replace(load, status=status, parts=whole.parts, of_ratios=of_ratios)
 
 
 def _first(holds: Callable[[NDArray[np.intp]], Mask], n: int, at_once: int, ever: bool = False) -> int:

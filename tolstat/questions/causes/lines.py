@@ -329,13 +329,12 @@ def _curves(changed: Lines, accepted: float) -> Iterator[Panel]:
         ax.set(xlabel="width of the line, relative to the drawing", ylabel=f"share above {changed.limit}")
         drawing.legend_above(ax, handles, labels)
 
-    points = {
-        line: ", ".join(f"{row['factor']:.3g} {text.percent(row['share'])}" for row in rows)
-        for line, rows in by_line.items()
-    }
-    title, words = "The share against the width of each line", "; ".join(f"{x}: {y}" for x, y in points.items())
+    title, words = "The share against the width of each line", []
+    for line, rows in by_line.items():
+        points = (f"{row['factor']:.3g} {text.percent(row['share'])}" for row in rows)
+        words.append(f"{line}: {', '.join(points)}")
     size = drawing.WIDTH, 3.4 + (room := drawing.legend_room(labels))
-    yield Panel(f"widths-{facts['load']}", title, words, draw, size, top=room)
+    yield Panel(f"widths-{facts['load']}", title, "; ".join(words), draw, size, top=room)
 
 
 def _floor(changed: Lines, accepted: float) -> float:

@@ -20,11 +20,8 @@ SHARES = (0.5, 0.9, 0.95, 0.99)
 COVERED = 0.99
 """Share of the joints that the tolerance limit covers."""
 ERROR_BUDGET = ("numerical_lower", "numerical_upper", "total_lower", "total_upper")
-WITHHELD = (
-    "estimate",
-    *(f"{kind}{end}" for kind in ("", "bound_", "outer_") for end in ("lower", "upper")),
-    *ERROR_BUDGET,
-)
+_ENDS = tuple(f"{kind}{end}" for kind in ("", "bound_", "outer_") for end in ("lower", "upper"))
+WITHHELD = ("estimate", *_ENDS, *ERROR_BUDGET)
 """Shares and intervals, which are not given where the weights of joints do not support them."""
 KNOWN = ("expected", "parts_lower", "parts_upper", "unsupported")
 """Fields of `known_share.KnownShare` that a row has where tolerances are known from measured parts."""
@@ -118,13 +115,11 @@ def quantile_rows(view: View) -> Rows:
         One row per load and share: ``load``, ``unit``, ``nominal``, the fields of `analysis.estimates.Quantile`,
         ``confidence``. Loads in SI units.
     """
-    return [
-        {"load": load.name, "unit": load.unit, "nominal": load.nominal}
-        | load.quantile(share)._asdict()
-        | {"confidence": CONFIDENCE}
-        for load in view.loads(view.shown_loads)
-        for share in SHARES
-    ]
+    rows: list[Row] = []
+    for load in view.loads(view.shown_loads):
+        head = {"load": load.name, "unit": load.unit, "nominal": load.nominal}
+        rows += [head | load.quantile(share)._asdict() | {"confidence": CONFIDENCE} for share in SHARES]
+    return rows
 
 
 def curve_rows(view: View) -> Rows:

@@ -5,8 +5,8 @@ import pytest
 from scipy.stats import norm, qmc
 
 from tests.support import exceedance
-from tolstat.analysis import binomial, replicated
-from tolstat.analysis.replicated import Replicated
+from tolstat.analysis import binomial, design
+from tolstat.analysis.design import Replicated
 from tolstat.analysis.sample import Sample
 
 SEEDS, REPLICATES, JOINTS = 600, 4, 64
@@ -25,14 +25,14 @@ def shares():
 
 def test_interval_covers_over_seeds_and_a_normal_one_does_not(shares):
     truth, slack = norm.sf(2.0 / np.sqrt(5.0)), 3.0 * np.sqrt(0.95 * 0.05 / SEEDS)
-    found = replicated.interval(shares.T)
+    found = design.over_replicates(shares.T)
     assert np.mean((found.lower <= truth) & (found.upper >= truth)) == pytest.approx(0.95, abs=slack)
     half = 1.96 * shares.std(axis=1, ddof=1) / np.sqrt(REPLICATES)
     assert np.mean(np.abs(shares.mean(axis=1) - truth) <= half) < 0.95 - slack
 
 
 def test_shares_stay_between_none_and_all():
-    found = replicated.interval([[0.0, 0.2], [0.02, 0.21], [0.0, 0.19]], least=0.0, most=1.0)
+    found = design.over_replicates([[0.0, 0.2], [0.02, 0.21], [0.0, 0.19]], least=0.0, most=1.0)
     assert found.lower[0] == 0.0
     assert found.estimate == pytest.approx([0.02 / 3, 0.2])
     # t(0.975, 2) = 4.3027; the standard deviation is 0.01
@@ -40,20 +40,20 @@ def test_shares_stay_between_none_and_all():
 
 
 def test_replicates_of_no_event_are_no_fault():
-    assert float(replicated.interval([0.0, 0.0, 0.0], least=0.0, most=1.0).upper) == 0.0
+    assert float(design.over_replicates([0.0, 0.0, 0.0], least=0.0, most=1.0).upper) == 0.0
 
 
 def test_estimates_of_any_kind():
     status = np.ones(50)
     shares = [exceedance.exceedance(np.random.default_rng(s).normal(size=50), status, 1.0).estimate for s in range(5)]
-    found = replicated.interval(shares)
+    found = design.over_replicates(shares)
     assert found.lower < np.mean(shares) < found.upper
 
 
 @pytest.mark.parametrize("estimates", [[0.1], [[1.0, 2.0]], [[1.0, 2.0], [1.0, 2.0]]])
 def test_too_few_and_equal_replicates_are_refused(estimates):
     with pytest.raises(ValueError, match=r"sampling\.seed"):
-        replicated.interval(estimates)
+        design.over_replicates(estimates)
 
 
 def loads_of(seed, joints, number):

@@ -68,7 +68,7 @@ def test_ends_are_where_the_estimate_is_at_the_edge_of_its_distribution(cpk, n):
 def test_index_of_few_joints_has_the_standard_deviation_with_divisor_n_less_1():
     loads = [640.0, 655.0, 648.0, 671.0]
     found = capability_of(loads, np.ones(4), 700.0)
-    assert found.cpk_normal == pytest.approx((700.0 - fmean(loads)) / (3.0 * stdev(loads)), rel=1e-12)
+    assert found.cpk_normal.estimate == pytest.approx((700.0 - fmean(loads)) / (3.0 * stdev(loads)), rel=1e-12)
 
 
 @pytest.mark.slow
@@ -95,7 +95,7 @@ def test_interval_of_mean_and_deviation_covers_for_loads_that_are_not_normal(loa
         found = capability_of(values, np.ones(n), limit)
         plain = capability.cpk_interval((limit - values.mean()) / (3.0 * values.std(ddof=1)), n)
         for name, (low, high) in (
-            ("own", (found.cpk_normal_lower, found.cpk_normal_upper)),
+            ("own", (found.cpk_normal.lower, found.cpk_normal.upper)),
             ("of a normal load", plain),
         ):
             missed[name][0] += low > truth
@@ -107,24 +107,24 @@ def test_interval_of_mean_and_deviation_covers_for_loads_that_are_not_normal(loa
 def test_no_index_of_a_long_tail_and_no_interval_of_few_joints():
     rng = np.random.default_rng(10)
     long, few = (capability_of(own, np.ones(own.size), 4.0) for own in (rng.lognormal(size=2000), rng.random(900)))
-    assert np.isnan([long.cpk_normal, long.cpk_normal_lower]).all()
-    assert np.isfinite(few.cpk_normal)
-    assert np.isnan([few.cpk_normal_lower, few.cpk_normal_upper]).all()
+    assert np.isnan([long.cpk_normal.estimate, long.cpk_normal.lower]).all()
+    assert np.isfinite(few.cpk_normal.estimate)
+    assert np.isnan([few.cpk_normal.lower, few.cpk_normal.upper]).all()
 
 
 def test_both_indices_agree_for_a_normal_load():
     loads = np.random.default_rng(3).normal(500.0, 20.0, 200_000)
     found = capability_of(loads, np.ones(loads.size), 580.0)
-    assert found.cpk_normal == pytest.approx(80 / 60, rel=5e-3)
-    assert found.cpk == pytest.approx(80 / 60, rel=2e-2)
+    assert found.cpk_normal.estimate == pytest.approx(80 / 60, rel=5e-3)
+    assert found.cpk.estimate == pytest.approx(80 / 60, rel=2e-2)
     assert found.normal_p > 0.01
 
 
 def test_too_few_joints_have_no_lower_end_and_are_told_the_number_needed():
     loads = np.random.default_rng(4).gamma(3.0, 1.0, 5000)
     few, enough = (capability_of(loads[:n], np.ones(n), 20.0) for n in (3000, 4000))
-    assert few.cpk_lower == 0.0
-    assert 0.0 < enough.cpk_lower < enough.cpk < enough.cpk_upper
+    assert few.cpk.lower == 0.0
+    assert 0.0 < enough.cpk.lower < enough.cpk.estimate < enough.cpk.upper
     assert few.needed == 3244  # 1 - 0.99865^n >= 1 - 0.05 / 4
 
 
@@ -139,24 +139,24 @@ def test_unresolved_joints_lower_the_yield():
 
 def test_dependent_samples_have_no_interval():
     found = capability_of(np.arange(50.0), np.ones(50), 60.0, iid=False)
-    assert np.isfinite([found.cpk, found.cpk_normal]).all()
+    assert np.isfinite([found.cpk.estimate, found.cpk_normal.estimate]).all()
     many = capability_of(np.arange(2000.0), np.ones(2000), 2100.0, iid=False)
-    assert (np.isfinite(many.cpk_normal), np.isnan(many.cpk_normal_lower)) == (True, True)
+    assert (np.isfinite(many.cpk_normal.estimate), np.isnan(many.cpk_normal.lower)) == (True, True)
     above = found.above.outer_lower, found.above.outer_upper
-    ends = (*above, found.cpk_lower, found.cpk_upper, found.cpk_normal_lower, found.cpk_normal_upper)
+    ends = (*above, found.cpk.lower, found.cpk.upper, found.cpk_normal.lower, found.cpk_normal.upper)
     assert np.isnan(ends).all()
 
 
 @pytest.mark.parametrize("loads", [[], [3.0], [3.0, 3.0, 3.0]])
 def test_joints_without_scatter_have_no_index(loads):
     found = capability_of(loads, np.ones(len(loads)), 4.0)
-    assert np.isnan([found.cpk, found.cpk_normal, found.cpk_lower]).all()
+    assert np.isnan([found.cpk.estimate, found.cpk_normal.estimate, found.cpk.lower]).all()
 
 
 def test_limit_below_the_median_is_a_negative_index():
     found = capability_of(np.random.default_rng(1).normal(size=6000), np.ones(6000), -1.0)
-    assert found.cpk_lower < found.cpk < found.cpk_upper < 0
-    assert found.cpk == pytest.approx(-1 / 3, abs=0.05)
+    assert found.cpk.lower < found.cpk.estimate < found.cpk.upper < 0
+    assert found.cpk.estimate == pytest.approx(-1 / 3, abs=0.05)
 
 
 def test_a_joint_is_good_when_no_load_is_above_its_limit():

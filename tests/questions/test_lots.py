@@ -60,9 +60,9 @@ def test_table_counts_lots_and_predicts_the_next_delivery():
     assert row["without"] == np.mean(by_lot == 0)
     assert row["worst"] == by_lot.max() / 20
     assert row["lower"] < row["estimate"] == above.mean() < row["upper"]
-    law = clustered.law_of(by_lot, np.full(40, 20)).delivery(100)
-    assert (row["next_lower"], row["next_upper"]) == law.ends()
-    assert row["bad"] == law.more_than(0.1)
+    predicted = clustered.delivery(by_lot, np.full(40, 20), 100)
+    assert (row["next_lower"], row["next_upper"]) == predicted.ends()
+    assert row["bad"] == predicted.more_than(0.1)
     assert "bad deliveries: more than 10 % of the joints above" in [getattr(part, "text", "") for part in answer.parts]
     table, plain = answer.tables["limits"], question.lots(made).tables["limits"]
     assert "bad deliveries" in as_text(table.columns, table.rows)

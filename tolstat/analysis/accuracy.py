@@ -158,7 +158,7 @@ def _measured_or(
 
 
 def corrected(
-    values: FloatArray, sizes: FloatArray, found: FloatArray, confidence: float = 0.95
+    values: FloatArray, sizes: FloatArray, lacking: FloatArray, confidence: float = 0.95
 ) -> tuple[FloatArray, FloatArray]:
     """Loads of all joints with the numerical error of joints near a limit put right, as far as these tell it.
 
@@ -169,7 +169,7 @@ def corrected(
     ----------
     values, sizes : ndarray, shape (n,)
         Load of each joint, and the largest load of its kind in the joint.
-    found : ndarray, shape (m,)
+    lacking : ndarray, shape (m,)
         `corrections` of m >= 2 joints near the limit.
     confidence : float
         Confidence level of the interval of the mean.
@@ -186,8 +186,8 @@ def corrected(
     >>> bool((low > 100.9).all() and (high < 102.1).all() and (low < high).all())
     True
     """
-    margin = float(half_width(confidence, found.size - 1)) * float(found.std(ddof=1)) / np.sqrt(found.size)
-    drawn = found[np.random.default_rng(2024).integers(found.size, size=values.size)]
+    margin = float(half_width(confidence, lacking.size - 1)) * float(lacking.std(ddof=1)) / np.sqrt(lacking.size)
+    drawn = lacking[np.random.default_rng(2024).integers(lacking.size, size=values.size)]
     return values + sizes * (drawn - margin), values + sizes * (drawn + margin)
 
 

@@ -97,10 +97,8 @@ def search(problem: Problem) -> Choice:
         The factors, and the constraint that they meet.
     """
     share = max(REGION, reweight.LEAST_ESS / len(problem.above))
-    choice = _within(problem, share)
-    while not problem.usable(choice.factors) and share < 0.9:
+    while not problem.usable((choice := _within(problem, share)).factors) and share < 0.9:
         share = min(1.5 * share, 0.9)
-        choice = _within(problem, share)
     return choice
 
 
@@ -153,10 +151,8 @@ def _minimise(
 ) -> FloatArray:
     low, high = np.log(problem.lower), np.log(problem.upper)
     settings: Any = {"method": "SLSQP", "options": {"maxiter": 60, "ftol": 1e-5, "eps": 1e-4}}
-    settings |= {
-        "bounds": optimize.Bounds(low, np.maximum(high, low + 1e-9)),
-        "constraints": {"type": "ineq", "fun": room},
-    }
+    constraint = {"type": "ineq", "fun": room}
+    settings |= {"bounds": optimize.Bounds(low, np.maximum(high, low + 1e-9)), "constraints": constraint}
     result = optimize.minimize(what, np.clip(start, low, high), **settings)
     return np.asarray(np.clip(result.x, low, high), dtype=float)
 

@@ -139,7 +139,7 @@ def half_width(confidence: float, freedom: float | FloatArray = np.inf) -> Float
 
 def log_beta_binomial(k: ArrayLike, n: ArrayLike, a: ArrayLike, b: ArrayLike) -> FloatArray:
     """Logarithm of the probability of k of n joints whose share is a beta variate with the parameters a and b."""
-    k, n, a, b = (np.asarray(own, dtype=float) for own in (k, n, a, b))
+    k, n, a, b = (np.asarray(x, dtype=float) for x in (k, n, a, b))
     choose = -np.log(n + 1.0) - special.betaln(k + 1.0, n - k + 1.0)
     return np.asarray(choose + special.betaln(k + a, n - k + b) - special.betaln(a, b))
 

@@ -9,13 +9,13 @@ assume no distribution.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from tolstat.analysis import binomial
-from tolstat.analysis.estimates import Exceedance
+from tolstat.analysis.estimates import Estimate, Exceedance
 from tolstat.analysis.sample import Sample
 from tolstat.common.late import special, stats
 from tolstat.common.loads import FloatArray
@@ -27,26 +27,26 @@ FEWEST_MOMENTS = 1000
 LONGEST_TAIL = 3.0
 """(q(95 %) - median) / (q(75 %) - median) from which on such an interval does not hold; 2.44 for a normal load. A rule
 by quantiles: samples that pass a test of skewness or kurtosis by luck are those whose interval misses."""
+NONE = Estimate(np.nan, np.nan, np.nan)
 WIDER = 1.3
 """Factor on the width of such an interval: the kurtosis of few joints is too small (measured)."""
 
 
-@dataclass(frozen=True)
-class Capability:
+class Capability(NamedTuple):
     """Capability of a load against its upper limit.
 
     Attributes
     ----------
     above : Exceedance
         Share of the joints above the limit; yield and ppm are read from it.
-    cpk_normal, cpk_normal_lower, cpk_normal_upper : float
+    cpk_normal : Estimate
         (limit - mean) / (3 sigma) of the valid joints and its interval, which assumes no normal load: it covers with at
         least the given confidence. The interval is NaN for fewer than `FEWEST_MOMENTS` joints; for so many joints with
         a tail longer than `LONGEST_TAIL`, all three are.
     normal_p : float
         p-value of the normality test by skewness and kurtosis (D'Agostino and Pearson 1973); where it is small,
         `cpk_normal` does not determine the share above the limit. NaN for fewer than 20 joints.
-    cpk, cpk_lower, cpk_upper : float
+    cpk : Estimate
         Quantile index of the valid joints. Its interval is conservative: it covers with at least the given confidence.
         With fewer joints than `needed` the lower end is at most 0.
     needed : int
@@ -57,13 +57,9 @@ class Capability:
     """
 
     above: Exceedance
-    cpk_normal: float
-    cpk_normal_lower: float
-    cpk_normal_upper: float
+    cpk_normal: Estimate[float]
     normal_p: float
-    cpk: float
-    cpk_lower: float
-    cpk_upper: float
+    cpk: Estimate[float]
     needed: int
 
 
@@ -89,18 +85,17 @@ def of_sample(sample: Sample, limit: float, confidence: float = 0.95) -> Capabil
     >>> import numpy as np
     >>> load = np.random.default_rng(1).normal(650.0, 10.0, 5000)  # N
     >>> found = of_sample(Sample.of(load, [1] * 5000), limit=690.0)
-    >>> round(found.cpk_normal, 1), found.above.count, found.needed
+    >>> round(found.cpk_normal.estimate, 1), found.above.count, found.needed
     (1.3, 0, 3244)
     """
     valid = sample.valid
-    normal = general = (np.nan, np.nan, np.nan)
-    p = np.nan
+    normal, p, general = NONE, np.nan, NONE
     if valid.size > 1 and np.ptp(valid) > 0:
         normal, general = (index(sample, limit, confidence) for index in (_normal, _of_quantiles))
         p = float(stats.normaltest(valid).pvalue) if valid.size >= 20 else np.nan
     # Bonferroni over two quantiles with two ends each: a quarter of the error probability for this upper end
     needed = binomial.wilks(REFERENCE, 1.0 - 0.25 * (1.0 - confidence))
-    return Capability(sample.above(limit, confidence), *normal, p, *general, needed)
+    return Capability(sample.above(limit, confidence), normal, p, general, needed)
 
 
 def cpk_interval(cpk: ArrayLike, n: int, confidence: float = 0.95) -> tuple[FloatArray, FloatArray]:
@@ -128,7 +123,7 @@ def cpk_interval(cpk: ArrayLike, n: int, confidence: float = 0.95) -> tuple[Floa
     return special.nctdtrinc(n - 1, 1.0 - tail, t) / scale, special.nctdtrinc(n - 1, tail, t) / scale
 
 
-def _normal(sample: Sample, limit: float, confidence: float) -> tuple[float, float, float]:
+def _normal(sample: Sample, limit: float, confidence: float) -> Estimate[float]:
     """Index of mean and standard deviation; interval of a normal load, widened for skewness and kurtosis.
 
     The factor is the ratio of standard errors from the central moments (delta method), at least 1, times `WIDER`.
@@ -136,33 +131,31 @@ def _normal(sample: Sample, limit: float, confidence: float) -> tuple[float, flo
     valid = sample.valid
     mean, n = valid.mean(), valid.size
     index = float((limit - mean) / (3.0 * valid.std(ddof=1)))
-    if n < FEWEST_MOMENTS:
-        return index, np.nan, np.nan
     middle, upper, high = np.quantile(valid, (0.5, 0.75, 0.95))
-    if high - middle > LONGEST_TAIL * (upper - middle):
-        return np.nan, np.nan, np.nan
-    if not sample.design.has_interval("index"):
-        return index, np.nan, np.nan
+    if n >= FEWEST_MOMENTS and high - middle > LONGEST_TAIL * (upper - middle):
+        return NONE
+    if n < FEWEST_MOMENTS or not sample.design.has_interval("index"):
+        return NONE._replace(estimate=index)
     scores, z = (valid - mean) / valid.std(), 3.0 * index
     skewness, kurtosis = (scores**3).mean(), (scores**4).mean()
     factor = (1.0 + z * skewness + 0.25 * z**2 * (kurtosis - 1.0)) / (1.0 + 0.5 * z**2)
     wider = WIDER * np.sqrt(max(1.0, factor))
     lower, upper = (float(end) for end in cpk_interval(index, n, confidence))
-    return index, index - wider * (index - lower), index + wider * (upper - index)
+    return Estimate(index, index - wider * (index - lower), index + wider * (upper - index))
 
 
-def _of_quantiles(sample: Sample, limit: float, confidence: float) -> tuple[float, float, float]:
+def _of_quantiles(sample: Sample, limit: float, confidence: float) -> Estimate[float]:
     """Quantile index; interval from those of both quantiles, half the error probability each (Bonferroni)."""
     each = 0.5 * (1.0 + confidence)
     middle, high = (sample.quantile(share, each) for share in (0.5, REFERENCE))
     index = float(_index(limit, middle.estimate, high.estimate))
     if not sample.design.has_interval("index"):
-        return index, np.nan, np.nan
+        return NONE._replace(estimate=index)
     if not middle.upper < high.lower:
-        return index, -np.inf, np.inf
+        return Estimate(index, -np.inf, np.inf)
     # the index is monotone in each quantile with the other fixed: its extremes are at the corners
     corners = [_index(limit, m, h) for m in (middle.lower, middle.upper) for h in (high.lower, high.upper)]
-    return index, min(corners), max(corners)
+    return Estimate(index, min(corners), max(corners))
 
 
 def _index(limit: float, middle: float, high: float) -> float:

@@ -119,7 +119,7 @@ def _posterior(
     correlation of two joints of a lot; all limits share it, so that the density is computed once for each pair of k and
     n. The prior distribution of the mean is Jeffreys' of a share, that of the correlation uniform.
     """
-    mean, r = (own.ravel() for own in np.meshgrid(special.expit(means), special.expit(spreads), indexing="ij"))
+    mean, r = (grid.ravel() for grid in np.meshgrid(special.expit(means), special.expit(spreads), indexing="ij"))
     a, b = mean * (1.0 - r) / r, (1.0 - mean) * (1.0 - r) / r
     pairs, which = np.unique(np.stack([k.ravel(), n.ravel()]), axis=1, return_inverse=True)
     times = np.zeros((k.shape[1], pairs.shape[1]))
@@ -176,46 +176,6 @@ class Clustered(Design):
         return Clustered(self.numbers[self._lots[joints]])
 
 
-class Law(NamedTuple):
-    """What is known of the law of the lots' shares: beta distributions, each with a probability.
-
-    Attributes
-    ----------
-    a, b : ndarray, shape (m,)
-        Parameters of the beta distributions.
-    weight : ndarray, shape (m,)
-        Their probabilities; the sum is 1.
-    counts : tuple of int
-        Joints above the limit, and joints, that this is known from.
-    """
-
-    a: FloatArray
-    b: FloatArray
-    weight: FloatArray
-    counts: tuple[int, int]
-
-    def delivery(self, number: int, lots: int = 1) -> Delivery:
-        """Predict the next delivery.
-
-        Parameters
-        ----------
-        number : int
-            Joints of the delivery.
-        lots : int
-            New lots that they come from, equally many of each but for one.
-        """
-        small, more = divmod(number, lots)
-        spectrum = np.ones((self.weight.size, (number + 1) // 2 + 1), dtype=complex)
-        for size, count in ((small, lots - more), (small + 1, more)):
-            if count and size:
-                padded = np.zeros((self.weight.size, number + 1))
-                log = log_beta_binomial(np.arange(size + 1), size, self.a[:, None], self.b[:, None])
-                padded[:, : size + 1] = np.exp(log)
-                spectrum = spectrum * np.fft.rfft(padded) ** count
-        pmf = np.fft.irfft(self.weight @ spectrum, number + 1).clip(0.0)
-        return Delivery(np.asarray(pmf / pmf.sum()), self.counts)
-
-
 class Delivery(NamedTuple):
     """Prediction of the number of joints above a limit in the next delivery.
 
@@ -224,7 +184,7 @@ class Delivery(NamedTuple):
     probability : ndarray, shape (number + 1,)
         Probability of each number.
     counts : tuple of int
-        As in `Law`.
+        Joints above the limit, and joints, that this is known from.
     """
 
     probability: FloatArray
@@ -245,8 +205,8 @@ class Delivery(NamedTuple):
         return float(self.probability[allowed + 1 :].sum())
 
 
-def law_of(above: ArrayLike, joints: ArrayLike) -> Law:
-    """Posterior distribution of the law of the lots' shares.
+def delivery(above: ArrayLike, joints: ArrayLike, number: int, lots: int = 1) -> Delivery:
+    """Predict the next delivery from the posterior distribution of the law of the lots' shares.
 
     The prior distribution of the mean is Jeffreys' of a share, that of the correlation of two joints of a lot uniform.
 
@@ -254,10 +214,10 @@ def law_of(above: ArrayLike, joints: ArrayLike) -> Law:
     ----------
     above, joints : array_like, shape (lots,)
         Joints above a limit, and joints, of each lot.
-
-    Returns
-    -------
-    Law
+    number : int
+        Joints of the delivery.
+    lots : int
+        New lots that they come from, equally many of each but for one.
     """
     k, n = np.asarray(above, dtype=np.intp), np.asarray(joints, dtype=np.intp)
     p = (k.sum() + 0.5) / (n.sum() + 1.0)
@@ -266,4 +226,13 @@ def law_of(above: ArrayLike, joints: ArrayLike) -> Law:
     means = special.logit(p) + np.linspace(-REACH, REACH, GRID) * min(float(error), 1.0)
     a, b, (weight,) = _posterior(k[:, None], n[:, None], means, SPREADS)
     kept = weight > NEGLIGIBLE
-    return Law(a[kept], b[kept], weight[kept] / weight[kept].sum(), (int(k.sum()), int(n.sum())))
+    a, b, weight = a[kept], b[kept], weight[kept] / weight[kept].sum()
+    small, more = divmod(number, lots)
+    spectrum = np.ones((weight.size, (number + 1) // 2 + 1), dtype=complex)
+    for size, count in ((small, lots - more), (small + 1, more)):
+        if count and size:
+            padded = np.zeros((weight.size, number + 1))
+            padded[:, : size + 1] = np.exp(log_beta_binomial(np.arange(size + 1), size, a[:, None], b[:, None]))
+            spectrum = spectrum * np.fft.rfft(padded) ** count
+    pmf = np.fft.irfft(weight @ spectrum, number + 1).clip(0.0)
+    return Delivery(np.asarray(pmf / pmf.sum()), (int(k.sum()), int(n.sum())))

@@ -80,8 +80,10 @@ class _Replaced(Column):
     def ascending(self) -> FloatArray:
         """Numbers of the joints that count, ascending, in a new array."""
         whole, old, new = self.base.ascending, self._old.ascending, self._new.ascending
-        place = np.searchsorted(whole, old) + np.arange(old.size) - np.searchsorted(old, old)  # equal ones one by one
-        kept = np.delete(whole, place)
+        replaced = (
+            np.searchsorted(whole, old) + np.arange(old.size) - np.searchsorted(old, old)
+        )  # equal ones one by one
+        kept = np.delete(whole, replaced)
         return frozen(np.insert(kept, np.searchsorted(kept, new), new))
 
     def above(self, levels: FloatArray) -> NDArray[np.intp]:
@@ -107,8 +109,8 @@ class Inexact(NamedTuple):
     def of(self, joints: NDArray[np.intp], values: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Ends of the loads of some joints, all of these among them, (m,) each; `values` are all loads."""
         lower, upper = values[joints], values[joints]
-        place = np.searchsorted(joints, self.joints)
-        lower[place], upper[place] = self.lower, self.upper
+        index = np.searchsorted(joints, self.joints)
+        lower[index], upper[index] = self.lower, self.upper
         return lower, upper
 
 
@@ -117,9 +119,9 @@ def largest(loads: Iterable[tuple[Column, Inexact]]) -> tuple[Column, Inexact]:
     each = iter(loads)
     column, inexact = next(each)
     values = column.values.copy()
-    for other, own in each:
-        joints = np.union1d(inexact.joints, own.joints)
-        ends = zip(inexact.of(joints, values), own.of(joints, other.values), strict=True)
+    for other, other_inexact in each:
+        joints = np.union1d(inexact.joints, other_inexact.joints)
+        ends = zip(inexact.of(joints, values), other_inexact.of(joints, other.values), strict=True)
         inexact = Inexact(joints, *(np.maximum(*pair) for pair in ends))
         np.maximum(values, other.values, out=values)
     return Column(frozen(values)), inexact

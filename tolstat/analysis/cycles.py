@@ -108,7 +108,7 @@ def duty_cycle(parts: Sequence[Cycles], shares: Sequence[float], transitions: Tr
     if transitions is not None:
         tables.append(transitions)
         number = number + transitions.repeats.sum(axis=2)
-    ranges, means, repeats = (np.concatenate(own, axis=2) for own in zip(*tables, strict=True))
+    ranges, means, repeats = (np.concatenate(table, axis=2) for table in zip(*tables, strict=True))
     omitted = np.concatenate([share * part.omitted for part, share in zip(parts, shares, strict=True)], axis=2)
     ceiling = np.concatenate([part.ceiling for part in parts], axis=2)
     return Cycles(parts[0].channels, ranges, means, number, repeats, omitted, ceiling)
@@ -136,8 +136,8 @@ def spectrum(cycles: Cycles, numbers: ArrayLike) -> FloatArray:
     reached = np.cumsum(np.take_along_axis(cycles.repeats, order, axis=2), axis=2)
     values = np.empty((*cycles.number.shape, wanted.size))
     for q, number in enumerate(wanted):
-        place = np.minimum((reached < number).sum(axis=2, keepdims=True), reached.shape[2] - 1)
-        here = np.take_along_axis(ranges, place, axis=2)[..., 0]
+        index = np.minimum((reached < number).sum(axis=2, keepdims=True), reached.shape[2] - 1)
+        here = np.take_along_axis(ranges, index, axis=2)[..., 0]
         values[..., q] = np.where(reached[..., -1] >= number, here, 0.0)
     values[np.isnan(cycles.number)] = np.nan
     return values

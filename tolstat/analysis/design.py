@@ -1,7 +1,9 @@
-"""What the joints of a campaign allow to conclude: the contract of a sampling design, and the two plainest ones.
+"""What the joints of a campaign allow to conclude: the contract of a sampling design, and the plainest ones.
 
-Independent joints of equal weight, and joints that are listed: sweeps, cases, designs, and one set of Sobol' points or
-one Latin hypercube.
+Independent joints of equal weight; joints that are listed: sweeps, cases, designs, and one set of Sobol' points or one
+Latin hypercube. The joints of such a set are not independent of each other, so formulas for independent samples do not
+give the uncertainty of its estimates. Sets of different seeds are independent, and so are the replicates of one file,
+which are consecutive blocks of its joints.
 """
 
 from __future__ import annotations
@@ -12,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tolstat.analysis import prediction
-from tolstat.analysis.binomial import clopper_pearson
+from tolstat.analysis.binomial import clopper_pearson, half_width
 from tolstat.analysis.column import Column
 from tolstat.analysis.estimates import Estimate
 from tolstat.common.loads import FloatArray
@@ -192,6 +194,91 @@ class Listed(Design):
         return without_interval(self._method) or super().without_interval(claim)
 
 
+class Replicated(Design):
+    """Consecutive blocks of joints, each a set of Sobol' points or a Latin hypercube of its own.
+
+    Parameters
+    ----------
+    n : int
+        Number of joints.
+    number : int
+        Number of replicates, of equal size.
+    method : str
+        Sampling method.
+    """
+
+    claims = frozenset(("share", "quantile", "delivery"))
+    of_quantiles = "over replicates"
+    ranks_at_once = 2000
+    innermost = True  # ends of shares are wider where few joints are above
+
+    def __init__(self, n: int, number: int, method: str) -> None:
+        self._blocks = np.arange(n) // (n // number)
+        self._method = method
+        self.interval = f"Student's t over {number} replicates"
+        self.covers = f"bands: pointwise 95 % intervals of the settled joints, {self.interval}"
+
+    def shares(self, x: Column, levels: FloatArray, confidence: float) -> Estimate[FloatArray]:
+        """See `Design.shares`: Student's t over the shares of the replicates.
+
+        It contains the share of all joints, and where few are on a side of a level (`FEW`) the interval of as
+        many independent joints: no joint above in any replicate does not mean that none can be.
+        """
+        above, joints = counts_by_group(x, self._blocks, levels)
+        estimate = self.estimate(x, levels)
+        with np.errstate(invalid="ignore"):
+            each = _students_t(above / joints[:, None], confidence, 0.0, 1.0)
+        lower = np.fmin(each.lower, np.nan_to_num(estimate, nan=0.0))
+        upper = np.fmax(each.upper, np.nan_to_num(estimate, nan=1.0))
+        return or_independent(Estimate(estimate, lower, upper), x, levels, confidence)
+
+    def only(self, joints: NDArray[np.intp] | NDArray[np.bool_]) -> Design:
+        """See `Design.only`: parts of replicates are no replicates."""
+        return Listed(self._method)
+
+
+def over_replicates(
+    estimates: ArrayLike, confidence: float = 0.95, least: float = -np.inf, most: float = np.inf
+) -> Estimate[FloatArray]:
+    """Student's t interval of the expectation of an estimator, from independent replicates (Owen 2013, 17.4).
+
+    The expectation is the true value for shares and means, which are unbiased. A quantile of few joints is biased, and
+    more replicates do not reduce the bias. With few replicates of a skew distribution the coverage is too low.
+
+    Parameters
+    ----------
+    estimates : array_like, shape (r, ...)
+        Any statistics of each of r >= 2 replicates, each with its own seed and the same number of joints.
+    confidence : float
+        Confidence level of each interval by itself.
+    least, most : float
+        Bounds of the quantity, such as 0 and 1 for shares.
+
+    Returns
+    -------
+    Estimate of ndarray, shape (...)
+        Mean of the replicates and its interval.
+
+    Raises
+    ------
+    ValueError
+        When there are fewer than two replicates, or they agree in every digit, as replicates of one seed do.
+    """
+    values = np.asarray(estimates, dtype=float)
+    n = len(values) if values.ndim else 0
+    if n < 2:
+        raise ValueError(f"{n} replicates: give two or more, of different sampling.seed")
+    if n * values[0].size > 2 and (values == values[0]).all() and not np.isin(values[0], (least, most)).all():
+        raise ValueError("the replicates are all equal: give campaigns of different sampling.seed")
+    return _students_t(values, confidence, least, most)
+
+
+def _students_t(values: FloatArray, confidence: float, least: float, most: float) -> Estimate[FloatArray]:
+    n, mean = len(values), values.mean(axis=0)
+    half = half_width(confidence, n - 1) * values.std(axis=0, ddof=1) / np.sqrt(n)
+    return Estimate(mean, np.maximum(mean - half, least), np.minimum(mean + half, most))
+
+
 def without_interval(method: str) -> str:
     """Return why shares of one set of joints have no interval, and the remedy; empty if they have one."""
     if method not in WITHOUT_INTERVAL:
@@ -201,14 +288,14 @@ def without_interval(method: str) -> str:
 
 
 def or_independent(
-    found: Estimate[FloatArray], x: Column, levels: FloatArray, confidence: float
+    estimate: Estimate[FloatArray], x: Column, levels: FloatArray, confidence: float
 ) -> Estimate[FloatArray]:
     """Let intervals contain Clopper and Pearson's, too, where fewer than `FEW` joints are on a side of a level."""
     count = x.above(levels)
     low, high = clopper_pearson(count, x.n, confidence)
     few = np.minimum(count, x.n - count) < FEW
-    lower = np.where(few, np.minimum(found.lower, low), found.lower)
-    return Estimate(found.estimate, lower, np.where(few, np.maximum(found.upper, high), found.upper))
+    lower = np.where(few, np.minimum(estimate.lower, low), estimate.lower)
+    return Estimate(estimate.estimate, lower, np.where(few, np.maximum(estimate.upper, high), estimate.upper))
 
 
 def counts_by_group(x: Column, groups: NDArray[np.intp], levels: ArrayLike) -> tuple[FloatArray, FloatArray]:

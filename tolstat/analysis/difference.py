@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from tolstat.analysis.binomial import clopper_pearson, half_width
 from tolstat.analysis.column import Column
 from tolstat.analysis.design import Claim, Design
+from tolstat.analysis.estimates import Estimate, Quantile
 from tolstat.analysis.sample import Sample
 from tolstat.common.late import special
 from tolstat.common.loads import FloatArray
@@ -111,15 +112,15 @@ def shares(a: Sample, b: Sample, levels: ArrayLike, paired: bool, confidence: fl
     _valid(a, b, paired)
     level = np.atleast_1d(np.asarray(levels, dtype=float))
     kind = _pairs if paired else _apart
-    found, least, most = (
+    fields, least, most = (
         kind(x, y, a.design, b.design, level, confidence)
         for x, y in ((a.value, b.value), (a.upper, b.lower), (a.lower, b.upper))
     )
     p = np.full(level.shape, np.nan)
     if paired and _have_interval(a.design, b.design, "difference"):
-        only_a, only_b = found[3:5]
+        only_a, only_b = fields[3:5]
         p = np.minimum(2.0 * special.bdtr(np.minimum(only_a, only_b) + 0.0, np.maximum(only_a + only_b, 1), 0.5), 1.0)
-    return ShareDifference._make((*found, p, least[5], most[5], least[6], most[7]))
+    return ShareDifference._make((*fields, p, least[5], most[5], least[6], most[7]))
 
 
 def quantiles(a: Sample, b: Sample, share: float, paired: bool, confidence: float = 0.95) -> Difference:
@@ -157,11 +158,7 @@ def quantiles(a: Sample, b: Sample, share: float, paired: bool, confidence: floa
     elif known:
         with np.errstate(divide="ignore", invalid="ignore"):  # NaN where all are below a quantile
             rho = np.nan_to_num(np.corrcoef(x <= of_a.estimate, y <= of_b.estimate)[0, 1]) if paired else 0.0
-        below, above = _recovered(
-            (of_b.estimate - of_b.lower, of_b.upper - of_b.estimate),
-            (of_a.estimate - of_a.lower, of_a.upper - of_a.estimate),
-            rho,
-        )
+        below, above = _recovered(_lengths(of_b), _lengths(of_a), rho)
         lower, upper = estimate - float(below), estimate + float(above)
     return Difference(of_a.estimate, of_b.estimate, estimate, lower, upper)
 
@@ -235,10 +232,14 @@ def _pairs(x: Column, y: Column, a: Design, b: Design, level: FloatArray, confid
 def _apart(x: Column, y: Column, a: Design, b: Design, level: FloatArray, confidence: float) -> tuple[Any, ...]:
     """Fields of `ShareDifference` up to the interval, of joints that are no pairs."""
     p, q = a.shares(x, level, confidence), b.shares(y, level, confidence)
-    below, above = (q.estimate - q.lower, q.upper - q.estimate), (p.estimate - p.lower, p.upper - p.estimate)
-    lower, upper = _recovered(below, above, 0.0)
+    lower, upper = _recovered(_lengths(q), _lengths(p), 0.0)
     d = q.estimate - p.estimate
     return p.estimate, q.estimate, min(x.n, y.n), x.above(level), y.above(level), d, d - lower, d + upper
+
+
+def _lengths(x: Quantile | Estimate[FloatArray]) -> tuple[ArrayLike, ArrayLike]:
+    """Lengths of an interval below and above its estimate."""
+    return x.estimate - x.lower, x.upper - x.estimate
 
 
 def _recovered(

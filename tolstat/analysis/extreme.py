@@ -33,10 +33,10 @@ GRID, SHARES = 81, 13
 class TooThinError(ValueError):
     """The tail has too few joints; `needed` is the number to simulate for enough of them above the threshold."""
 
-    def __init__(self, found: int, needed: int) -> None:
+    def __init__(self, above: int, needed: int) -> None:
         self.needed = needed
         super().__init__(
-            f"{found} joints above the threshold, {MIN_EXCESSES} are needed: simulate some {needed} joints"
+            f"{above} joints above the threshold, {MIN_EXCESSES} are needed: simulate some {needed} joints"
         )
 
 
@@ -195,7 +195,7 @@ def fit(sample: Sample, share: float | None = None, confidence: float = 0.95) ->
     inside = np.argwhere(deficit[None] + binomial[:, None, None] <= reach)
     region = np.column_stack([shares[inside[:, 0]], k[inside[:, 1], inside[:, 2]], sigma[inside[:, 1], inside[:, 2]]])
     ends = [(float(v.min()), float(v.max())) if iid else (np.nan, np.nan) for v in region.T[1:]]
-    shape, scale = (Estimate(value, *own) for value, own in zip(best, ends, strict=True))
+    shape, scale = (Estimate(value, *interval) for value, interval in zip(best, ends, strict=True))
     return Tail(threshold, joints, lost, m, shape, scale, excesses, region, iid)
 
 

@@ -127,15 +127,15 @@ def tallies(
     for begin in range(0, len(drawn.mean), step):
         here = slice(begin, begin + step)
         logs = base[:, None] + sum(
-            process.log_ratios(own, entry.errors, drawn.mean[here, k], drawn.deviation[here, k])
-            for k, (own, entry) in enumerate(zip(sums, known, strict=True))
+            process.log_ratios(scores, entry.errors, drawn.mean[here, k], drawn.deviation[here, k])
+            for k, (scores, entry) in enumerate(zip(sums, known, strict=True))
         )
         block = np.exp(logs - logs.max(axis=0))  # weights, up to a factor of each process
         largest = np.stack([block[mask].max(axis=0, initial=0.0) for mask in sides])
         every = np.broadcast_to(np.maximum(block.max(axis=0), heaviest * np.exp(-logs.max(axis=0))), largest.shape)
         tables.append([members @ block, members @ np.square(block), largest, every])
-    *found, every = (np.concatenate(parts, axis=1) for parts in zip(*tables, strict=True))
-    return [Split.of([own[k : k + 2] for own in found], every[k : k + 2]) for k in range(0, len(sides), 2)]
+    *tallied, every = (np.concatenate(parts, axis=1) for parts in zip(*tables, strict=True))
+    return [Split.of([tally[k : k + 2] for tally in tallied], every[k : k + 2]) for k in range(0, len(sides), 2)]
 
 
 def intervals(

@@ -64,9 +64,9 @@ def most_likely(excesses: ArrayLike) -> tuple[FloatArray, FloatArray]:
         k, likelihood = _profile(x, b)
         best = np.argmax(np.where(k >= LEAST_SHAPE, likelihood, -np.inf), axis=-1)[..., None]
         at = [np.take_along_axis(b, np.clip(best + step, 0, b.shape[-1] - 1), axis=-1) for step in (-1, 1)]
-        shape, own = (np.take_along_axis(values, best, axis=-1)[..., 0] for values in (k, b))
+        shape, most_likely_b = (np.take_along_axis(values, best, axis=-1)[..., 0] for values in (k, b))
         b = at[0] + (at[1] - at[0]) * part
-    return shape, -shape / own
+    return shape, -shape / most_likely_b
 
 
 def _grid(excesses: ArrayLike, u: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -30,14 +30,11 @@ class Indices(NamedTuple):
         Share of the load's variance that a group explains alone, and in which it takes part, interactions included.
     variance : float
         Variance of the load, in its unit squared.
-    points : int
-        Points with valid loads of A and B.
     """
 
     first: Estimate[FloatArray]
     total: Estimate[FloatArray]
     variance: float
-    points: int
 
 
 def indices(a: ArrayLike, b: ArrayLike, ab: ArrayLike, confidence: float = 0.95) -> Indices:
@@ -84,7 +81,7 @@ def indices(a: ArrayLike, b: ArrayLike, ab: ArrayLike, confidence: float = 0.95)
     moved = mixed - middle - x[:, None]
     half = float(half_width(confidence))
     first, total = (_index(term, square, half) for term in (moved * y[:, None], 0.5 * moved**2))
-    return Indices(first, total, float(square.mean()), len(x))
+    return Indices(first, total, float(square.mean()))
 
 
 def of_event(a: ArrayLike, b: ArrayLike, ab: ArrayLike, confidence: float = 0.95) -> Indices:
@@ -109,17 +106,14 @@ def of_event(a: ArrayLike, b: ArrayLike, ab: ArrayLike, confidence: float = 0.95
     counts = valid.sum(axis=0)
     up, down = (valid & ((mixed - x[:, None]) == sign) for sign in (1.0, -1.0))
     with_b = (y == 1.0)[:, None]
-    cells = np.array([(way & own).sum(axis=0) for way in (up, down) for own in (with_b, ~with_b)])
+    cells = np.array([(way & of_b).sum(axis=0) for way in (up, down) for of_b in (with_b, ~with_b)])
     signs = np.array([1.0 - share, -share, share - 1.0, share])[:, None]
     low, high = (float(end) for end in clopper_pearson(share * 2 * len(x), 2 * len(x), confidence))
     of_ends = low * (1.0 - low), high * (1.0 - high)
     variance = min(of_ends), share * (1.0 - share), 0.25 if low < 0.5 < high else max(of_ends)
-    return Indices(
-        _recovered(cells, signs, counts, variance, confidence),
-        _recovered((up | down).sum(axis=0)[None], np.array([[0.5]]), counts, variance, confidence),
-        variance[1],
-        len(x),
-    )
+    first = _recovered(cells, signs, counts, variance, confidence)
+    total = _recovered((up | down).sum(axis=0)[None], np.array([[0.5]]), counts, variance, confidence)
+    return Indices(first, total, variance[1])
 
 
 def _checked(a: ArrayLike, b: ArrayLike, ab: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -91,12 +91,12 @@ def places(values: ArrayLike) -> NDArray[np.intp]:
     return np.array([np.unique(column, return_inverse=True)[1] for column in columns]).reshape(columns.shape)
 
 
-def from_places(place: NDArray[np.intp]) -> FloatArray:
+def from_places(numbers: NDArray[np.intp]) -> FloatArray:
     """Ranks, from 1, of columns whose `places` are given, or of some of their rows.
 
     Parameters
     ----------
-    place : ndarray, shape (d, m)
+    numbers : ndarray, shape (d, m)
         Places of m rows among all.
 
     Returns
@@ -104,8 +104,8 @@ def from_places(place: NDArray[np.intp]) -> FloatArray:
     ndarray, shape (d, m)
         Ranks among these m rows, the same as those of `scipy.stats.rankdata` for each column.
     """
-    ranks = np.empty(place.shape)
-    for column, out in zip(place, ranks, strict=True):
+    ranks = np.empty(numbers.shape)
+    for column, out in zip(numbers, ranks, strict=True):
         alike = np.bincount(column)
         out[:] = (np.cumsum(alike) - 0.5 * (alike - 1))[column]
     return ranks
@@ -145,24 +145,24 @@ def regression(x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: bool =
     """
     errors, load = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
     if len(load) < errors.shape[1] + 2 * GROUPS:
-        found = f"{len(load)} joints are too few for {errors.shape[1]} errors"
-        raise ValueError(f"{found}: give {errors.shape[1] + 2 * GROUPS} or more")
+        few = f"{len(load)} joints are too few for {errors.shape[1]} errors"
+        raise ValueError(f"{few}: give {errors.shape[1] + 2 * GROUPS} or more")
     if (np.ptp(errors, axis=0) == 0).any() or np.ptp(load) == 0:
         raise ValueError("give a load and errors that scatter")
-    place = places(np.column_stack([errors, load]))
-    estimate, r2 = _coefficients(place)
+    numbers = places(np.column_stack([errors, load]))
+    estimate, r2 = _coefficients(numbers)
     if not iid:
         return RankRegression(estimate, np.full_like(estimate, np.nan), np.full_like(estimate, np.nan), r2)
     group = np.arange(len(load)) % GROUPS
-    without = np.array([_coefficients(place[:, group != g])[0] for g in range(GROUPS)])
+    without = np.array([_coefficients(numbers[:, group != g])[0] for g in range(GROUPS)])
     spread = np.sqrt((GROUPS - 1) / GROUPS * ((without - estimate) ** 2).sum(axis=0))
     half = half_width(confidence, GROUPS - 1) * spread
     return RankRegression(estimate, estimate - half, estimate + half, r2)
 
 
-def _coefficients(place: NDArray[np.intp]) -> tuple[FloatArray, float]:
+def _coefficients(numbers: NDArray[np.intp]) -> tuple[FloatArray, float]:
     """Coefficients and R^2 of joints whose places, (d + 1, m), are given: those of the errors, then of the load."""
-    correlation: FloatArray = np.asarray(np.corrcoef(from_places(place)))
+    correlation: FloatArray = np.asarray(np.corrcoef(from_places(numbers)))
     slopes: FloatArray = np.asarray(np.linalg.lstsq(correlation[:-1, :-1], correlation[:-1, -1], rcond=None)[0])
     return slopes, float(slopes @ correlation[:-1, -1])
 
@@ -210,17 +210,17 @@ def tail(scores: ArrayLike, above: ArrayLike, confidence: float = 0.95, iid: boo
 
 
 def _larger(
-    place: NDArray[np.intp], over: NDArray[np.bool_], confidence: float
+    numbers: NDArray[np.intp], over: NDArray[np.bool_], confidence: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """P(value of one above > of one not above), ties count half, with DeLong's (1988) interval on the logit scale.
 
-    The quantile is Student's, with Welch's (1947) degrees of freedom. `place` has the `places` of all joints,
+    The quantile is Student's, with Welch's (1947) degrees of freedom. `numbers` has the `places` of all joints,
     (d, n).
     """
     m, k = int(over.sum()), int((~over).sum())
-    joint = from_places(place)
-    of_above = (joint[:, over] - from_places(place[:, over])) / k  # share of the others that each one surpasses
-    of_others = 1.0 - (joint[:, ~over] - from_places(place[:, ~over])) / m
+    joint = from_places(numbers)
+    of_above = (joint[:, over] - from_places(numbers[:, over])) / k  # share of the others that each one surpasses
+    of_others = 1.0 - (joint[:, ~over] - from_places(numbers[:, ~over])) / m
     estimate = of_above.mean(axis=1)
     least = 0.5 / (m * k)
     var_above, var_others = of_above.var(axis=1, ddof=1) / m + least**2, of_others.var(axis=1, ddof=1) / k

@@ -17,7 +17,6 @@ from typing import NamedTuple
 import numpy as np
 
 from tolstat.analysis import pareto
-from tolstat.analysis.column import Mask
 from tolstat.analysis.sample import Sample
 from tolstat.analysis.weighted import Split, Weighted
 from tolstat.common.loads import FloatArray
@@ -72,6 +71,8 @@ class Support(NamedTuple):
 
     Attributes
     ----------
+    ess : float
+        Number of equally weighted joints with the same variance of the share.
     above, below : float
         Effective number of joints on each side, (sum of weights)^2 / sum of squares (Kish 1965).
     k : float
@@ -81,6 +82,7 @@ class Support(NamedTuple):
         or the ratio has a bound, which the interval then uses.
     """
 
+    ess: float
     above: float
     below: float
     k: float
@@ -96,8 +98,6 @@ class Share(NamedTuple):
         Share and interval; NaN ends for dependent samples.
     bound_lower, bound_upper : float
         Estimates with the joints without a valid load counted below, and above.
-    ess : float
-        Number of equally weighted joints with the same variance of the share.
     support : Support
         Whether these numbers are usable.
     """
@@ -107,7 +107,6 @@ class Share(NamedTuple):
     upper: float
     bound_lower: float
     bound_upper: float
-    ess: float
     support: Support
 
 
@@ -159,40 +158,30 @@ def share_above(load: Sample, ratios: Ratios, level: float, confidence: float = 
     >>> found = share_above(Sample.of(errors, [1] * 400), ratios, 1.0)
     >>> [round(float(x), 3) for x in (found.lower, found.estimate, found.upper, norm.sf(1.0 / 0.8))]
     [0.079, 0.105, 0.135, 0.106]
-    >>> found.support.usable, round(found.ess)
+    >>> found.support.usable, round(found.support.ess)
     (True, 518)
     """
     withheld = 0.0 if np.isfinite(ratios.heaviest) else LEAST_BESIDE
     design = Weighted(ratios.values, ratios.heaviest, withheld=withheld)
     row = replace(load, design=design).above(level, confidence)
     ends = (row.lower, row.upper) if load.design.has_interval("reweighting") else (np.nan, np.nan)
-    own = _ess(load, ratios, level), support(load, ratios, level)
-    return Share(row.estimate, *ends, row.bound_lower, row.bound_upper, *own)
-
-
-def _sides(load: Sample, ratios: Ratios, level: float) -> tuple[FloatArray, Mask]:
-    """Ratios of the joints with a load, and which of these are above the level, (m,) each."""
-    known = load.is_valid
-    return ratios.values[known], load.values[known] > level
-
-
-def _ess(load: Sample, ratios: Ratios, level: float) -> float:
-    w, above = _sides(load, ratios, level)
-    w = w / w.sum()
-    share = float(w[above].sum())
-    variance = float(((w * (above - share)) ** 2).sum())
-    return share * (1.0 - share) / variance if 0.0 < share < 1.0 and variance > 0 else ratios.effective
+    return Share(row.estimate, *ends, row.bound_lower, row.bound_upper, support(load, ratios, level))
 
 
 def support(load: Sample, ratios: Ratios, level: float) -> Support:
     """Tell whether the share above a level is usable; parameters as in `share_above`."""
-    w, above = _sides(load, ratios, level)
+    known = load.is_valid
+    w, above = ratios.values[known], load.values[known] > level
+    part = w / w.sum()
+    share = float(part[above].sum())
+    variance = float(((part * (above - share)) ** 2).sum())
+    ess = share * (1.0 - share) / variance if 0.0 < share < 1.0 and variance > 0 else ratios.effective
     effective = [float(side[0]) for side in Split.by(above, w).effective]
     k = float(np.fmax(pareto.shape_of_weights(w[above]), pareto.shape_of_weights(w[~above])))
     beside = np.isfinite(ratios.heaviest) or min(effective) >= LEAST_BESIDE
     converged = min(1.0 - 1.0 / np.log10(max(w.size, 11)), 0.7)  # largest k allowed (Vehtari et al. 2024)
     usable = ratios.usable and bool(beside) and not k > converged
-    return Support(effective[0], effective[1], k, usable)
+    return Support(ess, effective[0], effective[1], k, usable)
 
 
 def quantile(load: Sample, ratios: Ratios, share: float, confidence: float = 0.95) -> Load:
@@ -210,10 +199,9 @@ def quantile(load: Sample, ratios: Ratios, share: float, confidence: float = 0.9
     Load
         It holds only if `Load.usable`.
     """
-    found = replace(load, design=Weighted(ratios.values, ratios.heaviest)).quantile(share, confidence)
+    row = replace(load, design=Weighted(ratios.values, ratios.heaviest)).quantile(share, confidence)
     known = load.design.has_interval("reweighting")
-    ends = (found.lower, found.upper) if known else (found.estimate, found.estimate)
-    beside = [support(load, ratios, end) for end in (found.estimate, *ends) if np.isfinite(end)]
-    enough = len(beside) == 3 and all(s.usable and min(s.above, s.below) >= LEAST_BESIDE for s in beside)
-    lower, upper = (found.lower, found.upper) if known else (np.nan, np.nan)
-    return Load(found.estimate, lower, upper, _ess(load, ratios, found.estimate), enough)
+    ends = (row.lower, row.upper) if known else (np.nan, np.nan)
+    each = [support(load, ratios, end) for end in (row.estimate, *(ends if known else ())) if np.isfinite(end)]
+    enough = len(each) == (3 if known else 1) and all(s.usable and min(s.above, s.below) >= LEAST_BESIDE for s in each)
+    return Load(row.estimate, *ends, support(load, ratios, row.estimate).ess, enough)

@@ -116,8 +116,9 @@ class Sample:
         lower, upper = (np.where(np.isfinite(end) & valid, end, value) for end in ends or (value, value))
         joints = np.flatnonzero(lost | (valid & ((lower != value) | (upper != value))))
         low, high = np.where(lost, -np.inf, lower)[joints], np.where(lost, np.inf, upper)[joints]
-        own = Independent() if design is None else design
-        return cls(name, unit, limit, nominal, Column(value), Inexact(joints, low, high), state, own)
+        return cls(
+            name, unit, limit, nominal, Column(value), Inexact(joints, low, high), state, design or Independent()
+        )
 
     @property
     def values(self) -> FloatArray:
@@ -192,14 +193,14 @@ class Sample:
         x = np.unique(self.valid) if levels is None else np.atleast_1d(np.asarray(levels, dtype=float))
         if np.isnan(x).any():
             raise ValueError("a level is NaN")
-        own = self.design.shares(self.value, x, confidence)
+        share = self.design.shares(self.value, x, confidence)
         low, high = (
-            own if end is self.value else self.design.shares(end, x, confidence) for end in (self.lower, self.upper)
+            share if end is self.value else self.design.shares(end, x, confidence) for end in (self.lower, self.upper)
         )
         rows = np.zeros(x.shape, CURVE)
         rows["level"], rows["count"], rows["n"] = x, self.value.above(x), self.value.n + sum(self.unresolved)
         rows["n_failed"], rows["n_unsettled"] = self.unresolved
-        rows["estimate"], rows["lower"], rows["upper"] = own
+        rows["estimate"], rows["lower"], rows["upper"] = share
         rows["bound_lower"], rows["outer_lower"] = np.nan_to_num(low.estimate, nan=0.0), low.lower
         rows["bound_upper"], rows["outer_upper"] = np.nan_to_num(high.estimate, nan=1.0), high.upper
         return rows
@@ -286,15 +287,10 @@ class Sample:
         """Return the load of some of the joints."""
         value = self.values[joints]
         lower, upper = (end.values[joints] for end in (self.lower, self.upper))
-        own = np.flatnonzero((lower != value) & ~np.isnan(lower) | (upper != value) & ~np.isnan(upper))
-        return replace(
-            self,
-            value=Column(value),
-            inexact=Inexact(own, lower[own], upper[own]),
-            status=self.status[joints],
-            design=self.design.only(joints),
-            parts=tuple(part.only(joints) for part in self.parts),
-        )
+        inexact = np.flatnonzero((lower != value) & ~np.isnan(lower) | (upper != value) & ~np.isnan(upper))
+        parts, ends = tuple(part.only(joints) for part in self.parts), Inexact(inexact, lower[inexact], upper[inexact])
+        some = replace(self, value=Column(value), inexact=ends, status=self.status[joints])
+        return replace(some, design=self.design.only(joints), parts=parts)
 
 
 def is_valid(load: FloatArray, status: NDArray[np.uint8]) -> Mask:
@@ -318,7 +314,7 @@ def total_interval(samples: Sequence[Sample], level: float, confidence: float) -
         Envelope of their intervals; NaN when the design gives none.
     """
     each = [sample.above(level, confidence) for sample in samples]
-    return min(own.outer_lower for own in each), max(own.outer_upper for own in each)
+    return min(above.outer_lower for above in each), max(above.outer_upper for above in each)
 
 
 def largest_of(name: str, parts: Sequence[Sample], of_ratios: bool = False) -> Sample:
@@ -329,16 +325,10 @@ def largest_of(name: str, parts: Sequence[Sample], of_ratios: bool = False) -> S
     """
     whole = replace(parts[0], parts=tuple(parts), of_ratios=of_ratios)
     value, inexact = largest((load.value, load.inexact) for load in whole.each())
-    return replace(
-        next(whole.each()),
-        name=name,
-        nominal=max(part.nominal / (part.limit or 1.0) if of_ratios else part.nominal for part in parts),
-        value=value,
-        inexact=inexact,
-        status=worst_status([part.status for part in parts]),
-        parts=whole.parts,
-        of_ratios=of_ratios,
-    )
+    nominal = max(part.nominal / (part.limit or 1.0) if of_ratios else part.nominal for part in parts)
+    load = replace(next(whole.each()), name=name, nominal=nominal, value=value, inexact=inexact)
+    status = worst_status([part.status for part in parts])
+    return replace(load, status=status, parts=whole.parts, of_ratios=of_ratios)
 
 
 def _first(holds: Callable[[NDArray[np.intp]], Mask], n: int, at_once: int, ever: bool = False) -> int:
@@ -346,7 +336,7 @@ def _first(holds: Callable[[NDArray[np.intp]], Mask], n: int, at_once: int, ever
     begin, end = 0, n
     while begin < end:
         ranks = np.arange(begin, end, -(-(end - begin) // at_once))
-        held = holds(ranks)
-        place = int(np.argmax(held)) if ever and held.any() else int(np.flatnonzero(~held).max(initial=-1)) + 1
-        begin, end = int(ranks[place - 1]) + 1 if place else begin, int(ranks[place]) if place < ranks.size else end
+        is_met = holds(ranks)
+        i = int(np.argmax(is_met)) if ever and is_met.any() else int(np.flatnonzero(~is_met).max(initial=-1)) + 1
+        begin, end = int(ranks[i - 1]) + 1 if i else begin, int(ranks[i]) if i < ranks.size else end
     return end

@@ -127,7 +127,7 @@ def first_order(x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: bool 
     """
     errors, loads = _checked(x, y)
     at_angles, _ = over_revolution(errors, loads.reshape(len(loads), -1), confidence, iid)
-    return FirstOrder(*(own.reshape(own.shape[:-1] + loads.shape[1:]) for own in at_angles))
+    return FirstOrder(*(field.reshape(field.shape[:-1] + loads.shape[1:]) for field in at_angles))
 
 
 def over_revolution(
@@ -175,10 +175,8 @@ def over_revolution(
             over_all[0, i] = variance @ share / whole
             influence_over_all = (influence @ variance + square @ (share - over_all[0, i])) / whole
             over_all[1, i] = _error(influence_over_all, alike * _chance(over_all[0, i], fit.degrees, n)) * overall
-    return (
-        _with_ends(local[0], local[1], variance, confidence, iid),
-        _with_ends(over_all[0], over_all[1], np.asarray(variance.mean()), confidence, iid),
-    )
+    at_angles = _with_ends(local[0], local[1], variance, confidence, iid)
+    return at_angles, _with_ends(over_all[0], over_all[1], np.asarray(variance.mean()), confidence, iid)
 
 
 def first_and_total(x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: bool = True) -> tuple[FirstOrder, Total]:
@@ -226,12 +224,12 @@ def first_and_total(x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: b
     pairs, of_pairs, chance_of_pairs = _interactions(errors, e - main, e.var())
     influence_of_pairs = of_pairs - pairs.sum(axis=1) * (e**2 / e.var())[:, None]
     estimate = first + pairs.sum(axis=1)
-    own = influence + influence_of_pairs
+    of_error = influence + influence_of_pairs
     everything = influence.sum(axis=1) + 0.5 * influence_of_pairs.sum(axis=1)
     rest = 1.0 - first.sum() - 0.5 * pairs.sum()
-    errors_lower = _error(own, chance + chance_of_pairs.sum(axis=1)) * wider
+    errors_lower = _error(of_error, chance + chance_of_pairs.sum(axis=1)) * wider
     without = chance.sum() - chance + 0.5 * chance_of_pairs.sum() - chance_of_pairs.sum(axis=1)
-    errors_upper = _error(own - everything[:, None], without) * wider
+    errors_upper = _error(of_error - everything[:, None], without) * wider
     z = half_width(confidence) if iid else np.nan
     np.fill_diagonal(pairs, np.nan)
     lower = np.clip(estimate - z * errors_lower, 0, 1)

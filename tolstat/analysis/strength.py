@@ -205,7 +205,7 @@ def weakest(places: Sequence[Collective], line: Line) -> Collective:
     if len(places) == 1:
         return places[0]
     worst = np.argmax(np.nan_to_num([critical_factor(place, line) for place in places]), axis=0)
-    return Collective(*(np.stack(own)[worst, np.arange(len(worst))] for own in zip(*places, strict=True)))
+    return Collective(*(np.stack(field)[worst, np.arange(len(worst))] for field in zip(*places, strict=True)))
 
 
 def probability(factor: FloatArray, T_S: float) -> FloatArray:

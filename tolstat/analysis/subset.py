@@ -115,7 +115,7 @@ class _States(NamedTuple):
 
     def part(self, rows: slice | NDArray[np.bool_]) -> _States:
         """Some of the states."""
-        return _States._make(own[rows] for own in self)
+        return _States._make(field[rows] for field in self)
 
 
 class Walk:

@@ -57,7 +57,7 @@ class Split(NamedTuple):
         sides = []
         for w, number in ((weights[::-1], weights.size - first), (weights, first)):
             sums = w.cumsum(), (w**2).cumsum(), np.maximum.accumulate(w)
-            sides.append([np.insert(own, 0, 0.0)[number] for own in sums])
+            sides.append([np.insert(total, 0, 0.0)[number] for total in sums])
         every = heaviest if np.isfinite(heaviest) else weights.max(initial=0.0)
         return cls.of(np.swapaxes(sides, 0, 1), every)
 
@@ -66,7 +66,7 @@ class Split(NamedTuple):
         """Split by a mask, (n,), in place of a level."""
         sides = np.where([is_above, ~is_above], weights, 0.0)
         sums = sides.sum(axis=1), (sides**2).sum(axis=1), sides.max(axis=1, initial=0.0)
-        return cls.of([own[:, None] for own in sums], weights.max(initial=0.0))
+        return cls.of([total[:, None] for total in sums], weights.max(initial=0.0))
 
     @property
     def effective(self) -> FloatArray:
@@ -185,8 +185,8 @@ class Weighted(Design):
 
     def only(self, joints: NDArray[np.intp] | NDArray[np.bool_]) -> Weighted:
         """See `Design.only`."""
-        own = None if self.from_tolerances is None else self.from_tolerances[joints]
-        return Weighted(self.weights[joints], self.heaviest, own, self._withheld)
+        drawn = None if self.from_tolerances is None else self.from_tolerances[joints]
+        return Weighted(self.weights[joints], self.heaviest, drawn, self._withheld)
 
     def times(self, factors: FloatArray, largest: float = 1.0) -> Weighted:
         """Return the design with weights times factors, (n,), of mean 1 again; `largest` is the largest factor."""

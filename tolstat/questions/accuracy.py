@@ -14,7 +14,7 @@ from tolstat.common.loads import UNIT_OF_LOAD, FloatArray, load_of
 from tolstat.common.tables import Status
 from tolstat.display import text
 from tolstat.display.answer import Answer, Column, Rows, Sentence, Table
-from tolstat.questions.shares import inapplicable, word
+from tolstat.questions.shares import Cell, inapplicable, word
 from tolstat.store.verification import Verification
 from tolstat.store.view import View
 
@@ -23,17 +23,17 @@ LEAST = 1e-5
 """Smallest error that is given as a number in per cent."""
 
 
-def _small(x: float) -> str:
-    return text.formed(x, ".1e")
+def _small(key: str) -> Cell:
+    return lambda row: text.formed(row[key], ".1e")
 
 
 ERRORS = (
     Column("load", word("load")),
     Column("error", word("error"), words=True),
     Column("joints", word("joints")),
-    Column("median", lambda row: _small(row["median"])),
-    Column("95 % below", lambda row: _small(row["usual"])),
-    Column("worst", lambda row: _small(row["worst"])),
+    Column("median", _small("median")),
+    Column("95 % below", _small("usual")),
+    Column("worst", _small("worst")),
 )
 """Columns of the table ``errors``."""
 
@@ -76,21 +76,20 @@ def error_rows(verification: Verification, by_kind: bool = True) -> Rows:
         ``load`` (``F``: the worst of its bushings in each joint; ``cross1.F`` if not `by_kind`), ``error`` (name of the
         check or `TOTAL`), ``joints``, ``median``, ``usual`` (95 % of the joints are below) and ``worst``.
     """
-    found, kept = errors(verification), _kept(verification)
+    by_check, kept = errors(verification), _kept(verification)
+    columns = {OBSERVABLES[k]: k for k in np.flatnonzero(kept)}
     if by_kind:
         columns = {LOAD_KINDS[k].key: k for k in np.unique(KIND_OF[kept])}
-        found = {name: comparison.by_kind(values) for name, values in found.items()}
-    else:
-        columns = {OBSERVABLES[k]: k for k in np.flatnonzero(kept)}
-    each = ((load, name, *comparison.spread(found[name][:, k])) for load, k in columns.items() for name in found)
+        by_check = {name: comparison.by_kind(values) for name, values in by_check.items()}
+    each = ((load, name, *comparison.spread(by_check[name][:, k])) for load, k in columns.items() for name in by_check)
     return [dict(zip(("load", "error", "joints", "median", "usual", "worst"), row, strict=True)) for row in each]
 
 
 def errors(verification: Verification) -> dict[str, FloatArray]:
     """Errors, (m, loads), by check, as of `accuracy.differences`; last `TOTAL`, from `accuracy.numerical`."""
     results = {name: check.results for name, check in verification.checks.items()}
-    found = {name: comparison.differences(verification.base, other) for name, other in results.items()}
-    return found | {TOTAL: comparison.numerical(verification.base, results)}
+    by_check = {name: comparison.differences(verification.base, other) for name, other in results.items()}
+    return by_check | {TOTAL: comparison.numerical(verification.base, results)}
 
 
 def joint_rows(verification: Verification) -> Rows:
@@ -122,10 +121,14 @@ def note(verification: Verification, limits: Iterable[str] = ()) -> str:
     shown = [row for row in total if row["load"] in kinds or KIND[row["load"]].shown] or total
     known = [row for row in shown if not np.isnan(row["worst"])]
     called = {kind.key: kind.symbol if kind.symbol == kind.key else kind.noun for kind in LOAD_KINDS}
-    words = [f"{called[row['load']]} {_small(row['median'])}, at worst {_small(row['worst'])}" for row in known]
+    words = [f"{called[row['load']]} {row['median']:.1e}, at worst {row['worst']:.1e}" for row in known]
     noun = "error of numerics and fidelity" if FIDELITY in verification.checks else "numerical error"
-    unknown = f"; {unsettled}" if (unsettled := _unsettled(verification)) else ""
-    return f"{noun}, {basis(verification)}: {'; '.join(words) or 'unknown'}{unknown}"
+    base = verification.base["status"] == Status.OK
+    lost = {"": int((~base).sum())}  # joints that failed or did not settle, in the campaign and in each check
+    for name, check in verification.checks.items():
+        lost[f" in {name}"] = int((base & (check.results["status"] != Status.OK)).sum())
+    unsettled = ", ".join(f"{count} not settled{where}" for where, count in lost.items() if count)
+    return f"{noun}, {basis(verification)}: {'; '.join(words) or 'unknown'}{f'; {unsettled}' if unsettled else ''}"
 
 
 def basis(verification: Verification) -> str:
@@ -147,12 +150,3 @@ def _kept(verification: Verification) -> NDArray[np.bool_]:
     """Which of `OBSERVABLES` the campaign keeps, (loads,); all if no joint has a value."""
     kept = ~np.isnan(comparison.loads(verification.base)).all(axis=0)
     return np.asarray(kept | ~kept.any())
-
-
-def _unsettled(verification: Verification) -> str:
-    """Words on joints that failed or did not settle in the campaign or in a check; empty if there are none."""
-    base = verification.base["status"] == Status.OK
-    counts = {"": int((~base).sum())}
-    for name, check in verification.checks.items():
-        counts[f" in {name}"] = int((base & (check.results["status"] != Status.OK)).sum())
-    return ", ".join(f"{count} not settled{where}" for where, count in counts.items() if count)

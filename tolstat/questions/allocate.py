@@ -189,7 +189,7 @@ def allocate(
         judged.append((ANY_LIMIT, np.nan, [np.any(ends, axis=0) for ends in zip(*events, strict=False)]))
     limits = [_limit(view, statement, checked, ratios, delivery) for statement in judged]
     figures = [(row["estimate"], row["ess"], row["target"]) for row in limits[: len(events)]]
-    needed = ratios.effective * max(allocation.joints_needed(*own, CONFIDENCE) for own in figures)
+    needed = ratios.effective * max(allocation.joints_needed(*figure, CONFIDENCE) for figure in figures)
     limits = [row if row["usable"] else row | dict.fromkeys(WITHHELD, np.nan) for row in limits]
     holds, verdict = _verdict(limits[: len(events)], ratios, needed)
     facts = {"holds": holds, "verdict": verdict, "aim": choice.aim, "effective": ratios.effective}
@@ -360,7 +360,7 @@ def _limit(view: View, judged: _Judged, checked: NDArray[np.intp], ratios: Ratio
     share, (lower, upper), predicted = shares.reweighted(samples, ratios, 0.5, delivery)
     row = {"limit": name, "target": target, "before": float(above[0].mean()), "estimate": share.estimate}
     row |= {"lower": lower, "upper": upper} | predicted
-    return row | {"ess": share.ess, "usable": share.support.usable, "numerical": len(above) > 1}
+    return row | {"ess": share.support.ess, "usable": share.support.usable, "numerical": len(above) > 1}
 
 
 def _tolerances(request: _Request, entries: Entries) -> list[dict[str, Any]]:

@@ -110,8 +110,8 @@ def capability(
     try:
         rare = [row for load in view.limits for row in return_rows(view, load, one_in)]
     except ValueError as error:
-        found, _, remedy = str(error).partition(": ")
-        raise InputError([Fault("--one-in", found, remedy)]) from error
+        reason, _, remedy = str(error).partition(": ")
+        raise InputError([Fault("--one-in", reason, remedy)]) from error
     parts += [Table("one_in", RARE, RETURNS, rare), *notes]
     if refused := shares.grouped((row["load"], row["refusal"]) for row in rare if row["refusal"]):
         warning = f"{refused}: not extrapolated; tolstat rare, a subset simulation, needs no tail"
@@ -127,10 +127,10 @@ def capability_on_page(view: View, asked: Asked) -> Answer:
     if known_parts.of(view) is not None:
         parts.append(Sentence("for the tolerances as stated: what measured parts leave open is not in these"))
     tails = [partial(_rare_loads, view, name) for name in view.leading]
-    found = dict(zip(view.leading, mapped(tails, min(asked.processes, 2)), strict=True))
-    if rows := [row for own in found.values() if not isinstance(own, str) for row in own]:
+    by_load = dict(zip(view.leading, mapped(tails, min(asked.processes, 2)), strict=True))
+    if rows := [row for rare in by_load.values() if not isinstance(rare, str) for row in rare]:
         parts.append(Table("one_in", f"{RARE}, from a generalised Pareto tail", RETURNS, rows))
-    if reasons := shares.grouped((name, own) for name, own in found.items() if isinstance(own, str)):
+    if reasons := shares.grouped((name, rare) for name, rare in by_load.items() if isinstance(rare, str)):
         parts.append(Sentence(f"Rare loads. {reasons}."))
     if not parts:
         raise NotApplicable
@@ -172,12 +172,11 @@ def limit_rows(view: View, confidence: float = 0.95, delivery: int = DELIVERY) -
     rows = []
     for load in view.loads([*view.limits, ANY_LIMIT]):
         row = dict(shares.good(view, load.name, confidence, delivery))
-        c = indices.of_sample(load, row["limit"], confidence)
-        names = [f"{key}{end}" for key in ("cpk", "cpk_normal") for end in ("", "_lower", "_upper")]
-        row |= {key: getattr(c, key) for key in (*names, "normal_p", "needed")}
+        index = indices.of_sample(load, row["limit"], confidence)
+        both = shares.with_ends("cpk", index.cpk) | shares.with_ends("cpk_normal", index.cpk_normal)
         if binomial.unresolved_matter(row["count"], row["n"], row["n_failed"] + row["n_unsettled"]):
-            row |= dict.fromkeys(names, np.nan)
-        rows.append(row)
+            both = dict.fromkeys(both, np.nan)
+        rows.append(row | both | {"normal_p": index.normal_p, "needed": index.needed})
     return rows
 
 

@@ -81,7 +81,7 @@ def _rows(store: Reader) -> Rows:
         {key.removeprefix("solver."): value for key, value in variant.values.items() if key.startswith("solver.")}
         for variant in variants
     )
-    columns["remedy"] = [remedy(row, store.options | own) for row, own in zip(results, set_by_variants, strict=True)]
+    columns["remedy"] = [remedy(row, store.options | keys) for row, keys in zip(results, set_by_variants, strict=True)]
     gamma = relative_errors(results, design["group"])
     for b, bushing in enumerate(BUSHINGS):
         for load, (letter, unit) in enumerate((("F", "N"), ("T", "N*m"))):

@@ -18,17 +18,17 @@ from tolstat.analysis.sample import Sample
 from tolstat.common.counts import Counts
 from tolstat.common.draw_records import DRAWN
 from tolstat.common.errors import Fault, InputError, StoreError
-from tolstat.common.loads import ANY_LIMIT, FloatArray, unit_text
+from tolstat.common.loads import ANY_LIMIT, unit_text
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import Status
 from tolstat.display import drawing, style, text
-from tolstat.display.answer import Answer, Axes, Column, Panel, Panels, Row, Rows, Sentence, Table
+from tolstat.display.answer import Answer, Axes, Column, Panel, Panels, Part, Row, Rows, Sentence, Table
 from tolstat.display.options import Loads
 from tolstat.display.style import patches
 from tolstat.questions.shares import NO_INTERVALS, inapplicable, share, word
 from tolstat.store.view import View
 
-SHARES = (0.5, 0.9, 0.99)
+QUANTILES = (0.5, 0.9, 0.99)
 """Quantiles that are compared."""
 LEVELS = 200
 """Approximate number of levels of a curve."""
@@ -70,7 +70,7 @@ class Sides(NamedTuple):
         """Load of the joints of A and of B."""
         both = zip((view.load(name) for view in self.views), self.samples, strict=True)
         # a million joints are not copied
-        a, b = (load if len(own) == load.values.size else load.only(own) for load, own in both)
+        a, b = (load if len(joints) == load.values.size else load.only(joints) for load, joints in both)
         return a, b
 
 
@@ -83,22 +83,18 @@ def _interval(row: Row, factor: float, unit: str) -> str:
     return "-" if math.isnan(low) else f"{low:+.3g} .. {high:+.3g}{unit}"
 
 
-def _share_columns(paired: bool) -> tuple[Column, ...]:
-    """Columns of the table ``shares``; joints above on one side only are counted for pairs."""
-    only_a, only_b = map(word, ("only_a", "only_b")) if paired else (lambda _: "-", lambda _: "-")
-    return (
-        Column("load > limit", text.limit),
-        Column("A", share("a")),
-        Column("B", share("b")),
-        Column("B - A", lambda row: f"{100 * row['estimate']:+.3g} %"),
-        Column("ppm", lambda row: f"{1e6 * row['estimate']:+.4g}", rank=2),
-        Column("95 % interval", lambda row: _interval(row, 100.0, " %")),
-        Column("only A", only_a, rank=1),
-        Column("only B", only_b, rank=1),
-        Column("p", lambda row: text.formed(row["p"], ".2g")),
-    )
-
-
+SHARES = (
+    Column("load > limit", text.limit),
+    Column("A", share("a")),
+    Column("B", share("b")),
+    Column("B - A", lambda row: f"{100 * row['estimate']:+.3g} %"),
+    Column("ppm", lambda row: f"{1e6 * row['estimate']:+.4g}", rank=2),
+    Column("95 % interval", lambda row: _interval(row, 100.0, " %")),
+    Column("only A", word("only_a"), rank=1),
+    Column("only B", word("only_b"), rank=1),
+    Column("p", lambda row: text.formed(row["p"], ".2g")),
+)
+"""Columns of the table ``shares``; joints above on one side only are counted for pairs."""
 LOADS = (
     Column("load", word("load")),
     Column("statistic", word("statistic")),
@@ -170,21 +166,18 @@ def compare(a: View, b: View, by: Loads = None) -> Answer:
     except ValueError as error:
         raise StoreError(str(Fault(f"{a.path}, {b.path}", str(error), "resume both campaigns"))) from error
     switched = [row for limit in limits for row in _switched(both, *limit)] if both.paired else []
+    seen = rows if both.paired else [{**row, "only_a": "-", "only_b": "-"} for row in rows]
     differing = changes(a, b)
-    every = [{"key": key, "a": one, "b": other} for keys, one, other in differing for key in keys]
-    return Answer(
-        "compare",
-        "Two campaigns side by side",
-        [
-            Panels([panel for name in names[:MAX_LOADS] for panel in _panels(both, name, rows, loads)]),
-            Table("shares", "Shares above the limits", _share_columns(both.paired) if rows else (), rows),
-            Table("loads", "Quantiles and means", LOADS if by or not rows else (), loads),
-            Table("switched", "Pairs with one joint above a limit", (), switched),
-            Table("changes", "Differences between the studies", (), every),
-            *map(Sentence, _notes(both, differing, len(switched))),
-        ],
-        {"paired": both.paired},
-    )
+    keys = [{"key": key, "a": of_a, "b": of_b} for keys, of_a, of_b in differing for key in keys]
+    parts: list[Part] = [
+        Panels([panel for name in names[:MAX_LOADS] for panel in _panels(both, name, rows, loads)]),
+        Table("shares", "Shares above the limits", SHARES if rows else (), rows, seen=seen),
+        Table("loads", "Quantiles and means", LOADS if by or not rows else (), loads),
+        Table("switched", "Pairs with one joint above a limit", (), switched),
+        Table("changes", "Differences between the studies", (), keys),
+        *map(Sentence, _notes(both, differing, len(switched))),
+    ]
+    return Answer("compare", "Two campaigns side by side", parts, {"paired": both.paired})
 
 
 def changes(a: View, b: View) -> list[tuple[list[str], Any, Any]]:
@@ -192,18 +185,17 @@ def changes(a: View, b: View) -> list[tuple[list[str], Any, Any]]:
 
     Keys with equal values are together; a value is None where a study has no such key.
     """
-    one, other = (_identity(view) for view in (a, b))
-    found: dict[str, tuple[list[str], Any, Any]] = {}
-    for key in sorted(one.keys() | other.keys()):
-        pair = (one.get(key), other.get(key))
-        if pair[0] != pair[1]:
-            found.setdefault(json.dumps(pair), ([], *pair))[0].append(key)
-    return list(found.values())
-
-
-def _identity(view: View) -> dict[str, Any]:
-    limits = {f"limits.{name}": level for name, level in view.limits.items()}
-    return view.store.identity | limits | {key: view.store.versions.get(key) for key in ("tolstat", "sources")}
+    identities = []
+    for view in (a, b):
+        limits = {f"limits.{name}": level for name, level in view.limits.items()}
+        code = {key: view.store.versions.get(key) for key in ("tolstat", "sources")}
+        identities.append(view.store.identity | limits | code)
+    by_values: dict[str, tuple[list[str], Any, Any]] = {}
+    for key in sorted(set().union(*identities)):
+        of_a, of_b = (identity.get(key) for identity in identities)
+        if of_a != of_b:
+            by_values.setdefault(json.dumps((of_a, of_b)), ([], of_a, of_b))[0].append(key)
+    return list(by_values.values())
 
 
 def sides(a: View, b: View) -> Sides:
@@ -223,10 +215,10 @@ def sides(a: View, b: View) -> Sides:
 def _names(a: View, b: View, by: Sequence[str], limited: Sequence[str]) -> list[str]:
     """Loads whose quantiles and means are compared; checks that both files keep them and the loads with limits."""
     kept = [name for name in a.kept_loads if name in b.kept_loads]
-    places = {**dict.fromkeys(by, "--by"), **{name: f"limits.{name}" for name in limited}}
+    asked = dict.fromkeys(by, "--by") | {name: f"limits.{name}" for name in limited}
     faults = [
-        Fault(place, f"{name!r} is not a load that both files keep", did_you_mean(name, kept))
-        for name, place in places.items()
+        Fault(option, f"{name!r} is not a load that both files keep", did_you_mean(name, kept))
+        for name, option in asked.items()
         if name not in kept
     ]
     if faults:
@@ -236,33 +228,33 @@ def _names(a: View, b: View, by: Sequence[str], limited: Sequence[str]) -> list[
 
 def _share(both: Sides, name: str, level: float) -> Row:
     a, b = both.load(name)
-    found = difference.shares(a, b, [level], both.paired)._asdict()
-    values = {key: value if key == "n" else value[0].item() for key, value in found.items()}
+    fields = difference.shares(a, b, [level], both.paired)._asdict()
+    values = {key: value if key == "n" else value[0].item() for key, value in fields.items()}
     return {"load": name, "unit": a.unit, "level": level, **values}
 
 
 def _statistics(both: Sides, name: str) -> Rows:
     a, b = both.load(name)
-    found = {"mean": difference.means(a, b, both.paired)}
-    found |= {f"{100 * share:g} %": difference.quantiles(a, b, share, both.paired) for share in SHARES}
-    return [{"load": name, "unit": a.unit, "statistic": key, **value._asdict()} for key, value in found.items()]
+    statistics = {"mean": difference.means(a, b, both.paired)}
+    statistics |= {f"{100 * share:g} %": difference.quantiles(a, b, share, both.paired) for share in QUANTILES}
+    return [{"load": name, "unit": a.unit, "statistic": key, **value._asdict()} for key, value in statistics.items()]
 
 
 def _switched(both: Sides, name: str, level: float) -> Iterator[Row]:
-    of_a, of_b = both.load(name)
-    a, b = of_a.values, of_b.values
+    loads = both.load(name)
+    a, b = (load.values for load in loads)
     here = np.isfinite(a) & np.isfinite(b) & ((a > level) != (b > level))
-    for row, one, other in zip(both.rows[here].tolist(), a[here].tolist(), b[here].tolist(), strict=True):
-        yield {"row": row, "load": name, "unit": of_a.unit, "level": level, "a": one, "b": other}
+    for row, of_a, of_b in zip(both.rows[here].tolist(), a[here].tolist(), b[here].tolist(), strict=True):
+        yield {"row": row, "load": name, "unit": loads[0].unit, "level": level, "a": of_a, "b": of_b}
 
 
 def _notes(both: Sides, differing: Sequence[tuple[list[str], Any, Any]], switched: int) -> Iterator[str]:
     """Differences between the studies, numbers of joints, and what the intervals leave out."""
     for side, view in zip("AB", both.views, strict=True):
         yield f"{side}: {view.path}"
-    for keys, one, other in differing:
+    for keys, of_a, of_b in differing:
         more = f" and {len(keys) - 1} more" if len(keys) > 1 else ""
-        yield f"  {keys[0]}{more}: {_in_words(one)} -> {_in_words(other)}"
+        yield f"  {keys[0]}{more}: {_in_words(of_a)} -> {_in_words(of_b)}"
     if not differing:
         yield "  the studies are the same"
     a, b = map(len, both.samples)
@@ -271,8 +263,8 @@ def _notes(both: Sides, differing: Sequence[tuple[list[str], Any, Any]], switche
         yield f"{switched} times only one joint of a pair is above a limit"
     else:
         yield f"{a} and {b} joints with different random numbers"
-    counts = [Counts.of(view.status[own]) for view, own in zip(both.views, both.samples, strict=True)]
-    if unresolved := sum(own.failed + own.unsettled for own in counts):
+    each = [Counts.of(view.status[joints]) for view, joints in zip(both.views, both.samples, strict=True)]
+    if unresolved := sum(counts.failed + counts.unsettled for counts in each):
         bounds = "the bounds in JSON and CSV count them below, then above"
         yield f"{unresolved} joints without a valid load: left out; {bounds}"
     if not both.has_intervals:
@@ -305,14 +297,20 @@ def _panels(both: Sides, name: str, rows: Rows, loads: Rows) -> Iterator[Panel]:
 def _draw(ax: Axes, both: Sides, name: str, limits: Sequence[float], labels: Sequence[str], change: bool) -> None:
     """Draw the exceedance of both campaigns, or the share of B less that of A; the last of `labels` is of the bands."""
     a, b = both.load(name)
-    levels, floor = _levels(a.values, b.values), 0.5 / max(a.values.size, b.values.size)
+    # levels of the curves: quantiles of both campaigns pooled, denser in the tail
+    pooled = np.concatenate([a.valid, b.valid])
+    tail = 1.0 - np.geomspace(1.0, 1.0 / pooled.size, LEVELS // 2)
+    levels = np.unique(np.quantile(pooled, np.union1d(np.linspace(0.0, 1.0, LEVELS // 2), tail), method="inverted_cdf"))
+    floor = 0.5 / max(a.values.size, b.values.size)
     if change:
         ax.axhline(0.0, color=style.FAINT, lw=1.0)
-        found = difference.shares(a, b, levels, both.paired)
-        curves = [100.0 * np.array([found.estimate, found.lower, found.upper])]
+        shares = difference.shares(a, b, levels, both.paired)
+        curves = [100.0 * np.array([shares.estimate, shares.lower, shares.upper])]
     else:
         tables = (load.curve(levels) for load in (a, b))
-        curves = [np.array([own[end] for end in ("estimate", "lower", "upper")]).clip(0.1 * floor) for own in tables]
+        curves = [
+            np.array([curve[end] for end in ("estimate", "lower", "upper")]).clip(0.1 * floor) for curve in tables
+        ]
     look: Any = {"step": "post", "colours": (style.INK,) if change else style.COLOURS}
     handles = drawing.curves(ax, levels, curves, limits, bands=len(curves) if both.has_intervals else 0, **look)
     if labels:
@@ -322,11 +320,3 @@ def _draw(ax: Axes, both: Sides, name: str, limits: Sequence[float], labels: Seq
     ax.set_ylabel("B less A, % of the joints" if change else "share of the joints above x")
     if not change:
         style.share_axis(ax, floor)
-
-
-def _levels(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Levels of the curves: quantiles of both campaigns pooled, denser in the tail."""
-    both = np.concatenate([a[np.isfinite(a)], b[np.isfinite(b)]])
-    tail = np.geomspace(1.0, 1.0 / both.size, LEVELS // 2)
-    shares = np.union1d(np.linspace(0.0, 1.0, LEVELS // 2), 1.0 - tail)
-    return np.unique(np.quantile(both, shares, method="inverted_cdf"))

@@ -22,7 +22,7 @@ from tolstat.common.late import special
 from tolstat.common.loads import ANY_LIMIT
 from tolstat.common.tables import VALID
 from tolstat.display import drawing, style, text
-from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Row, Rows, Sentence, Table
+from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Part, Row, Rows, Sentence, Table
 from tolstat.display.options import Accepted, Opt
 from tolstat.display.table import has, has_unresolved
 from tolstat.questions import shares
@@ -165,7 +165,7 @@ def lots(
 
     @cache
     def predicted(*counts: int) -> Delivery:
-        return clustered.law_of(counts, n).delivery(delivery, from_lots)
+        return clustered.delivery(counts, n, delivery, from_lots)
 
     rows, counts = [], {}
     for sample in view.loads([*view.limits, ANY_LIMIT]):
@@ -176,17 +176,13 @@ def lots(
         rows.append(row | {"bad": math.nan if math.isnan(accepted) else most.more_than(accepted)})
     numbers, size = design.numbers[joints > 0], int(view.store.sampling["joints_per_lot"])
     notes = [*_notes(rows, size, accepted), error_budget.unknown(view)]
-    return Answer(
-        "lots",
-        "Lots, and the next delivery",
-        [
-            Panels([_panel(rows[-1], counts[ANY_LIMIT], n, size)]),
-            Table("limits", "Lots against each limit, and all of them together", COLUMNS, rows),
-            Table("lots", "Joints above the limits, by lot", (), shares.rows_of({"lot": numbers, "n": n} | counts)),
-            *(Sentence(note) for note in notes if note),
-        ],
-        {"joints_per_lot": size},
-    )
+    parts: list[Part] = [
+        Panels([_panel(rows[-1], counts[ANY_LIMIT], n, size)]),
+        Table("limits", "Lots against each limit, and all of them together", COLUMNS, rows),
+        Table("lots", "Joints above the limits, by lot", (), shares.rows_of({"lot": numbers, "n": n} | counts)),
+        *(Sentence(note) for note in notes if note),
+    ]
+    return Answer("lots", "Lots, and the next delivery", parts, {"joints_per_lot": size})
 
 
 def lots_on_page(view: View, asked: Asked) -> Answer:
@@ -238,7 +234,7 @@ def _panel(row: Row, above: Integers, n: Integers, size: int) -> Panel:
         share = np.sort(above / n)
         top = max(2, int(np.ceil(size * min(1.0, share[-1] * 1.15 + 1.0 / size))))
         at, x = np.arange(top + 1), np.arange(top + 2) / size
-        expected = np.cumsum(clustered.law_of(above, n).delivery(size).probability)[at]
+        expected = np.cumsum(clustered.delivery(above, n, size).probability)[at]
         alone = special.bdtr(at, size, above.sum() / n.sum())
         for cdf, colour, dash in ((alone, style.FAINT, style.DASHES[2]), (expected, style.COLOURS[1], style.DASHES[1])):
             ax.step(x, 100.0 * np.append(cdf, cdf[-1]), where="post", color=colour, ls=dash)

@@ -141,7 +141,12 @@ def reweight(
     verdict, usable = _verdict(ratios, rows), all(row["usable"] for row in rows)
     facts = {"usable": usable, "effective": ratios.effective, "needed": ratios.needed, "verdict": verdict}
     title, columns = ("Shares above the limits", LIMITS) if view.limits else ("Quantiles", QUANTILES)
-    again = "" if usable else f"fresh joints, same seeds: {_remedy(view, settings)}"
+    again = ""
+    if not usable:
+        changes = " ".join(f"--set {json.dumps(setting, ensure_ascii=False)}" for setting in settings)
+        command = f"tolstat reweight {quote(str(view.path))} {changes} --out changed"
+        study = quote(f"changed/{view.path.stem}_reweight.toml")
+        again = f"fresh joints, same seeds: {command} && tolstat run {study}"
     words = (f"{len(names)} errors changed; {verdict}", error_budget.unknown(view), again)
     notes, other = [Sentence(note) for note in words if note], Document(".toml", rewritten_with(view.study, settings))
     table = Table("loads", f"{title}, reweighted", columns, rows)
@@ -175,16 +180,13 @@ def _verdict(ratios: Ratios, rows: Rows) -> str:
     return figures + (f"; {missing} of {len(rows)} rows need new runs: {least}" if missing else "")
 
 
-def _remedy(view: View, settings: Sequence[str]) -> str:
-    """Commands that simulate what is not usable: fresh joints of the changed tolerances, from the same seed."""
-    changes = " ".join(f"--set {json.dumps(setting, ensure_ascii=False)}" for setting in settings)
-    study = quote(f"changed/{view.path.stem}_reweight.toml")
-    return f"tolstat reweight {quote(str(view.path))} {changes} --out changed && tolstat run {study}"
-
-
 def _ratios(view: View, new: Mapping[str, Distribution], names: Sequence[str], done: NDArray[np.intp]) -> Ratios:
     """Density ratios of the joints `done`, with their exact mean square."""
-    study, values = view.study, np.exp(_log_ratios(view, new, names)[done])
+    study = view.study
+    columns = [column for name in dict.fromkeys((*names, *study.copula.names)) for column in columns_of(name)]
+    blocks = view.error_blocks(columns)  # the errors of a million joints would be half a gigabyte
+    logs = np.concatenate([_block_log_ratios(study, new, names, errors) for errors in blocks])
+    values = np.exp((logs + np.log(view.design.counts_as(view.n)))[done])
     correlated = [name for name in names if name in study.copula.names]
     square, open_square, largest = density_ratio.exact(
         (new[name], study.tolerances[name]) for name in names if name not in correlated
@@ -212,15 +214,6 @@ def _beyond(old: Distribution, new: Distribution) -> str:
         x = new.ppf(u)
         outside = float(np.max(u[x < low], initial=0.0) + np.max(1 - u[x > high], initial=0.0))
     return f"{outside:.2g} of the new errors lie where the study draws none" if outside > MAX_OUTSIDE else ""
-
-
-def _log_ratios(view: View, new: Mapping[str, Distribution], names: Sequence[str]) -> FloatArray:
-    """Logarithm of new density over that which each joint was drawn from, (n,), up to a constant."""
-    study = view.study
-    columns = [column for name in dict.fromkeys((*names, *study.copula.names)) for column in columns_of(name)]
-    blocks = view.error_blocks(columns)  # the errors of a million joints would be half a gigabyte
-    logs = np.concatenate([_block_log_ratios(study, new, names, errors) for errors in blocks])
-    return logs + np.log(view.design.counts_as(view.n))
 
 
 def _block_log_ratios(
@@ -251,7 +244,7 @@ def _share_above(view: View, load: Sample, done: NDArray[np.intp], ratios: Ratio
     row = {"load": load.name, "unit": load.unit, "level": level, "before": before}
     row |= {key: getattr(share, key) for key in GIVEN}
     row["total_lower"], row["total_upper"] = total if known else (np.nan, np.nan)
-    return row | predicted | {"ess": share.ess} | share.support._asdict()
+    return row | predicted | share.support._asdict()
 
 
 def _quantile(load: Sample, ratios: Ratios, share: float) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tolstat.analysis import binomial, difference, prediction, reweight
-from tolstat.analysis.design import Claim
+from tolstat.analysis.design import SAMPLE, Claim
 from tolstat.analysis.estimates import Exceedance
 from tolstat.analysis.prediction import DELIVERY
 from tolstat.analysis.reweight import Ratios, Share
@@ -96,14 +96,14 @@ def rows_of(columns: Mapping[str, Iterable[Any]]) -> list[dict[str, Any]]:
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
 
-def inapplicable(view: View, found: str, remedy: str) -> NotApplicable:
+def inapplicable(view: View, reason: str, remedy: str) -> NotApplicable:
     """Make the error of a question that does not apply to a file."""
-    return NotApplicable(str(Fault(str(view.path), found, remedy)))
+    return NotApplicable(str(Fault(str(view.path), reason, remedy)))
 
 
-def unusable(view: View, found: str, remedy: str) -> StoreError:
+def unusable(view: View, reason: str, remedy: str) -> StoreError:
     """Make the error of a file that cannot be used for a question."""
-    return StoreError(str(Fault(str(view.path), found, remedy)))
+    return StoreError(str(Fault(str(view.path), reason, remedy)))
 
 
 def check_sample(view: View, statistic: Claim, whole: bool = False) -> None:
@@ -118,12 +118,10 @@ def check_sample(view: View, statistic: Claim, whole: bool = False) -> None:
     view.check_drawn()
     view.check(statistic)
     if view.study.groups:
-        remedy = 'give the file of a study with sampling.method "random", "sobol" or "lhs"'
-        raise unusable(view, "holds a pick-freeze design", remedy)
+        raise unusable(view, "holds a pick-freeze design", SAMPLE)
     if whole and not view.store.whole:
-        raise unusable(
-            view, "holds a part of the campaign only", "merge all slices first: tolstat merge SLICE... --out FILE"
-        )
+        remedy = "merge all slices first: tolstat merge SLICE... --out FILE"
+        raise unusable(view, "holds a part of the campaign only", remedy)
 
 
 def grouped(reasons: Iterable[tuple[str, str]]) -> str:
@@ -238,7 +236,7 @@ class ChangedJoints:
         A campaign whose joints are drawn from tolerances.
     by : str
         A load, or ``"any limit"``.
-    held : mapping
+    altered : mapping
         Changes by their digest, as `View.altered`.
 
     Attributes
@@ -251,28 +249,28 @@ class ChangedJoints:
         Load of the joints as drawn, from sample 0 on, NaN without a valid one: the campaign's, then fresh ones.
     """
 
-    def __init__(self, view: View, by: str, held: Mapping[str, Altered]) -> None:
-        self.load, self._study, self._held = view.load(by), view.study, held
+    def __init__(self, view: View, by: str, altered: Mapping[str, Altered]) -> None:
+        self.load, self._study, self._held = view.load(by), view.study, altered
         self.level = tail_level(self.load)
         levels = view.limits if by == ANY_LIMIT else {by: 1.0}
         self._parts = [(names_at_points(view, name), level) for name, level in levels.items()]
-        own = own_joints(view)
-        self.base, more = self.load.values[:own], held.get(what_if.key(sets.as_drawn(view.study, range(0)).about))
-        if more is not None and self.holds(more) and more.first <= own < more.end:
-            self.base = np.concatenate([self.base, self.of(more)[own - more.first :]])
+        n = own_joints(view)
+        self.base, more = self.load.values[:n], altered.get(what_if.key(sets.as_drawn(view.study, range(0)).about))
+        if more is not None and self.holds(more) and more.first <= n < more.end:
+            self.base = np.concatenate([self.base, self.of(more)[n - more.first :]])
 
-    def holds(self, one: Altered) -> bool:
+    def holds(self, altered: Altered) -> bool:
         """Whether a change has the load."""
-        return all(one.holds(names) for names, _ in self._parts)
+        return all(altered.holds(names) for names, _ in self._parts)
 
-    def of(self, one: Altered) -> FloatArray:
+    def of(self, altered: Altered) -> FloatArray:
         """Load of each joint with a change, or its largest ratio to all limits; NaN without a valid one, (n,)."""
-        return np.asarray(np.maximum.reduce([one.valid(names) / level for names, level in self._parts]))
+        return np.asarray(np.maximum.reduce([altered.valid(names) / level for names, level in self._parts]))
 
     def share(self, values: FloatArray, confidence: float = 0.95) -> Estimate:
         """Share of joints above the level."""
-        found = sample_of(values).above(self.level, confidence)
-        return found.estimate, found.outer_lower, found.outer_upper
+        above = sample_of(values).above(self.level, confidence)
+        return above.estimate, above.outer_lower, above.outer_upper
 
     def difference(self, a: FloatArray, b: FloatArray, confidence: float = 0.95) -> Estimate:
         """Share of B above the level less that of A, joint by joint; A may have more joints.
@@ -283,8 +281,8 @@ class ChangedJoints:
             No joint has a load in both.
         """
         a = a[: len(b)]
-        found = difference.shares(sample_of(a), sample_of(b), [self.level], paired=True, confidence=confidence)
-        return float(found.estimate[0]), float(found.outer_lower[0]), float(found.outer_upper[0])
+        change = difference.shares(sample_of(a), sample_of(b), [self.level], paired=True, confidence=confidence)
+        return float(change.estimate[0]), float(change.outer_lower[0]), float(change.outer_upper[0])
 
 
 def sample_of(values: FloatArray) -> Sample:
@@ -307,5 +305,5 @@ def own_joints(view: View) -> int:
 
 def names_at_points(view: View, load: str) -> tuple[str, ...]:
     """Names that the file keeps of a load, one for each operating point: that of the load unless it has several."""
-    own, plain = view.narrowed(load)
-    return tuple(at(plain, [point], list(view.store.points)) for point in own.points)
+    narrowed, plain = view.narrowed(load)
+    return tuple(at(plain, [point], list(view.store.points)) for point in narrowed.points)

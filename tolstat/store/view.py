@@ -15,8 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from tolstat.analysis import accuracy
 from tolstat.analysis.clustered import Clustered
 from tolstat.analysis.column import frozen
-from tolstat.analysis.design import SAMPLE, Claim, Design, Independent, Listed
-from tolstat.analysis.replicated import Replicated
+from tolstat.analysis.design import SAMPLE, Claim, Design, Independent, Listed, Replicated
 from tolstat.analysis.sample import Sample, largest_of
 from tolstat.analysis.weighted import Weighted
 from tolstat.common import selected_results

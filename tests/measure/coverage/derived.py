@@ -56,8 +56,8 @@ def _capability(law: Law, n: int) -> Experiment:
     def once(rng: Rng) -> list[Found]:
         own = capability.of_sample(sample_of(law.draw(rng, n)), limit)
         lower, upper = 1e6 * own.above.outer_lower, 1e6 * own.above.outer_upper
-        normal = Found(own.cpk_normal_lower, own.cpk_normal_upper, by_moments)
-        return [normal, Found(own.cpk_lower, own.cpk_upper, by_quantiles), Found(lower, upper, 1e3)]
+        normal = Found(own.cpk_normal.lower, own.cpk_normal.upper, by_moments)
+        return [normal, Found(own.cpk.lower, own.cpk.upper, by_quantiles), Found(lower, upper, 1e3)]
 
     return Experiment(asked, once)
 

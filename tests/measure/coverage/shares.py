@@ -24,8 +24,7 @@ from tests.measure.coverage.trial import (
 from tolstat.analysis import clustered, prediction
 from tolstat.analysis.binomial import simultaneous
 from tolstat.analysis.clustered import Clustered
-from tolstat.analysis.design import Independent
-from tolstat.analysis.replicated import Replicated
+from tolstat.analysis.design import Independent, Replicated
 from tolstat.analysis.sample import Sample, total_interval
 from tolstat.analysis.weighted import Weighted
 from tolstat.common.loads import FloatArray
@@ -187,7 +186,7 @@ def _of_lots(law: _Lots, share: float, number: int) -> Experiment:
     def once(rng: Rng) -> list[Found]:
         sample = sample_of(law.draw(rng, number, JOINTS, share).ravel(), design)
         above, joints = design.counts(sample.value, [level])
-        ends = clustered.law_of(above[:, 0], joints).delivery(DELIVERY).ends()
+        ends = clustered.delivery(above[:, 0], joints, DELIVERY).ends()
         truth = float((law.draw(rng, 1, DELIVERY, share) > level).sum())
         return [*judged(sample), Found(*ends, truth)]
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from tolstat.common.errors import Fault, NotApplicable
+from tolstat.common.errors import NotApplicable
 from tolstat.common.loads import ANY_LIMIT
 from tolstat.common.tables import VALID
 from tolstat.display import drawing, style, text
@@ -18,7 +18,7 @@ from tolstat.display.options import Accepted, Costs, Load
 from tolstat.display.style import markers, patches
 from tolstat.questions.causes import shares
 from tolstat.questions.causes.shares import INDICES, Lines
-from tolstat.questions.shares import estimated
+from tolstat.questions.shares import estimated, inapplicable, word
 from tolstat.store.view import View
 from tolstat.study.widths import COARSER, EXACT, FINER, HALF, STEPS
 
@@ -62,7 +62,7 @@ def _cost(head: str, name: str, rank: int = 0) -> Column:
     return Column(head, cell, shown=has(name), rank=rank)
 
 
-LINE = Column("line", lambda row: str(row["line"]), words=True)
+LINE = Column("line", word("line"), words=True)
 COLUMNS = (
     LINE,
     Column("tolerance", lambda row: row["size"] or "-", rank=3),
@@ -78,12 +78,12 @@ COLUMNS = (
 )
 """Columns of `Lines.by_line`: a line, its tolerance, and the share above the level after each step."""
 FITS = (
-    Column("fit", lambda row: str(row["step"])),
-    Column("in place of", lambda row: str(row["size"]), words=True),
+    Column("fit", word("step")),
+    Column("in place of", word("size"), words=True),
     estimated("share, %", "share"),
     estimated("change, %", "change", 0, "+.1f"),
     _cost("extra cost", "extra_cost"),
-    Column("what changes", lambda row: str(row["words"]), words=True, rank=1),
+    Column("what changes", word("words"), words=True, rank=1),
 )
 """Columns of `Lines.other_fits`."""
 
@@ -124,11 +124,11 @@ def lines(view: View, by: Load = None, accepted: Accepted = math.nan, costs: Cos
     StoreError
         When the joints are not drawn from tolerances, or differ in weight.
     """
-    found = shares.evaluate(view, by or view.decisive, costs)
-    if found is None:
+    changed = shares.evaluate(view, by or view.decisive, costs)
+    if changed is None:
         remedy = f"simulate them: tolstat causes {quote(str(view.path))} --run"
-        raise NotApplicable(str(Fault(str(view.path), "holds no joints with other widths of a line", remedy)))
-    return Answer("lines", TITLE, _parts(found, accepted), {**found.facts, "sentence": sentence(found) or None})
+        raise inapplicable(view, "holds no joints with other widths of a line", remedy)
+    return Answer("lines", TITLE, _parts(changed, accepted), {**changed.facts, "sentence": sentence(changed) or None})
 
 
 def lines_on_page(view: View, asked: Asked) -> Answer:
@@ -136,102 +136,99 @@ def lines_on_page(view: View, asked: Asked) -> Answer:
     applies = view.sampled and view.limits and view.store.whole and view.count(*VALID)
     if not applies or view.design.refuses("difference"):
         raise NotApplicable
-    found = shares.evaluate(view, view.decisive)
-    if found is not None:
-        explained = " ".join([ON_PAGE, *([FITS_ON_PAGE] if found.other_fits else []), COSTS_ON_PAGE])
-        return Answer("lines", TITLE, [*_parts(found, asked.accepted), Sentence(explained)])
+    changed = shares.evaluate(view, view.decisive)
+    if changed is not None:
+        explained = " ".join([ON_PAGE, *([FITS_ON_PAGE] if changed.other_fits else []), COSTS_ON_PAGE])
+        return Answer("lines", TITLE, [*_parts(changed, asked.accepted), Sentence(explained)])
     file = quote(asked.path.name)
-    steps = "To simulate the same joints with each tolerance half as wide, exact, finer and coarser:"
-    again = f"then this page again: tolstat report {file} --out PAGE.html"
-    missing = f"Not in the file yet. {steps} tolstat causes {file} --run; {again}"
+    missing = (
+        "Not in the file yet. To simulate the same joints with each tolerance half as wide, exact, finer and coarser: "
+        f"tolstat causes {file} --run; then this page again: tolstat report {file} --out PAGE.html"
+    )
     return Answer("lines", TITLE, [Sentence(missing, "lead")])
 
 
 def advice(view: View, load: str, accepted: float) -> str:
     """Return the `sentence` of a load for the verdict; empty where the file holds no joints with lines changed."""
-    found = shares.evaluate(view, load) if view.altered else None
-    return "" if found is None else sentence(found, accepted)
+    changed = shares.evaluate(view, load) if view.altered else None
+    return "" if changed is None else sentence(changed, accepted)
 
 
-def sentence(found: Lines, accepted: float = math.nan) -> str:
+def sentence(changed: Lines, accepted: float = math.nan) -> str:
     """Sentence on the line that lowers the share most, half as wide or with another fit; empty if none surely does.
 
     ``Halve the tilt tolerance of the holes (±0.5 deg) and 2.1 % (1.4 to 3 %) exceed the limit``, without full stop.
     Where that is more than the accepted share, it says that no line suffices, and what the exact line gives.
     """
-    row = found.best
-    if row is None:
+    best = changed.best
+    if best is None:
         return ""
-    is_half, other = row["step"] == HALF, f"{row['step']} in place of {row['size']}"
-    line = f"{_phrase(row)} ({row['size']})" if row["size"] else _phrase(row)
-    low, high = 100.0 * row["share_lower"], text.percent(row["share_upper"])
-    share = f"{text.percent(row['share'])} ({low:.3g} to {high})"
-    if not row["share"] > accepted:
-        return f"{f'Halve the {line}' if is_half else f'Write {other}'} and {share} exceed {found.limit}"
-    exact = {own["line"]: own for own in found.rows if own["step"] == EXACT}
-    least = min(exact.values(), key=lambda own: float(own["share"]), default=None)
+    is_half, other = best["step"] == HALF, f"{best['step']} in place of {best['size']}"
+    line = f"{_phrase(best)} ({best['size']})" if best["size"] else _phrase(best)
+    low, high = 100.0 * best["share_lower"], text.percent(best["share_upper"])
+    share = f"{text.percent(best['share'])} ({low:.3g} to {high})"
+    if not best["share"] > accepted:
+        return f"{f'Halve the {line}' if is_half else f'Write {other}'} and {share} exceed {changed.limit}"
+    exact = {row["line"]: row for row in changed.rows if row["step"] == EXACT}
+    least = min(exact.values(), key=lambda row: float(row["share"]), default=None)
     tried = f"{f'halving the {line}' if is_half else other} gives {share}"
     if least is not None and least["share"] <= accepted:
-        which = "" if least["line"] == row["line"] else f" the {_phrase(least)}"
+        which = "" if least["line"] == best["line"] else f" the {_phrase(least)}"
         what = "Halving a single line" if is_half else "Another fit"
         return f"{what} is not enough: {tried}, exact{which} {text.percent(least['share'])}"
-    same = exact.get(row["line"])
+    same = exact.get(best["line"])
     return f"No single line is enough: {tried}" + ("" if same is None else f", exact {text.percent(same['share'])}")
 
 
-def _parts(found: Lines, accepted: float) -> list[Part]:
-    n, share, lower, upper = (found.facts[name] for name in ("n", "share", "lower", "upper"))
-    drawn = f"{found.event} in {text.percent(share)} ({text.span(lower, upper)}) of {n} joints as drawn"
-    others = found.other_fits
+def _parts(changed: Lines, accepted: float) -> list[Part]:
+    n, share, lower, upper = (changed.facts[name] for name in ("n", "share", "lower", "upper"))
+    drawn = f"{changed.event} in {text.percent(share)} ({text.span(lower, upper)}) of {n} joints as drawn"
+    rows, by_line, others = changed.rows, changed.by_line, changed.other_fits
     none = f"No line that is made half as wide{', and no other fit,' if others else ''} surely lowers it"
-    title, units = f"Share of the joints with {found.event}, with", dict.fromkeys(_SHARES, "1")
-    made: list[Part] = [
-        Sentence(f"{text.sentence(drawn)} {sentence(found, accepted) or none}.", "lead"),
-        Panels([_tornado(found, accepted), *_curves(found, accepted)]),
-        Table("lines", f"{title} one line changed", COLUMNS if found.by_line else (), found.rows, units, found.by_line),
+    title, units = f"Share of the joints with {changed.event}, with", dict.fromkeys(_SHARES, "1")
+    parts: list[Part] = [
+        Sentence(f"{text.sentence(drawn)} {sentence(changed, accepted) or none}.", "lead"),
+        Panels([_tornado(changed, accepted), *_curves(changed, accepted)]),
+        Table("lines", f"{title} one line changed", COLUMNS if by_line else (), rows, units, by_line),
     ]
     if others:
-        made.append(Table("other_fits", f"{title} another fit", FITS, others, units))
-    if found.indices:
-        title = f"Part of each line in the scatter of the load, and in whether it is above {found.limit}"
-        made.append(Table("line_indices", title, _indices(found), found.indices, dict.fromkeys(INDICES, "1")))
-    return [*made, *map(Sentence, _notes(found))]
+        parts.append(Table("other_fits", f"{title} another fit", FITS, others, units))
+    if changed.indices:
+        load = "largest load over its limit" if changed.facts["load"] == ANY_LIMIT else changed.facts["load"]
+        load = f"log {load}" if changed.facts["logarithmic"] else load
+        heads = f"{load}: alone, %", f"{load}: in all, %", "above: alone, %", "above: in all, %"
+        keys = enumerate(zip(heads, INDICES[::3], strict=True))  # no share is beyond 0 and 1
+        columns = [LINE, *(estimated(head, key, 3 - i, ends=(0.0, 1.0)) for i, (head, key) in keys)]
+        title = f"Part of each line in the scatter of the load, and in whether it is above {changed.limit}"
+        parts.append(Table("line_indices", title, columns, changed.indices, dict.fromkeys(INDICES, "1")))
+    return [*parts, *map(Sentence, _notes(changed))]
 
 
-def _indices(found: Lines) -> list[Column]:
-    """Columns of `Lines.indices`: of the load and of the event, with intervals; no share is beyond 0 and 1."""
-    load = "largest load over its limit" if found.facts["load"] == ANY_LIMIT else found.facts["load"]
-    load = f"log {load}" if found.facts["logarithmic"] else load
-    names = {f"{load}: alone, %": "alone", f"{load}: in all, %": "in_all"}
-    names |= {"above: alone, %": "above_alone", "above: in all, %": "above_in_all"}
-    return [LINE, *(estimated(head, name, 3 - i, ends=(0.0, 1.0)) for i, (head, name) in enumerate(names.items()))]
-
-
-def _notes(found: Lines) -> Iterator[str]:
+def _notes(changed: Lines) -> Iterator[str]:
     """Definitions, and what the table lacks: joints, steps, lines without joints, lines that are not changed."""
-    least: dict[str, int] = {}
-    for row in found.rows:
+    limit, least = changed.limit, dict[str, int]()
+    for row in changed.rows:
         step = row["step"] if row["step"] in STEPS else "another fit"
         least[step] = min(row["n"], least.get(step, row["n"]))
-    said = "95 % intervals without the numerical error; joints with the same seeds, as drawn but for the line"
-    yield f"share of the joints above {found.limit}, {said}"
-    if len({row["n"] for row in found.rows}) > 1:
+    what = "95 % intervals without the numerical error; joints with the same seeds, as drawn but for the line"
+    yield f"share of the joints above {limit}, {what}"
+    if len({row["n"] for row in changed.rows}) > 1:
         order = [step for step in (*STEPS, "another fit") if step in least]
         yield f"joints compared: {', '.join(f'{step} {least[step]}' for step in order)}"
     if fewer := [step for step in (EXACT, FINER) if least.get(step, np.inf) < least.get(HALF, 0)]:
         yield f"{', '.join(fewer)}: the share half as wide, plus the difference on the joints that both have"
-    if not found.facts["settled"]:
+    if not changed.facts["settled"]:
         yield "the order of neighbouring lines is not settled: --run with a longer --budget or a larger --most goes on"
-    if any(step not in line for line in found.by_line for step in STEPS if step in least):
+    if any(step not in line for line in changed.by_line for step in STEPS if step in least):
         yield "-: not simulated yet; the same command with --run goes on"
-    if missing := found.facts["missing"]:
+    if missing := changed.facts["missing"]:
         yield f"not in the file: {', '.join(missing)}; --run simulates them"
-    if left_out := found.facts["left_out"]:
+    if left_out := changed.facts["left_out"]:
         zones = "the width of their zone depends on other errors (a common direction, or a bonus)"
         yield f"left out: {', '.join(left_out)}; {zones}, and is not changed by itself"
-    if found.indices:
-        pairs = max(row["pairs"] for row in found.indices)
-        yield f"alone, in all: closed and total Sobol' index, from {pairs} pairs of joints; above: above {found.limit}"
+    if changed.indices:
+        pairs = max(row["pairs"] for row in changed.indices)
+        yield f"alone, in all: closed and total Sobol' index, from {pairs} pairs of joints; above: above {limit}"
 
 
 def _phrase(row: Row) -> str:
@@ -244,18 +241,20 @@ def _phrase(row: Row) -> str:
     return f"{kinds.pop()} tolerance of the {' and '.join(sorted(f'{body}s' for body in bodies)[::-1])}"
 
 
-def _tornado(found: Lines, accepted: float) -> Panel:
+def _tornado(changed: Lines, accepted: float) -> Panel:
     """Share above the level with each line half as wide, exact, and coarser; and with each other fit."""
-    halves = "; ".join(f"{row['line']} {text.percent(row.get(HALF, np.nan))}" for row in found.by_line)
-    others = "; ".join(f"{row['step']} {text.percent(row['share'])}" for row in found.other_fits)
-    told = ". ".join(words for words in (f"Half as wide: {halves}" if halves else "", others) if words)
-    labels = [f"{row['line']}\n{row['size']}" if row["size"] else str(row["line"]) for row in found.by_line]
-    labels += [f"{row['step']}\nin place of {row['size']}" for row in found.other_fits]
+    by_line, fits = changed.by_line, changed.other_fits
+    halves = "; ".join(f"{row['line']} {text.percent(row.get(HALF, np.nan))}" for row in by_line)
+    others = "; ".join(f"{row['step']} {text.percent(row['share'])}" for row in fits)
+    description = ". ".join(filter(None, (f"Half as wide: {halves}" * bool(halves), others)))
+    labels = [f"{row['line']}\n{row['size']}" if row["size"] else str(row["line"]) for row in by_line]
+    labels += [f"{row['step']}\nin place of {row['size']}" for row in fits]
     bars = [*([HALF, COARSER] if halves else []), *(["share"] if others else [])]
     keys = [*(_BARS[name][0] for name in bars), *(["exact"] if halves else [])]
     left = drawing.rows_left([part for label in labels for part in label.split("\n")])
     top = drawing.legend_room(keys, left)
-    floor, drawn, lower, upper = _floor(found, accepted), *(found.facts[name] for name in ("share", "lower", "upper"))
+    drawn, lower, upper = (changed.facts[name] for name in ("share", "lower", "upper"))
+    floor = _floor(changed, accepted)
 
     def whisker(ax: Axes, y: float, low: float, high: float) -> None:
         ax.plot([max(low, floor), max(high, floor)], [y, y], color=style.INK, lw=1.2, zorder=3)
@@ -267,17 +266,17 @@ def _tornado(found: Lines, accepted: float) -> Panel:
         ax.set_ylim(len(labels) + 0.6, -1.2)  # a row above and one below, for what the vertical lines are
         ax.tick_params(axis="y", labelsize=7.6)
         style.share_axis(ax, floor, "x")
-        ax.set_xlim(floor, min(1.0, 1.4 * float(np.nanmax([upper, *(row["share_upper"] for row in found.rows)]))))
+        ax.set_xlim(floor, min(1.0, 1.4 * float(np.nanmax([upper, *(row["share_upper"] for row in changed.rows)]))))
         ax.axvspan(max(lower, floor), upper, color=drawing.GREY, alpha=0.3, lw=0)
         ax.axvline(drawn, color=style.INK, lw=1.2)
-        for place, row in enumerate([*found.by_line, *found.other_fits]):
+        for y, row in enumerate([*by_line, *fits]):
             for name, (_, colour, height, above) in _BARS.items():
                 if name in row:
-                    ax.barh(place, max(row[name], floor) - drawn, height, left=drawn, color=colour, zorder=2)
-                    whisker(ax, place - above, row[f"{name}_lower"], row[f"{name}_upper"])
+                    ax.barh(y, max(row[name], floor) - drawn, height, left=drawn, color=colour, zorder=2)
+                    whisker(ax, y - above, row[f"{name}_lower"], row[f"{name}_upper"])
             if EXACT in row:
                 marker = "o" if row[EXACT] >= floor else markers.CARETLEFT
-                ax.plot(max(row[EXACT], floor), place, marker=marker, zorder=4, clip_on=False, **_EXACT)
+                ax.plot(max(row[EXACT], floor), y, marker=marker, zorder=4, clip_on=False, **_EXACT)
         words: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 8.0, "backgroundcolor": "white"}
         ax.text(drawn, -0.9, f"as drawn {text.percent(drawn)}", **words)
         if accepted > 0.0:
@@ -286,62 +285,61 @@ def _tornado(found: Lines, accepted: float) -> Panel:
         handles: list[Artist] = [patches.Patch(color=_BARS[name][1]) for name in bars]
         handles += ax.plot([], [], marker="o", **_EXACT) if halves else []
         drawing.legend_above(ax, handles, keys)
-        ax.set_xlabel(f"share of the joints above {found.limit}")
+        ax.set_xlabel(f"share of the joints above {changed.limit}")
 
-    title, told = (
-        f"Share of the joints with {found.event}, if one line is changed",
-        f"As drawn {text.percent(drawn)}. {told}",
-    )
+    title = f"Share of the joints with {changed.event}, if one line is changed"
+    description = f"As drawn {text.percent(drawn)}. {description}"
     size = drawing.WIDTH, 0.34 * (len(labels) + 2.2) + drawing.BOTTOM + top
-    return Panel(f"lines-{found.facts['load']}", title, told, draw, size, left, top)
+    return Panel(f"lines-{changed.facts['load']}", title, description, draw, size, left, top)
 
 
-def _curves(found: Lines, accepted: float) -> Iterator[Panel]:
+def _curves(changed: Lines, accepted: float) -> Iterator[Panel]:
     """Share above the level against the width of each line; none without a line whose width is changed."""
     by_line: dict[str, list[Row]] = {}
-    for row in found.rows:
+    for row in changed.rows:
         if np.isfinite(row["factor"]):
             by_line.setdefault(row["line"], []).append(row)
     if not by_line:
         return
     labels = [*list(by_line)[:CURVES], *(["the other lines"] if len(by_line) > CURVES else [])]
     labels += [f"accepted {text.percent(accepted)}"] if accepted > 0.0 else []
-    floor, facts = _floor(found, accepted), found.facts
+    floor, facts = _floor(changed, accepted), changed.facts
     drawn = {"factor": 1.0, "share": facts["share"], "share_lower": facts["lower"], "share_upper": facts["upper"]}
 
     def draw(ax: Axes) -> None:
         style.share_axis(ax, floor)
         top = floor
         handles: list[Artist] = []
-        for place, rows in enumerate(by_line.values()):
+        for i, rows in enumerate(by_line.values()):
             ordered = sorted([*rows, drawn], key=lambda row: row["factor"])
             x, y, low, high = (np.array([row[name] for row in ordered]) for name in drawn)
-            top, grey = max(top, float(y.max())), place >= CURVES
-            colour, dash = (drawing.GREY, "-") if grey else (style.COLOURS[place], style.DASHES[place])
+            top, grey = max(top, float(y.max())), i >= CURVES
+            colour, dash = (drawing.GREY, "-") if grey else (style.COLOURS[i], style.DASHES[i])
             look: dict[str, Any] = {"color": colour, "ls": dash, "lw": 1.0 if grey else 1.6}
             (curve,) = ax.plot(x, np.maximum(y, floor), marker="o", ms=3.0, **look)
             at_edge = np.full(int((y < floor).sum()), floor)
             ax.plot(x[y < floor], at_edge, marker=markers.CARETDOWN, ls="", color=colour, ms=5.0, clip_on=False)
-            handles += [curve] if place <= CURVES else []
-            if place == 0:
+            handles += [curve] if i <= CURVES else []
+            if i == 0:
                 ax.fill_between(x, np.maximum(low, floor), np.maximum(high, floor), color=colour, alpha=0.18, lw=0)
         ax.plot(1.0, facts["share"], "D", color=style.INK, ms=6.0, zorder=5)
         ax.set_ylim(floor, min(1.0, 2.0 * top))
         if accepted > 0.0:
             handles.append(ax.axhline(accepted, **_ACCEPTED))
-        ax.set(xlabel="width of the line, relative to the drawing", ylabel=f"share above {found.limit}")
+        ax.set(xlabel="width of the line, relative to the drawing", ylabel=f"share above {changed.limit}")
         drawing.legend_above(ax, handles, labels)
 
-    told = {
-        line: ", ".join(f"{row['factor']:.3g} {text.percent(row['share'])}" for row in rows)
-        for line, rows in by_line.items()
-    }
-    title, words = "The share against the width of each line", "; ".join(f"{line}: {own}" for line, own in told.items())
+    title, words = "The share against the width of each line", []
+    for line, rows in by_line.items():
+        points = (f"{row['factor']:.3g} {text.percent(row['share'])}" for row in rows)
+        words.append(f"{line}: {', '.join(points)}")
     size = drawing.WIDTH, 3.4 + (room := drawing.legend_room(labels))
-    yield Panel(f"widths-{facts['load']}", title, words, draw, size, top=room)
+    yield Panel(f"widths-{facts['load']}", title, "; ".join(words), draw, size, top=room)
 
 
-def _floor(found: Lines, accepted: float) -> float:
+def _floor(changed: Lines, accepted: float) -> float:
     """Lower end of an axis of shares: below all shares that are not zero, and below the accepted share."""
-    least = [value for value in [*(row["share"] for row in found.rows), found.facts["share"], accepted] if value > 0.0]
-    return float(0.6 * max(min(least, default=1.0), 0.5 / max(found.facts["n"], 1)))
+    least = [
+        value for value in [*(row["share"] for row in changed.rows), changed.facts["share"], accepted] if value > 0.0
+    ]
+    return float(0.6 * max(min(least, default=1.0), 0.5 / max(changed.facts["n"], 1)))

@@ -23,8 +23,8 @@ from tolstat.display import style, text
 from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Part, Sentence, Table
 from tolstat.display.options import Load
 from tolstat.joint import HOLE_OF_PIN, perturb
+from tolstat.questions.shares import unusable, word
 from tolstat.store import points
-from tolstat.store.hdf5 import store_error
 from tolstat.store.view import View
 
 MOST = 4000
@@ -43,7 +43,7 @@ LISTED = 5
 """Number of combinations that people see."""
 COLUMNS = (
     Column("rank correlation", lambda row: f"{row['correlation']:+.2f}", words=True),
-    Column("share of the clearance used by", lambda row: str(row["name"]), words=True),
+    Column("share of the clearance used by", word("name"), words=True),
 )
 HOW = (
     "Chosen on the joints with an even number, so that it need not be the first of the table; picture and "
@@ -91,8 +91,8 @@ def pairs(view: View, by: Load = None) -> Answer:
     load = view.load(by or view.most_exceeded)
     samples = np.flatnonzero(load.is_valid)[:MOST]
     if samples.size < FEWEST or np.ptp(load.values[samples]) == 0.0:
-        found = f"has {samples.size} joints with a valid {load.name} that scatters"
-        raise store_error(view.path, found, f"run {FEWEST} joints or more")
+        few = f"has {samples.size} joints with a valid {load.name} that scatters"
+        raise unusable(view, few, f"run {FEWEST} joints or more")
     errors, values, point = view.errors(samples), load.values[samples], points.point_of(view, load.name)
     # what is taken of the parameters, clearances and stations, is the same at every operating point
     used = combinations(errors, perturb(view.study.joint, view.at(point).store.operation, errors))
@@ -119,9 +119,9 @@ def pairs_on_page(view: View, asked: Asked) -> Answer:
     if not (view.sampled and view.limits and view.leading) or view.design.refuses("index") or view.study.groups:
         raise NotApplicable
     with asked.noting("no pairs of errors"):
-        found = pairs(view)
-        if found.facts["correlation"] >= max(MATTERS, found.facts["single"]):
-            return found
+        answer = pairs(view)
+        if answer.facts["correlation"] >= max(MATTERS, answer.facts["single"]):
+            return answer
     raise NotApplicable
 
 
@@ -149,7 +149,7 @@ def combinations(errors: NDArray[np.void], params: NDArray[np.void]) -> dict[str
     along_z, about_t, about_z = relative("offset_z"), relative("tilt_t"), relative("tilt_z")
     missed = np.abs(along_z[:2].sum(axis=0) - along_z[2:].sum(axis=0)) / clearance.sum(axis=0)
     of_t, of_both = np.abs(about_t) * reach / clearance, np.hypot(about_t, about_z) * reach / clearance
-    found = {
+    used = {
         "largest tilt of a pin against its hole about t": of_t.max(axis=0),
         "largest tilt of a pin against its hole": of_both.max(axis=0),
         MISSED: missed,
@@ -157,19 +157,18 @@ def combinations(errors: NDArray[np.void], params: NDArray[np.void]) -> dict[str
         f"{MISSED} plus largest tilt about t": missed + of_t.max(axis=0),
         f"{MISSED} plus largest tilt": missed + of_both.max(axis=0),
     }
-    for place, pin in enumerate(PINS):
-        hole = HOLE_OF_PIN[pin]
-        found[f"tilt of {pin} against {hole} about t"] = of_t[place]
-        found[f"{MISSED} plus tilt of {pin} against {hole}"] = missed + of_both[place]
-    return found
+    for i, pin in enumerate(PINS):
+        used[f"tilt of {pin} against {HOLE_OF_PIN[pin]} about t"] = of_t[i]
+        used[f"{MISSED} plus tilt of {pin} against {HOLE_OF_PIN[pin]}"] = missed + of_both[i]
+    return used
 
 
 def _largest_single(errors: NDArray[np.void], values: FloatArray) -> float:
     """Magnitude of the correlation of the load and the single error, or its distance from the mean, that tells most."""
     scattering = [errors[name] for name in errors.dtype.names or () if np.ptp(errors[name]) > 0.0]
     single = [*scattering, *(np.abs(error - error.mean()) for error in scattering)]
-    one = max(single, key=lambda error: abs(_spearman(error[CHOSEN], values[CHOSEN])))
-    return abs(_spearman(one[SHOWN], values[SHOWN]))
+    best = max(single, key=lambda error: abs(_spearman(error[CHOSEN], values[CHOSEN])))
+    return abs(_spearman(best[SHOWN], values[SHOWN]))
 
 
 def _spearman(x: FloatArray, y: FloatArray) -> float:
@@ -183,13 +182,15 @@ def _spearman(x: FloatArray, y: FloatArray) -> float:
 def _finding(facts: Mapping[str, Any], use: FloatArray, values: FloatArray) -> str:
     """What the best combination is, and what it tells of joints above the limit."""
     load, name, limit = facts["load"], facts["name"], facts["limit"]
-    most = f"{load} comes of errors of pins against their holes: a joint binds where they use up its clearance. "
-    most += f"What tells most is {name}"
-    if facts["correlation"] < facts["single"]:
-        most = f"A single error tells more of {load} than any combination; of these, {name} tells most"
     sentences = (
-        f"{most}, as a share of the clearance: rank correlation with the load {facts['correlation']:.2f}, where that "
-        f"of the best single error is {facts['single']:.2f}."
+        f"{load} comes of errors of pins against their holes: a joint binds where they use up its clearance. What "
+        f"tells most is {name}"
+    )
+    if facts["correlation"] < facts["single"]:
+        sentences = f"A single error tells more of {load} than any combination; of these, {name} tells most"
+    sentences += (
+        f", as a share of the clearance: rank correlation with the load {facts['correlation']:.2f}, where that of the "
+        f"best single error is {facts['single']:.2f}."
     )
     if not math.isnan(limit):
         above, first = values[np.argsort(-use)] > limit, max(1, round(MOST_USED * use.size))
@@ -223,5 +224,5 @@ def _panel(facts: Mapping[str, Any], use: FloatArray, values: FloatArray) -> Pan
             ax.axhline(limit, color=style.INK, lw=1.2, ls=(0.0, (8.0, 3.0)), label="limit")
             ax.legend(loc="upper left", ncols=3, columnspacing=1.2, handlelength=1.8)
 
-    told = f"{facts['name']}: rank correlation {facts['correlation']:.2f} over {use.size} joints"
-    return Panel(f"pairs-{load}", f"{load} against the share of the clearance used", told, draw, (4.9, 3.6))
+    description = f"{facts['name']}: rank correlation {facts['correlation']:.2f} over {use.size} joints"
+    return Panel(f"pairs-{load}", f"{load} against the share of the clearance used", description, draw, (4.9, 3.6))

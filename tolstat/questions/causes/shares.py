@@ -66,15 +66,15 @@ class Lines(NamedTuple):
         ``half``, ``half_lower``, ``half_change``, ``half_cost``; ``by`` has the words of the steps that follow
         classes. Keys of steps that are not simulated are missing.
         """
-        found: dict[str, dict[str, Any]] = {}
+        lines: dict[str, dict[str, Any]] = {}
         for row in self.rows:
             if (step := row["step"]) in STEPS:
-                line = found.setdefault(row["line"], {"line": row["line"], "size": row["size"], "by": []})
+                line = lines.setdefault(row["line"], {"line": row["line"], "size": row["size"], "by": []})
                 line |= {f"{step}{end}": row[f"share{end}"] for end in ENDS}
                 line |= {f"{step}_change{end}": row[f"change{end}"] for end in ENDS}
                 line |= {f"{step}_cost": row.get("extra_cost", np.nan)}
                 line["by"] += [row["words"]] if step in (FINER, COARSER) else []
-        return list(found.values())
+        return list(lines.values())
 
     @property
     def other_fits(self) -> Rows:
@@ -157,15 +157,15 @@ class Joints(ChangedJoints):
 
         Of a fit it is the other fit that lowers the share most.
         """
-        found = {
-            about["step"]: self.of(one)
-            for about, one in self._changes(sets.WIDTH, sets.FIT)
+        loads = {
+            about["step"]: self.of(change)
+            for about, change in self._changes(sets.WIDTH, sets.FIT)
             if about["label"] == line.label and is_decisive(about["step"])
         }
-        if not found:
+        if not loads:
             return widths.steps(self._study, line)[0], None
-        step = min(found, key=lambda own: self.difference(self.base, found[own][: len(self.base)])[0])
-        return step, found[step]
+        step = min(loads, key=lambda step: self.difference(self.base, loads[step][: len(self.base)])[0])
+        return step, loads[step]
 
     def estimates(self, values: FloatArray, half: FloatArray | None) -> tuple[Estimate, Estimate]:
         """Share of joints with one line changed above the level, and its change from the joints as drawn.
@@ -185,54 +185,54 @@ class Joints(ChangedJoints):
 
     def rows(self) -> list[dict[str, Any]]:
         """Rows of `Lines.rows`: lines by their decisive share, then by that if exact, those without these behind."""
-        held: dict[Line, dict[str, Any]] = {}
-        for about, one in self._changes(sets.WIDTH, sets.FIT):
-            values = self.of(one)[: len(self.base)]
+        by_line: dict[Line, dict[str, Any]] = {}
+        for about, altered in self._changes(sets.WIDTH, sets.FIT):
+            values = self.of(altered)[: len(self.base)]
             if np.isfinite(values + self.base[: len(values)]).any():
-                held.setdefault(Line(about["label"], tuple(about["tolerances"])), {})[about["step"]] = about, values
-        rows, places = [], dict[str, tuple[int, float]]()
-        for line, steps in held.items():
-            about_line = {"line": line.label, "names": line.names, "size": widths.size(self._study, line)}
+                by_line.setdefault(Line(about["label"], tuple(about["tolerances"])), {})[about["step"]] = about, values
+        rows, ranks = [], dict[str, tuple[int, float]]()
+        for line, steps in by_line.items():
+            head = {"line": line.label, "names": line.names, "size": widths.size(self._study, line)}
             for step, (about, values) in steps.items():
                 half = steps[HALF][1] if step in (EXACT, FINER) and HALF in steps else None
                 share, change = self.estimates(values, half)
-                factors = {own.get("factor", np.nan) for own in about["tolerances"].values()}
-                row = {**about_line, "step": step, "words": about["words"]}
+                factors = {entry.get("factor", np.nan) for entry in about["tolerances"].values()}
+                row = {**head, "step": step, "words": about["words"]}
                 row |= {"factor": factors.pop() if len(factors) == 1 else np.nan, "n": len(values)}
                 rows.append(row | with_ends("share", share) | with_ends("change", change))
-                place = 0 if is_decisive(step) else 1 if step == EXACT else 2, share[0]
-                places[line.label] = min(places.get(line.label, place), place)
-        orders = {step: (place, 0.0) for place, step in enumerate(STEPS)}
+                rank = 0 if is_decisive(step) else 1 if step == EXACT else 2, share[0]
+                ranks[line.label] = min(ranks.get(line.label, rank), rank)
+        of_step = {step: (i, 0.0) for i, step in enumerate(STEPS)}
 
         def order(row: Row) -> Any:
-            return *places[row["line"]], row["line"], orders.get(row["step"], (0, row["share"]))
+            return *ranks[row["line"]], row["line"], of_step.get(row["step"], (0, row["share"]))
 
         return sorted(rows, key=order)
 
     def indices(self, lines: Sequence[str]) -> list[dict[str, Any]]:
         """Rows of `Lines.indices`, in the order of these lines."""
         rows = []
-        for about, one in self._changes(sets.EXCHANGE):
-            n = min(one.end, len(self.base) // 2)
+        for about, altered in self._changes(sets.EXCHANGE):
+            n = min(altered.end, len(self.base) // 2)
             if about["label"] not in lines or n < pick_freeze.FEWEST:
                 continue
             row: dict[str, Any] = {"line": about["label"], "pairs": n} | dict.fromkeys(INDICES, np.nan)
-            joints = self.base[: 2 * n : 2], self.base[1 : 2 * n : 2], self.of(one)[:n]
+            joints = self.base[: 2 * n : 2], self.base[1 : 2 * n : 2], self.of(altered)[:n]
             loads = [np.log(values) if self.load.long_tailed else values for values in joints]
             events = [np.where(np.isfinite(values), values > self.level, np.nan) for values in joints]
             pairs = (("", loads, pick_freeze.indices), ("above_", events, pick_freeze.of_event))
             for name, (a, b, ab), estimate in pairs:
                 with suppress(ValueError):  # too few joints with a load, or none, or all of them, above the level
-                    found = estimate(a, b, ab[:, None])
-                    row |= with_ends(f"{name}alone", [x[0] for x in found.first])
-                    row |= with_ends(f"{name}in_all", [x[0] for x in found.total])
+                    indices = estimate(a, b, ab[:, None])
+                    row |= with_ends(f"{name}alone", [end[0] for end in indices.first])
+                    row |= with_ends(f"{name}in_all", [end[0] for end in indices.total])
             rows.append(row)
         return sorted(rows, key=lambda row: lines.index(row["line"]))
 
     def _changes(self, *kinds: str) -> list[tuple[Mapping[str, Any], Altered]]:
         """Changes of some kinds that have the load from the first joint on."""
-        every = self._held.values()
-        return [(one.about, one) for one in every if one.about["kind"] in kinds and not one.first and self.holds(one)]
+        changes = [altered for altered in self._held.values() if altered.about["kind"] in kinds]
+        return [(altered.about, altered) for altered in changes if not altered.first and self.holds(altered)]
 
 
 def _with_costs(study: Study, rows: list[dict[str, Any]], table: Path) -> list[dict[str, Any]]:
@@ -246,10 +246,9 @@ def _with_costs(study: Study, rows: list[dict[str, Any]], table: Path) -> list[d
     }
     for row in rows:
         factors = widths.factors(study, Line(row["line"], row["names"]), row["step"])
-        known = all(name in prices and factor > 0.0 for name, factor in factors.items())
-        cost = sum(prices[name].at(factor) for name, factor in factors.items()) if known else np.nan
-        before = sum(prices[name].at(1.0) for name in factors) if known else np.nan
-        row |= {"cost": cost, "extra_cost": cost - before}
+        is_known = all(name in prices and factor > 0.0 for name, factor in factors.items())
+        cost = sum(prices[name].at(factor) for name, factor in factors.items()) if is_known else np.nan
+        row |= {"cost": cost, "extra_cost": cost - (sum(prices[name].at(1.0) for name in factors) if is_known else 0.0)}
     return rows
 
 
@@ -262,12 +261,12 @@ def is_settled(values: Sequence[FloatArray], base: FloatArray, level: float, con
     if len(values) < 2:
         return True
     n = min(len(base), *map(len, values))
-    ranked = sorted(values, key=lambda own: float(np.mean(own[:n] > level)))
+    ranked = sorted((loads[:n] for loads in values), key=lambda loads: float(np.mean(loads > level)))
     drawn = float(np.mean(base[:n] > level))
-    own = 1.0 - (1.0 - confidence) / (len(values) - 1)
-    for one, other in pairwise(ranked):
-        found = difference.shares(sample_of(one[:n]), sample_of(other[:n]), [level], paired=True, confidence=own)
-        low, high = float(found.lower[0]), float(found.upper[0])
+    of_each = 1.0 - (1.0 - confidence) / (len(values) - 1)
+    for pair in pairwise(map(sample_of, ranked)):
+        change = difference.shares(*pair, [level], paired=True, confidence=of_each)
+        low, high = float(change.lower[0]), float(change.upper[0])
         if low <= 0.0 <= high and max(-low, high) > NEGLIGIBLE * drawn:
             return False
     return True

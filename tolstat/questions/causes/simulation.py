@@ -104,12 +104,8 @@ def simulate(
         When the file cannot be used, or was made by other code.
     """
     of_study = {"--points": points != POINTS, "--groups": groups != "tolerance"}
-    of_file = {
-        "--each": each != "entry",
-        "--group": bool(group),
-        "--budget": budget != BUDGET_S,
-        "--most": most != MOST,
-    }
+    of_file = {"--each": each != "entry", "--group": bool(group)}
+    of_file |= {"--budget": budget != BUDGET_S, "--most": most != MOST}
     refused, about, remedy = of_file, "about what --run simulates into FILE", "give a result file"
     if isinstance(source, Path):
         refused, about, remedy = of_study, "about the design of a study", "give a study (TOML)"

@@ -133,7 +133,12 @@ def limits(view: View, accepted: Accepted = math.nan) -> Answer:
     table, *others = limit_tables(view, accepted)
     panel = forest_panel(table.for_people, accepted)
     how = [Text(line, small=True) for line in _how(view, accepted)]
-    return Answer("limits", "Each limit", [Panels([panel], beside=how), table, *others, *_uncertain(view)])
+    parts: list[Part] = [Panels([panel], beside=how), table, *others]
+    rows = [row for row in of.limit_rows(view) if not math.isnan(row["numerical_lower"])]
+    if any(_is_notable(row) for row in rows):
+        title = "What makes the shares above limits uncertain, in per cent of the joints"
+        parts.append(Table("uncertainty", title, BUDGET, rows, seen=one_force(rows, "level", "estimate")))
+    return Answer("limits", "Each limit", parts)
 
 
 def limits_on_page(view: View, asked: Asked) -> Answer:
@@ -264,14 +269,10 @@ def _how(view: View, accepted: float) -> Iterator[str]:
         )
 
 
-def _uncertain(view: View) -> list[Part]:
-    """What makes the shares uncertain, where a part exceeds a tenth of sampling."""
-    rows = [row for row in of.limit_rows(view) if not math.isnan(row["numerical_lower"])]
-    others = [max(_numerical(row), row["bound_upper"] - row["bound_lower"]) for row in rows]
-    if not any(other > NOTABLE * 0.5 * (row["upper"] - row["lower"]) for row, other in zip(rows, others, strict=True)):
-        return []
-    title = "What makes the shares above limits uncertain, in per cent of the joints"
-    return [Table("uncertainty", title, BUDGET, rows, seen=one_force(rows, "level", "estimate"))]
+def _is_notable(row: Row) -> bool:
+    """Whether something else makes a share uncertain by more than `NOTABLE` of its interval of sampling."""
+    other = max(_numerical(row), row["bound_upper"] - row["bound_lower"])
+    return bool(other > NOTABLE * 0.5 * (row["upper"] - row["lower"]))
 
 
 def _numerical(row: Row) -> float:

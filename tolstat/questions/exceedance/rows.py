@@ -20,11 +20,8 @@ SHARES = (0.5, 0.9, 0.95, 0.99)
 COVERED = 0.99
 """Share of the joints that the tolerance limit covers."""
 ERROR_BUDGET = ("numerical_lower", "numerical_upper", "total_lower", "total_upper")
-WITHHELD = (
-    "estimate",
-    *(f"{kind}{end}" for kind in ("", "bound_", "outer_") for end in ("lower", "upper")),
-    *ERROR_BUDGET,
-)
+_ENDS = tuple(f"{kind}{end}" for kind in ("", "bound_", "outer_") for end in ("lower", "upper"))
+WITHHELD = ("estimate", *_ENDS, *ERROR_BUDGET)
 """Shares and intervals, which are not given where the weights of joints do not support them."""
 KNOWN = ("expected", "parts_lower", "parts_upper", "unsupported")
 """Fields of `known_share.KnownShare` that a row has where tolerances are known from measured parts."""
@@ -118,13 +115,11 @@ def quantile_rows(view: View) -> Rows:
         One row per load and share: ``load``, ``unit``, ``nominal``, the fields of `analysis.estimates.Quantile`,
         ``confidence``. Loads in SI units.
     """
-    return [
-        {"load": load.name, "unit": load.unit, "nominal": load.nominal}
-        | load.quantile(share)._asdict()
-        | {"confidence": CONFIDENCE}
-        for load in view.loads(view.shown_loads)
-        for share in SHARES
-    ]
+    rows: list[Row] = []
+    for load in view.loads(view.shown_loads):
+        head = {"load": load.name, "unit": load.unit, "nominal": load.nominal}
+        rows += [head | load.quantile(share)._asdict() | {"confidence": CONFIDENCE} for share in SHARES]
+    return rows
 
 
 def curve_rows(view: View) -> Rows:
@@ -170,8 +165,13 @@ def readings(view: View) -> dict[str, Any]:
     for load in view.loads(list(dict.fromkeys((*view.shown_loads, *view.limits)))):
         if not load.valid.size:
             continue
-        x = _round_levels(float(load.valid[0]), float(load.valid[-1]), load.limit)
-        start = load.limit if load.limit is not None else load.quantile(0.9).estimate
+        marked = [] if load.limit is None else [load.limit]
+        low, high = (float(end([*load.valid[[0, -1]], *marked])) for end in (min, max))
+        raw = max(high - low, 1e-3 * abs(high), 1e-12) / READER_LEVELS
+        power = 10.0 ** np.floor(np.log10(raw))
+        step = power * next(multiple for multiple in (1, 2, 5, 10) if multiple * power >= raw)
+        x = np.union1d(step * np.arange(np.floor(low / step), np.ceil(high / step) + 1), marked)
+        start = load.quantile(0.9).estimate if load.limit is None else load.limit
         table = load.curve(x)
         curves[load.name] = {
             "unit": unit_text(load.unit),
@@ -185,15 +185,6 @@ def readings(view: View) -> dict[str, Any]:
             **{end: [float(f"{v:.3g}") for v in table[end]] for end in ends},
         }
     return curves
-
-
-def _round_levels(low: float, high: float, limit: float | None) -> NDArray[np.float64]:
-    low, high = (low, high) if limit is None else (min(low, limit), max(high, limit))
-    raw = max(high - low, 1e-3 * abs(high), 1e-12) / READER_LEVELS
-    power = 10.0 ** np.floor(np.log10(raw))
-    step = power * next(m for m in (1, 2, 5, 10) if m * power >= raw)
-    marks = step * np.arange(np.floor(low / step), np.ceil(high / step) + 1)
-    return np.unique(marks if limit is None else np.append(marks, limit))
 
 
 def not_kept(view: View) -> str:

@@ -67,14 +67,10 @@ def _facts(store: ResultFile, states: dict[str, NDArray[np.uint8]]) -> dict[str,
     facts |= _counts(records.worst_status(list(states.values())))
     counts = {point: _counts(status) for point, status in states.items()}
     if len(counts) > 1:
-        facts["points"] = {
-            point: {k: n for k, n in number_by_status.items() if n} for point, number_by_status in counts.items()
-        }
-    points, pending = (
-        store.each(),
-        sum(number_by_status[records.Status.PENDING.label] for number_by_status in counts.values()),
-    )
-    stored = sum(_counts(at.column("results", "status", slice(None)))[records.Status.PENDING.label] for at in points)
+        facts["points"] = {point: {k: n for k, n in numbers.items() if n} for point, numbers in counts.items()}
+    points, waiting = store.each(), records.Status.PENDING.label
+    pending = sum(numbers[waiting] for numbers in counts.values())
+    stored = sum(_counts(at.column("results", "status", slice(None)))[waiting] for at in points)
     again = sum(int(np.count_nonzero(at.attempt())) for at in points)
     condition = {"damaged": pending - stored, "simulated_again": again}
     facts |= {name: number for name, number in condition.items() if number}

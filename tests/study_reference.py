@@ -15,21 +15,20 @@ from tolstat.joint import Operation
 from tolstat.joint.contact import Station
 from tolstat.joint.orders import SpeedOrder, TorqueOrder
 from tolstat.joint.partner import Partner
+from tolstat.study import schema
 from tolstat.study.costs import CostEntry
-from tolstat.study.fatigue import LineEntry, SequenceEntry
+from tolstat.study.fatigue import LineEntry, SequenceEntry, StressPointEntry
+from tolstat.study.file import OF_CASE
 from tolstat.study.listing import Range
 from tolstat.study.model import SweepEntry
 from tolstat.study.points import PointEntry
-from tolstat.study.schema import files
-from tolstat.study.schema.parts import of_model
+from tolstat.study.schema import of_model
 from tolstat.study.selection import TOLERANCED
 from tolstat.study.selective import SelectiveEntry
 from tolstat.study.sorting import RejectEntry
-from tolstat.study.stress_point import StressPointEntry
-from tolstat.study.tolerances.entry import Banded, SingleEntry
+from tolstat.study.tolerances.entry import Banded, LotEntry, SingleEntry
 from tolstat.study.tolerances.fits import FitEntry
 from tolstat.study.tolerances.kinds import ZONE_KINDS, kinds_of
-from tolstat.study.tolerances.lots import LotEntry
 
 BAND = tuple(key for key in Banded.model_fields if key not in SingleEntry.model_fields)
 ZONES = tuple(key for key in ZONE_KINDS if key != "offset_radial")
@@ -107,17 +106,18 @@ def _own(model: Any, base: Any) -> dict[str, Any]:
 def sections() -> str:
     """Table of the sections of study and case."""
     lines = ["| section | in a study | in a case | what it says |", "|---|---|---|---|"]
-    for name, section in files.SECTIONS.items():
-        header = f"[[{name}]]" if section.repeated else f"[{name}]"
-        state = "needed" if section.required else "any number" if section.repeated else "optional"
-        case = state if section.in_case else "–"
-        lines.append(f"| `{header}` | {state} | {case} | {section.schema()['description']} |")
+    for name, section in schema.sections().items():
+        repeated = section.get("type") == "array"
+        header = f"[[{name}]]" if repeated else f"[{name}]"
+        state = "needed" if name in schema.REQUIRED else "any number" if repeated else "optional"
+        case = state if name in OF_CASE else "–"
+        lines.append(f"| `{header}` | {state} | {case} | {section['description']} |")
     return "\n".join(lines)
 
 
 def joint_tables() -> Iterator[str]:
     """Sections of a joint file."""
-    made = files.joint()
+    made = schema.joint()
     yield key_table(made["properties"])
     yield from _joint_sections(made, "")
     yield f"`contact.stations`: {of_model(Station)['description']}\n\n{model_table(Station)}"
@@ -199,11 +199,9 @@ def results() -> str:
 
 def tables() -> dict[str, str]:
     """Each table of the page, by the name in its comment."""
-    with_keys = {
-        name: section.schema()
-        for name, section in files.SECTIONS.items()
-        if "patternProperties" not in section.schema()
-    }
+    made = {name: section.get("items", section) for name, section in schema.sections().items()}
+    made |= {"operation": of_model(Operation)}
+    with_keys = {name: section for name, section in made.items() if not section.get("patternProperties")}
     found = {name: key_table(made["properties"], made.get("required", ())) for name, made in with_keys.items()}
     entries = {
         "sweep": SweepEntry,

@@ -26,7 +26,7 @@ from tolstat.study.design import Design, sobol
 from tolstat.study.proposal import component, weights
 from tolstat.study.selective import matching
 from tolstat.study.tolerances.distributions import score
-from tolstat.study.tolerances.radial import plane_scores
+from tolstat.study.tolerances.zone_laws import plane_scores
 
 Array = NDArray[np.float64]
 Table = NDArray[np.void]

@@ -7,9 +7,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from studies.cirelli2021 import page_checks as paper_checks
+from studies.cirelli2021 import rccc, rccc_statics
 from studies.cirelli2021 import tables as paper
 from studies.cirelli2021.page_source import PaperStudy
-from tolstat.joint import Joint, ideal, material, rccc
+from tolstat.joint import Joint, ideal, material
 from tolstat.joint.derived import DERIVED
 
 FIT_LOAD, H = 20e3, 6.9
@@ -147,7 +148,7 @@ def mobility(study: PaperStudy) -> list[tuple[str, str, int, int, str, str]]:
     match = [m for m in study.matches if m.printed.startswith("Ang")][-1]
     for pairs in ("RRRR", "RCCC"):
         for row, name in ((study.ideal(match.alpha), "ideal"), (match.row, match.case)):
-            found = rccc.mobility(
+            found = rccc_statics.mobility(
                 rccc.solve(study.joint, study.main.operation, study.main.errors[row], theta).lines, pairs
             )
             rows.append((pairs, name, found.kutzbach, found.equations, _span(found.rank), _span(found.dof)))

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from studies.cirelli2021 import rccc
 from studies.cirelli2021 import spectra as paper_spectra
 from studies.cirelli2021 import tables as paper
 from studies.cirelli2021.evidence import Evidence
 from tolstat.common.tables import Status
-from tolstat.joint import Joint, Operation, operating, rccc
+from tolstat.joint import Joint, Operation, operating
 from tolstat.store import ResultFile
 from tolstat.store.recorded import operation_of
 

@@ -16,10 +16,10 @@ from studies.cirelli2021 import statics as paper_statics
 from studies.cirelli2021 import tables as paper
 from studies.cirelli2021.evidence import Answer
 from studies.cirelli2021.page_main import Main, revolutions
-from tolstat.analysis.gamma import gamma as relative_errors
 from tolstat.common.columns import RESULT_COLUMNS
 from tolstat.common.tables import Status, Variant
 from tolstat.joint import Joint, operating, varied
+from tolstat.questions.cases import relative_errors
 from tolstat.store import ResultFile
 from tolstat.store.recorded import operating_points
 

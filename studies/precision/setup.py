@@ -17,7 +17,7 @@ from tolstat.common.strict import Strict
 from tolstat.common.tables import Fidelity, Method, Options
 from tolstat.study import Study
 
-METHOD_NAMES = {"bdf2": "BDF2", "generalized_alpha": "generalised-α", "tr_bdf2": "TR-BDF2"}
+METHOD_NAMES = {"bdf2": "BDF2", "tr_bdf2": "TR-BDF2"}
 IDEAL_STEPS = 90
 """Steps a revolution of the ideal joint, whose error does not depend on them: the nearest setting is taken."""
 
@@ -30,7 +30,7 @@ class Own(Strict):
     """``[tolstat]``: settings of the solver. `block`: number of joints simulated together for the curve "at once"."""
 
     fidelities: Annotated[tuple[Literal["dynamic", "quasistatic", "ideal"], ...], Field(min_length=1)]
-    methods: Annotated[tuple[Literal["bdf2", "generalized_alpha", "tr_bdf2"], ...], Field(min_length=1)]
+    methods: Annotated[tuple[Literal["bdf2", "tr_bdf2"], ...], Field(min_length=1)]
     steps_per_rev: Annotated[tuple[Steps, ...], Field(min_length=1)]
     block: Count
 

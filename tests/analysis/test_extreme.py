@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import expon, genpareto, norm
 
 from tolstat.analysis import extreme, pareto
-from tolstat.analysis.listed import Listed
+from tolstat.analysis.design import Listed
 from tolstat.analysis.sample import Sample
 from tolstat.common.tables import Status
 

@@ -25,7 +25,7 @@ from tolstat.campaign import run as campaign
 from tolstat.common import files, tables
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.tables import Options, Simulation, Status
-from tolstat.store import ResultFile, Writer, metadata, provenance
+from tolstat.store import ResultFile, Writer, metadata
 from tolstat.study import Study
 
 KINDS = ("none", "full")
@@ -123,7 +123,7 @@ def test_what_cannot_grow_is_refused(tmp_path: Path, make: Make, method: str, n:
 def test_a_file_of_other_code_does_not_grow(tmp_path: Path, make: Make, monkeypatch: pytest.MonkeyPatch) -> None:
     path = run(make(40), tmp_path / "a.h5")
     before = path.read_bytes()
-    monkeypatch.setattr(provenance, "source_hash", lambda: "0")
+    monkeypatch.setattr(metadata, "source_hash", lambda: "0")
     says = r"another version of the code\n    sources: \w+ in the file, 0 now\n  hint: .*STUDY --n 80 --out OTHER.h5"
     with pytest.raises(InputError, match=says):
         extend.extend(path, 80)

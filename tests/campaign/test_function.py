@@ -1,5 +1,7 @@
 """The function of a study: a campaign's loads for its errors, its errors for its random numbers, to the last bit."""
 
+import multiprocessing
+
 import numpy as np
 import pytest
 
@@ -70,17 +72,56 @@ def test_faults():
     with pytest.raises(InputError, match=r"(?s)did you mean 'cross1'.*is no load") as caught:
         tolstat.function(load(MAIN), ["cros1.F", "cross1.G"])
     assert len(caught.value.faults) == 2
-    lots = study_of(
-        TEXT.replace("n = 64", "n = 128").replace('"uniform" }', '"uniform", lot = { share = 0.3 } }')
-        + "joints_per_lot = 4\n"
-    )
-    f = tolstat.function(lots)
-    with pytest.raises(InputError, match="joints of one lot depend on each other"):
-        f.uniform(np.full((2, len(f.cube_names)), 0.5))
-    with pytest.raises(ValueError, match=r"shape \(n, 13\)"):
-        f(np.zeros((2, 3)))
     with pytest.raises(InputError, match="draws no errors"):
         tolstat.function(load(STUDIES / "clearance.toml"))
+
+
+def dependent(key):
+    text = TEXT.replace("n = 64", "n = 128").replace('[[correlation]]\nbetween = ["pin*.diameter"]\nrho = 0.6\n', "")
+    if key == "joints_per_lot":
+        lot = '"uniform", lot = { share = 0.3 } }'
+        return study_of(text.replace('"uniform" }', lot) + "joints_per_lot = 4\n")
+    return load(STUDIES / "selective.toml")
+
+
+@pytest.mark.parametrize("key", ["joints_per_lot", "selective"])
+def test_joints_that_depend_on_each_other_have_no_cube(key):
+    """The refusal names the key and another way, which works."""
+    study = dependent(key)
+    f = tolstat.function(study, ["psi"])
+    for use in (lambda: f.uniform(np.full((2, len(f.cube_names)), 0.5)), f.salib):
+        with pytest.raises(InputError, match=rf"sampling\.{key}.*\n.*remove sampling\.{key}, or give errors") as caught:
+            use()
+        assert "depend on each other" in str(caught.value)
+    assert f.distributions is None
+    drawn = tolstat.draw(study, range(1, 4))
+    assert np.column_stack([drawn[name] for name in f.names]).shape == (3, len(f.names))
+
+
+@pytest.mark.parametrize(
+    ("x", "words"),
+    [
+        (np.zeros((2, 3)), r"shape \(n, 13\), .* not \(2, 3\); they are pin1\.offset_t, "),
+        (np.zeros(13), r"not \(13,\); give \[x\] for one joint"),
+        (0.0, r"not \(\)"),
+    ],
+)
+def test_an_array_of_another_shape(x, words):
+    f = tolstat.function(study_of(TEXT), ["psi"])
+    with pytest.raises(ValueError, match=words):
+        f(x)
+    with pytest.raises(ValueError, match=r"each of f\.cube_names is needed"):
+        f.uniform(np.zeros((1, 1)))
+
+
+def test_kernels_that_some_joints_need_are_compiled_before_processes_start(monkeypatch):
+    compiled = []
+    monkeypatch.setattr(functions, "compile_missing", lambda options, params=None: compiled.append(params))
+    monkeypatch.setattr(functions.pool, "map_blocks", lambda work, blocks, workers: (_ for _ in ()))
+    f = tolstat.function(study_of(TEXT), ["psi"], workers=2)
+    f(np.zeros((functions.LEAST_SHARED, len(f.names))))
+    assert compiled[0] is None
+    assert len(compiled[1]) == 64
 
 
 @pytest.mark.slow
@@ -103,4 +144,8 @@ def test_loads_are_those_of_a_campaign(tmp_path, monkeypatch):
     assert np.isnan(alone[3:5]).all()
     monkeypatch.setattr(functions, "LEAST_SHARED", 2)
     both = tolstat.function(study, f.loads, workers=2)
-    assert both(x[::-1])[::-1].tobytes() == alone.tobytes()
+    with both:
+        assert both(x[::-1])[::-1].tobytes() == alone.tobytes()
+        assert multiprocessing.active_children()
+        assert both(x).tobytes() == alone.tobytes()
+    assert not multiprocessing.active_children()

@@ -23,7 +23,7 @@ from tolstat.common.tables import Simulation, Status
 from tolstat.questions.causes.worst import joint_rows, largest_errors
 from tolstat.store import ResultFile, Writer, recorded
 from tolstat.study.tolerances import distributions
-from tolstat.study.tolerances.radial import Rayleigh
+from tolstat.study.tolerances.zone_laws import Rayleigh
 
 HEAD = """
 [joint]

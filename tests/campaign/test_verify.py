@@ -18,11 +18,10 @@ from tolstat.campaign import checks, verify
 from tolstat.campaign import run as campaign
 from tolstat.common.errors import InputError, NotApplicable, StoreError
 from tolstat.common.load_kinds import LOAD_KINDS
-from tolstat.common.solver_options import from_names
-from tolstat.common.tables import Method, Options, Simulation, Start, Status
+from tolstat.common.tables import Method, Options, Simulation, Start, Status, from_names
 from tolstat.questions import accuracy as question
 from tolstat.questions.exceedance.answer import exceedance
-from tolstat.store import ResultFile, Writer, provenance, recorded, verification
+from tolstat.store import ResultFile, Writer, metadata, recorded, verification
 from tolstat.store.verification import Check, Verification
 
 REAL = """
@@ -303,7 +302,7 @@ def test_parameters_and_settings_come_back_from_the_file_alone(tmp_path):
     text = REAL.partition("[tolerances]")[0] + (
         '[sampling]\nmethod = "cases"\n[[case]]\nname = "a"\nerrors.hole4.offset_t = "0.1 mm"\n'
         '[[variant]]\nname = "plain"\n[[variant]]\nname = "tight"\njoint.contact.D_P = "76.1 mm"\n'
-        '[variant.solver]\nmethod = "generalized_alpha"\nsteps_per_rev = 48\n[variant.operation]\nspeed = "300 rpm"\n'
+        '[variant.solver]\nmethod = "tr_bdf2"\nsteps_per_rev = 48\n[variant.operation]\nspeed = "300 rpm"\n'
     )
     listed = study.load(written(tmp_path, text))
     errors = sampling.draw(listed)
@@ -316,7 +315,7 @@ def test_parameters_and_settings_come_back_from_the_file_alone(tmp_path):
         assert found[k] == own[0]
     assert (found["clearance"][0] != found["clearance"][1]).all()
     assert settings == [solver.options() for solver in listed.solvers]
-    assert settings[1] == settings[0]._replace(method=int(Method.GENERALIZED_ALPHA), steps_per_rev=48)
+    assert settings[1] == settings[0]._replace(method=int(Method.TR_BDF2), steps_per_rev=48)
 
 
 @pytest.mark.slow
@@ -354,6 +353,6 @@ def test_what_cannot_be_verified_is_exit_code_2(tmp_path, monkeypatch):
     with pytest.raises(InputError, match="at least one"):
         verify.check(written(tmp_path), joints=-1)
     other = synthetic.store(tmp_path, name="other")
-    monkeypatch.setattr(provenance, "source_hash", lambda: "0")
+    monkeypatch.setattr(metadata, "source_hash", lambda: "0")
     with pytest.raises(StoreError, match="was made by another version of the code"):
         verify.check_file(other, 24)

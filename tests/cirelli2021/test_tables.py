@@ -16,10 +16,10 @@ from studies.cirelli2021 import distances as paper_distances
 from studies.cirelli2021 import spectra as paper_spectra
 from studies.cirelli2021 import statics as paper_statics
 from studies.cirelli2021 import tables as paper
-from tolstat.analysis.gamma import gamma as relative_errors
 from tolstat.common.load_kinds import BUSHINGS
 from tolstat.common.tables import RESULT, Status
 from tolstat.joint import ideal
+from tolstat.questions.cases import relative_errors
 
 
 def test_printed_tables_have_128_entries_in_the_paper_s_order():

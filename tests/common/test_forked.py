@@ -6,12 +6,10 @@ import os
 import signal
 import subprocess
 import sys
-import time
 
 import pytest
 
 from tests.support.environment import environment
-from tolstat.common import forked
 from tolstat.common.forked import CAN_FORK, Forked, mapped
 
 
@@ -36,18 +34,6 @@ def test_what_was_killed_is_evaluated_here() -> None:
 
     other = Forked(killed)
     assert other.result() == other.result() == 7
-
-
-def test_what_hangs_is_evaluated_here(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(forked, "STILL_S", 0.1)
-    parent = os.getpid()
-
-    def hangs() -> int:
-        if os.getpid() != parent:
-            time.sleep(1000)
-        return 7
-
-    assert Forked(hangs).result() == 7
 
 
 def test_what_fails_raises_where_the_result_is_asked_for() -> None:

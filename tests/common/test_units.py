@@ -14,8 +14,7 @@ from pydantic_core import PydanticCustomError
 from tests.support.environment import ROOT
 from tolstat.common import units
 from tolstat.common.notation import DIAMETER, PLUS_MINUS
-from tolstat.common.units import diameter, is_diameter, to_si, written
-from tolstat.common.usual_units import FACTORS
+from tolstat.common.units import FACTORS, diameter, is_diameter, to_si, written
 
 NUMBERS = ("0.1", "3.3", "-7.77e3", "1e-7", "0.30000000000000004", "123456.789", "0")
 

@@ -80,8 +80,20 @@ def test_frame_has_the_rows_by_name(answer: Answer) -> None:
         answer.frame("others")
 
 
+def test_the_prompt_shows_what_an_answer_has(answer: Answer) -> None:
+    assert repr(answer) == "<answer 'known': What is known; frames loads; facts share, names>"
+    assert repr(Answer("empty", "Nothing", [])) == "<answer 'empty': Nothing>"
+
+
 def test_a_notebook_shows_tables_pictures_and_facts(answer: Answer) -> None:
     shown = answer._repr_html_()
-    for piece in ("<h3>What is known</h3>", "<table", "<svg", "<dt>share</dt><dd>inf</dd>", "N: joints."):
+    for piece in (
+        "<h3>What is known</h3>",
+        "<table",
+        "<svg",
+        "<dt>share</dt><dd>inf</dd>",
+        "<dd>a, b</dd>",
+        "N: joints.",
+    ):
         assert piece in shown
     assert "<script" not in shown

@@ -13,8 +13,8 @@ from scipy.spatial.transform import Rotation
 from tolstat import joint as joints
 from tolstat.common import files
 from tolstat.common.errors import InputError
+from tolstat.common.fields import MAX_STATIONS
 from tolstat.common.load_kinds import PINS
-from tolstat.common.parameters import MAX_STATIONS
 from tolstat.common.strict import validate
 from tolstat.common.tables import ERROR_FIELDS, HOLES, PARAM
 from tolstat.joint import Joint, Operation, material

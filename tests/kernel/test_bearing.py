@@ -81,8 +81,8 @@ def test_no_force_and_no_result(params):
 
 METHODS = {
     "bdf2": {},
-    "generalized_alpha": {"method": int(Method.GENERALIZED_ALPHA)},
-    "error_controlled": {"method": int(Method.TR_BDF2), "rtol": 1e-4, "atol": 1e-4},
+    "tr_bdf2": {"method": int(Method.TR_BDF2)},
+    "error_controlled": {"method": int(Method.TR_BDF2), "rtol": 1e-4},
     "quasistatic": {"fidelity": int(Fidelity.QUASISTATIC)},
     "ideal": {"fidelity": int(Fidelity.IDEAL)},
 }

@@ -185,7 +185,7 @@ def test_largest_contact_forces_of_a_joint_are_those_of_its_motion(params):
     par = params(alpha=0.26, pin1__tilt_z=0.004, hole2__tilt_t=-0.004)
     left = np.full(1, iterations_allowed(Options().steps_per_rev, Options().max_revs))
     options = Options(peak_substeps=1)
-    (found,) = simulation.simulate_alone(par, options, left, True, np.zeros(1, RESULT).view(np.recarray))
+    (found,) = simulation.simulate_together(par, options, left, True, np.zeros(1, RESULT).view(np.recarray))
     largest = np.zeros((4, 3))
     for k, sample in enumerate(found[1]):
         t = 2 * np.pi * k / len(found[1]) / par.omega[0]
@@ -199,7 +199,7 @@ def test_samples_know_which_stations_carry_and_see_an_end_touch_beside_the_middl
     """The middle of the law `mode` can carry before the other end does: that end's touch is a switch."""
     par = params(alpha=0.26, torque=1000.0, pin1__tilt_z=0.004, hole2__tilt_t=-0.004)
     left = np.full(1, iterations_allowed(Options().steps_per_rev, Options().max_revs))
-    (found,) = simulation.simulate_alone(par, Options(), left, True, np.zeros(1, RESULT).view(np.recarray))
+    (found,) = simulation.simulate_together(par, Options(), left, True, np.zeros(1, RESULT).view(np.recarray))
     samples, work = found[1].copy(), make_work()
     bits = np.zeros((len(samples), 4), int)
     for k, sample in enumerate(samples):

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from tests.conftest import sliding, with_law
+from tests.support.stepping import make_state
 from tolstat.common.tables import Options
 from tolstat.kernel.integrators.stability import depth_at, eigenvalue, fewest_steps, largest_force
-from tolstat.kernel.integrators.state import make_state_record
 from tolstat.kernel.integrators.verlet import correct, predict
 from tolstat.kernel.mechanics.topology import (
     ARM,
@@ -32,7 +32,7 @@ from tolstat.kernel.revolution.peaks import PEAKS, follow_value, forget
 
 def oscillator(steps: int, stiffness: float, damping: float, end: float = 1.0) -> float:
     """Displacement at `end` of an oscillator of mass 1 that starts from 1, at rest."""
-    state, h = make_state_record(N_DOF), end / steps
+    state, h = make_state(N_DOF), end / steps
     state.q[:], state.v[:], state.a[:] = 1.0, 0.0, -stiffness
     for _ in range(steps):
         predict(h, state)

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from tests.conftest import REFERENCE, joint_with_law, sliding
-from tests.support import kernel_states
+from tests.support import kernel_states, trajectory
 from tolstat import joint as joints
 from tolstat import sampling, study
-from tolstat.common.tables import PARAM, Fidelity, Options, Start, Status, iterations_allowed
+from tolstat.common.tables import PARAM, Fidelity, Method, Options, Start, Status, iterations_allowed
 from tolstat.joint.contact import PREDEFINED
 from tolstat.kernel.lanes import lockstep
 from tolstat.kernel.lanes.lane_memory import aligned_zeros, as_lanes, lane_dtype
@@ -24,9 +24,14 @@ FAST = Options(steps_per_rev=45, max_revs=6, max_refinements=0)
 STATIC = FAST._replace(fidelity=int(Fidelity.QUASISTATIC))
 
 
+OPERATION = np.dtype([("a", "f8"), ("b", "f8"), ("out", "f8", 19)])
+"""Two operands, and results of operations on them."""
+
+
 @njit_inner
-def operations(a, b, out):
-    a, b, out = as_lanes(a)[0], as_lanes(b)[0], as_lanes(out)
+def operations(record):
+    lanes = as_lanes(record)
+    a, b, out = lanes.a, lanes.b, lanes.out
     out[0], out[1], out[2], out[3] = a + b, a - b, a * b, a / b
     out[4], out[5], out[6], out[7] = -a, math.sqrt(abs(a)), max(a, b), min(a, b)
     out[8], out[9], out[10], out[11] = math.sin(a), math.cos(a), math.tan(a), math.atan2(a, b)
@@ -44,20 +49,16 @@ def test_operations_are_those_of_numpy():
     rng = np.random.default_rng(3)
     special = np.array([0.0, -0.0, np.inf, -np.inf, np.nan, 1.0, -1.5, 3.0])
     for k in range(40):
-        a, b, out = (
-            aligned_zeros((1, WIDTH), float),
-            aligned_zeros((1, WIDTH), float),
-            aligned_zeros((19, WIDTH), float),
-        )
-        a[0], b[0] = (rng.choice(special, WIDTH) if k % 2 else rng.normal(size=WIDTH) for _ in range(2))
-        reduced = operations(a, b, out)
-        x, y = a[0], b[0]
+        record = aligned_zeros(1, lane_dtype(OPERATION)).view(np.recarray)[0]
+        x, y = (rng.choice(special, WIDTH) if k % 2 else rng.normal(size=WIDTH) for _ in range(2))
+        record.a[:], record.b[:] = x, y
+        reduced = operations(record)
         with np.errstate(all="ignore"):
             expected = [x + y, x - y, x * y, x / y, -x, np.sqrt(abs(x)), np.where(y > x, y, x), np.where(y < x, y, x)]
             expected += [libm(math.sin, x), libm(math.cos, x), libm(math.tan, x), libm(math.atan2, x, y)]
             expected += [np.where(x < y, x, y), np.where((x >= y) | ~(y > 0), 2.0, x), (x <= y) & (x != y), x == y]
             expected += [2 - x, (1 + x) * 3, 0.0 + 0 * x + 1 * x + 2 * x]
-        np.testing.assert_array_equal(out, np.array(expected, float))
+        np.testing.assert_array_equal(record.out, np.array(expected, float))
         more = x > y
         assert reduced[:4] == (more.any(), more.all(), more.sum(), sum(int(m) << i for i, m in enumerate(more)))
         np.testing.assert_equal(reduced[4], x[-1])
@@ -126,10 +127,12 @@ def assert_same(a, b):
         np.testing.assert_array_equal(a[name], b[name], err_msg=name)
 
 
-def alone(params, options):
+def alone(params, options, monkeypatch):
     results = np.zeros(len(params), simulation.RESULT).view(np.recarray)
     left = np.full(len(params), iterations_allowed(options.steps_per_rev, options.max_revs))
-    samples = [own.copy() for _, own in simulation.simulate_alone(params, options, left, True, results)]
+    monkeypatch.setattr(simulation, "MOST_ALONE", len(params))
+    samples = {i: own.copy() for i, own in simulation.simulate_together(params, options, left, True, results)}
+    monkeypatch.undo()
     stationary.fill_intervals(results)
     results["clearance"] = params["clearance"]
     return results, samples
@@ -142,20 +145,36 @@ def alone(params, options):
         FAST._replace(start=int(Start.RAMP), settle_tol=1e-3),
         FAST._replace(newton_max_iter=6, max_halvings=8),
         FAST._replace(max_halvings=0, newton_max_iter=4, max_revs=2),
+        FAST._replace(method=int(Method.TR_BDF2), peak_substeps=4),
+        FAST._replace(method=int(Method.TR_BDF2), start=int(Start.RAMP), newton_max_iter=6),
         STATIC,
         STATIC._replace(steps_per_rev=12),
         STATIC._replace(newton_max_iter=3, settle_tol=1e-12, max_revs=2),
     ],
 )
-def test_a_joint_has_the_same_bits_in_lanes_and_alone(mixed, options):
-    results, samples = alone(mixed, options)
+def test_a_joint_has_the_same_bits_in_lanes_and_alone(mixed, options, monkeypatch):
+    results, samples = alone(mixed, options, monkeypatch)
     together = simulation.simulate_rows(mixed, options, "full")
     assert_same(together.results, results)
     for i in np.flatnonzero(np.isin(results.status, simulation.SIMULATED)):
         np.testing.assert_array_equal(together.histories["loads"][i], samples[i]["components"].astype("f4"))
         np.testing.assert_array_equal(together.histories["tau"][i], samples[i]["tau"])
-    if options.newton_max_iter == 6 or options.steps_per_rev == 12:
+    if (options.newton_max_iter == 6 and options.method == Method.BDF2) or options.steps_per_rev == 12:
         assert ((results.status == Status.OK) & (results.halvings > 0)).any()
+
+
+@pytest.mark.parametrize("start", Start)
+@pytest.mark.parametrize("method", Method)
+def test_lanes_take_the_steps_of_a_plain_driver(mixed, method, start):
+    """States at every point of the second revolution, m and rad, beside those of `stepping`; two joints may whirl."""
+    options = Options(method=int(method), start=int(start), max_revs=2, settle_tol=1e-12, newton_tol=1e-9)
+    rows = [params for params in np.split(mixed, len(mixed)) if params["clearance"].min() > 0][:6]
+    results = np.zeros(len(rows), simulation.RESULT).view(np.recarray)
+    left, n, apart = np.full(len(rows), 10**6), options.steps_per_rev, np.full(len(rows), np.inf)
+    for i, samples in simulation.simulate_together(np.concatenate(rows), options, left, True, results):
+        points, _ = trajectory.follow(rows[i], options, 2 * n)
+        apart[i] = np.abs(np.roll(samples["q"], -1, axis=0) - points[n + 1 :, 0]).max()
+    assert (apart < 1e-7).sum() >= 4
 
 
 def test_the_mixed_joints_are_mixed(mixed):

@@ -13,9 +13,9 @@ from tolstat.common.loads import LOADS, largest, of_kind, put_largest
 from tolstat.common.tables import KERNEL_RESULT, RESULT, RESULT_FIELDS, Options, Status, for_kernels, without_results
 from tolstat.kernel.mechanics import dynamics, ideal_loads, loads
 from tolstat.kernel.mechanics.loads import DECIDING, MEASURES, N_AVERAGED, N_INSTANT, N_LOADS, OF_MEASURE, OTHERS
+from tolstat.kernel.mechanics.topology import N_DOF
 from tolstat.kernel.mechanics.work import make_work
 from tolstat.kernel.revolution import settle
-from tolstat.kernel.revolution.simulate import make_scratch
 from tolstat.solver.simulation import simulate_rows
 
 
@@ -99,16 +99,15 @@ def written(evaluate) -> dict[str, np.ndarray]:
 
 def test_ideal_loads_and_equations_of_motion_fill_the_same_fields(params) -> None:
     """All that loads follow from, in the ideal joint as in the dynamic one."""
-    par, options = params(alpha=0.2)[0], Options()
-    state = make_scratch(options).state
-    state.q0[:] = state.v0[:] = 0.0
-    dynamic = written(lambda work: dynamics.forces(0.01, state.q0, state.v0, par, work))
-    ideal = written(lambda work: ideal_loads.ideal_loads(0.5, par, state, work))
+    par = params(alpha=0.2)[0]
+    at_rest = np.zeros(N_DOF)
+    dynamic = written(lambda work: dynamics.forces(0.01, at_rest, at_rest, par, work))
+    ideal = written(lambda work: ideal_loads.ideal_loads(0.5, at_rest, par, work))
     for name in ("load", "contact", "mode", "force", "shaft", "turned", "pos", "vel"):
         assert dynamic[name].all(), name
         assert ideal[name].all(), name
     work = make_work()
-    ideal_loads.ideal_loads(0.5, par, state, work)
+    ideal_loads.ideal_loads(0.5, at_rest, par, work)
     loads.write_loads(0, 0.0, par, work)
     assert np.isfinite(work.loads).all()
 

@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 from tests.conftest import with_law
 from tolstat.joint.contact import PREDEFINED
 from tolstat.kernel.mechanics.spring import elastic, has_needles, penetration
-from tolstat.kernel.revolution.simulate import inside_model
+from tolstat.kernel.revolution.outcome import inside_model
 
 
 @pytest.mark.parametrize("law", PREDEFINED)

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any, NamedTuple
+from unittest import mock
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,26 +17,21 @@ from scipy.linalg.lapack import dgetrf, dgetrs
 
 from studies.precision.measuring import in_turn
 from tests.measure.operations import count_apart
-from tests.support.kernel_states import Sample, Snapshot, dense, into_lanes, snapshots, tally
-from tolstat.common.tables import RESULT, Options, for_kernels
-from tolstat.kernel.integrators.state import FACTORISATIONS, ITERATIONS, UNLIMITED
+from tests.support.kernel_states import UNLIMITED, Sample, Snapshot, dense, into_lanes, snapshots, tally
+from tests.support.stepping import make_state
+from tolstat.common.tables import RESULT, Options
 from tolstat.kernel.lanes.lane_memory import as_lanes
+from tolstat.kernel.lanes.lockstep import START_ONLY
+from tolstat.kernel.mechanics import dynamics, linsolve, tangent
 from tolstat.kernel.mechanics.contact import contact_load
 from tolstat.kernel.mechanics.topology import N_DOF
-from tolstat.kernel.revolution.simulate import (
-    assemble,
-    begin,
-    clear,
-    eliminate,
-    residual,
-    rigid_guess,
-    simulate_joint,
-    solve,
-)
+from tolstat.kernel.mechanics.work import make_work
 from tolstat.kernel.simd.jit import njit
 from tolstat.kernel.simd.lane import WIDTH, fma
 from tolstat.solver import simulation
 
+residual, assemble = dynamics.residual, tangent.assemble
+eliminate, solve = linsolve.factorise, linsolve.solve
 TIMES = 1000
 """Executions of a part in one measurement of one joint or of all lanes, some 1 to 10 ms."""
 PEAK_TIMES = 2_000_000
@@ -79,24 +75,6 @@ def repeat_in_lanes(part, times, options, batch):
 
 
 @njit
-def start(rows, options, alone):
-    """Compute the initial state of every joint of `rows`."""
-    work, state, ring, _ = alone
-    for i in range(len(rows)):
-        clear(rows[i], state, ring.samples, ring.notes)
-        begin(rows[i], options, work, state)
-
-
-@njit
-def guess(rows, alone):
-    """Compute the rigid-body guess of every joint of `rows`, the part of the start that is not done in lanes."""
-    work, state, ring, _ = alone
-    for i in range(len(rows)):
-        clear(rows[i], state, ring.samples, ring.notes)
-        rigid_guess(0.0, rows[i], work, state)
-
-
-@njit
 def multiply_add(times, batch):
     """Do `times` fused multiply-adds in each of `CHAINS` independent lane registers: measures the core's peak rate."""
     motion = as_lanes(batch.motion)
@@ -111,11 +89,15 @@ def multiply_add(times, batch):
 
 def alone(params: NDArray[np.void], options: Options) -> NDArray[np.void]:
     """Simulate joints one after the other, without lanes; results, (n,) RESULT."""
-    results = np.zeros(len(params), RESULT)
-    rows, out, scratch = params.view(np.recarray), for_kernels(results), simulation.scratch(options)
-    for i in range(len(params)):
-        simulate_joint(rows[i], options, UNLIMITED, scratch, out[i])
+    results, left = np.zeros(len(params), RESULT), np.full(len(params), UNLIMITED)
+    with mock.patch.object(simulation, "MOST_ALONE", len(params)):
+        list(simulation.simulate_together(params, options, left, False, results.view(np.recarray)))
     return results
+
+
+def begin(params: NDArray[np.void], options: Options) -> NDArray[np.void]:
+    """Find the start of joints, one after the other; results with the work done, (n,)."""
+    return alone(params, options._replace(max_revs=START_ONLY))
 
 
 class Once(NamedTuple):
@@ -239,39 +221,32 @@ def _parts(parts: tuple[dict[str, tuple[float, float]], ...], whole: list[float]
 
 def _start_counts(these: Sample) -> NDArray[np.float64]:
     """Newton iterations and tangents of a joint's initial equilibrium, mean."""
-    params, options = these
-    scratch = simulation.scratch(options)
-    counts = []
-    for i in range(len(params)):
-        start(params[i : i + 1].view(np.recarray), options, scratch)
-        counts.append(scratch.state.counters[[ITERATIONS, FACTORISATIONS]])
-    return np.asarray(np.mean(counts, axis=0))
+    results = begin(*these)
+    return np.array([results[name].mean() for name in ("newton_iterations", "factorisations")])
 
 
 def _systems(snaps: list[Snapshot], options: Options) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]:
     """Yield the dense tangent and the right-hand side of each state."""
-    work, state, *_ = simulation.scratch(options)
+    work, out = make_work(), np.empty(N_DOF)
     for snap in snaps:
         par = snap.params.view(np.recarray)[0]
-        state.q[:], state.v[:], state.a[:] = snap.q, snap.v, snap.a
-        residual(snap.t, state.q, state.v, state.a, par, options, work, state.residual)
+        residual(snap.t, snap.q, snap.v, snap.a, par, options, work, out)
         assemble(snap.cv, snap.ca, snap.cv, par, work)
-        yield np.asfortranarray(dense(work)), -state.residual
+        yield np.asfortranarray(dense(work)), -out
 
 
 def _tasks(these: Sample, snaps: list[Snapshot]) -> dict[str, Callable[[], object]]:
     """Functions to be timed, by name."""
     params, options = these
-    scratch = simulation.scratch(options)
-    work, state, *_ = scratch
+    work, motion = make_work(), make_state(N_DOF)
     batch = into_lanes(snaps, options)
     rows = [snap.params.view(np.recarray)[0] for snap in snaps]
     tangents = list(_systems(snaps, options))
 
     def one_by_one(part: int) -> None:
         for snap, par in zip(snaps, rows, strict=True):
-            state.q[:], state.v[:], state.a[:] = snap.q, snap.v, snap.a
-            repeat(part, TIMES, snap.t, snap.cv, snap.ca, state, par, options, work)
+            motion.q[:], motion.v[:], motion.a[:] = snap.q, snap.v, snap.a
+            repeat(part, TIMES, snap.t, snap.cv, snap.ca, motion, par, options, work)
 
     def in_lanes(part: int) -> None:
         repeat_in_lanes(part, TIMES, options, batch)
@@ -286,8 +261,8 @@ def _tasks(these: Sample, snaps: list[Snapshot]) -> dict[str, Callable[[], objec
     tasks: dict[str, Callable[[], object]] = {
         "lanes": lambda: simulation.simulate_rows(params, options),
         "alone": lambda: alone(params, options),
-        "lanes start": lambda: guess(params.view(np.recarray), scratch),
-        "alone start": lambda: start(params.view(np.recarray), options, scratch),
+        "lanes start": lambda: simulation.starts(params.view(np.recarray), options),
+        "alone start": lambda: begin(params, options),
         "peak": lambda: multiply_add(PEAK_TIMES, batch),
     }
     for part, name in enumerate(Once._fields):

@@ -1,7 +1,8 @@
 """``python -m tests.measure.other_tools [PART ...]``: OpenTURNS and SALib beside our own methods, on the main job.
 
 Printed are tables of docs/functions.md: a rare load with equilibria at 36 angles, Sobol' indices of the lines of the
-drawing, and the processor time of ``f(x)`` beside that of a campaign of the same joints. Needs the extra ``oracles``.
+drawing, the processor time of ``f(x)`` beside that of a campaign of the same joints, and of joints one by one. Needs
+the extra ``oracles``.
 """
 
 from __future__ import annotations
@@ -21,19 +22,19 @@ from tests.support.environment import ROOT
 from tolstat.analysis import binomial
 from tolstat.campaign.work import Work
 from tolstat.display.progress import silent
+from tolstat.questions import rare
 from tolstat.questions.causes import errors as causes
-from tolstat.questions.rare import simulation as rare
 from tolstat.study import Study, load
 
 MAIN = ROOT / "studies" / "iso2768_f.toml"
 EQUILIBRIA = '\n[solver]\nfidelity = "quasistatic"\nsteps_per_rev = 36\n'
 LOAD, LIMIT, PER_LEVEL, SEEDS = "cross1.F", 3000.0, 1000, 4
-POINTS, JOINTS, ROUNDS, FORM_SAMPLE = 1024, 10_000, 3, 30_000
+POINTS, JOINTS, ROUNDS, FORM_SAMPLE, FEW = 1024, 10_000, 3, 30_000, 240
 
 
 def main(*parts: str) -> None:
-    """Print the tables of these parts, by default of all: rare, form, sobol, cost."""
-    parts = parts or ("rare", "form", "sobol", "cost")
+    """Print the tables of these parts, by default of all: rare, form, sobol, cost, alone."""
+    parts = parts or ("rare", "form", "sobol", "cost", "alone")
     equilibria, main_job = load(MAIN, text=MAIN.read_text("utf-8") + EQUILIBRIA), load(MAIN)
     if {"rare", "form"} & set(parts):
         print("| method | P | 95 % interval | joints |\n|---|---|---|---|")
@@ -47,6 +48,8 @@ def main(*parts: str) -> None:
         sobol(main_job)
     if "cost" in parts:
         print(f"\nprocessor time of f(x) over that of a campaign, {JOINTS} joints: {cost(main_job)}")
+    if "alone" in parts:
+        print(f"\nprocessor time of {FEW} joints one by one over that of one call: {alone(main_job)}")
 
 
 def line(name: str, p: float, lower: float, upper: float, joints: int) -> None:
@@ -178,6 +181,15 @@ def cost(study: Study) -> str:
             campaign = seconds(lambda path=path: tolstat.run(whole, path, workers=2, check=False, tell=silent))
             ratios.append(seconds(lambda: f(x)) / campaign)
     return ", ".join(f"{ratio:.2f}" for ratio in ratios)
+
+
+def alone(study: Study) -> str:
+    """Ratios of processor times, the two in turn, in this process."""
+    f = tolstat.function(study, workers=1)
+    x = f.uniform(np.random.default_rng(2).random((FEW, len(f.cube_names))))
+    f(x[:1])  # which loads the kernels
+    ratios = [seconds(lambda: [f(row[None]) for row in x]) / seconds(lambda: f(x)) for _ in range(ROUNDS)]
+    return ", ".join(f"{ratio:.1f}" for ratio in ratios)
 
 
 def seconds(job: Callable[[], Any]) -> float:

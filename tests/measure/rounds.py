@@ -17,12 +17,10 @@ from unittest import mock
 import numpy as np
 from numpy.typing import NDArray
 
+from tests.measure.kernel_parts import begin
 from tests.support.kernel_states import Sample, sample
 from tolstat.common.tables import Options
 from tolstat.display.text import align
-from tolstat.kernel.integrators.state import ITERATIONS
-from tolstat.kernel.lanes import lockstep as engine
-from tolstat.kernel.revolution.simulate import begin, clear
 from tolstat.kernel.simd.lane import WIDTH
 from tolstat.solver import simulation
 from tolstat.study import load
@@ -48,32 +46,20 @@ NONE = Calls(0, 0, 0, 0, 0, 0, 0.0)
 def counting() -> Iterator[dict[str, Calls]]:
     """Count the calls of the lock-step, by kind of steps, and joints simulated alone, while the context lasts."""
     counts = dict.fromkeys((UNIFORM, REFINED, ALONE), NONE)
-    original = engine.lockstep
+    run_lanes = simulation.run_lanes
 
-    def counted(*arguments: Any) -> None:
-        rows, options, out, tally = arguments[0], arguments[4], arguments[-2], arguments[-1]
-        tallied, since = tally.copy(), time.process_time()
-        original(*arguments)
-        spent = time.process_time() - since
-        rounds, live, tangents = (int(count) for count in tally - tallied)
+    def counted(queue: Any, options: Options) -> NDArray[np.int64]:
+        since, width = time.process_time(), simulation.width_for(len(queue.rows))
+        tally = run_lanes(queue, options)
+        spent, out = time.process_time() - since, queue.results
+        rounds, live, tangents = (int(count) for count in tally)
         done = (int(out["steps"].sum()), int(out["newton_iterations"].sum()))
-        made = Calls(len(rows), rounds * WIDTH, live, *done, tangents * WIDTH, spent)
-        kind = REFINED if options.rtol > 0 else UNIFORM
-        sums = zip(counts[kind], made, strict=True)
-        counts[kind] = Calls._make(before + more for before, more in sums)
+        made = Calls(len(out), rounds * width, live, *done, tangents * width, spent)
+        kind = ALONE if width == 1 else REFINED if options.rtol > 0 else UNIFORM
+        counts[kind] = Calls._make(before + more for before, more in zip(counts[kind], made, strict=True))
+        return tally
 
-    alone = simulation.simulate_alone
-
-    def counted_alone(*arguments: Any) -> Iterator[Any]:
-        out, since = arguments[4], time.process_time()
-        yield from alone(*arguments)
-        spent = time.process_time() - since
-        done = (int(out["steps"].sum()), int(out["newton_iterations"].sum()))
-        sums = zip(counts[ALONE], Calls(len(out), 0, 0, *done, 0, spent), strict=True)
-        counts[ALONE] = Calls._make(before + more for before, more in sums)
-
-    patched = mock.patch.object(simulation, "simulate_alone", counted_alone)
-    with mock.patch.object(engine, "lockstep", counted), patched:
+    with mock.patch.object(simulation, "run_lanes", counted):
         yield counts
 
 
@@ -86,14 +72,8 @@ def count(params: NDArray[np.void], options: Options, block: int) -> dict[str, C
 
 
 def start_iterations(params: NDArray[np.void], options: Options) -> int:
-    """Newton iterations of the starts of all joints, which lock-step and joints alone have in common."""
-    work, state, ring, _ = simulation.scratch(options)
-    rows, iterations = params.view(np.recarray), 0
-    for row in rows[(params["clearance"] >= 0).all(axis=1)]:
-        clear(row, state, ring.samples, ring.notes)
-        begin(row, options, work, state)
-        iterations += int(state.counters[ITERATIONS])
-    return iterations
+    """Newton iterations of the starts of all joints."""
+    return int(begin(params, options)["newton_iterations"].sum())
 
 
 def causes(these: Sample, block: int) -> list[list[str]]:

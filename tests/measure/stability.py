@@ -16,16 +16,16 @@ from typing import NamedTuple
 import numpy as np
 
 from tests.conftest import joint_with_law
+from tests.support import trajectory
+from tests.support.stepping import CV_FACTORISED, H_OLD, make_state, reset
+from tests.support.trajectory import advance
 from tolstat import joint, sampling, study
 from tolstat.common.tables import RESULT, SIMULATED, Options, Status, iterations_allowed
 from tolstat.joint.contact import PREDEFINED
 from tolstat.kernel.integrators import first_order
-from tolstat.kernel.integrators.integrate import reset
-from tolstat.kernel.integrators.state import CV_FACTORISED, H_OLD, make_state_record
 from tolstat.kernel.mechanics.topology import N_DOF, N_LUMPS, S
-from tolstat.kernel.mechanics.work import WORK
+from tolstat.kernel.mechanics.work import WORK, make_work
 from tolstat.kernel.revolution.settle import grid_step
-from tolstat.kernel.revolution.simulate import advance, begin, clear, make_scratch
 from tolstat.kernel.simd.jit import njit, njit_inner
 from tolstat.solver import simulation
 
@@ -79,7 +79,7 @@ def growths(params: Table, options: Options) -> list[Growth | None]:
     matrices = np.empty((ANGLES, 2 * N_DOF, 2 * N_DOF))
     results = np.zeros(len(params), RESULT).view(np.recarray)
     left = np.full(len(params), iterations_allowed(options.steps_per_rev, options.max_revs))
-    for i, samples in simulation.simulate_alone(params, options, left, True, results):
+    for i, samples in simulation.simulate_together(params, options, left, True, results):
         if results[i].status not in SIMULATED:
             found.append(None)
             continue
@@ -135,7 +135,6 @@ def draw_near(state, shadow, factor):
         shadow.q0[i], shadow.v0[i], shadow.a0[i] = state.q0[i] + dq, state.v0[i] + dv, state.a0[i] + da
         shadow.q1[i] = state.q1[i] + dq - h * (dv - 0.5 * h * da)
         shadow.v1[i] = state.v1[i] + dv - h * da
-        shadow.a1[i], shadow.aux[i] = state.a1[i] + da, state.aux[i] + da
     shadow.memory[H_OLD] = h
 
 
@@ -152,10 +151,8 @@ def distance(state, shadow, h, R):
 
 def exponent(params: Table, options: Options, settling: int, revolutions: int) -> float:
     """Largest Lyapunov exponent of one joint, per revolution, after `settling` of them; NaN where a step fails."""
-    work, state, ring, _ = make_scratch(options)
-    par, shadow, n = params.view(np.recarray)[0], make_state_record(N_DOF), options.steps_per_rev
-    clear(par, state, ring.samples, ring.notes)
-    begin(par, options, work, state)
+    work, state, shadow = make_work(), trajectory.begin(params, options), make_state(N_DOF)
+    par, n = params.view(np.recarray)[0], options.steps_per_rev
     for r in range(settling):
         if not _revolution(r * n, par, options, work, state):
             return math.nan

@@ -9,7 +9,7 @@ from scipy.stats import betabinom, lognorm, norm, normaltest, t
 
 from tests.support.views import view
 from tolstat.analysis import binomial, capability, extreme, prediction
-from tolstat.analysis.listed import Listed
+from tolstat.analysis.design import Listed
 from tolstat.analysis.sample import Sample
 from tolstat.common.loads import ANY_LIMIT
 from tolstat.common.tables import Status

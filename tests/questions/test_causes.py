@@ -19,8 +19,8 @@ from tolstat.display.answer import Asked, Sentence
 from tolstat.display.text import value
 from tolstat.questions import QUESTIONS, Question
 from tolstat.questions.capability import capability
-from tolstat.questions.causes import errors, worst
-from tolstat.questions.causes import indices as of_errors
+from tolstat.questions.causes import errors as module
+from tolstat.questions.causes import worst
 from tolstat.questions.causes.errors import causes
 from tolstat.store import ResultFile, Writer, view
 
@@ -72,7 +72,7 @@ def test_known_causes_are_found_with_their_shares(path):
 
 
 def test_of_many_joints_the_first_are_taken_and_all_of_a_thin_tail(path, monkeypatch):
-    monkeypatch.setattr(of_errors, "MAX_JOINTS", 1000)
+    monkeypatch.setattr(module, "MAX_JOINTS", 1000)
     monkeypatch.setattr(view, "BLOCK", 700)
     with ResultFile.open(path) as store:
         found = causes(store.view(), "cross1.F")
@@ -106,7 +106,7 @@ def test_shares_in_all_are_offered_until_they_are_simulated(path, monkeypatch):
         known = store.view()
         before = [part.text for part in causes(known, "cross2.F").parts if isinstance(part, Sentence)]
         known.altered = {"a change": None}
-        monkeypatch.setattr(errors.lines, "lines", refuses)
+        monkeypatch.setattr(module.lines, "lines", refuses)
         after = [part.text for part in causes(known, "cross2.F").parts if isinstance(part, Sentence)]
     assert (
         f"no shares in all: given joints bound them too widely; tolstat causes {quote(str(path))} --run gives them"
@@ -146,7 +146,7 @@ def test_what_has_no_causes_is_refused(tmp_path, path):
 
 def test_of_the_first_samples_only_these_count(path):
     with ResultFile.open(path) as store:
-        found, rows = of_errors.indices(store.view(), "cross1.F", joints=1000)
+        found, rows = module.indices(store.view(), "cross1.F", joints=1000)
         errors, loads = store.errors()[1:1001], store.results()["F_max"][1:1001, 0]
     assert [found[key] for key in ("joints", "used", "without_load")] == [1000, 1000, 0]
     assert found["above"] == np.sum(loads > found["level"])

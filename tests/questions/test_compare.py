@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from tests.support import synthetic
 from tolstat.analysis import difference
 from tolstat.analysis.binomial import clopper_pearson
-from tolstat.analysis.listed import Listed
+from tolstat.analysis.design import Listed
 from tolstat.analysis.sample import Sample
 from tolstat.cli import app
 from tolstat.common.errors import InputError, NotApplicable

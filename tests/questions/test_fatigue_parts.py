@@ -17,7 +17,7 @@ import tolstat
 from tests.support.synthetic import store as store_of
 from tolstat.analysis import strength
 from tolstat.analysis.cycles import Cycles
-from tolstat.analysis.independent import Independent
+from tolstat.analysis.design import Independent
 from tolstat.common.errors import InputError, NotApplicable
 from tolstat.common.load_kinds import BUSHINGS
 from tolstat.common.tables import Status
@@ -30,8 +30,7 @@ from tolstat.questions.fatigue.duty import ANY, Joints, members, settings_of
 from tolstat.questions.fatigue.parts import Stressed, Stresses, load_stresses
 from tolstat.solver import rainflow
 from tolstat.store import ResultFile
-from tolstat.study.fatigue import Fatigue, of_text
-from tolstat.study.stress_point import StressPoint
+from tolstat.study.fatigue import Fatigue, StressPoint, of_text
 
 STUDY = """
 [joint]

@@ -43,7 +43,7 @@ from tolstat.solver.simulation import simulate_rows
 from tolstat.store import ResultFile, Writer, what_if
 from tolstat.study import widths
 from tolstat.study.starter import joint_text
-from tolstat.study.tolerances import fits, iso286
+from tolstat.study.tolerances import fits, iso
 from tolstat.study.widths import COARSER, EXACT, FINER, HALF, Line
 
 TEXT = (
@@ -194,15 +194,15 @@ def test_other_fits_are_the_next_in_the_tables_without_interference(tmp_path, co
 
 
 def test_no_other_fit_interferes_at_any_size(tmp_path):
-    drawn = [f"{hole}7/{shaft}7" for hole in ("C", "E", "F", "G", "H", "JS") for shaft in iso286.CLEARANCE]
+    drawn = [f"{hole}7/{shaft}7" for hole in ("C", "E", "F", "G", "H", "JS") for shaft in iso.CLEARANCE]
     for size in (2.0, 25.0, 76.0, 450.0):
         for code in drawn:
-            zones = iso286.zones(iso286.parse(code), size)
+            zones = iso.zones(iso.parse(code), size)
             if zones.least < 0.0:
                 continue
             scatter = {"basic": f"{size} mm", "code": code, "distribution": "uniform"}
             for other in widths.other_fits(fits.read({"fit": scatter}, "study")):
-                assert iso286.zones(iso286.parse(other), size).least >= 0.0
+                assert iso.zones(iso.parse(other), size).least >= 0.0
 
 
 @pytest.mark.parametrize("contact", ["", 'contact.law = "uniform"', 'contact.law = "point"'])

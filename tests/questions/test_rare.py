@@ -17,15 +17,14 @@ from tolstat import sampling, study
 from tolstat.analysis import subset
 from tolstat.analysis.subset import Walk
 from tolstat.campaign import run as campaign
+from tolstat.campaign import subset as simulation
 from tolstat.campaign.work import Work
 from tolstat.cli import app
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.tables import PARAM, RESULT, Simulation, Status
-from tolstat.questions.rare import answer as module
-from tolstat.questions.rare import simulation
-from tolstat.questions.rare.answer import rare, seed_row
-from tolstat.questions.rare.simulation import subset_study
-from tolstat.store import ResultFile, Writer, provenance
+from tolstat.questions import rare as module
+from tolstat.questions.rare import rare, seed_row
+from tolstat.store import ResultFile, Writer, metadata
 from tolstat.store.recorded import recall
 
 SEEDS = 500
@@ -201,7 +200,7 @@ def test_progress_counts_joints_of_all_levels(whole):
 def test_the_answer_is_about_the_files_of_all_seeds(tmp_path):
     """The load is normal: 700 N, standard deviation 100 N."""
     work, words = Work(folder=tmp_path, tell=lambda text: None), "cross1.F > 850 N"
-    files = simulation.simulate(load(tmp_path), work, words, n=100, p0=0.5, repeats=2)
+    files = module.simulate(load(tmp_path), work, words, n=100, p0=0.5, repeats=2)
     assert [path.name for path in files] == ["plan_rare.h5", "plan_rare_2.h5"]
     with ResultFile.open(files[0]) as a, ResultFile.open(files[1]) as b:
         both, one = rare(a.view(), b.view()), rare(b.view())
@@ -212,7 +211,7 @@ def test_the_answer_is_about_the_files_of_all_seeds(tmp_path):
     assert [row["seed"] for row in both.tables["seeds"].rows] == [2021, 2022]
     assert {row["seed"] for row in both.tables["levels"].rows} == {2021, 2022}
     assert {row["seed"] for row in both.tables["levels"].for_people} == {2021}
-    other = simulation.simulate(load(tmp_path, name="other"), work, "cross1.F > 860 N", n=100, p0=0.5, repeats=1)
+    other = module.simulate(load(tmp_path, name="other"), work, "cross1.F > 860 N", n=100, p0=0.5, repeats=1)
     with (
         ResultFile.open(files[0]) as a,
         ResultFile.open(*other) as b,
@@ -347,7 +346,7 @@ def test_a_file_that_lacks_joints_is_resumed_by_its_own_command(whole):
 @pytest.mark.slow
 def test_a_finished_file_of_other_code_is_shown_and_an_unfinished_one_refused(whole, monkeypatch):
     plan, found, path = whole
-    monkeypatch.setattr(provenance, "source_hash", lambda: "other")
+    monkeypatch.setattr(metadata, "source_hash", lambda: "other")
     assert run_to_end(plan, path) == found
     done = CliRunner().invoke(app, ["rare", str(path)])
     assert done.exit_code == 0, done.stderr
@@ -376,11 +375,13 @@ def test_every_fault_of_a_question_is_told(tmp_path):
         load(tmp_path, PLAN.replace("seed = 2021", 'seed = 2021\nmethod = "subset"'))
 
 
-def test_limits_by_pattern_and_all_limits_together(tmp_path):
-    plan = load(tmp_path)
-    several = subset_study(plan, "cross*.F > 950 N", 100, 0.5).sampling.limit
+def test_limits_by_pattern_and_all_limits_together(tmp_path, monkeypatch):
+    plan, plans = load(tmp_path), []
+    monkeypatch.setattr(simulation, "run", lambda own, *_: plans.append(own))
+    for words in ("cross*.F > 950 N", "any limit"):
+        module.simulate(plan, Work(tell=lambda text: None), words, 100, 0.5, repeats=1)
+    several, every = (own.sampling.limit for own in plans)
     assert several.loads == ("cross1.F", "cross2.F", "cross3.F", "cross4.F")
-    every = subset_study(plan, "any limit", 100, 0.5).sampling.limit
     assert dict(zip(every.loads, every.levels, strict=True)) == plan.limits
 
 

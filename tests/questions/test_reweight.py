@@ -20,7 +20,7 @@ from tolstat.common.tables import Simulation, Status
 from tolstat.display.answer import Document, Sentence
 from tolstat.questions import reweight as question
 from tolstat.store import ResultFile, Writer
-from tolstat.study.change import changed, rewritten
+from tolstat.study.scaling import changed, rewritten_with
 from tolstat.study.tolerances import density_ratio
 from tolstat.study.tolerances.distributions import Normal
 
@@ -286,7 +286,7 @@ def test_the_study_with_the_changes_is_written_where_the_remedy_says(tmp_path):
 )
 def test_the_study_written_has_the_changed_tolerances_and_the_same_seed(tmp_path, setting):
     old = load(tmp_path)
-    new = load(tmp_path, rewritten(old, [setting]), "new")
+    new = load(tmp_path, rewritten_with(old, [setting]), "new")
     assert new.tolerances == changed(old, [setting])
     assert (new.sampling, new.limits) == (old.sampling, old.limits)
     fresh, drawn = sampling.draw(new), sampling.draw(old)
@@ -297,6 +297,6 @@ def test_the_study_written_has_the_changed_tolerances_and_the_same_seed(tmp_path
 def test_the_study_written_parts_a_fit(tmp_path):
     text = synthetic.STUDY.replace("[tolerances]", "[tolerances]\n" + f"{FIT}")
     old = load(tmp_path, text)
-    new = load(tmp_path, rewritten(old, ["hole1.diameter.plus_minus=5 um"]), "new")
+    new = load(tmp_path, rewritten_with(old, ["hole1.diameter.plus_minus=5 um"]), "new")
     assert new.tolerances == changed(old, ["hole1.diameter.plus_minus=5 um"])
     assert new.joint.contact == old.joint.contact

@@ -9,7 +9,7 @@ import pytest
 
 from tests.questions.test_fatigue import of_signals
 from tolstat.analysis import cycles
-from tolstat.analysis.independent import Independent
+from tolstat.analysis.design import Independent
 from tolstat.common.tables import Status
 from tolstat.questions.fatigue import loads
 from tolstat.questions.fatigue.duty import Joints

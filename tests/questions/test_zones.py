@@ -14,7 +14,7 @@ from tolstat.questions.causes.errors import causes
 from tolstat.questions.reweight import _block_log_ratios
 from tolstat.store import View, Writer
 from tolstat.study import scaling
-from tolstat.study.change import changed
+from tolstat.study.scaling import changed
 
 ENTRIES = (
     HEAD

@@ -16,11 +16,11 @@ from tolstat.common.errors import InputError
 from tolstat.common.load_kinds import PINS
 from tolstat.common.tables import HOLES
 from tolstat.study import scaling
-from tolstat.study.bonus import Bonus
-from tolstat.study.change import changed
+from tolstat.study.axes import Bonus
+from tolstat.study.scaling import changed
 from tolstat.study.tolerances import meaning
-from tolstat.study.tolerances.accepted import Accepted
 from tolstat.study.tolerances.distributions import Array, Distribution, Normal, Uniform
+from tolstat.study.tolerances.zone_laws import Accepted
 
 N = 4096
 ZONE, OVER, HALF = 0.1e-3, 22e-3, 30e-6

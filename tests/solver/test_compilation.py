@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from tolstat.common.tables import Options
-from tolstat.solver import compilation, simulation
+from tolstat.common.tables import Fidelity, Options
+from tolstat.solver import compilation
 
 
 @pytest.fixture
@@ -39,7 +39,6 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     noted = {name: partial(note, name) for name in compilation.KERNELS}
     monkeypatch.setattr(subprocess, "Popen", Process)
     monkeypatch.setattr(compilation, "missing", compilation.kernels)
-    monkeypatch.setattr(simulation, "in_lanes", lambda _: True)
     monkeypatch.setattr(compilation, "available_cores", lambda: 2)
     monkeypatch.setattr(compilation, "KERNELS", noted)
     return called
@@ -49,7 +48,7 @@ def test_some_kernels_are_compiled_in_a_second_process(calls: list[str]) -> None
     compilation.warm_up()
     said, *own = calls
     assert own[: own.index("wait")] == ["lockstep.lockstep", "starts.write_starts", "rainflow.count_joint"]
-    others = "['simulate.simulate_joint']"
+    others = "['lockstep.one_at_a_time']"
     assert f"compile_kernels({others}, Options(" in said
     compile(said, "said", "exec")
     assert own[own.index("wait") + 1 :] == compilation.kernels(Options())  # loaded
@@ -59,11 +58,16 @@ def test_explicit_steps_are_compiled_for_joints_that_need_them(calls: list[str],
     compilation.warm_up(Options(), params())
     assert not {"explicit.explicit", "explicit.count_steps"} & set(calls)
     reversing = compilation._outside_model(torque_reverses=True)
-    assert set(compilation.kernels(Options(), reversing)) == set(compilation.KERNELS)
+    assert set(compilation.kernels(Options(), reversing)) == set(compilation.KERNELS) - {"ideal.ideal_revolution"}
+
+
+def test_closed_forms_compile_no_equations_of_motion(calls: list[str]) -> None:
+    compilation.warm_up(Options(fidelity=int(Fidelity.IDEAL)))
+    assert set(calls) == {"ideal.ideal_revolution", "rainflow.count_joint"}
 
 
 def test_one_core_compiles_alone(calls: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(compilation, "available_cores", lambda: 1)
     compilation.warm_up(Options())
     assert "wait" not in calls
-    assert set(calls) == set(compilation.KERNELS) - {"explicit.explicit", "explicit.count_steps"}
+    assert set(calls) == {name for name in compilation.KERNELS if not name.startswith(("explicit.", "ideal."))}

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from tests.support import fakes
+from tests.support.closed_forms import pin_force
 from tests.support.environment import ROOT
 from tolstat import joint, sampling, study
 from tolstat.campaign import run as campaign
@@ -53,7 +54,7 @@ class TestIdeal:
         theta = np.linspace(0, 2 * np.pi, 73)
         loads, contact = ideal.loads(theta, par)
         radius = par.R[0] + 0.011
-        expected = ideal.pin_force(theta, ALPHA, 100.0, radius)
+        expected = pin_force(theta, ALPHA, 100.0, radius)
         np.testing.assert_allclose(contact, np.tile(expected, (4, 1)).T, rtol=1e-9)
         np.testing.assert_allclose(np.linalg.norm(loads[..., :3], axis=-1), np.tile(expected, (8, 1)).T, rtol=1e-9)
 

@@ -46,7 +46,14 @@ def assert_honest(results: np.ndarray) -> None:
     assert ((results["failed_step"] > 0) == (results["status"] == Status.NEWTON_FAILED)).all()
 
 
-DEAREST = ("no damping, nor by the method", "0 N m", "1 N m", "70 deg", "85 deg, 720 steps", "5000 rpm", "Js x 1e4")
+DEAREST = (
+    "0 N m",
+    "1 N m",
+    "70 deg",
+    "85 deg, 720 steps",
+    "5000 rpm",
+    "Js x 1e4",
+)
 """Variants whose joints rattle or ring for ever; their classes are in docs/notes/hard_cases.md."""
 
 

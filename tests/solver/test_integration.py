@@ -31,7 +31,7 @@ from tolstat.kernel.mechanics import rotation
 
 pytestmark = pytest.mark.slow
 
-METHODS = ("bdf2", "generalized_alpha", "tr_bdf2")
+METHODS = ("bdf2", "tr_bdf2")
 
 
 def orders(errors):
@@ -89,10 +89,10 @@ def test_a_free_body_keeps_energy_and_momentum_to_the_order(method):
 def test_a_given_tangent_gives_the_same_solution():
     plain = solve(pendulum, [1.5], [0.0], (0, 5), 300)
     given = integrate(pendulum, [1.5], [0.0], (0, 5), 300, tangent=pendulum_tangent)
-    np.testing.assert_allclose(given.q, plain.q, atol=1e-9)
+    np.testing.assert_allclose(given.q, plain.q)
 
 
-@pytest.mark.parametrize(("method", "loss"), [("bdf2", 0.06), ("generalized_alpha", 0.01), ("tr_bdf2", 0.01)])
+@pytest.mark.parametrize(("method", "loss"), [("bdf2", 0.06), ("tr_bdf2", 0.01)])
 def test_an_impact_gives_back_its_energy(method, loss):
     """Restitution 1 in truth; at 8 steps a contact the methods lose a few per cent of the speed at most."""
     contact = np.pi / 1e3
@@ -117,20 +117,12 @@ def test_van_der_pol_at_mu_1000():
     expected = 1.706167732170469, -8.928097010248125e-4
     errors = []
     for rtol in (1e-4, 1e-6, 1e-8):
-        r = solve(van_der_pol, [2.0], [0.0], (0, 2000), 100, "tr_bdf2", rtol=rtol, atol=1e-9, max_halvings=24)
+        r = solve(van_der_pol, [2.0], [0.0], (0, 2000), 100, "tr_bdf2", rtol=rtol, max_halvings=24)
         assert r.status == Status.OK
         errors.append(max(abs(r.q[-1, 0] / expected[0] - 1), abs(r.v[-1, 0] / expected[1] - 1)))
     assert errors[0] < 1e-3
     assert errors[1] < 1e-4
     assert errors[2] < 1e-5
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_van_der_pol_as_a_user_would_ask(method):
-    """No speed at the start and no absolute tolerance to speak of: rounding must not be taken for error."""
-    r = solve(van_der_pol, [2.0], [0.0], (0, 2000), 100, method, rtol=1e-6)
-    assert r.status == Status.OK
-    assert r.q[-1, 0] == pytest.approx(1.706167732170469, rel=1e-4)
 
 
 def test_pleiades():
@@ -151,9 +143,9 @@ def test_pleiades():
 
     truth = solve_ivp(first_order, (0, 3), [*q0, *v0], "DOP853", rtol=1e-12, atol=1e-12).y[:14, -1]
     np.testing.assert_allclose(truth, expected, atol=1e-6)
-    r = solve(pleiades, q0, v0, (0, 3), 30, "tr_bdf2", rtol=1e-7, atol=1e-9, max_halvings=20)
+    r = solve(pleiades, q0, v0, (0, 3), 30, "tr_bdf2", rtol=1e-7, max_halvings=20)
     np.testing.assert_allclose(r.q[-1], expected, atol=1e-3)
-    fixed = solve(pleiades, q0, v0, (0, 3), 60_000, "generalized_alpha", rho_inf=1.0)
+    fixed = solve(pleiades, q0, v0, (0, 3), 60_000)
     np.testing.assert_allclose(fixed.q[-1], expected, atol=5e-3)
 
 
@@ -194,20 +186,18 @@ def kinked_end():
     return solve_ivp(first_order, (0, 15), np.zeros(4), "Radau", rtol=1e-8, atol=1e-11, max_step=0.05).y[:2, -1]
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_error_control_finds_impacts_and_sticking(method, kinked_end):
+def test_error_control_finds_impacts_and_sticking(kinked_end):
     """A grid far too coarse for either, as a user would ask for it."""
-    r = solve(kinked, [0.0, 0.0], [0.0, 0.0], (0, 15), 60, method, rtol=1e-7, atol=1e-9)
+    r = solve(kinked, [0.0, 0.0], [0.0, 0.0], (0, 15), 60, rtol=1e-7)
     assert r.status == Status.OK
     np.testing.assert_allclose(r.q[-1], kinked_end, atol=1e-3)
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_error_control_meets_the_pendulum_to_its_tolerance(method):
+def test_error_control_meets_the_pendulum_to_its_tolerance():
     """Steps of order 2 grow as rtol^(1/3), and as many errors of rtol add up."""
     errors = []
     for rtol in (1e-4, 1e-6, 1e-8):
-        r = solve(pendulum, [1.5], [0.0], (0, 5), 5, method, rtol=rtol, atol=1e-9)
+        r = solve(pendulum, [1.5], [0.0], (0, 5), 5, rtol=rtol)
         errors.append(abs(r.q[-1, 0] - pendulum_angle(5, 1.5)))
         assert errors[-1] < 3 * rtol ** (2 / 3)
     assert errors[0] > 7 * errors[1] > 49 * errors[2]

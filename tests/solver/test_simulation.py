@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from tests.conftest import REFERENCE, REFERENCE_CASES, with_law
+from tests.support.closed_forms import pin_force
 from tolstat import joint, study
 from tolstat.campaign import replay
 from tolstat.campaign.remedy import Reason, remedy
@@ -66,7 +67,7 @@ def halves(case):
     par = joint.perturb(case.joint, case.operation, errors).view(np.recarray)
     options = case.solver.options()
     left = np.full(1, iterations_allowed(options.steps_per_rev, options.max_revs))
-    ((_, samples),) = simulation.simulate_alone(par, options, left, True, np.zeros(1, RESULT).view(np.recarray))
+    ((_, samples),) = simulation.simulate_together(par, options, left, True, np.zeros(1, RESULT).view(np.recarray))
     work, found = make_work(), np.zeros((len(samples), 4, 2))
     outer = np.sign(par.station_s[0, : par.n_stations[0]]) / 2 + 0.5
     for k, sample in enumerate(samples):
@@ -104,12 +105,12 @@ def test_bent_ideal_joint_follows_the_closed_form(params, rpm):
     _, histories = full(par)
     theta = np.linspace(0, 2 * np.pi, 180, endpoint=False)
     outer = par.R[0] + 0.011
-    force = ideal.pin_force(theta, alpha, 100.0, outer)
+    force = pin_force(theta, alpha, 100.0, outer)
     assert force.min() == pytest.approx(596.5, abs=0.1)
     assert force.max() == pytest.approx(596.5 / np.cos(alpha), abs=0.2)
     arms = 2 * (par.arm_mass[0] * par.R[0] ** 2 + par.arm_inertia[0, 2])
     torque = 100.0 + (par.Js[0] + arms) * output_acceleration(theta, alpha, omega)
-    expected = ideal.pin_force(theta, alpha, 1.0, outer) * torque
+    expected = pin_force(theta, alpha, 1.0, outer) * torque
     total = histories["contact"][:, :, RESULTANT]
     np.testing.assert_allclose(total[:, :2].mean(axis=1), expected, rtol=3e-3)
     if rpm < 100:  # without noticeable inertia every pin stays between the bounds
@@ -340,8 +341,9 @@ PROBE = """
 import numpy as np
 from tolstat import joint
 from tolstat.kernel.mechanics import dynamics
-from tolstat.kernel.revolution import simulate
-from tolstat.common.tables import KERNEL_RESULT, Options
+from tolstat.kernel.mechanics.work import make_work
+from tolstat.solver import simulation
+from tolstat.common.tables import RESULT, Options
 operation = joint.Operation.model_construct(alpha=0.3, speed=50.0, torque=100.0)
 par = joint.perturb(joint.load("cirelli2021", {}, "test", None), operation, joint.nominal_errors(1))
 par = par.view(np.recarray)
@@ -362,7 +364,7 @@ def python(code, **environment):
 
 ACCELERATION = """
 q, out = np.linspace(-1e-4, 2e-4, 56), np.empty(56)
-dynamics.acceleration(0.01, q, q, par[0], Options(), simulate.make_work(), out)
+dynamics.acceleration(0.01, q, q, par[0], Options(), make_work(), out)
 print(out.tolist())
 """
 
@@ -378,13 +380,13 @@ def test_nothing_is_allocated_per_step():
     code = """
 from numba.core.runtime import _nrt_python, rtsys
 _nrt_python.memsys_enable_stats()
-alone = simulate.make_scratch(Options())
-out = np.zeros(1, KERNEL_RESULT).view(np.recarray)
+out = np.zeros(1, RESULT).view(np.recarray)
 counts = []
 for revolutions in (2, 2, 4):
-    before = rtsys.get_allocation_stats().alloc
     options = Options(max_revs=revolutions, settle_tol=1e-12)
-    simulate.simulate_joint(par[0], options, 10**6, alone, out[0])
+    simulation.lanes(options, 1)
+    before = rtsys.get_allocation_stats().alloc
+    list(simulation.simulate_together(par, options, np.full(1, 10**6), False, out))
     counts.append(rtsys.get_allocation_stats().alloc - before)
     assert out[0].steps > 150 * revolutions
 print(counts)

@@ -60,7 +60,7 @@ def test_only_loads_that_were_asked_for_and_the_first_errors_are_held(path, monk
     monkeypatch.setattr(view, "BLOCK", BLOCK)
     with ResultFile.open(path) as store:
         whole, part = store.results()[1:], store.view()
-        assert tuple(part.results) == ("status",)
+        assert not part.results
         part.load("fork2.T")
         assert set(part.results) == {"status", "T_max", "T_lower", "T_upper"}
         for field in LOAD_FIELDS:

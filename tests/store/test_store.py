@@ -22,7 +22,7 @@ from tolstat.common.columns import ERROR_COLUMNS, RESULT_COLUMNS
 from tolstat.common.counts import Counts
 from tolstat.common.errors import StoreError
 from tolstat.common.tables import Simulation, Status
-from tolstat.store import ResultFile, Writer, metadata, provenance
+from tolstat.store import ResultFile, Writer, metadata
 from tolstat.store.hdf5 import text
 from tolstat.store.metadata import Metadata
 
@@ -306,7 +306,7 @@ def test_other_sources_of_the_same_version_are_refused(tmp_path: Path, monkeypat
     fakes.run(fakes.Study(), path, 1, check=True)  # the same code in another place
     for name in ("kernel/contact.py", "joint/material.py", "tolerance.py"):
         (package / name).write_text("# edited")
-        says = rf"a.h5: was begun by another version.*\n    sources: .*, {provenance.source_hash()} now\n  hint: "
+        says = rf"a.h5: was begun by another version.*\n    sources: .*, {metadata.source_hash()} now\n  hint: "
         with pytest.raises(StoreError, match=says):
             fakes.run(fakes.Study(), path, 1, check=True)
 

@@ -92,7 +92,7 @@ def test_shares_at_each_point(view, tables):
 
 
 def test_the_worst_joints_name_their_point(view, monkeypatch):
-    monkeypatch.setattr("tolstat.questions.causes.worst._scores", lambda view, samples: [{}] * len(samples))
+    monkeypatch.setattr("tolstat.questions.causes.worst._scores", lambda view, samples: {})
     samples = _largest(view, "cross1.F", 20)[0]
     parts = np.stack([view.load(f"cross1.F at {name}").values[samples] for name in ("one", "two")])
     found = [joint["point"] for joint in joint_rows(view, "cross1.F", 20)]

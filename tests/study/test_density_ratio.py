@@ -18,7 +18,7 @@ from tolstat.study.tolerances.distributions import (
     TruncatedNormal,
     Uniform,
 )
-from tolstat.study.tolerances.radial import Rayleigh
+from tolstat.study.tolerances.zone_laws import Rayleigh
 
 
 class Laplace(Distribution):

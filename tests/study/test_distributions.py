@@ -11,12 +11,11 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from tolstat.study import widths
-from tolstat.study.bonus import Bonus
+from tolstat.study.axes import Bonus
 from tolstat.study.tolerances import distributions
-from tolstat.study.tolerances.accepted import Accepted
 from tolstat.study.tolerances.distributions import Distribution
-from tolstat.study.tolerances.radial import Disc, Rayleigh, plane_scores
-from tolstat.study.tolerances.scipy_law import ScipyLaw
+from tolstat.study.tolerances.external import ScipyLaw
+from tolstat.study.tolerances.zone_laws import Accepted, Disc, Rayleigh, plane_scores
 
 U = np.concatenate([10.0 ** np.arange(-15, -2), np.linspace(0.01, 0.99, 99), 1 - 10.0 ** np.arange(-3.0, -16, -1)])
 

@@ -14,9 +14,9 @@ from tolstat import joint, sampling, study
 from tolstat.campaign import plan
 from tolstat.common.errors import InputError
 from tolstat.study import scaling
-from tolstat.study.change import changed
+from tolstat.study.scaling import changed
 from tolstat.study.starter import joint_text
-from tolstat.study.tolerances import distributions, fits, iso286
+from tolstat.study.tolerances import distributions, fits, iso
 
 SAMPLING = '[sampling]\nmethod = "random"\nn = 8\nseed = 1\n'
 H7_F7 = 'fit = { basic = "76 mm", code = "H7/f7", distribution = "normal", cpk = 1.0 }'
@@ -58,7 +58,7 @@ PUBLISHED = """
 def test_zones_are_those_of_published_tables(row: str) -> None:
     size, name, lower, upper = row.split()
     code = f"{name}/h6" if name[0].isupper() else f"H6/{name}"
-    found = iso286.zones(iso286.parse(code), float(size))
+    found = iso.zones(iso.parse(code), float(size))
     assert (found.hole if name[0].isupper() else found.shaft) == (float(lower), float(upper))
 
 
@@ -67,7 +67,7 @@ FACTORS = {5: 7, 6: 10, 7: 16, 8: 25, 9: 40, 10: 64, 11: 100, 12: 160, 13: 250, 
 
 
 def test_tables_follow_the_formulas_that_they_were_rounded_from() -> None:
-    for row in iso286.table(iso286.GRADES)[1:]:
+    for row in iso.table(iso.GRADES)[1:]:
         mean = math.sqrt(row["over_mm"] * row["up_to_mm"])
         factor = 0.45 * mean ** (1 / 3) + 0.001 * mean
         for grade, times in FACTORS.items():
@@ -75,7 +75,7 @@ def test_tables_follow_the_formulas_that_they_were_rounded_from() -> None:
         widths = list(row.values())[2:]
         assert widths == sorted(widths)
     forms = {"d": (-16, 0.44), "e": (-11, 0.41), "f": (-5.5, 0.41), "g": (-2.5, 0.34), "n": (5, 0.34)}
-    for row in iso286.table(iso286.DEVIATIONS)[1:]:
+    for row in iso.table(iso.DEVIATIONS)[1:]:
         mean = math.sqrt(row["over_mm"] * row["up_to_mm"])
         for letter, (size, power) in forms.items():
             assert row[letter] == pytest.approx(size * mean**power, rel=0.08)
@@ -84,10 +84,10 @@ def test_tables_follow_the_formulas_that_they_were_rounded_from() -> None:
 
 
 def test_ranges_follow_each_other() -> None:
-    for name in (iso286.GRADES, iso286.DEVIATIONS):
-        rows = iso286.table(name)
+    for name in (iso.GRADES, iso.DEVIATIONS):
+        rows = iso.table(name)
         assert [row["over_mm"] for row in rows] == [0.0, *(row["up_to_mm"] for row in rows[:-1])]
-        assert rows[-1]["up_to_mm"] == iso286.LARGEST
+        assert rows[-1]["up_to_mm"] == iso.LARGEST
 
 
 def test_a_fit_sets_nominal_diameters_and_their_tolerances() -> None:

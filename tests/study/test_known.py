@@ -6,7 +6,6 @@ import pytest
 from tests.support import synthetic
 from tolstat import study
 from tolstat.common.errors import InputError
-from tolstat.study import known
 from tolstat.study.tolerances.distributions import LogNormal, Normal
 
 KNOWN = synthetic.STUDY.replace("cpk = 1.0 }", "cpk = 1.0, known_from = 30 }")
@@ -27,8 +26,8 @@ def entry(keys):
 def test_parts_are_no_part_of_the_identity(tmp_path):
     plain, some = load(tmp_path, synthetic.STUDY), load(tmp_path, KNOWN)
     assert some.identity() == plain.identity()
-    assert known.of(plain.entries) == ()
-    (found,) = known.of(some.entries)
+    assert plain.known == ()
+    (found,) = some.known
     assert (found.pattern, found.parts, len(found.names)) == ("pin*.offset_t", 30, 4)
 
 
@@ -36,11 +35,11 @@ def test_a_sample_with_a_law_has_its_mean_and_deviation(tmp_path):
     found = load(tmp_path, entry(f'law = "normal", unit = "mm", values = {VALUES}'))
     values = 1e-3 * np.array(VALUES)
     assert found.tolerances["pin2.offset_t"] == Normal(pytest.approx(values.mean()), pytest.approx(values.std(ddof=1)))
-    assert known.of(found.entries)[0].parts == len(VALUES)
+    assert found.known[0].parts == len(VALUES)
     (tmp_path / "parts.csv").write_text("d\n" + "\n".join(str(1.0 + v) for v in VALUES), encoding="utf-8")
     of_file = load(tmp_path, entry('law = "lognormal", unit = "mm", file = "parts.csv", column = "d"'))
     assert isinstance(of_file.tolerances["pin1.offset_t"], LogNormal)
-    assert known.of(of_file.entries)[0].parts == len(VALUES)
+    assert of_file.known[0].parts == len(VALUES)
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from tolstat import study
 from tolstat.cli import app
 from tolstat.common.errors import InputError
 from tolstat.common.files import data_dir
-from tolstat.study import plausible, starter
+from tolstat.study import assumptions, starter
 
 STUDY = """[joint]
 base = "own_joint.toml"
@@ -160,7 +160,7 @@ def told(folder: Path, *changes: tuple[str, str]) -> list[str]:
     for old, new in changes:
         assert old in text
         text = text.replace(old, new)
-    return [str(fault).replace(str(folder / "study.toml"), "") for fault in plausible.warnings(load(folder, text))]
+    return [str(fault).replace(str(folder / "study.toml"), "") for fault in assumptions.warnings(load(folder, text))]
 
 
 def test_a_zone_far_wider_than_the_clearance_is_told(folder: Path) -> None:
@@ -200,4 +200,4 @@ def test_commands_tell_such_warnings(folder: Path) -> None:
 @pytest.mark.parametrize("file", sorted((ROOT / "studies").glob("*.toml")), ids=lambda file: file.stem)
 def test_studies_that_come_along_have_no_such_warnings(file: Path) -> None:
     if "[sampling]" in file.read_text("utf-8"):
-        assert [*plausible.warnings(study.load(file, None))] == []
+        assert [*assumptions.warnings(study.load(file, None))] == []

@@ -15,8 +15,8 @@ from tolstat.common.tables import Simulation
 from tolstat.joint.derived import DERIVED
 from tolstat.questions.sweep import swept_axes
 from tolstat.store import ResultFile, Writer, recorded
-from tolstat.study import swept
-from tolstat.study.swept import KEYS
+from tolstat.study import design
+from tolstat.study.design import KEYS
 
 TEXT = """
 [joint]
@@ -101,12 +101,12 @@ def test_identity_tells_sweeps_apart(tmp_path: Path, change: tuple[str, str]) ->
 
 def test_axes_of_deviations_are_told(tmp_path: Path) -> None:
     s = load(tmp_path)
-    assert swept.meaning(s.sweep, s.joint) == [
+    assert design.meaning(s.sweep, s.joint) == [
         "sweep of pin1.clearance and 3 others: deviations from -0.02 to 0.02 mm,",
         "  the clearance is 0.01 to 0.05 mm; to sweep it itself: contact.clearance",
     ]
     s = load(tmp_path, ('"pin*.clearance"', '"hole2.diameter"'))
-    assert swept.meaning(s.sweep, s.joint)[1] == "  the diameter is 20.04 to 20.08 mm; to sweep it itself: contact.D_H"
+    assert design.meaning(s.sweep, s.joint)[1] == "  the diameter is 20.04 to 20.08 mm; to sweep it itself: contact.D_H"
 
 
 def test_every_quantity_of_a_joint_can_be_swept() -> None:

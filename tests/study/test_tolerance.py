@@ -13,12 +13,12 @@ from tests.support.synthetic import HEAD
 from tolstat import study
 from tolstat.common.errors import InputError
 from tolstat.study.assumptions import unselected
-from tolstat.study.tolerances import distributions, iso2768, meaning, zones
+from tolstat.study.tolerances import distributions, iso, meaning, zones
 from tolstat.study.tolerances.correlation import Copula
 from tolstat.study.tolerances.distributions import Distribution
 from tolstat.study.tolerances.entry import Site
 from tolstat.study.tolerances.kinds import KINDS, ZONE_KINDS, entry
-from tolstat.study.tolerances.radial import Rayleigh
+from tolstat.study.tolerances.zone_laws import Rayleigh
 
 
 def build(data: dict[str, object], name: str = "pin1.offset_t", center: float = 0.0, unit: str = "m") -> Distribution:
@@ -41,18 +41,18 @@ LINEAR = {
 @pytest.mark.parametrize("grade", ["f", "m"])
 def test_iso2768_tables(grade: str) -> None:
     for size, deviation in (map(float, pair.split()) for pair in LINEAR[grade].split(",")):
-        assert iso2768.deviation("linear", grade, size * 1e-3) == pytest.approx(deviation * 1e-3, rel=1e-12)
+        assert iso.deviation("linear", grade, size * 1e-3) == pytest.approx(deviation * 1e-3, rel=1e-12)
     for leg, minutes in [(0.1, 60), (10, 60), (10.1, 30), (50, 30), (120, 20), (400, 10), (401, 5), (9e4, 5)]:
-        found = iso2768.deviation("angular", grade, leg * 1e-3)
+        found = iso.deviation("angular", grade, leg * 1e-3)
         assert found == pytest.approx(math.radians(minutes / 60), rel=1e-12)
 
 
 @pytest.mark.parametrize(("grade", "size"), [("f", 0.49), ("f", 2001), ("m", 4001)])
 def test_iso2768_outside_the_table(grade: str, size: float) -> None:
     with pytest.raises(ValueError, match="outside the table"):
-        iso2768.deviation("linear", grade, size * 1e-3)
+        iso.deviation("linear", grade, size * 1e-3)
     with pytest.raises(ValueError, match="no linear table for class 'c'"):
-        iso2768.deviation("linear", "c", 0.01)
+        iso.deviation("linear", "c", 0.01)
 
 
 def test_normal_entries() -> None:

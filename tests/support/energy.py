@@ -98,14 +98,10 @@ def follow(joint: NDArray[np.void], options: Options, steps: int) -> Trajectory:
     Trajectory
         ``steps + 1`` points, fewer where a step failed.
     """
-    from tolstat.kernel.mechanics.topology import N_DOF
-    from tolstat.kernel.revolution import trajectory
-    from tolstat.kernel.revolution.simulate import make_scratch
+    from tests.support import trajectory
 
     row = joint.view(np.recarray)[0]
-    points = np.full((steps + 1, 3, N_DOF), np.nan)
-    work, state, *_ = make_scratch(options)
-    status = Status(trajectory.follow(row, options, work, state, points))
+    points, status = trajectory.follow(joint, options, steps)
     h = 2.0 * math.pi / (abs(float(row["omega"])) * options.steps_per_rev)
     reached = int(np.isfinite(points[:, 0, 0]).sum())
     return Trajectory(np.asarray(h * np.arange(reached)), points[:reached], status)
@@ -128,11 +124,11 @@ def balance(joint: NDArray[np.void], options: Options, trajectory: Trajectory) -
     Balance
     """
     from tests.support import kernel_energy
-    from tolstat.kernel.revolution.simulate import make_scratch
+    from tolstat.kernel.mechanics.work import make_work
 
     rows = _gauges(joint)
     of = np.zeros(len(trajectory.t), kernel_energy.ENERGY).view(np.recarray)
-    kernel_energy.measure_all(trajectory.t, trajectory.points, rows, options, make_scratch(options).work, of)
+    kernel_energy.measure_all(trajectory.t, trajectory.points, rows, options, make_work(), of)
     return Balance(trajectory.t, of.view(np.ndarray))
 
 

@@ -1,6 +1,6 @@
 """Shares and quantiles of arrays of loads, whose joints are drawn independently, listed or weighted."""
 
-from tolstat.analysis.listed import Listed
+from tolstat.analysis.design import Listed
 from tolstat.analysis.sample import Sample
 from tolstat.analysis.weighted import Weighted
 

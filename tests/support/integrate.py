@@ -7,9 +7,18 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tests.support.stepping import (
+    ATTEMPTS_LEFT,
+    IF_STALLED,
+    NO,
+    START_LEVEL,
+    YES,
+    at_rounding,
+    build_advance,
+    make_state,
+    reset,
+)
 from tolstat.common.tables import Method, Options, Status
-from tolstat.kernel.integrators.integrate import IF_STALLED, NO, YES, at_rounding, build_integrator, reset
-from tolstat.kernel.integrators.state import ATTEMPTS_LEFT, make_state
 from tolstat.kernel.mechanics.vector import copy, larger
 from tolstat.kernel.simd.jit import njit, njit_inner
 
@@ -93,7 +102,7 @@ def largest_motion(cv, state):
 
 @njit
 def motion_size(cv, ca, state):
-    """Largest residual of the accelerations relative to the motion in the step; see `integrate.build_integrator`."""
+    """Largest residual of the accelerations relative to the motion in the step; see `stepping.build_advance`."""
     largest = largest_motion(cv, state)
     worst = 0.0
     for i in range(state.q.size):
@@ -107,7 +116,7 @@ def small_change(cv, ca, fresh, options, work, state):
 
     Where large stiff forces cancel, their rounding keeps the residual above any tolerance although the unknowns are
     exact: a Newton step with a new tangent then changes them very little, and the residual does not fall. Arguments as
-    of `small` in `integrate.build_integrator`.
+    of `small` in `stepping.build_advance`.
     """
     if at_rounding(cv, ca, fresh, options, work, state) == YES:
         return YES
@@ -128,7 +137,7 @@ def increment(j, q, v, a, cv, ca):
 
 @lru_cache(maxsize=32)
 def bind(force: Any, tangent: Any) -> Any:
-    """Bind the kernel's integrator to a system; the cache spares compiling it again.
+    """Bind the kernel's steps to a system; the cache spares compiling it again.
 
     Returns
     -------
@@ -175,7 +184,7 @@ def bind(force: Any, tangent: Any) -> Any:
         return lu(work.matrix, work.pivots)
 
     factorise = by_differences if tangent is None else by_tangent
-    _, advance = build_integrator(residual, factorise, solve, motion_size, small_change)
+    advance = build_advance(residual, factorise, solve, motion_size, small_change, START_LEVEL)
 
     @njit_inner
     def finite(state):
@@ -241,7 +250,7 @@ def integrate(
     v0: Sequence[float] | NDArray[np.float64],
     t_span: tuple[float, float],
     steps: int,
-    method: str = "generalized_alpha",
+    method: str = "tr_bdf2",
     tangent: Any = None,
     *,
     max_substeps: int = 1_000_000,
@@ -259,7 +268,7 @@ def integrate(
         First and last time.
     steps : int
         Steps of the output grid.
-    method : {"generalized_alpha", "bdf2", "tr_bdf2"}
+    method : {"bdf2", "tr_bdf2"}
         All of order 2.
     tangent : jitted function (t, q, v, dq, dv) -> None, optional
         Writes to `dq` and `dv`, each (n, n), the derivatives by q and by v of what `acceleration` writes; row i belongs
@@ -267,9 +276,9 @@ def integrate(
     max_substeps : int
         Bound on the work: sub-steps that may be tried beyond those of the output grid.
     **settings : float
-        Fields of `Options`: `rho_inf`, `newton_tol`, `newton_max_iter`, `max_halvings`, `rtol`, `atol`. With `rtol`
-        above zero a step is halved until the estimated error in it of every unknown and velocity y is below
-        ``atol + rtol |y|``. With 0, the default here, steps are halved for Newton's iteration alone.
+        Fields of `Options`: `newton_tol`, `newton_max_iter`, `max_halvings`, and `rtol` for TR-BDF2: above zero a step
+        is halved until the estimated error in it of every unknown and velocity y is below ``1e-12 + rtol |y|``. With 0,
+        the default here, steps are halved for Newton's iteration alone.
 
     Returns
     -------
@@ -287,9 +296,7 @@ def integrate(
         "newton_tol": 1e-10,
         "newton_max_iter": 12,
         "max_halvings": 40,
-        "rho_inf": 0.8,
         "rtol": 0.0,
-        "atol": 1e-12,
     }
     options = Options(method=int(Method[method.upper()]), **defaults | settings)
     points = np.full((steps + 1, 3, len(q0)), np.nan)

@@ -12,12 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studies.precision.measuring import parameters
-from tolstat.common.tables import KERNEL_RESULT, Fidelity, Method, Options
+from tolstat.common.tables import RESULT, Fidelity, Method, Options
 from tolstat.solver import simulation
 
 if TYPE_CHECKING:
     from tolstat.kernel.lanes.batch import Batch
     from tolstat.study import Study
+
+
+UNLIMITED = 2**62
+"""Newton iterations allowed to a joint."""
 
 
 class Sample(NamedTuple):
@@ -70,19 +74,14 @@ class Snapshot(NamedTuple):
 
 def snapshots(these: Sample, n: int) -> Iterator[Snapshot]:
     """Yield the last recorded state of each of the first n joints."""
-    from tolstat.kernel.integrators.state import UNLIMITED
-    from tolstat.kernel.revolution.simulate import simulate_joint
-
-    params, options = these
-    scratch = simulation.scratch(options)
-    state = scratch.state
-    out = np.zeros(1, KERNEL_RESULT).view(np.recarray)
-    for i in range(min(n, len(params))):
-        simulate_joint(params.view(np.recarray)[i], options, UNLIMITED, scratch, out[0])
+    params, options = these[0][:n], these.options
+    results, left = np.zeros(len(params), RESULT).view(np.recarray), np.full(len(params), UNLIMITED)
+    for i, samples in simulation.simulate_together(params, options, left, True, results):
         h = 2 * np.pi / (abs(float(params["omega"][i])) * options.steps_per_rev)
-        cv = 1.5 / h
-        t = float(out["revolutions"][0]) * options.steps_per_rev * h
-        yield Snapshot(params[i : i + 1], t, cv, cv * cv, state.q0.copy(), state.v0.copy(), state.a0.copy())
+        k = round(float(results[i].revolutions) * options.steps_per_rev)
+        here, before, first = (samples[(k - back) % options.steps_per_rev] for back in range(3))
+        acceleration = (3 * here.v - 4 * before.v + first.v) / (2 * h)
+        yield Snapshot(params[i : i + 1], k * h, 1.5 / h, (1.5 / h) ** 2, here.q.copy(), here.v.copy(), acceleration)
 
 
 def into_lanes(snaps: list[Snapshot], options: Options) -> Batch:
@@ -104,21 +103,11 @@ def into_lanes(snaps: list[Snapshot], options: Options) -> Batch:
 
 def tally(these: Sample) -> NDArray[np.int64]:
     """Counts of all joints in lock-step: rounds, lanes with a joint summed over rounds, rounds with new tangents."""
-    from tolstat.kernel.integrators.state import UNLIMITED
-    from tolstat.kernel.lanes.lockstep import PATIENCE, lockstep
     from tolstat.kernel.revolution.settle import make_samples
 
     params, options = these
-    batch, counts = simulation.lanes(options), np.zeros(3, np.int64)
-    batch.par.n_stations = params["n_stations"][0]
-    words = params.view(np.float64).reshape(len(params), -1)
-    out = np.zeros(len(params), KERNEL_RESULT).view(np.recarray)
-    samples, blocks = make_samples(0, options.steps_per_rev), np.zeros((0, 0), KERNEL_RESULT).view(np.recarray)
-    rows = params.view(np.recarray)
-    left, scratch = np.full(len(params), UNLIMITED), simulation.scratch(options)
-    starts = simulation.starts(rows, options)
-    lockstep(rows, words, starts, left, options, PATIENCE, scratch, batch, samples, blocks, out, counts)
-    return counts
+    left, samples = np.full(len(params), UNLIMITED), make_samples(0, options.steps_per_rev)
+    return simulation.run_lanes(simulation.make_queue(params, options, left, samples, simulation.NO_BLOCKS), options)
 
 
 def dense(work: np.record) -> NDArray[np.float64]:

@@ -1,8 +1,11 @@
-"""What the joints of a campaign allow to conclude: the contract of a sampling design."""
+"""What the joints of a campaign allow to conclude: the contract of a sampling design, and the two plainest ones.
+
+Independent joints of equal weight, and joints that are listed: sweeps, cases, designs, and one set of Sobol' points or
+one Latin hypercube.
+"""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -20,9 +23,11 @@ holds for a whole curve; reweighting counts the joints by other weights."""
 FEW = 20
 """Number of joints on a side of a level below which an interval over units contains that of independent joints, too."""
 SAMPLE = 'give the file of a study with sampling.method "random", "sobol" or "lhs"'
+WITHOUT_INTERVAL = {"sobol": "Sobol' points", "lhs": "a Latin hypercube"}
+"""Sampling methods of a production whose joints are not independent."""
 
 
-class Design(ABC):
+class Design:
     """How the joints of a campaign were drawn.
 
     Attributes
@@ -78,9 +83,9 @@ class Design(ABC):
         with np.errstate(invalid="ignore"):  # NaN without joints
             return np.asarray(x.above(levels) / np.float64(x.n))
 
-    @abstractmethod
     def only(self, joints: NDArray[np.intp] | NDArray[np.bool_]) -> Design:
-        """Return the design of some of the joints."""
+        """Return the design of some of the joints; by default the same."""
+        return self
 
     def refuses(self, claim: Claim) -> tuple[str, str] | None:
         """Return why the joints give no estimate of a claim, and the remedy, of file ``{path}``; None if they do."""
@@ -138,6 +143,61 @@ class Design(ABC):
         at, half = np.array([level]), prediction.half(confidence)
         low, high = self.shares(lower, at, half).lower[0], self.shares(upper, at, half).upper[0]
         return prediction.of_share(float(low), float(high), number, confidence)
+
+
+class Independent(Design):
+    """Joints drawn one by one from the tolerances: every claim has an interval."""
+
+    claims = frozenset(("share", "quantile", "mean", "difference", "index", "tail", "band", "delivery", "reweighting"))
+    interval = "Clopper–Pearson's"
+    covers = "bands: pointwise 95 % Clopper–Pearson intervals of the settled joints"
+
+    def shares(self, x: Column, levels: FloatArray, confidence: float) -> Estimate[FloatArray]:
+        """See `Design.shares`; the interval is exact (Clopper and Pearson 1934)."""
+        return Estimate(self.estimate(x, levels), *clopper_pearson(x.above(levels), x.n, confidence))
+
+    def delivery(
+        self, lower: Column, upper: Column, level: float, number: int, confidence: float
+    ) -> tuple[float, float]:
+        """See `Design.delivery`; exact (Thatcher 1964)."""
+        at = np.array([level])
+        least, most = int(lower.above(at)[0]), int(upper.above(at)[0])
+        return prediction.of_counts(least, most, upper.n, number, confidence)
+
+
+class Listed(Design):
+    """Joints that depend on each other, so that no claim has an interval.
+
+    Parameters
+    ----------
+    method : str
+        Sampling method.
+    """
+
+    def __init__(self, method: str = "") -> None:
+        self._method = method
+        self.is_sample = method in (*WITHOUT_INTERVAL, "random")
+
+    def refuses(self, claim: Claim) -> tuple[str, str] | None:
+        """See `Design.refuses`."""
+        if self._method == "subset":
+            remedy = "print its probability: tolstat rare {path}"
+            return "holds the levels of a subset simulation, no random sample", remedy
+        if self._method in ("cases", "sweep"):
+            return "holds joints that are no sample of a production", SAMPLE
+        return None
+
+    def without_interval(self, claim: Claim) -> str:
+        """See `Design.without_interval`."""
+        return without_interval(self._method) or super().without_interval(claim)
+
+
+def without_interval(method: str) -> str:
+    """Return why shares of one set of joints have no interval, and the remedy; empty if they have one."""
+    if method not in WITHOUT_INTERVAL:
+        return ""
+    remedy = 'set sampling.replicates = 8, or sampling.method = "random"'
+    return f"shares of {WITHOUT_INTERVAL[method]} have no interval: {remedy} for a verdict"
 
 
 def or_independent(

@@ -17,22 +17,9 @@ WEIBULL_SLOPE = 9 / 8
 """Slope e of the lives of bearings with line contact (Lundberg and Palmgren 1952): combines bearings of a joint."""
 FRETTING = 0.5
 """Part of the critical amplitude below which fretting is to be expected (Harris, Rumbarger and Butterfield 2009)."""
-A1 = {
-    0.9: 1.0,
-    0.95: 0.64,
-    0.96: 0.55,
-    0.97: 0.47,
-    0.98: 0.37,
-    0.99: 0.25,
-    0.992: 0.22,
-    0.994: 0.19,
-    0.996: 0.16,
-    0.998: 0.12,
-    0.999: 0.093,
-    0.9992: 0.087,
-    0.9994: 0.080,
-    0.9995: 0.077,
-}
+_RELIABILITY = (0.9, 0.95, 0.96, 0.97, 0.98, 0.99, 0.992, 0.994, 0.996, 0.998, 0.999, 0.9992, 0.9994, 0.9995)
+_FACTOR = (1.0, 0.64, 0.55, 0.47, 0.37, 0.25, 0.22, 0.19, 0.16, 0.12, 0.093, 0.087, 0.080, 0.077)
+A1 = dict(zip(_RELIABILITY, _FACTOR, strict=True))
 """Life modification factor a_1 by reliability (ISO 281:2007, Table 12)."""
 
 

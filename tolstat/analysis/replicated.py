@@ -12,9 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from tolstat.analysis.binomial import half_width
 from tolstat.analysis.column import Column
-from tolstat.analysis.design import Design, counts_by_group, or_independent
+from tolstat.analysis.design import Design, Listed, counts_by_group, or_independent
 from tolstat.analysis.estimates import Estimate
-from tolstat.analysis.listed import Listed
 from tolstat.common.loads import FloatArray
 
 

@@ -18,9 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from tolstat.analysis import pareto
 from tolstat.analysis.column import Column
-from tolstat.analysis.design import Claim, Design
+from tolstat.analysis.design import Claim, Design, Independent
 from tolstat.analysis.estimates import Estimate
-from tolstat.analysis.independent import Independent
 from tolstat.common.bisection import first
 from tolstat.common.late import special
 from tolstat.common.loads import FloatArray

@@ -16,8 +16,7 @@ from tolstat.campaign.block import Block, BlockWork, load_kernels, results_of, s
 from tolstat.campaign.cluster import map_on_cluster
 from tolstat.campaign.pool import Lost, Work
 from tolstat.common.cores import available_cores
-from tolstat.common.solver_options import from_names
-from tolstat.common.tables import Options, Simulation, Status, without_results
+from tolstat.common.tables import Options, Simulation, Status, from_names, without_results
 from tolstat.solver.compilation import is_compiled, warm_up
 from tolstat.solver.simulation import simulate_rows
 from tolstat.store import Reader
@@ -130,7 +129,7 @@ def simulate_pending(
 
 def simulate_beside(params: NDArray[np.void], options: Options) -> Simulation:
     """Simulate joints, (m,) table PARAM, in one worker and without histories; those that crash get no results."""
-    _compile_missing(options)
+    compile_missing(options)
     results = without_results(len(params), Status.PENDING)
     whole = Block("", np.arange(len(params)), params, options)
     with closing(pool.map_blocks(work_beside(options), [whole], 1)) as done:
@@ -160,7 +159,7 @@ def _each_settings(study: Study, store: Reader) -> list[Options]:
     return variants + [from_names(retry["options"]) for retry in store.retries]
 
 
-def _compile_missing(options: Options, params: NDArray[np.void] | None = None) -> None:
+def compile_missing(options: Options, params: NDArray[np.void] | None = None) -> None:
     """Compile what joints with these options need, such as `params`, unless it lies in the cache."""
     if not is_compiled(options, params):
         warm_up(options, params)
@@ -173,7 +172,7 @@ def compile_for(study: Study, store: Reader) -> None:
     errors = store.errors(slice(0, first))[slots]
     each = [perturbed(study.at(at_point.point or ""), at_point.row(slots), errors) for at_point in store.each()]
     for options in settings_in_use(study, store):
-        _compile_missing(options, np.concatenate(each))
+        compile_missing(options, np.concatenate(each))
 
 
 def _blocks(study: Study, store: Reader, stop_slot: int, pace: Pace) -> Iterator[Block]:

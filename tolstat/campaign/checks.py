@@ -12,8 +12,17 @@ from tolstat.campaign import pool
 from tolstat.campaign.blocks import simulate_beside
 from tolstat.campaign.pool import Lost, Work, kept_workers
 from tolstat.common.counts import Counts
-from tolstat.common.solver_options import to_names
-from tolstat.common.tables import RESULT, Fidelity, Method, Options, Simulation, Start, Status, without_results
+from tolstat.common.tables import (
+    RESULT,
+    Fidelity,
+    Method,
+    Options,
+    Simulation,
+    Start,
+    Status,
+    to_names,
+    without_results,
+)
 from tolstat.solver.reference import reference_rows
 from tolstat.store.verification import Check
 
@@ -115,7 +124,7 @@ def _references(
     params: NDArray[np.void], options: Sequence[Options], workers: int, progress: Progress
 ) -> NDArray[np.void]:
     """Compute the reference of each joint, (m,) table RESULT; each process computes one joint at a time."""
-    joints: list[Single] = [(i, params[i : i + 1], one) for i, one in enumerate(options)]
+    joints: list[Single] = [(i, params[i : i + 1], of_joint) for i, of_joint in enumerate(options)]
     work: Work[Single, NDArray[np.void] | Lost] = Work(_reference)
     done = pool.map_blocks(work, joints, min(workers, len(joints)))
     results, counts = without_results(len(joints), Status.CRASHED), Counts(len(joints), 0, 0, 0)

@@ -22,7 +22,7 @@ from tolstat.campaign import pool
 from tolstat.campaign.pool import BlockT, Lost, ResultT, Work, WorkerDied
 from tolstat.common.cores import one_thread_each
 from tolstat.common.errors import Fault, InputError
-from tolstat.store.provenance import differing, versions
+from tolstat.store.metadata import differing, versions
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -138,7 +138,7 @@ def _prepare(prepare: Callable[[], object]) -> None:
         prepare()
 
 
-def check(expected: Mapping[str, str], found: Mapping[str, str], where: str) -> None:
+def check(expected: Mapping[str, str], actual: Mapping[str, str], where: str) -> None:
     """Reject a process whose results could differ because its versions differ.
 
     Raises
@@ -146,7 +146,7 @@ def check(expected: Mapping[str, str], found: Mapping[str, str], where: str) -> 
     InputError
         With all differences.
     """
-    if lines := differing(found, expected, "on the worker", "here"):
+    if lines := differing(actual, expected, "on the worker", "here"):
         text = "\n    ".join([f"{where} has other software versions", *lines])
         raise InputError([Fault("--executor dask", text, "install the same versions there, and restart the workers")])
 
@@ -158,11 +158,11 @@ def _checked(client: Client) -> dict[str, str]:
     except TimeoutError as error:
         raise WorkerDied(NO_WORKER) from error
     expected = versions()
-    for address, found in client.run(versions, on_error="return").items():
-        if isinstance(found, BaseException):
+    for address, actual in client.run(versions, on_error="return").items():
+        if isinstance(actual, BaseException):
             remedy = "install tolstat there, and restart the workers"
-            raise InputError([Fault("--executor dask", f"the worker {address} cannot run tolstat: {found!r}", remedy)])
-        check(expected, found, f"the worker {address}")
+            raise InputError([Fault("--executor dask", f"the worker {address} cannot run tolstat: {actual!r}", remedy)])
+        check(expected, actual, f"the worker {address}")
     return expected
 
 

@@ -22,7 +22,7 @@ from tolstat.common.tables import Status
 from tolstat.sampling import draw_blocks, origin_blocks
 from tolstat.store import Reader, Writer, layout, what_if
 from tolstat.store.hdf5 import BLOCK
-from tolstat.store.provenance import differing, differing_code
+from tolstat.store.metadata import differing, differing_code
 from tolstat.store.recorded import differing_keys, recall
 from tolstat.store.writer import check_free, write_new
 from tolstat.study import Study

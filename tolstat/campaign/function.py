@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from contextlib import closing
+from contextlib import ExitStack, closing
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,20 +14,19 @@ from numpy.typing import NDArray
 from tolstat import sampling
 from tolstat.campaign import pool
 from tolstat.campaign.block import Block, Timed, results_of, simulate_block
-from tolstat.campaign.blocks import MAX_BLOCK, MIN_BLOCKS_PER_WORKER, work_beside
+from tolstat.campaign.blocks import MAX_BLOCK, MIN_BLOCKS_PER_WORKER, SOME, compile_missing, work_beside
 from tolstat.campaign.run import choose_fidelity
 from tolstat.common.cores import available_cores
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import LOADS, SHOWN_LOADS, UNIT_OF_LOAD
 from tolstat.common.tables import VALID, Options
 from tolstat.joint import nominal_errors, perturb
-from tolstat.solver.compilation import is_compiled, warm_up
 from tolstat.solver.simulation import simulate_rows
 from tolstat.store.recorded import settings
 from tolstat.study import Study, axes
 from tolstat.study.selection import select, suggestion
 from tolstat.study.tolerances import distributions as law
-from tolstat.study.tolerances.scipy_law import ScipyLaw
+from tolstat.study.tolerances.external import ScipyLaw
 
 if TYPE_CHECKING:
     import openturns
@@ -46,7 +45,7 @@ class Function:
 
     ``f(x)`` takes errors, (n, d), SI, in the order of `names`, and returns loads, (n, m), SI, in the order of `loads`;
     NaN where a joint has no valid one, and `status` says why. It equals what a campaign of the study stores for the
-    same errors, to the last bit.
+    same errors, to the last bit. Inside ``with f:`` worker processes stay from one call to the next.
 
     Attributes
     ----------
@@ -80,16 +79,31 @@ class Function:
         self.distributions = None if self.reason else dict(study.tolerances)
         self.status: NDArray[np.uint8] = np.zeros(0, np.uint8)
         self.simulated = 0
+        self._inside = ExitStack()
+
+    def __enter__(self) -> Self:
+        self._inside.enter_context(pool.kept_workers())
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._inside.close()
 
     def __repr__(self) -> str:
         return f"<function of {len(self.names)} errors, {len(self.loads)} loads, of study {self.study.name!r}>"
 
     def __call__(self, x: Array) -> Array:
-        """Loads of joints, (n, m), from their errors `x`, (n, d)."""
-        errors = nominal_errors(len(x))
+        """Loads of joints, (n, m), from their errors `x`, (n, d).
+
+        Raises
+        ------
+        ValueError
+            When `x` has another shape.
+        """
+        columns = _columns(x, self.names, "names")
+        errors = nominal_errors(len(columns[0]))
         for name, value in self.study.errors.items():
             errors[name] = value
-        for name, column in zip(self.names, _columns(x, self.names), strict=True):
+        for name, column in zip(self.names, columns, strict=True):
             errors[name] = column
         return self._simulate(errors)
 
@@ -102,11 +116,11 @@ class Function:
         ------
         InputError
             When joints of the study depend on each other: with lots of several joints, and matched by classes.
+        ValueError
+            When `u` has another shape.
         """
-        if self.study.sampling.joints_per_lot > 1:
-            remedy = "remove sampling.joints_per_lot: joints of one lot depend on each other"
-            raise InputError([self.study.fault("sampling.joints_per_lot", "joints have no free errors", remedy)])
-        errors = sampling.from_probabilities(self.study, np.array(_columns(u, self.cube_names)).T)
+        self._check_free()
+        errors = sampling.from_probabilities(self.study, np.array(_columns(u, self.cube_names, "cube_names")).T)
         return np.column_stack([errors[name] for name in self.names])
 
     @cached_property
@@ -123,8 +137,7 @@ class Function:
         """Solver options of a campaign of the study; those of fidelity "auto" come from its pilot."""
         solver = self._whole.solver
         options = settings(solver, choose_fidelity(self._whole) if solver.fidelity == "auto" else {})
-        if not is_compiled(options):
-            warm_up(options)
+        compile_missing(options)
         return options
 
     def openturns(self, cube: bool = False) -> tuple[openturns.Function, openturns.Distribution]:
@@ -142,10 +155,17 @@ class Function:
             From errors, or points of the cube, to loads.
         distribution : openturns.Distribution
             Of the errors, with their copula, or of the cube.
+
+        Raises
+        ------
+        InputError
+            When joints of the study depend on each other; or a distribution has no equal in OpenTURNS.
         """
         import openturns as ot
 
         is_cube = cube or self.distributions is None
+        if is_cube:
+            self._check_free()
         names = self.cube_names if is_cube else self.names
         copula = ot.IndependentCopula(len(names))
         if is_cube:
@@ -175,11 +195,24 @@ class Function:
         """Return the problem for SALib, on the unit cube: ``f(f.uniform(u))`` are loads of its points.
 
         Coordinates of one vector, such as both of a position's zone, are one group.
+
+        Raises
+        ------
+        InputError
+            When joints of the study depend on each other.
         """
+        self._check_free()
         groups = {stream: name for name in self.study.tolerances for stream in axes.streams_of(name)}
         names, labels = self.cube_names, [groups[name] for name in self.cube_names]
         problem: dict[str, Any] = {"num_vars": len(names), "names": names, "bounds": [[0.0, 1.0]] * len(names)}
         return problem if len(set(labels)) == len(labels) else problem | {"groups": labels}
+
+    def _check_free(self) -> None:
+        """Refuse a study whose joints depend on each other: no cube of independent numbers gives their errors."""
+        key, found = _dependence(self.study)
+        if key:
+            remedy = f"remove {key}, or give errors that tolstat.draw(study) draws to f(x)"
+            raise InputError([self.study.fault(key, found, remedy)])
 
     def _simulate(self, errors: NDArray[np.void]) -> Array:
         n, workers = len(errors), self.workers or available_cores()
@@ -202,6 +235,8 @@ class Function:
             for block in blocks:
                 put(block, simulate_block(simulate_rows, "none", 0, {}, block))
             return loads
+        some = np.unique(np.linspace(0, n - 1, min(n, SOME)).astype(np.intp))
+        compile_missing(options, perturb(joint, operation, errors[some]))  # once, before the processes start
         with closing(pool.map_blocks(work_beside(options), blocks, workers)) as finished:
             for block, result in finished:
                 put(block, result)
@@ -248,8 +283,8 @@ def function(
     return Function(study, list(chosen), point, workers)
 
 
-def _columns(values: Array, names: Sequence[str]) -> list[Array]:
-    """Columns of a table with these names.
+def _columns(values: Array, names: Sequence[str], attribute: str) -> list[Array]:
+    """Columns of a table with these names, which an attribute of `Function` lists.
 
     Raises
     ------
@@ -258,18 +293,25 @@ def _columns(values: Array, names: Sequence[str]) -> list[Array]:
     """
     table = np.asarray(values, float)
     if table.ndim != 2 or table.shape[1] != len(names):
-        raise ValueError(f"an array of shape (n, {len(names)}) is needed, a column for each of {', '.join(names)}")
+        needed = f"(n, {len(names)}), a row for each joint and a column for each of f.{attribute}"
+        remedy = "give [x] for one joint" if table.shape == (len(names),) else f"they are {', '.join(names)}"
+        raise ValueError(f"an array of shape {needed} is needed, not {table.shape}; {remedy}")
     return [np.ascontiguousarray(column) for column in table.T]
+
+
+def _dependence(study: Study) -> tuple[str, str]:
+    """Key of a study that makes its joints depend on each other, and how; empty if they do not."""
+    if study.sampling.is_matched:
+        return "sampling.selective", "pins and holes are matched by classes, so joints depend on each other"
+    if study.sampling.joints_per_lot > 1:
+        return "sampling.joints_per_lot", "joints of one lot depend on each other"
+    return "", ""
 
 
 def _reason(study: Study) -> str:
     """Why the errors of a study have no distribution each; empty if they have."""
     zones = [name for name in study.tolerances if axes.is_zone(name)]
-    if zones:
-        return f"{zones[0]} is drawn as a vector, from which errors follow"
-    if study.sampling.is_matched:
-        return "sampling.selective matches diameters by classes"
-    return "joints of one lot depend on each other" if study.sampling.joints_per_lot > 1 else ""
+    return f"{zones[0]} is drawn as a vector, from which errors follow" if zones else _dependence(study)[1]
 
 
 def _marginal(ot: Any, own: law.Distribution) -> Any:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.analysis import binomial
-from tolstat.analysis.independent import Independent
+from tolstat.analysis.design import Independent
 from tolstat.analysis.sample import Sample
 from tolstat.campaign import checks, verify
 from tolstat.campaign.run import choose_fidelity
@@ -30,7 +30,7 @@ from tolstat.solver.compilation import stage_name, warm_up
 from tolstat.solver.simulation import history_specs, simulate_rows
 from tolstat.store import layout, metadata, worst
 from tolstat.store.recorded import perturbed, settings, variants
-from tolstat.study import Study, assumptions, swept
+from tolstat.study import Study, assumptions, design
 from tolstat.study.points import names_of
 from tolstat.study.tolerances import meaning
 
@@ -229,8 +229,8 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT, stage: Te
     timed = {name: simulate_timed(study, params, options) for name, params in at.items()}
     each = sum(seconds for _, seconds in timed.values()) / len(rows)
     stage("check of the numerical error")
-    results = {name: own for name, (own, _) in timed.items()}
-    check = sum(_check(study, at[name], own, options) for name, own in results.items())
+    results = {name: table for name, (table, _) in timed.items()}
+    check = sum(_check(study, at[name], table, options) for name, table in results.items())
     slower = min(_loop() for _ in range(LOOPS)) / LOOP_S
     stages = {"start": slower * START_S, "joints": each * study.rows / workers, "check": check}
     stages["report"] = slower * (REPORT_S + REPORT_S_PER_JOINT * study.rows)
@@ -253,12 +253,12 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT, stage: Te
         process_bytes=_process_bytes(),
         file_bytes=layout.size_of(document) + len(document.model_dump_json()),
         widths={share: _width(share, study.samples) for share in SHARES} if iid else {},
-        limits=_limits(study, {name: own[valid] for name, own in results.items()}) if iid else [],
+        limits=_limits(study, {name: table[valid] for name, table in results.items()}) if iid else [],
         wilks={share: binomial.wilks(share, CONFIDENCE) for share in QUANTILES},
         reversals=_reversals(np.concatenate([*at.values()]), np.concatenate([*results.values()])),
         assembly=_assembly(study, iid),
         fit=fit_in_words(study),
-        sweep=swept.meaning(study.sweep, study.joint),
+        sweep=design.meaning(study.sweep, study.joint),
         tolerances=text.plain(meaning.table(study.entries).to_dict("records")),
         exact=list(assumptions.unselected(study)),
         correlations=text.plain(meaning.correlations(study.copula, study.tolerances).to_dict("records")),

@@ -239,14 +239,10 @@ class _Map(Generic[BlockT, ResultT]):
 
     def _hand_out(self) -> None:
         self.ahead = self.ahead or self._next()
+        while self.ahead is not None and len(self.workers) < self.size:
+            self.workers.append(_kept.pop() if _kept else _Worker(self.work.prepare))
         for worker in self.workers:
             if worker.ready and worker.task is None and self.ahead is not None:
-                worker.give(self.work.function, self.ahead)
-                self.ahead = self._next()
-        while self.ahead is not None and len(self.workers) < self.size:
-            worker = _kept.pop() if _kept else _Worker(self.work.prepare)
-            self.workers.append(worker)
-            if worker.ready:
                 worker.give(self.work.function, self.ahead)
                 self.ahead = self._next()
 

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from tolstat.common import strict
 from tolstat.common.errors import Fault, InputError, gather
-from tolstat.common.solver_options import to_names
 from tolstat.common.tables import (
     FAILED,
     MAX_ITERATIONS,
@@ -24,6 +23,7 @@ from tolstat.common.tables import (
     Options,
     Status,
     iterations_allowed,
+    to_names,
 )
 from tolstat.joint.ideal import NO_CLOSED_FORM
 from tolstat.solver import fidelity
@@ -274,15 +274,15 @@ def begin_retry(store: Writer, retry: Retry, specs: Mapping[str, HistorySpec], t
         When there is no room for a second copy of the file.
     """
     entry = json.loads(json.dumps(retry.entry()))
-    number = len(store.retries)
     each = store.each()
-    if store.retries[-1:] == (entry,) and any(np.any(one.attempt()[one.pending()] == number) for one in each):
+    attempts = np.concatenate([at_point.attempt()[at_point.pending()] for at_point in each])
+    if store.retries[-1:] == (entry,) and np.any(attempts == len(store.retries)):
         return
     if dict(specs) != store.history_specs:
         found = "these settings give load histories another number of samples than those in the file"
         remedy = "remove solver.steps_per_rev, or run another campaign: tolstat run STUDY --out OTHER.h5"
         raise InputError([Fault("--set", found, remedy)])
-    rows = {one.point or "": np.flatnonzero(np.isin(one.status(), retry.status)) for one in each}
+    rows = {at_point.point or "": np.flatnonzero(np.isin(at_point.status(), retry.status)) for at_point in each}
     again = sum(slots.size for slots in rows.values())
     tell(f"{again} joints are simulated again")
     if again:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,19 +14,16 @@ from tolstat.campaign.remedy import remedy
 from tolstat.common import loads
 from tolstat.common.channels import BUSHING_LOADS, SHAFT_LOADS, LoadHistory
 from tolstat.common.errors import Fault, InputError
+from tolstat.common.late import pandas as pd
 from tolstat.common.load_kinds import CONTACTS, PINS
 from tolstat.common.tables import Options, Simulation, Status
 from tolstat.joint import ideal, nominal_errors, perturb
 from tolstat.solver.compilation import warm_up
 from tolstat.solver.simulation import simulate_rows
 from tolstat.store import Reader
-from tolstat.store.provenance import differing, versions
+from tolstat.store.metadata import differing, versions
 from tolstat.store.recorded import options_of, parameters
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from tolstat.study import Case
+from tolstat.study import Case
 
 
 class CaseResult(NamedTuple):
@@ -77,13 +74,13 @@ class CaseResult(NamedTuple):
         return facts | {"max": {load.name: self._largest(load) for load in loads.LOADS.values()}}
 
     def _largest(self, load: loads.Load) -> dict[str, Any]:
-        own = float(load.of(self.simulation.results)[0])
-        found = {"unit": load.unit, "joint": _number(own)}
+        value = float(load.of(self.simulation.results)[0])
+        facts = {"unit": load.unit, "joint": _number(value)}
         if self.nominal is None:
-            return found
-        ideal = float(load.of(self.nominal)[0])
-        change = own / ideal - 1.0 if ideal else math.nan
-        return found | {"without_errors": _number(ideal), "change": _number(change)}
+            return facts
+        nominal = float(load.of(self.nominal)[0])
+        change = value / nominal - 1.0 if nominal else math.nan
+        return facts | {"without_errors": _number(nominal), "change": _number(change)}
 
     def remedy(self) -> str:
         """Return what to do about a joint that is not ok; empty for one that is."""
@@ -98,8 +95,6 @@ class CaseResult(NamedTuple):
         ``input.f_x`` … ``output.m_z`` (force and moment about O on the shafts, N and N m, in axes that do not turn) and
         ``pin1.mode`` …
         """
-        import pandas as pd
-
         histories = {name: values[0] for name, values in self.simulation.histories.items()}
         tau = histories["tau"].astype(float)
         theta = 2 * math.pi * np.arange(len(tau)) / len(tau)
@@ -150,8 +145,8 @@ def simulate_case(case: Case) -> CaseResult:
     options = case.solver.options()
     both = simulate_rows(params, options, "full")
     wall_s = time.perf_counter() - begin
-    own = Simulation(both.results[:1], {name: values[:1] for name, values in both.histories.items()})
-    return CaseResult(own, params[:1], wall_s, options, both.results[1:])
+    with_errors = Simulation(both.results[:1], {name: values[:1] for name, values in both.histories.items()})
+    return CaseResult(with_errors, params[:1], wall_s, options, both.results[1:])
 
 
 def _number(value: float) -> float | None:

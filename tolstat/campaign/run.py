@@ -22,14 +22,14 @@ from tolstat.campaign.remedy import Retry, begin_retry
 from tolstat.common.counts import Counts
 from tolstat.common.errors import Fault, InputError, StoreError
 from tolstat.common.tables import Simulation, Status
-from tolstat.display.progress import JOINTS, Reporter, Tell, note, silent
+from tolstat.display.progress import JOINTS, Reporter, Tell, display, note, silent
 from tolstat.sampling import dimensions, draw_blocks, origin_blocks
 from tolstat.solver import fidelity, rainflow
 from tolstat.solver.compilation import stage_name
 from tolstat.solver.simulation import Histories, history_specs
 from tolstat.store import Reader, Writer, metadata
 from tolstat.store.hdf5 import store_error
-from tolstat.store.provenance import differing_code
+from tolstat.store.metadata import differing_code
 from tolstat.store.recorded import differing_keys, perturbed, settings
 from tolstat.study import Study
 
@@ -119,7 +119,7 @@ def run(
     out: str | Path,
     workers: int | None = None,
     block: int | None = None,
-    progress: Reporter | None = None,
+    progress: Reporter | bool = False,
     rows: range | None = None,
     until_row: int | None = None,
     executor: Executor = "processes",
@@ -144,8 +144,9 @@ def run(
         Number of processes; without it the number of cores.
     block : int, optional
         Joints per block; without it as many as take some seconds, see `blocks.Pace`.
-    progress : Reporter, optional
-        Called with the counts at the start and after every block.
+    progress : bool or Reporter
+        Whether to show a bar, on a terminal or in a notebook; or what is called with the counts at the start and after
+        every block.
     rows : range, optional
         Rows of the campaign that the file holds, if a slice; all without it.
     until_row : int, optional
@@ -179,6 +180,10 @@ def run(
     WorkerDied
         When worker processes die whichever block they work on; the file holds all finished blocks.
     """
+    if progress is True:
+        with display(tell) as shown:
+            others = rows, until_row, executor, scheduler, retry, tell, check
+            return run(study, out, workers, block, shown, *others, stage=shown.stage)
     numbers = {"workers": workers, "block": block}
     wrong = {name: number for name, number in numbers.items() if number is not None and number < 1}
     if wrong:
@@ -200,7 +205,7 @@ def run(
             stage(JOINTS)
             finished = simulate_pending(study, store, last, workers, block, executor, scheduler, stop)
             with stop.deferred(), closing(finished):
-                counts = _write_blocks(store, finished, counts, progress, tell)
+                counts = _write_blocks(store, finished, counts, progress or None, tell)
             if check:
                 stage("check of the numerical error")
                 verify.check_few(store)
@@ -230,8 +235,8 @@ def _write_blocks(
         store.at(block.point).write(block.slots, simulation)
         counts = counts.after(simulation.results["status"])
         if trouble:
-            place = f"row {store.rows[block.slots[0]]}" + (f" at {block.point}" if block.point else "")
-            tell(f"{place}: {Status.CRASHED.label}: {trouble}")
+            joint = f"row {store.rows[block.slots[0]]}" + (f" at {block.point}" if block.point else "")
+            tell(f"{joint}: {Status.CRASHED.label}: {trouble}")
         if progress:
             progress(counts)
     return counts
@@ -291,8 +296,8 @@ def _check_same(store: Reader, study: Study, rows: range) -> None:
     if len(differing) == 1 and differing[0].startswith("sampling.n:") and store.whole:
         raise _of_number(store, study.samples)
     if not differing and store.rows != rows:
-        held, asked = (f"{r.start}:{r.stop}" for r in (store.rows, rows))
-        raise store_error(store.path, f"holds rows {held}, not {asked}", f"give --rows {held}")
+        in_file, asked = (f"{r.start}:{r.stop}" for r in (store.rows, rows))
+        raise store_error(store.path, f"holds rows {in_file}, not {asked}", f"give --rows {in_file}")
     if differing:
         raise store_error(store.path, "\n    ".join([found, *differing]), remedy)
 

@@ -113,8 +113,7 @@ def run_until(study: Study, out: Path, rule: rules.Statement, run: Callable[[int
         When the joints are not independent samples, or the study does not keep a load.
     """
     if study.sampling.method != "random":
-        own = study.sampling.method
-        found = f"sampling.method is {own!r}: its interval needs independent samples of equal weight"
+        found = f"sampling.method is {study.sampling.method!r}: its interval needs independent samples of equal weight"
         raise InputError([Fault("--until", found, 'write sampling.method = "random" in the study')])
     if study.sampling.joints_per_lot > 1:
         found = "joints share lots: the interval of a stop needs independent samples"

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from tolstat.analysis.accuracy import LEAST_NEAR
 from tolstat.campaign.checks import ALL_CHECKS, QUICK_CHECKS, Progress, no_progress, run_checks, simulate_each
+from tolstat.campaign.what_if import check_code
 from tolstat.common import selected_results
 from tolstat.common.errors import Fault, InputError, gather
 from tolstat.common.loads import LOADS, Limit, load_of, split
@@ -18,7 +19,6 @@ from tolstat.sampling import draw
 from tolstat.solver import compilation
 from tolstat.store import Reader, Writer, verification
 from tolstat.store.hdf5 import pick, store_error
-from tolstat.store.provenance import differing_code
 from tolstat.store.recorded import options_of, parameters, perturbed, variants
 from tolstat.store.verification import Verification
 from tolstat.study import Study, load, rule
@@ -95,11 +95,7 @@ def check_few(store: Writer) -> None:
 
 
 def check(
-    path: Path,
-    joints: int | str = 24,
-    seed: int | None = None,
-    workers: int = 1,
-    progress: Progress = no_progress,
+    path: Path, joints: int | str = 24, seed: int | None = None, workers: int = 1, progress: Progress = no_progress
 ) -> Verification:
     """Check joints of a study file (``.toml``) or of a result file; see `check_study` and `check_file`.
 
@@ -156,7 +152,7 @@ def check_file(
         When the file cannot be used, was made by other code, or has no settled joint.
     """
     with Writer.open(path) as store:
-        _check_version(store)
+        check_code(store)
         seed = int(store.sampling["seed"]) if seed is None else seed
         if not any((at_point.status() == Status.OK).any() for at_point in store.each()):
             raise store_error(path, "has no settled joint", f"run the campaign first: tolstat run STUDY --out {path}")
@@ -171,13 +167,6 @@ def _stored(store: Reader, name: str) -> Verification:
     """Verifications of a group at all operating points at which the file has one."""
     verifications = [verification.read(at_point, name) for at_point in store.each()]
     return verification.together([read for read in verifications if read is not None])
-
-
-def _check_version(store: Reader) -> None:
-    """Raise a StoreError for a file that other code made."""
-    if differing_code(store.versions):
-        remedy = "verify it with that version, or run the campaign again: tolstat run STUDY --out OTHER.h5"
-        raise store_error(store.path, "was made by another version of the code", remedy)
 
 
 def nearest(store: Reader, limit: Limit, joints: int) -> NDArray[np.intp]:
@@ -197,11 +186,7 @@ def nearest(store: Reader, limit: Limit, joints: int) -> NDArray[np.intp]:
 
 
 def check_near(
-    path: Path,
-    text: str,
-    joints: int | str = LEAST_NEAR,
-    workers: int = 1,
-    progress: Progress = no_progress,
+    path: Path, text: str, joints: int | str = LEAST_NEAR, workers: int = 1, progress: Progress = no_progress
 ) -> Verification:
     """Make the `QUICK_CHECKS` of the joints of a result file nearest to a limit, and add them to those that it holds.
 
@@ -238,7 +223,7 @@ def check_near(
         if lacking:
             remedy = "give loads that it keeps, see tolstat status"
             raise InputError([Fault("--near", f"the file does not keep {', '.join(lacking)}", remedy)])
-        _check_version(store)
+        check_code(store)
         chosen = [(at_point, nearest(at_point, limit, number)) for at_point in store.each()]
         fewest = min((slots.size for _, slots in chosen if slots.size), default=0)
         if fewest < LEAST_NEAR:

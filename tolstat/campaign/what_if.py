@@ -19,9 +19,9 @@ from tolstat.common.counts import Counts
 from tolstat.common.loads import LOADS
 from tolstat.common.tables import VALID, Options, Status, worst_status
 from tolstat.joint import perturb
-from tolstat.store import Writer, what_if
+from tolstat.store import Reader, Writer, what_if
 from tolstat.store.hdf5 import store_error
-from tolstat.store.provenance import versions
+from tolstat.store.metadata import differing_code
 from tolstat.store.recorded import settings
 from tolstat.store.what_if import Altered
 from tolstat.study import Study, axes, widths
@@ -128,9 +128,9 @@ class Asked(NamedTuple):
         return tuple(at(load, [point], every) for point in self.points for load in self.loads)
 
 
-def missing(held: Mapping[str, Altered], wanted: Change, names: Sequence[str]) -> range:
-    """Joints of a change that the file lacks; all of them if those held begin later, or lack one of the loads."""
-    altered = held.get(what_if.key(wanted.about))
+def missing(in_file: Mapping[str, Altered], wanted: Change, names: Sequence[str]) -> range:
+    """Joints of a change that the file lacks; all of them if its own begin later, or lack one of the loads."""
+    altered = in_file.get(what_if.key(wanted.about))
     if altered is None or altered.first > wanted.numbers.start or not altered.holds(names):
         return wanted.numbers
     return range(max(altered.end, wanted.numbers.start), max(altered.end, wanted.numbers.stop))
@@ -182,9 +182,9 @@ def simulate(
     dict of str to Altered
         All sets that the file holds.
     """
-    held = what_if.read(store)
+    in_file = what_if.read(store)
     names = asked.names(study)
-    todo = [one._replace(numbers=own) for one in wanted if (own := missing(held, one, names))]
+    todo = [change._replace(numbers=lacking) for change in wanted if (lacking := missing(in_file, change, names))]
     table = _Table(todo, asked, names)
     every = _blocks(study, options_of(study, store), todo, asked.points)
     done = pool.map_blocks(work_beside(Options()), every, workers, stop)
@@ -196,18 +196,18 @@ def simulate(
                 counts = counts.after(table.put(block, results_of(block, result)))
                 progress(counts)
                 if time.monotonic() - saved > SAVE_S:
-                    what_if.write(store, table.sets(held))
+                    what_if.write(store, table.sets(in_file))
                     saved = time.monotonic()
     finally:
-        new = table.sets(held)
+        new = table.sets(in_file)
         if new:
             what_if.write(store, new)
-    return held | new
+    return in_file | new
 
 
-def check_code(store: Writer) -> None:
+def check_code(store: Reader) -> None:
     """Refuse a file whose joints another version of the code simulated; raises a StoreError."""
-    if any(store.versions.get(name) != versions()[name] for name in ("tolstat", "sources")):
+    if differing_code(store.versions):
         remedy = "use that version, or run the campaign again: tolstat run STUDY --out OTHER.h5"
         raise store_error(store.path, "was made by another version of the code", remedy)
 
@@ -222,24 +222,24 @@ class _Table:
         self.status = np.full((n, len(asked.points)), Status.PENDING, np.uint8)
 
     def put(self, block: Block, results: NDArray[np.void]) -> NDArray[np.uint8]:
-        place = block.slots, self.asked.points.index(block.point)
+        index = block.slots, self.asked.points.index(block.point)
         loads = np.column_stack([LOADS[name].of(results) for name in self.asked.loads])
-        self.loads[place] = np.where(np.isin(results["status"], VALID)[:, None], loads, np.nan)
-        self.status[place] = results["status"]
-        return np.asarray(self.status[place])
+        self.loads[index] = np.where(np.isin(results["status"], VALID)[:, None], loads, np.nan)
+        self.status[index] = results["status"]
+        return np.asarray(self.status[index])
 
-    def sets(self, held: Mapping[str, Altered]) -> dict[str, Altered]:
-        """Sets that have grown: of each, the joints before the first that is not done, behind those held."""
+    def sets(self, in_file: Mapping[str, Altered]) -> dict[str, Altered]:
+        """Sets that have grown: of each, the joints before the first that is not done, behind those in the file."""
         grown, begin = {}, 0
         for about, _, _, numbers in self.todo:
             here = slice(begin, begin + len(numbers))
             begin = here.stop
             waiting = np.flatnonzero((self.status[here] == Status.PENDING).any(axis=1))
-            own = slice(here.start, here.start + int(waiting[0]) if waiting.size else here.stop)
-            if own.stop > own.start:
-                name, states = what_if.key(about), list(self.status[own].T)
+            done = slice(here.start, here.start + int(waiting[0]) if waiting.size else here.stop)
+            if done.stop > done.start:
+                name, states = what_if.key(about), list(self.status[done].T)
                 status = worst_status(states)
-                loads, old = self.loads[own].reshape(-1, len(self.names)), held.get(name)
+                loads, old = self.loads[done].reshape(-1, len(self.names)), in_file.get(name)
                 grown[name] = Altered(about, numbers.start, self.names, loads, status)
                 if old is not None and (old.end, old.names) == (numbers.start, self.names):
                     joined = np.concatenate([old.loads, loads]), np.concatenate([old.status, status])

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from tolstat import store as stores
     from tolstat import study as studies
     from tolstat.analysis import accuracy as numerical
-    from tolstat.analysis import listed as listed
+    from tolstat.analysis import design as design
     from tolstat.campaign import extend as growth
     from tolstat.campaign import function as functions
     from tolstat.campaign import plan as plans
@@ -50,7 +50,6 @@ if TYPE_CHECKING:
     from tolstat.store import what_if as what_if
     from tolstat.study import assumptions as assumptions
     from tolstat.study import mounting as mounting
-    from tolstat.study import plausible as plausible
     from tolstat.study import points as points
     from tolstat.study import rewriting as rewriting
     from tolstat.study import schema as schemas
@@ -59,7 +58,7 @@ if TYPE_CHECKING:
 else:
     np = Late("numpy")
     stores, studies = (Late(f"tolstat.{name}") for name in ("store", "study"))
-    listed, numerical = (Late(f"tolstat.analysis.{name}") for name in ("listed", "accuracy"))
+    design, numerical = (Late(f"tolstat.analysis.{name}") for name in ("design", "accuracy"))
     growth, functions, plans, pool, remedies, replays, campaigns, stop_rule, checks, works = (
         Late(f"tolstat.campaign.{name}")
         for name in ("extend", "function", "plan", "pool", "remedy", "replay", "run", "stop_rule", "verify", "work")
@@ -78,7 +77,7 @@ else:
     recorded, result_files, revolutions, verification, what_if = (
         Late(f"tolstat.store.{name}") for name in ("recorded", "result_file", "revolutions", "verification", "what_if")
     )
-    assumptions, mounting, plausible, points, rewriting, schemas, spectra, starter = (
+    assumptions, mounting, points, rewriting, schemas, spectra, starter = (
         Late(f"tolstat.study.{name}")
-        for name in ("assumptions", "mounting", "plausible", "points", "rewriting", "schema", "spectrum", "starter")
+        for name in ("assumptions", "mounting", "points", "rewriting", "schema", "spectrum", "starter")
     )

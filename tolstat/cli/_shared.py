@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TextIO
 import typer
 
 from tolstat import __version__
-from tolstat.cli._library import answers, campaigns, compilation, listed, mounting, plausible, pool, tables, works
+from tolstat.cli._library import answers, assumptions, campaigns, compilation, design, mounting, pool, tables, works
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.files import atomic_write, make_parent
 from tolstat.display.options import Opt
@@ -231,7 +231,7 @@ def print_study_notes(path: Path, study: Study) -> None:
     if note := mounting.note(study.tolerances, axial, mounting.command(str(path), path.stem, study.joint)):
         say(f"note: {note}")
     print_warnings(path, study.joints, study.variants)
-    for fault in plausible.warnings(study):
+    for fault in assumptions.warnings(study):
         warn(f"warning: {fault}")
-    if not study.sampling.has_replicates and (reason := listed.without_interval(study.sampling.method)):
+    if not study.sampling.has_replicates and (reason := design.without_interval(study.sampling.method)):
         warn(f"warning: {reason}")

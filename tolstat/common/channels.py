@@ -110,8 +110,8 @@ class Channel(NamedTuple):
     def of(self, loads: Mapping[str, NDArray[np.floating]]) -> NDArray[np.float64]:
         """Values (...,), N or N m, of histories by name, each (..., places, components)."""
         index = self.history.places.index(self.place)
-        own: NDArray[np.float64] = loads[self.history.name][..., index, self.components].astype(float)
-        return np.asarray(np.linalg.norm(own, axis=-1) if self.is_modulus else own[..., 0])
+        values: NDArray[np.float64] = loads[self.history.name][..., index, self.components].astype(float)
+        return np.asarray(np.linalg.norm(values, axis=-1) if self.is_modulus else values[..., 0])
 
 
 def _channels() -> Iterator[Channel]:

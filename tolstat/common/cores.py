@@ -1,12 +1,10 @@
-"""Processors: their number, processor time of a process, and libraries that would divide small products among them."""
+"""Processors: their number, and libraries that would divide small products among them."""
 
 from __future__ import annotations
 
 import os
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 
 THREAD_VARIABLES = (
     "OMP_NUM_THREADS",
@@ -48,13 +46,3 @@ def available_cores() -> int:
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
-
-
-def processor_time(pid: int) -> tuple[float, bool]:
-    """Processor time of a process, s, and whether it sleeps; where the system does not say, the time on the clock."""
-    try:
-        text = Path(f"/proc/{pid}/stat").read_text(encoding="ascii", errors="replace")
-    except OSError:
-        return time.monotonic(), False
-    state, *fields = text.rpartition(")")[2].split()  # the name of the program, in brackets, may have spaces
-    return (int(fields[10]) + int(fields[11])) / os.sysconf("SC_CLK_TCK"), state == "S"

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 MAX_SHOWN = 4000
-"""Most characters of a place, a finding or a remedy that a message shows."""
+"""Most characters of a place, a finding or a remedy that a message shows; a file may have made them very long."""
 
 
 @dataclass(frozen=True)
@@ -29,13 +29,9 @@ class Fault:
     remedy: str
 
     def __str__(self) -> str:
-        place, found, remedy = map(_shortened, (self.place, self.found, self.remedy))
+        texts = self.place, self.found, self.remedy
+        place, found, remedy = (text if len(text) <= MAX_SHOWN else f"{text[:MAX_SHOWN]} ..." for text in texts)
         return f"{place}: {found}\n  hint: {remedy}"
-
-
-def _shortened(text: str) -> str:
-    """Beginning of a text that a file has made very long."""
-    return text if len(text) <= MAX_SHOWN else f"{text[:MAX_SHOWN]} ..."
 
 
 class TolstatError(Exception):

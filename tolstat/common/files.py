@@ -39,8 +39,8 @@ def reason(error: OSError) -> str:
     """Say in a few words why a file cannot be used; of the messages of HDF5 the system's own words are taken."""
     if error.strerror:
         return error.strerror
-    own = re.search(r"error message = '([^']*)'", str(error))
-    return own[1] if own else " ".join(str(error).split())
+    of_system = re.search(r"error message = '([^']*)'", str(error))
+    return of_system[1] if of_system else " ".join(str(error).split())
 
 
 def read_input(path: Path) -> str:
@@ -56,10 +56,10 @@ def read_input(path: Path) -> str:
     """
     handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
     with open(handle, "rb") as file:
-        held = os.fstat(handle)
-        if stat.S_ISDIR(held.st_mode):
+        status = os.fstat(handle)
+        if stat.S_ISDIR(status.st_mode):
             raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
-        if not stat.S_ISREG(held.st_mode):
+        if not stat.S_ISREG(status.st_mode):
             raise OSError(errno.EINVAL, "is a pipe or a device, not a file", str(path))
         content = file.read(MAX_INPUT_BYTES + 1)
     if len(content) > MAX_INPUT_BYTES:

@@ -14,13 +14,9 @@ from functools import partial
 from multiprocessing.connection import Connection
 from typing import Generic, TypeVar
 
-from tolstat.common.cores import processor_time
-
 T = TypeVar("T")
 
 CAN_FORK = sys.platform == "linux"
-STILL_S = 60.0
-"""Time without any processor time after which a process is killed, s: a fork may wait for what a thread had locked."""
 
 
 class Forked(Generic[T]):
@@ -46,13 +42,8 @@ class Forked(Generic[T]):
             other.close()
 
     def result(self) -> T:
-        """Result of the function; where its process failed, hung or was killed, it is evaluated here, and may raise."""
+        """Result of the function; where its process failed or was killed, it is evaluated here, and may raise."""
         if not self._results and self._process is not None:
-            used = -1.0
-            while not self._end.poll(STILL_S):
-                before, (used, _) = used, processor_time(self._process.pid or 0)
-                if used == before:
-                    self._process.kill()
             with suppress(EOFError, OSError):  # the process has ended without its result
                 self._results.append(self._end.recv())
             self._end.close()

@@ -24,9 +24,12 @@ if TYPE_CHECKING:
     import tomlkit as tomlkit
     import tomlkit.exceptions
     import tomlkit.items
+    from scipy import integrate as integrate
+    from scipy import interpolate as interpolate
     from scipy import optimize as optimize
     from scipy import special as special
     from scipy import stats as stats
 else:
     pandas, tomlkit = Late("pandas"), Late("tomlkit")
-    optimize, special, stats = (Late(f"scipy.{name}") for name in ("optimize", "special", "stats"))
+    modules = ("integrate", "interpolate", "optimize", "special", "stats")
+    integrate, interpolate, optimize, special, stats = (Late(f"scipy.{name}") for name in modules)

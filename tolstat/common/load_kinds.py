@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from itertools import accumulate
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from tolstat.common.fields import Field
 
@@ -159,89 +159,27 @@ class Kind(NamedTuple):
 OVER = "over the revolutions that count"
 ORDERS = (1, 2, 3, 4)
 """Multiples of the input speed whose amplitudes are loads."""
+_BUSHING: dict[str, Any] = {"places": BUSHINGS, "decides": True, "shown": True, "averaged": True, "modulus": True}
+_SHAFT: dict[str, Any] = {"places": SHAFTS, "decides": True}
+_ACROSS = _SHAFT | {"modulus": True}
+_ROOT = "bending moment at the root of pin or arm"
+_FORCE = f"modulus of the bushing force {OVER}"
+_TORQUE = f"modulus of the {_ROOT} (torque of the bushing) {OVER}"
+_CONTACT = "contact force of the pin: of its outermost station, of its innermost one, resultant of all stations"
+_PSI = "|Psi|, relative error of the speed ratio, eq. (13)"
+_AXIAL = f"force along the shaft, of a sliding output shaft that on its bearing, {OVER}"
+_LATERAL = f"force across the shaft {OVER}"
+_MOMENT = f"bending moment of the shaft about the joint's centre {OVER}"
+_DRIVE = f"torque about the input shaft {OVER}"
 LOAD_KINDS = (
-    Kind(
-        "F",
-        "F",
-        "bushing force",
-        "N",
-        f"modulus of the bushing force {OVER}",
-        BUSHINGS,
-        decides=True,
-        shown=True,
-        averaged=True,
-        modulus=True,
-        components=("F_e", "F_t", "F_z"),
-    ),
-    Kind(
-        "T",
-        "T",
-        "bending moment at the root of pin or arm",
-        "N*m",
-        f"modulus of the bending moment at the root of pin or arm (torque of the bushing) {OVER}",
-        BUSHINGS,
-        decides=True,
-        shown=True,
-        averaged=True,
-        modulus=True,
-        components=("T_e", "T_t", "T_z"),
-    ),
-    Kind(
-        "contact",
-        "contact",
-        "contact force",
-        "N",
-        "contact force of the pin: of its outermost station, of its innermost one, resultant of all stations",
-        PINS,
-        CONTACTS,
-    ),
-    Kind("psi", "psi", "|Psi|", "1", "|Psi|, relative error of the speed ratio, eq. (13)", interpolated=False),
-    Kind(
-        "axial",
-        "axial",
-        "axial force",
-        "N",
-        f"force along the shaft, of a sliding output shaft that on its bearing, {OVER}",
-        SHAFTS,
-        measure="F",
-        decides=True,
-        components=("f_z",),
-    ),
-    Kind(
-        "lateral",
-        "lateral",
-        "lateral force",
-        "N",
-        f"force across the shaft {OVER}",
-        SHAFTS,
-        measure="F",
-        decides=True,
-        modulus=True,
-        components=("f_x", "f_y"),
-    ),
-    Kind(
-        "moment",
-        "moment",
-        "bending moment",
-        "N*m",
-        f"bending moment of the shaft about the joint's centre {OVER}",
-        SHAFTS,
-        measure="T",
-        decides=True,
-        modulus=True,
-        components=("m_x", "m_y"),
-    ),
-    Kind(
-        "drive",
-        "drive",
-        "driving torque",
-        "N*m",
-        f"torque about the input shaft {OVER}",
-        ("input",),
-        measure="T",
-        decides=True,
-        components=("m_z",),
-    ),
+    Kind("F", "F", "bushing force", "N", _FORCE, components=("F_e", "F_t", "F_z"), **_BUSHING),
+    Kind("T", "T", _ROOT, "N*m", _TORQUE, components=("T_e", "T_t", "T_z"), **_BUSHING),
+    Kind("contact", "contact", "contact force", "N", _CONTACT, PINS, CONTACTS),
+    Kind("psi", "psi", "|Psi|", "1", _PSI, interpolated=False),
+    Kind("axial", "axial", "axial force", "N", _AXIAL, measure="F", components=("f_z",), **_SHAFT),
+    Kind("lateral", "lateral", "lateral force", "N", _LATERAL, measure="F", components=("f_x", "f_y"), **_ACROSS),
+    Kind("moment", "moment", "bending moment", "N*m", _MOMENT, measure="T", components=("m_x", "m_y"), **_ACROSS),
+    Kind("drive", "drive", "driving torque", "N*m", _DRIVE, ("input",), measure="T", decides=True, components=("m_z",)),
     *(
         Kind(
             f"{symbol}_orders",

@@ -138,14 +138,14 @@ def put_largest(values: FloatArray | float, results: NDArray[np.void]) -> None:
 
 def _entries() -> list[Load]:
     """Loads by place, in the order in which the registry of kinds first names the places."""
-    found = []
+    loads = []
     for kind in LOAD_KINDS:
         columns, parts = kind.columns("max"), len(kind.parts or ("",))
         for i, (place, name) in enumerate(kind.loads()):
-            found.append(Load(name, kind, PLACES[place], i, columns[i * parts : (i + 1) * parts]))
-    first = [load.place.name for load in found]
+            loads.append(Load(name, kind, PLACES[place], i, columns[i * parts : (i + 1) * parts]))
+    first = [load.place.name for load in loads]
     groups = [kind.places for kind in LOAD_KINDS]
-    return sorted(found, key=lambda load: (groups.index(load.kind.places), first.index(load.place.name)))
+    return sorted(loads, key=lambda load: (groups.index(load.kind.places), first.index(load.place.name)))
 
 
 def names_of(group: str, kind: Kind) -> tuple[str, ...]:

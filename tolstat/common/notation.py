@@ -70,17 +70,17 @@ def read(text: str) -> Written | None:
     if len(text) > MAX_LENGTH or _ODD_POWER.search(text):
         return None
     mark, rest = "", text
-    if (found := _MARK.match(text)) is not None:
-        mark, rest = (DIAMETER if found["diameter"] else PLUS_MINUS), text[found.end() :]
+    if (sign := _MARK.match(text)) is not None:
+        mark, rest = (DIAMETER if sign["diameter"] else PLUS_MINUS), text[sign.end() :]
         if rest[:1] in ("+", "-"):
             return None
-    elif (found := _MARK_BEHIND.search(text)) is not None and found.end() == len(text):
-        mark, rest = DIAMETER, text[: found.start()]
+    elif (sign := _MARK_BEHIND.search(text)) is not None and sign.end() == len(text):
+        mark, rest = DIAMETER, text[: sign.start()]
     angle = _degrees(rest)
     if angle is not None:
         return Written(mark, angle, "deg")
-    found = _QUANTITY.fullmatch(rest)
-    return None if found is None else Written(mark, float(found["number"]), found["unit"])
+    quantity = _QUANTITY.fullmatch(rest)
+    return None if quantity is None else Written(mark, float(quantity["number"]), quantity["unit"])
 
 
 def pint_unit(unit: str) -> str:
@@ -92,13 +92,13 @@ def pint_unit(unit: str) -> str:
 
 def _degrees(text: str) -> float | None:
     """Degrees of an angle with minutes or seconds; None for other texts, and for 60 or more beside a larger unit."""
-    found = _ANGLE.fullmatch(text)
-    if found is None or not (found["minutes"] or found["seconds"]):
+    angle = _ANGLE.fullmatch(text)
+    if angle is None or not (angle["minutes"] or angle["seconds"]):
         return None
-    degrees, minutes, seconds = (float(found[name] or 0.0) for name in ("degrees", "minutes", "seconds"))
-    whole = "." not in (found["minutes"] or "") or not found["seconds"]
-    below = (not found["degrees"] or minutes < 60.0) and (not (found["degrees"] or found["minutes"]) or seconds < 60.0)
+    degrees, minutes, seconds = (float(angle[name] or 0.0) for name in ("degrees", "minutes", "seconds"))
+    whole = "." not in (angle["minutes"] or "") or not angle["seconds"]
+    below = (not angle["degrees"] or minutes < 60.0) and (not (angle["degrees"] or angle["minutes"]) or seconds < 60.0)
     if not (whole and below):
         return None
     size = degrees + minutes / 60.0 + seconds / 3600.0
-    return -size if found["sign"] == "-" else size
+    return -size if angle["sign"] == "-" else size

@@ -31,8 +31,8 @@ NAMES = tuple(c.name for c in RESULT_COLUMNS)
 def chosen(names: Iterable[str]) -> list[str] | None:
     """Optional columns among `names`, in the order of the table; None if no optional column is left out."""
     optional = [c.name for c in RESULT_COLUMNS if c.field in OPTIONAL_FIELDS]
-    found = [name for name in optional if name in set(names)]
-    return None if found == optional else found
+    selected = [name for name in optional if name in set(names)]
+    return None if selected == optional else selected
 
 
 def columns(identity: Mapping[str, Any]) -> tuple[Column, ...]:

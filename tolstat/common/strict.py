@@ -13,14 +13,12 @@ from types import NoneType
 from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, GetJsonSchemaHandler, ValidationError
+from pydantic.fields import FieldInfo
 from pydantic_core import CoreSchema, PydanticCustomError
 
 from tolstat.common import json_schema, toml_lines, units
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.files import about_encoding, read_input
-
-MAX_DEPTH = 32
-"""Largest number of tables and lists inside each other in an input file."""
 
 
 class Strict(BaseModel):
@@ -32,7 +30,7 @@ class Strict(BaseModel):
     def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         """Return the JSON schema with bounds of quantities, see `json_schema.complete`."""
         schema = handler(core)
-        json_schema.complete(handler.resolve_ref_schema(schema), cls.model_fields, units.SIGNS)
+        json_schema.complete(handler.resolve_ref_schema(schema), cls, units.SIGNS)
         return schema
 
 
@@ -49,16 +47,13 @@ def read_toml(path: Path, text: str | None = None) -> dict[str, Any]:
     """
     text = read_text(path) if text is None else text
     try:
-        data = tomllib.loads(text)
+        return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        line, said, remedy = toml_lines.of_syntax(error, text)
-        raise InputError([Fault(f"{path}:{line}", f"is not TOML: {said}", remedy)]) from error
-    except RecursionError:
-        data = None
-    if data is None or depth(data) > MAX_DEPTH:
-        found = f"has tables and lists nested deeper than {MAX_DEPTH}"
-        raise InputError([Fault(str(path), found, "no key needs more than a few: remove brackets")])
-    return data
+        line, cause, remedy = toml_lines.of_syntax(error, text)
+        raise InputError([Fault(f"{path}:{line}", f"is not TOML: {cause}", remedy)]) from error
+    except RecursionError as error:
+        remedy = "no key needs more than a few: remove brackets"
+        raise InputError([Fault(str(path), "has too many tables and lists inside each other", remedy)]) from error
 
 
 def read_text(path: Path) -> str:
@@ -81,27 +76,9 @@ def read_text(path: Path) -> str:
 
 
 def read_section(place: Path, text: str, name: str) -> dict[str, Any]:
-    """Read a section of a TOML text that a file holds; empty if there is none.
-
-    Raises
-    ------
-    InputError
-        When the text is not TOML, or the section is no table.
-    """
-    found = read_toml(place, text).get(name, {})
-    if not isinstance(found, dict):
-        remedy = "the file is damaged: run its study again into another one"
-        raise InputError([Fault(str(place), f"holds a study whose {name} is no table", remedy)])
-    return found
-
-
-def depth(data: object) -> int:
-    """Number of tables and lists inside each other."""
-    depth, level = 0, [data]
-    while level := [one for one in level if isinstance(one, (dict, list))]:
-        depth += 1
-        level = [one for holder in level for one in (holder.values() if isinstance(holder, dict) else holder)]
-    return depth
+    """Read a section of the TOML text of a study that a file holds; empty if there is none. Raises as `read_toml`."""
+    section: dict[str, Any] = read_toml(place, text).get(name, {})
+    return section
 
 
 def with_lines(faults: Sequence[Fault], place: str, text: str) -> list[Fault]:
@@ -193,19 +170,8 @@ def validate(
     try:
         return model.model_validate(data, context=context)
     except ValidationError as error:
-        raise InputError(faults(error, model, data, place, prefix, examples)) from error
-
-
-def faults(
-    error: ValidationError,
-    model: type[BaseModel],
-    data: object,
-    place: str,
-    prefix: tuple[int | str, ...] = (),
-    examples: Mapping[str, Any] | None = None,
-) -> list[Fault]:
-    """Translate pydantic's errors of `data` to faults with remedies; see `validate`."""
-    return [_fault(e, model, data, place, prefix, examples or {}) for e in error.errors(include_url=False)]
+        each = error.errors(include_url=False)
+        raise InputError([_fault(e, model, data, place, prefix, examples or {}) for e in each]) from error
 
 
 _REMEDIES = {
@@ -226,12 +192,7 @@ _REMEDIES = {
 
 
 def _fault(
-    e: Any,
-    model: type[BaseModel],
-    data: object,
-    place: str,
-    prefix: tuple[int | str, ...],
-    known: Mapping[str, Any],
+    e: Any, model: type[BaseModel], data: object, place: str, prefix: tuple[int | str, ...], known: Mapping[str, Any]
 ) -> Fault:
     path = dotted((*prefix, *e["loc"]))
     where = f"{place}: {path}" if path else place
@@ -243,7 +204,8 @@ def _fault(
             found, remedy = (text.replace(f"{{{key}}}", written) for text in (found, remedy))
         return Fault(where, found, remedy)
     if e["type"] == "extra_forbidden":
-        return Fault(where, "unknown key", did_you_mean(str(e["loc"][-1]), _keys_at(model, e["loc"][:-1])))
+        keys = [field.alias or name for name, field in _fields_around(model, e["loc"]).items()]
+        return Fault(where, "unknown key", did_you_mean(str(e["loc"][-1]), keys))
     if e["type"] == "missing":
         return Fault(where, "missing key", f"add {path}" + _example(model, e["loc"], known))
     if e["type"] in ("literal_error", "enum"):
@@ -276,41 +238,34 @@ def did_you_mean(word: str, allowed: Sequence[str]) -> str:
     return f"did you mean {spelt[close[0]]!r}?" if close else f"allowed here: {', '.join(allowed) or 'nothing'}"
 
 
-def _keys_at(model: type[BaseModel], location: Sequence[int | str]) -> list[str]:
-    """Names of the keys that `model` allows at a key path; empty where they are not known."""
-    fields = getattr(_model_at(model, location), "model_fields", {})
-    return [f.alias or name for name, f in fields.items()]
-
-
-def _model_at(model: type[BaseModel], location: Sequence[int | str]) -> Any:
-    """Annotation at a key path of `model`; None where it is not known."""
+def _fields_around(model: type[BaseModel], location: Sequence[int | str]) -> dict[str, FieldInfo]:
+    """Fields of the model around the key at a path of `model`, by name; empty where they are not known."""
     current: Any = model
-    for part in location:
-        fields = getattr(current, "model_fields", None)
+    for part in location[:-1]:
         if isinstance(part, int):
             current = next(iter(get_args(current)), None)
-        elif fields is None or part not in fields:
-            return None
+        elif part not in (fields := getattr(current, "model_fields", {})):
+            return {}
         else:
             current = fields[part].annotation
             if NoneType in get_args(current):  # a key that may be left out
                 current = get_args(current)[0]
-    return current
+    return getattr(current, "model_fields", {})
 
 
 def _example(model: type[BaseModel], location: Sequence[int | str], known: Mapping[str, Any]) -> str:
     """How a file writes the key at a path, as its field has it: `` = "22 mm"``; empty where no example is known."""
-    fields = getattr(_model_at(model, location[:-1]), "model_fields", {})
-    examples = next((field.examples for name, field in fields.items() if location[-1] in (name, field.alias)), None)
+    fields = _fields_around(model, location).items()
+    examples = next((field.examples for name, field in fields if location[-1] in (name, field.alias)), None)
     example = examples[0] if examples else known.get(dotted(location))
     if example is None or isinstance(example, (Mapping, list)):
         return ""
     return f", for example {location[-1]} = {json.dumps(example, ensure_ascii=False)}"
 
 
-def described(meaning: str, example: Any, **bounds: Any) -> Any:
-    """Field of a key: its meaning, an example, and bounds as `pydantic.Field` has them."""
-    return Field(description=meaning, examples=[example], **bounds)
+def described(meaning: str, *examples: Any, **others: Any) -> Any:
+    """Field of a key: its meaning, examples, and bounds, defaults and the like as `pydantic.Field` has them."""
+    return Field(description=meaning, examples=list(examples) or None, **others)
 
 
 def whole(least: int, most: int, meaning: str, example: int) -> Any:

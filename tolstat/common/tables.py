@@ -7,7 +7,7 @@ columns of the result file and of every CSV (`columns`). SI units throughout.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from enum import IntEnum
 from itertools import chain
 from typing import Any, NamedTuple
@@ -15,9 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.fields import Field, dtype_of
+from tolstat.common.fields import PARAM_FIELDS, Field, dtype_of
 from tolstat.common.load_kinds import JOINT, LOAD_KINDS, OVER, PINS
-from tolstat.common.parameters import PARAM_FIELDS
 
 SCHEMA_VERSION = 11
 """Version of the result file: raise it with every change of its layout, and so of the fields of errors and results."""
@@ -121,8 +120,7 @@ class Method(IntEnum):
     """Time integration method."""
 
     BDF2 = 0
-    GENERALIZED_ALPHA = 1
-    TR_BDF2 = 2
+    TR_BDF2 = 1
 
 
 class Start(IntEnum):
@@ -164,9 +162,7 @@ class Options(NamedTuple):
     newton_tol: float = 1e-6
     newton_max_iter: int = 12
     max_halvings: int = 16
-    rho_inf: float = 0.8
     rtol: float = 0.0
-    atol: float = 0.0
     fidelity: int = int(Fidelity.DYNAMIC)
     peak_substeps: int = 16
     max_refinements: int = 3
@@ -351,3 +347,18 @@ def without_results(n: int, status: Status) -> NDArray[np.void]:
             results[field.name] = np.nan
     results["status"], results["failed_step"] = status, -1
     return results
+
+
+CODES: dict[str, type[IntEnum]] = {"method": Method, "start": Start, "fidelity": Fidelity}
+"""Options that are names in a study and in a result file."""
+
+
+def to_names(options: Options) -> dict[str, Any]:
+    """Return the options by name, with ``method``, ``start`` and ``fidelity`` as a study writes them."""
+    held = options._asdict()
+    return held | {name: code(held[name]).name.lower() for name, code in CODES.items()}
+
+
+def from_names(held: Mapping[str, Any]) -> Options:
+    """Return the options that `to_names` has written."""
+    return Options(**{k: int(CODES[k][v.upper()]) if k in CODES else v for k, v in held.items()})

@@ -97,7 +97,7 @@ class Sheet:
 Part = Sentence | Table | Panels | Reader | Sheet | Listing | Document
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Answer:
     """The answer to a question.
 
@@ -117,6 +117,10 @@ class Answer:
     title: str
     parts: Sequence[Part]
     facts: Mapping[str, Any] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        names = [f"{kind} {', '.join(held)}" for kind, held in (("frames", self.tables), ("facts", self.facts)) if held]
+        return f"<answer {self.name!r}: {'; '.join([self.title, *names])}>"
 
     @property
     def tables(self) -> dict[str, Table]:
@@ -175,9 +179,12 @@ class Answer:
     def _repr_html_(self) -> str:
         from tolstat.display import html
 
-        items = [
-            (key.replace("_", " "), f"{x:.4g}" if isinstance(x, float) else str(x)) for key, x in self.facts.items()
-        ]
+        def words(value: Any) -> str:
+            if isinstance(value, list | tuple):
+                return ", ".join(map(words, value))
+            return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+        items = [(key.replace("_", " "), words(value)) for key, value in self.facts.items()]
         return html.fragment(self.title, [*self.blocks(), *([Facts(items)] if items else [])])
 
 

@@ -1,13 +1,16 @@
-"""Progress of long work on stderr: a bar on a terminal, otherwise one line a minute."""
+"""Progress of long work: a bar on a terminal or in a notebook, otherwise one line a minute on stderr."""
 
 from __future__ import annotations
 
 import math
+import re
 import sys
 import threading
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Self
+from html import escape
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Self
 
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
@@ -194,7 +197,48 @@ class Bar(Display):
         super()._end()
 
 
+class Cell(Display):
+    """A bar of the current stage in the output of a notebook's cell; that of the joints stays at the end."""
+
+    _output: Any
+
+    def __enter__(self) -> Self:
+        self._bars: dict[str, str] = {}
+        self._output = import_module("IPython.display").display({"text/plain": ""}, raw=True, display_id=True)
+        return self
+
+    def _begin(self) -> None:
+        self._show("<progress></progress>", self._name)
+
+    def __call__(self, counts: Counts) -> None:
+        """Move the bar to `counts`."""
+        super().__call__(counts)
+        self._show(f'<progress max="{counts.total}" value="{counts.done}"></progress>', self.words)
+
+    def _end(self) -> None:
+        if self._name != JOINTS:
+            self._bars.pop(self._name, None)
+            self._update()
+        super()._end()
+
+    def _show(self, bar: str, words: str) -> None:
+        self._bars[self._name] = f"{bar} {escape(words)}"
+        self._update()
+
+    def _update(self) -> None:
+        whole = "".join(f"<div>{line}</div>" for line in self._bars.values())
+        self._output.update({"text/html": whole, "text/plain": re.sub("<[^>]*>", "", whole)}, raw=True)
+
+
+def _in_notebook() -> bool:
+    """Whether a notebook's kernel runs this code."""
+    shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
+    return hasattr(shell, "kernel")
+
+
 def display(tell: Tell = note, detail: Tell = silent, quiet: bool = False) -> Display:
-    """Return the display of progress that suits stderr: a context manager to pass to `campaign.run`."""
-    kind = Display if quiet else Bar if sys.stderr.isatty() else Lines
+    """Return the display of progress that suits stderr, or a notebook: a context manager to pass to `campaign.run`."""
+    if quiet:
+        return Display(tell, detail)
+    kind = Cell if _in_notebook() else Bar if sys.stderr.isatty() else Lines
     return kind(tell, detail)

@@ -11,16 +11,15 @@ from functools import cache
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
-from pydantic import AfterValidator, Field, ValidationInfo, field_validator
+from pydantic import AfterValidator, ValidationInfo, field_validator
 
 from tolstat.analysis.rating_life import A1, critical_amplitude
 from tolstat.common import units
 from tolstat.common.bisection import first
-from tolstat.common.strict import Strict, refuse
+from tolstat.common.strict import Strict, described, refuse
 from tolstat.joint.material import Array
-from tolstat.joint.sections import POSITIVE, Force, Length, Number
+from tolstat.joint.sections import Force, Length, Number
 
-Time = Annotated[units.Time, POSITIVE]
 FOR_LIFE = ("C", "needle_diameter", "pitch_diameter")
 """Keys without which a bearing has no rating life."""
 LEFT_OUT: Any = None
@@ -40,33 +39,24 @@ class Bearing(Strict):
     With the contact law `needles` its `needles` and `needle_length` say how stiff it is; the other keys affect no load.
     """
 
-    needles: Annotated[int, Field(strict=True, ge=3, le=1000, description="needles of one bearing", examples=[32])]
-    needle_length: Annotated[
-        Length, Field(description="length of a needle, needed with law `needles`", examples=["22 mm"])
-    ] = LEFT_OUT
+    needles: Annotated[int, described("needles of one bearing", 32, strict=True, ge=3, le=1000)]
+    needle_length: Annotated[Length, described("length of a needle, needed with law `needles`", "22 mm")] = LEFT_OUT
     C: Annotated[
-        Force,
-        Field(
-            description="basic dynamic load rating of one bearing (ISO 281), needed for the life", examples=["30 kN"]
-        ),
+        Force, described("basic dynamic load rating of one bearing (ISO 281), needed for the life", "30 kN")
     ] = LEFT_OUT
-    needle_diameter: Annotated[
-        Length, Field(description="diameter of a needle, needed for the life", examples=["4 mm"])
-    ] = LEFT_OUT
+    needle_diameter: Annotated[Length, described("diameter of a needle, needed for the life", "4 mm")] = LEFT_OUT
     pitch_diameter: Annotated[
-        Length,
-        Field(description="diameter of the circle of the needles' axes, needed for the life", examples=["42 mm"]),
+        Length, described("diameter of the circle of the needles' axes, needed for the life", "42 mm")
     ] = LEFT_OUT
     required_life: Annotated[
-        Time | None, Field(description="life that all four bearings of a joint must reach", examples=["5000 h"])
+        units.Time | None, described("life that all four bearings of a joint must reach", "5000 h")
     ] = None
     reliability: Annotated[
         Annotated[units.Number, AfterValidator(_tabulated)],
-        Field(description="share of equal joints that reach their rating life", examples=["95 %"]),
+        described("share of equal joints that reach their rating life", "95 %"),
     ] = 0.9
     a_iso: Annotated[
-        Number | None,
-        Field(description="life modification factor for lubrication and contamination (ISO 281)", examples=[0.8]),
+        Number | None, described("life modification factor for lubrication and contamination (ISO 281)", 0.8)
     ] = None
 
     @field_validator("pitch_diameter")

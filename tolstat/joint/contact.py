@@ -14,24 +14,12 @@ import numpy as np
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator
 
 from tolstat.common import units
-from tolstat.common.parameters import MAX_STATIONS
-from tolstat.common.strict import Strict, refuse
+from tolstat.common.fields import MAX_STATIONS
+from tolstat.common.strict import Strict, described, refuse
+from tolstat.common.units import NOT_NEGATIVE, Damping, Diameter, QuadraticStiffness
 from tolstat.joint.bearing import Bearing, fit_needles
 from tolstat.joint.material import Array
-from tolstat.joint.sections import (
-    FOLLOWS,
-    NOT_NEGATIVE,
-    Diameter,
-    Force,
-    Length,
-    Number,
-    Ratio,
-    Stiffness,
-    follows,
-)
-
-QuadraticStiffness = Annotated[units.QuadraticStiffness, NOT_NEGATIVE]
-Damping = Annotated[units.Damping, NOT_NEGATIVE]
+from tolstat.joint.sections import FOLLOWS, Force, Length, Number, Ratio, Stiffness, follows
 
 
 class Stations(NamedTuple):
@@ -70,16 +58,11 @@ class Station(Strict):
 
     s_over_z: Annotated[
         Annotated[units.Number, AfterValidator(_check_position)],
-        Field(description="place along the contact, from -0.5 (inner end) to 0.5 (outer end)", examples=[0.5]),
+        described("place along the contact, from -0.5 (inner end) to 0.5 (outer end)", 0.5),
     ]
-    k1: Annotated[
-        QuadraticStiffness, Field(description="quadratic coefficient of the force", examples=["1.6e6 N/mm^2"])
-    ]
-    k2: Annotated[
-        Annotated[units.Stiffness, NOT_NEGATIVE],
-        Field(description="linear coefficient of the force", examples=["1.8e5 N/mm"]),
-    ]
-    weight: Annotated[Ratio, Field(description="weight of damping `c_d` and film `c_t`", examples=[1.0])]
+    k1: Annotated[QuadraticStiffness, described("quadratic coefficient of the force", "1.6e6 N/mm^2")]
+    k2: Annotated[Annotated[units.Stiffness, NOT_NEGATIVE], described("linear coefficient of the force", "1.8e5 N/mm")]
+    weight: Annotated[Ratio, described("weight of damping `c_d` and film `c_t`", 1.0)]
 
 
 def _check_stations(stations: tuple[Station, ...] | None) -> tuple[Station, ...] | None:
@@ -119,26 +102,24 @@ class Law(NamedTuple):
 
 def _mode(contact: Contact, bearing: Bearing | None) -> Stations:
     k1u, k2u, k1p, k2p = contact.coefficients()
-    ends = contact.ends()
-    return Stations(
-        np.array([ends[0], 0.0, ends[1]]),
-        np.array([k1p, max(k1u - 2.0 * k1p, 0.0), k1p]),
-        np.array([k2p, max(k2u - 2.0 * k2p, 0.0), k2p]),
-        np.zeros(3),
-        np.array([1.0, 0.0, 1.0]),
-    )
+    x = np.array([1.0, 0.0, -1.0])
+    k1 = np.array([k1p, max(k1u - 2.0 * k1p, 0.0), k1p])
+    k2 = np.array([k2p, max(k2u - 2.0 * k2p, 0.0), k2p])
+    return Stations(0.5 * contact.z * x, k1, k2, np.zeros(3), np.abs(x))
 
 
 def _uniform(contact: Contact, bearing: Bearing | None) -> Stations:
     k1u, k2u, _, _ = contact.coefficients()
-    weight = np.ones(2)
-    return Stations(contact.ends(), 0.5 * k1u * weight, 0.5 * k2u * weight, 0.0 * weight, weight)
+    return _weighted(contact.ends(), np.ones(2), 0.5 * k1u, 0.5 * k2u)
 
 
 def _point(contact: Contact, bearing: Bearing | None) -> Stations:
     _, _, k1p, k2p = contact.coefficients()
-    weight = np.ones(2)
-    return Stations(contact.ends(), k1p * weight, k2p * weight, 0.0 * weight, weight)
+    return _weighted(contact.ends(), np.ones(2), k1p, k2p)
+
+
+def _weighted(s: Array, weight: Array, k1: float, k2: float) -> Stations:
+    return Stations(s, k1 * weight, k2 * weight, 0.0 * weight, weight)
 
 
 def _slices(contact: Contact) -> tuple[Array, Array]:
@@ -151,7 +132,7 @@ def _slices(contact: Contact) -> tuple[Array, Array]:
 def _sliced(contact: Contact, bearing: Bearing | None) -> Stations:
     k1u, k2u, _, _ = contact.coefficients()
     x, weight = _slices(contact)
-    return Stations(0.5 * contact.z * x, 0.5 * k1u * weight, 0.5 * k2u * weight, 0.0 * weight, weight)
+    return _weighted(0.5 * contact.z * x, weight, 0.5 * k1u, 0.5 * k2u)
 
 
 def _needles(contact: Contact, bearing: Bearing | None) -> Stations:
@@ -166,13 +147,8 @@ def _needles(contact: Contact, bearing: Bearing | None) -> Stations:
 def _given(contact: Contact, bearing: Bearing | None) -> Stations:
     assert contact.stations is not None
     stations = sorted(contact.stations, key=lambda station: -station.s_over_z)
-    return Stations(
-        contact.z * np.array([station.s_over_z for station in stations]),
-        np.array([station.k1 for station in stations]),
-        np.array([station.k2 for station in stations]),
-        np.zeros(len(stations)),
-        np.array([station.weight for station in stations]),
-    )
+    s, k1, k2, weight = np.array([[x.s_over_z, x.k1, x.k2, x.weight] for x in stations]).T
+    return Stations(contact.z * s, k1, k2, np.zeros(len(stations)), weight)
 
 
 DEFAULT, GIVEN = "mode", "stations"
@@ -233,42 +209,40 @@ class Contact(Strict):
     Of `D_H`, `D_P` and `clearance` two define the third.
     """
 
-    law: Annotated[LawName, Field(description="set of contact stations, see the contact laws of the joint model")]
-    n_stations: Annotated[int, Field(strict=True, ge=1, le=MAX_STATIONS)] | None = Field(
-        default=None, validate_default=True, description="stations of a pin, for laws `sliced` and `needles`"
+    law: Annotated[LawName, described("set of contact stations, see the contact laws of the joint model")]
+    n_stations: Annotated[int, Field(strict=True, ge=1, le=MAX_STATIONS)] | None = described(
+        "stations of a pin, for laws `sliced` and `needles`", default=None, validate_default=True
     )
-    stations: Annotated[tuple[Station, ...] | None, AfterValidator(_check_stations)] = Field(
+    stations: Annotated[tuple[Station, ...] | None, AfterValidator(_check_stations)] = described(
+        "stations of one's own, for law `stations`",
+        [{"s_over_z": 0.5, "k1": "1.6e6 N/mm^2", "k2": "1.8e5 N/mm", "weight": 1.0}],
         default=None,
         validate_default=True,
-        description="stations of one's own, for law `stations`",
-        examples=[[{"s_over_z": 0.5, "k1": "1.6e6 N/mm^2", "k2": "1.8e5 N/mm", "weight": 1.0}]],
     )
     D_H: Annotated[Diameter, follows("contact.D_H", "diameter of the hole")] = FOLLOWS
     D_P: Annotated[Diameter, follows("contact.D_P", "diameter of the pin in the hole, not above `D_H`")] = FOLLOWS
     clearance: Annotated[
-        units.Length,
-        NOT_NEGATIVE,
-        follows("contact.clearance", "radial clearance of the pin in its hole", "0.1 mm"),
+        units.Length, NOT_NEGATIVE, follows("contact.clearance", "radial clearance of the pin in its hole", "0.1 mm")
     ] = FOLLOWS
-    z: Annotated[Length, Field(description="length of the contact")]
+    z: Annotated[Length, described("length of the contact")]
     k1u: Annotated[QuadraticStiffness, follows("contact.k1u", "quadratic coefficient of uniform contact")] = FOLLOWS
     k2u: Annotated[Stiffness, follows("contact.k2u", "linear coefficient of uniform contact")] = FOLLOWS
     k1p: Annotated[QuadraticStiffness, follows("contact.k1p", "quadratic coefficient of point contact")] = FOLLOWS
     k2p: Annotated[Stiffness, follows("contact.k2p", "linear coefficient of point contact")] = FOLLOWS
-    H: Number | None = Field(
+    H: Number | None = described(
+        "displacement in point contact over that in uniform contact at the same force",
         default=None,
         validate_default=True,
-        description="displacement in point contact over that in uniform contact at the same force",
     )
-    fit_load: Force | None = Field(
-        default=None, validate_default=True, description="largest load of the fit of k1u and k2u, or of that to needles"
+    fit_load: Force | None = described(
+        "largest load of the fit of k1u and k2u, or of that to needles", default=None, validate_default=True
     )
     c_d: Annotated[Damping, follows("contact.c_d", "damping of a station")] = FOLLOWS
-    xi: Ratio | None = Field(default=None, description="damping ratio of the contact, from which c_d follows")
+    xi: Ratio | None = described("damping ratio of the contact, from which c_d follows", default=None)
     c_t: Annotated[
-        Damping, Field(description="damping by the lubricant across the clearance; without it a pin whirls for ever")
+        Damping, described("damping by the lubricant across the clearance; without it a pin whirls for ever")
     ]
-    delta_d: Annotated[Length, Field(description="penetration over which contact damping rises to its full value")]
+    delta_d: Annotated[Length, described("penetration over which contact damping rises to its full value")]
 
     @field_validator("D_P")
     @classmethod
@@ -278,29 +252,16 @@ class Contact(Strict):
             raise refuse("a pin of {D_P} does not fit into a hole of {D_H}", "give D_P <= D_H", "D_P", "D_H")
         return value
 
-    @field_validator(*COEFFICIENTS)
+    @field_validator(GIVEN, *COEFFICIENTS)
     @classmethod
-    def _without_stations(cls, value: object, info: ValidationInfo) -> object:
-        if value is not None and info.data.get("law") == GIVEN:
-            raise refuse('has no effect with law = "stations"', "remove it: each station has its own coefficients")
-        return value
-
-    @field_validator("stations")
-    @classmethod
-    def _of_their_law(cls, value: object, info: ValidationInfo) -> object:
-        law = info.data.get("law", GIVEN)  # an invalid law has a fault of its own
-        if value is not None and law != GIVEN:
-            raise refuse(f'has no effect with law = "{law}"', 'write law = "stations"')
-        return value
-
-    @field_validator(*dict.fromkeys(key for law in LAWS.values() for key in law.needs))
-    @classmethod
-    def _needed(cls, value: object, info: ValidationInfo) -> object:
-        law = info.data.get("law")
-        if value is None and law is not None and info.field_name in LAWS[law].needs:
-            raise refuse(
-                f'missing key, needed with law = "{law}"', f'add {info.field_name}, or write law = "{DEFAULT}"'
-            )
+    def _of_law(cls, value: object, info: ValidationInfo) -> object:
+        """Refuse a key that the law does not use, or needs and lacks; an invalid law has a fault of its own."""
+        law, key = info.data.get("law"), str(info.field_name)
+        if law is not None and value is None and key in LAWS[law].needs:
+            raise refuse(f'missing key, needed with law = "{law}"', f'add {key}, or write law = "{DEFAULT}"')
+        if law is not None and value is not None and (key == GIVEN) != (law == GIVEN):
+            remedy = 'write law = "stations"' if key == GIVEN else "remove it: each station has its own coefficients"
+            raise refuse(f'has no effect with law = "{law}"', remedy)
         return value
 
     @field_validator("k1p", "k2p")

@@ -63,18 +63,9 @@ class Rule(NamedTuple):
         return any(all(get(joint, of) is not None for of in keys) for keys in self.enough or (self.follows,))
 
 
-def _beam(name: str, body: str) -> Rule:
+def _beam(body: str, modulus: str, section: str, length: str) -> Rule:
     """Rule of a stiffness of a bushing: that of a pin or arm as a beam along z, lumped at its end, eqs. (9)-(11)."""
-    length, about_x, about_y = ("l", "J", "J") if body == "pin" else ("l_f", "Jx", "Jy")
-    modulus, section = {
-        "k_x": ("G", "A"),
-        "k_y": ("G", "A"),
-        "k_z": ("E", "A"),
-        "k_bx": ("E", about_x),
-        "k_by": ("E", about_y),
-        "k_tz": ("G", "Jp"),
-    }[name]
-    is_shear = name in ("k_x", "k_y")
+    is_shear = (modulus, section) == ("G", "A")
 
     def value(joint: Any) -> float:
         part = getattr(joint, body)
@@ -88,14 +79,14 @@ def _beam(name: str, body: str) -> Rule:
 
 def _section(name: str, unit: str, of_round: str, of_rectangular: str) -> Rule:
     """Rule of a property of the arms' section, that of a circle or that of a rectangle: `A`, `Jx` or `Jy`."""
-    place = ("A", "Jx", "Jy").index(name)
+    index = ("A", "Jx", "Jy").index(name)
 
     def value(joint: Any) -> float:
         arm = joint.arm
         if arm.d is None:
-            return material.rectangle(arm.width, arm.depth)[place]
+            return material.rectangle(arm.width, arm.depth)[index]
         A, J = material.circle(arm.d)
-        return (A, J, J)[place]
+        return (A, J, J)[index]
 
     formula = f"{of_rectangular}, of a round arm {of_round}"
     return Rule((*ROUND, *RECTANGULAR), formula, value, unit, enough=(ROUND, RECTANGULAR))
@@ -107,20 +98,16 @@ def _pin_diameter(joint: Any) -> float:
     return float(joint.pin.d if one_left_out else of.D_H - 2.0 * of.clearance)
 
 
-def _hub(joint: Any) -> tuple[float, tuple[float, float, float]] | None:
+def _hub(joint: Any) -> tuple[float | None, tuple[float, ...]]:
+    """Mass and inertia of the hub; None where its pins overlap."""
     if not 2.0 * joint.cross.r_b > joint.pin.d:
-        return None
+        return None, ()
     return material.crossed_cylinders(joint.material.rho, joint.pin.d, 2.0 * joint.cross.r_b)
 
 
-def _hub_mass(joint: Any) -> float | None:
-    hub = _hub(joint)
-    return None if hub is None else hub[0]
-
-
 def _hub_inertia(joint: Any) -> tuple[float, ...] | None:
-    hub = _hub(joint)
-    return None if hub is None else tuple(joint.hub.mass / hub[0] * moment for moment in hub[1])
+    mass, inertia = _hub(joint)
+    return None if mass is None else tuple(joint.hub.mass / mass * moment for moment in inertia)
 
 
 def fitted_load(steel: Any, contact: Any) -> float:
@@ -192,22 +179,22 @@ DERIVED: dict[str, Rule] = {
         "kg*m^2",
     ),
     "cross.r_b": Rule(("cross.R", "pin.l"), "R - pin.l", lambda j: j.cross.R - j.pin.l, "m"),
-    "hub.mass": Rule(("material.rho", "pin.d", "cross.r_b"), _CYLINDERS, _hub_mass, "kg", stays=True),
+    "hub.mass": Rule(("material.rho", "pin.d", "cross.r_b"), _CYLINDERS, lambda j: _hub(j)[0], "kg", stays=True),
     "hub.inertia": Rule(
         ("hub.mass", "pin.d", "cross.r_b"), f"{_CYLINDERS}, of this mass", _hub_inertia, "kg*m^2", stays=True
     ),
-    "bushing.cross.k_x": _beam("k_x", "pin"),
-    "bushing.cross.k_y": _beam("k_y", "pin"),
-    "bushing.cross.k_z": _beam("k_z", "pin"),
-    "bushing.cross.k_bx": _beam("k_bx", "pin"),
-    "bushing.cross.k_by": _beam("k_by", "pin"),
-    "bushing.cross.k_tz": _beam("k_tz", "pin"),
-    "bushing.fork.k_x": _beam("k_x", "arm"),
-    "bushing.fork.k_y": _beam("k_y", "arm"),
-    "bushing.fork.k_z": _beam("k_z", "arm"),
-    "bushing.fork.k_bx": _beam("k_bx", "arm"),
-    "bushing.fork.k_by": _beam("k_by", "arm"),
-    "bushing.fork.k_tz": _beam("k_tz", "arm"),
+    "bushing.cross.k_x": _beam("pin", "G", "A", "l"),
+    "bushing.cross.k_y": _beam("pin", "G", "A", "l"),
+    "bushing.cross.k_z": _beam("pin", "E", "A", "l"),
+    "bushing.cross.k_bx": _beam("pin", "E", "J", "l"),
+    "bushing.cross.k_by": _beam("pin", "E", "J", "l"),
+    "bushing.cross.k_tz": _beam("pin", "G", "Jp", "l"),
+    "bushing.fork.k_x": _beam("arm", "G", "A", "l_f"),
+    "bushing.fork.k_y": _beam("arm", "G", "A", "l_f"),
+    "bushing.fork.k_z": _beam("arm", "E", "A", "l_f"),
+    "bushing.fork.k_bx": _beam("arm", "E", "Jx", "l_f"),
+    "bushing.fork.k_by": _beam("arm", "E", "Jy", "l_f"),
+    "bushing.fork.k_tz": _beam("arm", "G", "Jp", "l_f"),
     "contact.D_P": Rule(
         ("pin.d",), "D_H - 2 clearance, or pin.d where D_H or clearance is left out", _pin_diameter, "m", stays=True
     ),
@@ -241,39 +228,33 @@ DERIVED: dict[str, Rule] = {
 """Keys that follow from others, each after those that it follows from (but for a bearing's)."""
 
 
-def changed(given: Set[str], held: Collection[str]) -> set[str]:
-    """Keys with another value than before when a joint file with the keys `held` is overridden by the keys `given`.
+def changed(given: Set[str], in_file: Collection[str]) -> set[str]:
+    """Keys with another value than before when a joint file with the keys `in_file` is overridden by the keys `given`.
 
     They contain `given`; the others follow from them.
     """
     keys = set(given)
     for key, rule in DERIVED.items():
-        if key not in keys and not (rule.stays and key in held) and keys.intersection(rule.follows):
+        if key not in keys and not (rule.stays and key in in_file) and keys.intersection(rule.follows):
             keys.add(key)
     return keys
 
 
-def replaced(given: Collection[str], held: Collection[str]) -> set[str]:
-    """Keys among `held` that give way to `given` ones of the same bearing or section.
+def replaced(given: Collection[str], in_file: Collection[str]) -> set[str]:
+    """Keys among `in_file` that give way to `given` ones of the same bearing or section.
 
     Of a bearing two of three keys define it; the section of an arm is round or rectangular.
     """
     new = set(given).intersection(BEARING)
     hole, pin, clearance = BEARING
+    third = {clearance: pin, pin: clearance} if hole in in_file else {hole: clearance}
+    away = {third[key] for key in new & third.keys()}
     if len(new) > 1 or (new == {clearance} and "pin.d" in given):
         away = set(BEARING)
-    elif new == {clearance}:
-        away = {pin} if hole in held else set()
-    elif new == {pin}:
-        away = {clearance} if hole in held else set()
-    elif new == {hole}:
-        away = set() if hole in held else {clearance}
-    else:
-        away = set()
     for section, other in ((ROUND, RECTANGULAR), (RECTANGULAR, ROUND)):
         if set(section).intersection(given):
             away.update(other)
-    return (away - set(given)).intersection(held)
+    return (away - set(given)).intersection(in_file)
 
 
 UNITS = {key: rule.unit for key, rule in DERIVED.items()} | {"pin.d": "m"}
@@ -347,9 +328,8 @@ def expected(joint: Any, given: Set[str], changed: Set[str], stay: Set[str]) -> 
         Key to SI value, words that say what gives it, and the key that may be given instead, or nothing.
     """
     disagreeing: dict[str, Any] = {}
-    hub = _hub(joint)
-    if hub is not None and changed & {*DERIVED["hub.mass"].follows, "hub.mass"}:
-        mass, inertia = hub
+    mass, inertia = _hub(joint)
+    if mass is not None and changed & {*DERIVED["hub.mass"].follows, "hub.mass"}:
         ratio = joint.hub.mass / mass if "hub.mass" in changed else 1.0
         values = {"hub.mass": mass, "hub.inertia": tuple(ratio * moment for moment in inertia)}
         disagreeing |= {key: (value, f"{_CYLINDERS}, give", "") for key, value in values.items() if key in stay}

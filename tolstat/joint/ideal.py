@@ -1,7 +1,6 @@
 """Closed forms of the ideal joint: no errors, clearance or elasticity; inertia in `loads` and `reversal_torque` only.
 
-Reference of tests and baseline of reports. Source: Seherr-Thoss, Schmelz, Aucktor (2006), Universal Joints and
-Driveshafts, ch. 4; Cirelli et al. (2021), eq. (2).
+Source: Seherr-Thoss, Schmelz, Aucktor (2006), Universal Joints and Driveshafts, ch. 4; Cirelli et al. (2021), eq. (2).
 """
 
 from __future__ import annotations
@@ -50,43 +49,6 @@ def output_angle(theta: ArrayLike, alpha: ArrayLike) -> Array:
     theta = np.asarray(theta, float)
     advance = np.sin(theta) * np.cos(theta) * (1 - np.cos(alpha))
     return np.asarray(theta + np.arctan2(advance, np.cos(theta) ** 2 * np.cos(alpha) + np.sin(theta) ** 2))
-
-
-def cross_angle(theta: ArrayLike, alpha: float) -> Array:
-    """Rotation beta of the cross in the input fork, tan(beta) = tan(alpha) sin(theta), rad."""
-    return np.asarray(np.arctan(np.tan(alpha) * np.sin(theta)))
-
-
-def cross_couple(theta: ArrayLike, alpha: float, torque: float) -> Array:
-    """Couple that the forks exert on the cross about its normal when the output carries a constant torque.
-
-    Frictionless pins transmit no moment about their own axes, so input and output couples both lie along the normal
-    of the cross; its component along the output shaft is the torque: M = T / cos(gamma), sin(gamma) = sin(alpha)
-    cos(theta). It runs between T and T / cos(alpha).
-
-    Parameters
-    ----------
-    theta : array_like
-        Input angle, rad.
-    alpha : float
-        Misalignment, rad.
-    torque : float
-        Output torque, N m.
-
-    Returns
-    -------
-    ndarray
-        N m, same shape as `theta`.
-    """
-    return np.asarray(torque / np.sqrt(1 - (np.sin(alpha) * np.cos(theta)) ** 2))
-
-
-def pin_force(theta: ArrayLike, alpha: float, torque: float, radius: float) -> Array:
-    """Force on each pin when the couple acts at `radius` (m) from the centre: M / (2 radius), N.
-
-    Other parameters as in `cross_couple`.
-    """
-    return cross_couple(theta, alpha, torque) / (2 * radius)
 
 
 def reversal_torque(params: NDArray[np.void]) -> Array:
@@ -179,9 +141,9 @@ def loads(theta: ArrayLike, par: NDArray[np.void]) -> tuple[Array, Array]:
     Each pin touches the outer end of its hole, R + z/2 from the centre (R + the outermost station's distance with the
     law ``sliced``), as it does once the cross has turned through its clearance; without clearance both ends touch and
     the force acts closer to the centre. The inertial loads of the ideal motion are included: centrifugal loads, the
-    couple that moves the cross, inertia of the output shaft and its arms. Without them the loads are the forces of
-    `pin_force` and, in the forks' axes, the secondary couples, up to T sin(alpha) on the input side and T tan(alpha)
-    on the output side.
+    couple that moves the cross, inertia of the output shaft and its arms. Without them each pin takes M / (2 R) of the
+    couple M = T / cos(gamma), sin(gamma) = sin(alpha) cos(theta); in the forks' axes there are secondary couples, up to
+    T sin(alpha) on the input side and T tan(alpha) on the output side.
 
     Parameters
     ----------
@@ -203,16 +165,16 @@ def loads(theta: ArrayLike, par: NDArray[np.void]) -> tuple[Array, Array]:
     InputError
         See `check`.
     """
-    from tolstat.common.tables import Options
     from tolstat.kernel.mechanics.ideal_loads import ideal_loads
-    from tolstat.kernel.revolution.simulate import make_scratch
+    from tolstat.kernel.mechanics.topology import N_DOF
+    from tolstat.kernel.mechanics.work import WORK
 
     check(par)
     angles = np.atleast_1d(np.asarray(theta, float))
     row: Any = par.view(np.recarray)[0]
-    work, state, *_ = make_scratch(Options())
+    work, at_rest = np.zeros(1, WORK).view(np.recarray)[0], np.zeros(N_DOF)
     load, contact = np.empty((angles.size, 8, 6)), np.empty((angles.size, 4))
     for i, angle in enumerate(angles):
-        ideal_loads(angle, row, state, work)
+        ideal_loads(angle, at_rest, row, work)
         load[i], contact[i] = work.load, work.contact[:, 0]
     return load, contact

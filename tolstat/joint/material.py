@@ -174,9 +174,9 @@ def crossed_cylinders(rho: float, d: float, length: float) -> tuple[float, tuple
         About x, y, z through the middle (kg*m^2).
     """
     r = 0.5 * d
-    one = rho * circle(d)[0] * length
-    along, across, _ = cylinder_inertia(one, d, length)
+    cylinder = rho * circle(d)[0] * length
+    along, across, _ = cylinder_inertia(cylinder, d, length)
     # the part that both have in common: |x| and |y| up to sqrt(r^2 - z^2)
     common, flat, upright = rho * 16.0 / 3.0 * r**3, rho * 112.0 / 45.0 * r**5, rho * 128.0 / 45.0 * r**5
     in_plane = along + across - flat
-    return 2.0 * one - common, (in_plane, in_plane, 2.0 * across - upright)
+    return 2.0 * cylinder - common, (in_plane, in_plane, 2.0 * across - upright)

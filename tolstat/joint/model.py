@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import BaseModel, Field, ValidationInfo, field_validator
 
 from tolstat.common.errors import Fault
-from tolstat.common.strict import Strict, refuse
+from tolstat.common.strict import Strict, described, refuse
 from tolstat.joint import derived
 from tolstat.joint.bearing import Bearing
 from tolstat.joint.contact import COEFFICIENTS, LAWS, Contact
@@ -28,7 +28,7 @@ def affects_results(key: str, law: str | None = None) -> bool:
     """Whether a dotted key of a joint affects results of its simulation with a contact law; None: with any."""
     section, _, name = key.partition(".")
     laws = LAWS.values() if law is None else [LAWS[law]]
-    return section not in TOLD and (section != "bearing" or any(name in one.of_bearing for one in laws))
+    return section not in TOLD and (section != "bearing" or any(name in with_law.of_bearing for with_law in laws))
 
 
 def affecting_results(given: Mapping[str, Any]) -> dict[str, Any]:
@@ -40,21 +40,17 @@ def affecting_results(given: Mapping[str, Any]) -> dict[str, Any]:
 class Assumed(Strict):
     """Keys of the joint whose values are assumed, and other values that they may have; affects no result."""
 
-    name: Annotated[str, Field(min_length=1, description="what is assumed, as a noun", examples=["contact law"])]
+    name: Annotated[str, described("what is assumed, as a noun", "contact law", min_length=1)]
     values: Annotated[
         tuple[Annotated[dict[str, Any], Field(min_length=1, json_schema_extra={"x-table": "keys"})], ...],
-        Field(
+        described(
+            "other values, each some keys of the joint, with those that follow from them and are to stay",
+            [{"contact": {"law": "sliced"}}, {"contact": {"law": "uniform"}}],
             min_length=1,
-            description="other values, each some keys of the joint, with those that follow from them and are to stay",
-            examples=[[{"contact": {"law": "sliced"}}, {"contact": {"law": "uniform"}}]],
         ),
     ]
-    because: Annotated[
-        str, Field(min_length=1, description="why the value is not known", examples=["no drawing gives it"])
-    ]
-    varied: Annotated[
-        bool, Field(strict=True, description="whether it is varied unless it is asked for by name", examples=[False])
-    ] = True
+    because: Annotated[str, described("why the value is not known", "no drawing gives it", min_length=1)]
+    varied: Annotated[bool, described("whether it is varied unless it is asked for by name", False, strict=True)] = True
 
 
 class Joint(Strict):
@@ -64,7 +60,7 @@ class Joint(Strict):
     """
 
     description: Annotated[
-        str, Field(description="text about the joint, copied to result files", examples=["gearbox A, drawing 4711"])
+        str, described("text about the joint, copied to result files", "gearbox A, drawing 4711")
     ] = ""
     material: Material
     pin: Pin
@@ -76,17 +72,17 @@ class Joint(Strict):
     contact: Contact
     bearing: Annotated[
         Bearing | None,
-        Field(
-            validate_default=True,
-            description='Needle bearing of each pin: with `law = "needles"` and `n_stations` of the contact, `needles` '
+        described(
+            'Needle bearing of each pin: with `law = "needles"` and `n_stations` of the contact, `needles` '
             "and `needle_length` say how stiff it is; other keys are for its rating life and affect no load",
+            validate_default=True,
         ),
     ] = None
     assumed: Annotated[
         tuple[Assumed, ...],
-        Field(
-            description="values of the joint that nobody measured, a table `[[assumed]]` each",
-            examples=[[{"name": "H", "values": [{"contact": {"H": 3.0}}], "because": "no drawing gives it"}]],
+        described(
+            "values of the joint that nobody measured, a table `[[assumed]]` each",
+            [{"name": "H", "values": [{"contact": {"H": 3.0}}], "because": "no drawing gives it"}],
         ),
     ] = ()
     _inherited: tuple[Fault, ...] = ()
@@ -98,8 +94,8 @@ class Joint(Strict):
         """Fill in the keys that follow from others; refuse a section that lacks one which does not."""
         name = str(info.field_name)
         section = derived.completed(name, value, info.data)
-        own = isinstance(section, Contact) and not LAWS[section.law].from_coefficients
-        exempt = [f"contact.{key}" for key in COEFFICIENTS] if own else []
+        without_coefficients = isinstance(section, Contact) and not LAWS[section.law].from_coefficients
+        exempt = [f"contact.{key}" for key in COEFFICIENTS] if without_coefficients else []
         lacking = derived.missing(name, section, info.data, exempt)
         if lacking:
             raise refuse(*_lacking(lacking, section))
@@ -115,29 +111,18 @@ class Joint(Strict):
     @field_validator("contact")
     @classmethod
     def _bears(cls, value: Contact, info: ValidationInfo) -> Contact:
-        """Refuse diameters that do not go together."""
-        if "pin" not in info.data:
-            return value
-        if abs(0.5 * (value.D_H - value.D_P) - value.clearance) > 1e-9:
-            raise refuse("D_H, D_P and clearance contradict each other", "remove one of the three")
-        if not 0.0 < value.D_P <= value.D_H:
-            raise refuse(*NO_FIT)
-        return value
+        """Refuse a pin that does not bear in its hole, or contact that does not stiffen up to any load.
 
-    @field_validator("contact")
-    @classmethod
-    def _beside_the_centre(cls, value: Contact, info: ValidationInfo) -> Contact:
+        Record the load up to which eq. (3) was fitted.
+        """
         cross = info.data.get("cross")
+        if "pin" in info.data and abs(0.5 * (value.D_H - value.D_P) - value.clearance) > 1e-9:
+            raise refuse("D_H, D_P and clearance contradict each other", "remove one of the three")
+        if "pin" in info.data and not 0.0 < value.D_P <= value.D_H:
+            raise refuse(*NO_FIT)
         if cross is not None and value.z >= 2.0 * cross.R:
-            keys = ("contact.z", "cross.R")
             remedy = "give contact.z < 2 cross.R, where cross.R = {cross.R}"
-            raise refuse("z = {contact.z} reaches past the joint centre", remedy, *keys)
-        return value
-
-    @field_validator("contact")
-    @classmethod
-    def _stiffens(cls, value: Contact, info: ValidationInfo) -> Contact:
-        """Record the load up to which eq. (3) was fitted; refuse contact that does not stiffen up to any."""
+            raise refuse("z = {contact.z} reaches past the joint centre", remedy, "contact.z", "cross.R")
         if not LAWS[value.law].from_coefficients or not info.data.keys() >= {"material", "pin"}:
             return value
         k1u, k2u, k1p, k2p = value.coefficients()

@@ -12,12 +12,12 @@ from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, BeforeValidator, Field, model_validator
+from pydantic import AfterValidator, BeforeValidator, model_validator
 from pydantic_core import PydanticCustomError
 
 from tolstat.common import units
-from tolstat.common.parameters import MAX_ORDERS
-from tolstat.common.strict import Strict, refuse
+from tolstat.common.fields import MAX_ORDERS
+from tolstat.common.strict import Strict, described, refuse
 
 MAX_GIVEN = 16
 """Maximum number of orders of the speed, and of the torque, that a study gives."""
@@ -34,23 +34,15 @@ class Order(Strict):
     """One order: its number, and the phase of its wave."""
 
     n: Annotated[
-        int,
-        BeforeValidator(_check_whole),
-        Field(strict=True, ge=1, description="waves in a revolution of the input shaft", examples=[2]),
+        int, BeforeValidator(_check_whole), described("waves in a revolution of the input shaft", 2, strict=True, ge=1)
     ]
-    phase: Annotated[
-        units.Angle, Field(description="phase of the wave where the mean input angle is zero", examples=["30 deg"])
-    ] = 0.0
+    phase: Annotated[units.Angle, described("phase of the wave where the mean input angle is zero", "30 deg")] = 0.0
 
 
 class TorqueOrder(Order):
     """Order of the resisting torque, amplitude cos(n phase + q)."""
 
-    amplitude: Annotated[
-        units.Torque,
-        AfterValidator(units.positive),
-        Field(description="amplitude of the resisting torque", examples=["40 N*m"]),
-    ]
+    amplitude: Annotated[units.Torque, units.POSITIVE, described("amplitude of the resisting torque", "40 N*m")]
 
 
 class SpeedOrder(Order):
@@ -58,8 +50,8 @@ class SpeedOrder(Order):
 
     amplitude: Annotated[
         units.Angle,
-        AfterValidator(units.positive),
-        Field(description='amplitude of the input angle, or of the speed as a share of it: "2 %"', examples=["1 deg"]),
+        units.POSITIVE,
+        described('amplitude of the input angle, or of the speed as a share of it: "2 %"', "1 deg"),
     ]
 
     @model_validator(mode="before")
@@ -96,12 +88,12 @@ SpeedOrders = Annotated[
     tuple[SpeedOrder, ...],
     AfterValidator(_check_numbers),
     AfterValidator(_check_turning),
-    Field(max_length=MAX_GIVEN, description="orders of the speed, { n, amplitude, phase } each"),
+    described("orders of the speed, { n, amplitude, phase } each", max_length=MAX_GIVEN),
 ]
 TorqueOrders = Annotated[
     tuple[TorqueOrder, ...],
     AfterValidator(_check_numbers),
-    Field(max_length=MAX_GIVEN, description="orders of the resisting torque, { n, amplitude, phase } each"),
+    described("orders of the resisting torque, { n, amplitude, phase } each", max_length=MAX_GIVEN),
 ]
 
 

@@ -12,11 +12,11 @@ from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator
 
 from tolstat.common import units
-from tolstat.common.parameters import MAX_ORDERS
-from tolstat.common.strict import Strict, refuse
+from tolstat.common.fields import MAX_ORDERS
+from tolstat.common.strict import Strict, described, refuse
 from tolstat.joint import ideal
 from tolstat.joint.material import Array
 
@@ -40,40 +40,36 @@ class Partner(Strict):
 
     position: Annotated[
         Literal["before", "after"],
-        Field(
-            description="where the partner is: before this joint, towards the input, or after it", examples=["after"]
-        ),
+        described("where the partner is: before this joint, towards the input, or after it", "after"),
     ]
     alpha: Annotated[
         units.Angle,
         AfterValidator(check_misalignment),
-        Field(description="misalignment of the partner, below 90 deg", examples=["12 deg"]),
+        described("misalignment of the partner, below 90 deg", "12 deg"),
     ]
     offset: Annotated[
         units.Angle,
-        Field(
-            description="angle by which the fork of the intermediate shaft at its output end is turned ahead of the "
+        described(
+            "angle by which the fork of the intermediate shaft at its output end is turned ahead of the "
             "fork at its input end, less the angle between the planes of the two joints",
-            examples=["90 deg"],
+            "90 deg",
         ),
     ] = 0.0
     inertia: Annotated[
         units.Inertia,
-        AfterValidator(units.positive),
-        Field(description="moment of inertia behind the second joint of the shaft", examples=["0.02 kg*m^2"]),
+        described("moment of inertia behind the second joint of the shaft", "0.02 kg*m^2"),
     ]
     stiffness: Annotated[
         units.RotaryStiffness | None,
-        AfterValidator(units.positive),
-        Field(description="torsional stiffness of the intermediate shaft", examples=["2e4 N*m/rad"]),
+        described("torsional stiffness of the intermediate shaft", "2e4 N*m/rad"),
     ] = None
 
     @property
     def in_words(self) -> str:
         """``"behind a joint of 12 deg"``."""
-        place = "behind" if self.position == "before" else "before"
+        side = "behind" if self.position == "before" else "before"
         turned = f", offset {math.degrees(self.offset):.4g} deg" if self.offset else ""
-        return f"{place} a joint of {math.degrees(self.alpha):.4g} deg{turned}"
+        return f"{side} a joint of {math.degrees(self.alpha):.4g} deg{turned}"
 
     def torsion(self, speed: float, n: int) -> float:
         """Relative change of order `n` by torsion of the intermediate shaft at a speed (rad/s); NaN if not known.

@@ -10,9 +10,9 @@ from pydantic import AfterValidator, Field, GetJsonSchemaHandler, model_validato
 from pydantic_core import CoreSchema
 
 from tolstat.common import units
+from tolstat.common.fields import MAX_STATIONS
 from tolstat.common.load_kinds import PINS
-from tolstat.common.parameters import MAX_STATIONS
-from tolstat.common.strict import Strict
+from tolstat.common.strict import Strict, described
 from tolstat.common.tables import ERROR, FACTORS, HOLES, PARAM
 from tolstat.joint import material, orders
 from tolstat.joint.contact import Contact
@@ -38,42 +38,39 @@ class Operation(Strict):
     """Operating point of the joint."""
 
     alpha: Annotated[
-        units.Angle,
-        AfterValidator(check_misalignment),
-        Field(description="misalignment of the shafts, below 90 deg", examples=["15 deg"]),
+        units.Angle, AfterValidator(check_misalignment), described("misalignment of the shafts, below 90 deg", "15 deg")
     ]
     speed: Annotated[
         units.Speed,
         AfterValidator(units.not_zero),
-        Field(
-            description="speed of the input shaft, with orders { mean, orders }, or measured { file }; negative: turns "
+        described(
+            "speed of the input shaft, with orders { mean, orders }, or measured { file }; negative: turns "
             "the other way",
-            examples=["500 rpm"],
+            "500 rpm",
         ),
     ]
     torque: Annotated[
         units.Torque,
-        Field(
-            description="resisting torque on the output shaft, with orders { mean, orders }, or measured { file }; "
+        described(
+            "resisting torque on the output shaft, with orders { mean, orders }, or measured { file }; "
             "negative: drives the output shaft",
-            examples=["100 N*m"],
+            "100 N*m",
         ),
     ]
     axial_force: Annotated[
         units.Force,
-        Field(
-            description="axial force on an output shaft that is not rigid along its axis; above zero: pulls it away "
-            "from the joint",
-            examples=["500 N"],
+        described(
+            "axial force on an output shaft that is not rigid along its axis; above zero: pulls it away from the joint",
+            "500 N",
         ),
     ] = 0.0
     speed_orders: Annotated[orders.SpeedOrders, Field(alias="speed.orders")] = ()
     torque_orders: Annotated[orders.TorqueOrders, Field(alias="torque.orders")] = ()
     partner: Annotated[
         Partner | None,
-        Field(
-            description="the other joint of a drive shaft; speed and torque are then those of the shaft's ends",
-            examples=[{"position": "after", "alpha": "12 deg", "inertia": "0.02 kg*m^2"}],
+        described(
+            "the other joint of a drive shaft; speed and torque are then those of the shaft's ends",
+            {"position": "after", "alpha": "12 deg", "inertia": "0.02 kg*m^2"},
         ),
     ] = None
 

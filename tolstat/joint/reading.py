@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
@@ -23,11 +23,7 @@ DEFAULT_JOINT = "cirelli2021"
 
 
 def load(
-    base: str | Path,
-    overrides: Mapping[str, Any],
-    place: str,
-    relative_to: Path | None = None,
-    section: str = "joint",
+    base: str | Path, overrides: Mapping[str, Any], place: str, relative_to: Path | None = None, section: str = "joint"
 ) -> Joint:
     """Read a joint file and merge a case's own keys over it.
 
@@ -72,11 +68,11 @@ def load(
         if faults:
             raise InputError(faults)
     merged = leaves(overridden(data, overrides))
-    given, held = leaves(overrides), leaves(data)
-    gone = given.keys() | derived.replaced(given, held)
+    given, in_file = leaves(overrides).keys(), leaves(data)
+    gone = derived.replaced(given, in_file)
     joint.remember(
-        [*_inherited(joint, data, overrides, path), *_lowered(joint, merged.get("contact.fit_load"))],
-        {key: str(held[key]) for key in derived.BEARING if key in held and key in gone},
+        [*_inherited(joint, given, in_file, gone, path), *_lowered(joint, merged.get("contact.fit_load"))],
+        {key: str(in_file[key]) for key in derived.BEARING if key in in_file and key in given | gone},
     )
     return joint
 
@@ -102,7 +98,7 @@ def _faults_of_file(path: Path, text: str) -> tuple[Fault, ...]:
 
 
 def faults_of_assumed(
-    entries: Sequence[Assumed], data: Mapping[str, Any], own: Mapping[str, Any], place: str
+    entries: Sequence[Assumed], data: Mapping[str, Any], of_study: Mapping[str, Any], place: str
 ) -> Iterator[Fault]:
     """Faults of assumptions whose values make no joint.
 
@@ -110,7 +106,7 @@ def faults_of_assumed(
     ----------
     entries : sequence of Assumed
         Tables ``[[assumed]]`` of one file.
-    data, own : mapping
+    data, of_study : mapping
         Keys of the joint, and those that the study sets, see `with_keys`.
     place : str
         File name shown in faults.
@@ -126,21 +122,21 @@ def faults_of_assumed(
                 if not affects_results(key):
                     yield Fault(f"{at}.{key}", "affects no result", "remove it")
             try:
-                with_keys(data, own, value, at)
+                with_keys(data, of_study, value, at)
             except InputError as error:
                 for fault in error.faults:
                     key = fault.place.removeprefix(f"{at}: ")
                     yield Fault(f"{at}.{key}" if key != fault.place else at, fault.found, fault.remedy)
 
 
-def with_keys(data: Mapping[str, Any], own: Mapping[str, Any], keys: Mapping[str, Any], place: str) -> Joint:
+def with_keys(data: Mapping[str, Any], of_study: Mapping[str, Any], keys: Mapping[str, Any], place: str) -> Joint:
     """Joint with some keys set beside those that a study sets, and all that follows from them computed anew.
 
     Parameters
     ----------
     data : mapping
         Keys of the joint as `Joint.given` returns them in mode ``json``; those of the study among them.
-    own, keys : mapping
+    of_study, keys : mapping
         Keys that the study sets, which stay; and the keys to set; nested, as a file writes them.
     place : str
         What stands before the key path in faults.
@@ -150,7 +146,7 @@ def with_keys(data: Mapping[str, Any], own: Mapping[str, Any], keys: Mapping[str
     InputError
         When the keys make no valid joint.
     """
-    return strict.validate(Joint, overridden(data, laid_over(own, keys)), place, examples=examples())
+    return strict.validate(Joint, overridden(data, laid_over(of_study, keys)), place, examples=examples())
 
 
 @cache
@@ -178,32 +174,27 @@ def _attributed(
     """Report the faults that the joint file has without overrides under its name, the others under `place`."""
     try:
         strict.validate(Joint, data, str(path), examples=examples())
-        own = {}
+        faults_of_file = {}
     except InputError as error:
-        own = {(f.place.removeprefix(f"{path}: "), f.found): f for f in error.faults}
+        faults_of_file = {(f.place.removeprefix(f"{path}: "), f.found): f for f in error.faults}
     attributed = []
     for f in faults:
         key = f.place.removeprefix(f"{place}: ")
-        attributed.append(own.get((key, f.found)) or Fault(f"{place}: {section}.{key}", f.found, f.remedy))
+        attributed.append(faults_of_file.get((key, f.found)) or Fault(f"{place}: {section}.{key}", f.found, f.remedy))
     return attributed
 
 
-def _inherited(joint: Joint, data: Mapping[str, Any], over: Mapping[str, Any], path: Path) -> Iterator[Fault]:
+def _inherited(
+    joint: Joint, given: Set[str], in_file: Mapping[str, Any], gone: Set[str], path: Path
+) -> Iterator[Fault]:
     """Warn of values of the joint file that an override leaves, although it gives keys that they follow from."""
-    given, held = leaves(over).keys(), leaves(data)
-    changed = derived.changed(given, held)
-    stay = held.keys() - changed - derived.replaced(given, held)
+    changed = derived.changed(given, in_file)
+    stay = in_file.keys() - changed - gone
     for key, (expected, reason, instead) in derived.expected(joint, given, changed, stay).items():
-        D_P = held.get("contact.D_P")
+        D_P = in_file.get("contact.D_P")
         if key == "pin.d" and D_P and math.isclose(units.to_si(D_P, "m", DIAMETER), expected, rel_tol=derived.WIDE):
             continue  # the joint file has pins of two diameters itself
-        inherited = held[key]
-        if isinstance(inherited, list):
-            each = zip(expected, inherited, strict=True)
-            value = f"[{', '.join(_written(number, key, like) for number, like in each)}]"
-            inherited = f"[{', '.join(inherited)}]"
-        else:
-            value = _written(expected, key, inherited)
+        inherited, value = _written(in_file[key], key, in_file[key]), _written(expected, key, in_file[key])
         remedy = f"give {instead}, from which it follows, or {key}" if instead else f"give {key}, this value or that"
         yield Fault(key, f"{inherited} is inherited from {path.stem}; {reason} {value}", remedy)
 
@@ -218,8 +209,11 @@ def _lowered(joint: Joint, written: object) -> Iterator[Fault]:
     yield Fault("contact.fit_load", found, f'write fit_load = "{text}", or give k1u and k2u')
 
 
-def _written(value: float, key: str, like: object) -> str:
-    return str(units.written(value, derived.UNITS[key], like, digits=3))
+def _written(value: Any, key: str, like: object) -> str:
+    """Text of a value as a file has it, or of an SI value in the unit of `like`; also of three values."""
+    if isinstance(like, list):
+        return f"[{', '.join(_written(*each) for each in zip(value, [key] * 3, like, strict=True))}]"
+    return value if isinstance(value, str) else str(units.written(value, derived.UNITS[key], like, digits=3))
 
 
 def varied(joint: Joint, values: Mapping[str, Any]) -> Joint:

@@ -9,26 +9,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Annotated, Any, get_args, get_origin
 
-from pydantic import AfterValidator, BaseModel, Field, ValidationInfo, field_validator
+from pydantic import AfterValidator, BaseModel, ValidationInfo, field_validator
 
 from tolstat.common import units
-from tolstat.common.strict import Strict, refuse
+from tolstat.common.strict import Strict, described, refuse
+from tolstat.common.units import NOT_NEGATIVE, POSITIVE
 from tolstat.joint.derived import DERIVED, PIN_CHI
 
-POSITIVE = AfterValidator(units.positive)
-NOT_NEGATIVE = AfterValidator(units.not_negative)
-
 Length = Annotated[units.Length, POSITIVE]
-Diameter = Annotated[units.Diameter, POSITIVE]
-Area = Annotated[units.Area, POSITIVE]
-AreaMoment = Annotated[units.AreaMoment, POSITIVE]
 Stress = Annotated[units.Stress, POSITIVE]
-Mass = Annotated[units.Mass, POSITIVE]
-Inertia = Annotated[units.Inertia, POSITIVE]
-Density = Annotated[units.Density, POSITIVE]
-Force = Annotated[float, units.Quantity("N"), POSITIVE]
+Force = Annotated[units.Force, POSITIVE]
 Stiffness = Annotated[units.Stiffness, POSITIVE]
-RotaryStiffness = Annotated[units.RotaryStiffness, POSITIVE]
 Number = Annotated[units.Number, POSITIVE]
 Ratio = Annotated[units.Number, NOT_NEGATIVE]
 
@@ -55,7 +46,7 @@ def _body(inertia: tuple[float, float, float]) -> tuple[float, float, float]:
 
 LEAST_E = 1e9
 """Young's modulus (Pa) below that of any metal."""
-Triple = Annotated[tuple[Inertia, Inertia, Inertia], AfterValidator(_body)]
+Triple = Annotated[tuple[units.Inertia, units.Inertia, units.Inertia], AfterValidator(_body)]
 
 
 PIN_INERTIA = ["5.78e-5 kg*m^2", "6.42e-5 kg*m^2", "6.42e-5 kg*m^2"]
@@ -67,7 +58,7 @@ FOLLOWS: Any = None
 
 def follows(key: str, meaning: str, *examples: Any) -> Any:
     """Field of a key of `DERIVED`: its meaning, and the formula that it follows by."""
-    return Field(description=f"{meaning}; when left out: {DERIVED[key].formula}", examples=list(examples) or None)
+    return described(f"{meaning}; when left out: {DERIVED[key].formula}", *examples)
 
 
 def quantities(model: type[BaseModel], before: str = "") -> dict[str, str]:
@@ -89,12 +80,10 @@ def quantities(model: type[BaseModel], before: str = "") -> dict[str, str]:
 class Material(Strict):
     """Material of all parts."""
 
-    E: Annotated[Annotated[Stress, AfterValidator(_modulus)], Field(description="Young's modulus")]
-    nu: Annotated[
-        Annotated[units.Number, AfterValidator(_poisson)], Field(description="Poisson's ratio, from 0 to below 0.5")
-    ]
+    E: Annotated[Annotated[Stress, AfterValidator(_modulus)], described("Young's modulus")]
+    nu: Annotated[Annotated[units.Number, AfterValidator(_poisson)], described("Poisson's ratio, from 0 to below 0.5")]
     G: Annotated[Stress, follows("material.G", "shear modulus")] = FOLLOWS
-    rho: Annotated[Density, Field(description="density")]
+    rho: Annotated[units.Density, described("density")]
 
 
 class Pin(Strict):
@@ -102,17 +91,17 @@ class Pin(Strict):
 
     l: Annotated[  # noqa: E741
         Length,
-        Field(
-            description="length of the beam, from the hub to the middle of the contact; know it to 1 mm: the torque "
+        described(
+            "length of the beam, from the hub to the middle of the contact; know it to 1 mm: the torque "
             "of the bushing is the force times l, or up to l + z/2"
         ),
     ]
-    d: Annotated[Diameter, Field(description="diameter of the beam")]
-    chi: Annotated[Number, Field(description="shear factor of the section")] = PIN_CHI
-    A: Annotated[Area, follows("pin.A", "area of the section")] = FOLLOWS
-    J: Annotated[AreaMoment, follows("pin.J", "area moment of the section")] = FOLLOWS
-    Jp: Annotated[AreaMoment, follows("pin.Jp", "polar moment of the section")] = FOLLOWS
-    mass: Annotated[Mass, follows("pin.mass", "mass")] = FOLLOWS
+    d: Annotated[units.Diameter, described("diameter of the beam")]
+    chi: Annotated[Number, described("shear factor of the section")] = PIN_CHI
+    A: Annotated[units.Area, follows("pin.A", "area of the section")] = FOLLOWS
+    J: Annotated[units.AreaMoment, follows("pin.J", "area moment of the section")] = FOLLOWS
+    Jp: Annotated[units.AreaMoment, follows("pin.Jp", "polar moment of the section")] = FOLLOWS
+    mass: Annotated[units.Mass, follows("pin.mass", "mass")] = FOLLOWS
     inertia: Annotated[Triple, follows("pin.inertia", "moments of inertia about e, t, z", PIN_INERTIA)] = FOLLOWS
 
 
@@ -122,20 +111,16 @@ class Arm(Strict):
     A rectangular section needs only its `width` and `depth`, a round one `d`; for another give `A`, `Jx` and `Jy`.
     """
 
-    l_f: Annotated[Length, Field(description="length of the beam, from its fork to the hole's centre")]
-    width: Annotated[Length | None, Field(description="side of a rectangular section along t", examples=["58 mm"])] = (
-        None
-    )
-    depth: Annotated[
-        Length | None, Field(description="side of a rectangular section along e, the hole's axis", examples=["21 mm"])
-    ] = None
-    d: Annotated[Diameter | None, Field(description="diameter of a round section", examples=["40 mm"])] = None
+    l_f: Annotated[Length, described("length of the beam, from its fork to the hole's centre")]
+    width: Annotated[Length | None, described("side of a rectangular section along t", "58 mm")] = None
+    depth: Annotated[Length | None, described("side of a rectangular section along e, the hole's axis", "21 mm")] = None
+    d: Annotated[units.Diameter | None, described("diameter of a round section", "40 mm")] = None
     chi: Annotated[Number, follows("arm.chi", "shear factor of the section")] = FOLLOWS
-    A: Annotated[Area, follows("arm.A", "area of the section")] = FOLLOWS
-    Jx: Annotated[AreaMoment, follows("arm.Jx", "area moment about x, the local t")] = FOLLOWS
-    Jy: Annotated[AreaMoment, follows("arm.Jy", "area moment about y, the local e")] = FOLLOWS
-    Jp: Annotated[AreaMoment, follows("arm.Jp", "polar moment of the section")] = FOLLOWS
-    mass: Annotated[Mass, follows("arm.mass", "mass", "0.3516 kg")] = FOLLOWS
+    A: Annotated[units.Area, follows("arm.A", "area of the section")] = FOLLOWS
+    Jx: Annotated[units.AreaMoment, follows("arm.Jx", "area moment about x, the local t")] = FOLLOWS
+    Jy: Annotated[units.AreaMoment, follows("arm.Jy", "area moment about y, the local e")] = FOLLOWS
+    Jp: Annotated[units.AreaMoment, follows("arm.Jp", "polar moment of the section")] = FOLLOWS
+    mass: Annotated[units.Mass, follows("arm.mass", "mass", "0.3516 kg")] = FOLLOWS
     inertia: Annotated[Triple, follows("arm.inertia", "moments of inertia about e, t, z", ARM_INERTIA)] = FOLLOWS
 
     @field_validator("d")
@@ -151,7 +136,7 @@ class Arm(Strict):
 class Hub(Strict):
     """Middle of the cross, to which the four pins are attached."""
 
-    mass: Annotated[Mass, follows("hub.mass", "mass")] = FOLLOWS
+    mass: Annotated[units.Mass, follows("hub.mass", "mass")] = FOLLOWS
     inertia: Annotated[Triple, follows("hub.inertia", "moments of inertia about x, y, z of the cross")] = FOLLOWS
 
 
@@ -165,22 +150,22 @@ class Shaft(Strict):
     A shaft that is not rigid along its axis needs the mass that moves and the damping of its motion.
     """
 
-    Js: Annotated[Inertia, Field(description="inertia of the output shaft about its axis")]
-    mass: Annotated[
-        Mass | None, Field(description="mass that moves along the axis; needed unless `axial` is rigid")
-    ] = None
+    Js: Annotated[units.Inertia, described("inertia of the output shaft about its axis")]
+    mass: Annotated[units.Mass | None, described("mass that moves along the axis; needed unless `axial` is rigid")] = (
+        None
+    )
     axial_damping: Annotated[
-        Annotated[units.Damping, NOT_NEGATIVE] | None,
-        Field(description="damping of the motion along the axis, as by grease; needed unless `axial` is rigid"),
+        units.Damping | None,
+        described("damping of the motion along the axis, as by grease; needed unless `axial` is rigid"),
     ] = None
     axial: Annotated[
         float | str,
         units.Quantity("N/m", words=(RIGID, FREE)),
         POSITIVE,
-        Field(
-            description="what holds the shaft along its axis: `rigid`, nothing gives way; `free`, a spline or a loose "
+        described(
+            "what holds the shaft along its axis: `rigid`, nothing gives way; `free`, a spline or a loose "
             "bearing; or the stiffness of the bearings of both shafts in series",
-            examples=[FREE],
+            FREE,
         ),
     ] = RIGID
 
@@ -208,7 +193,7 @@ class Shaft(Strict):
 class Cross(Strict):
     """Main dimensions of the cross."""
 
-    R: Annotated[Length, Field(description="distance from the centre of the joint to the middle of pin and hole")]
+    R: Annotated[Length, described("distance from the centre of the joint to the middle of pin and hole")]
     r_b: Annotated[
         Length, follows("cross.r_b", "distance from the centre of the joint to the marker of a cross bushing")
     ] = FOLLOWS
@@ -220,9 +205,9 @@ class PinBushing(Strict):
     k_x: Annotated[Stiffness, follows("bushing.cross.k_x", "shear along x")] = FOLLOWS
     k_y: Annotated[Stiffness, follows("bushing.cross.k_y", "shear along y")] = FOLLOWS
     k_z: Annotated[Stiffness, follows("bushing.cross.k_z", "tension")] = FOLLOWS
-    k_bx: Annotated[RotaryStiffness, follows("bushing.cross.k_bx", "bending about x")] = FOLLOWS
-    k_by: Annotated[RotaryStiffness, follows("bushing.cross.k_by", "bending about y")] = FOLLOWS
-    k_tz: Annotated[RotaryStiffness, follows("bushing.cross.k_tz", "torsion")] = FOLLOWS
+    k_bx: Annotated[units.RotaryStiffness, follows("bushing.cross.k_bx", "bending about x")] = FOLLOWS
+    k_by: Annotated[units.RotaryStiffness, follows("bushing.cross.k_by", "bending about y")] = FOLLOWS
+    k_tz: Annotated[units.RotaryStiffness, follows("bushing.cross.k_tz", "torsion")] = FOLLOWS
 
 
 class ArmBushing(Strict):
@@ -231,17 +216,17 @@ class ArmBushing(Strict):
     k_x: Annotated[Stiffness, follows("bushing.fork.k_x", "shear along x")] = FOLLOWS
     k_y: Annotated[Stiffness, follows("bushing.fork.k_y", "shear along y")] = FOLLOWS
     k_z: Annotated[Stiffness, follows("bushing.fork.k_z", "tension")] = FOLLOWS
-    k_bx: Annotated[RotaryStiffness, follows("bushing.fork.k_bx", "bending about x")] = FOLLOWS
-    k_by: Annotated[RotaryStiffness, follows("bushing.fork.k_by", "bending about y")] = FOLLOWS
-    k_tz: Annotated[RotaryStiffness, follows("bushing.fork.k_tz", "torsion")] = FOLLOWS
+    k_bx: Annotated[units.RotaryStiffness, follows("bushing.fork.k_bx", "bending about x")] = FOLLOWS
+    k_by: Annotated[units.RotaryStiffness, follows("bushing.fork.k_by", "bending about y")] = FOLLOWS
+    k_tz: Annotated[units.RotaryStiffness, follows("bushing.fork.k_tz", "torsion")] = FOLLOWS
 
 
 class Bushing(Strict):
     """Bushings, the elasticity of pins and arms: three springs and three torsion springs each, eq. (8)."""
 
-    xi: Annotated[Ratio, Field(description="damping ratio: damping is 2 xi sqrt(k m), of rotations 2 xi sqrt(k J)")]
-    cross: Annotated[PinBushing, Field(description="Stiffness of a pin's bushing")] = PinBushing()
-    fork: Annotated[ArmBushing, Field(description="Stiffness of an arm's bushing")] = ArmBushing()
+    xi: Annotated[Ratio, described("damping ratio: damping is 2 xi sqrt(k m), of rotations 2 xi sqrt(k J)")]
+    cross: Annotated[PinBushing, described("Stiffness of a pin's bushing")] = PinBushing()
+    fork: Annotated[ArmBushing, described("Stiffness of an arm's bushing")] = ArmBushing()
 
 
 RIGID_SHAFTS = "shafts rigid along their axes"

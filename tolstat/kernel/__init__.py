@@ -27,18 +27,12 @@ options : Options
     Numerical settings.
 work : record of WORK
     Scratch of an evaluation: bodies, stations, loads, blocks of the tangent.
-state : record of State
-    Trial point, accepted points, counters of the integrator.
-ring : Ring
-    Samples of the last revolution, closure errors, and samples of the closer look.
 samples : ndarray of SAMPLE, shape (steps_per_rev,)
     The last revolution; point k of the output grid is sample k modulo its length.
 notes : record of NOTES
     Closure errors.
 fine : ndarray of SAMPLE, shape (3,)
     Last parts of a closer look, or of a cell.
-alone : Scratch
-    All work arrays of one joint.
 past : Past
     What error-controlled and explicit steps keep from one revolution to the next.
 trail : Trail
@@ -57,8 +51,6 @@ pin : int
     Number of the pin, 0 to 3.
 status : int
     How a joint has ended, a `Status`.
-counters : ndarray of int, shape (6,)
-    Work so far, indices as in `integrators.state`.
 loads : ndarray, shape (N_LOADS,)
     Values of all loads at one instant, N, N m or 1.
 mask : bool, read as lanes

@@ -103,7 +103,7 @@ QUESTIONS = (
     Question("reweight", "Decide", "Estimate exceedances for changed tolerances."),
     Question("allocate", "Decide", "Propose the cheapest tolerances that meet the targets."),
     Question("compare", "Decide", "Compare the exceedances and loads of two campaigns."),
-    Question("rare", "Decide", "Estimate a rare exceedance by subset simulation.", file="rare.answer"),
+    Question("rare", "Decide", "Estimate a rare exceedance by subset simulation."),
 )
 
 PUBLIC = {question.name: f"tolstat.questions.{question.file or question.name}" for question in QUESTIONS}

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat import sampling
-from tolstat.analysis import allocation, prediction, reweight
+from tolstat.analysis import allocation, reweight
 from tolstat.analysis.prediction import DELIVERY
 from tolstat.analysis.reweight import Ratios
 from tolstat.analysis.sample import CONFIDENCE, Sample
@@ -25,8 +25,8 @@ from tolstat.common.units import DISPLAY_UNITS
 from tolstat.display import text
 from tolstat.display.answer import Answer, Column, Document, Listing, Part, Row, Rows, Sentence, Table
 from tolstat.display.options import Costs, Delivery, Opt
+from tolstat.questions import shares
 from tolstat.store import error_budget
-from tolstat.store.hdf5 import store_error
 from tolstat.store.view import View
 from tolstat.study import Study, axes, rule, scaling, selection
 from tolstat.study import costs as prices
@@ -35,7 +35,7 @@ from tolstat.study.rule import Statement
 from tolstat.study.scaling import Tolerance
 from tolstat.study.tolerances.density_ratio import Exact, of_error
 from tolstat.study.tolerances.distributions import Distribution, Normal
-from tolstat.study.tolerances.radial import Rayleigh
+from tolstat.study.tolerances.zone_laws import Rayleigh
 
 EXAMPLE = 'write --target "P(cross1.F > 700 N) < 0.001"'
 DIGITS = 3
@@ -56,8 +56,8 @@ def _width(row: Row, key: str) -> str:
 
 
 TOLERANCES = (
-    Column("tolerance", lambda row: str(row["tolerance"])),
-    Column("errors", lambda row: str(row["errors"]), rank=1),
+    Column("tolerance", shares.word("tolerance")),
+    Column("errors", shares.word("errors"), rank=1),
     Column("before", lambda row: _width(row, "before")),
     Column("proposed", lambda row: _width(row, "proposed")),
     Column("factor", lambda row: f"{row['factor']:.3g}"),
@@ -67,9 +67,9 @@ TOLERANCES = (
 """Columns of the table ``tolerances``."""
 LIMITS = (
     Column("target", lambda row: row["limit"].replace("N*m", unit_text("N*m"))),
-    Column("before", lambda row: text.percent(row["before"])),
-    Column("proposed", lambda row: text.percent(row["estimate"])),
-    Column("95 % interval", lambda row: text.span(row["lower"], row["upper"])),
+    Column("before", shares.share("before")),
+    Column("proposed", shares.share("estimate")),
+    Column("95 % interval", shares.shares("lower", "upper")),
     Column("ppm", lambda row: text.ppm(row["estimate"]), rank=2),
     Column("above in delivery", text.delivery, rank=3),
     Column("counts as joints", lambda row: text.formed(row["ess"], ".0f"), rank=1),
@@ -164,16 +164,16 @@ def allocate(
     view.check("mean")
     if view.study.groups:
         remedy = 'give the file of a study with sampling.method = "random"'
-        found = "holds joints that share errors with others, so that one half of them is no check of the other"
-        raise store_error(view.path, found, remedy)
+        reason = "holds joints that share errors with others, so that one half of them is no check of the other"
+        raise shares.unusable(view, reason, remedy)
     request = _read_request(view, targets, costs, keep or ())
     done = np.flatnonzero(view.status != Status.PENDING)
     events = [_above(view, statement, done) for statement in request.statements]
     searched, checked = allocation.halves(view.design.units(view.n)[done], MAX_SEARCHED)
     if len(checked) < 4 * reweight.LEAST_ESS:
         remedy = f"run {8 * reweight.LEAST_ESS} joints or more"
-        raise store_error(view.path, f"has {len(done)} joints simulated", remedy)
-    choice = _search(view, request, np.column_stack([own[0][searched] for own in events]), done[searched])
+        raise shares.unusable(view, f"has {len(done)} joints simulated", remedy)
+    choice = _search(view, request, np.column_stack([event[0][searched] for event in events]), done[searched])
     entries = {
         t.pattern: t.scaled(float(f), DIGITS)
         for t, f in zip(request.tolerances, choice.factors, strict=True)
@@ -184,12 +184,12 @@ def allocate(
         for errors in view.error_blocks(request.columns)
     ]
     ratios = _ratios(np.concatenate([logs for logs, _ in blocks])[done[checked]], blocks[-1][1])
-    judged: list[_Judged] = [(one.text, one.bound, own) for one, own in zip(request.statements, events, strict=True)]
+    judged: list[_Judged] = [(s.text, s.bound, event) for s, event in zip(request.statements, events, strict=True)]
     if len(events) > 1:  # with both ends of the numerical error where it is known of all
-        judged.append((ANY_LIMIT, np.nan, [np.any(own, axis=0) for own in zip(*events, strict=False)]))
-    limits = [_limit(view, one, checked, ratios, delivery) for one in judged]
-    each = [(row["estimate"], row["ess"], row["target"]) for row in limits[: len(events)]]
-    needed = ratios.effective * max(allocation.joints_needed(*own, CONFIDENCE) for own in each)
+        judged.append((ANY_LIMIT, np.nan, [np.any(ends, axis=0) for ends in zip(*events, strict=False)]))
+    limits = [_limit(view, statement, checked, ratios, delivery) for statement in judged]
+    figures = [(row["estimate"], row["ess"], row["target"]) for row in limits[: len(events)]]
+    needed = ratios.effective * max(allocation.joints_needed(*own, CONFIDENCE) for own in figures)
     limits = [row if row["usable"] else row | dict.fromkeys(WITHHELD, np.nan) for row in limits]
     holds, verdict = _verdict(limits[: len(events)], ratios, needed)
     facts = {"holds": holds, "verdict": verdict, "aim": choice.aim, "effective": ratios.effective}
@@ -230,13 +230,13 @@ class DensityRatios:
     def of_entries(self, entries: Entries) -> tuple[FloatArray, Exact]:
         """Logarithms of the ratios for changed entries, (n,), and their exact numbers."""
         new = [t.distribution(entries.get(t.pattern, t.entry)) for t in self._tolerances]
-        logs = np.asarray(sum(self._log_density(i, own) for i, own in enumerate(new)) - sum(self._old_density))
+        logs = np.asarray(sum(self._log_density(i, law) for i, law in enumerate(new)) - sum(self._old_density))
         return logs, self._sum(of_error(*pair) for pair in zip(new, self._old, strict=True))
 
     def _sum(self, each: Iterable[Exact]) -> Exact:
         """Sum over errors, of which a tolerance may have several."""
-        found = np.array([len(t.names) * np.array(own) for t, own in zip(self._tolerances, each, strict=True)])
-        return Exact(*found.sum(axis=0).tolist())
+        terms = [len(t.names) * np.array(exact) for t, exact in zip(self._tolerances, each, strict=True)]
+        return Exact(*np.sum(terms, axis=0).tolist())
 
     def _scaled(self, i: int, factor: float) -> Distribution:
         old, t = self._old[i], self._tolerances[i]
@@ -311,13 +311,13 @@ def _read_request(view: View, targets: Sequence[str], costs: Path | None, keep: 
             faults.append(Fault("--keep", f"{pattern!r} selects no error that the study scatters", "see [tolerances]"))
         kept_names |= set(names)
     every = scaling.tolerances(study)
-    own_costs: list[Cost] = []
+    each: list[Cost] = []
     with gather(faults):
-        own_costs = prices.of(every, costs)
+        each = prices.of(every, costs)
     if faults:
         raise InputError(faults)
-    free = [pair for pair in zip(every, own_costs, strict=True) if pair[1].reach[0] < pair[1].reach[1]]
-    free = [(t, cost) for t, cost in free if not kept_names & set(t.names)]
+    pairs = zip(every, each, strict=True)
+    free = [(t, cost) for t, cost in pairs if cost.reach[0] < cost.reach[1] and not kept_names & set(t.names)]
     if not free:
         remedy = "name some in --costs, or leave --keep out; measured, lognormal and correlated errors stay as they are"
         raise InputError([Fault("--costs", "leaves no tolerance that may change", remedy)])
@@ -331,7 +331,7 @@ def _above(view: View, statement: Statement, done: NDArray[np.intp]) -> list[NDA
     """
     load, level = view.load_of(statement.limit), statement.limit.level
     loads = (load, *(error_budget.near(view, load) or ()))
-    return [(~own.is_valid | (own.values > level))[done] for own in loads]
+    return [(~end.is_valid | (end.values > level))[done] for end in loads]
 
 
 def _search(view: View, request: _Request, above: NDArray[np.bool_], samples: NDArray[np.intp]) -> allocation.Choice:
@@ -356,16 +356,10 @@ def _search(view: View, request: _Request, above: NDArray[np.bool_], samples: ND
 def _limit(view: View, judged: _Judged, checked: NDArray[np.intp], ratios: Ratios, delivery: int) -> dict[str, Any]:
     """One row of the table ``limits``; `checked` are the joints of the check."""
     name, target, above = judged
-    samples = [Sample.of(own[checked], np.full(checked.size, Status.OK), view.design) for own in above]
-
-    def estimated(confidence: float) -> tuple[reweight.Share, float, float]:
-        shares = [reweight.share_above(sample, ratios, 0.5, confidence) for sample in samples]
-        return shares[0], min(share.lower for share in shares), max(share.upper for share in shares)
-
-    share, lower, upper = estimated(CONFIDENCE)
+    samples = [Sample.of(end[checked], np.full(checked.size, Status.OK), view.design) for end in above]
+    share, (lower, upper), predicted = shares.reweighted(samples, ratios, 0.5, delivery)
     row = {"limit": name, "target": target, "before": float(above[0].mean()), "estimate": share.estimate}
-    following = prediction.of_share(*estimated(prediction.half(CONFIDENCE))[1:], delivery, CONFIDENCE)
-    row |= {"lower": lower, "upper": upper} | prediction.columns(following, delivery)
+    row |= {"lower": lower, "upper": upper} | predicted
     return row | {"ess": share.ess, "usable": share.support.usable, "numerical": len(above) > 1}
 
 

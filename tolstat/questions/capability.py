@@ -35,7 +35,7 @@ RARE = "Load that one in N joints exceeds; median of the largest load of N joint
 LIMITS = (
     Column("load", shares.word("load")),
     Column("limit", shares.limit),
-    Column("above", lambda row: f"{row['count']} of {row['n'] - row['n_failed'] - row['n_unsettled']}"),
+    Column("above", shares.above),
     Column("yield", shares.share("good")),
     Column("total interval", shares.shares("good_lower", "good_upper")),
     Column("ppm", lambda row: text.number(row["ppm"]), rank=1),

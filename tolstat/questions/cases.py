@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tolstat.analysis import accuracy
-from tolstat.analysis.gamma import gamma as relative_errors
 from tolstat.campaign.remedy import remedy
 from tolstat.common import selected_results
 from tolstat.common.load_kinds import BUSHINGS
-from tolstat.common.tables import Status, Variant
+from tolstat.common.tables import Status
 from tolstat.display.answer import Answer, Document, Part, Row, Rows, Sentence, Table, plain
 from tolstat.questions.shares import inapplicable, rows_of
 from tolstat.solver import refinement
@@ -76,8 +76,12 @@ def _rows(store: Reader) -> Rows:
         "period": results["period"].tolist(),
         "revolutions": results["revolutions"].tolist(),
         "cost": (work / max(1.0, float(work[0]))).tolist(),
-        "remedy": [remedy(row, store.options | _solver(v)) for row, v in zip(results, variants, strict=True)],
     }
+    set_by_variants = (
+        {key.removeprefix("solver."): value for key, value in variant.values.items() if key.startswith("solver.")}
+        for variant in variants
+    )
+    columns["remedy"] = [remedy(row, store.options | own) for row, own in zip(results, set_by_variants, strict=True)]
     gamma = relative_errors(results, design["group"])
     for b, bushing in enumerate(BUSHINGS):
         for load, (letter, unit) in enumerate((("F", "N"), ("T", "N*m"))):
@@ -87,24 +91,42 @@ def _rows(store: Reader) -> Rows:
     return rows_of(columns | _reference(store))
 
 
+def relative_errors(results: NDArray[np.void], group: NDArray[np.int32]) -> NDArray[np.float64]:
+    """Compare the largest loads of each joint with those of the first joint of its group: Gamma.
+
+    Cirelli, Rossi, Valentini and Pennestri (2021), eq. (14).
+
+    Parameters
+    ----------
+    results : ndarray of RESULT, shape (n,)
+        Joints; the first of a group is the one without errors.
+    group : ndarray of int, shape (n,)
+        Group number of each joint; joints of a group differ in their errors only.
+
+    Returns
+    -------
+    ndarray, shape (n, 8, 2)
+        Relative difference in per cent, signed: force, torque. NaN unless the joint and the first of its group are OK.
+    """
+    loads = np.stack([results["F_max"], results["T_max"]], axis=-1)
+    loads[results["status"] != Status.OK] = np.nan
+    _, first, inverse = np.unique(group, return_index=True, return_inverse=True)
+    return np.asarray(100.0 * (loads / loads[first[inverse]] - 1.0))
+
+
 def _reference(store: Reader) -> dict[str, Sequence[Any]]:
     """Columns that compare every joint with the tight reference; none if the file holds no comparison."""
-    found = verification.read(store)
-    if found is None or accuracy.REFERENCE not in found.checks:
+    verified = verification.read(store)
+    if verified is None or accuracy.REFERENCE not in verified.checks:
         return {}
-    true, slots = found.checks[accuracy.REFERENCE].results, store.slot(found.rows)
+    true, slots = verified.checks[accuracy.REFERENCE].results, store.slot(verified.rows)
     columns = {"reference": np.full(store.n, "", object)}
     columns |= {key: np.full(store.n, np.nan) for key in ("reference_change", "error_F", "error_T")}
     columns["reference"][slots] = [Status(int(code)).label for code in true["status"]]
     columns["reference_change"][slots] = true["closure"]
-    error = accuracy.by_kind(accuracy.differences(found.base, true))
+    error = accuracy.by_kind(accuracy.differences(verified.base, true))
     columns["error_F"][slots], columns["error_T"][slots] = error[:, 0], error[:, 1]
     return {name: values.tolist() for name, values in columns.items()}
-
-
-def _solver(variant: Variant) -> dict[str, Any]:
-    """Options of the solver that a variant sets."""
-    return {key.removeprefix("solver."): own for key, own in variant.values.items() if key.startswith("solver.")}
 
 
 def _worst(row: Row) -> dict[str, Any]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from functools import partial
 
 from tolstat.analysis.sample import CONFIDENCE
 from tolstat.common.loads import ANY_LIMIT
@@ -63,56 +62,54 @@ def known_parts(view: View) -> Answer:
     NotApplicable
         When the study takes its tolerances as exact or has no limits, or no joint is simulated.
     """
-    own = known.of(view)
-    if own is None or not view.counts.done:
+    process = known.of(view)
+    if process is None or not view.counts.done:
         remedy = "give an entry of [tolerances] known_from, and the study [limits]"
         raise shares.inapplicable(view, "has no share that measured parts leave open", remedy)
-    names = [*view.limits, *([ANY_LIMIT] if len(view.limits) > 1 else [])]
-    rows = sorted(
-        (_row(view, own, name) for name in names), key=lambda row: (row["load"] != ANY_LIMIT, -row["estimate"])
-    )
+    rows = [_row(view, process, name) for name in (*view.limits, *([ANY_LIMIT] if len(view.limits) > 1 else []))]
+    rows.sort(key=lambda row: (row["load"] != ANY_LIMIT, -row["estimate"]))
     given = [row for row in rows if not math.isnan(row["both_upper"])][:DRAWN]
-    entries = ", ".join(f"{entry.pattern} from {entry.parts}" for entry in own.entries)
+    entries = ", ".join(f"{entry.pattern} from {entry.parts}" for entry in process.entries)
     words = (f"Mean and deviation are estimated from measured parts: {entries}.", EXPLANATION)
     parts: list[Part] = [Panels([_panel(given)], beside=[Text(line, small=True) for line in words])] if given else []
     parts.append(Table("intervals", "Shares above the limits, with what leaves them open", COLUMNS, rows))
     if len(given) < min(len(rows), DRAWN):
         most = text.percent(max(row["unsupported"] for row in rows))
-        parts.append(Sentence(f"The joints do not support {most} of the likely processes. {own.remedy}.", "lead"))
+        parts.append(Sentence(f"The joints do not support {most} of the likely processes. {process.remedy}.", "lead"))
     return Answer("known_parts", "Tolerances known from measured parts", parts)
 
 
-def _row(view: View, own: known.KnownParts, name: str) -> Row:
+def _row(view: View, process: known.KnownParts, name: str) -> Row:
     load = view.load(name)
     assert load.limit is not None
     above = load.above(load.limit)
     row = {"load": name, "unit": load.unit, "level": load.limit}
     row |= {key: getattr(above, key) for key in ("estimate", "lower", "upper")}
-    return row | dict(zip(OF_BOTH, own.share(name, CONFIDENCE), strict=True))
+    return row | dict(zip(OF_BOTH, process.share(name, CONFIDENCE), strict=True))
 
 
 def _panel(rows: Rows) -> Panel:
     """Picture of the three intervals of some shares."""
-    left = drawing.rows_left([text.limit(row) for row in rows])
+    labels = [text.limit(row) for row in rows]
+
+    def draw(ax: Axes) -> None:
+        """Draw the three intervals of each share, below each other; shares on a logarithmic axis."""
+        drawing.rows(ax, labels)
+        ends = [row[end] for row in rows for low, high, _ in INTERVALS.values() for end in (low, high)]
+        low = max(0.7 * min(end for end in ends if end > LEAST), LEAST)
+        style.share_axis(ax, low, "x", min(1.3 * max(ends), 1.0))
+        for i, row in enumerate(rows):
+            for k, (lower, upper, colour) in enumerate(INTERVALS.values()):
+                y = i + 0.24 * (k - 1)
+                ax.plot([max(row[lower], 0.1 * low), row[upper]], [y, y], color=colour, lw=3.0, solid_capstyle="butt")
+            if row["estimate"] > low:
+                ax.plot([row["estimate"]] * 2, [i - 0.36, i + 0.36], color=style.FAINT, lw=1.2)
+        handles = [lines.Line2D([], [], color=colour, lw=3.0) for *_, colour in INTERVALS.values()]
+        drawing.legend_above(ax, handles, list(INTERVALS))
+        ax.set_xlabel("share of the joints above the limit, 95 % intervals")
+
+    left = drawing.rows_left(labels)
     top = drawing.legend_room(list(INTERVALS), left)
     size = (drawing.WIDTH, 0.47 * len(rows) + drawing.BOTTOM + top + 0.1)
     spans = "; ".join(f"{row['load']}: {text.span(row['both_lower'], row['both_upper'])}" for row in rows)
-    title = "What joints and parts leave open"
-    return Panel("intervals", title, f"Intervals of both: {spans}", partial(_draw, rows=rows), size, left, top)
-
-
-def _draw(ax: Axes, rows: Rows) -> None:
-    """Draw the three intervals of each share, below each other; shares on a logarithmic axis."""
-    drawing.rows(ax, [text.limit(row) for row in rows])
-    ends = [row[end] for row in rows for low, high, _ in INTERVALS.values() for end in (low, high)]
-    low = max(0.7 * min(end for end in ends if end > LEAST), LEAST)
-    style.share_axis(ax, low, "x", min(1.3 * max(ends), 1.0))
-    for i, row in enumerate(rows):
-        for k, (lower, upper, colour) in enumerate(INTERVALS.values()):
-            y = i + 0.24 * (k - 1)
-            ax.plot([max(row[lower], 0.1 * low), row[upper]], [y, y], color=colour, lw=3.0, solid_capstyle="butt")
-        if row["estimate"] > low:
-            ax.plot([row["estimate"]] * 2, [i - 0.36, i + 0.36], color=style.FAINT, lw=1.2)
-    handles = [lines.Line2D([], [], color=colour, lw=3.0) for *_, colour in INTERVALS.values()]
-    drawing.legend_above(ax, handles, list(INTERVALS))
-    ax.set_xlabel("share of the joints above the limit, 95 % intervals")
+    return Panel("intervals", "What joints and parts leave open", f"Intervals of both: {spans}", draw, size, left, top)

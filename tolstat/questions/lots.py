@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import replace
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -91,9 +91,9 @@ def study_of(study: Study, number: int | None = None, joints: int | None = None)
     InputError
         With every fault of the study.
     """
-    own = study.sampling.joints_per_lot
-    size = joints or (own if own > 1 else JOINTS)
-    lots_of_study = study.samples // own if own > 1 else LOTS
+    size_of_study = study.sampling.joints_per_lot
+    lots_of_study = study.samples // size_of_study if size_of_study > 1 else LOTS
+    size = joints or (size_of_study if size_of_study > 1 else JOINTS)
     keys = {"method": "random", "n": size * (number or lots_of_study), "joints_per_lot": size, "replicates": None}
     changed = with_keys(study.text, {("sampling",): keys | {"groups": None}}, str(study.path))
     return load(study.path, text=changed)
@@ -149,8 +149,16 @@ def lots(
         When fewer than `clustered.LEAST` lots have joints done.
     """
     _check_delivery(delivery, from_lots)
-    design, joints = _lots_of(view)
+    if not isinstance(view.design, Clustered) or not view.limits:
+        in_lots = isinstance(view.design, Clustered)
+        reason = "is of a study without [limits]" if in_lots else "holds joints that are each its own lot"
+        remedy = "give the file of a study with [limits], or simulate its lots: tolstat lots STUDY"
+        raise shares.inapplicable(view, reason, remedy)
+    design, joints = view.design, view.design.counts(view.load(ANY_LIMIT).upper, [1.0])[1].astype(np.intp)
     n = joints[joints > 0]
+    if n.size < clustered.LEAST:
+        reason = f"has joints of {n.size} lots simulated, and fewer than {clustered.LEAST} have no interval"
+        raise shares.unusable(view, reason, "simulate the others: run the same command again, or tolstat run STUDY")
 
     def above(x: Values, limit: float | None) -> Integers:
         return np.asarray(design.counts(x, [limit or 0.0])[0][joints > 0, 0], dtype=np.intp)
@@ -199,20 +207,6 @@ def _check_delivery(delivery: int, from_lots: int) -> None:
         raise InputError([Fault("--from-lots", f"{from_lots} lots of {delivery} joints", "give fewer lots")])
 
 
-def _lots_of(view: View) -> tuple[Clustered, Integers]:
-    """Design of a file, and the joints done of each lot, (lots,); raises a StoreError where lots tell nothing."""
-    if not isinstance(view.design, Clustered) or not view.limits:
-        in_lots = isinstance(view.design, Clustered)
-        found = "is of a study without [limits]" if in_lots else "holds joints that are each its own lot"
-        remedy = "give the file of a study with [limits], or simulate its lots: tolstat lots STUDY"
-        raise shares.inapplicable(view, found, remedy)
-    joints = view.design.counts(view.load(ANY_LIMIT).upper, [1.0])[1].astype(np.intp)
-    if (done := np.count_nonzero(joints)) < clustered.LEAST:
-        found = f"has joints of {done} lots simulated, and fewer than {clustered.LEAST} have no interval"
-        raise shares.unusable(view, found, "simulate the others: run the same command again, or tolstat run STUDY")
-    return view.design, joints
-
-
 def _shares(sample: Sample, ends: tuple[Sample, ...], count: Integers, n: Integers) -> dict[str, Any]:
     """Shares of the joints and of the lots above the limit of a load, `count` of `n` joints in each lot."""
     assert sample.limit is not None
@@ -238,25 +232,24 @@ def _notes(rows: Rows, size: int, accepted: float) -> Iterator[str]:
 
 def _panel(row: Row, above: Integers, n: Integers, size: int) -> Panel:
     """Picture of the shares of the lots that exceed at least one limit; `row` is that of all limits together."""
+
+    def draw(ax: Axes) -> None:
+        """Draw the share of the lots with at most a share of bad joints: simulated, expected, and without lots."""
+        share = np.sort(above / n)
+        top = max(2, int(np.ceil(size * min(1.0, share[-1] * 1.15 + 1.0 / size))))
+        at, x = np.arange(top + 1), np.arange(top + 2) / size
+        expected = np.cumsum(clustered.law_of(above, n).delivery(size).probability)[at]
+        alone = special.bdtr(at, size, above.sum() / n.sum())
+        for cdf, colour, dash in ((alone, style.FAINT, style.DASHES[2]), (expected, style.COLOURS[1], style.DASHES[1])):
+            ax.step(x, 100.0 * np.append(cdf, cdf[-1]), where="post", color=colour, ls=dash)
+        steps = 100.0 * np.arange(1, share.size + 1) / share.size
+        ax.step(np.append(share, x[-1]), np.append(steps, 100.0), where="post", color=style.COLOURS[0])
+        drawing.legend_above(ax, ax.lines[::-1], LINES)
+        ax.set(xlim=(0.0, x[-1]), ylim=(0.0, 104.0), ylabel="lots with at most this share [%]")
+        ax.xaxis.set_major_formatter(lambda value, _: f"{100.0 * value:g} %")
+        ax.set_xlabel("share of the joints of a lot that exceed at least one limit")
+
     title = f"{row['lots']} lots: which share of their joints is bad"
     half, worst = text.percent(row["median"]), text.percent(row["worst"])
     description = f"Half of the lots have at most {half}, the worst has {worst}"
-    draw = partial(_draw, above=above, n=n, size=size)
     return Panel("lots", title, description, draw, (drawing.WIDTH, 3.2), top=drawing.legend_room(LINES))
-
-
-def _draw(ax: Axes, above: Integers, n: Integers, size: int) -> None:
-    """Draw the share of the lots with at most a share of bad joints: simulated, expected, and without lots."""
-    share = np.sort(above / n)
-    top = max(2, int(np.ceil(size * min(1.0, share[-1] * 1.15 + 1.0 / size))))
-    at, x = np.arange(top + 1), np.arange(top + 2) / size
-    expected = np.cumsum(clustered.law_of(above, n).delivery(size).probability)[at]
-    alone = special.bdtr(at, size, above.sum() / n.sum())
-    for cdf, colour, dash in ((alone, style.FAINT, style.DASHES[2]), (expected, style.COLOURS[1], style.DASHES[1])):
-        ax.step(x, 100.0 * np.append(cdf, cdf[-1]), where="post", color=colour, ls=dash)
-    steps = 100.0 * np.arange(1, share.size + 1) / share.size
-    ax.step(np.append(share, x[-1]), np.append(steps, 100.0), where="post", color=style.COLOURS[0])
-    drawing.legend_above(ax, ax.lines[::-1], LINES)
-    ax.set(xlim=(0.0, x[-1]), ylim=(0.0, 104.0), ylabel="lots with at most this share [%]")
-    ax.xaxis.set_major_formatter(lambda value, _: f"{100.0 * value:g} %")
-    ax.set_xlabel("share of the joints of a lot that exceed at least one limit")

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat import sampling
-from tolstat.analysis import prediction
 from tolstat.analysis import reweight as weighting
 from tolstat.analysis.prediction import DELIVERY
 from tolstat.analysis.reweight import Ratios
@@ -30,7 +29,7 @@ from tolstat.store import error_budget
 from tolstat.store.view import View
 from tolstat.study import Study
 from tolstat.study.axes import columns_of
-from tolstat.study.change import changed, rewritten
+from tolstat.study.scaling import changed, rewritten_with
 from tolstat.study.tolerances import density_ratio
 from tolstat.study.tolerances.distributions import Distribution, score
 
@@ -132,7 +131,7 @@ def reweight(
     names = [name for name in new if new[name].describe() != old[name].describe()]
     remedy = "run a study with these tolerances"
     beyond = {name: _beyond(old[name], new[name]) for name in names}
-    if faults := [Fault(f"tolerances.{name}", found, remedy) for name, found in beyond.items() if found]:
+    if faults := [Fault(f"tolerances.{name}", words, remedy) for name, words in beyond.items() if words]:
         raise InputError(faults)
     done = np.flatnonzero(view.status != Status.PENDING)
     ratios = _ratios(view, new, names, done)
@@ -144,7 +143,7 @@ def reweight(
     title, columns = ("Shares above the limits", LIMITS) if view.limits else ("Quantiles", QUANTILES)
     again = "" if usable else f"fresh joints, same seeds: {_remedy(view, settings)}"
     words = (f"{len(names)} errors changed; {verdict}", error_budget.unknown(view), again)
-    notes, other = [Sentence(note) for note in words if note], Document(".toml", rewritten(view.study, settings))
+    notes, other = [Sentence(note) for note in words if note], Document(".toml", rewritten_with(view.study, settings))
     table = Table("loads", f"{title}, reweighted", columns, rows)
     return Answer("reweight", "Other tolerances", [table, *notes, other], facts | {"changed": names})
 
@@ -153,8 +152,8 @@ def _rows(view: View, done: NDArray[np.intp], ratios: Ratios, delivery: int) -> 
     """Rows of the table ``loads``; `ratios` are those of the joints `done`."""
     loads = view.loads(list(view.limits) or list(view.shown_loads))
     if lacking := [load.name for load in loads if not load.is_valid.any()]:
-        found = f"holds no joint with a valid load: {', '.join(lacking)}"
-        raise shares.unusable(view, found, f"see why: tolstat status {view.path}")
+        reason = f"holds no joint with a valid load: {', '.join(lacking)}"
+        raise shares.unusable(view, reason, f"see why: tolstat status {view.path}")
     if view.limits:
         rows = [_share_above(view, load, done, ratios, delivery) for load in (*loads, view.load(ANY_LIMIT))]
     else:
@@ -168,8 +167,8 @@ def _verdict(ratios: Ratios, rows: Rows) -> str:
     if ratios.effective < ratios.needed:
         return f"needs new runs, no estimates: {figures}, {ratios.needed:.0f} needed"
     if not ratios.usable:
-        found, allowed = math.exp(ratios.log_unbounded), weighting.LARGEST_SPREAD
-        wide = f"mean square {found:.3g} of the density ratio of wider or shifted tolerances, {allowed:g} allowed"
+        square, allowed = math.exp(ratios.log_unbounded), weighting.LARGEST_SPREAD
+        wide = f"mean square {square:.3g} of the density ratio of wider or shifted tolerances, {allowed:g} allowed"
         return f"needs new runs, no estimates: {wide}"
     missing = sum(not row["usable"] for row in rows)
     least = f"fewer than {weighting.LEAST_BESIDE:g} effective joints on one side, or the tail of their weights"
@@ -191,18 +190,14 @@ def _ratios(view: View, new: Mapping[str, Distribution], names: Sequence[str], d
         (new[name], study.tolerances[name]) for name in names if name not in correlated
     )
     if correlated:
-        own = _mean_square_of_correlated(study, new, correlated)
-        square, open_square, largest = square + own, open_square + own, np.inf
+        # mean ratio over errors drawn from the new tolerances: its mean square over the old ones
+        scores = np.random.default_rng(2024).standard_normal((DRAWS, len(sampling.streams(study))))
+        errors = sampling.from_scores(replace(study, tolerances=dict(new)), scores)
+        added = float(np.log(np.mean(np.exp(_block_log_ratios(study, new, correlated, errors)))))
+        square, open_square, largest = square + added, open_square + added, np.inf
     # the tolerances have at least the share 1 / heaviest of the mixture drawn from
     heaviest = np.log(view.design.heaviest) if isinstance(view.design, Weighted) else 0.0
     return Ratios(values, float(square + heaviest), float(open_square), float(np.exp(largest + heaviest)))
-
-
-def _mean_square_of_correlated(study: Study, new: Mapping[str, Distribution], names: Sequence[str]) -> float:
-    """Logarithm of the mean ratio over errors drawn from the new tolerances: its mean square over the old ones."""
-    scores = np.random.default_rng(2024).standard_normal((DRAWS, len(sampling.streams(study))))
-    errors = sampling.from_scores(replace(study, tolerances=dict(new)), scores)
-    return float(np.log(np.mean(np.exp(_block_log_ratios(study, new, names, errors)))))
 
 
 def _beyond(old: Distribution, new: Distribution) -> str:
@@ -250,24 +245,17 @@ def _share_above(view: View, load: Sample, done: NDArray[np.intp], ratios: Ratio
     """Row of the table for a limit; `ratios` are those of the joints `done`."""
     assert load.limit is not None
     level, known = load.limit, error_budget.near(view, load)
-
-    def share(load: Sample, confidence: float) -> weighting.Share:
-        return weighting.share_above(load.only(done), ratios, level, confidence)
-
-    def widest(confidence: float) -> tuple[float, float]:
-        """Ends of the interval; with the numerical error where that is known."""
-        ends = [share(end, confidence) for end in (load, *(known or ()))]
-        return min(end.lower for end in ends), max(end.upper for end in ends)
-
-    found, before = share(load, CONFIDENCE), load.only(done).above(level, CONFIDENCE).estimate
+    samples = [end.only(done) for end in (load, *(known or ()))]
+    share, total, predicted = shares.reweighted(samples, ratios, level, delivery)
+    before = samples[0].above(level, CONFIDENCE).estimate
     row = {"load": load.name, "unit": load.unit, "level": level, "before": before}
-    row |= {key: getattr(found, key) for key in GIVEN}
-    row["total_lower"], row["total_upper"] = widest(CONFIDENCE) if known else (np.nan, np.nan)
-    following = prediction.of_share(*widest(prediction.half(CONFIDENCE)), delivery, CONFIDENCE)
-    return row | prediction.columns(following, delivery) | {"ess": found.ess} | found.support._asdict()
+    row |= {key: getattr(share, key) for key in GIVEN}
+    row["total_lower"], row["total_upper"] = total if known else (np.nan, np.nan)
+    return row | predicted | {"ess": share.ess} | share.support._asdict()
 
 
 def _quantile(load: Sample, ratios: Ratios, share: float) -> dict[str, Any]:
     """Row of the table for a quantile; `ratios` are those of the joints of `load`."""
-    found, before = weighting.quantile(load, ratios, share, CONFIDENCE), load.quantile(share, CONFIDENCE).estimate
-    return {"load": load.name, "unit": load.unit, "share": share, "before": before, **found._asdict()}
+    before = load.quantile(share, CONFIDENCE).estimate
+    row = {"load": load.name, "unit": load.unit, "share": share, "before": before}
+    return row | weighting.quantile(load, ratios, share, CONFIDENCE)._asdict()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -13,7 +12,7 @@ from tolstat.common import units
 from tolstat.common.errors import InputError, NotApplicable
 from tolstat.common.tables import VALID
 from tolstat.display import drawing, style, text
-from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Row, Rows, Sentence, Table
+from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Row, Sentence, Table
 from tolstat.display.options import Opt
 from tolstat.joint.perturbation import HOLE_OF_PIN
 from tolstat.questions import shares
@@ -80,7 +79,7 @@ def simulate(
         Number of joints of each.
     """
     studies = {number: study_of(study, number, n) for number in sorted(set(classes or NUMBERS))}
-    return [work.run(own, f"{study.path.stem}_k{number}.h5") for number, own in studies.items()]
+    return [work.run(changed, f"{study.path.stem}_k{number}.h5") for number, changed in studies.items()]
 
 
 def study_of(study: Study, classes: int, n: int | None = None) -> Study:
@@ -132,27 +131,38 @@ def selective(*views: View) -> Answer:
         When its joints are no sample of a production.
     """
     rows = sorted(map(_row, views), key=lambda row: row["classes"])
+
+    def draw(ax: Axes) -> None:
+        """Draw yield with its interval, unmatched share, and share of all crosses in a good joint, over the classes."""
+        x = [row["classes"] for row in rows]
+        for key, colour, dash in zip(LINES, style.COLOURS, style.DASHES, strict=False):
+            ax.plot(x, [100.0 * row[key] for row in rows], marker="o", ms=4.5, color=colour, ls=dash)
+        low, high = ([100.0 * row[end] for row in rows] for end in ("good_lower", "good_upper"))
+        drawing.legend_above(ax, ax.lines, list(LINES.values()))
+        ax.vlines(x, low, high, color=style.COLOURS[0], lw=1.2)
+        ax.set(xlabel="classes", ylabel="share [%]", ylim=(-2.0, 102.0), xticks=x)
+
     top = drawing.legend_room(list(LINES.values()))
     description = "; ".join(f"{row['classes']} classes: yield {text.percent(row['good'])}" for row in rows)
-    panel = Panel("classes", TITLE, description, partial(_draw, rows=rows), (drawing.WIDTH, 3.4), top=top)
+    panel = Panel("classes", TITLE, description, draw, (drawing.WIDTH, 3.4), top=top)
     table = Table("classes", "Yield and unmatched parts, by number of classes", COLUMNS, rows, {"clearance": "m"})
     return Answer("selective", TITLE, [Panels([panel]), table, *NOTES])
 
 
 def selective_on_page(view: View, asked: Asked) -> Answer:
     """Classes of a campaign whose pins and holes are sorted."""
-    found = classes_of(view) if view.store.sampling.get("selective") and view.count(*VALID) else None
-    if found is None:
+    classes = classes_of(view) if view.store.sampling.get("selective") and view.count(*VALID) else None
+    if classes is None:
         raise NotApplicable
-    words = f"{text.percent(found.unmatched)} of the crosses and forks have no partner of their class."
+    words = f"{text.percent(classes.unmatched)} of the crosses and forks have no partner of their class."
     if view.limits:
         kept = shares.good(view)
         ends = text.span(kept["good_lower"], kept["good_upper"])
         words += f" {text.percent(kept['good'])} of the assembled joints keep all limits (total interval {ends})."
-    columns = {"class": range(1, found.matched.size + 1), "pins": found.edges[0, 1:], "holes": found.edges[1, 1:]}
-    columns |= {kind.name: own for kind, own in zip(KINDS, found.shares, strict=True)} | {"matched": found.matched}
-    title, units_of = "Classes by measured diameter, deviation from nominal", {"pins": "m", "holes": "m"}
-    table = Table("edges", title, OF_ONE, shares.rows_of(columns), units_of)
+    columns = {"class": range(1, classes.matched.size + 1), "pins": classes.edges[0, 1:], "holes": classes.edges[1, 1:]}
+    columns |= dict(zip((kind.name for kind in KINDS), classes.shares, strict=True)) | {"matched": classes.matched}
+    title = "Classes by measured diameter, deviation from nominal"
+    table = Table("edges", title, OF_ONE, shares.rows_of(columns), {"pins": "m", "holes": "m"})
     return Answer("selective", TITLE, [Sentence(words, "lead"), table, *NOTES])
 
 
@@ -178,15 +188,3 @@ def _row(view: View) -> Row:
     ends = ("good", "good_lower", "good_upper")
     row |= {key: kept[key] for key in ("n", "count", "n_failed", "n_unsettled", *ends)}
     return row | {key.replace("good", "of_all"): (1.0 - unmatched) * kept[key] for key in ends}
-
-
-def _draw(ax: Axes, rows: Rows) -> None:
-    """Draw yield with its interval, unmatched share, and share of all crosses in a good joint, over the classes."""
-    x, lines = [row["classes"] for row in rows], []
-    for (name, label), colour, dash in zip(LINES.items(), style.COLOURS, style.DASHES, strict=False):
-        y = [100.0 * row[name] for row in rows]
-        lines += ax.plot(x, y, marker="o", ms=4.5, color=colour, ls=dash, label=label)
-    low, high = ([100.0 * row[end] for row in rows] for end in ("good_lower", "good_upper"))
-    ax.vlines(x, low, high, color=style.COLOURS[0], lw=1.2)
-    drawing.legend_above(ax, lines, list(LINES.values()))
-    ax.set(xlabel="classes", ylabel="share [%]", ylim=(-2.0, 102.0), xticks=x)

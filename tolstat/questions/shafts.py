@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from tolstat import sampling
 from tolstat.analysis import binomial
-from tolstat.analysis.independent import Independent
+from tolstat.analysis.design import Independent
 from tolstat.analysis.sensitivity import FEWEST, MOST, first_order
 from tolstat.common.load_kinds import ORDERS
 from tolstat.common.loads import ANY_LIMIT

@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from tolstat.analysis import binomial, difference
+from tolstat.analysis import binomial, difference, prediction, reweight
 from tolstat.analysis.design import Claim
 from tolstat.analysis.estimates import Exceedance
 from tolstat.analysis.prediction import DELIVERY
-from tolstat.analysis.sample import Sample, total_interval
+from tolstat.analysis.reweight import Ratios, Share
+from tolstat.analysis.sample import CONFIDENCE, Sample, total_interval
 from tolstat.campaign import what_if as sets
 from tolstat.common.errors import Fault, NotApplicable, StoreError
 from tolstat.common.loads import ANY_LIMIT, FloatArray
 from tolstat.common.tables import Status
 from tolstat.display import text
-from tolstat.display.table import Row
+from tolstat.display.table import Column, Row, has
 from tolstat.store import error_budget, what_if
 from tolstat.store.view import View
 from tolstat.store.what_if import Altered
@@ -57,6 +58,27 @@ def value(key: str) -> Cell:
 def values(lower: str, upper: str) -> Cell:
     """Make a `Column.cell` of an interval of loads, in the row's ``unit``."""
     return lambda row: text.span_of(row[lower], row[upper], row["unit"])
+
+
+def estimated(
+    head: str, name: str, rank: int = 0, form: str = ".1f", ends: tuple[float, float] | None = None
+) -> Column:
+    """Column of an estimate between two `ends`, in per cent unless `form` has two digits, with its interval."""
+    factor = 1.0 if form.endswith("2f") else 100.0
+
+    def cell(row: Row) -> str:
+        if math.isnan(value := row.get(name, math.nan)):
+            return "-"
+        low, high = (factor * row[f"{name}{end}"] for end in ("_lower", "_upper"))
+        value = factor * (value if ends is None else min(max(value, ends[0]), ends[1])) + 0.0  # no -0
+        return f"{value:{form}}" + ("" if math.isnan(low) else f" ({text.ends(low, high, form)})")
+
+    return Column(head, cell, shown=has(name), rank=rank)
+
+
+def above(row: Row) -> str:
+    """Cell of the joints above a limit, and of how many with a valid load."""
+    return f"{row['count']} of {row['n'] - row['n_failed'] - row['n_unsettled']}"
 
 
 def limit(row: Row) -> str:
@@ -122,15 +144,48 @@ def _good(view: View, name: str, confidence: float, delivery: int) -> Mapping[st
     assert load.limit is not None
     loads, above = error_budget.with_error(view, load), load.above(load.limit, confidence)
     row = {"load": load.name, "unit": load.unit, "limit": load.limit, **counts(above)}
-    low, high = total_interval(loads, load.limit, confidence)
-    row |= {"good": 1.0 - above.estimate, "good_lower": 1.0 - high, "good_upper": 1.0 - low}
-    row |= {"ppm": 1e6 * above.estimate, "ppm_lower": 1e6 * low, "ppm_upper": 1e6 * high}
+    share, low, high = above.estimate, *total_interval(loads, load.limit, confidence)
+    row |= with_ends("good", (1.0 - share, 1.0 - high, 1.0 - low))
+    row |= with_ends("ppm", (1e6 * share, 1e6 * low, 1e6 * high))
     return row | error_budget.delivery(loads, load.limit, delivery, confidence)
 
 
 def counts(above: Exceedance) -> dict[str, int]:
     """Columns of a table: numbers of joints, of those without a valid load, and of those above a level."""
     return {"n": above.n, "n_failed": above.n_failed, "n_unsettled": above.n_unsettled, "count": above.count}
+
+
+def reweighted(
+    samples: Sequence[Sample], ratios: Ratios, level: float, delivery: int
+) -> tuple[Share, tuple[float, float], dict[str, float]]:
+    """Share of the joints above a level under other tolerances.
+
+    Parameters
+    ----------
+    samples : sequence of Sample
+        Load of some joints and, where it is known, with both ends of its numerical error.
+    ratios : Ratios
+        Density ratios of these joints.
+    level, delivery
+        The level, and the number of joints of the next delivery.
+
+    Returns
+    -------
+    Share
+        Of the load as simulated.
+    tuple of float
+        Ends of the interval, with the numerical error where it is known.
+    dict
+        Columns of the prediction interval.
+    """
+
+    def ends(confidence: float) -> tuple[float, float]:
+        each = [reweight.share_above(sample, ratios, level, confidence) for sample in samples]
+        return min(share.lower for share in each), max(share.upper for share in each)
+
+    predicted = prediction.of_share(*ends(prediction.half(CONFIDENCE)), delivery, CONFIDENCE)
+    share = reweight.share_above(samples[0], ratios, level, CONFIDENCE)
+    return share, ends(CONFIDENCE), prediction.columns(predicted, delivery)
 
 
 class Yield(NamedTuple):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -38,15 +37,15 @@ ON_PAGE = (
 )
 
 
-def _cost(row: Row, name: str) -> str:
-    return f"{row[name]:.4g}" if math.isfinite(row[name]) else "-"
+def _cost(key: str) -> shares.Cell:
+    return lambda row: f"{row[key]:.4g}" if math.isfinite(row[key]) else "-"
 
 
 OF_PARTS = (
     Column("part", shares.word("part")),
     Column("scrapped", shares.share("scrapped")),
-    Column("cost of one made", lambda row: _cost(row, "cost")),
-    Column("of one used", lambda row: _cost(row, "cost_used")),
+    Column("cost of one made", _cost("cost")),
+    Column("of one used", _cost("cost_used")),
 )
 STAGES = (
     Column("load > limit", text.limit),
@@ -54,8 +53,8 @@ STAGES = (
     Column("above", shares.share("estimate")),
     Column("95 % interval", shares.shares("lower", "upper")),
     Column("rejected", lambda row: text.percent(row["rejected"]) if row["rejected"] else "-", rank=1),
-    Column("cost of a joint", lambda row: _cost(row, "cost"), rank=2),
-    Column("of a good one", lambda row: _cost(row, "cost_good")),
+    Column("cost of a joint", _cost("cost"), rank=2),
+    Column("of a good one", _cost("cost_good")),
 )
 
 
@@ -175,21 +174,20 @@ def _row(view: View, load: Sample, stage: str, kept: FloatArray | None, rejected
 
 def _panel(rows: Rows) -> Panel:
     """Picture of the share above the limits at each stage."""
-    left = drawing.rows_left([row["stage"] for row in rows])
+    labels = [row["stage"] for row in rows]
+
+    def draw(ax: Axes) -> None:
+        """Draw the share above the limits at each stage, with its interval, and beside it what a good joint costs."""
+        drawing.rows(ax, labels)
+        high = 1.25 * max(float(row["upper"]) for row in rows)
+        ax.set(xlim=(0.0, 100.0 * high), xlabel="share of the joints above a limit, per cent")
+        for i, row in enumerate(rows):
+            ax.plot([100.0 * row["lower"], 100.0 * row["upper"]], [i, i], color=style.COLOURS[0], lw=3.0)
+            ax.plot(100.0 * row["estimate"], i, "o", color=style.COLOURS[0], ms=6.0)
+            at, side = (row["lower"], "left") if row["lower"] < 0.5 * high else (row["upper"], "right")
+            label = f"a good joint costs {_cost('cost_good')(row)}"
+            ax.text(100.0 * at, i - 0.14, label, ha=side, va="bottom", size=8.0, color=style.INK)
+
     size = (drawing.WIDTH, 0.55 * len(rows) + drawing.BOTTOM + 0.1)
     description = "; ".join(f"{row['stage']}: {text.percent(row['estimate'])}" for row in rows)
-    title = "Joints above a limit, before and after"
-    return Panel("stages", title, description, partial(_draw, rows=rows), size, left)
-
-
-def _draw(ax: Axes, rows: Rows) -> None:
-    """Draw the share above the limits at each stage, with its interval, and beside it what a good joint costs."""
-    drawing.rows(ax, [row["stage"] for row in rows])
-    high = 1.25 * max(float(row["upper"]) for row in rows)
-    ax.set(xlim=(0.0, 100.0 * high), xlabel="share of the joints above a limit, per cent")
-    for i, row in enumerate(rows):
-        ax.plot([100.0 * row["lower"], 100.0 * row["upper"]], [i, i], color=style.COLOURS[0], lw=3.0)
-        ax.plot(100.0 * row["estimate"], i, "o", color=style.COLOURS[0], ms=6.0)
-        label = f"a good joint costs {_cost(row, 'cost_good')}"
-        at, side = (row["lower"], "left") if row["lower"] < 0.5 * high else (row["upper"], "right")
-        ax.text(100.0 * at, i - 0.14, label, ha=side, va="bottom", size=8.0, color=style.INK)
+    return Panel("stages", "Joints above a limit, before and after", description, draw, size, drawing.rows_left(labels))

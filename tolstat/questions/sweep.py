@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from fnmatch import fnmatchcase
 from functools import partial
 from typing import Any, NamedTuple
@@ -21,8 +21,8 @@ from tolstat.display.style import lines, ticker
 from tolstat.questions.shares import inapplicable, rows_of
 from tolstat.store import recorded
 from tolstat.store.view import View
+from tolstat.study.design import KEYS
 from tolstat.study.selection import UNITS
-from tolstat.study.swept import KEYS
 
 MAX_LEGEND = 6
 """Maximum number of values of the second swept quantity in the legend."""
@@ -63,10 +63,16 @@ def sweep(view: View) -> Answer:
     seen = [_short(row) for row in rows]
     ranked = [name for name in (seen[0] if seen else ()) if "." in name][1:]
     table = Table("sweep", "Worst bushing", plain(seen, ranked), rows, seen=seen)
-    pictures: list[Part] = (
-        [Panels([*_panels(view)]), Sheet("sweep", partial(sheet, view))] if view.bushing_loads else []
-    )
+    pictures: list[Part] = []
+    if view.bushing_loads:
+        panels = [_panel(view, group, kind) for group, kind in PANELS if _kept(view, group, kind)]
+        pictures = [Panels(panels), Sheet("sweep", partial(sheet, view))]
     return Answer("sweep", "Loads against the swept value", [*pictures, table])
+
+
+def _kept(view: View, group: str, kind: Kind) -> dict[str, FloatArray]:
+    """Largest loads of one kind at ``cross`` or ``fork`` bushings that the study keeps, (n,) each."""
+    return {name: view.simulated(name) for name in names_of(group, kind) if name in view.bushing_loads}
 
 
 def _head(name: str, unit: str) -> str:
@@ -83,20 +89,17 @@ def _short(row: Row) -> Row:
     return short
 
 
-def _panels(view: View) -> Iterator[Panel]:
+def _panel(view: View, group: str, kind: Kind) -> Panel:
     axes = swept_axes(view)
-    room = drawing.legend_room(_legend(view, axes)[1])
+    room, quantity = drawing.legend_room(_legend(view, axes)[1]), QUANTITY[kind.unit]
 
-    def draw(ax: Axes, group: str, kind: Kind) -> None:
+    def draw(ax: Axes) -> None:
         _draw(ax, view, axes, group, kind)
         drawing.legend_above(ax, *_legend(view, axes))
 
-    for group, kind in PANELS:
-        if any(name in view.bushing_loads for name in names_of(group, kind)):
-            title, key = f"{group.capitalize()} bushings, {QUANTITY[kind.unit]}", f"sweep-{group}-{kind.symbol}"
-            words = f"Largest {QUANTITY[kind.unit]}s of the {group} bushings against the swept value"
-            size, draw_loads = (drawing.WIDTH, 3.3 + room), partial(draw, group=group, kind=kind)
-            yield Panel(key, title, words, draw_loads, size, top=room)
+    title, words = f"{group.capitalize()} bushings, {quantity}", f"Largest {quantity}s of the {group} bushings"
+    size = (drawing.WIDTH, 3.3 + room)
+    return Panel(f"sweep-{group}-{kind.symbol}", title, f"{words} against the swept value", draw, size, top=room)
 
 
 def sheet(view: View) -> Figure:
@@ -120,13 +123,8 @@ def sheet(view: View) -> Figure:
         small = f"largest of the four bushings, coloured by {axes[1].head}"
     if len(axes) > 2:
         small += f"; one line for each {', '.join(axis.label for axis in axes[2:])}"
-    with style.settings():
-        title = f"{view.name}: largest loads against " + (axes[0].label if axes else "the joint's number")
-        page, panels = style.panels(title, f"{view.head()}\n{small}")
-        for group, kind, ax in panels:
-            _draw(ax, view, axes, group, kind)
-        style.legend(page, *_legend(view, axes))
-    return page
+    title = f"{view.name}: largest loads against {axes[0].label if axes else 'the number of the joint'}"
+    return drawing.sheet([_panel(view, *panel) for panel in PANELS], title, [view.head(), small], columns=2)
 
 
 def _draw(ax: Axes, view: View, axes: list[Axis], group: str, kind: Kind) -> None:
@@ -134,7 +132,7 @@ def _draw(ax: Axes, view: View, axes: list[Axis], group: str, kind: Kind) -> Non
     first = axes[0] if axes else Axis("joint", "", np.arange(1, view.n + 1, dtype=np.float64))
     ax.set(xlabel=first.head, ylabel=f"largest |{kind.symbol}| [{unit_text(kind.unit)}]")
     ax.xaxis.set_major_locator(ticker.MaxNLocator(6))
-    loads = {name: view.simulated(name) for name in names_of(group, kind) if name in view.bushing_loads}
+    loads = _kept(view, group, kind)
     if not loads:
         drawing.empty(ax, "not kept by the study")
         return
@@ -171,8 +169,8 @@ def _line(ax: Axes, view: View, axis: Axis, values: FloatArray, joints: NDArray[
 def _shades(axis: Axis) -> dict[float, str]:
     """Colour of `style.shades` of each value of a swept quantity, ascending."""
     values, shades = np.unique(axis.values), style.shades()
-    places = np.linspace(0, len(shades) - 1, values.size).round().astype(int)
-    return {value: shades[i] for value, i in zip(values, places, strict=True)}
+    numbers = np.linspace(0, len(shades) - 1, values.size).round().astype(int)
+    return {value: shades[i] for value, i in zip(values, numbers, strict=True)}
 
 
 def _legend(view: View, axes: list[Axis]) -> tuple[list[Artist], list[str]]:
@@ -234,8 +232,8 @@ def swept_axes(view: View) -> list[Axis]:
     errors = view.errors(np.arange(view.n))
     columns = {(field.name, field.unit): errors[field.name] for field in ERROR_FIELDS}
     if len(view.parts) == 1:  # of several operating points none is swept
-        own = recorded.operating_points(view.store, slice(view.store.first_sample, None))
-        columns |= {(f"operation.{key}", UNITS[f"operation.{key}"]): values for key, values in own.items()}
+        points = recorded.operating_points(view.store, slice(view.store.first_sample, None))
+        columns |= {(f"operation.{key}", UNITS[f"operation.{key}"]): values for key, values in points.items()}
     if view.store.variants:
         columns |= {(key, KEYS[key]): of[view.store.first_sample :] for key, of in recorded.swept(view.store).items()}
     groups: dict[bytes, list[tuple[str, str]]] = {}
@@ -247,20 +245,18 @@ def swept_axes(view: View) -> list[Axis]:
         unit, factor = DISPLAY_UNITS.get(keys[0][1], (keys[0][1], 1.0))
         values = columns[keys[0]] * factor
         values[np.abs(values) < 1e-12 * np.abs(values).max()] = 0.0  # rounding error of a sweep through zero
-        axes.append(Axis(_label([name for name, _ in keys], patterns), unit, values))
+        names = [name for name, _ in keys]
+        matching = (pattern for pattern in patterns if all(fnmatchcase(name, pattern) for name in names))
+        label = next(matching, names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more")
+        axes.append(Axis(label, unit, values))
     rank = {pattern: i for i, pattern in enumerate(patterns)}
     return sorted(axes, key=lambda axis: rank.get(axis.label, len(rank)))
 
 
 def _patterns(table: Mapping[str, Any], before: str = "") -> list[str]:
     """Key paths of the entries of ``[sweep]``, whether quoted or dotted."""
-    found = []
+    paths = []
     for key, value in table.items():
-        nested = isinstance(value, Mapping) and "from" not in value
-        found += _patterns(value, f"{before}{key}.") if nested else [f"{before}{key}"]
-    return found
-
-
-def _label(names: list[str], patterns: list[str]) -> str:
-    every = (pattern for pattern in patterns if all(fnmatchcase(name, pattern) for name in names))
-    return next(every, names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more")
+        is_section = isinstance(value, Mapping) and "from" not in value
+        paths += _patterns(value, f"{before}{key}.") if is_section else [f"{before}{key}"]
+    return paths

@@ -26,7 +26,6 @@ from tolstat.questions.assumptions import answer, sentences, variations
 from tolstat.questions.causes import lines, worst
 from tolstat.questions.drawings.answer import place_of
 from tolstat.questions.exceedance import rows as exceedance
-from tolstat.questions.exceedance.answer import above
 from tolstat.report.answer import stopped
 from tolstat.report.headline import headline, life_verdicts, tells_yield
 from tolstat.solver import fidelity
@@ -327,7 +326,7 @@ def _cards(view: View, verdict: Verdict | None) -> list[Card]:
         label = f"exceed {text.value(most['level'], most['unit'])} on {most['load']}, the limit exceeded most"
         low, high = exceedance.ends(most)
         interval = "no interval" if np.isnan(low) else f"total interval {text.span(low, high)}"
-        note = f"{above(most)} joints with a valid load; {interval}"
+        note = f"{shares.above(most)} joints with a valid load; {interval}"
         cards.append(Card(exceedance.share_of(most), label, note))
     return [*cards, *_basis(view)]
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from tolstat.common.channels import LOAD_HISTORIES
 from tolstat.common.cores import available_cores
-from tolstat.common.tables import PARAM, RESULT, Options
+from tolstat.common.tables import PARAM, RESULT, Fidelity, Options
 from tolstat.solver import rainflow, refinement, simulation
 
 LOG = logging.getLogger("tolstat")
@@ -35,8 +35,9 @@ def _outside_model(torque_reverses: bool = False) -> NDArray[np.void]:
     return params
 
 
-def _simulate(simulate: Callable[..., Iterator[object]], options: Options) -> None:
-    list(simulate(_outside_model(), options, np.ones(1, np.int64), False, np.zeros(1, RESULT).view(np.recarray)))
+def _simulate(joints: int, options: Options) -> None:
+    params, results = np.repeat(_outside_model(), joints), np.zeros(joints, RESULT).view(np.recarray)
+    list(simulation.simulate_together(params, options, np.ones(joints, np.int64), False, results))
 
 
 def _explicit(options: Options) -> None:
@@ -45,18 +46,24 @@ def _explicit(options: Options) -> None:
     list(simulation.simulate_together(joint, settings, revolutions, False, results, results[:, None], steps))
 
 
+def _ideal(options: Options) -> None:
+    results = np.zeros(1, RESULT).view(np.recarray)
+    list(simulation.simulate_ideal(_outside_model(), options, np.ones(1, np.int64), False, results))
+
+
 KERNELS: dict[str, Callable[[Options], object]] = {
-    "lockstep.lockstep": partial(_simulate, simulation.simulate_together),
-    "simulate.simulate_joint": partial(_simulate, simulation.simulate_alone),
+    "lockstep.lockstep": partial(_simulate, simulation.MOST_ALONE + 1),
+    "lockstep.one_at_a_time": partial(_simulate, 1),
     "explicit.explicit": _explicit,
     "explicit.count_steps": lambda options: simulation.explicit_steps(_outside_model(torque_reverses=True), options),
     "starts.write_starts": lambda options: simulation.starts(np.zeros(1, PARAM).view(np.recarray), options),
+    "ideal.ideal_revolution": _ideal,
     "rainflow.count_joint": lambda options: rainflow.count(
         {of.name: np.zeros((2, *of.shape)) for of in LOAD_HISTORIES}
     ),
 }
 """Kernels that Python calls, by their names in the cache, each with a call that compiles it."""
-SECOND = ("simulate.simulate_joint", "explicit.explicit")
+SECOND = ("lockstep.one_at_a_time", "explicit.explicit")
 """Kernels that the second process compiles; they take about as long as all others together."""
 
 
@@ -66,7 +73,9 @@ def kernels(options: Options, params: NDArray[np.void] | None = None) -> list[st
     Kernels with explicit steps are only among them where one of the joints `params` needs them; without them such a
     joint compiles them when it is simulated.
     """
-    left_out = set() if simulation.in_lanes(options) else {"lockstep.lockstep", "starts.write_starts"}
+    if options.fidelity == Fidelity.IDEAL:
+        return ["ideal.ideal_revolution", "rainflow.count_joint"]
+    left_out = {"ideal.ideal_revolution"}
     if params is None or not len(simulation.hitting(params, options)):
         left_out |= {"explicit.explicit", "explicit.count_steps"}
     return [name for name in KERNELS if name not in left_out]

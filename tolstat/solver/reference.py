@@ -25,6 +25,7 @@ from tolstat.common.tables import (
     iterations_allowed,
     without_results,
 )
+from tolstat.solver.simulation import AT_REST, equilibrium, simulate_together
 
 IntegratorName = Literal["Radau", "BDF", "LSODA"]
 
@@ -99,27 +100,23 @@ def first_order(params: NDArray[np.void], options: Options, from_start: bool = F
     from tolstat.kernel.mechanics.topology import N_DOF
     from tolstat.kernel.mechanics.work import WORK
     from tolstat.kernel.revolution.orders import write_orders
-    from tolstat.kernel.revolution.settle import make_samples
-    from tolstat.kernel.revolution.simulate import make_scratch, simulate_joint
-    from tolstat.kernel.revolution.trajectory import sample
+    from tolstat.kernel.revolution.settle import make_samples, sample
     from tolstat.kernel.simd.jit import compiled_entry
 
     par = params.view(np.recarray)[0]
     options = options._replace(fidelity=int(Fidelity.DYNAMIC))
-    alone = make_scratch(options)
-    work, state = alone.work, alone.state
-    settled = np.zeros(1, RESULT)
-    allowed = iterations_allowed(options.steps_per_rev, options.max_revs)
-    simulate_joint(par, options, allowed, alone, for_kernels(settled)[0])
+    settled, revolution = _last_revolution(params, options)
     period = 2 * np.pi / abs(float(par.omega))
-    t0, y0 = period * (float(settled["revolutions"][0]) % 1.0), np.concatenate([state.q0, state.v0])
+    last = round(float(np.nan_to_num(settled["revolutions"][0])) * options.steps_per_rev) % options.steps_per_rev
+    t0, y0 = period * last / options.steps_per_rev, np.concatenate([revolution[last].q, revolution[last].v])
     if from_start:
-        t0, y0 = 0.0, _start(par, options)
+        t0, y0 = 0.0, _start(params, options)
     else:
         options = options._replace(start=int(Start.STATIC))  # the torque ramp has ended
 
     n = 2 * N_DOF
     works, scratch = np.zeros(1, WORK), np.empty((3, n))
+    work = works.view(np.recarray)[0]
     fast_rate = compiled_entry(kernel.rate_of_row, t0, y0, params, options, works, y0)
     fast_jacobian = compiled_entry(kernel.jacobian_of_row, t0, y0, params, options, works, scratch, scratch)
 
@@ -145,15 +142,18 @@ def first_order(params: NDArray[np.void], options: Options, from_start: bool = F
     return FirstOrder(rate, jacobian, t0, y0, period, scale, largest, settled)
 
 
-def _start(par: np.record, options: Options) -> FloatArray:
-    """Initial state of the solver at time zero, (112,)."""
-    from tolstat.kernel.revolution.simulate import make_scratch
-    from tolstat.kernel.revolution.trajectory import follow
+def _last_revolution(params: NDArray[np.void], options: Options) -> tuple[NDArray[np.void], Any]:
+    """Result of a joint with uniform or error-controlled steps, (1,), and samples of its last revolution."""
+    settled, allowed = np.zeros(1, RESULT), np.full(1, iterations_allowed(options.steps_per_rev, options.max_revs))
+    ((_, samples),) = simulate_together(params, options, allowed, True, settled)
+    return settled, samples
 
-    work, state, *_ = make_scratch(options)
-    point = np.empty((1, 3, len(state.q)))
-    follow(par, options, work, state, point)
-    return point[0, :2].ravel()
+
+def _start(params: NDArray[np.void], options: Options) -> FloatArray:
+    """Initial state of the solver at time zero, (112,)."""
+    if options.start == Start.RAMP:
+        return np.zeros(2 * len(AT_REST))
+    return np.concatenate([equilibrium(params, options), AT_REST])
 
 
 def reference_rows(

@@ -18,7 +18,7 @@ from tolstat.solver import stationary
 
 TOLERANCE = 0.04
 """First tolerance of the error of a part of a step, as a load relative to the joint's largest
-(`kernel.integrators.mesh`); each tighter one is an eighth (`kernel.revolution.adaptive.TIGHTER`). Explicit steps are
+(`kernel.integrators.mesh`); each tighter one is an eighth (`kernel.revolution.resolve.TIGHTER`). Explicit steps are
 halved instead."""
 MIN_MAX_REVS = 48
 """Revolutions after which a joint that has not repeated is given up, unless `max_revs` is larger."""

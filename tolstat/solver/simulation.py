@@ -21,6 +21,7 @@ from tolstat.common.tables import (
     Method,
     Options,
     Simulation,
+    Start,
     Status,
     for_kernels,
     iterations_allowed,
@@ -29,11 +30,11 @@ from tolstat.joint import ideal
 from tolstat.solver import harmonics, rainflow, refinement, stationary
 
 if TYPE_CHECKING:
-    from tolstat.kernel.lanes.batch import Batch
-    from tolstat.kernel.revolution.simulate import Scratch
+    from tolstat.kernel.lanes.batch import Batch, Queue
 
+Table = np.recarray[Any, np.dtype[np.void]]
 Run = Callable[..., Iterator[tuple[int, NDArray[np.void]]]]
-"""Simulation of joints, `simulate_alone` or `simulate_together`."""
+"""Simulation of joints, such as `simulate_together`."""
 Histories = Literal["none", "cycles", "harmonics", "harmonics+cycles", "full"]
 
 MAX_KEPT_SAMPLES = 12_000
@@ -43,10 +44,15 @@ NEARLY_REVERSING = 0.8
 """Torque that reverses the load (`ideal.reversal_torque`), relative to a joint's own, above which explicit steps cost
 less than error-controlled ones."""
 
+MOST_ALONE = 3
+"""Number of joints up to which they are simulated one after the other."""
+
 UNIFORM_REVS = 4
 """Revolutions with uniform steps of a joint that explicit steps suit: what uniform steps resolve settles sooner."""
 
-NO_BLOCKS = np.zeros((0, 0), RESULT).view(np.recarray)
+AT_REST = np.zeros(56)
+"""Unknowns of the ideal pose, or velocities of a joint at rest."""
+NO_BLOCKS = np.zeros((0, 0), KERNEL_RESULT).view(np.recarray)
 """Empty statistics of single revolutions, if they are not needed."""
 
 
@@ -88,31 +94,22 @@ def _of_samples(history: LoadHistory, n: int) -> HistorySpec:
 
 
 @cache
-def scratch(options: Options) -> Scratch:
-    """Work arrays of this process for `options`; importing the kernel here keeps it out of light commands."""
-    from tolstat.kernel.revolution.simulate import make_scratch
-
-    return make_scratch(options)
-
-
-@cache
-def lanes(options: Options) -> Batch:
-    """Work arrays of this process for joints simulated in lock-step."""
+def lanes(options: Options, width: int) -> Batch:
+    """Work arrays of this process for `width` joints at a time; importing the kernel here spares light commands."""
     from tolstat.kernel.lanes.batch import make_batch
 
-    return make_batch(options)
+    return make_batch(options, width)
 
 
-def in_lanes(options: Options) -> bool:
-    """Whether joints with these settings are simulated in lock-step; all others are simulated one after the other."""
-    uniform = options.method == Method.BDF2 and options.rtol == 0
-    dynamic = options.fidelity == Fidelity.DYNAMIC and (uniform or follows_error(options))
-    return (dynamic or options.fidelity == Fidelity.QUASISTATIC) and not _is_switched_off()
+def width_for(joints: int) -> int:
+    """Number of lanes for so many joints: a few of them take less time alone than in lanes most of which are empty.
 
+    Without compilation there are no lanes.
+    """
+    from tolstat.kernel.simd.lane import WIDTH
 
-def _is_switched_off() -> bool:
-    """Whether Numba compiles nothing; importing Numba to ask it takes 0.2 s."""
-    return os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
+    switched_off = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
+    return 1 if switched_off or joints <= MOST_ALONE else WIDTH
 
 
 def follows_error(options: Options) -> bool:
@@ -157,7 +154,7 @@ def simulate_rows(
         found = np.zeros(len(rows), RESULT).view(np.recarray)
         revolutions = settings.max_revs if follows_error(settings) else 0
         blocks = np.zeros((len(rows) if revolutions else 0, revolutions), RESULT).view(np.recarray)
-        run: Run = simulate_together if in_lanes(settings) else simulate_alone
+        run: Run = simulate_ideal if settings.fidelity == Fidelity.IDEAL else simulate_together
         if follows_error(settings):
             run = partial(_resolved, steps[rows])
         own = left[rows]
@@ -183,32 +180,6 @@ def simulate_rows(
     return Simulation(results, kept)
 
 
-def simulate_alone(
-    params: NDArray[np.void],
-    options: Options,
-    left: NDArray[np.int64],
-    keep: bool,
-    results: NDArray[np.void],
-    blocks: NDArray[np.void] = NO_BLOCKS,
-) -> Iterator[tuple[int, NDArray[np.void]]]:
-    """Simulate joints one after the other; yield index and samples of each if `keep`.
-
-    `left`: Newton iterations still allowed to each joint, (n,), reduced by those taken.
-    """
-    from tolstat.kernel.integrators.state import ITERATIONS
-    from tolstat.kernel.revolution.simulate import simulate_joint
-
-    alone = scratch(options)
-    rows, out, own = params.view(np.recarray), for_kernels(results), for_kernels(blocks)
-    for i in range(len(params)):
-        simulate_joint(rows[i], options, left[i], alone, out[i])
-        left[i] -= alone.state.counters[ITERATIONS]
-        if len(own):
-            own[i] = alone.past.trail.revolution
-        if keep:
-            yield i, alone.ring.samples
-
-
 def simulate_together(
     params: NDArray[np.void],
     options: Options,
@@ -220,39 +191,100 @@ def simulate_together(
 ) -> Iterator[tuple[int, NDArray[np.void]]]:
     """Simulate joints in lanes by numbers of contact stations and orders; yield index and samples of each if `keep`.
 
-    `left` is as of `simulate_alone`. `steps`: number of explicit steps of the first revolution, (n,); without it joints
-    are simulated in lock-step, and those in which a step fails are simulated again, alone.
+    `left`: Newton iterations still allowed to each joint, (n,), reduced by those taken. `steps`: number of explicit
+    steps of the first revolution, (n,); without it joints are simulated in lock-step.
     """
-    from tolstat.kernel.lanes.explicit import explicit
-    from tolstat.kernel.lanes.lockstep import PATIENCE, lockstep
+    from tolstat.kernel.lanes.lockstep import START_ONLY
     from tolstat.kernel.revolution.settle import make_samples
 
-    batch, tally = lanes(options), np.zeros(3, np.int64)
     max_size = max(1, MAX_KEPT_SAMPLES // options.steps_per_rev) if keep else len(params)
     memory = make_samples(min(max_size, len(params)) if keep else 0, options.steps_per_rev)
     for here in _groups(params, max_size):
-        part = np.ascontiguousarray(params[here])
-        batch.par.n_stations, batch.par.n_orders = part["n_stations"][0], part["n_orders"][0]
-        words = part.view(np.float64).reshape(len(part), -1)
-        samples = memory[: len(part)]
-        own = np.zeros((len(part) if len(blocks) else 0, blocks.shape[1]), KERNEL_RESULT).view(np.recarray)
-        out = np.zeros(len(part), KERNEL_RESULT).view(np.recarray)
-        rows, allowed = part.view(np.recarray), left[here]
+        allowed = left[here]
+        own = np.zeros((len(here) if len(blocks) else 0, blocks.shape[1]), KERNEL_RESULT).view(np.recarray)
+        queue = make_queue(params[here], options, allowed, memory[: len(here)].view(np.recarray), own)
         if steps is None:
-            begun = starts(rows, options)
-            lockstep(rows, words, begun, allowed, options, PATIENCE, scratch(options), batch, samples, own, out, tally)
-            again = np.flatnonzero(out["status"] == Status.PENDING)
-            found, remaining = out[again], allowed[again]
-            for i, revolution in simulate_alone(part[again], options, remaining, keep, found):
-                samples[again[i]] = revolution
-            out[again], allowed[again] = found, remaining
+            run_lanes(queue, options)
         else:
-            explicit(rows, words, steps[here], allowed, options, scratch(options), batch, samples, own, out)
+            run_lanes(queue._replace(left=allowed.copy(), blocks=NO_BLOCKS), options._replace(max_revs=START_ONLY))
+            run_explicit(queue, steps[here], options)
         left[here] = allowed
-        for_kernels(results)[here] = out
+        for_kernels(results)[here] = queue.results
         if len(blocks):
             for_kernels(blocks)[here] = own
-        yield from zip(here.tolist(), samples, strict=False)
+        yield from zip(here.tolist(), memory, strict=False)
+
+
+def make_queue(
+    params: NDArray[np.void],
+    options: Options,
+    left: NDArray[np.int64],
+    samples: Table,
+    blocks: Table,
+) -> Queue:
+    """Make a queue of joints, see `kernel.lanes.batch.Queue`; their starts are computed."""
+    from tolstat.kernel.lanes.batch import Queue
+
+    rows = np.ascontiguousarray(params).view(np.recarray)
+    words, out = rows.view(np.float64).view(np.ndarray).reshape(len(rows), -1), np.zeros(len(rows), KERNEL_RESULT)
+    return Queue(rows, words, starts(rows, options), left, samples, blocks, out.view(np.recarray))
+
+
+def run_lanes(queue: Queue, options: Options) -> NDArray[np.int64]:
+    """Simulate the joints of a queue in lock-step; return the counts of `kernel.lanes.lockstep.lockstep`."""
+    from tolstat.kernel.lanes.lockstep import PATIENCE, lockstep, one_at_a_time
+
+    width, tally = width_for(len(queue.rows)), np.zeros(3, np.int64)
+    batch = lanes_for(queue, options, width)
+    if width == 1:
+        one_at_a_time(options, batch, queue, tally)
+    else:
+        lockstep(options, PATIENCE, batch, queue, tally)
+    return tally
+
+
+def run_explicit(queue: Queue, steps: NDArray[np.int64], options: Options) -> None:
+    """Simulate the joints of a queue with explicit steps, see `kernel.lanes.explicit.explicit`."""
+    from tolstat.kernel.lanes.explicit import explicit
+    from tolstat.kernel.simd.lane import WIDTH
+
+    explicit(steps, options, lanes_for(queue, options, width_for(WIDTH)), queue)
+
+
+def lanes_for(queue: Queue, options: Options, width: int) -> Batch:
+    """Lanes for the joints of a queue, with what all of these share."""
+    batch = lanes(options, width)
+    batch.par.n_stations, batch.par.n_orders = queue.rows.n_stations[0], queue.rows.n_orders[0]
+    return batch
+
+
+def equilibrium(params: NDArray[np.void], options: Options) -> NDArray[np.float64]:
+    """Unknowns of a joint, (1,), in static equilibrium at the input angle zero, (56,)."""
+    from tolstat.kernel.lanes.lockstep import START_ONLY
+    from tolstat.kernel.revolution.settle import make_samples
+
+    settings = options._replace(max_revs=START_ONLY, start=int(Start.STATIC))
+    queue = make_queue(params, settings, np.full(1, 2**31), make_samples(0, options.steps_per_rev), NO_BLOCKS)
+    run_lanes(queue, settings)
+    return np.asarray(queue.starts[0])
+
+
+def simulate_ideal(
+    params: NDArray[np.void],
+    options: Options,
+    left: NDArray[np.int64],
+    keep: bool,
+    results: NDArray[np.void],
+    blocks: NDArray[np.void] = NO_BLOCKS,
+) -> Iterator[tuple[int, NDArray[np.void]]]:
+    """Evaluate the closed forms of ideal joints; arguments as of `simulate_together`, to which they take no work."""
+    from tolstat.kernel.revolution.ideal import ideal_revolution
+
+    batch, rows, out = lanes(options, 1), params.view(np.recarray), for_kernels(results)
+    for i in range(len(params)):
+        ideal_revolution(rows[i], options, AT_REST, batch.one, batch.samples[0], batch.notes[0], out[i])
+        if keep:
+            yield i, batch.samples[0]
 
 
 def starts(rows: NDArray[np.void], options: Options) -> NDArray[np.float64]:
@@ -260,13 +292,12 @@ def starts(rows: NDArray[np.void], options: Options) -> NDArray[np.float64]:
 
     The kernel is not called, and so not compiled, for joints with negative clearance alone: these end at once.
     """
-    from tolstat.kernel.mechanics.topology import N_DOF
     from tolstat.kernel.revolution.starts import write_starts
 
-    alone, found = scratch(options), np.zeros((len(rows), N_DOF))
+    out = np.zeros((len(rows), AT_REST.size))
     if (rows["clearance"] >= 0).all(axis=1).any():
-        write_starts(rows, options, alone.work, alone.state, found)
-    return found
+        write_starts(rows, options, lanes(options, 1).one, AT_REST, out)
+    return out
 
 
 def explicit_steps(params: NDArray[np.void], options: Options) -> NDArray[np.int64]:
@@ -282,14 +313,14 @@ def explicit_steps(params: NDArray[np.void], options: Options) -> NDArray[np.int
     from tolstat.kernel.revolution.explicit import MOST_STEPS
 
     own = np.zeros(len(these), np.int64)
-    count_steps(params[these].view(np.recarray), options, scratch(options).work, own)
+    count_steps(params[these].view(np.recarray), options, lanes(options, 1).one, own)
     steps[these] = np.where(own <= MOST_STEPS, own, 0)
     return steps
 
 
 def hitting(params: NDArray[np.void], options: Options) -> NDArray[np.intp]:
     """Indices of the joints whose torque reverses, or nearly does, if they are to be refined."""
-    if not refinement.may_refine(options) or not in_lanes(refinement.settings(options)):
+    if not refinement.may_refine(options):
         return np.zeros(0, np.intp)
     return np.flatnonzero(ideal.reversal_torque(params) > NEARLY_REVERSING * np.abs(params["torque"]))
 
@@ -308,20 +339,15 @@ def _resolved(
     Joints that turn out too stiff for explicit steps get error-controlled ones. Other arguments are as of
     `simulate_together`.
     """
-    from tolstat.kernel.simd.lane import WIDTH
-
-    few, steps = 1 + WIDTH // 4, steps.copy()  # as many joints alone take less time than most lanes without a joint
+    steps = steps.copy()
     for explicit in (True, False):
         rows = np.flatnonzero((steps > 0) == explicit)
         if not len(rows):
             continue
         out = np.zeros(len(rows), RESULT).view(np.recarray)
-        own = np.zeros((len(rows), blocks.shape[1]), RESULT).view(np.recarray)
-        run: Run = simulate_together if in_lanes(options) and len(rows) > few else simulate_alone
-        if explicit:
-            run = partial(simulate_together, steps=steps[rows])
-        allowed = left[rows]
-        for i, samples in run(params[rows], options, allowed, keep, out, own):
+        own, allowed = np.zeros((len(rows), blocks.shape[1]), RESULT).view(np.recarray), left[rows]
+        these = steps[rows] if explicit else None
+        for i, samples in simulate_together(params[rows], options, allowed, keep, out, own, these):
             results[rows[i]] = out[i]
             yield int(rows[i]), samples
         results[rows], blocks[rows], left[rows] = out, own, allowed

@@ -71,14 +71,15 @@ class CheckedFile:
 
     def dataset(self, path: str) -> h5py.Dataset:
         """Look up a dataset with a row for each joint; its type and shape must be those that the metadata imply."""
-        found = self._datasets.get(path)
-        if found is None:
+        dataset = self._datasets.get(path)
+        if dataset is None:
             with told_as_damage(self.path):
-                found, stored = self.file[path], self.stored[path]
-                if found.shape != stored.shape or found.dtype != stored.dtype:
-                    raise ValueError(f"{path} is {found.shape} of {found.dtype}, not {stored.shape} of {stored.dtype}")
-            self._datasets[path] = found
-        return found
+                dataset, stored = self.file[path], self.stored[path]
+                if dataset.shape != stored.shape or dataset.dtype != stored.dtype:
+                    expected = f"{stored.shape} of {stored.dtype}"
+                    raise ValueError(f"{path} is {dataset.shape} of {dataset.dtype}, not {expected}")
+            self._datasets[path] = dataset
+        return dataset
 
     @property
     def number(self) -> int:
@@ -97,7 +98,7 @@ class CheckedFile:
         if changes and number % 2:
             return blocks[:0]
         if number != self._number:
-            self._known = {own: known for own, known in self._known.items() if not layout.is_at_point(own[0])}
+            self._known = {group: known for group, known in self._known.items() if not layout.is_at_point(group[0])}
             self._number = number
         known = self._known.setdefault(paths, np.full(blocks_of(self.stored[paths[0]].shape[0]), UNKNOWN, np.uint8))
         new = blocks[known[blocks] == UNKNOWN]
@@ -157,9 +158,9 @@ def computed(file: h5py.File, stored: Sequence[Stored], blocks: NDArray[np.intp]
     """Checksums of some blocks of datasets, (datasets, blocks), from what is in the file now."""
     checksums = np.empty((len(stored), len(blocks)), np.uint64)
     runs = np.split(np.arange(len(blocks)), np.flatnonzero(np.diff(blocks) != 1) + 1) if len(blocks) else []
-    for k, own in enumerate(stored):
+    for k, dataset in enumerate(stored):
         for run in runs:
-            checksums[k, run] = _of_run(file[own.path], own, int(blocks[run[0]]), int(blocks[run[-1]]) + 1)
+            checksums[k, run] = _of_run(file[dataset.path], dataset, int(blocks[run[0]]), int(blocks[run[-1]]) + 1)
     return checksums
 
 

@@ -27,6 +27,7 @@ MAX_FIXED_TEXT = 32_000
 """Largest size of a text stored as an attribute of fixed length, bytes: HDF5 allows some 64 kB."""
 RUN_AGAIN = "run the campaign again: tolstat run STUDY --out OTHER.h5"
 """Remedy for a file that cannot be repaired."""
+DAMAGED = "is damaged or no tolstat result file"
 DAMAGE_ERRORS = (KeyError, ValueError, TypeError, AttributeError, IndexError, RuntimeError, OSError)
 """Exceptions that h5py, or code that relies on what a file states, raises where the file is damaged."""
 
@@ -37,14 +38,14 @@ def store_error(path: Path, found: str, remedy: str) -> StoreError:
 
 
 @contextmanager
-def told_as_damage(path: Path) -> Iterator[None]:
+def told_as_damage(path: Path, found: str = DAMAGED, remedy: str = RUN_AGAIN) -> Iterator[None]:
     """Turn what a damaged file raises into one sentence."""
     try:
         yield
     except StoreError:
         raise
     except DAMAGE_ERRORS as error:
-        raise store_error(path, f"is damaged or no tolstat result file: {error}", RUN_AGAIN) from error
+        raise store_error(path, f"{found}: {error}", remedy) from error
 
 
 def open_hdf5(path: Path, mode: str) -> h5py.File:
@@ -92,7 +93,7 @@ def _not_opened(path: Path, mode: str, error: OSError) -> StoreError:
         return store_error(path, "cannot be opened: no permission", f"change its permissions: chmod u+rw {path}")
     if not h5py.is_hdf5(path):
         return store_error(path, "is not an HDF5 file", "give a result file made by tolstat run")
-    return store_error(path, f"is damaged or no tolstat result file: {error}", RUN_AGAIN)
+    return store_error(path, f"{DAMAGED}: {error}", RUN_AGAIN)
 
 
 def is_at(file: h5py.File, path: Path) -> bool:
@@ -121,16 +122,16 @@ def copy_open(file: h5py.File, path: Path) -> None:
             offset += len(chunk)
 
 
-def replace(path: Path, held: h5py.File, change: Callable[[h5py.File], None], growth: int = 0) -> h5py.File:
+def replace(path: Path, file: h5py.File, change: Callable[[h5py.File], None], growth: int = 0) -> h5py.File:
     """Change the structure of a file by way of a copy; a kill leaves either the old or the changed file.
 
-    No other process can write in between: `held` stays open and locked until the copy is locked and at `path`.
+    No other process can write in between: `file` stays open and locked until the copy is locked and at `path`.
 
     Parameters
     ----------
     path : Path
         The file.
-    held : h5py.File
+    file : h5py.File
         The same file, open for writing; closed afterwards.
     change : callable
         Called with the copy, open for writing.
@@ -142,15 +143,15 @@ def replace(path: Path, held: h5py.File, change: Callable[[h5py.File], None], gr
     h5py.File
         The file now at `path`, open for writing.
     """
-    check_disk_space(path, held.id.get_filesize() + growth)
+    check_disk_space(path, file.id.get_filesize() + growth)
     with ExitStack() as opened:
         with atomic_write(path) as temporary:
-            copy_open(held, temporary)
-            with open_hdf5(temporary, "r+") as file:
-                change(file)
+            copy_open(file, temporary)
+            with open_hdf5(temporary, "r+") as changed:
+                change(changed)
             copy = opened.enter_context(open_hdf5(temporary, "r+"))
         opened.pop_all()
-    held.close()
+    file.close()
     return copy
 
 
@@ -196,7 +197,7 @@ def text(attrs: h5py.AttributeManager, name: str) -> str:
     return value.decode("utf-8") if isinstance(value, bytes) else str(value)
 
 
-def pick(read: Callable[[slice], NDArray[Any]], slots: NDArray[np.intp]) -> NDArray[Any]:
-    """Read file slots, (m,) and ascending, of a table that is read by slices: one for each block of `TOGETHER`."""
-    runs = np.split(slots, np.flatnonzero(np.diff(slots // TOGETHER)) + 1)
+def pick(read: Callable[[slice], NDArray[Any]], slots: NDArray[np.intp], size: int = TOGETHER) -> NDArray[Any]:
+    """Read file slots, (m,) and ascending, of a table that is read by slices: one for each block of `size` rows."""
+    runs = np.split(slots, np.flatnonzero(np.diff(slots // size)) + 1)
     return np.concatenate([read(slice(int(run[0]), int(run[-1]) + 1))[run - run[0]] for run in runs])

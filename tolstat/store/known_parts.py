@@ -17,10 +17,9 @@ from tolstat.common.tables import Status
 from tolstat.store import error_budget
 from tolstat.store.recorded import mentions
 from tolstat.store.view import View
-from tolstat.study import known
 from tolstat.study.axes import streams_of
-from tolstat.study.known import KnownEntry
 from tolstat.study.tolerances.distributions import score
+from tolstat.study.tolerances.entry import KnownEntry
 
 KEYS = ("known_from", "law")
 """Keys of an entry of ``[tolerances]`` that is known from measured parts."""
@@ -34,7 +33,7 @@ def of(view: View) -> KnownParts | None:
 def _of(view: View) -> KnownParts | None:
     if not (view.sampled and view.limits and mentions(view.store, KEYS, "tolerances")):
         return None
-    entries = known.of(view.study.entries)
+    entries = view.study.known
     return KnownParts(view, entries) if entries else None
 
 
@@ -75,7 +74,7 @@ class KnownParts:
     def remedy(self) -> str:
         """Sentence on what lets a campaign support the likely processes."""
         parts = ", ".join(f'"{entry.pattern}" = {entry.parts}' for entry in self.entries)
-        if any(own is not None for part in self._mixture for own in part.parts):
+        if any(number is not None for part in self._mixture for number in part.parts):
             return f"Simulate more joints, or draw them anew with parts = {{ {parts} }} in [[proposal]]"
         return f'Draw them with method = "importance" and [[proposal]] share = 0.8, parts = {{ {parts} }}'
 
@@ -94,9 +93,9 @@ class KnownParts:
         tolerances = 1.0 - sum(proposal.share for proposal in proposals)
         mixtures = [Mixture(tolerances, (None,) * len(self.entries))]
         for proposal in proposals:
-            of = {frozenset(own.streams): own.parts for own in reversed(proposal.processes)}
+            of = {frozenset(drawn.streams): drawn.parts for drawn in reversed(proposal.processes)}
             parts = [of.get(frozenset(streams_of(name)[0] for name in entry.names)) for entry in self.entries]
-            others = len(proposal.scores) + len(proposal.processes) - sum(own is not None for own in parts)
+            others = len(proposal.scores) + len(proposal.processes) - sum(number is not None for number in parts)
             if not others:
                 mixtures.append(Mixture(proposal.share, tuple(parts)))
         return mixtures
@@ -137,6 +136,6 @@ class KnownParts:
         for errors in view.error_blocks(names):
             scores = {name: score(view.study.tolerances[name], np.asarray(errors[name])) for name in names}
             stacked = (np.stack([scores[name] for name in entry.names]) for entry in self.entries)
-            parts.append([(own.sum(axis=0), np.square(own).sum(axis=0)) for own in stacked])
+            parts.append([(of_entry.sum(axis=0), np.square(of_entry).sum(axis=0)) for of_entry in stacked])
         each = zip(*parts, strict=True)
-        return [Sums(*(np.concatenate(one)[self._done] for one in zip(*entry, strict=True))) for entry in each]
+        return [Sums(*(np.concatenate(blocks)[self._done] for blocks in zip(*entry, strict=True))) for entry in each]

@@ -164,8 +164,10 @@ def create(file: h5py.File, metadata: Metadata, tables: Tables) -> None:
         holder = file.require_group(place_of(point) or "/")
         for group in ("results", "ledger"):
             create_table(holder, group, groups[group], n, codes=codes)
-        if metadata.histories:
-            _create_histories(holder, metadata)
+        if metadata.histories:  # at full size: a full disk is told before the first joint
+            histories = _linked(holder, "histories")
+            for name, spec in metadata.histories.items():
+                attach_scales(_create(histories, name, (n, *spec.shape), spec, row, MEANINGS), spec)
     session = file.create_group("session")
     for name, (dtype, unit, description) in SESSION.items():
         blank = np.nan if dtype == "f8" else int(name == "number")
@@ -204,9 +206,7 @@ def create_table(
     scale : h5py.Dataset, optional
         Dimension scale of the rows; ``row`` of the file without it, which the group then has with ``nominal``.
     """
-    group = holder.create_group(name)
-    for link in LINKED if scale is None else (scale.name,):
-        group[link.rpartition("/")[2]] = holder.file[link]
+    group = _linked(holder, name, LINKED if scale is None else (scale.name,))
     for c in columns:
         _create(group, c.name, (n,), c, scale or holder.file["row"], codes or MEANINGS, blocks is None)
     first = 0
@@ -217,13 +217,11 @@ def create_table(
         raise ValueError(f"{first} rows of {name} given, {n} expected")
 
 
-def _create_histories(holder: h5py.Group, metadata: Metadata) -> None:
-    """Create the datasets of all histories at full size: a full disk is told before the first joint."""
-    group, row = holder.create_group("histories"), holder.file["row"]
-    for link in LINKED:
-        group[link] = holder.file[link]
-    for name, spec in metadata.histories.items():
-        attach_scales(_create(group, name, (metadata.n, *spec.shape), spec, row, MEANINGS), spec)
+def _linked(holder: h5py.Group, name: str, links: Iterable[str] = LINKED) -> h5py.Group:
+    group = holder.create_group(name)
+    for link in links:
+        group[link.rpartition("/")[2]] = holder.file[link]
+    return group
 
 
 def _create(

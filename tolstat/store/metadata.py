@@ -1,21 +1,27 @@
-"""Metadata of a result file: one JSON document in the dataset ``metadata``, with its SHA-256 beside it."""
+"""Metadata of a result file: one JSON document in the dataset ``metadata``, with its SHA-256 beside it.
+
+Among them is the provenance of the results: versions of the software that computed them, and the commit of the code.
+"""
 
 from __future__ import annotations
 
 import hashlib
 import json
+import platform
+import subprocess
 from collections.abc import Mapping
 from datetime import UTC, datetime
+from importlib.metadata import version
+from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
 from pydantic import BaseModel, ConfigDict
 
-from tolstat.common.solver_options import to_names
-from tolstat.common.tables import HistorySpec, Options, Variant
+import tolstat
+from tolstat.common.tables import HistorySpec, Options, Variant, to_names
 from tolstat.store.hdf5 import put_attributes, text
-from tolstat.store.provenance import git_commit, versions
 from tolstat.study import Study
 
 DATASET, CHECKSUM = "metadata", "sha256"
@@ -160,3 +166,72 @@ def write(file: h5py.File, metadata: Metadata) -> None:
     dataset = file.create_dataset(DATASET, data=np.bytes_(document))
     about = "study, joint and settings of the campaign as JSON in UTF-8"
     put_attributes(dataset, {"description": about, CHECKSUM: hashlib.sha256(document).hexdigest()})
+
+
+LIBRARIES = ("numpy", "numba", "scipy", "h5py")
+RESULT_SOURCES = (
+    *("kernel", "joint", "common/fields.py", "common/tables.py", "sampling.py"),
+    *("study/tolerances", "study/axes.py", "study/design.py", "study/proposal.py", "analysis/process.py"),
+    *("solver/simulation.py", "solver/refinement.py", "solver/stationary.py", "solver/rainflow.py"),
+)
+"""Sources that, together with the study's identity, determine the results of a campaign."""
+
+
+def versions() -> dict[str, str]:
+    """Versions of tolstat, of Python and of the libraries that affect results, and `source_hash`."""
+    of_tolstat = {"tolstat": tolstat.__version__, "sources": source_hash(), "python": platform.python_version()}
+    return of_tolstat | {name: version(name) for name in LIBRARIES}
+
+
+def differing(recorded: Mapping[str, str], other: Mapping[str, str], here: str, there: str) -> list[str]:
+    """Compare two records of `versions`: ``"numpy: 2.1.0 in the file, 2.2.0 now"`` for each of `other` that differs."""
+    return [
+        f"{name}: {recorded.get(name, 'unknown')} {here}, {value} {there}"
+        for name, value in other.items()
+        if recorded.get(name) != value
+    ]
+
+
+def differing_code(recorded: Mapping[str, str]) -> list[str]:
+    """Compare the code that began a file with that of now: only equal code adds joints to a file."""
+    return differing(recorded, {"tolstat": tolstat.__version__, "sources": source_hash()}, "in the file", "now")
+
+
+def source_hash() -> str:
+    """Hash of the sources that determine results: during development, code changes without a new version number."""
+    package = Path(tolstat.__file__).parent
+    digest = hashlib.sha256()
+    for name in RESULT_SOURCES:
+        source = package / name
+        for path in sorted(source.rglob("*.py")) if source.is_dir() else [source]:
+            digest.update(path.relative_to(package).as_posix().encode())
+            digest.update(hashlib.sha256(path.read_bytes()).digest())
+    return digest.hexdigest()[:16]
+
+
+def git_commit() -> str:
+    """Git commit of the checkout that the package was installed from or runs in, with ``-dirty`` if files differ.
+
+    Returns
+    -------
+    str
+        Empty when the package is not at the top of a git checkout: a virtual environment may lie inside the
+        repository of another project, whose commit does not describe this code.
+    """
+    package = Path(tolstat.__file__).resolve().parent
+    recorded = package / "_commit.txt"
+    if recorded.is_file():  # written when a wheel is built from a checkout
+        return recorded.read_text(encoding="ascii").strip()
+    root = package.parent
+    top = _git(root, "rev-parse", "--show-toplevel")
+    if not top or Path(top).resolve() != root:
+        return ""
+    return _git(root, "describe", "--always", "--dirty", "--abbrev=40", "--exclude=*")
+
+
+def _git(folder: Path, *arguments: str) -> str:
+    command = ["git", "-C", str(folder), *arguments]
+    try:
+        return subprocess.run(command, capture_output=True, text=True, check=True, timeout=10).stdout.strip()
+    except (OSError, subprocess.SubprocessError):
+        return ""

@@ -111,6 +111,7 @@ class Reader:
         """Return the file at one of its operating points; both are closed together. `InputError` if it has no such."""
         only_one(point, list(self.points), str(self.path))
         other = copy(self)
+        other.__dict__.pop("loads", None)  # those that a `ResultFile` keeps are of another point
         other.point = point
         return other
 
@@ -315,9 +316,9 @@ class Reader:
         Raises a `StoreError` when the file holds no such histories, or they are damaged.
         """
         if name not in self.history_specs:
-            held = ", ".join(self.history_specs) or "none"
+            kinds = ", ".join(self.history_specs) or "none"
             remedy = f'write histories = "full" or "harmonics" in [output] of the study, and {RUN_AGAIN}'
-            raise store_error(self.path, f"holds no histories {name!r} (it holds: {held})", remedy)
+            raise store_error(self.path, f"holds no histories {name!r} (it holds: {kinds})", remedy)
         slots = np.arange(self.n) if slots is None else np.asarray(slots, dtype=np.intp)
         values = self.history_specs[name].blank(len(slots))
         wanted, back = np.unique(slots, return_inverse=True)
@@ -347,16 +348,16 @@ class Reader:
     def check(self) -> Integrity:
         """Compare everything that has a checksum with it, histories included."""
         checked = self._checked.number % 2 == 0
-        found = self._checked.check()
-        return Integrity(checked, {path: [self._rows_of(b) for b in own.tolist()] for path, own in found.items()})
+        damaged = self._checked.check().items()
+        return Integrity(checked, {path: [self._rows_of(b) for b in blocks.tolist()] for path, blocks in damaged})
 
     def results_checksum(self) -> str:
         """Number that is equal for files with the same joints and results; empty while they have no checksums."""
         if self._checked.number % 2:
             return ""
         with told_as_damage(self.path):
-            own = [k for k, path in enumerate(self._checked.stored) if path.split("/")[-2] == "results"]
-            return hashlib.sha256(self._checked.file[GROUP]["crc"][:][own].tobytes()).hexdigest()
+            results = [k for k, path in enumerate(self._checked.stored) if path.split("/")[-2] == "results"]
+            return hashlib.sha256(self._checked.file[GROUP]["crc"][:][results].tobytes()).hexdigest()
 
     def _table(
         self, group: str, columns: tuple[Column, ...], dtype: np.dtype[np.void], slots: slice, fields: Sequence[str]

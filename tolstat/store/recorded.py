@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.common.errors import Fault, InputError
-from tolstat.common.solver_options import from_names
 from tolstat.common.strict import read_section, validate
-from tolstat.common.tables import PARAM, Options
+from tolstat.common.tables import PARAM, Options, from_names
 from tolstat.joint import MEANS, Joint, Operation, operating, perturb, varied
 from tolstat.joint.derived import get
 from tolstat.joint.overrides import nested
@@ -22,8 +21,8 @@ from tolstat.solver import fidelity
 from tolstat.store.hdf5 import store_error
 from tolstat.store.reader import Reader
 from tolstat.study import Study, load, mounting, subset_of
+from tolstat.study.design import KEYS
 from tolstat.study.model import Solver
-from tolstat.study.swept import KEYS
 
 _OPERATION = tuple(f"operation.{name}" for name in MEANS)
 
@@ -90,12 +89,12 @@ def swept(store: Reader) -> dict[str, NDArray[np.float64]]:
     names = [name for names, *_ in store.identity.get("sweep", []) for name in names if name in KEYS]
     if not names:
         return {}
-    nominal, variant = validate(Joint, store.joint, f"{store.path}: joint"), store.design()["variant"]
-    joints = [varied(nominal, one.values) for one in store.variants]
+    nominal, number = validate(Joint, store.joint, f"{store.path}: joint"), store.design()["variant"]
+    joints = [varied(nominal, variant.values) for variant in store.variants]
     values = {name: [get(joint, name) for joint in joints] for name in names}
     return {
-        name: np.array([np.nan if isinstance(value, str) else value for value in own], float)[variant]
-        for name, own in values.items()
+        name: np.array([np.nan if isinstance(value, str) else value for value in of_variants], float)[number]
+        for name, of_variants in values.items()
     }
 
 
@@ -216,7 +215,7 @@ def _at_point(store: Reader, study: Study) -> Study:
     return study
 
 
-def differing_keys(held: Mapping[str, Any], wanted: Mapping[str, Any]) -> list[str]:
+def differing_keys(in_file: Mapping[str, Any], wanted: Mapping[str, Any]) -> list[str]:
     """Compare two identities of studies.
 
     Returns
@@ -225,8 +224,8 @@ def differing_keys(held: Mapping[str, Any], wanted: Mapping[str, Any]) -> list[s
         ``"solver.steps_per_rev: 90 in the file, 180 in the study"`` for every key that differs.
     """
     lines = []
-    for key in sorted(held.keys() | wanted.keys()):
-        if key not in wanted or key not in held or held[key] != wanted[key]:
-            sides = (f"{side[key]!r}" if key in side else "nothing" for side in (held, wanted))
+    for key in sorted(in_file.keys() | wanted.keys()):
+        if key not in wanted or key not in in_file or in_file[key] != wanted[key]:
+            sides = (f"{side[key]!r}" if key in side else "nothing" for side in (in_file, wanted))
             lines.append("{}: {} in the file, {} in the study".format(key, *sides))
     return lines

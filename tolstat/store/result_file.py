@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from tolstat.common import draw_records
 from tolstat.common.columns import ERROR_COLUMNS, Column
 from tolstat.common.errors import Fault, InputError
+from tolstat.common.late import pandas as pd
 from tolstat.common.loads import LOADS
 from tolstat.common.tables import Status
 from tolstat.store import recorded
@@ -22,7 +23,6 @@ from tolstat.store.reader import Reader
 from tolstat.store.view import View
 
 if TYPE_CHECKING:
-    import pandas as pd
     import xarray
 
 AT_ONCE = 8192
@@ -39,17 +39,11 @@ OPERATING = {
 class ResultFile(Reader):
     """A result file that is open for reading, as `tolstat.open` gives it; close it, or use a ``with`` block."""
 
-    def at(self, point: str) -> ResultFile:
-        """Return the file at one of its operating points; both are closed together."""
-        other = super().at(point)
-        other.__dict__.pop("loads", None)
-        return other
-
     def __repr__(self) -> str:
         if not self.is_open:
             return f"<result file {self.path.name!r}, closed>"
         joints = f"{self.n - self.first_sample} joints"
-        progress = [f"{one.point}: {one._progress()}" if one.point else one._progress() for one in self.each()]
+        progress = [f"{store.point}: " * bool(store.point) + store._progress() for store in self.each()]
         return f"<result file {self.path.name!r}: {joints} ({'; '.join(progress)})>"
 
     def _progress(self) -> str:
@@ -78,8 +72,6 @@ class ResultFile(Reader):
     @property
     def nominal(self) -> pd.Series[float]:
         """Largest loads of the nominal joint by name, SI; NaN where the file has none or its results are not valid."""
-        import pandas as pd
-
         names, results = list(self.loads), self.loads.view.nominal
         values = [float(LOADS[name].of(results)[0]) if len(results) else np.nan for name in names]
         series = pd.Series(values, pd.Index(names, name="load"), dtype=float, name="nominal")
@@ -158,8 +150,6 @@ class NamedLoads(Mapping[str, "pd.Series[float]"]):
         InputError, StoreError
             When the file has no such load for a sample of joints; see `View.load`.
         """
-        import pandas as pd
-
         load, store = self.view.load(name), self.view.store
         index = pd.RangeIndex(store.rows[store.first_sample :], name="row")
         series = pd.Series(load.values, index, name=name)
@@ -199,8 +189,6 @@ def in_blocks(store: Reader, nominal: bool) -> Iterator[pd.DataFrame]:
 
 def _frame(store: Reader, rows: slice, nominal: bool, listed: Mapping[str, NDArray[Any]]) -> pd.DataFrame:
     """Rows of a campaign; `listed` as from `_listed`."""
-    import pandas as pd
-
     errors, results = store.errors(rows), store.results(rows)
     data: dict[str, NDArray[Any]] = {}
     if nominal:

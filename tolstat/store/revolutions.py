@@ -102,11 +102,11 @@ def read(store: Reader, slots: NDArray[np.intp], names: Sequence[str], max_angle
     angles = 2.0 * np.pi * np.arange(0, steps, every) / steps
     loads = {name: np.empty((len(slots), angles.size)) for name in names}
     apart = 0.0
-    for part, found, difference in of_components(store, slots, histories):
+    for part, histories_of_part, difference in of_components(store, slots, histories):
         apart = max(apart, difference)
-        thinned = {name: values[:, ::every] for name, values in found.items()}
-        for name, own in loads.items():
-            own[part] = CHANNELS[name].of(thinned)
+        thinned = {name: values[:, ::every] for name, values in histories_of_part.items()}
+        for name, values in loads.items():
+            values[part] = CHANNELS[name].of(thinned)
     return Revolutions(angles, loads, origin, apart)
 
 
@@ -122,7 +122,9 @@ def of_components(
         warm_up()
     for part in blocks(len(slots)):
         if again:
-            yield part, *_again(store, slots[part])
+            ready = None if store.ahead is None else store.ahead.of(slots[part])
+            simulated, apart = ready or _simulated(store, slots[part])
+            yield part, simulated, float(np.max(apart, initial=0.0))
         else:
             yield part, loads(store, slots[part], histories), 0.0
 
@@ -182,12 +184,9 @@ class Ahead(NamedTuple):
         if not np.array_equal(self.slots[np.minimum(position, len(self.slots) - 1)], slots):
             return None
         pieces = in_order(self.parts)
-        block, joint = np.divmod(position, JOINTS_PER_BLOCK)
-        loads = {
-            history.name: np.stack([pieces[b][0][history.name][k] for b, k in zip(block, joint, strict=True)])
-            for history in LOAD_HISTORIES
-        }
-        return loads, np.array([pieces[b][1][k] for b, k in zip(block, joint, strict=True)])
+        names = [history.name for history in LOAD_HISTORIES]
+        loads = {name: np.concatenate([piece[name] for piece, _ in pieces])[position] for name in names}
+        return loads, np.concatenate([apart for _, apart in pieces])[position]
 
 
 def ahead(store: Reader, slots: NDArray[np.intp], processes: int) -> None:
@@ -206,13 +205,6 @@ def ahead(store: Reader, slots: NDArray[np.intp], processes: int) -> None:
         warm_up()  # one process compiles
     each = [partial(_simulated, store, slots[part]) for part in blocks(len(slots))]
     store.ahead = Ahead(slots, begun(each, max(1, processes - 1), here=int(processes == 1)))
-
-
-def _again(store: Reader, slots: NDArray[np.intp]) -> tuple[Loads, float]:
-    """Loads of joints that are simulated again, all histories, and `Revolutions.apart`."""
-    simulated = None if store.ahead is None else store.ahead.of(slots)
-    loads, off = simulated or _simulated(store, slots)
-    return loads, float(np.max(off, initial=0.0))
 
 
 def _simulated(store: Reader, slots: NDArray[np.intp]) -> Again:

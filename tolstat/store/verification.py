@@ -12,9 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.common import selected_results, tables
-from tolstat.common.columns import Column
 from tolstat.store import layout
-from tolstat.store.hdf5 import DAMAGE_ERRORS, pick, put_attributes, put_scale, store_error, text
+from tolstat.store.hdf5 import pick, put_attributes, put_scale, text, told_as_damage
 from tolstat.store.metadata import CHECKSUM
 from tolstat.store.reader import Reader
 from tolstat.store.writer import Writer
@@ -67,28 +66,21 @@ def read(store: Reader, name: str = VERIFY) -> Verification | None:
     group = store.group(name)
     if group is None:
         return None
-    try:
-        return _read(group, store)
-    except DAMAGE_ERRORS as error:
-        found = f"is damaged: its verification cannot be used: {error}"
-        again = f"tolstat verify {store.path}" + (" --near LIMIT" if name == NEAR else "")
-        raise store_error(store.path, found, f"make it anew: {again}") from error
-
-
-def _read(group: h5py.Group, store: Reader) -> Verification:
-    if text(group.attrs, CHECKSUM) != _checksum(group):
-        raise ValueError("its values do not match their checksum")
-    rows = np.asarray(group["rows"][:], np.intp)
-    checks = {}
-    for check in text(group.attrs, "checks").split():
-        table = np.empty(len(rows), tables.RESULT)
-        selected_results.blank_others(table, store.columns)
-        for c in store.columns:
-            c.of(table)[:] = group[check][c.name][:]
-        attrs = group[check].attrs
-        checks[check] = Check(text(attrs, "description"), json.loads(text(attrs, "options")), table)
-    base = pick(store.results, np.asarray(store.slot(rows)))
-    return Verification(int(group.attrs["seed"]), rows, base, checks)
+    again = f"tolstat verify {store.path}" + (" --near LIMIT" if name == NEAR else "")
+    with told_as_damage(store.path, "is damaged: its verification cannot be used", f"make it anew: {again}"):
+        if text(group.attrs, CHECKSUM) != _checksum(group):
+            raise ValueError("its values do not match their checksum")
+        rows = np.asarray(group["rows"][:], np.intp)
+        checks = {}
+        for check in text(group.attrs, "checks").split():
+            table = np.empty(len(rows), tables.RESULT)
+            selected_results.blank_others(table, store.columns)
+            for c in store.columns:
+                c.of(table)[:] = group[check][c.name][:]
+            attrs = group[check].attrs
+            checks[check] = Check(text(attrs, "description"), json.loads(text(attrs, "options")), table)
+        base = pick(store.results, np.asarray(store.slot(rows)))
+        return Verification(int(group.attrs["seed"]), rows, base, checks)
 
 
 def _checksum(group: h5py.Group) -> str:
@@ -127,22 +119,19 @@ def write(verifications: Sequence[tuple[Writer, Verification]], name: str = VERI
 
     def change(file: h5py.File) -> None:
         for store, verification in verifications:
-            _write(file[layout.place_of(store.point or "") or "/"], name, verification, store.columns)
+            holder = file[layout.place_of(store.point or "") or "/"]
+            if name in holder:
+                del holder[name]
+            group = holder.create_group(name)
+            about = "joints of the campaign simulated again in other ways, to know its numerical error"
+            checks = " ".join(verification.checks)
+            put_attributes(group, {"description": about, "seed": verification.seed, "checks": checks})
+            about = "rows of the joints in the campaign, counted from 0"
+            rows = put_scale(group, "rows", verification.rows.astype("i8"), "1", about)
+            for check_name, check in verification.checks.items():
+                layout.create_table(group, check_name, store.columns, len(rows), [check.results], scale=rows)
+                options = json.dumps(check.options, allow_nan=False)
+                put_attributes(group[check_name], {"description": check.description, "options": options})
+            put_attributes(group, {CHECKSUM: _checksum(group)})
 
     verifications[0][0].replace(change)
-
-
-def _write(holder: h5py.Group, place: str, verification: Verification, columns: tuple[Column, ...]) -> None:
-    if place in holder:
-        del holder[place]
-    group = holder.create_group(place)
-    about = "joints of the campaign simulated again in other ways, to know its numerical error"
-    names = " ".join(verification.checks)
-    put_attributes(group, {"description": about, "seed": verification.seed, "checks": names})
-    about = "rows of the joints in the campaign, counted from 0"
-    rows = put_scale(group, "rows", verification.rows.astype("i8"), "1", about)
-    for name, check in verification.checks.items():
-        layout.create_table(group, name, columns, len(rows), [check.results], scale=rows)
-        options = json.dumps(check.options, allow_nan=False)
-        put_attributes(group[name], {"description": check.description, "options": options})
-    put_attributes(group, {CHECKSUM: _checksum(group)})

@@ -15,9 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from tolstat.analysis import accuracy
 from tolstat.analysis.clustered import Clustered
 from tolstat.analysis.column import frozen
-from tolstat.analysis.design import SAMPLE, Claim, Design
-from tolstat.analysis.independent import Independent
-from tolstat.analysis.listed import Listed
+from tolstat.analysis.design import SAMPLE, Claim, Design, Independent, Listed
 from tolstat.analysis.replicated import Replicated
 from tolstat.analysis.sample import Sample, largest_of
 from tolstat.analysis.weighted import Weighted
@@ -27,14 +25,13 @@ from tolstat.common.draw_records import METHODS
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import ANY_LIMIT, LOADS, SHOWN_LOADS, FloatArray, Limit, split
 from tolstat.common.strict import did_you_mean
-from tolstat.common.tables import ERROR, Status
+from tolstat.common.tables import Status
 from tolstat.store import verification, what_if, worst
-from tolstat.store.hdf5 import BLOCK, store_error
+from tolstat.store.hdf5 import BLOCK, pick, store_error
 from tolstat.store.reader import Reader
 from tolstat.store.recorded import recall
 from tolstat.store.verification import Verification
 from tolstat.store.what_if import Altered
-from tolstat.store.worst import FirstPass
 from tolstat.study import Study
 from tolstat.study.points import limits_at, names_of
 
@@ -91,8 +88,8 @@ class View:
         """Result of a function of this view that several ask for, computed once for each key; nobody may change it."""
         if key not in self._kept:
             self._kept[key] = compute()
-        found: T = self._kept[key]
-        return found
+        result: T = self._kept[key]
+        return result
 
     def at(self, selection: str) -> View:
         """View of one operating point, ``"cruise"``, or the worst of several, ``"cruise+start"``; ``""`` for all."""
@@ -124,7 +121,7 @@ class View:
 
     def _verified(self, group: str) -> Verification | None:
         """Verifications of all operating points; None if one of them has none."""
-        verifications = [held for part in self.parts if (held := verification.read(part.store, group)) is not None]
+        verifications = [each for part in self.parts if (each := verification.read(part.store, group)) is not None]
         return verification.together(verifications) if len(verifications) == len(self.parts) else None
 
     @cached_property
@@ -147,10 +144,12 @@ class View:
             return None
         return frozen(self.store.origin()["weight"][self.store.first_sample :].copy())
 
-    @property
+    @cached_property
     def results(self) -> worst.Columns:
         """Columns `LOAD_FIELDS` of the results, (n, ...) each."""
-        return self._tables.results
+        if len(self.parts) > 1:
+            return worst.together([part.results for part in self.parts])
+        return worst.columns_of(self.store)
 
     def read_results(self, fields: Sequence[str]) -> NDArray[np.void]:
         """Read other fields of the results, (n,) table; they are not kept."""
@@ -161,31 +160,28 @@ class View:
         """Status of the joints, (n,)."""
         return self.results["status"]
 
-    @property
+    @cached_property
     def nominal(self) -> NDArray[np.void]:
         """The nominal joint, RESULT (1,); (0,) if the file has none or its results are not valid."""
-        return self._tables.nominal
+        return worst.nominal([part.store for part in self.parts])
 
     @property
     def nominal_slots(self) -> NDArray[np.intp]:
         """File slots of `nominal`, (1,) or (0,)."""
         return np.zeros(len(self.nominal), dtype=np.intp)
 
-    @property
+    @cached_property
     def first_without_load(self) -> NDArray[np.void]:
         """Complete results of the first `worst.MAX_LISTED` joints that failed or did not settle, RESULT (m,)."""
-        return self._tables.without_load
-
-    @property
-    def mode_share(self) -> FloatArray:
-        """Mean share of the revolution by pin and contact mode, (4, 4), over the valid joints; NaN if not kept."""
-        return self._tables.mode_share
+        return worst.without_load([part.status for part in self.parts], [part.store for part in self.parts])
 
     @cached_property
-    def _tables(self) -> FirstPass:
-        if len(self.parts) > 1:
-            return worst.of_points([part._tables for part in self.parts], [part.store for part in self.parts])
-        return worst.first_pass(self.store, self._weights)
+    def mode_share(self) -> FloatArray:
+        """Mean share of the revolution by pin and contact mode, (4, 4), over the valid joints; NaN if not kept.
+
+        Several operating points have none.
+        """
+        return np.full((4, 4), np.nan) if len(self.parts) > 1 else worst.mode_share(self.store, self._weights)
 
     def load(self, name: str) -> Sample:
         """Largest load over the revolution of every joint, by its name; ``"cross1.F at cruise"`` at that point only.
@@ -327,17 +323,7 @@ class View:
         """
         if not samples.size or samples[-1] < len(self._first_errors):
             return self._first_errors[samples]
-        names = tuple(ERROR.names or ()) if columns is None else tuple(columns)
-        table = np.empty(len(samples), [(name, ERROR[name]) for name in names])
-        for first in range(0, self.n, BLOCK):
-            here = np.flatnonzero((samples >= first) & (samples < first + BLOCK))
-            if here.size:
-                # of a block, only the part that holds the samples is read
-                begin, end = int(samples[here[0]]), int(samples[here[-1]]) + 1
-                block = self._errors(begin, end, names)
-                for name in names:
-                    table[name][here] = block[name][samples[here] - begin]
-        return table
+        return pick(lambda slots: self.store.errors(slots, columns), self.slots(samples), BLOCK)
 
     def error_blocks(self, columns: Sequence[str]) -> Iterator[NDArray[np.void]]:
         """Yield the errors of all samples in consecutive blocks, with at least these columns."""

@@ -76,9 +76,10 @@ def read(store: Reader) -> dict[str, Altered]:
     """Read all sets, by the digest of their change; damaged ones are left out with a warning, and so run again."""
     altered, lost = _read(store)
     if lost:
-        place, sets = str(store.path), "1 change" if lost == 1 else f"{lost} changes"
+        sets = "1 change" if lost == 1 else f"{lost} changes"
         remedy = f"simulate them again: tolstat causes {store.path} --run, tolstat assumptions {store.path} --run"
-        LOG.warning("warning: %s", Fault(place, f"the joints of {sets} of what_if are damaged and left out", remedy))
+        found = f"the joints of {sets} of what_if are damaged and left out"
+        LOG.warning("warning: %s", Fault(str(store.path), found, remedy))
     return altered
 
 
@@ -89,10 +90,10 @@ def damaged(store: Reader) -> int:
 
 def _read(store: Reader) -> tuple[dict[str, Altered], int]:
     """Sets by the digest of their change, and number of damaged ones."""
-    held = store.group(GROUP, at_point=False)
+    group_of_sets = store.group(GROUP, at_point=False)
     sets: dict[str, Altered] = {}
     lost = 0
-    for name, group in {} if held is None else held.items():
+    for name, group in {} if group_of_sets is None else group_of_sets.items():
         try:
             altered = Altered(
                 json.loads(text(group.attrs, "change")),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -126,43 +126,9 @@ class Columns(dict[str, NDArray[Any]]):
         return self.setdefault(name, frozen(self._make(name)))
 
 
-class FirstPass(NamedTuple):
-    """What is kept of the results.
-
-    Attributes
-    ----------
-    results : Columns
-        Those of the samples, shape (n, ...) each; the values of one load lie side by side.
-    nominal : ndarray of RESULT, shape (1,) or (0,)
-        The nominal joint, if the file has one and its results are valid.
-    without_load : ndarray of RESULT, shape (m,)
-        The first `MAX_LISTED` joints that failed or did not settle.
-    mode_share : ndarray, shape (4, 4)
-        Weighted mean over the valid joints; NaN if none is valid or the study does not keep it.
-    """
-
-    results: Columns
-    nominal: NDArray[np.void]
-    without_load: NDArray[np.void]
-    mode_share: FloatArray
-
-
-def first_pass(store: Reader, weights: FloatArray | None) -> FirstPass:
-    """Read the results of a file at one operating point; `weights` are those of its samples, if they differ."""
-    skip, results = store.first_sample, Columns(partial(_column, store))
-    nominal = store.results(slice(0, skip))
-    lost = np.flatnonzero(np.isin(results["status"], (*FAILED, *UNSETTLED)))[:MAX_LISTED] + skip
-    without = [store.results(slice(slot, slot + 1)) for slot in lost.tolist()]
-    total, shares = 0.0, np.zeros((4, 4))
-    for slots in _slots(store):
-        block = store.results(slots, ("status", "mode_share"))
-        valid = np.isin(block["status"], VALID)
-        weight = np.ones(len(block)) if weights is None else weights[slots.start - skip : slots.stop - skip]
-        shares += np.tensordot(weight[valid], block["mode_share"][valid], 1)
-        total += float(weight[valid].sum())
-    mean = shares / total if total else np.full((4, 4), np.nan)
-    listed = np.concatenate([np.empty(0, RESULT), *without])
-    return FirstPass(results, frozen(nominal[np.isin(nominal["status"], VALID)]), frozen(listed), frozen(mean))
+def columns_of(store: Reader) -> Columns:
+    """Columns of the results of the samples of a file at one operating point; values of one load lie side by side."""
+    return Columns(partial(_column, store))
 
 
 def _column(store: Reader, name: str) -> NDArray[Any]:
@@ -180,18 +146,42 @@ def _slots(store: Reader) -> Iterator[slice]:
         yield slice(max(first, store.first_sample), first + AT_ONCE)
 
 
-def of_points(parts: Sequence[FirstPass], stores: Sequence[Reader]) -> FirstPass:
-    """Combine what was read at several operating points; `stores` are the file at each. There is no ``mode_share``."""
-    results = together([part.results for part in parts])
-    samples = np.flatnonzero(np.isin(results["status"], (*FAILED, *UNSETTLED)))[:MAX_LISTED]
-    points = deciding([part.results["status"][samples] for part in parts])
-    without = [np.empty(0, RESULT)]
-    for sample, number in zip(samples.tolist(), points.tolist(), strict=True):
-        slot = sample + stores[number].first_sample
-        without.append(stores[number].results(slice(slot, slot + 1)))
-    at_each = [part.nominal for part in parts]
-    nominal = without_results(int(all(map(len, at_each))), Status.OK)
-    for name in LOAD_FIELDS if nominal.size else ():
-        nominal[name] = together(at_each)[name]
-    none = np.full((4, 4), np.nan)
-    return FirstPass(results, frozen(nominal), frozen(np.concatenate(without)), frozen(none))
+def nominal(stores: Sequence[Reader]) -> NDArray[np.void]:
+    """The nominal joint over the operating points of `stores`, RESULT (1,); (0,) unless it is valid at all of them."""
+    at_each = [store.results(slice(0, store.first_sample)) for store in stores]
+    at_each = [table[np.isin(table["status"], VALID)] for table in at_each]
+    if len(stores) == 1:
+        return frozen(at_each[0])
+    joint = without_results(int(all(map(len, at_each))), Status.OK)
+    for name in LOAD_FIELDS if joint.size else ():
+        joint[name] = together(at_each)[name]
+    return frozen(joint)
+
+
+def without_load(status: Sequence[NDArray[np.uint8]], stores: Sequence[Reader]) -> NDArray[np.void]:
+    """Results of the first `MAX_LISTED` joints that failed or did not settle, RESULT (m,), at the point that decides.
+
+    Parameters
+    ----------
+    status : sequence of ndarray, shape (n,)
+        Status of the samples at each operating point.
+    stores : sequence of Reader
+        The file at each operating point.
+    """
+    samples = np.flatnonzero(np.isin(worst_status(status), (*FAILED, *UNSETTLED)))[:MAX_LISTED]
+    points = deciding([at_point[samples] for at_point in status]).tolist()
+    slots = (samples + stores[0].first_sample).tolist()
+    each = [stores[point].results(slice(slot, slot + 1)) for point, slot in zip(points, slots, strict=True)]
+    return frozen(np.concatenate([np.empty(0, RESULT), *each]))
+
+
+def mode_share(store: Reader, weights: FloatArray | None) -> FloatArray:
+    """Weighted mean over the valid joints at one operating point, (4, 4); NaN if none is valid or it is not kept."""
+    skip, total, shares = store.first_sample, 0.0, np.zeros((4, 4))
+    for slots in _slots(store):
+        block = store.results(slots, ("status", "mode_share"))
+        valid = np.isin(block["status"], VALID)
+        weight = np.ones(len(block)) if weights is None else weights[slots.start - skip : slots.stop - skip]
+        shares += np.tensordot(weight[valid], block["mode_share"][valid], 1)
+        total += float(weight[valid].sum())
+    return frozen(shares / total if total else np.full((4, 4), np.nan))

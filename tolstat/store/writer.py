@@ -121,12 +121,12 @@ class Writer(Reader):
         block = np.arange(self.n) // ROWS
         for at_point in self.each():
             places = [layout.path_of(at_point.point or "", group, "") for group in layout.AT_POINTS]
-            own = [blocks for path, blocks in damaged_blocks.items() if path.rpartition("/")[0] in places]
-            damaged = np.unique(np.concatenate([np.empty(0, np.intp), *own]))
+            of_point = [blocks for path, blocks in damaged_blocks.items() if path.rpartition("/")[0] in places]
+            damaged = np.unique(np.concatenate([np.empty(0, np.intp), *of_point]))
             if damaged.size:
                 at_point._left_out.update(damaged.tolist())
                 ledger = damaged_blocks.get(layout.path_of(at_point.point or "", "ledger", "attempt"), damaged[:0])
-                rows, again = (np.flatnonzero(np.isin(block, own)) for own in (damaged, ledger))
+                rows, again = (np.flatnonzero(np.isin(block, which)) for which in (damaged, ledger))
                 at_point._begin_writing(rows)
                 put(at_point._place("results"), rows, {"status": np.full(rows.size, Status.PENDING, np.uint8)})
                 # attempts that are damaged: again with the study's settings
@@ -307,7 +307,7 @@ class Writer(Reader):
 
 def write_new(
     path: Path,
-    held: Metadata,
+    document: Metadata,
     exists: str,
     tables: Tables,
     fill: Callable[[h5py.File], None] | None = None,
@@ -319,7 +319,7 @@ def write_new(
     ----------
     path : Path
         The file.
-    held : Metadata
+    document : Metadata
         Its metadata.
     exists : str
         Remedy if the file exists.
@@ -339,13 +339,13 @@ def write_new(
         check_free(path, exists)
     try:
         make_parent(path)
-        check_disk_space(path, layout.size_of(held))
+        check_disk_space(path, layout.size_of(document))
         with atomic_write(path, overwrite=overwrite) as temporary, h5py.File(temporary, "w") as file:
-            layout.create(file, held, tables)
-            checksums.create(file, held)
+            layout.create(file, document, tables)
+            checksums.create(file, document)
             if fill is not None:
                 fill(file)
-                checksums.update(file, held, True, np.arange(blocks_of(held.n)))
+                checksums.update(file, document, True, np.arange(blocks_of(document.n)))
                 file["session"]["number"][()] = 2
     except FileExistsError as error:
         raise store_error(path, "exists already", exists) from error

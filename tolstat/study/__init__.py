@@ -1,7 +1,6 @@
 """Studies and cases: the only reader of their TOML files."""
 
-from tolstat.study.case import Case, load_case
-from tolstat.study.study import Study, load
-from tolstat.study.subset_design import subset_of
+from tolstat.study.loading import load, load_case, subset_of
+from tolstat.study.study import Case, Study
 
 __all__ = ["Case", "Study", "load", "load_case", "subset_of"]

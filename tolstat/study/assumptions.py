@@ -1,12 +1,14 @@
-"""What a study assumes: values of the joint that nobody measured, the joint with others, errors taken as exact."""
+"""What a study assumes: values that nobody measured, errors taken as exact; and values that are hardly meant."""
 
 from __future__ import annotations
 
+import math
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
+from tolstat.common import units
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.load_kinds import PINS
 from tolstat.common.tables import HOLES
@@ -17,6 +19,7 @@ from tolstat.joint.overrides import leaves, merged, nested
 from tolstat.joint.reading import with_keys
 from tolstat.study.selection import EXCLUDES, UNITS
 from tolstat.study.study import Study
+from tolstat.study.tolerances.zones import short_axes
 
 _AXES = {"positions": ("offset_e", "offset_t", "offset_z"), "angles": ("tilt_t", "tilt_z"), "diameters": ("diameter",)}
 """Errors of a pin or hole by what they are about."""
@@ -91,13 +94,12 @@ def with_value(study: Study, keys: Mapping[str, Any]) -> Study:
         When the keys make no valid joint, or one that does not go with the study's settings; when the joints of the
         study have dimensions of their own.
     """
-    if study.listed or study.swept:
+    if study.variants:
         found = "has joints with dimensions of their own: they are no variations of one joint"
         raise InputError([Fault(str(study.path), found, "vary the joint of a study with tolerances")])
     joint = with_keys(study.joint.given("json"), _keys_of_study(study), nested(keys), f"{study.path}: joint")
     changed = replace(study, joint=joint)
-    if faults := changed.faults_of_mounting():
-        raise InputError(faults)
+    changed.check_mounting()
     return changed
 
 
@@ -184,3 +186,57 @@ def _given_keys(study: Study) -> set[str]:
         removed = named - keys_valid_for(dict.fromkeys(named), values["contact.law"]).keys()
         keys |= {f"contact.{key}" for key in removed if "." not in key}
     return keys
+
+
+WIDE = 10.0
+"""Standard deviation of an error of position over the radial clearance, at which nearly every pin binds."""
+LEAST_CLEARANCE = 1e-5
+"""Clearance (m) that errors are compared with where a joint has less: pins without clearance are preloaded."""
+FAST = 30_000.0
+"""Speed times misalignment, rpm deg, beyond what makers of joint shafts allow."""
+ROUNDING = 1e-9
+"""Relative error of a product of converted quantities: 2500 rpm at 12 deg is not beyond 30000."""
+
+
+def warnings(study: Study) -> Iterator[Fault]:
+    """Warnings about a study: short common axes, errors far wider than the clearance, speeds far too high."""
+    yield from (study.fault(*warning) for warning in short_axes(study.entries, study.joint.contact.z))
+    yield from _wide_bands(study)
+    yield from _fast_points(study)
+
+
+def _wide_bands(study: Study) -> Iterator[Fault]:
+    """Entries whose positions and angles across a pin leave no room for it in its hole."""
+    contact = study.joint.contact
+    for entry in study.entries:
+        sizes = []
+        for site, model in entry.models:
+            for meaning in model.meaning(site):
+                keys = {name.partition(".")[2] for name in meaning.errors}
+                across = meaning.sigma if keys & {"offset_t", "offset_z"} else 0.0
+                sizes.append(0.5 * contact.z * meaning.sigma if keys & {"tilt_t", "tilt_z"} else across)
+        ratio = max(sizes, default=0.0) / max(contact.clearance, LEAST_CLEARANCE)
+        if ratio > WIDE:
+            room = units.shown(contact.clearance, "m")
+            found = (
+                f"moves the end of a pin by {units.shown(max(sizes), 'm')} (standard deviation), {ratio:.0f} times the "
+                f"radial clearance of {room}: nearly every pin binds"
+            )
+            yield study.fault(
+                f"tolerances.{entry.pattern}", found, "check its unit, and contact.clearance of the joint"
+            )
+
+
+def _fast_points(study: Study) -> Iterator[Fault]:
+    """Operating points whose speed is far beyond that of any joint shaft at their misalignment."""
+    for number, point in enumerate(study.points):
+        rpm, alpha = point.operation.speed * 30.0 / math.pi, math.degrees(point.operation.alpha)
+        product = abs(rpm) * alpha
+        if product > FAST * (1.0 + ROUNDING):
+            at = f" at {point.name}" if point.name else ""
+            found = (
+                f"{rpm:.4g} rpm at {alpha:.3g} deg{at}: speed times angle, {product:.0f} rpm deg, is beyond the "
+                f"{FAST:g} that makers of joint shafts allow"
+            )
+            key = f"operation[{number}].speed" if point.name else "operation.speed"
+            yield study.fault(key, found, "check it and alpha, and their units")

@@ -31,29 +31,20 @@ REACH = (0.25, 4.0)
 class CostEntry(Strict):
     """Cost of the tolerance of one error."""
 
-    cost: Annotated[
-        units.Number, Field(ge=0, description="cost of the tolerance `at`, in any currency", examples=[4.0])
-    ] = 1.0
-    fixed: Annotated[
-        units.Number, Field(ge=0, description="part of it that does not depend on the tolerance", examples=[1.0])
-    ] = 0.0
-    at: Annotated[
-        Positive | None,
-        Field(
-            description="tolerance (half the band) that costs `cost`; that of the study by default",
-            examples=["0.5 deg"],
-        ),
-    ] = None
-    power: Annotated[units.Number, Field(gt=0, le=10, description="exponent of the reciprocal", examples=[2.0])] = 1.0
-    least: Annotated[
-        Positive | None, Field(description="smallest tolerance that the process can hold", examples=["0.1 deg"])
-    ] = None
-    most: Annotated[
-        Positive | None, Field(description="largest tolerance that the function allows", examples=["0.030 mm"])
-    ] = None
-    keep: Annotated[bool, Field(strict=True, description="whether the tolerance stays as it is", examples=[True])] = (
-        False
-    )
+    cost: Annotated[units.Number, Field(ge=0)] = Field(default=1.0, examples=[4.0])
+    """cost of the tolerance `at`, in any currency"""
+    fixed: Annotated[units.Number, Field(ge=0)] = Field(default=0.0, examples=[1.0])
+    """part of it that does not depend on the tolerance"""
+    at: Positive | None = Field(default=None, examples=["0.5 deg"])
+    """tolerance (half the band) that costs `cost`; that of the study by default"""
+    power: Annotated[units.Number, Field(gt=0, le=10)] = Field(default=1.0, examples=[2.0])
+    """exponent of the reciprocal"""
+    least: Positive | None = Field(default=None, examples=["0.1 deg"])
+    """smallest tolerance that the process can hold"""
+    most: Positive | None = Field(default=None, examples=["0.030 mm"])
+    """largest tolerance that the function allows"""
+    keep: bool = Field(default=False, strict=True, examples=[True])
+    """whether the tolerance stays as it is"""
 
     @model_validator(mode="after")
     def _in_order(self) -> CostEntry:

@@ -1,18 +1,25 @@
-"""Joints listed one by one: every variant of the joint, at every point of a grid, with the errors of every case."""
+"""Joints with dimensions of their own: those of a sweep, and joints that are listed one by one.
+
+Listed is every variant of the joint, at every point of a grid, with the errors of every case.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import groupby
+from itertools import groupby, product
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tolstat.common.errors import Fault, InputError
+from tolstat.common.late import stats
 from tolstat.common.tables import DESIGN, Variant
-from tolstat.joint import Joint, Operation
-from tolstat.study.model import Solver
+from tolstat.common.units import Quantity
+from tolstat.joint import Joint, Operation, affects_results
+from tolstat.joint.sections import quantities
+from tolstat.study.model import Solver, SweepAxis
 
 IDEAL = "ideal"
 """Name of the case without errors, the first of every list."""
@@ -96,9 +103,7 @@ def table(cases: Sequence[Sequence[int]], points: int) -> NDArray[np.void]:
 
 def sobol(n: int, dimensions: int, seed: int | Sequence[int], first: int = 0) -> NDArray[np.float64]:
     """Scrambled Sobol' points `first` and following in the unit cube, (n, dimensions), at the middle of their cells."""
-    from scipy.stats import qmc
-
-    engine = qmc.Sobol(dimensions, scramble=True, bits=SOBOL_BITS, seed=np.random.default_rng(seed))
+    engine = stats.qmc.Sobol(dimensions, scramble=True, bits=SOBOL_BITS, seed=np.random.default_rng(seed))
     # SciPy expects a power of two when it draws from the start of the sequence
     start = engine.fast_forward(first).random(n) if first else engine.random_base2(max(n - 1, 0).bit_length())
     points: NDArray[np.float64] = start[:n]
@@ -119,3 +124,86 @@ def flat(value: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]
             yield from flat(inner, f"{prefix}{key}.")
         else:
             yield f"{prefix}{key}", list(inner) if isinstance(inner, tuple) else inner
+
+
+KEYS = {key: unit for key, unit in quantities(Joint).items() if affects_results(key)}
+"""SI unit of each quantity of a joint that affects results, by dotted key."""
+MAX_JOINTS = 10_000
+"""Maximum number of joints with dimensions of their own."""
+
+
+def meaning(axes: Sequence[SweepAxis], joint: Joint) -> list[str]:
+    """Describe the axes of clearances and diameters, whose values are deviations from those of the joint.
+
+    Returns
+    -------
+    list of str
+        One line for each such axis, with the key that has the value itself; empty for other sweeps.
+    """
+    of = joint.contact
+    keys = {"clearance": "clearance"} | {f"{part}.diameter": key for part, key in (("hole", "D_H"), ("pin", "D_P"))}
+    lines = []
+    for axis in axes:
+        part, _, kind = axis.names[0].partition(".")
+        key = keys.get(kind) or keys.get(f"{part.rstrip('1234')}.{kind}")
+        if axis.names[0] not in KEYS and key is not None:
+            ends = (f"{1e3 * end:.6g}" for end in (axis.start, axis.stop))
+            whole = (f"{1e3 * (getattr(of, key) + end):.6g}" for end in (axis.start, axis.stop))
+            others = len(axis.names) - 1
+            what = f"{axis.names[0]}{f' and {others} others' if others else ''}"
+            lines.append(f"sweep of {what}: deviations from {' to '.join(ends)} mm,")
+            lines.append(f"  the {kind} is {' to '.join(whole)} mm; to sweep it itself: contact.{key}")
+    return lines
+
+
+def swept(
+    axes: Sequence[SweepAxis],
+    nominal: tuple[Joint, Operation, Solver],
+    make: Callable[[Mapping[str, Any]], tuple[Variant, Joint]],
+    first: int,
+    place: str,
+) -> Design | None:
+    """Make the joints of a sweep: that of the study, then one for each point of the axes of dimensions.
+
+    Parameters
+    ----------
+    axes : sequence of SweepAxis
+        All axes of the sweep, the last varying fastest.
+    nominal : tuple
+        Joint, operating point and settings of the study.
+    make : callable
+        Returns the variant, and its joint, with some keys of the joint set, by dotted key.
+    first : int
+        Row of the first joint of the grid; the study's joint, without errors, is before it.
+    place : str
+        File name shown in faults.
+
+    Returns
+    -------
+    Design
+        None if no axis is a dimension of the joint.
+
+    Raises
+    ------
+    InputError
+        When there are too many joints, or one of them is not valid.
+    """
+    dimensions = [number for number, axis in enumerate(axes) if axis.names[0] in KEYS]
+    if not dimensions:
+        return None
+    shape = [axes[number].points for number in dimensions]
+    if np.prod(shape) > MAX_JOINTS:
+        found = f"gives {np.prod(shape)} joints with dimensions of their own"
+        raise InputError([Fault(f"{place}: sweep", found, f"give at most {MAX_JOINTS}")])
+    made = [(Variant("joint", {}), nominal[0])]
+    for values in product(*(np.linspace(axes[k].start, axes[k].stop, axes[k].points).tolist() for k in dimensions)):
+        point = {name: value for k, value in zip(dimensions, values, strict=True) for name in axes[k].names}
+        made.append(make({key: Quantity(KEYS[key]).written(value) for key, value in point.items()}))
+    all_points = [axis.points for axis in axes]
+    index = np.unravel_index(np.arange(np.prod(all_points)), all_points)
+    number = 1 + np.ravel_multi_index([index[k] for k in dimensions], shape)
+    table = np.zeros(first + len(number), DESIGN)
+    table["variant"][first:] = number
+    table["group"] = np.arange(len(table))
+    variants, joints = zip(*made, strict=True)
+    return Design(variants, joints, (nominal[1],) * len(made), (nominal[2],) * len(made), {}, (), table)

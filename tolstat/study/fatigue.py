@@ -6,78 +6,204 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
-from pydantic import AfterValidator, Field, model_validator
+import numpy as np
+from pydantic import AfterValidator, Field, WithJsonSchema, model_validator
 
-from tolstat.common import strict, units
+from tolstat.analysis.strength import Line
+from tolstat.common import json_schema, strict, units
 from tolstat.common.channels import UNIT_OF_CHANNEL
 from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.load_kinds import BUSHINGS
 from tolstat.common.strict import Strict, did_you_mean, read_section, refuse
-from tolstat.study import stress_point
-from tolstat.study.selection import Assignments, Entry, entries, quantity, resolve
-from tolstat.study.stress_point import Exponent, Positive, StressPoint
+from tolstat.study.selection import Assignments, Entry, entries, quantity, resolve, select
+
+Positive = Annotated[units.Number, AfterValidator(units.positive)]
+Exponent = Annotated[units.Number, Field(ge=1, le=30)]
+PerForce = Annotated[float, units.Quantity("1/m^2")]
+PerTorque = Annotated[float, units.Quantity("1/m^3")]
+PositiveStress = Annotated[units.Stress, AfterValidator(units.positive)]
+COMPONENTS = ("F_e", "F_t", "F_z", "T_e", "T_t", "T_z")
+ROUND = {"T_et": ("T_e", "T_t"), "T_tz": ("T_t", "T_z")}
+"""Moments that bend a round section, by the key that gives their stress at its surface: of an arm and of a pin."""
+PLACES = 24
+"""Places around a round section: the stress between two of them is at most 1 - cos(7.5 deg), 0.9 %, above theirs."""
+
+
+def _found(name: str, other: str, value: float | None) -> str:
+    return f"has neither {name} nor {other}" if value is None else f"has both {name} and {other}"
+
+
+class StressPointEntry(Strict):
+    """Point of a part: its stress is a sum of the bushing's load components, each times a factor.
+
+    A round section has no one point where bending about two axes is largest: it is evaluated all around.
+    """
+
+    bushing: str = Field(examples=["fork*"])
+    """bushing whose load stresses the point, or pattern of several"""
+    F_e: PerForce = Field(default=0.0, examples=["2.5 MPa/kN"])
+    """stress at the point by the force along e of the bushing"""
+    F_t: PerForce = Field(default=0.0, examples=["0.8 MPa/kN"])
+    """stress at the point by the force along t of the bushing"""
+    F_z: PerForce = Field(default=0.0, examples=["2.5 MPa/kN"])
+    """stress at the point by the force along z of the bushing"""
+    T_e: PerTorque = Field(default=0.0, examples=["0.2 MPa/(N*m)"])
+    """stress at the point by the torque about e of the bushing"""
+    T_t: PerTorque = Field(default=0.0, examples=["-0.2 MPa/(N*m)"])
+    """stress at the point by the torque about t of the bushing"""
+    T_z: PerTorque = Field(default=0.0, examples=["0.1 MPa/(N*m)"])
+    """stress at the point by the torque about z of the bushing"""
+    T_et: PerTorque = Field(default=0.0, examples=["0.2 MPa/(N*m)"])
+    """bending of a round arm: as T_e and T_t, all around it"""
+    T_tz: PerTorque = Field(default=0.0, examples=["0.2 MPa/(N*m)"])
+    """bending of a round pin: as T_t and T_z, all around it"""
+    k: Exponent = Field(examples=[3])
+    """exponent of the S–N line above the knee"""
+    k_2: Annotated[units.Number | None, Field(ge=1, le=100)] = Field(default=None, examples=[5])
+    """exponent below the knee; 2k - 1 (Haibach) by default"""
+    N_D: Positive = Field(examples=[1e7])
+    """cycles at the knee"""
+    S_D: PositiveStress | None = Field(default=None, examples=["29 MPa"])
+    """range of the stress at the knee that half of the parts survive"""
+    S_aD: PositiveStress | None = Field(default=None, examples=["14.5 MPa"])
+    """amplitude of the stress at the knee, half of S_D; instead of S_D"""
+    T_S: Annotated[units.Number | None, Field(ge=1)] = Field(default=None, examples=[1.5])
+    """scatter of the strength: 90 % quantile over 10 % quantile; 1: none"""
+    T_N: Annotated[units.Number | None, Field(ge=1)] = Field(default=None, examples=[3.4])
+    """scatter of the life at one range, T_S^k; instead of T_S"""
+    D_c: Positive = Field(default=1.0, examples=[0.3])
+    """damage sum at which a part fails"""
+    M: Annotated[units.Number, Field(ge=0, le=1)] = Field(default=0.0, examples=[0.3])
+    """mean-stress sensitivity; 0: the mean has no effect"""
+    R: Annotated[units.Number, Field(ge=-1, lt=1)] = Field(default=-1.0, examples=[0.0])
+    """stress ratio, smallest over largest stress, of the S–N line"""
+
+    @model_validator(mode="after")
+    def _complete(self) -> StressPointEntry:
+        if not any(map(any, self.per_load)):
+            raise refuse("no load stresses the point", 'give a stress per load, for example T_e = "0.2 MPa/(N*m)"')
+        if (self.S_D is None) == (self.S_aD is None):
+            raise refuse(_found("S_D", "S_aD", self.S_D), "give one of them: S_D is a range, S_aD an amplitude")
+        if (self.T_S is None) == (self.T_N is None):
+            raise refuse(
+                _found("T_S", "T_N", self.T_S), "give one of them; T_S = 1 is a strength that does not scatter"
+            )
+        return self
+
+    @property
+    def per_load(self) -> tuple[tuple[float, ...], ...]:
+        """Stress per load component at each place, in the order of `COMPONENTS`, 1/m^2 and 1/m^3."""
+        factors = np.array([float(getattr(self, name)) for name in COMPONENTS])
+        bent = {pair: value for name, pair in ROUND.items() if (value := float(getattr(self, name)))}
+        places = []
+        for angle in 2.0 * np.pi * np.arange(PLACES if bent else 1) / PLACES:
+            own = factors.copy()
+            for (first, second), value in bent.items():
+                own[COMPONENTS.index(first)] += value * np.cos(angle)
+                own[COMPONENTS.index(second)] += value * np.sin(angle)
+            places.append(tuple(own.tolist()))
+        return tuple(places)
+
+    @property
+    def line(self) -> Line:
+        """S–N line with all that follows from other keys."""
+        k_2 = 2.0 * self.k - 1.0 if self.k_2 is None else self.k_2
+        size = 2.0 * self.S_aD if self.S_aD is not None else self.S_D
+        scatter = self.T_N ** (1.0 / self.k) if self.T_N is not None else self.T_S
+        assert size is not None
+        assert scatter is not None
+        return Line(self.k, k_2, self.N_D, size, scatter, self.D_c, self.M, self.R)
+
+
+class StressPoint(NamedTuple):
+    """A point of a part.
+
+    Attributes
+    ----------
+    name : str
+        Name in the study; with the bushing where the study names several.
+    bushing : str
+        One of `load_kinds.BUSHINGS`.
+    per_load : tuple of tuple of float
+        Stress per load component along e, t, z, three forces, 1/m^2, and three torques, 1/m^3: at one place or, of a
+        round section, at several around it, of which the part fails at the worst.
+    line : Line
+        S–N line.
+    """
+
+    name: str
+    bushing: str
+    per_load: tuple[tuple[float, ...], ...]
+    line: Line
+
+
+def _stress_points(table: Mapping[str, Any], place: str) -> tuple[StressPoint, ...]:
+    """Read ``[fatigue.point]``.
+
+    Raises
+    ------
+    InputError
+        With every fault.
+    """
+    points, faults = list[StressPoint](), list[Fault]()
+    for name, value in table.items():
+        prefix = ("fatigue", "point", name)
+        with gather(faults):
+            entry = strict.validate(StressPointEntry, value, place, prefix=prefix)
+            bushings = select(entry.bushing, BUSHINGS)
+            if not bushings:
+                where = f"{place}: {strict.dotted((*prefix, 'bushing'))}"
+                found = f"{entry.bushing!r} is not a bushing"
+                raise InputError([Fault(where, found, did_you_mean(entry.bushing, BUSHINGS))])
+            for bushing in bushings:
+                own = name if len(bushings) == 1 else f"{name}, {bushing}"
+                points.append(StressPoint(own, bushing, entry.per_load, entry.line))
+    if faults:
+        raise InputError(faults)
+    return tuple(points)
 
 
 class SequenceEntry(Strict):
     """Order in which the operating points of a duty cycle are visited; it repeats."""
 
-    points: Annotated[
-        str,
-        Field(
-            description="operating points in the order of their visits, with blanks between them",
-            examples=["drive start drive climb"],
-        ),
-    ]
-    revolutions: Annotated[Positive, Field(description="revolutions of the input shaft in it", examples=[90000])]
+    points: str = Field(examples=["drive start drive climb"])
+    """operating points in the order of their visits, with blanks between them"""
+    revolutions: Positive = Field(examples=[90000])
+    """revolutions of the input shaft in it"""
 
 
 class Settings(Strict):
     """Evaluation of load cycles; affects no result."""
 
-    exponents: list[Exponent] = Field(
-        default_factory=lambda: [3.0, 5.0, 10.0],
-        min_length=1,
-        description="Wöhler exponents of the damage-equivalent loads",
-        examples=[[5.0]],
-    )
-    revolutions: Annotated[
-        Positive | None,
-        Field(
-            description="service life in revolutions of the input shaft; left out: the `required_life` of the bearings "
-            "at the speeds of the study, without it 1e6",
-            examples=[2e7],
-        ),
-    ] = None
-    reference_cycles: Annotated[
-        Positive, Field(description="number of cycles that the damage-equivalent loads refer to", examples=[2e6])
-    ] = 1e6
+    exponents: list[Exponent] = Field(default_factory=lambda: [3.0, 5.0, 10.0], min_length=1, examples=[[5.0]])
+    """Wöhler exponents of the damage-equivalent loads"""
+    revolutions: Positive | None = Field(default=None, examples=[2e7])
+    """service life in revolutions of the input shaft; left out: the `required_life` of the bearings at the speeds of
+    the study, without it 1e6"""
+    reference_cycles: Positive = Field(default=1e6, examples=[2e6])
+    """number of cycles that the damage-equivalent loads refer to"""
     line: dict[str, Any] = Field(
         default_factory=dict,
-        description="S–N lines by channel or pattern",
-        examples=[{"cross*.T": {"m": 5, "S0": "150 N*m", "N0": 2e6}}],
         json_schema_extra={"x-table": "lines"},
+        examples=[{"cross*.T": {"m": 5, "S0": "150 N*m", "N0": 2e6}}],
     )
-    starts: Annotated[
-        units.Number,
-        AfterValidator(units.not_negative),
-        Field(description="starts from standstill in the service life, for points", examples=[2e4]),
-    ] = 0.0
-    sequence: Annotated[
-        SequenceEntry | None,
-        Field(
-            description="order in which the operating points are visited, whose changes of load are counted, too",
-            examples=[{"points": "drive start drive climb", "revolutions": 9e4}],
-        ),
-    ] = None
+    """S–N lines by channel or pattern"""
+    starts: Annotated[units.Number, AfterValidator(units.not_negative)] = Field(default=0.0, examples=[2e4])
+    """starts from standstill in the service life, for points"""
+    sequence: SequenceEntry | None = Field(
+        default=None, examples=[{"points": "drive start drive climb", "revolutions": 9e4}]
+    )
+    """order in which the operating points are visited, whose changes of load are counted, too"""
     point: dict[str, Any] = Field(
         default_factory=dict,
-        description="points of the parts by name, with stress per load and S–N line",
+        json_schema_extra={"x-table": "points"},
         examples=[
             {"pin root": {"bushing": "cross*", "T_t": "0.2 MPa/Nm", "k": 5, "N_D": 2e6, "S_D": "360 MPa", "T_S": 1.25}}
         ],
-        json_schema_extra={"x-table": "points"},
     )
+    """points of the parts by name, with stress per load and S–N line"""
 
     @model_validator(mode="after")
     def _starts_take_revolutions(self) -> Settings:
@@ -91,16 +217,14 @@ class Settings(Strict):
 class LineEntry(Strict):
     """S–N line N = N0 (S/S0)^-m, S the range of a load cycle."""
 
-    m: Annotated[Exponent, Field(description="exponent", examples=[5])]
-    S0: Annotated[
-        Any,
-        Field(
-            description="range of the load that is borne for N0 cycles, a force or torque",
-            examples=["150 N*m"],
-            json_schema_extra={"x-table": "quantity"},
-        ),
-    ]
-    N0: Annotated[Positive, Field(description="number of cycles at the range S0", examples=[2e6])]
+    m: Exponent = Field(examples=[5])
+    """exponent"""
+    S0: Annotated[Any, WithJsonSchema(json_schema.positive(json_schema.quantity("", "150 N*m")))] = Field(
+        examples=["150 N*m"]
+    )
+    """range of the load that is borne for N0 cycles, a force or torque"""
+    N0: Positive = Field(examples=[2e6])
+    """number of cycles at the range S0"""
 
 
 @dataclass(frozen=True)
@@ -210,7 +334,7 @@ def read(table: object, place: str, names: Sequence[str] = ()) -> Fatigue:
             claims.claim(entry, names)
             lines |= dict.fromkeys(names, _line(entry, UNIT_OF_CHANNEL[names[0]], place))
     with gather(faults):
-        points = stress_point.read(_inner(table, "point"), place)
+        points = _stress_points(_inner(table, "point"), place)
     if faults:
         raise InputError(faults)
     revolutions = {} if settings.revolutions is None else {"revolutions": settings.revolutions, "required": True}

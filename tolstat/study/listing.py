@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from itertools import product
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple, Self
+from typing import Any, Literal, NamedTuple, Self
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from tolstat import joint
 from tolstat.common import strict, units
 from tolstat.common.errors import Fault, InputError, gather
 from tolstat.common.notation import DIAMETER
-from tolstat.common.strict import Strict, described, refuse, whole
+from tolstat.common.strict import Strict, refuse
 from tolstat.common.tables import Variant
 from tolstat.joint import Joint, Operation
 from tolstat.joint.model import TOLD
@@ -29,71 +29,52 @@ Section = tuple[int | str, ...]
 class CaseEntry(Strict):
     """A joint with these errors; the joint without errors is always run, too."""
 
-    name: Annotated[str, described("name of the case", "tilt", min_length=1)]
-    errors: Annotated[
-        dict[str, Any],
-        described(
-            "errors by name or pattern, as in [errors]",
-            {"pin1.tilt_z": "0.5 deg"},
-            min_length=1,
-            json_schema_extra={"x-table": "errors"},
-        ),
-    ]
+    name: str = Field(min_length=1, examples=["tilt"])
+    """name of the case"""
+    errors: dict[str, Any] = Field(
+        min_length=1, json_schema_extra={"x-table": "errors"}, examples=[{"pin1.tilt_z": "0.5 deg"}]
+    )
+    """errors by name or pattern, as in [errors]"""
 
 
 class Range(Strict):
     """One entry of ``vary``: a key of the joint goes from `start` to `stop`, given as in the file."""
 
-    start: Annotated[Any, described("value of the first joint, a quantity of the key's unit", "76.0 mm", alias="from")]
-    stop: Annotated[Any, described("value of the last joint, a quantity of the key's unit", "75.6 mm", alias="to")]
+    start: Any = Field(alias="from", examples=["76.0 mm"])
+    """value of the first joint, a quantity of the key's unit"""
+    stop: Any = Field(alias="to", examples=["75.6 mm"])
+    """value of the last joint, a quantity of the key's unit"""
 
 
-def _table(meaning: str, example: dict[str, Any], of: str) -> Any:
-    """Field of a table that may be left out; `of` is the name of its schema."""
-    return described(meaning, example, default_factory=dict, json_schema_extra={"x-table": of})
+def _keys_of(table: str, example: dict[str, Any]) -> Any:
+    """Field of a table that may be left out; its JSON schema has a name."""
+    return Field(default_factory=dict, json_schema_extra={"x-table": table}, examples=[example])
 
 
 class VariantEntry(Strict):
     """Another joint, or a family of them."""
 
-    name: Annotated[
-        str, described("name of the family; entries of one name make one family", "clearance", min_length=1)
-    ]
-    joint: Annotated[
-        dict[str, Any],
-        _table(
-            "keys in place of those of [joint], which may name another `base`, too",
-            {"contact": {"law": "point"}},
-            "overrides",
-        ),
-    ]
-    points: Annotated[int | None, whole(2, 10_000, "number of joints of a family; needed with `vary`", 21)] = None
-    design: Annotated[
-        Literal["line", "sobol"],
-        described(
-            "`line`: all keys of `vary` go from one end to the other together; `sobol`: a scrambled Sobol' "
-            "sequence fills the box",
-            "sobol",
-        ),
-    ] = "line"
-    seed: Annotated[int, described("seed of the scrambling of `sobol`", 2021, strict=True, ge=0, lt=2**63)] = 0
-    vary: Annotated[
-        dict[str, Any],
-        _table(
-            "keys of the joint that the family varies, each with its range",
-            {"cross.R": {"from": "60 mm", "to": "90 mm"}},
-            "vary",
-        ),
-    ]
-    cases: Annotated[
-        list[str] | None,
-        described("names of the cases to run; all by default; the joint without errors is always run", ["tilt"]),
-    ] = None
-    operation: Annotated[
-        dict[str, Any], _table("keys in place of those of [operation]", {"torque": "0 N*m"}, "operation")
-    ]
-    solver: Annotated[dict[str, Any], _table("keys in place of those of [solver]", {"steps_per_rev": 720}, "solver")]
-    note: Annotated[str, described("note for the reader of the report", "long free flight")] = ""
+    name: str = Field(min_length=1, examples=["clearance"])
+    """name of the family; entries of one name make one family"""
+    joint: dict[str, Any] = _keys_of("overrides", {"contact": {"law": "point"}})
+    """keys in place of those of [joint], which may name another `base`, too"""
+    points: int | None = Field(default=None, strict=True, ge=2, le=10_000, examples=[21])
+    """number of joints of a family; needed with `vary`"""
+    design: Literal["line", "sobol"] = Field(default="line", examples=["sobol"])
+    """`line`: all keys of `vary` go from one end to the other together; `sobol`: a scrambled Sobol' sequence fills the
+    box"""
+    seed: int = Field(default=0, strict=True, ge=0, lt=2**63, examples=[2021])
+    """seed of the scrambling of `sobol`"""
+    vary: dict[str, Any] = _keys_of("vary", {"cross.R": {"from": "60 mm", "to": "90 mm"}})
+    """keys of the joint that the family varies, each with its range"""
+    cases: list[str] | None = Field(default=None, examples=[["tilt"]])
+    """names of the cases to run; all by default; the joint without errors is always run"""
+    operation: dict[str, Any] = _keys_of("operation", {"torque": "0 N*m"})
+    """keys in place of those of [operation]"""
+    solver: dict[str, Any] = _keys_of("solver", {"steps_per_rev": 720})
+    """keys in place of those of [solver]"""
+    note: str = Field(default="", examples=["long free flight"])
+    """note for the reader of the report"""
 
     @model_validator(mode="after")
     def _family(self) -> Self:
@@ -293,7 +274,7 @@ class Variants:
         own |= {f"solver.{key}": getattr(solver, key) for key in entry.solver}
         written = [key for key, _ in flat(entry.joint)] + list(ranges)
         return [
-            Listed(Variant(entry.name, self.values(joint, written) | own, entry.note), joint, operation, solver, run)
+            Listed(Variant(entry.name, self._values(joint, written) | own, entry.note), joint, operation, solver, run)
             for joint in made
         ]
 
@@ -343,15 +324,16 @@ class Variants:
             nested({key: _written(value, text[key], ranges[key].start) for key, value in own.items()}) for own in values
         ]
 
-    def joint(self, over: Mapping[str, Any], at: Section) -> Joint:
-        """Make a joint from the study's by the keys `over`; `at` is their key path in faults."""
-        return self._loaded(laid_over(self._study, over), at)
+    def swept(self, point: Mapping[str, Any]) -> tuple[Variant, Joint]:
+        """Variant at a point of a sweep, from dotted keys with values as a file writes them, and its joint."""
+        joint = self._loaded(laid_over(self._study, nested(point)), ("sweep",))
+        return Variant("sweep", self._values(joint, list(point))), joint
 
     def _loaded(self, keys: Mapping[str, Any], at: Section) -> Joint:
         overrides = {key: value for key, value in keys.items() if key != "base"}
         return joint.load(keys["base"], overrides, self._place, self._folder, strict.dotted(at))
 
-    def values(self, made: Joint, written: list[str]) -> dict[str, Any]:
+    def _values(self, made: Joint, written: list[str]) -> dict[str, Any]:
         """Return the keys `written` and all others in which a joint differs from the study's, see `Variant.values`."""
         nominal, values = (dict(flat(joint.given())) for joint in (self._nominal.joint, made))
         keys = [key for key in nominal | values if key not in TOLD]

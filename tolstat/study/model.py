@@ -11,9 +11,8 @@ from tolstat.analysis.clustered import LEAST
 from tolstat.common import selected_results, units
 from tolstat.common.columns import Column
 from tolstat.common.loads import Limit
-from tolstat.common.solver_options import from_names
-from tolstat.common.strict import Strict, described, refuse, whole
-from tolstat.common.tables import Options
+from tolstat.common.strict import Strict, refuse
+from tolstat.common.tables import Options, from_names
 from tolstat.study import selection
 from tolstat.study.selective import SelectiveEntry
 from tolstat.study.tolerances.entry import Value
@@ -34,65 +33,34 @@ Flag = Annotated[bool, Field(strict=True)]
 class Solver(Strict):
     """Numerical settings of all joints except those of variants with settings of their own."""
 
-    fidelity: Annotated[
-        Literal["dynamic", "quasistatic", "ideal", "auto"],
-        described(
-            "what is solved: `dynamic`, integration until settled; `quasistatic`, equilibrium at each angle; "
-            "`ideal`, closed forms of the joint without errors; `auto`, the cheapest fidelity and steps per revolution "
-            "that meet `error_budget`",
-            "quasistatic",
-        ),
-    ] = "dynamic"
-    error_budget: Annotated[
-        Number,
-        described(
-            "largest error of a load that `auto` allows, relative to the joint's largest load of the kind",
-            0.01,
-            ge=1e-6,
-            lt=1,
-        ),
-    ] = 0.005
-    method: Annotated[
-        Literal["bdf2", "generalized_alpha", "tr_bdf2"],
-        described("time integration; `bdf2` alone runs joints in SIMD lanes", "tr_bdf2"),
-    ] = "bdf2"
-    start: Annotated[
-        Literal["static", "ramp"],
-        described("start from the equilibrium at theta = 0, or from the ideal pose with a torque that rises", "ramp"),
-    ] = "static"
-    steps_per_rev: Annotated[int, whole(12, 20_000, "equal steps per revolution", 360)] = _DEFAULTS.steps_per_rev
-    max_revs: Annotated[int, whole(2, 1000, "most revolutions until a joint settles", 60)] = _DEFAULTS.max_revs
-    settle_tol: Annotated[Number, described("closure error below which a joint is settled", 1e-3, gt=0, lt=1)] = (
-        _DEFAULTS.settle_tol
-    )
-    newton_tol: Annotated[
-        Number, described("residual that ends Newton's iteration, relative to torque / (2 R)", 1e-7, ge=1e-12, le=1e-2)
-    ] = _DEFAULTS.newton_tol
-    newton_max_iter: Annotated[int, whole(2, 100, "most Newton iterations of a step", 20)] = _DEFAULTS.newton_max_iter
-    max_halvings: Annotated[int, whole(0, 20, "most halvings of a step that Newton's iteration fails on", 8)] = (
-        _DEFAULTS.max_halvings
-    )
-    rho_inf: Annotated[
-        Number, described("spectral radius of `generalized_alpha` at infinite frequency", 0.9, ge=0, le=1)
-    ] = _DEFAULTS.rho_inf
-    peak_substeps: Annotated[
-        int,
-        whole(
-            1, 64, "parts of a step where a contact switches on a load's peak; with 1 these steps are not repeated", 1
-        ),
-    ] = _DEFAULTS.peak_substeps
-    max_refinements: Annotated[
-        int, whole(0, 4, "most halvings of the steps of a refined joint; 0 leaves all joints at `steps_per_rev`", 0)
-    ] = _DEFAULTS.max_refinements
-    duration: Annotated[
-        int,
-        whole(
-            1,
-            1_000_000_000,
-            "revolutions for which the largest loads of a joint that never repeats are estimated",
-            1000,
-        ),
-    ] = _DEFAULTS.duration
+    fidelity: Literal["dynamic", "quasistatic", "ideal", "auto"] = Field(default="dynamic", examples=["quasistatic"])
+    """what is solved: `dynamic`, integration until settled; `quasistatic`, equilibrium at each angle; `ideal`, closed
+    forms of the joint without errors; `auto`, the cheapest fidelity and steps per revolution that meet
+    `error_budget`"""
+    error_budget: Annotated[Number, Field(ge=1e-6, lt=1)] = Field(default=0.005, examples=[0.01])
+    """largest error of a load that `auto` allows, relative to the joint's largest load of the kind"""
+    method: Literal["bdf2", "tr_bdf2"] = Field(default="bdf2", examples=["tr_bdf2"])
+    """time integration; `tr_bdf2` damps less and costs twice as much"""
+    start: Literal["static", "ramp"] = Field(default="static", examples=["ramp"])
+    """start from the equilibrium at theta = 0, or from the ideal pose with a torque that rises"""
+    steps_per_rev: int = Field(default=_DEFAULTS.steps_per_rev, strict=True, ge=12, le=20_000, examples=[360])
+    """equal steps per revolution"""
+    max_revs: int = Field(default=_DEFAULTS.max_revs, strict=True, ge=2, le=1000, examples=[60])
+    """most revolutions until a joint settles"""
+    settle_tol: Annotated[Number, Field(gt=0, lt=1)] = Field(default=_DEFAULTS.settle_tol, examples=[1e-3])
+    """closure error below which a joint is settled"""
+    newton_tol: Annotated[Number, Field(ge=1e-12, le=1e-2)] = Field(default=_DEFAULTS.newton_tol, examples=[1e-7])
+    """residual that ends Newton's iteration, relative to torque / (2 R)"""
+    newton_max_iter: int = Field(default=_DEFAULTS.newton_max_iter, strict=True, ge=2, le=100, examples=[20])
+    """most Newton iterations of a step"""
+    max_halvings: int = Field(default=_DEFAULTS.max_halvings, strict=True, ge=0, le=20, examples=[8])
+    """most halvings of a step that Newton's iteration fails on"""
+    peak_substeps: int = Field(default=_DEFAULTS.peak_substeps, strict=True, ge=1, le=64, examples=[1])
+    """parts of a step where a contact switches on a load's peak; with 1 these steps are not repeated"""
+    max_refinements: int = Field(default=_DEFAULTS.max_refinements, strict=True, ge=0, le=4, examples=[0])
+    """most halvings of the steps of a refined joint; 0 leaves all joints at `steps_per_rev`"""
+    duration: int = Field(default=_DEFAULTS.duration, strict=True, ge=1, le=1_000_000_000, examples=[1000])
+    """revolutions for which the largest loads of a joint that never repeats are estimated"""
 
     @model_validator(mode="after")
     def _auto(self) -> Self:
@@ -122,64 +90,29 @@ def _of_a_file(schema: dict[str, Any]) -> None:
 class Sampling(Strict):
     """How many joints there are, and how they are drawn."""
 
-    method: Annotated[
-        SamplingMethod,
-        described(
-            "`random`; `sobol`, scrambled Sobol' points; `lhs`, Latin hypercube; `importance`, random, from "
-            "[tolerances] and [[proposal]]; `pick_freeze`, joints that share errors, for Sobol' indices; `sweep`, the "
-            "grid of [sweep]; `cases`, the joints of [[case]], [[variant]] and [grid]",
-            "sobol",
-            json_schema_extra=_of_a_file,
-        ),
-    ] = "random"
-    n: Annotated[
-        int | None,
-        whole(
-            1,
-            MAX_SAMPLES,
-            "number of joints without the nominal one; needed by all methods but `sweep` and `cases`; "
-            "with `pick_freeze` of pairs of random joints",
-            1024,
-        ),
-    ] = None
-    seed: Annotated[int, described("seed of all draws", 2021, strict=True, ge=0, lt=2**63)] = 0
-    nominal_first: Annotated[
-        Flag,
-        described("whether row 0 is the joint without errors, which statistics leave out; not with `cases`", False),
-    ] = True
-    groups: Annotated[
-        Literal["tolerance", "error"],
-        described(
-            "what `pick_freeze` exchanges together: all errors of an entry of [tolerances], or each alone", "error"
-        ),
-    ] = "tolerance"
+    method: SamplingMethod = Field(default="random", json_schema_extra=_of_a_file, examples=["sobol"])
+    """`random`; `sobol`, scrambled Sobol' points; `lhs`, Latin hypercube; `importance`, random, from [tolerances] and
+    [[proposal]]; `pick_freeze`, joints that share errors, for Sobol' indices; `sweep`, the grid of [sweep]; `cases`,
+    the joints of [[case]], [[variant]] and [grid]"""
+    n: int | None = Field(default=None, strict=True, ge=1, le=MAX_SAMPLES, examples=[1024])
+    """number of joints without the nominal one; needed by all methods but `sweep` and `cases`; with `pick_freeze` of
+    pairs of random joints"""
+    seed: int = Field(default=0, strict=True, ge=0, lt=2**63, examples=[2021])
+    """seed of all draws"""
+    nominal_first: Flag = Field(default=True, examples=[False])
+    """whether row 0 is the joint without errors, which statistics leave out; not with `cases`"""
+    groups: Literal["tolerance", "error"] = Field(default="tolerance", examples=["error"])
+    """what `pick_freeze` exchanges together: all errors of an entry of [tolerances], or each alone"""
 
-    replicates: Annotated[
-        int,
-        described(
-            "number of independent randomisations that `n` is divided into, with `sobol` or `lhs`: shares "
-            "and quantiles then have intervals",
-            8,
-            strict=True,
-            ge=1,
-            le=1000,
-        ),
-    ] = 1
+    replicates: int = Field(default=1, strict=True, ge=1, le=1000, examples=[8])
+    """number of independent randomisations that `n` is divided into, with `sobol` or `lhs`: shares and quantiles then
+    have intervals"""
 
-    joints_per_lot: Annotated[
-        int,
-        whole(
-            1,
-            MAX_SAMPLES,
-            "joints of a lot, for errors with `lot`; with 1 each joint is its own lot, and all are independent",
-            20,
-        ),
-    ] = 1
+    joints_per_lot: int = Field(default=1, strict=True, ge=1, le=MAX_SAMPLES, examples=[20])
+    """joints of a lot, for errors with `lot`; with 1 each joint is its own lot, and all are independent"""
 
-    selective: Annotated[
-        SelectiveEntry | None,
-        described("pins and holes are measured, sorted in classes, and matched class to class", {"classes": 3}),
-    ] = None
+    selective: SelectiveEntry | None = Field(default=None, examples=[{"classes": 3}])
+    """pins and holes are measured, sorted in classes, and matched class to class"""
 
     @property
     def has_replicates(self) -> bool:
@@ -312,24 +245,16 @@ def _check_pattern(pattern: str) -> str:
 class Output(Strict):
     """What is stored of each joint."""
 
-    results: Annotated[
-        list[Annotated[str, AfterValidator(_check_pattern)]] | None,
-        described(
-            "names or patterns of result columns to store beside status and course; all by default",
-            ["cross*.[FT]_max"],
-            min_length=1,
-        ),
-    ] = None
-    histories: Annotated[
-        Literal["none", "full", "harmonics", "cycles", "harmonics+cycles"],
-        described(
-            "what is stored of the last revolution: all samples, Fourier coefficients, counted load cycles",
-            "harmonics+cycles",
-        ),
-    ] = "none"
-    harmonics: Annotated[
-        int, whole(0, 10_000, "highest order of the Fourier coefficients, where `histories` has them", 32)
-    ] = 16
+    results: list[Annotated[str, AfterValidator(_check_pattern)]] | None = Field(
+        default=None, min_length=1, examples=[["cross*.[FT]_max"]]
+    )
+    """names or patterns of result columns to store beside status and course; all by default"""
+    histories: Literal["none", "full", "harmonics", "cycles", "harmonics+cycles"] = Field(
+        default="none", examples=["harmonics+cycles"]
+    )
+    """what is stored of the last revolution: all samples, Fourier coefficients, counted load cycles"""
+    harmonics: int = Field(default=16, strict=True, ge=0, le=10_000, examples=[32])
+    """highest order of the Fourier coefficients, where `histories` has them"""
 
     def identity(self) -> dict[str, Any]:
         """Settings that determine what is stored: names instead of patterns, no names if all results are kept."""
@@ -349,9 +274,12 @@ class Output(Strict):
 class SweepEntry(Strict):
     """The errors that a name or pattern selects go from one value to another together; several entries make a grid."""
 
-    start: Annotated[Value, described("first value", "0.14 mm", alias="from")]
-    stop: Annotated[Value, described("last value", "-0.60 mm", alias="to")]
-    points: Annotated[int, whole(2, MAX_ROWS, "number of equally spaced values", 38)]
+    start: Value = Field(alias="from", examples=["0.14 mm"])
+    """first value"""
+    stop: Value = Field(alias="to", examples=["-0.60 mm"])
+    """last value"""
+    points: int = Field(strict=True, ge=2, le=MAX_ROWS, examples=[38])
+    """number of equally spaced values"""
 
     @model_validator(mode="after")
     def _moves(self) -> Self:

@@ -80,20 +80,10 @@ def check_name(name: str) -> str:
 class PointEntry(Operation):
     """One of several operating points that all joints are simulated at."""
 
-    name: Annotated[
-        str,
-        AfterValidator(check_name),
-        Field(description="name of the operating point, of several ones", examples=["cruise"]),
-    ]
-    share: Annotated[
-        units.Number | None,
-        Field(
-            gt=0,
-            le=1,
-            description="share of the service time, for lives and fatigue; given for all points or for none",
-            examples=["60 %"],
-        ),
-    ] = None
+    name: Annotated[str, AfterValidator(check_name)] = Field(examples=["cruise"])
+    """name of the operating point, of several ones"""
+    share: Annotated[units.Number | None, Field(gt=0, le=1)] = Field(default=None, examples=["60 %"])
+    """share of the service time, for lives and fatigue; given for all points or for none"""
 
 
 def read(section: Any, place: str) -> tuple[Point, ...]:

@@ -19,6 +19,7 @@ from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from tolstat.analysis import process
 from tolstat.analysis.process import LEAST_PARTS, MOST_PARTS, Known, Sums
@@ -39,7 +40,8 @@ MAX_SHIFT, MAX_WIDEN = 10.0, 10.0
 class ProposalEntry(Strict):
     """A component of the mixture that importance sampling draws joints from."""
 
-    share: Annotated[Number, described("share of the joints drawn from it", 0.3, gt=0, lt=1)]
+    share: Annotated[Number, Field(gt=0, lt=1)] = Field(examples=[0.3])
+    """share of the joints drawn from it"""
     widen: Annotated[
         float | dict[str, Any],
         described(

@@ -127,9 +127,7 @@ def with_keys(text: str, changes: Mapping[tuple[int | str, ...], Mapping[str, An
         for key, value in values.items():
             _put(reduce(getitem, path, document), key, value)
         table = reduce(getitem, path, document)
-        if isinstance(
-            table, tomlkit.items.InlineTable
-        ):  # where keys were added or removed, tomlkit leaves uneven blanks
+        if isinstance(table, tomlkit.items.InlineTable):  # tomlkit leaves uneven blanks in it
             reduce(getitem, path[:-1], document)[path[-1]] = tomlkit.value(inline(table))
     return str(document.as_string())
 

@@ -7,26 +7,23 @@ with forks of class c. Of the parts of a class as many are matched as the rarest
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from functools import lru_cache
-from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator
+from pydantic import AfterValidator, Field
 
 from tolstat.common import units
 from tolstat.common.bisection import first
-from tolstat.common.errors import Fault
+from tolstat.common.late import special
 from tolstat.common.load_kinds import PINS
-from tolstat.common.strict import Strict, described, refuse
-from tolstat.study.tolerances.accepted import scores_among
+from tolstat.common.strict import Strict, refuse
 from tolstat.study.tolerances.distributions import Array, Distribution, probability
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from tolstat.study.tolerances.entry import Toleranced
+from tolstat.study.tolerances.entry import Toleranced
+from tolstat.study.tolerances.reading import Tolerances
+from tolstat.study.tolerances.zone_laws import scores_among
 
 MAX_CLASSES = 20
 ROUNDING = 1e-8
@@ -44,20 +41,13 @@ def _not_negative(value: float) -> float:
 class SelectiveEntry(Strict):
     """Pins and holes are sorted by their measured diameters, and crosses and forks of equal class matched."""
 
-    classes: Annotated[int, described("number of classes; 1: not sorted", 3, strict=True, ge=1, le=MAX_CLASSES)]
-    gauge: Annotated[
-        units.Length,
-        AfterValidator(_not_negative),
-        described("standard deviation of the error with which a diameter is measured", "2 um"),
-    ] = 0.0
-    split: Annotated[
-        Literal["width", "count"],
-        described(
-            "`width`: classes are equal parts of the tolerance bands, those at the ends are open; `count`: "
-            "each class has as many crosses, and as many forks, as any other",
-            "count",
-        ),
-    ] = "width"
+    classes: int = Field(strict=True, ge=1, le=MAX_CLASSES, examples=[3])
+    """number of classes; 1: not sorted"""
+    gauge: Annotated[units.Length, AfterValidator(_not_negative)] = Field(default=0.0, examples=["2 um"])
+    """standard deviation of the error with which a diameter is measured"""
+    split: Literal["width", "count"] = Field(default="width", examples=["count"])
+    """`width`: classes are equal parts of the tolerance bands, those at the ends are open; `count`: each class has as
+    many crosses, and as many forks, as any other"""
 
 
 class Kind(NamedTuple):
@@ -120,13 +110,11 @@ class Range(NamedTuple):
 
     def scores(self, u: Array) -> Array:
         """Score, among all parts, of the diameter that is exceeded with probability 1 - u in the range; both (n,)."""
-        from scipy.special import ndtri
-
         if self.gauge:
             z, own, _ = _among(self)
-            return np.asarray(np.interp(ndtri(u), own, z))
+            return np.asarray(np.interp(special.ndtri(u), own, z))
         low, high = self._ends
-        return np.asarray(ndtri(np.clip(low + u * (high - low), LEAST, 1.0 - 2.0**-53)))
+        return np.asarray(special.ndtri(np.clip(low + u * (high - low), LEAST, 1.0 - 2.0**-53)))
 
     @property
     def _ends(self) -> Array:
@@ -136,11 +124,9 @@ class Range(NamedTuple):
 
 @lru_cache(maxsize=512)
 def _among(of: Range) -> tuple[Array, Array, float]:
-    from scipy.special import ndtr
-
     def inside(deviation: Array) -> Array:
         d = np.clip(deviation, -1.0, 1.0)  # beyond the largest score an unbounded one is infinite
-        return np.asarray(ndtr((of.high - d) / of.gauge) - ndtr((of.low - d) / of.gauge))
+        return np.asarray(special.ndtr((of.high - d) / of.gauge) - special.ndtr((of.low - d) / of.gauge))
 
     return scores_among(of.distribution, inside)
 
@@ -187,8 +173,6 @@ class Matching(NamedTuple):
         dict of str to ndarray, (n,)
             Probabilities of the same diameters in their distributions among all parts.
         """
-        from scipy.special import ndtr
-
         upto = np.cumsum(self.matched) / self.matched.sum()
         number = np.searchsorted(upto[:-1], u_class, side="right")
         found: dict[str, Array] = {}
@@ -198,7 +182,8 @@ class Matching(NamedTuple):
                 drawn = _in_class([u[name][here] for name in kind.errors], near[c], within[c])
                 for name, z in zip(kind.errors, drawn, strict=True):
                     found.setdefault(name, np.empty(len(number)))[here] = z
-        return {name: np.clip(ndtr(z), np.finfo(float).tiny, 1.0 - np.finfo(float).epsneg) for name, z in found.items()}
+        low, high = np.finfo(float).tiny, 1.0 - np.finfo(float).epsneg
+        return {name: np.clip(special.ndtr(z), low, high) for name, z in found.items()}
 
 
 def _in_class(u: list[Array], near: Range, within: Range) -> list[Array]:
@@ -283,28 +268,21 @@ def _bands(entries: Iterable[Toleranced]) -> dict[str, tuple[float, float] | Non
     return {site.name: model.band(site) for site, model in models}
 
 
-def faults(
-    settings: SelectiveEntry,
-    entries: tuple[Toleranced, ...],
-    found: Mapping[str, Distribution],
-    depending: set[str],
-    place: str,
-) -> list[Fault]:
-    """Faults of ``sampling.selective`` beside the tolerances; `depending`: errors that depend on others."""
-    where, bands = f"{place}: sampling.selective", _bands(entries)
-    missing = [name for name in DIAMETERS if name not in found]
+def faults(settings: SelectiveEntry, scatter: Tolerances, depending: Collection[str]) -> Iterator[tuple[str, str]]:
+    """Faults of ``sampling.selective`` with their remedies; `depending`: errors that depend on others."""
+    distributions, bands = scatter.distributions, _bands(scatter.entries)
+    missing = [name for name in DIAMETERS if name not in distributions]
     if missing:
         remedy = 'add "pin*.diameter" and "hole*.diameter" to [tolerances], or fit'
-        return [Fault(where, f"{missing[0]} has no tolerance", remedy)]
-    made = []
+        yield f"{missing[0]} has no tolerance", remedy
+        return
     for kind in KINDS:
-        if len({(str(found[name].describe()), bands[name]) for name in kind.errors}) > 1:
+        if len({(str(distributions[name].describe()), bands[name]) for name in kind.errors}) > 1:
             remedy = "give the diameters of one part one tolerance"
-            made.append(Fault(where, f"the diameters of the {kind.name} have different tolerances", remedy))
+            yield f"the diameters of the {kind.name} have different tolerances", remedy
         if settings.split == "width" and bands[kind.errors[0]] is None:
-            made.append(Fault(where, f"{kind.errors[0]} has no band", 'add plus_minus, or write split = "count"'))
-    both = sorted(depending & set(DIAMETERS))
+            yield f"{kind.errors[0]} has no band", 'add plus_minus, or write split = "count"'
+    both = sorted(set(DIAMETERS) & set(depending))
     if both:
-        found_ = f"{both[0]} depends on other parts or errors: by a correlation, a lot or a bonus with reject"
-        made.append(Fault(where, found_, "remove that, or selective"))
-    return made
+        found = f"{both[0]} depends on other parts or errors: by a correlation, a lot or a bonus with reject"
+        yield found, "remove that, or selective"

@@ -15,6 +15,7 @@ from pydantic_core import PydanticCustomError
 
 from tolstat.common import units
 from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.late import interpolate
 from tolstat.common.loads import FloatArray
 from tolstat.common.strict import dotted, read_text
 from tolstat.display.text import percent
@@ -182,8 +183,6 @@ def orders(angle: FloatArray, time: FloatArray, values: FloatArray | None = None
     ValueError
         When the samples cover less than one revolution, or are fewer than `FEWEST` in one.
     """
-    from scipy.interpolate import CubicSpline
-
     turns = turns_of(angle)
     if turns < 1:
         raise ValueError(f"covers {(angle[-1] - angle[0]) / TURN:.3g} of a revolution, one at least is needed")
@@ -198,10 +197,10 @@ def orders(angle: FloatArray, time: FloatArray, values: FloatArray | None = None
         time = np.append(time, 2 * time[-1] - time[-2])
         angle = np.append(angle, following)
     parts = min(FINEST, 2 ** math.ceil(math.log2(2 * density)))
-    begin = CubicSpline(angle, time)(angle[0] + TURN * np.arange(turns + 1))
+    begin = interpolate.CubicSpline(angle, time)(angle[0] + TURN * np.arange(turns + 1))
     at = begin[:-1, None] + np.diff(begin)[:, None] * np.arange(parts) / parts
-    speed = CubicSpline(time, angle)(at, 1)
-    signal = speed if values is None else CubicSpline(time, values)(at)
+    speed = interpolate.CubicSpline(time, angle)(at, 1)
+    signal = speed if values is None else interpolate.CubicSpline(time, values)(at)
     mean_speed = TURN * turns / (begin[-1] - begin[0])
     mean = float(mean_speed if values is None else np.average(signal.mean(axis=1), weights=np.diff(begin)))
     ahead = _ahead(speed.mean(axis=0) / mean_speed)
@@ -267,9 +266,7 @@ def orders_of(path: Path, key: str) -> Orders:
 
 
 def _integral(x: Any, y: Any) -> FloatArray:
-    from scipy.interpolate import CubicSpline
-
-    return np.asarray(CubicSpline(x, y).antiderivative()(x))
+    return np.asarray(interpolate.CubicSpline(x, y).antiderivative()(x))
 
 
 def replaced(text: str, data: Mapping[str, Any], path: Path, faults: list[Fault]) -> tuple[str, tuple[str, ...]]:

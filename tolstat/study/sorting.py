@@ -9,20 +9,21 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from tolstat.common import strict
 from tolstat.common.errors import Fault, gather
 from tolstat.common.load_kinds import PINS
-from tolstat.common.strict import Strict, described, refuse
+from tolstat.common.strict import Strict, refuse
 from tolstat.common.tables import HOLES
 from tolstat.joint import HOLE_OF_PIN, Joint
 from tolstat.study import selection
 from tolstat.study.selection import UNITS, Entry
+from tolstat.study.tolerances.distributions import share_between
 from tolstat.study.tolerances.entry import NotNegative, Site, Toleranced, Value
 
 MEASURABLE = {name: unit for name, unit in UNITS.items() if name.startswith(("pin", "hole"))}
@@ -34,11 +35,12 @@ CROSS, INPUT, OUTPUT = PARTS = ("cross", "input fork", "output fork")
 class RejectEntry(Strict):
     """Joints that are rejected at assembly by a measured value."""
 
-    below: Annotated[Value | None, described("smaller measured values are rejected", "0.06 mm")] = None
-    above: Annotated[Value | None, described("larger measured values are rejected", "0.14 mm")] = None
-    gauge: Annotated[NotNegative, described("standard deviation of the measurement; exact by default", "0.005 mm")] = (
-        0.0
-    )
+    below: Value | None = Field(default=None, examples=["0.06 mm"])
+    """smaller measured values are rejected"""
+    above: Value | None = Field(default=None, examples=["0.14 mm"])
+    """larger measured values are rejected"""
+    gauge: NotNegative = Field(default=0.0, examples=["0.005 mm"])
+    """standard deviation of the measurement; exact by default"""
 
     @model_validator(mode="after")
     def _has_a_limit(self) -> Self:
@@ -83,8 +85,6 @@ class Gauge(NamedTuple):
 
         The error of the gauge is normal with mean zero; without deviation the gauge is exact.
         """
-        from scipy.special import ndtr
-
         values = np.asarray(errors[self.name])
         if self.name.endswith(".clearance"):
             _, pin, hole = self.columns
@@ -93,8 +93,7 @@ class Gauge(NamedTuple):
         if self.deviation == 0.0:
             return ((values >= self.lower) & (values <= self.upper)).astype(float)
         low, high = (self.lower - values) / self.deviation, (self.upper - values) / self.deviation
-        # from the tail that is nearer, where a difference keeps its digits
-        return np.where(low > 0.0, ndtr(-low) - ndtr(-high), ndtr(high) - ndtr(low))
+        return share_between(low, high)
 
 
 def part_of(name: str) -> str:

@@ -8,11 +8,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-import tomlkit
 from numpy.typing import NDArray
-from tomlkit.exceptions import TOMLKitError
 
 from tolstat.common.errors import Fault, InputError
+from tolstat.common.late import tomlkit
 from tolstat.common.loads import FloatArray
 from tolstat.common.strict import read_text
 from tolstat.study import signals, starter
@@ -222,7 +221,7 @@ def text(cycle: DutyCycle, source: Path, path: Path, base: Path | None = None) -
     given = starter.study_text(path, JOINT) if base is None else read_text(base)
     try:
         document = tomlkit.parse(given)
-    except TOMLKitError as error:
+    except tomlkit.exceptions.TOMLKitError as error:
         raise InputError([Fault(str(base), f"is not TOML: {error}", "give a study that tolstat plan reads")]) from error
     document.pop("operation", None)
     points = tomlkit.aot()

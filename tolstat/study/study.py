@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -14,30 +15,97 @@ from numpy.typing import NDArray
 from tolstat.common import selected_results
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import UNIT_OF_LOAD, limits_in_words, split
-from tolstat.common.strict import dotted
+from tolstat.common.strict import dotted, with_lines
 from tolstat.common.tables import DESIGN, Variant
 from tolstat.joint import Joint, Operation, affecting_results
 from tolstat.joint.model import Assumed
 from tolstat.joint.sections import mounting_and_law
-from tolstat.study import listing, mounting
+from tolstat.study import mounting
 from tolstat.study.axes import Axis
-from tolstat.study.case import Case
 from tolstat.study.design import Design, flat
 from tolstat.study.fatigue import Fatigue
-from tolstat.study.file import StudyFile
-from tolstat.study.freeze_design import Group, groups
 from tolstat.study.model import Output, Sampling, Solver, SweepAxis
 from tolstat.study.mounting import Setting
 from tolstat.study.points import Point, limits_at, only_one
 from tolstat.study.proposal import Proposal
-from tolstat.study.schema.files import SECTIONS
 from tolstat.study.sorting import Gauge
-from tolstat.study.swept import Swept
-from tolstat.study.tolerances.correlation import Copula
+from tolstat.study.tolerances.correlation import Copula, Group, Lot
 from tolstat.study.tolerances.distributions import Distribution
-from tolstat.study.tolerances.entry import Toleranced
+from tolstat.study.tolerances.entry import KnownEntry, Toleranced, known_of
 from tolstat.study.tolerances.fits import Fit
-from tolstat.study.tolerances.lots import Lot
+
+
+@dataclass(frozen=True, repr=False)
+class Case:
+    """One joint to be simulated.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    text : str
+        The file as read.
+    joint : Joint
+        Nominal joint.
+    operation : Operation
+        Operating point.
+    solver : Solver
+        Numerical settings.
+    errors : dict
+        Error name to deviation (SI).
+    """
+
+    path: Path
+    text: str
+    joint: Joint
+    operation: Operation
+    solver: Solver
+    errors: dict[str, float]
+
+    @property
+    def name(self) -> str:
+        """Name of the file without folder and ending."""
+        return self.path.stem
+
+    def fault(self, key: str, found: str, remedy: str) -> Fault:
+        """Fault of a key of the file, with its line."""
+        (lined,) = with_lines([Fault(f"{self.path}: {key}", found, remedy)], str(self.path), self.text)
+        return lined
+
+    def check_mounting(self) -> None:
+        """Refuse settings without effect, see `mounting.refusals`.
+
+        Raises
+        ------
+        InputError
+            With every such setting.
+        """
+        faults = [self.fault(dotted(path), *texts) for path, *texts in mounting.refusals(self._settings, self._varied)]
+        if faults:
+            raise InputError(faults)
+
+    @property
+    def _settings(self) -> list[Setting]:
+        return [Setting(("operation",), self.joint, self.operation, self.solver.fidelity)]
+
+    @property
+    def _varied(self) -> dict[str, list[str]]:
+        return {}
+
+    def __repr__(self) -> str:
+        errors = f"{len(self.errors)} errors" if self.errors else "no errors"
+        return f"<case {self.name!r}: one joint, {errors}, {self.solver.fidelity}>"
+
+    def _repr_html_(self) -> str:
+        rows = (f"<tr><th>{escape(name)}</th><td>{escape(str(value))}</td></tr>" for name, value in self._entries())
+        return f"<table><caption>{escape(repr(self)[1:-1])}</caption>{''.join(rows)}</table>"
+
+    def _entries(self) -> list[tuple[str, object]]:
+        """Named values that a notebook shows."""
+        solver, turned = self.solver, Point("", self.operation).in_words
+        words = f"{solver.fidelity}, {solver.method}, {solver.steps_per_rev} steps a revolution"
+        errors = ", ".join(f"{name} {value:.4g}" for name, value in self.errors.items()) or "none"
+        return [("file", str(self.path)), ("operation", turned), ("solver", words), ("fixed errors, SI", errors)]
 
 
 @dataclass(frozen=True, repr=False)
@@ -69,7 +137,7 @@ class Study(Case):
         How many, and how they are drawn.
     sweep : tuple of SweepAxis
         Axes of a grid, the last varying fastest; empty unless ``sampling.method`` is ``sweep``.
-    swept : Swept, optional
+    swept : Design, optional
         The joints of a sweep of dimensions; None for other sweeps and methods.
     listed : Design, optional
         The joints listed one by one; None unless ``sampling.method`` is ``cases``.
@@ -102,7 +170,7 @@ class Study(Case):
     lots: Mapping[str, Lot] = field(default_factory=dict)
     proposals: tuple[Proposal, ...] = ()
     sweep: tuple[SweepAxis, ...] = ()
-    swept: Swept | None = None
+    swept: Design | None = None
     listed: Design | None = None
     limits: dict[str, float] = field(default_factory=dict)
     fatigue: Fatigue = field(default_factory=Fatigue)
@@ -113,20 +181,19 @@ class Study(Case):
     signals: tuple[str, ...] = ()
 
     @property
+    def known(self) -> tuple[KnownEntry, ...]:
+        """Entries whose mean and deviation were estimated from measured parts, in the order of the file."""
+        return known_of(self.entries)
+
+    @property
     def has_axial_force(self) -> bool:
         """Whether an axial force moves the output shaft of some joint."""
-        return any(own.moved(self._varied) for own in self._settings)
+        return any(setting.moved(self._varied) for setting in self._settings)
 
     @property
     def joint_in_words(self) -> str:
         """Mounting of the shafts and contact law, in words."""
-        joints = self.joints
-        return mounting_and_law([own.shaft.axial for own in joints], [own.contact.law for own in joints])
-
-    def faults_of_mounting(self) -> list[Fault]:
-        """Faults of settings without effect, see `mounting.refusals`."""
-        found = mounting.refusals(self._settings, self._varied)
-        return [self.fault(dotted(path), text, remedy) for path, text, remedy in found]
+        return mounting_and_law([j.shaft.axial for j in self.joints], [j.contact.law for j in self.joints])
 
     @property
     def _settings(self) -> list[Setting]:
@@ -154,20 +221,24 @@ class Study(Case):
         return sections
 
     @property
+    def _different(self) -> Design | None:
+        """Joints with dimensions of their own."""
+        return self.listed or self.swept
+
+    @property
     def joints(self) -> tuple[Joint, ...]:
         """Nominal joint of each variant."""
-        of = self.listed or self.swept
-        return of.joints if of else (self.joint,)
+        return self._different.joints if self._different else (self.joint,)
 
     @property
     def solvers(self) -> tuple[Solver, ...]:
         """Numerical settings of each of `joints`."""
-        return self.listed.solvers if self.listed else (self.solver,) * len(self.joints)
+        return self._different.solvers if self._different else (self.solver,)
 
     @property
     def operations(self) -> tuple[Operation, ...]:
         """Operating point of each of `joints`."""
-        return self.listed.operations if self.listed else (self.operation,) * len(self.joints)
+        return self._different.operations if self._different else (self.operation,)
 
     def at(self, name: str) -> Study:
         """Return the study at one of its operating points alone, with the limits that hold there.
@@ -186,8 +257,7 @@ class Study(Case):
     @property
     def variants(self) -> tuple[Variant, ...]:
         """Variant of each of `joints`; empty where all rows have the study's joint."""
-        of = self.listed or self.swept
-        return of.variants if of else ()
+        return self._different.variants if self._different else ()
 
     @property
     def case_names(self) -> tuple[str, ...]:
@@ -197,8 +267,7 @@ class Study(Case):
     @property
     def design(self) -> NDArray[np.void]:
         """Variant, case and group of each row, (rows,), dtype DESIGN; zeros where all rows have the study's joint."""
-        of = self.listed or self.swept
-        return of.table if of else np.broadcast_to(np.zeros(1, DESIGN), self.rows)
+        return self._different.table if self._different else np.broadcast_to(np.zeros(1, DESIGN), self.rows)
 
     def has_bonus(self, name: str) -> bool:
         """Whether `name` is a position with a bonus, or the diameter of such a feature or of one matched by classes."""
@@ -279,110 +348,3 @@ class Study(Case):
     def _operation_identity(self) -> dict[str, Any]:
         named = {point.name: point.operation.model_dump() for point in self.points}
         return named.get("", named)
-
-
-def load(
-    path: str | Path | Mapping[str, Any], n: int | None = None, text: str | None = None, joint: Joint | None = None
-) -> Study:
-    """Read a study file, or make a study of its sections.
-
-    Parameters
-    ----------
-    path : str, Path or mapping
-        TOML file; or the sections of one as nested dictionaries, ``{"joint": {"base": "cirelli2021"}, ...}``, whose
-        paths start from the working directory.
-    n : int, optional
-        Number of joints instead of the file's ``sampling.n``.
-    text : str, optional
-        TOML to read instead of the file's; `path` is then only what faults and relative paths refer to.
-    joint : Joint, optional
-        Nominal joint in place of that of ``[joint]``; variants and swept dimensions are read from the file still.
-
-    Returns
-    -------
-    Study
-        With patterns expanded, units converted and the joint file read.
-
-    Raises
-    ------
-    InputError
-        With every fault of the file, of the joint file and of measured data that it names.
-    """
-    if isinstance(path, Mapping):
-        from tolstat.study import rewriting  # it loads tomlkit
-
-        text = rewriting.as_text(path)
-        path = "study.toml"
-    file = StudyFile(Path(path), SECTIONS, text)
-    if n is not None:
-        file.override("sampling", "n", n)
-    fit = file.fit()
-    joint = file.joint(fit) if joint is None else joint
-    assumed = file.assumed(joint, fit)
-    points = file.points()
-    operation = points[0].operation if points else None
-    solver = file.model("solver", Solver)
-    errors = file.errors()
-    read = file.tolerances(joint, fit)
-    copula = file.correlation(read.lots)
-    proposals = file.proposals()
-    sampling = file.model("sampling", Sampling, required=True)
-    sweep = file.sweep()
-    limits = file.limits(points)
-    rejects = file.rejects()
-    fatigue = file.fatigue(points)
-    output = file.model("output", Output)
-    listed = None
-    moved: tuple[Group, ...] = ()
-    if sampling is not None and sampling.method == "pick_freeze":
-        moved = groups(read.entries, copula, sampling.groups)
-    if sampling is not None and sampling.method == "cases":
-        listed = file.listed(joint, operation, solver)
-    joints_swept = None
-    if sampling is not None and sampling.method == "sweep" and joint and operation and solver:
-        joints_swept = file.swept(listing.Nominal(joint, operation, solver), sweep, sampling.nominal_first)
-    if sampling is not None:
-        file.check_method(sampling, sweep, read, copula)
-        file.check_points(sampling, sweep, points)
-        file.check_known(read, copula, sampling.method)
-    if output is not None:
-        file.check_fatigue(output)
-        file.check_limits(output, limits)
-    if output is not None and solver is not None:
-        file.check_histories(output, solver, listed)
-    file.finish()
-    assert joint is not None
-    assert operation is not None
-    assert solver is not None
-    assert sampling is not None
-    assert output is not None
-    made = Study(
-        path=file.path,
-        text=file.text,
-        joint=joint,
-        operation=operation,
-        points=points,
-        solver=solver,
-        errors=errors,
-        sampling=sampling,
-        output=output,
-        tolerances=read.distributions,
-        entries=read.entries,
-        axes=read.axes,
-        fit=fit,
-        copula=copula,
-        lots=read.lots,
-        proposals=proposals,
-        sweep=sweep,
-        swept=joints_swept,
-        listed=listed,
-        limits=limits,
-        rejects=rejects,
-        assumed=assumed,
-        fatigue=fatigue,
-        groups=moved,
-        signals=file.signals,
-    )
-    if found := made.faults_of_mounting():
-        raise InputError(found)
-    return made

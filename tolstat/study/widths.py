@@ -22,8 +22,9 @@ from tolstat.common.strict import did_you_mean
 from tolstat.joint import HOLE_OF_PIN, varied
 from tolstat.study import rewriting, scaling, selection
 from tolstat.study.axes import is_zone
-from tolstat.study.study import Study, load
-from tolstat.study.tolerances import fits, iso286, iso2768
+from tolstat.study.loading import load
+from tolstat.study.study import Study
+from tolstat.study.tolerances import fits, iso
 from tolstat.study.tolerances.distributions import Array, Distribution
 from tolstat.study.tolerances.entry import SingleEntry, Site, Toleranced, ToleranceEntry
 
@@ -168,24 +169,24 @@ def steps(study: Study, line: Line) -> tuple[str, ...]:
     return STEPS if study.fit is None or line.label != _fit_label(study) else tuple(other_fits(study.fit))
 
 
-def other_fits(fit: fits.Fit) -> dict[str, iso286.Zones]:
+def other_fits(fit: fits.Fit) -> dict[str, iso.Zones]:
     """Fits next to that of the drawing, with their zones.
 
     They have the hole's fundamental deviation or grade that follows in the tables, on either side. In the system of
     the basic hole, H, the hole keeps its deviation, and the shaft's deviation and grade are changed, too. Fits are left
     out with which a pin of its zone may be larger than a hole of its zone.
     """
-    code = iso286.parse(fit.entry.code)
+    code = iso.parse(fit.entry.code)
     is_basis = code.hole == "H"
-    changes = [] if is_basis else [("hole", iso286.HOLES)]
-    changes += [("hole_grade", iso286.GRADE_NAMES)]
-    changes += [("shaft", iso286.SHAFTS), ("shaft_grade", iso286.GRADE_NAMES)] if is_basis else []
+    changes = [] if is_basis else [("hole", iso.HOLES)]
+    changes += [("hole_grade", iso.GRADE_NAMES)]
+    changes += [("shaft", iso.SHAFTS), ("shaft_grade", iso.GRADE_NAMES)] if is_basis else []
     found = {}
     for part, names in changes:
         place = names.index(getattr(code, part))
         for name in names[max(place - 1, 0) : place + 2]:
             other = code._replace(**{part: name})
-            zones = iso286.zones(other, fit.entry.size)
+            zones = iso.zones(other, fit.entry.size)
             if other != code and zones.least >= 0.0:
                 found[str(other)] = zones
     return found
@@ -278,7 +279,7 @@ def _width(entry: Toleranced, site: Site, step: str) -> tuple[float, str]:
     if side and own in CLASSES and 0 <= CLASSES.index(own) + side < len(CLASSES):
         other, kind = CLASSES[CLASSES.index(own) + side], "angular" if site.unit == "rad" else "linear"
         nominal = units.to_si(entry.keys["nominal"], "m")
-        old, new = (iso2768.deviation(kind, name, nominal) for name in (own, other))
+        old, new = (iso.deviation(kind, name, nominal) for name in (own, other))
         if new != old:
             return new / old, f"class {other}"
     return FACTORS[step], f"× {FACTORS[step]:g}" if side else step

@@ -24,7 +24,7 @@ from tests.measure.coverage.trial import (
 from tolstat.analysis import clustered, prediction
 from tolstat.analysis.binomial import simultaneous
 from tolstat.analysis.clustered import Clustered
-from tolstat.analysis.independent import Independent
+from tolstat.analysis.design import Independent
 from tolstat.analysis.replicated import Replicated
 from tolstat.analysis.sample import Sample, total_interval
 from tolstat.analysis.weighted import Weighted

@@ -6,7 +6,6 @@ Euler. Algebraic order 2, L-stable. The trapezoidal rule, y_1' = 2 (y_1 - y_0) /
 at ringing takes it, a few steps long.
 """
 
-from tolstat.kernel.integrators.state import AHEAD, H_OLD, TRAPEZOIDAL
 from tolstat.kernel.simd.jit import njit
 from tolstat.kernel.simd.lane import where
 
@@ -49,14 +48,3 @@ def trial(h, of, last, before, known, ahead):
     q = last[0] + where(known, ahead, h * (last[1] + 0.5 * h * last[2]))
     v = cv * q + (b1 * last[0] + b2 * before[0]) + b3 * last[1]
     return q, v, cv * v + (b1 * last[1] + b2 * before[1]) + b3 * last[2]
-
-
-@njit
-def predict(h, state, options):
-    """Write a trial point that satisfies the formula of a step `h` (s); return cv = dv/dq and ca = da/dq."""
-    of = formula(h, state.memory[H_OLD], state.memory[TRAPEZOIDAL])
-    known = state.memory[AHEAD] > 0
-    for i in range(state.q.size):
-        last, before = (state.q0[i], state.v0[i], state.a0[i]), (state.q1[i], state.v1[i])
-        state.q[i], state.v[i], state.a[i] = trial(h, of, last, before, known, state.ahead[i])
-    return of[0], of[0] * of[0]

@@ -15,7 +15,7 @@ import math
 import numpy as np
 
 from tolstat.kernel.integrators import trbdf2
-from tolstat.kernel.integrators.state import FORCE, LAST_ITERATION_BELOW, TOLERANCE, TORQUE
+from tolstat.kernel.integrators.memory import FORCE, LAST_ITERATION_BELOW, TOLERANCE, TORQUE
 from tolstat.kernel.mechanics.dynamics import mass_of
 from tolstat.kernel.mechanics.scale import set_weight, stiffness, typical_force
 from tolstat.kernel.mechanics.topology import N_LUMPS, PSI, S
@@ -43,10 +43,10 @@ LAST_ITERATION_FACTOR = 3.0
 
 
 @njit
-def load_error(h, par, state):
+def load_error(h, par, motion):
     """Estimated error of a part of length `h` (s) as a load, in units of the tolerance; the largest of all unknowns."""
-    force = 1 / (state.memory[TOLERANCE] * state.memory[FORCE])
-    torque = 1 / (state.memory[TOLERANCE] * state.memory[TORQUE])
+    force = 1 / (motion.memory[TOLERANCE] * motion.memory[FORCE])
+    torque = 1 / (motion.memory[TOLERANCE] * motion.memory[TORQUE])
     worst = 0.0 * force
     k = 0.0 * force
     for body in range(N_LUMPS):
@@ -55,12 +55,12 @@ def load_error(h, par, state):
         mean_inertia = (inertia[0] + inertia[1] + inertia[2]) / 3
         of = (force * k, force * math.sqrt(k * mass), torque * k_turn, torque * math.sqrt(k_turn * mean_inertia))
         for j in range(6):
-            of_q, of_v = errors(6 * body + j, h, state)
+            of_q, of_v = errors(6 * body + j, h, motion)
             kind = 0 if j < 3 else 2
             worst = max(worst, max(of[kind] * abs(of_q), of[kind + 1] * abs(of_v)))
-    of_q, of_v = errors(PSI, h, state)
+    of_q, of_v = errors(PSI, h, motion)
     worst = max(worst, max(force * k * par.R * abs(of_q), force * math.sqrt(k * par.Js) * abs(of_v)))
-    of_q, of_v = errors(S, h, state)
+    of_q, of_v = errors(S, h, motion)
     return max(worst, max(force * k * abs(of_q), force * math.sqrt(k * par.m_s) * abs(of_v)))
 
 
@@ -141,7 +141,7 @@ def set_scale(closure, turns, options, par, memory, weight):
     options, par
         Settings and record of PARAM.
     memory, weight : ndarray
-        As in State, with the tolerance in `memory`; written.
+        Those of the joint's motion, with the tolerance in `memory`; written.
     """
     memory[FORCE], memory[TORQUE] = turns.force, turns.torque
     share = min(NEWTON_SHARE * memory[TOLERANCE], SETTLE_SHARE * closure)

@@ -7,8 +7,6 @@ w = sqrt(2) / 4; the embedded formula of order 3 has ((1 - w) / 3, (3 w + 1) / 3
 
 import math
 
-from tolstat.kernel.integrators.quadrature import relative
-from tolstat.kernel.integrators.state import STAGED_STEP
 from tolstat.kernel.simd.jit import njit
 from tolstat.kernel.simd.lane import where
 
@@ -61,41 +59,11 @@ def second(of, last, stage):
 
 
 @njit
-def predict(h, stage, state, options):
-    """Write a trial point that satisfies the formula of `stage` (0 or 1); return cv = dv/dq and ca = da/dq.
+def errors(i, h, motion):
+    """Estimated errors of unknown `i` and of its velocity at the end of a step.
 
-    ``state.v1`` and ``state.aux`` hold velocity and acceleration of the first stage.
+    ``motion.v1`` and ``motion.aux`` hold velocity and acceleration of the first stage.
     """
-    of = formula(h, state.memory[STAGED_STEP])
-    for i in range(state.q.size):
-        last = state.q0[i], state.v0[i], state.a0[i]
-        if stage == 0:
-            state.q[i], state.v[i], state.a[i] = first(of, last, state.aux[i])
-        else:
-            state.q[i], state.v[i], state.a[i] = second(of, last, (state.q[i], state.v[i], state.a[i]))
-    return of[0], of[0] * of[0]
-
-
-@njit
-def keep_stage(state):
-    """Store velocity and acceleration of the first stage for the second one."""
-    for i in range(state.q.size):
-        state.v1[i], state.aux[i] = state.v[i], state.a[i]
-
-
-@njit
-def errors(i, h, state):
-    """Estimated errors of unknown `i` and of its velocity at the end of the step."""
-    of_q = h * (E0 * state.v0[i] + E1 * state.v1[i] + E2 * state.v[i])
-    of_v = h * (E0 * state.a0[i] + E1 * state.aux[i] + E2 * state.a[i])
+    of_q = h * (E0 * motion.v0[i] + E1 * motion.v1[i] + E2 * motion.v[i])
+    of_v = h * (E0 * motion.a0[i] + E1 * motion.aux[i] + E2 * motion.a[i])
     return of_q, of_v
-
-
-@njit
-def error(h, state, options):
-    """Estimated error of q and v at the end of the step, in units of ``atol + rtol |y|``; the largest of all."""
-    worst = 0.0
-    for i in range(state.q.size):
-        of_q, of_v = errors(i, h, state)
-        worst = max(worst, relative(i, h, of_q, of_v, state, options))
-    return worst

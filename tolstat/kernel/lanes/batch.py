@@ -1,26 +1,13 @@
-"""Memory of the joints simulated in lock-step: a few records whose float fields have one value per lane.
-
-The start of a joint is computed in the State of a single joint and copied to a lane.
-"""
+"""Memory of the joints simulated in lock-step: a few records whose float fields have one value per lane."""
 
 from typing import NamedTuple
 
 import numpy as np
 
 from tolstat.common.tables import PARAM, Options
-from tolstat.kernel.integrators.state import (
-    AHEAD,
-    FACTORISATIONS,
-    H_OLD,
-    HALVINGS,
-    ITERATIONS,
-    LAST_ITERATION_BELOW,
-    MEMORY,
-    STAGED_STEP,
-    STEPS,
-    TRAPEZOIDAL,
-)
+from tolstat.kernel.integrators.memory import MEMORY
 from tolstat.kernel.lanes.lane_memory import aligned_zeros, lane_dtype
+from tolstat.kernel.mechanics.scale import set_weight, typical_force
 from tolstat.kernel.mechanics.topology import N_DOF
 from tolstat.kernel.mechanics.work import WORK
 from tolstat.kernel.revolution.peaks import PEAKS
@@ -35,24 +22,27 @@ MOTION = np.dtype(
     + [(name, "f8", N_DOF) for name in ("residual", "weight", "ahead")]
     + [("memory", "f8", MEMORY)]
 )
-"""The arrays of `state.State`, for all lanes."""
+"""Motion of a joint, in the unknowns.
+
+- ``q``, ``v``, ``a``: trial point; ``q0``, ``v0``, ``a0``: last accepted point; ``q1``, ``v1``, ``a1``: the one before
+- ``aux``: acceleration at the first stage of a part; at input angles, the third last solution
+- ``residual``; ``weight``: factors that make residuals dimensionless
+- ``ahead``: expected change of q in the next step, where a better prediction than a Taylor series is known
+- ``memory``: see `integrators.memory`
+"""
 
 HOLD, RELAX, CHECK, STEP, LOOK, ANGLE, PART = range(7)
 """Phases of a lane. Equilibrium: Newton's iteration (`HOLD`), step of pseudo-time (`RELAX`), test of the static
 residual after it (`CHECK`). Dynamics: sub-step of the output grid (`STEP`), step of the recorded revolution again, in
 parts (`LOOK`, see `closeup`), part of a cell of the `mesh` (`PART`). Quasi-statics: input angle (`ANGLE`)."""
 
-CONTROL = np.dtype(
-    [(name, "f8") for name in ("t", "h", "cv", "ca", "before", "iteration", "factorised", "at_roundoff")]
-    + [
-        (name, "f8")
-        for name in ("phase", "live", "fresh", "passed", "origin", "grid", "pseudo", "stage", "error", "worst")
-    ]
-    + [(name, "f8") for name in ("count", "until")]
-    + [(name, "f8") for name in ("steps", "iterations", "halvings", "factorisations")]
-    + [(name, "i8", WIDTH) for name in ("joint", "k", "level", "done", "tries", "left", "part", "looked", "began")]
+NUMBERS = (
+    *("t", "h", "cv", "ca", "before", "iteration", "factorised", "at_roundoff"),
+    *("phase", "live", "fresh", "passed", "origin", "grid", "pseudo", "stage", "error", "worst"),
+    *("count", "until", "steps", "iterations", "halvings", "factorisations"),
 )
-"""State machine of one lane: phase, step, Newton iteration.
+INTEGERS = ("joint", "k", "level", "done", "tries", "left", "part", "looked", "began")
+"""State machine of one lane: phase, step, Newton iteration. Fields of a batch's ``control``.
 
 - ``t``, ``h``: time that the trial point belongs to, length of the step or part, s
 - ``cv``, ``ca``: dv/dq (1/s) and da/dq (1/s^2); ``factorised``: cv of the tangent in use, 0 if there is none
@@ -61,9 +51,9 @@ CONTROL = np.dtype(
   ``passed``: 1 if its trial point is accepted then
 - ``origin``, ``grid``: start and length of the step of the output grid, cell, or part of a closer look, s
 - ``pseudo``: step of pseudo-time, s; ``tries``: number of such steps
-- ``stage``: of a part of a cell, 0 or 1; ``error``: of that part; ``worst``: of the cell's worst part
+- ``stage``: of a step or part of TR-BDF2, 0 or 1; ``error``: of a part; ``worst``: of the cell's worst part
 - ``count``, ``until``: explicit steps of the revolution that are done; steps up to the next point of the output grid
-- ``steps``, ``iterations``, ``halvings``, ``factorisations``: counters as of State
+- ``steps``, ``iterations``, ``halvings``, ``factorisations``: work so far
 - ``joint``: index of the joint; ``k``: grid point, cell or angle that is being solved
 - ``level``: halvings of the sub-step or part; at an angle, attempts that failed; in pseudo-time, as `course.FROM_GUESS`
 - ``done``: smallest sub-steps that are done of the step; for angles, revolutions that are done
@@ -77,79 +67,87 @@ class Batch(NamedTuple):
 
     par: np.record
     par_words: np.ndarray  # the same memory as doubles
+    places: np.ndarray  # (words,) index among them of the words of a row of PARAM, in lane 0; -1: shared by all lanes
     work: np.record
     kept: np.record  # factorised tangents in use; each lane replaces only its own
     motion: np.record
     control: np.record
     peaks: np.record
-    samples: np.recarray  # (WIDTH, steps_per_rev) SAMPLE
-    fine: np.recarray  # (WIDTH, 3) SAMPLE, as in `settle.Ring`
-    notes: np.recarray  # (WIDTH,) NOTES
+    samples: np.recarray  # (width, steps_per_rev) SAMPLE
+    fine: np.recarray  # (width, 3) SAMPLE: last parts of a closer look, or of a cell
+    notes: np.recarray  # (width,) NOTES
     pasts: Pasts
+    one: np.record  # WORK: scratch of an evaluation of one joint
 
 
-def _places():
-    """Index of each word of a row of PARAM among the words of its lanes; -1 for integers, which all lanes share."""
-    lanes = lane_dtype(PARAM)
+class Queue(NamedTuple):
+    """Joints that are simulated together, with equal numbers of contact stations and orders; n > 0."""
+
+    rows: np.recarray  # (n,) PARAM
+    words: np.ndarray  # (n, words) the same memory as doubles
+    starts: np.ndarray  # (n, 56) where the search for each joint's start begins, see `revolution.starts`
+    left: np.ndarray  # (n,) work still allowed to each joint, in Newton iterations; reduced by that done
+    samples: np.recarray  # (n, steps_per_rev) SAMPLE: the last revolution of each joint; not written if empty
+    blocks: np.recarray  # (n, revolutions) KERNEL_RESULT, revolution r at r modulo their number; not written if empty
+    results: np.recarray  # (n,) KERNEL_RESULT
+
+
+def make_batch(options: Options, width: int = WIDTH) -> Batch:
+    """Allocate `width` lanes."""
+    control = np.dtype([(name, "f8") for name in NUMBERS] + [(name, "i8", width) for name in INTEGERS])
+    pars = aligned_zeros(1, lane_dtype(PARAM, width)).view(np.recarray)
+    layouts = [lane_dtype(dtype, width) for dtype in (WORK, WORK, MOTION, control, PEAKS)]
+    work, kept, motion, state, peaks = (aligned_zeros(1, layout).view(np.recarray)[0] for layout in layouts)
+    words = pars.view(np.float64).view(np.ndarray)
+    samples, fine = make_samples(width, options.steps_per_rev), make_samples(width, 3)
+    notes, pasts = make_notes(width), make_pasts(width, options)
+    one = np.zeros(1, WORK).view(np.recarray)[0]
+    return Batch(pars[0], words, _places(width), work, kept, motion, state, peaks, samples, fine, notes, pasts, one)
+
+
+def _places(width):
+    """Values of `Batch.places`: integers of PARAM are shared by all lanes."""
+    lanes = lane_dtype(PARAM, width)
     places = np.full(PARAM.itemsize // 8, -1)
     for name in PARAM.names:
         if PARAM[name].base == np.float64:
             first, size = PARAM.fields[name][1] // 8, PARAM[name].itemsize // 8
-            places[first : first + size] = lanes.fields[name][1] // 8 + WIDTH * np.arange(size)
+            places[first : first + size] = lanes.fields[name][1] // 8 + width * np.arange(size)
     return places
 
 
-PLACE = _places()
-
-
-def make_batch(options: Options) -> Batch:
-    """Allocate."""
-    pars = aligned_zeros(1, lane_dtype(PARAM)).view(np.recarray)
-    work, kept, motion, control, peaks = (
-        aligned_zeros(1, lane_dtype(dtype)).view(np.recarray)[0] for dtype in (WORK, WORK, MOTION, CONTROL, PEAKS)
-    )
-    motion.weight[:] = 1.0
-    words = pars.view(np.float64).view(np.ndarray)
-    samples = make_samples(WIDTH, options.steps_per_rev)
-    fine = make_samples(WIDTH, 3)
-    notes, pasts = make_notes(WIDTH), make_pasts(WIDTH, options)
-    return Batch(pars[0], words, work, kept, motion, control, peaks, samples, fine, notes, pasts)
-
-
 @njit
-def samples_of(lane, batch, samples):
-    """Samples of the lane's joint: its row of `samples` if the caller keeps them, else those of the batch."""
-    return samples[batch.control.joint[lane]] if len(samples) > 0 else batch.samples[lane]
+def samples_of(lane, batch, queue):
+    """Samples of the lane's joint: those of the queue if the caller keeps them, else those of the batch."""
+    return queue.samples[batch.control.joint[lane]] if len(queue.samples) > 0 else batch.samples[lane]
 
 
 @njit
 def put_joint(lane, words, batch):
     """Copy a row of PARAM, as doubles, to a lane."""
-    for i in range(PLACE.size):
-        if PLACE[i] >= 0:
-            batch.par_words[PLACE[i] + lane] = words[i]
+    for i in range(batch.places.size):
+        if batch.places[i] >= 0:
+            batch.par_words[batch.places[i] + lane] = words[i]
 
 
 @njit
-def put_points(lane, state, control, motion):
-    """Copy the last accepted points of a joint to a lane, and mark its tangent as missing."""
+def put_start(lane, par, q, control, motion):
+    """Put the joint `par` to rest at the unknowns `q` in a lane, and reset its counters."""
     for i in range(N_DOF):
-        motion.q0[i, lane], motion.v0[i, lane], motion.a0[i, lane] = state.q0[i], state.v0[i], state.a0[i]
-        motion.q1[i, lane], motion.v1[i, lane] = state.q1[i], state.v1[i]
-    motion.memory[H_OLD, lane], motion.memory[AHEAD, lane] = state.memory[H_OLD], state.memory[AHEAD]
-    motion.memory[TRAPEZOIDAL, lane] = state.memory[TRAPEZOIDAL]
-    motion.memory[LAST_ITERATION_BELOW, lane] = motion.memory[STAGED_STEP, lane] = 0.0
-    control.passed[lane] = control.factorised[lane] = control.stage[lane] = 0.0
-
-
-@njit
-def put_start(lane, state, control, motion):
-    """Copy the start of a joint to a lane, and reset its counters."""
-    put_points(lane, state, control, motion)
-    for i in range(N_DOF):
-        motion.weight[i, lane] = state.weight[i]
+        motion.q0[i, lane] = motion.q1[i, lane] = q[i]
+        motion.v0[i, lane] = motion.a0[i, lane] = motion.v1[i, lane] = motion.aux[i, lane] = 0.0
+    set_weight(typical_force(par), par, motion.weight[:, lane])
+    forget_steps(lane, control, motion)
     control.live[lane], control.fresh[lane] = 1.0, 0.0
     control.steps[lane] = control.iterations[lane] = control.halvings[lane] = control.factorisations[lane] = 0.0
+
+
+@njit
+def forget_steps(lane, control, motion):
+    """Mark tangent and earlier steps of a lane as missing."""
+    for i in range(MEMORY):
+        motion.memory[i, lane] = 0.0
+    control.passed[lane] = control.factorised[lane] = control.stage[lane] = 0.0
 
 
 @njit
@@ -172,11 +170,3 @@ def empty(lane, batch):
     control.live[lane] = control.fresh[lane] = control.passed[lane] = 0.0
     for i in range(N_DOF):  # no NaN: it would send all lanes through the branch for large rotations
         motion.q[i, lane] = motion.v[i, lane] = motion.a[i, lane] = 0.0
-
-
-@njit
-def get_counters(lane, batch, counters):
-    """Copy the counters of a lane's joint."""
-    control = batch.control
-    counters[STEPS], counters[ITERATIONS] = int(control.steps[lane]), int(control.iterations[lane])
-    counters[HALVINGS], counters[FACTORISATIONS] = int(control.halvings[lane]), int(control.factorisations[lane])

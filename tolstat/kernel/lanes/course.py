@@ -6,37 +6,40 @@ lane's joint; `control` and `motion` are read joint by joint.
 """
 
 from tolstat.common.tables import MAX_ITERATIONS
-from tolstat.kernel.integrators.integrate import admissible_level, next_substep_level
+from tolstat.kernel.integrators.memory import AHEAD, H_OLD, STAGED_STEP
 from tolstat.kernel.integrators.mesh import cells_of, next_level, note_cell
-from tolstat.kernel.integrators.state import AHEAD, H_OLD, STAGED_STEP
 from tolstat.kernel.integrators.trbdf2 import GAMMA
 from tolstat.kernel.lanes.batch import ANGLE, CHECK, HOLD, PART, RELAX, STEP, start_newton
+from tolstat.kernel.lanes.equilibrium import (
+    AT_ANGLE,
+    CV_STATIC,
+    FROM_GUESS,
+    GROWTH,
+    LARGEST,
+    SHRINK,
+    relax,
+    start_relaxing,
+)
 from tolstat.kernel.mechanics.topology import N_DOF, PSI
-from tolstat.kernel.revolution.adaptive import adapt_mesh, begin_mesh
 from tolstat.kernel.revolution.closeup import count_in
-from tolstat.kernel.revolution.equilibrium import CV_STATIC, FIRST, GROWTH, LARGEST, MAX_STEPS, SHRINK, SMALLEST
+from tolstat.kernel.revolution.outcome import NEWTON_FAILED, NOT_SETTLED, OK, QUASISTATIC, check_settled
 from tolstat.kernel.revolution.quasistatic import angle_time
 from tolstat.kernel.revolution.resolve import (
+    TR_BDF2,
+    adapt_mesh,
     after_revolution,
+    begin_mesh,
     clear_extremes,
     follows_error,
     merge_extremes,
 )
 from tolstat.kernel.revolution.settle import ALL_LOADS, closure_error, grid_step, predict_increment, record
-from tolstat.kernel.revolution.simulate import (
-    NEWTON_FAILED,
-    NOT_SETTLED,
-    OK,
-    QUASISTATIC,
-    check_settled,
-)
 from tolstat.kernel.simd.jit import njit
 
 GIVEN_UP = -1
 """Status, in addition to those of a joint, after the last revolution without settling."""
-FROM_GUESS, FROM_ZERO, AT_ANGLE = range(3)
-"""Levels of pseudo-transient continuation: from the guess; from zero; from the solution at the previous angle, as the
-third attempt at an input angle."""
+MAX_RATIO = 2.0
+"""Largest ratio of a step to the one before, for the stability of BDF2."""
 
 
 @njit
@@ -47,29 +50,10 @@ def accept_unknowns(lane, motion):
 
 
 @njit
-def relax(lane, par, options, control, motion):
-    """Set up the next step of pseudo-time in a lane, as in `equilibrium`: first from the guess, then from zero.
-
-    After `MAX_STEPS`, or at the smallest step, keep the last iterate; at an input angle, retry the equilibrium once.
-    """
-    if control.tries[lane] == MAX_STEPS or control.pseudo[lane] < SMALLEST:
-        control.factorised[lane] = 0.0
-        if control.level[lane] > FROM_GUESS:
-            resume(lane, par, options, control, motion)
-            return
-        for i in range(N_DOF):
-            motion.q0[i, lane] = 0.0
-        start_relaxing(lane, FROM_ZERO, control)
-    control.phase[lane] = RELAX
-    control.tries[lane] += 1
-    step = control.pseudo[lane]
-    start_newton(lane, 1 / step, 1 / (step * step), control, motion)
-
-
-@njit
-def start_relaxing(lane, level, control):
-    """Start pseudo-transient continuation in a lane at a level, `FROM_GUESS` to `AT_ANGLE`."""
-    control.level[lane], control.tries[lane], control.pseudo[lane] = level, 0, FIRST
+def search(lane, par, options, control, motion):
+    """Take the next step of pseudo-time in a lane; once it ends, continue with the last iterate."""
+    if not relax(lane, control, motion):
+        resume(lane, par, options, control, motion)
 
 
 @njit
@@ -110,22 +94,44 @@ def set_angle(lane, k, par, options, control):
 @njit
 def set_substep(lane, options, control, motion):
     """Set up the next sub-step of a lane."""
+    if options.method != TR_BDF2:
+        h_old = motion.memory[H_OLD, lane]
+        control.level[lane] = admissible_level(control.level[lane], control.grid[lane], h_old, options)
+    set_stage(lane, 0, options, control)
+
+
+@njit
+def admissible_level(level, h, h_old, options):
+    """Smallest level, from `level` on, with a sub-step h / 2^level of at most `MAX_RATIO` times the last, `h_old`."""
+    while level < options.max_halvings and h_old > 0 and h / (1 << level) > 1.0001 * MAX_RATIO * h_old:
+        level += 1
+    return level
+
+
+@njit
+def set_stage(lane, stage, options, control):
+    """Set up a stage of the current sub-step, or part of a cell."""
     grid, whole = control.grid[lane], 1 << options.max_halvings
-    level = admissible_level(control.level[lane], grid, motion.memory[H_OLD, lane], options)
-    h = grid / (1 << level)
-    control.level[lane], control.h[lane], control.fresh[lane] = level, h, 1.0
-    control.t[lane] = control.origin[lane] + grid * (control.done[lane] / whole) + h
+    h = grid / (1 << control.level[lane])
+    reach = GAMMA if options.method == TR_BDF2 and stage == 0 else 1.0
+    control.stage[lane], control.h[lane], control.fresh[lane] = stage, h, 1.0
+    control.t[lane] = control.origin[lane] + grid * (control.done[lane] / whole) + reach * h
 
 
 @njit
 def advance(lane, options, control, motion):
-    """Accept the sub-step of a lane; return whether its step is complete, else set up the next sub-step."""
+    """Accept the stage or sub-step of a lane; return whether its step is complete, else set up what follows."""
+    if options.method == TR_BDF2 and control.stage[lane] == 0:
+        set_stage(lane, 1, options, control)
+        return False
     whole = 1 << options.max_halvings
     control.steps[lane] += 1
     control.passed[lane] = 1.0
     motion.memory[H_OLD, lane], motion.memory[AHEAD, lane] = control.h[lane], 0.0
+    motion.memory[STAGED_STEP, lane] = control.h[lane]
     control.done[lane] += whole >> control.level[lane]
-    control.level[lane] = next_substep_level(control.level[lane], control.done[lane], whole, 0.0)
+    while control.level[lane] > 0 and control.done[lane] % (whole >> (control.level[lane] - 1)) == 0:
+        control.level[lane] -= 1  # steps grow again where the grid allows it
     if control.done[lane] < whole:
         set_substep(lane, options, control, motion)
         return False
@@ -181,9 +187,10 @@ def finish_angle(lane, par, lanes, options, control, motion, samples, out):
         out.closure, out.revolutions = closure_error(0, 1, ALL_LOADS, samples), float(control.done[lane])
         if out.closure <= options.settle_tol:
             return OK
-        tired = control.iterations[lane] > MAX_ITERATIONS * n * options.max_revs
-        if tired or control.done[lane] == options.max_revs:
+        if control.iterations[lane] > MAX_ITERATIONS * n * options.max_revs:
             return NEWTON_FAILED
+        if control.done[lane] == options.max_revs:
+            return GIVEN_UP
     set_angle(lane, k + 1, par, options, control)
     return NOT_SETTLED
 
@@ -209,15 +216,15 @@ def fall_back(lane, par, options, control, motion):
     phase = control.phase[lane]
     if phase == CHECK:
         control.pseudo[lane] = min(GROWTH * control.pseudo[lane], LARGEST)
-        relax(lane, par, options, control, motion)
+        search(lane, par, options, control, motion)
         return NOT_SETTLED
     control.factorised[lane] = 0.0
     if phase == HOLD:
         start_relaxing(lane, FROM_GUESS, control)
-        relax(lane, par, options, control, motion)
+        search(lane, par, options, control, motion)
     elif phase == RELAX:
         control.pseudo[lane] *= SHRINK
-        relax(lane, par, options, control, motion)
+        search(lane, par, options, control, motion)
     elif phase == ANGLE:
         if control.level[lane] == AT_ANGLE:
             return NEWTON_FAILED
@@ -227,13 +234,13 @@ def fall_back(lane, par, options, control, motion):
             start_newton(lane, CV_STATIC, 0.0, control, motion)
         else:
             start_relaxing(lane, AT_ANGLE, control)
-            relax(lane, par, options, control, motion)
+            search(lane, par, options, control, motion)
     else:
         control.halvings[lane] += 1
         control.level[lane] += 1
         if control.level[lane] > options.max_halvings:
             return NEWTON_FAILED
-        motion.memory[AHEAD, lane] = 0.0
+        motion.memory[AHEAD, lane] = motion.memory[STAGED_STEP, lane] = 0.0
         set_substep(lane, options, control, motion)
     return NOT_SETTLED
 
@@ -266,16 +273,6 @@ def start_parts(lane, options, control, past):
     control.worst[lane] = 0.0
     clear_extremes(past.extremes[0])
     set_stage(lane, 0, options, control)
-
-
-@njit
-def set_stage(lane, stage, options, control):
-    """Set up a stage of the current part of a cell."""
-    grid, whole = control.grid[lane], 1 << options.max_halvings
-    h = grid / (1 << control.level[lane])
-    reach = GAMMA if stage == 0 else 1.0
-    control.stage[lane], control.h[lane], control.fresh[lane] = stage, h, 1.0
-    control.t[lane] = control.origin[lane] + grid * (control.done[lane] / whole) + reach * h
 
 
 @njit

@@ -8,9 +8,10 @@ import math
 
 from tolstat.common.tables import STEPS_PER_ITERATION
 from tolstat.kernel.integrators.stability import fewest_steps
-from tolstat.kernel.integrators.state import ALLOWED, FACTORISATIONS, ITERATIONS
-from tolstat.kernel.lanes.batch import empty, get_counters, put_joint, samples_of
+from tolstat.kernel.lanes.batch import empty, put_joint, put_start, samples_of
 from tolstat.kernel.lanes.lane_memory import as_lanes
+from tolstat.kernel.lanes.lockstep import end_joint
+from tolstat.kernel.mechanics.dynamics import acceleration
 from tolstat.kernel.mechanics.topology import N_DOF
 from tolstat.kernel.revolution.explicit import (
     begin_explicit,
@@ -21,24 +22,14 @@ from tolstat.kernel.revolution.explicit import (
     steps_of,
     walk,
 )
+from tolstat.kernel.revolution.outcome import NEWTON_FAILED, NOT_SETTLED, RAMP, clear_results, clear_samples
 from tolstat.kernel.revolution.peaks import forget, largest_at_an_end, write_peaks
 from tolstat.kernel.revolution.resolve import Past, after_revolution
 from tolstat.kernel.revolution.settle import record
-from tolstat.kernel.revolution.simulate import (
-    NEWTON_FAILED,
-    NOT_SETTLED,
-    OUTSIDE_MODEL,
-    acceleration,
-    begin,
-    clear,
-    clear_results,
-    finish,
-    inside_model,
-)
 from tolstat.kernel.revolution.trail import Trail
 from tolstat.kernel.simd.borrow import without_refcount
 from tolstat.kernel.simd.jit import njit
-from tolstat.kernel.simd.lane import WIDTH, any_of, bits_of
+from tolstat.kernel.simd.lane import any_of, bits_of
 
 NEVER = 1e300
 """Steps up to the next grid point of a lane without a joint."""
@@ -73,28 +64,28 @@ def start_revolution(lane, par, options, batch):
 
 
 @njit
-def load_joint(lane, joint, rows, words, steps, left, options, alone, batch, samples, past, results):
-    """Put a joint into a lane, at its start; one outside the model ends at once."""
-    work, state, _, _ = alone
-    par, control, motion, out = rows[joint], batch.control, batch.motion, results[joint]
-    clear_results(out)
-    state.counters[:] = 0
-    state.counters[ALLOWED] = left[joint]
-    if not inside_model(par):
-        finish(OUTSIDE_MODEL, -1, options.steps_per_rev, options, state.counters, out)
+def load_joint(lane, joint, steps, options, batch, queue, past):
+    """Put a joint into a lane, at its start; one that has none has ended.
+
+    `steps`: of the first revolution of each joint, (n,).
+    """
+    par, start, control, motion, out = queue.rows[joint], past.begun, batch.control, batch.motion, queue.results[joint]
+    if out.status != NOT_SETTLED:
         return
-    put_joint(lane, words[joint], batch)
-    control.joint[lane], control.live[lane] = joint, 1.0
-    clear(par, state, samples_of(lane, batch, samples), batch.notes[lane])
-    begin(par, options, work, state)
-    acceleration(0.0, state.q0, state.v0, par, options, work, state.a0)
     for i in range(N_DOF):
-        motion.q[i, lane], motion.v[i, lane], motion.a[i, lane] = state.q0[i], state.v0[i], state.a0[i]
-    control.steps[lane] = control.halvings[lane] = 0.0
-    control.iterations[lane] = state.counters[ITERATIONS]
-    control.factorisations[lane] = state.counters[FACTORISATIONS]
-    begin_explicit(steps[joint], par, options, work, past)
-    begin_revolution((state.q0, state.v0, state.a0), steps[joint], par, work, past)
+        start[0, i] = 0.0 if options.start == RAMP else queue.starts[joint, i]
+        start[1, i] = 0.0
+    acceleration(0.0, start[0], start[1], par, options, batch.one, start[2])
+    put_joint(lane, queue.words[joint], batch)
+    put_start(lane, par, start[0], control, motion)
+    for i in range(N_DOF):
+        motion.q[i, lane], motion.v[i, lane], motion.a[i, lane] = start[0, i], start[1, i], start[2, i]
+    control.joint[lane] = joint
+    control.iterations[lane], control.factorisations[lane] = out.newton_iterations, out.factorisations
+    clear_results(out)
+    clear_samples(samples_of(lane, batch, queue), batch.notes[lane])
+    begin_explicit(steps[joint], par, options, batch.one, past)
+    begin_revolution((start[0], start[1], start[2]), steps[joint], par, batch.one, past)
     start_revolution(lane, par, options, batch)
 
 
@@ -105,10 +96,13 @@ def spent(lane, control):
 
 
 @njit
-def arrive(lane, par, lanes, left, options, alone, batch, samples, past, out):
-    """Record the grid point that a lane has reached, decide after a revolution; return status and whether to go on."""
+def arrive(lane, par, lanes, left, options, batch, samples, past, out):
+    """Record the grid point that a lane has reached, decide after a revolution; return status and whether to go on.
+
+    `left`: work still allowed to the joint, in Newton iterations.
+    """
     control, motion, turns = batch.control, batch.motion, past.turns
-    n, work = options.steps_per_rev, alone.work
+    n, work = options.steps_per_rev, batch.one
     point = motion.q[:, lane], motion.v[:, lane], motion.a[:, lane]
     steps = steps_of(turns)
     k = int(control.count[lane]) // (steps // n)
@@ -139,76 +133,54 @@ def arrive(lane, par, lanes, left, options, alone, batch, samples, past, out):
 
 
 @njit
-def finish_joint(lane, status, left, options, alone, batch, blocks, results):
+def finish_joint(lane, status, options, batch, queue):
     """Write the results of a joint that has ended, and empty its lane."""
-    joint, counters = batch.control.joint[lane], alone.state.counters
-    batch.control.count[lane] = 0.0  # is part of the steps by now
-    left[joint] -= spent(lane, batch.control)
-    get_counters(lane, batch, counters)
-    failed = max(1, results[joint].failed_step) if status == NEWTON_FAILED else -1
-    finish(status, failed, steps_of(batch.pasts.turns[lane]), options, counters, results[joint])
-    for r in range(blocks.shape[1]):
-        if joint < len(blocks):
-            blocks[joint, r] = batch.pasts.revolution[lane, r]
+    control, joint = batch.control, batch.control.joint[lane]
+    control.count[lane] = 0.0  # is part of the steps by now
+    work_of_steps = spent(lane, control) - int(control.iterations[lane])
+    failed = max(1, queue.results[joint].failed_step) if status == NEWTON_FAILED else -1
+    end_joint(lane, status, failed, steps_of(batch.pasts.turns[lane]), options, batch, queue)
+    queue.left[joint] -= work_of_steps
     rest(lane, batch)
 
 
 @njit
-def explicit(rows, words, steps, left, options, alone, batch, samples, blocks, results):
-    """Simulate joints with equal numbers of contact stations; row i of the results is joint i.
+def explicit(steps, options, batch, queue):
+    """Simulate the joints of a queue that have a start.
 
     Parameters
     ----------
-    rows : ndarray of PARAM, shape (n,)
-        The joints, n > 0.
-    words : ndarray, shape (n, words)
-        The same memory as doubles.
     steps : ndarray of int, shape (n,)
         Steps of the first revolution of each joint, multiples of ``options.steps_per_rev``, see `count_steps`.
-    left : ndarray of int, shape (n,)
-        Work still allowed to each joint, in Newton iterations; reduced by that done. A joint without any ends as
-        `NEWTON_FAILED`.
     options : Options
         Numerical settings, with ``max_refinements``; its tolerance plays no part.
-    alone : Scratch
-        Work arrays of one joint.
     batch : Batch
         Memory of the lanes; nothing is carried over from one call to the next.
-    samples : ndarray of SAMPLE, shape (n, steps_per_rev) or (0, steps_per_rev)
-        Written unless empty: the last revolution of every joint.
-    blocks : ndarray of KERNEL_RESULT, shape (n, revolutions) or (0, 0)
-        Written unless empty: statistics of the last revolutions of every joint, revolution r at r modulo their number.
-    results : ndarray of KERNEL_RESULT, shape (n,)
-        Written.
+    queue : Queue
+        The joints. Where a joint's status is `NOT_SETTLED`, ``starts`` holds its start, unless the torque rises from
+        zero; others have ended. A joint without work left ends as `NEWTON_FAILED`.
     """
-    rows, words, samples, results = (
-        without_refcount(rows),
-        without_refcount(words),
-        without_refcount(samples),
-        without_refcount(results),
-    )
-    blocks, steps = without_refcount(blocks), without_refcount(steps)
-    left = without_refcount(left)
-    alone, batch = without_refcount(alone), without_refcount(batch)
+    batch, queue, steps = without_refcount(batch), without_refcount(queue), without_refcount(steps)
     lanes = as_lanes(batch.par), as_lanes(batch.work), as_lanes(batch.peaks)
     motion, control = as_lanes(batch.motion), as_lanes(batch.control)
     pasts, at, queued = batch.pasts, batch.control, 0
-    for lane in range(WIDTH):
-        put_joint(lane, words[0], batch)
+    for lane in range(at.joint.size):
+        put_joint(lane, queue.words[0], batch)
         rest(lane, batch)
-    while queued < len(rows) or any_of(control.live > 0):
+    while queued < len(queue.rows) or any_of(control.live > 0):
         arrived = bits_of(control.until <= 0)
-        for lane in range(WIDTH):
+        for lane in range(at.joint.size):
             trail = Trail(pasts.loads[lane], pasts.revolution[lane], pasts.notes[lane])
             past = Past(trail, pasts.turns[lane], pasts.extremes[lane], pasts.begun[lane], pasts.mesh[lane])
             if (arrived >> lane) & 1:
                 joint = at.joint[lane]
-                own, out = samples_of(lane, batch, samples), results[joint]
-                status, goes_on = arrive(lane, rows[joint], lanes, left[joint], options, alone, batch, own, past, out)
+                samples, out = samples_of(lane, batch, queue), queue.results[joint]
+                left = queue.left[joint]
+                status, goes_on = arrive(lane, queue.rows[joint], lanes, left, options, batch, samples, past, out)
                 if not goes_on:
-                    finish_joint(lane, status, left, options, alone, batch, blocks, results)
-            while queued < len(rows) and at.live[lane] == 0:
-                load_joint(lane, queued, rows, words, steps, left, options, alone, batch, samples, past, results)
+                    finish_joint(lane, status, options, batch, queue)
+            while queued < len(queue.rows) and at.live[lane] == 0:
+                load_joint(lane, queued, steps, options, batch, queue, past)
                 queued += 1
         fresh = control.fresh > 0
         if any_of(fresh):

@@ -1,19 +1,21 @@
-"""Lanes in memory: NumPy records and arrays whose last axis, of length `WIDTH`, holds the joints."""
+"""Lanes in memory: NumPy records whose float fields have a last axis that holds the joints.
+
+A record of one joint, of width 1, is read as plain numbers.
+"""
 
 import numpy as np
-from numba.core import cgutils, types
+from numba.core import types
 from numba.core.datamodel import models
-from numba.extending import intrinsic, register_model
-from numba.np.arrayobj import make_array, populate_array
+from numba.extending import intrinsic, overload, register_model
 
-from tolstat.kernel.simd.lane import DOUBLES, LANE, WIDTH
+from tolstat.kernel.simd.lane import LANE, WIDTH
 
 ALIGNMENT = 8 * WIDTH
 """Alignment of every lane in memory, bytes."""
 
 
 class LaneRecord(types.Record):
-    """A record of lanes: a NumPy record whose float fields have a last axis of length `WIDTH`."""
+    """A record of lanes: a NumPy record whose float fields have a last axis of joints."""
 
     @property
     def dtype(self):
@@ -32,40 +34,38 @@ def record_of_lanes(record):
     for name, field in record.fields.items():
         ty = field.type
         if isinstance(ty, types.NestedArray) and ty.dtype == types.float64:
-            shape = ty.shape[:-1]
-            ty = types.NestedArray(LANE, shape) if shape else LANE
+            shape, value = ty.shape[:-1], LANE if ty.shape[-1] == WIDTH else types.float64
+            ty = types.NestedArray(value, shape) if shape else value
         fields.append((name, {"type": ty, "offset": field.offset}))
     return LaneRecord(fields, record.size, record.aligned)
 
 
+def as_lanes(memory):
+    """View a NumPy record whose float fields' last axis holds the joints as one of lanes; it must be aligned.
+
+    Without compilation the record has one joint, and is the only one of its array.
+    """
+    fields = {name: (_without_last_axis(field[0]), field[1]) for name, field in memory.dtype.fields.items()}
+    names, (formats, offsets) = list(fields), zip(*fields.values(), strict=True)
+    plain = np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": memory.dtype.itemsize})
+    return memory.base.view(plain).view(np.recarray)[0]
+
+
+def _without_last_axis(dtype):
+    return np.dtype((dtype.base, dtype.shape[:-1])) if dtype.base == np.float64 else dtype
+
+
 @intrinsic
-def as_lanes(typingctx, memory):
-    """View a NumPy record or array, whose last axis holds the joints, as one of lanes; it must be aligned."""
-    if isinstance(memory, types.Record):
-        out = record_of_lanes(memory)
+def _as_lanes(typingctx, memory):
+    def codegen(context, builder, sig, args):
+        return args[0]
 
-        def codegen(context, builder, sig, args):
-            return args[0]
+    return record_of_lanes(memory)(memory), codegen
 
-        return out(memory), codegen
-    out = types.Array(LANE, memory.ndim - 1, "C")
 
-    def of_array(context, builder, sig, args):
-        source = make_array(memory)(context, builder, args[0])
-        view = make_array(out)(context, builder)
-        shape = cgutils.unpack_tuple(builder, source.shape)[:-1]
-        strides = cgutils.unpack_tuple(builder, source.strides)[:-1]
-        size = context.get_constant(types.intp, 8 * WIDTH)
-        data = builder.bitcast(source.data, DOUBLES.as_pointer())
-        populate_array(
-            view, data=data, shape=shape, strides=strides, itemsize=size, meminfo=source.meminfo, parent=source.parent
-        )
-        value = view._getvalue()
-        if context.enable_nrt:
-            context.nrt.incref(builder, out, value)
-        return value
-
-    return out(memory), of_array
+@overload(as_lanes)
+def _as_lanes_of(memory):
+    return lambda memory: _as_lanes(memory)
 
 
 def aligned_zeros(shape, dtype):
@@ -77,12 +77,12 @@ def aligned_zeros(shape, dtype):
     return raw[start : start + nbytes].view(dtype).reshape(shape)
 
 
-def lane_dtype(dtype):
-    """Layout of `WIDTH` records of `dtype` in lanes: float fields get a last axis, others are shared by all lanes."""
+def lane_dtype(dtype, width=WIDTH):
+    """Layout of `width` records of `dtype` in lanes: float fields get a last axis, others are shared by all lanes."""
     names, formats, offsets, offset = [], [], [], 0
     for name in dtype.names:
         base, shape = dtype[name].base, dtype[name].shape
-        formats.append((base, (*shape, WIDTH) if base == np.float64 else shape))
+        formats.append((base, (*shape, width) if base == np.float64 else shape))
         names.append(name)
         offsets.append(offset)
         offset += -(-np.dtype(formats[-1]).itemsize // ALIGNMENT) * ALIGNMENT

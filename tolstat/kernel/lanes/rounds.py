@@ -5,19 +5,24 @@ lanes that begin a step, stage or angle, and lanes whose trial point is accepted
 """
 
 from tolstat.kernel.integrators import bdf2, trbdf2
-from tolstat.kernel.integrators.integrate import ROUNDOFF, SLOW, scaled_size
-from tolstat.kernel.integrators.state import AHEAD, H_OLD, LAST_ITERATION_BELOW, STAGED_STEP, TRAPEZOIDAL
+from tolstat.kernel.integrators.memory import AHEAD, H_OLD, LAST_ITERATION_BELOW, STAGED_STEP, TRAPEZOIDAL
 from tolstat.kernel.lanes.batch import CHECK
+from tolstat.kernel.lanes.equilibrium import CA_REGULAR, CV_REGULAR, CV_STATIC, ENOUGH, FAR
+from tolstat.kernel.mechanics.linsolve import factorise, solve
+from tolstat.kernel.mechanics.tangent import assemble
 from tolstat.kernel.mechanics.topology import N_DOF
-from tolstat.kernel.revolution.equilibrium import CA_REGULAR, CV_REGULAR, CV_STATIC, ENOUGH, FAR
+from tolstat.kernel.revolution.outcome import QUASISTATIC
 from tolstat.kernel.revolution.quasistatic import extrapolate, keep
-from tolstat.kernel.revolution.resolve import follows_error
-from tolstat.kernel.revolution.simulate import QUASISTATIC, assemble, eliminate, solve
+from tolstat.kernel.revolution.resolve import TR_BDF2
 from tolstat.kernel.simd.jit import njit
 from tolstat.kernel.simd.lane import retain, where
 
 formula, trial = bdf2.formula, bdf2.trial
 first_and_second, first, second = trbdf2.formula, trbdf2.first, trbdf2.second
+SLOW = 0.2
+"""Ratio of successive residuals above which the tangent is renewed."""
+ROUNDOFF = 10 * 2.0**-52
+"""Change of the unknowns, relative to the largest of them, that is no more than their rounding."""
 
 
 @njit
@@ -74,13 +79,23 @@ def begin(options, motion, control):
     begins, passed = control.fresh > 0, control.passed > 0
     if options.fidelity == QUASISTATIC:
         begin_angles(begins, passed, motion, control)
-    elif follows_error(options):
+    elif options.method == TR_BDF2:
         begin_parts(begins, passed, motion, control)
     else:
         begin_steps(begins, passed, motion, control)
     control.iteration = where(begins, 0.0, control.iteration)
     control.at_roundoff = where(begins, 0.0, control.at_roundoff)
     control.fresh = control.passed = 0.0 * control.fresh
+
+
+@njit
+def scaled_size(motion):
+    """Largest weighted residual; NaN if any residual is NaN."""
+    size = total = 0.0
+    for i in range(N_DOF):
+        one = abs(motion.residual[i]) * motion.weight[i]
+        size, total = max(size, one), total + one
+    return where(total == total, size, total)  # the sum detects NaN; a NaN-safe maximum is slower
 
 
 @njit
@@ -96,7 +111,7 @@ def classify_lanes(options, motion, control):
     now : lane
         Scaled size of the residuals.
     """
-    now = scaled_size(control.cv, control.ca, motion)
+    now = scaled_size(motion)
     finite, live, checked = now < 1e300, control.live > 0, control.phase == CHECK
     small = (now <= options.newton_tol) | ((control.at_roundoff > 0) & finite)
     solved = live & ((checked & (now < ENOUGH)) | (~checked & small))
@@ -132,7 +147,7 @@ def refactorise(mask, control, par, work, kept):
     held = control.cv == CV_STATIC
     cv, ca = where(held, CV_REGULAR, control.cv), where(held, CA_REGULAR, control.ca)
     assemble(cv, ca, where(held, 0.0, control.cv), par, work)
-    good = eliminate(work)
+    good = factorise(work)
     keep_blocks(mask, work.block, kept.block)
     keep_blocks(mask, work.edge, kept.edge)
     keep_rows(mask, work.corner, kept.corner)

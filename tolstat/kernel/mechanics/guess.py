@@ -66,18 +66,16 @@ def travel_to_contact(pin, side, across, par, work):
 
 
 @njit
-def rigid_guess(t, par, work, state):
-    """Write the guess of the unknowns at time `t` (s) to ``state.q0``, and zero to ``state.v0``; `work` is scratch."""
-    q = state.q0
+def rigid_guess(t, at_rest, par, work, q):
+    """Write the guess of the unknowns at time `t` (s) to `q`; `at_rest`: zeros, (56,); `work` is scratch."""
     q[:] = 0.0
-    state.v0[:] = 0.0
     ideal_motion(par.omega * t, par, work)
-    locate_all(q, state.v0, par, work)
+    locate_all(q, at_rest, par, work)
     if par.slides > 0:
         q[S] = shift_along_axis(par, work)
         for body in (ARM + 2, ARM + 3):
             q[6 * body + 2] = q[S]
-        locate_all(q, state.v0, par, work)
+        locate_all(q, at_rest, par, work)
     z0, z1, z2, z3 = middle(0, par, work), middle(1, par, work), middle(2, par, work), middle(3, par, work)
     about_x, about_y = -(z0 - z1) / (2 * par.R), (z2 - z3) / (2 * par.R)
     up = -0.25 * (z0 + z1 + z2 + z3)

@@ -68,24 +68,22 @@ def moving_moments(par, work):
 
 
 @njit
-def ideal_loads(phase, par, state, work):
+def ideal_loads(phase, at_rest, par, work):
     """Write loads of the bushings, contact forces and modes of the ideal joint at one phase.
 
     Parameters
     ----------
     phase : float
         Mean input angle omega t, rad.
+    at_rest : ndarray, shape (56,)
+        Zeros.
     par : record of PARAM
         The joint; its errors and clearances are not used.
-    state : State
-        Its ``q0`` and ``v0`` are set to zero.
     work : record of WORK
         ``load``, ``contact``, ``mode`` and, of the shafts, ``force`` are written; other fields are scratch.
     """
-    state.q0[:] = 0.0
-    state.v0[:] = 0.0
     ideal_motion(phase, par, work)
-    set_bodies(state.q0, state.v0, par, work)
+    set_bodies(at_rest, at_rest, par, work)
     radius = contact_radius(par)
     moment, torque = moving_moments(par, work)
     sin_gamma, cos_gamma = work.relative[FRAME_F, 2, 0], work.relative[FRAME_F, 2, 2]

@@ -7,7 +7,7 @@ took five times as long.) All 6 x 6 blocks lie in one array: a kernel is compile
 
 import numpy as np
 
-from tolstat.common.parameters import MAX_STATIONS
+from tolstat.common.fields import MAX_STATIONS
 from tolstat.kernel.mechanics.loads import N_INSTANT
 from tolstat.kernel.mechanics.topology import N_BODIES, N_DOF, N_LUMPS
 

@@ -7,10 +7,7 @@ which damps the ringing, by the trapezoidal rule. The parts count among the larg
 samples stay as they are.
 """
 
-import math
-
-from tolstat.kernel.integrators.integrate import BDF2
-from tolstat.kernel.integrators.state import ATTEMPTS_LEFT, H_OLD, TRAPEZOIDAL, UNLIMITED
+from tolstat.kernel.integrators.memory import H_OLD, TRAPEZOIDAL
 from tolstat.kernel.mechanics.loads import (
     DECIDING,
     INTERPOLATED,
@@ -20,9 +17,9 @@ from tolstat.kernel.mechanics.loads import (
     OF_MEASURE,
     size_of,
 )
-from tolstat.kernel.mechanics.vector import copy
-from tolstat.kernel.revolution.settle import peak, record
-from tolstat.kernel.simd.jit import njit, njit_inner
+from tolstat.kernel.mechanics.topology import N_DOF
+from tolstat.kernel.revolution.settle import peak
+from tolstat.kernel.simd.jit import njit
 
 NEAR = 0.01
 """Distance of a load from its largest value, in units of its measure, that ringing may bridge."""
@@ -87,65 +84,14 @@ def count_in(j, fine, out):
 
 
 @njit
-def recall(s, h, state, samples):
-    """Restore recorded sample `s` as the last accepted point; `h` is the step of the output grid, s.
+def recall(s, h, lane, samples, motion):
+    """Restore recorded sample `s` as the last accepted point of a lane; `h` is the step of the output grid, s.
 
-    Accelerations are those of BDF2's formula for equal steps; other methods need those of the equations of motion.
+    `motion`: record of MOTION. Accelerations are those of BDF2's formula for equal steps.
     """
     here, before, first = samples[s], samples[s - 1], samples[s - 2]
-    for i in range(state.q0.size):
-        state.q0[i], state.v0[i] = here.q[i], here.v[i]
-        state.q1[i], state.v1[i] = before.q[i], before.v[i]
-        state.a0[i] = (3 * here.v[i] - 4 * before.v[i] + first.v[i]) / (2 * h)
-        state.a1[i] = state.aux[i] = state.a0[i]
-    state.memory[:] = 0.0
-    state.memory[H_OLD], state.counters[ATTEMPTS_LEFT] = h, UNLIMITED
-    state.memory[TRAPEZOIDAL] = 1.0
-
-
-def build_closeup(advance, acceleration):
-    """Bind a stepping scheme and the equations of motion.
-
-    Parameters
-    ----------
-    advance : jitted function
-        As `integrate.build_advance` returns it.
-    acceleration : jitted function (t, q, v, par, options, work, out) -> None
-        Writes the accelerations that meet the equations of motion.
-
-    Returns
-    -------
-    look_closer : jitted function (par, options, work, state, samples, fine, out) -> None
-        Integrates the steps around switches on peaks of the recorded revolution again, each in
-        ``options.peak_substeps`` parts, and extends the extremes in `out`, a row of KERNEL_RESULT. The work is added to
-        ``state.counters``.
-    """
-
-    @njit_inner
-    def look_closer(par, options, work, state, samples, fine, out):
-        n = samples.size
-        h = 2 * math.pi / (abs(par.omega) * n)
-        part = h / options.peak_substeps
-        left = j = 0
-        for k in range(n + 1):
-            if k < n and switches(k, samples) and on_a_peak(k, samples, out):
-                if left == 0:
-                    recall(k - 1, h, state, samples)
-                    if options.method != BDF2:
-                        acceleration((n + k - 1) * h, state.q0, state.v0, par, options, work, state.a0)
-                        copy(state.a0, state.a1)
-                        copy(state.a0, state.aux)
-                    j = 0
-                left = STEPS
-            if left == 0:
-                continue
-            left -= 1
-            for i in range(options.peak_substeps):
-                if not advance((n + k - 1) * h + i * part, part, par, options, work, state):
-                    left = 0
-                    break
-                record(j, 0, par, work, state.v0, fine)
-                count_in(j, fine, out)
-                j += 1
-
-    return look_closer
+    for i in range(N_DOF):
+        motion.q0[i, lane], motion.v0[i, lane] = here.q[i], here.v[i]
+        motion.q1[i, lane], motion.v1[i, lane] = before.q[i], before.v[i]
+        motion.a0[i, lane] = (3 * here.v[i] - 4 * before.v[i] + first.v[i]) / (2 * h)
+    motion.memory[H_OLD, lane], motion.memory[TRAPEZOIDAL, lane] = h, 1.0

@@ -10,11 +10,11 @@ where pseudo-transient continuation leads from there.
 
 import math
 
-from tolstat.kernel.integrators.state import AHEAD, HALVINGS, STEPS
+from tolstat.kernel.integrators.memory import AHEAD
 from tolstat.kernel.mechanics.loads import SPEED_ERROR
 from tolstat.kernel.mechanics.motion import drive_and_load, speed_ratio
-from tolstat.kernel.mechanics.topology import PSI
-from tolstat.kernel.simd.jit import njit, njit_inner
+from tolstat.kernel.mechanics.topology import N_DOF
+from tolstat.kernel.simd.jit import njit
 from tolstat.kernel.simd.lane import where
 
 
@@ -25,7 +25,7 @@ def angle_time(k, n, par):
 
 
 @njit
-def extrapolate(begins, known, state):
+def extrapolate(begins, known, motion):
     """Predictor: write the trial point of the next angle, in lanes that begin one.
 
     It extrapolates through the last four equally spaced angles; through three if no more are known or if three
@@ -37,40 +37,33 @@ def extrapolate(begins, known, state):
         Mask: whether a lane begins an angle.
     known : int
         Number of angles solved.
-    state : State
+    motion : record of MOTION, read as lanes
         ``q0``, ``q1``, ``aux`` and ``a1`` hold the last to the fourth last solution; ``q`` is written.
     """
-    cubic, square = (known > 3) & (state.memory[AHEAD] > 0), known > 2
-    for i in range(state.q.size):
-        by_four = 4 * (state.q0[i] + state.aux[i]) - 6 * state.q1[i] - state.a1[i]
-        by_three = 3 * (state.q0[i] - state.q1[i]) + state.aux[i]
-        guess = where(cubic, by_four, where(square, by_three, state.q0[i]))
-        state.q[i] = where(begins, guess, state.q[i])
+    cubic, square = (known > 3) & (motion.memory[AHEAD] > 0), known > 2
+    for i in range(N_DOF):
+        by_four = 4 * (motion.q0[i] + motion.aux[i]) - 6 * motion.q1[i] - motion.a1[i]
+        by_three = 3 * (motion.q0[i] - motion.q1[i]) + motion.aux[i]
+        guess = where(cubic, by_four, where(square, by_three, motion.q0[i]))
+        motion.q[i] = where(begins, guess, motion.q[i])
 
 
 @njit
-def repeat_last(state):
-    """Set the trial point to the solution at the previous angle."""
-    for i in range(state.q.size):
-        state.q[i] = state.q0[i]
-
-
-@njit
-def keep(solved, state):
+def keep(solved, motion):
     """Accept the trial point as the last solution, in lanes that have solved an angle.
 
-    ``state.memory[AHEAD]`` becomes 1 if four angles predicted this solution better than three, else 0.
+    ``motion.memory[AHEAD]`` becomes 1 if four angles predicted this solution better than three, else 0.
     """
-    by_three = by_four = 0.0 * state.q[0]
-    for i in range(state.q.size):
-        third = state.q[i] - 3 * (state.q0[i] - state.q1[i]) - state.aux[i]
+    by_three = by_four = 0.0 * motion.q[0]
+    for i in range(N_DOF):
+        third = motion.q[i] - 3 * (motion.q0[i] - motion.q1[i]) - motion.aux[i]
         by_three += abs(third)
-        by_four += abs(third - (state.q0[i] - 3 * (state.q1[i] - state.aux[i]) - state.a1[i]))
-        state.a1[i] = where(solved, state.aux[i], state.a1[i])
-        state.aux[i] = where(solved, state.q1[i], state.aux[i])
-        state.q1[i] = where(solved, state.q0[i], state.q1[i])
-        state.q0[i] = where(solved, state.q[i], state.q0[i])
-    state.memory[AHEAD] = where(solved, where(by_four < by_three, 1.0, 0.0), state.memory[AHEAD])
+        by_four += abs(third - (motion.q0[i] - 3 * (motion.q1[i] - motion.aux[i]) - motion.a1[i]))
+        motion.a1[i] = where(solved, motion.aux[i], motion.a1[i])
+        motion.aux[i] = where(solved, motion.q1[i], motion.aux[i])
+        motion.q1[i] = where(solved, motion.q0[i], motion.q1[i])
+        motion.q0[i] = where(solved, motion.q[i], motion.q0[i])
+    motion.memory[AHEAD] = where(solved, where(by_four < by_three, 1.0, 0.0), motion.memory[AHEAD])
 
 
 @njit
@@ -91,43 +84,3 @@ def speed_ratios(par, samples):
         samples[s].tau = speed_ratio(theta, par.alpha) + error
         samples[s].psi = error / samples[s].tau
         samples[s].loads[SPEED_ERROR] = abs(samples[s].psi)
-
-
-def build_quasistatic(hold, relax, record):
-    """Bind the equilibrium solvers of a system to a revolution.
-
-    Parameters
-    ----------
-    hold, relax : jitted functions
-        As `equilibrium.build_equilibrium` returns them.
-    record : jitted function (k, lane, par, work, v, samples) -> None
-        Records an angle, see `settle.record`.
-
-    Returns
-    -------
-    jitted function (first, par, options, work, state, ring) -> bool
-        Solves one revolution from the equilibrium ``state.q0`` at theta = 0; False if no equilibrium was found at an
-        angle. `first`: whether it is the first revolution.
-    """
-
-    @njit_inner
-    def revolution(first, par, options, work, state, ring):
-        n = ring.samples.size
-        for k in range(0 if first else 1, n + 1):
-            t = angle_time(k, n, par)
-            extrapolate(True, state.counters[STEPS], state)
-            if not hold(t, par, options, work, state):
-                state.counters[HALVINGS] += 1
-                repeat_last(state)
-                if not hold(t, par, options, work, state):
-                    relax(t, par, options, work, state)
-                    repeat_last(state)
-                    if not hold(t, par, options, work, state):
-                        return False
-            keep(True, state)
-            state.counters[STEPS] += 1
-            record(k, 0, par, work, state.v0, ring.samples)
-            ring.samples[k % n].tau = state.q0[PSI]
-        return True
-
-    return revolution

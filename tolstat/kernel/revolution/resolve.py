@@ -10,7 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from tolstat.common.tables import KERNEL_RESULT, Fidelity, Method, Options, Status
-from tolstat.kernel.integrators.mesh import CELL, cells_of
+from tolstat.kernel.integrators.memory import STAGED_STEP, TOLERANCE
+from tolstat.kernel.integrators.mesh import CELL, cells_of, forget_mesh, refine_mesh, set_scale
 from tolstat.kernel.mechanics.loads import FORCES, N_AVERAGED, N_DECIDING, N_INSTANT, TORQUES
 from tolstat.kernel.mechanics.scale import SMALLEST_FORCE, typical_force
 from tolstat.kernel.mechanics.topology import N_DOF
@@ -46,6 +47,8 @@ FAR = 2 * RESOLVED
 """Change in the first revolution with steps half as long above which they are halved again at once."""
 SETTLING = 16
 """Minimum number of revolutions with steps half as long before a joint is given up."""
+TIGHTER = 8
+"""Factor from one tolerance of error-controlled steps to the next tighter one: it halves the steps."""
 LONGEST_PERIOD = 8
 """Longest period that is recognised, revolutions."""
 MIN_FALL, MIN_FALL_OVER_SCATTER = 0.1, 10.0
@@ -101,13 +104,6 @@ def make_pasts(joints: int, options: Options) -> Pasts:
     cells = options.steps_per_rev * cells_of(options.steps_per_rev)
     mesh = np.zeros((joints, cells), CELL).view(np.recarray)
     return Pasts(*trails, turns, extremes, np.zeros((joints, 3, N_DOF)), mesh)
-
-
-def make_past(options: Options) -> Past:
-    """Allocate for one joint."""
-    all_of_it = make_pasts(1, options)
-    trail = Trail(all_of_it.loads[0], all_of_it.revolution[0], all_of_it.notes[0])
-    return Past(trail, all_of_it.turns[0], all_of_it.extremes[0], all_of_it.begun[0], all_of_it.mesh[0])
 
 
 def revolutions_kept(options: Options) -> int:
@@ -281,3 +277,25 @@ def after_revolution(par, options, samples, past, out):
         conclude(trail, turns, out)
         return NOT_SETTLED, False
     return NOT_SETTLED, True
+
+
+@njit
+def begin_mesh(par, options, memory, weight, past):
+    """Initialise `past`, and `memory` and `weight` of its motion, for a joint at its start."""
+    begin_turns(par, options, past)
+    forget_mesh(past.mesh)
+    memory[TOLERANCE] = options.rtol
+    set_scale(closure_target(options, past.turns), past.turns, options, par, memory, weight)
+
+
+@njit
+def adapt_mesh(halved, par, options, memory, weight, past):
+    """Prepare the next revolution; `halved`: number of times that steps had been halved before this one.
+
+    `memory` and `weight`, those of its motion, are written.
+    """
+    if past.turns.halved > halved:
+        memory[TOLERANCE] /= TIGHTER
+        refine_mesh(past.mesh)
+    memory[STAGED_STEP] = 0.0  # the stage may belong to the other motion
+    set_scale(closure_target(options, past.turns), past.turns, options, par, memory, weight)

@@ -1,10 +1,10 @@
 """The recorded revolution: a ring buffer of samples by input angle, and the closure error between revolutions."""
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
+from tolstat.kernel.mechanics.dynamics import forces
 from tolstat.kernel.mechanics.loads import (
     DECIDING,
     INTERPOLATED,
@@ -28,7 +28,6 @@ from tolstat.kernel.mechanics.vector import larger
 from tolstat.kernel.mechanics.work import FORCE
 from tolstat.kernel.revolution.bearing import write_equivalent_loads
 from tolstat.kernel.revolution.orders import write_orders
-from tolstat.kernel.revolution.trail import make_notes
 from tolstat.kernel.simd.borrow import fetch
 from tolstat.kernel.simd.jit import njit
 from tolstat.kernel.simd.lane import pick
@@ -61,19 +60,6 @@ def make_samples(joints: int, steps_per_rev: int) -> np.recarray:
         if SAMPLE[name].base.kind == "f":
             samples[name] = np.nan
     return samples.view(np.recarray)
-
-
-class Ring(NamedTuple):
-    """The last revolution of a joint, its closure errors, and scratch of the closer look."""
-
-    samples: np.recarray  # (steps_per_rev,) SAMPLE
-    notes: np.record  # NOTES: closure errors
-    fine: np.recarray  # (3,) SAMPLE: last parts of the closer look, see `closeup`
-
-
-def make_ring(steps_per_rev: int) -> Ring:
-    """Allocate, filled with NaN."""
-    return Ring(make_samples(1, steps_per_rev)[0], make_notes(1)[0], make_samples(1, 3)[0])
 
 
 @njit
@@ -294,3 +280,21 @@ def summarise(par, samples, out):
             out.mode_share[pin, mode] = count / n
     write_equivalent_loads(par, samples, out)
     write_orders(samples, out)
+
+
+@njit
+def sample(times, states, par, work, samples):
+    """Record the loads along a solution.
+
+    Parameters
+    ----------
+    times, states : ndarray, shapes (m,) and (m, 112)
+        The solution, s; m and rad, per s.
+    par, work : records of PARAM and WORK
+        The joint; scratch.
+    samples : ndarray of SAMPLE, shape (m,)
+        Written.
+    """
+    for k in range(times.size):
+        forces(times[k], states[k, :N_DOF], states[k, N_DOF:], par, work)
+        record(k, 0, par, work, states[k, N_DOF:], samples)

@@ -3,14 +3,15 @@
 The lock-step does not compute it, so that it has no equations of motion for plain numbers to compile.
 """
 
-from tolstat.kernel.mechanics.vector import copy
+from tolstat.kernel.mechanics.dynamics import acceleration
+from tolstat.kernel.mechanics.guess import rigid_guess
+from tolstat.kernel.revolution.outcome import DYNAMIC, RAMP, inside_model
 from tolstat.kernel.revolution.quasistatic import angle_time
-from tolstat.kernel.revolution.simulate import DYNAMIC, RAMP, acceleration, inside_model, rigid_guess
 from tolstat.kernel.simd.jit import njit
 
 
 @njit
-def write_starts(rows, options, work, state, starts):
+def write_starts(rows, options, work, at_rest, starts):
     """Write the unknowns of the rigid cross that just touches all holes; with a torque ramp, the accelerations at rest.
 
     Parameters
@@ -19,8 +20,10 @@ def write_starts(rows, options, work, state, starts):
         The joints.
     options : Options
         Numerical settings.
-    work, state : records of WORK and State
+    work : record of WORK
         Scratch.
+    at_rest : ndarray, shape (56,)
+        Zeros.
     starts : ndarray, shape (n, 56)
         Written, except for joints outside the model; m and rad, or m/s^2 and rad/s^2.
     """
@@ -31,12 +34,8 @@ def write_starts(rows, options, work, state, starts):
         if not inside_model(par):
             continue
         if ramp:
-            state.q0[:] = 0.0
-            state.v0[:] = 0.0
-            acceleration(t, state.q0, state.v0, par, options, work, state.a0)
-            copy(state.a0, starts[i])
+            acceleration(t, at_rest, at_rest, par, options, work, starts[i])
         else:
             if options.fidelity != DYNAMIC:
                 t = angle_time(0, options.steps_per_rev, par)
-            rigid_guess(t, par, work, state)
-            copy(state.q0, starts[i])
+            rigid_guess(t, at_rest, par, work, starts[i])

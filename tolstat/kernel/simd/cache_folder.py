@@ -17,7 +17,7 @@ from importlib import metadata
 from pathlib import Path
 
 KERNEL = Path(__file__).parent.parent
-TABLES = ("fields.py", "load_kinds.py", "parameters.py", "tables.py")
+TABLES = ("fields.py", "load_kinds.py", "tables.py")
 """Files of ``common/`` that the layout of the tables follows from."""
 PREFIX, SUFFIX = "kernel-", ".nbc"
 """How names of folders begin, and how those of files with compiled code end."""

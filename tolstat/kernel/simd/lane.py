@@ -320,10 +320,18 @@ def _all_of(condition):
     return (lambda condition: _all(condition)) if condition == MASK else (lambda condition: condition)
 
 
-@intrinsic
-def bits_of(typingctx, mask):
+def bits_of(condition):
     """Integer whose bit i is the mask's lane i."""
+    return int(condition)
 
+
+def count_of(condition):
+    """Number of lanes in which the mask is true."""
+    return int(condition)
+
+
+@intrinsic
+def _bits(typingctx, mask):
     def codegen(context, builder, sig, args):
         return builder.zext(builder.bitcast(args[0], ir.IntType(WIDTH)), ir.IntType(64))
 
@@ -331,10 +339,18 @@ def bits_of(typingctx, mask):
 
 
 @intrinsic
-def count_of(typingctx, mask):
-    """Number of lanes in which the mask is true."""
-
+def _count(typingctx, mask):
     def codegen(context, builder, sig, args):
         return builder.zext(builder.ctpop(builder.bitcast(args[0], ir.IntType(WIDTH))), ir.IntType(64))
 
     return types.int64(MASK), codegen
+
+
+@overload(bits_of)
+def _bits_of(condition):
+    return (lambda condition: _bits(condition)) if condition == MASK else (lambda condition: int(condition))
+
+
+@overload(count_of)
+def _count_of(condition):
+    return (lambda condition: _count(condition)) if condition == MASK else (lambda condition: int(condition))

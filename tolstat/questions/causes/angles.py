@@ -18,11 +18,10 @@ from tolstat.common.loads import FloatArray, unit_text
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import VALID, Status
 from tolstat.display import drawing, style
-from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Part, Row, Sentence, Table
+from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Part, Sentence, Table
 from tolstat.display.options import Load, Opt, Top
 from tolstat.display.text import ends
-from tolstat.questions.causes.indices import scattering
-from tolstat.questions.shares import check_sample, with_ends
+from tolstat.questions.shares import Cell, check_sample, with_ends, word
 from tolstat.store import revolutions
 from tolstat.store.hdf5 import store_error
 from tolstat.store.view import View
@@ -45,12 +44,17 @@ ORIGIN = {
 }
 OVER_REVOLUTION = "Share of the variance over the whole revolution, every angle weighted by its variance"
 
+
+def _percent(key: str) -> Cell:
+    return lambda row: f"{round(100.0 * row[key], 1) + 0.0:.1f}"  # no -0
+
+
 COLUMNS = (
-    Column("load", lambda row: str(row["load"]), shown=lambda rows: len({row["load"] for row in rows}) > 1),
-    Column("error", lambda row: str(row["error"]), words=True),
-    Column("revolution, %", lambda row: _percent(row["share"])),
+    Column("load", word("load"), shown=lambda rows: len({row["load"] for row in rows}) > 1),
+    Column("error", word("error"), words=True),
+    Column("revolution, %", _percent("share")),
     Column("95 % interval", lambda row: ends(100.0 * row["share_lower"], 100.0 * row["share_upper"], ".1f")),
-    Column("largest, %", lambda row: _percent(row["largest"])),
+    Column("largest, %", _percent("largest")),
     Column("at, deg", lambda row: f"{math.degrees(row['theta']):.0f}"),
 )
 """Columns of the table ``revolution``."""
@@ -99,11 +103,18 @@ def angles(
         See `against_angle`.
     """
     view, load = view.narrowed(by or view.most_exceeded)
-    (found,) = against_angle(view, [load], joints, (load,) if logarithm else ())
+    (indices,) = against_angle(view, [load], joints, (load,) if logarithm else ())
+    std = np.sqrt(indices.first.variance).tolist()
+    rows = [
+        {"theta": theta, "load": load, "unit": indices.unit, "std": std[k], "error": name}
+        | with_ends("share", (end[i, k] for end in indices.first[:3]))
+        for k, theta in enumerate(indices.angles.tolist())
+        for i, name in enumerate(indices.names)
+    ]
+    parts = _parts([indices], indices.names[:top])
+    parts.insert(2, Table("angles", "Shares at each input angle", (), rows, {"theta": "rad"}))
     keys = ("load", "unit", "logarithm", "joints", "origin", "apart", "additive")
-    parts = _parts([found], found.names[:top])
-    parts.insert(2, Table("angles", "Shares at each input angle", (), _angle_rows(found), {"theta": "rad"}))
-    return Answer("angles", TITLE, parts, {key: getattr(found, key) for key in keys})
+    return Answer("angles", TITLE, parts, {key: getattr(indices, key) for key in keys})
 
 
 def angles_on_page(view: View, asked: Asked) -> Answer:
@@ -114,8 +125,8 @@ def angles_on_page(view: View, asked: Asked) -> Answer:
         raise NotApplicable
     with asked.noting("nothing over the input angle"):
         logarithmic = {load.name for load in view.loads(view.leading) if load.long_tailed}
-        found = against_angle(view, followed, asked.replay, logarithmic)
-        return Answer("angles", TITLE, _parts(found, {name for angle in found for name in angle.names[:LINES]}))
+        each = against_angle(view, followed, asked.replay, logarithmic)
+        return Answer("angles", TITLE, _parts(each, {name for indices in each for name in indices.names[:LINES]}))
     raise NotApplicable
 
 
@@ -207,27 +218,19 @@ def against_angle(
         if name not in CHANNELS:
             raise InputError([Fault(name, "is not a load over the input angle", did_you_mean(name, list(CHANNELS)))])
     nominal, samples = evaluated(view, joints)
-    found = revolutions.read(view.store, np.concatenate([nominal, view.slots(samples)]), loads)
+    histories = revolutions.read(view.store, np.concatenate([nominal, view.slots(samples)]), loads)
     errors = view.errors(samples, sampling.columns(view.study))
-    components = scattering(sampling.components(view.study, errors))
-    x, names, independent = (
-        np.column_stack(list(components.values())),
-        list(components),
-        view.design.has_interval("index"),
-    )
+    components = {n: x for n, x in sampling.components(view.study, errors).items() if np.ptp(x) > 0}
+    x, names, iid = np.column_stack(list(components.values())), list(components), view.design.has_interval("index")
     each = []
     for name in loads:
-        y, without_errors = found.loads[name][len(nominal) :], found.loads[name][: len(nominal)]
-        response = np.log(y) if name in logarithmic else y
-        first, overall = sensitivity.over_revolution(x, response, iid=independent)
-        order = np.argsort(-overall.estimate, kind="stable")
-        ordered = [
-            FirstOrder(own.estimate[order], own.lower[order], own.upper[order], own.variance)
-            for own in (first, overall)
-        ]
-        about = name, name in logarithmic, len(y), found.origin, found.apart, found.angles
-        drawn = without_errors[0] if len(nominal) else np.full(len(found.angles), np.nan)
-        each.append(AgainstAngle(*about, drawn, _quantiles(y), tuple(names[i] for i in order), *ordered))
+        without_errors, y = np.split(histories.loads[name], [len(nominal)])
+        of_angles = sensitivity.over_revolution(x, np.log(y) if name in logarithmic else y, iid=iid)
+        order = np.argsort(-of_angles[1].estimate, kind="stable")
+        ordered = [FirstOrder._make((*(end[order] for end in index[:3]), index.variance)) for index in of_angles]
+        head = name, name in logarithmic, len(y), histories.origin, histories.apart, histories.angles
+        drawn = without_errors[0] if len(nominal) else np.full(len(histories.angles), np.nan)
+        each.append(AgainstAngle(*head, drawn, _quantiles(y), tuple(names[i] for i in order), *ordered))
     return each
 
 
@@ -236,8 +239,8 @@ def spreads(view: View, loads: Sequence[str], joints: int) -> dict[str, tuple[Fl
 
     Raises as `against_angle`.
     """
-    found = revolutions.read(view.store, view.slots(evaluated(view, joints)[1]), loads)
-    return {name: (found.angles, _quantiles(found.loads[name])) for name in loads}
+    histories = revolutions.read(view.store, view.slots(evaluated(view, joints)[1]), loads)
+    return {name: (histories.angles, _quantiles(histories.loads[name])) for name in loads}
 
 
 def evaluated(view: View, joints: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -251,8 +254,8 @@ def evaluated(view: View, joints: int) -> tuple[NDArray[np.intp], NDArray[np.int
     check_sample(view, "index")
     samples = np.flatnonzero(view.status == Status.OK)[:joints]
     if len(samples) < MIN_JOINTS:
-        found = f"has {len(samples)} settled joints to evaluate"
-        raise store_error(view.path, found, f"{MIN_JOINTS} are needed: run more joints")
+        few = f"has {len(samples)} settled joints to evaluate"
+        raise store_error(view.path, few, f"{MIN_JOINTS} are needed: run more joints")
     return view.nominal_slots[view.nominal["status"] == Status.OK], samples
 
 
@@ -271,46 +274,23 @@ def theta_axis(ax: Axes, theta: FloatArray) -> FloatArray:
     return np.append(np.degrees(theta), 360.0)
 
 
-def _parts(found: Sequence[AgainstAngle], shown: Container[str]) -> list[Part]:
+def _parts(each: Sequence[AgainstAngle], shown: Container[str]) -> list[Part]:
     """Pictures; shares over the revolution, of which people see those of the errors `shown`; a note."""
-    rows = [row for angle in found for row in _overall_rows(angle)]
+    rows = [
+        {"load": indices.load, "error": name, **with_ends("share", (end[i] for end in indices.overall[:3]))}
+        | {"largest": float(indices.first.estimate[i, k]), "theta": float(indices.angles[k])}
+        for indices in each
+        for i, (name, k) in enumerate(zip(indices.names, indices.first.estimate.argmax(axis=1), strict=True))
+    ]
     seen = [row for row in rows if row["error"] in shown]
     table = Table("revolution", OVER_REVOLUTION, COLUMNS, rows, {"theta": "rad"}, seen)
-    return [Panels([panel for angle in found for panel in _panels(angle)]), table, Sentence(_note(found))]
+    return [Panels([panel for indices in each for panel in _panels(indices)]), table, Sentence(_note(each))]
 
 
-def _share(indices: FirstOrder, place: int | tuple[int, int]) -> dict[str, float]:
-    """One share with the ends of its interval."""
-    return with_ends("share", (part[place] for part in indices[:3]))
-
-
-def _overall_rows(angle: AgainstAngle) -> list[Row]:
-    largest = angle.first.estimate.argmax(axis=1)
-    return [
-        {"load": angle.load, "error": name, **_share(angle.overall, i)}
-        | {"largest": float(angle.first.estimate[i, k]), "theta": float(angle.angles[k])}
-        for i, (name, k) in enumerate(zip(angle.names, largest, strict=True))
-    ]
-
-
-def _angle_rows(angle: AgainstAngle) -> list[Row]:
-    std = np.sqrt(angle.first.variance).tolist()
-    return [
-        {"theta": theta, "load": angle.load, "unit": angle.unit, "std": std[k], "error": name}
-        | _share(angle.first, (i, k))
-        for k, theta in enumerate(angle.angles.tolist())
-        for i, name in enumerate(angle.names)
-    ]
-
-
-def _percent(share: float) -> str:
-    return f"{round(100.0 * share, 1) + 0.0:.1f}"  # no -0
-
-
-def _note(found: Sequence[AgainstAngle]) -> str:
+def _note(each: Sequence[AgainstAngle]) -> str:
     """Sums of the shares, joints, source of the histories, bias correction."""
-    first = found[0]
-    alone = ", ".join(f"{100 * angle.additive:.0f} % of the variance of {angle.quantity}" for angle in found)
+    first = each[0]
+    alone = ", ".join(f"{100 * indices.additive:.0f} % of the variance of {indices.quantity}" for indices in each)
     sentences = (
         f"All errors alone explain {alone}. Over the input angle: the first {first.joints} settled joints, "
         f"{ORIGIN[first.origin]}; bands are the 95 % intervals at each angle. Shares are corrected for chance: an "
@@ -324,25 +304,25 @@ def _note(found: Sequence[AgainstAngle]) -> str:
     return sentences
 
 
-def _panels(angle: AgainstAngle) -> Iterator[Panel]:
+def _panels(indices: AgainstAngle) -> Iterator[Panel]:
     """Load over the revolution, and shares of its variance."""
-    key, unit, leading = angle.load, unit_text(angle.unit), angle.names[:LINES]
-    low, middle, high = angle.spread
+    key, unit, leading = indices.load, unit_text(indices.unit), indices.names[:LINES]
+    low, middle, high = indices.spread
 
     def draw_loads(ax: Axes) -> None:
-        theta = theta_axis(ax, angle.angles)
+        theta = theta_axis(ax, indices.angles)
         ax.fill_between(theta, closed(low), closed(high), color=style.COLOURS[0], alpha=0.2, lw=0, label=LOADS[0])
         ax.plot(theta, closed(middle), color=style.COLOURS[0], label=LOADS[1])
-        if np.isfinite(angle.nominal).all():
-            ax.plot(theta, closed(angle.nominal), color=style.INK, lw=1.0, ls=(0.0, (4.0, 2.0)), label=LOADS[2])
+        if np.isfinite(indices.nominal).all():
+            ax.plot(theta, closed(indices.nominal), color=style.INK, lw=1.0, ls=(0.0, (4.0, 2.0)), label=LOADS[2])
         ax.set_ylabel(f"|{key}| [{unit}]")
-        ax.set_ylim(0.0, 1.05 * max(high.max(), np.nan_to_num(angle.nominal).max()))
+        ax.set_ylim(0.0, 1.05 * max(high.max(), np.nan_to_num(indices.nominal).max()))
         drawing.legend_above(ax, *ax.get_legend_handles_labels())
 
     def draw_shares(ax: Axes) -> None:
-        theta, ceiling = theta_axis(ax, angle.angles), 0.0
+        theta, ceiling = theta_axis(ax, indices.angles), 0.0
         for i, name in enumerate(leading):
-            share, lower, upper = (100.0 * closed(part[i]) for part in angle.first[:3])
+            share, lower, upper = (100.0 * closed(end[i]) for end in indices.first[:3])
             if np.isfinite(lower).all():
                 ax.fill_between(theta, lower, upper, color=style.COLOURS[i], alpha=0.15, lw=0)
             ax.plot(theta, share, color=style.COLOURS[i], ls=style.DASHES[i], label=name)
@@ -350,13 +330,13 @@ def _panels(angle: AgainstAngle) -> Iterator[Panel]:
         ax.set(ylim=(0.0, 1.05 * max(ceiling, 1.0)), ylabel="share of the variance [%]")
         drawing.legend_above(ax, *ax.get_legend_handles_labels())
 
-    told = (
+    description = (
         f"Median of the joints between {middle.min():.4g} and {middle.max():.4g} {unit} over the input angle; "
         f"95 % of the joints stay below {high.max():.4g} {unit} everywhere"
     )
     size, room = (4.9, 3.1), drawing.legend_room
-    yield Panel(f"angle-{key}", f"{key} over the revolution", told, draw_loads, size, top=room(LOADS))
-    estimates = zip(leading, angle.overall.estimate, strict=False)
-    told = "Over the whole revolution: " + ", ".join(f"{name} {100 * share:.1f} %" for name, share in estimates)
-    title = f"{angle.quantity}: share of the variance over the input angle"
-    yield Panel(f"angle-shares-{key}", title, told, draw_shares, size, top=room(leading))
+    yield Panel(f"angle-{key}", f"{key} over the revolution", description, draw_loads, size, top=room(LOADS))
+    estimates = zip(leading, indices.overall.estimate, strict=False)
+    description = f"Over the whole revolution: {', '.join(f'{name} {100 * x:.1f} %' for name, x in estimates)}"
+    title = f"{indices.quantity}: share of the variance over the input angle"
+    yield Panel(f"angle-shares-{key}", title, description, draw_shares, size, top=room(leading))

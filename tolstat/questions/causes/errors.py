@@ -6,29 +6,27 @@ import math
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from functools import partial
-from pathlib import Path
 from shlex import quote
-from typing import Annotated, Any, Literal
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from tolstat import study
-from tolstat.campaign.work import Work
+from tolstat import sampling
+from tolstat.analysis import pick_freeze, ranks, sensitivity
+from tolstat.analysis.sample import Sample
 from tolstat.common.errors import Fault, InputError, NotApplicable, TolstatError
 from tolstat.common.forked import mapped
-from tolstat.common.loads import unit_text
+from tolstat.common.loads import ANY_LIMIT, FloatArray, unit_text
 from tolstat.common.tables import VALID
 from tolstat.display import drawing, style
 from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Part, Row, Rows, Sentence, Table, has
-from tolstat.display.options import Costs, Load, Opt, Top
+from tolstat.display.options import Costs, Load, Top
 from tolstat.display.style import patches
 from tolstat.display.text import ends
 from tolstat.questions import shares
-from tolstat.questions.causes import lines, simulation
-from tolstat.questions.causes.indices import Indices, estimated, indices
+from tolstat.questions.causes import lines
+from tolstat.questions.causes.simulation import simulate as simulate
 from tolstat.store.view import View
-from tolstat.study import Study
-from tolstat.study.rewriting import with_keys
 
 SIGNIFICANT = 0.05
 """p-value below which a table marks an error of the tail."""
@@ -36,10 +34,18 @@ SHOWN = 10
 """Number of errors shown for each load on the page."""
 JOINTS = 20_000
 """Maximum number of joints (the first ones) of which the page takes causes: more add little and take memory."""
-POINTS = 1024
-"""Default number of points of a pick-freeze design."""
-Groups = Literal["tolerance", "error"]
-"""Errors that a pick-freeze design exchanges together."""
+MIN_JOINTS = 200
+"""Minimum number of valid joints."""
+MAX_JOINTS = sensitivity.MOST
+"""Maximum number of joints (the first ones) for shares and ranks, and on either side of the tail: more add little, and
+a million joints with fifty errors do not fit into a gigabyte."""
+KINDS = ("first", "total", "srrc", "direction", "size")
+TAIL = KINDS[-2:]
+
+Parts = Mapping[str, NamedTuple]
+"""Estimates of all errors with their ends, by name of `KINDS`."""
+
+
 ALONE, IN_ALL = "alone (first order), 95 %", "in all (bounds of the total index)"
 BARS = (
     "Bars: share of a load's variance that vanishes when the error is removed (first-order index). "
@@ -47,6 +53,42 @@ BARS = (
 )
 GREY = "Grey: share that the error takes part in, alone or with others (bounds of the total index)."
 LOGARITHMS = "Where a few joints with large loads dominate the variance, it is that of the logarithm."
+
+
+class Indices(NamedTuple):
+    """What each error contributes to a load.
+
+    Attributes
+    ----------
+    facts : mapping
+        ``load``, ``unit``, ``logarithm``; ``joints`` (valid), ``used`` (of them for shares and ranks),
+        ``without_load``; ``level`` at which the tail begins, SI: the study's limit or, without one, the 90 % quantile;
+        ``above``: number of joints above it; ``std`` of the load or its logarithm; ``additive``: sum of the
+        first-order indices; ``r2`` of the rank regression, NaN for a pick-freeze design.
+    rows : sequence of mapping
+        One row per error that scatters (two per vector of a zone), the largest first-order index first: ``error``; with
+        ``_lower`` and ``_upper``: ``first``, ``total`` (NaN for correlated errors), ``srrc``, ``direction`` and
+        ``size``; the last two also with ``_p``, and NaN if too few joints are on either side of the level. For a
+        pick-freeze design, one row per group of errors, with ``first`` and ``total`` only.
+    """
+
+    facts: Mapping[str, Any]
+    rows: Rows
+
+    @property
+    def quantity(self) -> str:
+        """Name of the decomposed quantity: the load, or its logarithm."""
+        return f"log {self.facts['load']}" if self.facts["logarithm"] else str(self.facts["load"])
+
+    @property
+    def of_design(self) -> bool:
+        """Whether the joints are a pick-freeze design."""
+        return math.isnan(self.facts["r2"])
+
+    @property
+    def with_intervals(self) -> bool:
+        """Whether the samples are independent."""
+        return not all(math.isnan(row["first_lower"]) for row in self.rows)
 
 
 def causes(view: View, by: Load = None, top: Top = 12, logarithm: bool = False, costs: Costs = None) -> Answer:
@@ -84,7 +126,7 @@ def causes(view: View, by: Load = None, top: Top = 12, logarithm: bool = False, 
     Returns
     -------
     Answer
-        Table ``errors`` and facts, see `indices.indices`. Where the file has joints with other widths, first the tables
+        Table ``errors`` and facts, see `Indices`. Where the file has joints with other widths, first the tables
         of `lines.lines`, and a fact ``lines`` with its facts.
 
     Raises
@@ -103,8 +145,8 @@ def causes(view: View, by: Load = None, top: Top = 12, logarithm: bool = False, 
     ['pin1.offset_t', 'pin2.offset_z']
     """
     load = by or view.decisive
-    found = indices(view, load, logarithm)
-    facts, parts = found.facts, list[Part]()
+    of_errors = indices(view, load, logarithm)
+    facts, parts = of_errors.facts, list[Part]()
     command = f"tolstat causes {quote(str(view.path))} --run"
     if costs is not None and not view.altered:
         missing = f"is about changes of lines, and {view.path} holds no joints with one"
@@ -113,98 +155,36 @@ def causes(view: View, by: Load = None, top: Top = 12, logarithm: bool = False, 
         with suppress(NotApplicable):  # joints of other lines, or at other operating points
             changed = lines.lines(view, load, costs=costs)
             parts, facts = list(changed.parts), {**facts, "lines": changed.facts}
-    elif not found.of_design:
+    elif not of_errors.of_design:
         parts.append(Sentence(f"which line of the drawing to change: {command}"))
-    parts += [Panels([_tornado(found)]), _table("errors", found, top)]
-    parts += map(Sentence, _notes(found, "" if view.altered else command))
+    parts += [Panels([_tornado(of_errors)]), _table("errors", of_errors, top)]
+    parts += map(Sentence, _notes(of_errors, "" if view.altered else command))
     return Answer("causes", "Causes by error", parts, facts)
-
-
-def simulate(
-    source: Study | Path,
-    work: Work,
-    by: Load = None,
-    points: Annotated[int, Opt("N", least=50)] = POINTS,
-    groups: Groups = "tolerance",
-    each: simulation.Each = "entry",
-    group: Annotated[list[str] | None, Opt("NAME=PATTERN,...")] = None,
-    budget: Annotated[float, Opt("TIME", unit="s")] = simulation.BUDGET_S,
-    most: Annotated[int, Opt("N", least=simulation.LEAST)] = simulation.MOST,
-) -> list[Path]:
-    """Simulate a pick-freeze design of a study, or into a result file joints with other widths of each line.
-
-    Parameters
-    ----------
-    source : Study or Path
-        The study, or the result file, see `simulation.simulate`.
-    work : Work
-        Workers, folder and progress.
-    by : str, optional
-        Load whose limit orders the lines.
-    points : int
-        With STUDY: number of points of the pick-freeze design.
-    groups : {"tolerance", "error"}
-        With STUDY: exchange all errors of a tolerance together, or each error by itself.
-    each : {"entry", "feature", "error"}
-        With --run: a line is an entry of [tolerances], a pin with its hole, or an error.
-    group : list of str, optional
-        With --run: also change these errors together; repeatable.
-    budget : float
-        With --run: time limit, with unit s, min or h; 5 min unless given.
-    most : int
-        With --run: largest number of joints of each change.
-
-    Returns
-    -------
-    list of Path
-        The result file.
-
-    Raises
-    ------
-    InputError
-        When options of the one are given with the other.
-    """
-    of_study = {"--points": points != POINTS, "--groups": groups != "tolerance"}
-    of_file = {"--each": each != "entry", "--group": bool(group)}
-    of_file |= {"--budget": budget != simulation.BUDGET_S, "--most": most != simulation.MOST}
-    if isinstance(source, Path):
-        _refuse(of_study, "about the design of a study", "give a study (TOML)")
-        return simulation.simulate(source, work, by, each, group or (), budget, most)
-    _refuse(of_file, "about what --run simulates into FILE", "give a result file")
-    keys = {"method": "pick_freeze", "n": points, "groups": groups}
-    text = with_keys(source.text, {("sampling",): keys}, str(source.path))
-    return [work.run(study.load(source.path, text=text), f"{source.path.stem}_causes.h5")]
-
-
-def _refuse(given: Mapping[str, bool], found: str, remedy: str) -> None:
-    """Refuse those of some options that are given."""
-    if used := [option for option, is_given in given.items() if is_given]:
-        raise InputError([Fault(", ".join(used), f"{'are' if len(used) > 1 else 'is'} {found}", remedy)])
 
 
 def causes_on_page(view: View, asked: Asked) -> Answer:
     """Causes of the leading loads; of a load with a long tail, those of its logarithm."""
     if view.method == "sweep" or not view.count(*VALID):
         raise NotApplicable
-    found: list[Indices] = []
+    each: list[Indices] = []
     with asked.noting("causes are left out"):
         view.check("index")
         loads = view.loads(view.leading)
         jobs = [partial(indices, view, load.name, load.long_tailed, JOINTS) for load in loads]
         tried = mapped([partial(_tried, job) for job in jobs], min(asked.processes, 2))
-        for load, job, own in zip(loads, jobs, tried, strict=True):
+        for load, job, of_errors in zip(loads, jobs, tried, strict=True):
             with asked.noting(f"no causes of {load.name}"):
-                found.append(own or job())  # which raises what it raised before
-    if not found:
+                each.append(of_errors or job())  # which raises what it raised before
+    if not each:
         raise NotApplicable
-    introduction = [BARS, *([GREY] if any(_has_narrow_bounds(own.rows) for own in found) else [])]
-    introduction += [LOGARITHMS] if any(own.facts["logarithm"] for own in found) else []
-    introduction += [] if found[0].with_intervals else ["No intervals: the samples are not independent."]
-    parts: list[Part] = [Sentence(" ".join(introduction), "lead"), Panels(list(map(_tornado, found)))]
+    introduction = [BARS, GREY * any(_has_narrow_bounds(of_errors.rows) for of_errors in each)]
+    introduction.append(LOGARITHMS * any(of_errors.facts["logarithm"] for of_errors in each))
+    introduction.append("" if each[0].with_intervals else "No intervals: the samples are not independent.")
+    parts: list[Part] = [Sentence(" ".join(filter(None, introduction)), "lead"), Panels(list(map(_tornado, each)))]
     command = "" if view.altered else f"tolstat causes {quote(view.path.name)} --run"
-    for own in found:
-        parts.append(_table(f"errors_{own.facts['load']}", own, SHOWN))
-        parts += map(Sentence, _notes(own, command))
+    for of_errors in each:
+        parts.append(_table(f"errors_{of_errors.facts['load']}", of_errors, SHOWN))
+        parts += map(Sentence, _notes(of_errors, command))
     return Answer("causes", "Causes by error", parts)
 
 
@@ -221,28 +201,28 @@ def _has_narrow_bounds(rows: Rows) -> bool:
     return bool(widths) and bool(np.median(widths) < 0.5)  # false without bounds (NaN)
 
 
-def _table(name: str, found: Indices, shown: int) -> Table:
+def _table(name: str, of_errors: Indices, shown: int) -> Table:
     """Table of all errors; people see the `shown` with the largest shares, and those with an effect on the tail.
 
     Shares of the variance in per cent and rank coefficients, with intervals; probability that a joint of the tail has
     the larger error (``direction``) and the error farther from the middle (``size``), where ``*`` marks
     p < `SIGNIFICANT`.
     """
-    total = estimated("in all, %", "total", ends=(0.0, 1.0))
-    if not found.of_design:  # given data yield bounds only
+    total = shares.estimated("in all, %", "total", ends=(0.0, 1.0))
+    if not of_errors.of_design:  # given data yield bounds only
         total = Column("in all, %", _bounds, shown=_has_narrow_bounds, rank=3)
     columns = [
-        Column("error", lambda row: str(row["error"])),
-        estimated("alone, %", "first", ends=(0.0, 1.0)),
+        Column("error", shares.word("error")),
+        shares.estimated("alone, %", "first", ends=(0.0, 1.0)),
         total,
-        estimated("rank coefficient", "srrc", form="+.2f"),
+        shares.estimated("rank coefficient", "srrc", form="+.2f"),
         Column("tail: larger", partial(_tail, name="direction"), shown=has("direction"), rank=2),
         Column("tail: farther out", partial(_tail, name="size"), shown=has("size"), rank=1),
     ]
-    marked = [min(row["direction_p"], row["size_p"]) < SIGNIFICANT for row in found.rows]
-    seen = [row for i, row in enumerate(found.rows) if i < shown or marked[i]]
-    title = f"Scatter of {found.quantity} over all joints, not of exceeding a limit, by error"
-    return Table(name, title, columns, found.rows, seen=seen)
+    rows = of_errors.rows
+    seen = [row for i, row in enumerate(rows) if i < shown or min(row["direction_p"], row["size_p"]) < SIGNIFICANT]
+    title = f"Scatter of {of_errors.quantity} over all joints, not of exceeding a limit, by error"
+    return Table(name, title, columns, rows, seen=seen)
 
 
 def _bounds(row: Row) -> str:
@@ -254,13 +234,13 @@ def _tail(row: Row, name: str) -> str:
     return "-" if math.isnan(row[name]) else f"{row[name]:.2f}{star}"
 
 
-def _notes(found: Indices, command: str) -> list[str]:
+def _notes(of_errors: Indices, command: str) -> list[str]:
     """Joints, explained variance, restrictions; `command` gives shares in all, empty if it has been run."""
-    facts, rows = found
+    facts, rows = of_errors
     unit, std = unit_text(facts["unit"]), f"{facts['std']:.4g}"
     std = f"{std}, of the logarithm" if facts["logarithm"] else f"{std} {unit}".rstrip()
     what, tail = "groups of errors", "; from a pick-freeze design"
-    if not found.of_design:
+    if not of_errors.of_design:
         what, tail = "errors", f", ranks {100 * facts['r2']:.0f} %"
         tail += f"; tail: {facts['above']} joints above {facts['level']:.5g} {unit}".rstrip()
     notes = [
@@ -272,38 +252,143 @@ def _notes(found: Indices, command: str) -> list[str]:
         notes.append(f"shares and ranks are from the first {used} joints, the tail from at most as many on either side")
     if all(math.isnan(row["total"]) for row in rows):
         notes.append("errors are correlated: shares overlap, and shares in all are not given")
-    elif not (found.of_design or _has_narrow_bounds(rows)):
+    elif not (of_errors.of_design or _has_narrow_bounds(rows)):
         remedy = f"; {command} gives them" if command else ""
         notes.append(f"no shares in all: given joints bound them too widely{remedy}")
-    return notes if found.with_intervals else [*notes, shares.NO_INTERVALS]
+    return notes if of_errors.with_intervals else [*notes, shares.NO_INTERVALS]
 
 
-def _tornado(found: Indices) -> Panel:
-    rows = found.rows[:SHOWN]
+def _tornado(of_errors: Indices) -> Panel:
+    facts, rows = of_errors.facts, of_errors.rows[:SHOWN]
     names, is_narrow = [str(row["error"]) for row in rows], _has_narrow_bounds(rows)
-    top = ", ".join(f"{row['error']} {100 * row['first']:.1f} %" for row in rows[:5])
     labels = [ALONE, *([IN_ALL] if is_narrow else [])]
 
     def draw(ax: Axes) -> None:
-        place = np.arange(len(rows))
+        y = np.arange(len(rows))
         first, low, high, total_low, total_high = (
             100.0 * np.array([row[key] for row in rows])
             for key in ("first", "first_lower", "first_upper", "total_lower", "total_upper")
         )
         drawing.rows(ax, names)
-        ax.barh(place, first.clip(min=0.0), height=0.5, color=style.COLOURS[0], zorder=2)
+        ax.barh(y, first.clip(min=0.0), height=0.5, color=style.COLOURS[0], zorder=2)
         handles = [patches.Patch(color=style.COLOURS[0])]
         if is_narrow:
             grey: dict[str, Any] = {"color": drawing.GREY, "alpha": 0.45}
-            ax.barh(place, total_high - total_low, left=total_low, height=0.74, zorder=1, **grey)
+            ax.barh(y, total_high - total_low, left=total_low, height=0.74, zorder=1, **grey)
             handles.append(patches.Patch(**grey))
         if np.isfinite(low).any():
-            ax.hlines(place, low, high, color=style.INK, lw=1.2, zorder=3)
+            ax.hlines(y, low, high, color=style.INK, lw=1.2, zorder=3)
         ax.set_xlim(0.0, None)
         drawing.legend_above(ax, handles, labels)
-        ax.set_xlabel(f"share of the variance of {found.quantity} [%]")
+        ax.set_xlabel(f"share of the variance of {of_errors.quantity} [%]")
 
-    told = f"Largest first-order indices: {top}; all errors alone {100 * found.facts['additive']:.0f} %"
-    title, size = f"{found.quantity}: share of the variance by error", (4.9, drawing.rows_height(len(rows)) + 0.25)
-    left, key = drawing.rows_left(names), f"tornado-{found.facts['load']}"
-    return Panel(key, title, told, draw, size, left, drawing.legend_room(labels, left))
+    largest = ", ".join(f"{row['error']} {100 * row['first']:.1f} %" for row in rows[:5])
+    description = f"Largest first-order indices: {largest}; all errors alone {100 * facts['additive']:.0f} %"
+    title, size = f"{of_errors.quantity}: share of the variance by error", (4.9, drawing.rows_height(len(rows)) + 0.25)
+    left, key = drawing.rows_left(names), f"tornado-{facts['load']}"
+    return Panel(key, title, description, draw, size, left, drawing.legend_room(labels, left))
+
+
+def indices(
+    view: View, by: str, logarithm: bool = False, joints: int | None = None, confidence: float = 0.95
+) -> Indices:
+    """Estimate what each error contributes to a load.
+
+    Parameters
+    ----------
+    view : View
+        A campaign whose joints are drawn from tolerances, all of the same weight.
+    by : str
+        A load that can have a limit (``cross1.F``, ``pin2.contact``, ``psi``).
+    logarithm : bool
+        Decompose the variance of the load's logarithm: for a load whose variance a few joints dominate.
+    joints : int, optional
+        Number of samples to use, from the first; by default all. Of a pick-freeze design all are used.
+    confidence : float
+        Confidence level of all intervals.
+
+    Returns
+    -------
+    Indices
+
+    Raises
+    ------
+    InputError
+        When there is no such load, the study does not keep it, or `logarithm` is set and a value is not positive.
+    StoreError
+        When the file has too few valid joints, or joints that are not drawn from tolerances or differ in weight.
+    """
+    view.check_drawn()
+    view.check("index")
+    load = view.load(by)
+    if joints is not None and not view.study.groups:
+        load = load.only(np.arange(min(joints, view.n)))
+    estimate = _of_design if view.study.groups else _of_samples
+    names, parts, variance = estimate(view, load, logarithm, confidence)
+    first: Any = parts["first"]
+    regression: Any = parts.get("srrc")
+    valid, level = load.valid, shares.tail_level(load)
+    facts = {"load": load.name, "unit": load.unit, "logarithm": logarithm, "joints": valid.size}
+    facts |= {"used": min(valid.size, MAX_JOINTS) if regression else valid.size, "without_load": sum(load.unresolved)}
+    facts |= {"level": level, "above": int((valid > level).sum()), "std": math.sqrt(variance)}
+    facts |= {"additive": float(first.estimate.sum()), "r2": regression.r2 if regression else math.nan}
+    columns: dict[str, Any] = {"error": names}
+    for kind in KINDS:
+        estimates = parts[kind]._asdict() if kind in parts else {}
+        keys = {"": "estimate", "_lower": "lower", "_upper": "upper"} | ({"_p": "p"} if kind in TAIL else {})
+        for end, key in keys.items():
+            columns[f"{kind}{end}"] = np.broadcast_to(estimates.get(key, np.nan), len(names)).tolist()
+    return Indices(facts, sorted(shares.rows_of(columns), key=lambda row: -row["first"]))
+
+
+def _of_samples(view: View, load: Sample, logarithm: bool, confidence: float) -> tuple[list[str], Parts, float]:
+    """Names, estimates and variance from joints that are all drawn from the same tolerances."""
+    study, independent = view.study, view.design.has_interval("index")
+    samples = np.flatnonzero(load.is_valid)
+    values = load.values[samples]
+    needed = max(MIN_JOINTS, len(sampling.streams(study)) + 2 * ranks.GROUPS)
+    if values.size < needed:
+        what = "load on all limits" if load.name == ANY_LIMIT else load.name
+        raise shares.unusable(view, f"has {values.size} joints with a valid {what}", f"run {needed} joints or more")
+    if np.ptp(values) == 0:
+        same = f"has the same {load.name} in all joints: no error causes it"
+        raise shares.unusable(view, same, "name another load with --by")
+    columns = sampling.columns(study)
+    components = sampling.components(study, view.errors(samples[:MAX_JOINTS], columns))
+    names = [name for name, values_of_error in components.items() if np.ptp(values_of_error) > 0]
+    x = np.column_stack([components[name] for name in names])
+    response = (_logarithm(load.name, values) if logarithm else values)[:MAX_JOINTS]
+    parts: dict[str, NamedTuple] = {"srrc": ranks.regression(x, values[:MAX_JOINTS], confidence, independent)}
+    if study.copula.names or study.sampling.is_matched:
+        first = sensitivity.first_order(x, response, confidence, independent)
+    else:
+        first, parts["total"] = sensitivity.first_and_total(x, response, confidence, independent)
+    above = values > shares.tail_level(load)
+    if ranks.FEWEST <= above.sum() <= above.size - ranks.FEWEST:
+        chosen = np.sort(np.concatenate([np.flatnonzero(side)[:MAX_JOINTS] for side in (above, ~above)]))
+        scores = sampling.normal_scores(study, view.errors(samples[chosen], columns))
+        z = np.column_stack([scores[name] for name in names])
+        parts |= ranks.tail(z, above[chosen], confidence, independent)._asdict()
+    return names, parts | {"first": first}, float(first.variance)
+
+
+def _of_design(view: View, load: Sample, logarithm: bool, confidence: float) -> tuple[list[str], Parts, float]:
+    """Names of groups, their Sobol' indices and variance from a pick-freeze design."""
+    groups = view.study.groups
+    if not view.store.whole:
+        raise shares.unusable(view, "holds a slice of a design", "merge all slices first: tolstat merge")
+    values = _logarithm(load.name, load.values) if logarithm else load.values
+    points = values.reshape(-1, len(groups) + 2)
+    try:
+        index = pick_freeze.indices(points[:, 0], points[:, 1], points[:, 2:], confidence)
+    except ValueError as error:
+        remedy = f"run {pick_freeze.FEWEST} points or more; decompose the logarithm of a load with a long tail"
+        raise shares.unusable(view, str(error), remedy) from error
+    return [group.label for group in groups], {"first": index.first, "total": index.total}, float(index.variance)
+
+
+def _logarithm(name: str, values: FloatArray) -> FloatArray:
+    if np.nanmin(values, initial=np.inf) <= 0:
+        remedy = "decompose the variance of the load itself, not of its logarithm"
+        raise InputError([Fault(name, "is not positive in all joints", remedy)])
+    return np.asarray(np.log(values))

@@ -17,8 +17,8 @@ from tolstat.display.answer import Answer, Artist, Asked, Axes, Column, Panel, P
 from tolstat.display.options import Accepted, Costs, Load
 from tolstat.display.style import markers, patches
 from tolstat.questions.causes import shares
-from tolstat.questions.causes.indices import estimated
 from tolstat.questions.causes.shares import INDICES, Lines
+from tolstat.questions.shares import estimated
 from tolstat.store.view import View
 from tolstat.study.widths import COARSER, EXACT, FINER, HALF, STEPS
 

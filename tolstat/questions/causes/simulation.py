@@ -1,4 +1,7 @@
-"""Simulate the joints that the lines of the drawing are compared on, until the order of the lines is settled."""
+"""Simulate what tells causes: a pick-freeze design, or joints with each line of the drawing changed.
+
+The lines are compared on the latter, more and more of them, until their order is settled.
+"""
 
 from __future__ import annotations
 
@@ -6,16 +9,19 @@ import math
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 
+from tolstat import study
 from tolstat.campaign import what_if as sets
 from tolstat.campaign.pool import kept_workers
 from tolstat.campaign.what_if import Asked, Change
 from tolstat.campaign.work import Work
 from tolstat.common.cores import available_cores
+from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import ANY_LIMIT, split
+from tolstat.display.options import Load, Opt
 from tolstat.display.progress import clock
 from tolstat.questions.causes import shares
 from tolstat.questions.shares import check_sample, own_joints
@@ -23,8 +29,9 @@ from tolstat.solver.compilation import warm_up
 from tolstat.store import Writer, what_if
 from tolstat.store.hdf5 import store_error
 from tolstat.store.view import View
-from tolstat.study import widths
+from tolstat.study import Study, widths
 from tolstat.study.points import names_of
+from tolstat.study.rewriting import with_keys
 from tolstat.study.widths import STEPS, Line
 
 FIRST, LEAST, MOST = 1024, 128, 16_384
@@ -35,7 +42,11 @@ RELIABLE = 2000
 """Number of simulated joints whose time, with the start of the workers, says more than the pilot's."""
 BUDGET_S = 300.0
 """Default time limit, s."""
+POINTS = 1024
+"""Default number of points of a pick-freeze design."""
 
+Groups = Literal["tolerance", "error"]
+"""Errors that a pick-freeze design exchanges together."""
 Each = Literal["entry", "feature", "error"]
 """What a line is."""
 LINES = {"entry": widths.lines, "feature": widths.features, "error": widths.errors}
@@ -43,70 +54,92 @@ LINES = {"entry": widths.lines, "feature": widths.features, "error": widths.erro
 
 
 def simulate(
-    path: Path,
+    source: Study | Path,
     work: Work,
-    by: str | None = None,
+    by: Load = None,
+    points: Annotated[int, Opt("N", least=50)] = POINTS,
+    groups: Groups = "tolerance",
     each: Each = "entry",
-    group: Sequence[str] = (),
-    budget: float = BUDGET_S,
-    most: int = MOST,
+    group: Annotated[list[str] | None, Opt("NAME=PATTERN,...")] = None,
+    budget: Annotated[float, Opt("TIME", unit="s")] = BUDGET_S,
+    most: Annotated[int, Opt("N", least=LEAST)] = MOST,
 ) -> list[Path]:
-    """Simulate joints with each line changed, and keep their loads in the file.
+    """Simulate a pick-freeze design of a study, or into a result file joints with other widths of each line.
 
-    Of several operating points those that `by` or a limit of the study is about. Ends when the order of the lines is
-    settled, the time is up, or each change has `most` joints. What is done by then stays in the file; the same call
-    goes on.
+    Of a file with several operating points those that `by` or a limit of the study is about. Ends when the order of the
+    lines is settled, the time is up, or each change has `most` joints. What is done by then stays in the file; the same
+    call goes on.
 
     Parameters
     ----------
-    path : Path
-        Result file of a campaign whose joints are drawn from tolerances.
+    source : Study or Path
+        The study, or the result file of a campaign whose joints are drawn from tolerances.
     work : Work
-        Workers, progress and messages.
+        Workers, folder, progress and messages.
     by : str, optional
         Load whose limit orders the lines; by default all limits together, or the only one.
+    points : int
+        With STUDY: number of points of the pick-freeze design.
+    groups : {"tolerance", "error"}
+        With STUDY: exchange all errors of a tolerance together, or each error by itself.
     each : {"entry", "feature", "error"}
-        A line is an entry of [tolerances], a pin with its hole, or an error.
-    group : sequence of str
-        Errors that are changed together, too: ``"tilts = pin*.tilt_*, hole*.tilt_*"``.
+        With --run: a line is an entry of [tolerances], a pin with its hole, or an error.
+    group : list of str, optional
+        With --run: also change these errors together; repeatable.
     budget : float
-        Time limit, s.
+        With --run: time limit, with unit s, min or h; 5 min unless given.
     most : int
-        Largest number of joints of each change.
+        With --run: largest number of joints of each change.
 
     Returns
     -------
     list of Path
-        The file.
+        The result file.
 
     Raises
     ------
     InputError
-        With every fault of `group`, or when there is no such load.
+        When options of the one are given with the other, with every fault of `group`, or when there is no such load.
     StoreError
         When the file cannot be used, or was made by other code.
     """
-    with Writer.open(path) as store, kept_workers():
+    of_study = {"--points": points != POINTS, "--groups": groups != "tolerance"}
+    of_file = {
+        "--each": each != "entry",
+        "--group": bool(group),
+        "--budget": budget != BUDGET_S,
+        "--most": most != MOST,
+    }
+    refused, about, remedy = of_file, "about what --run simulates into FILE", "give a result file"
+    if isinstance(source, Path):
+        refused, about, remedy = of_study, "about the design of a study", "give a study (TOML)"
+    if used := [option for option, is_given in refused.items() if is_given]:
+        raise InputError([Fault(", ".join(used), f"{'are' if len(used) > 1 else 'is'} {about}", remedy)])
+    if not isinstance(source, Path):
+        keys = {"method": "pick_freeze", "n": points, "groups": groups}
+        text = with_keys(source.text, {("sampling",): keys}, str(source.path))
+        return [work.run(study.load(source.path, text=text), f"{source.path.stem}_causes.h5")]
+    with Writer.open(source) as store, kept_workers():
         view = View(store)
         check_sample(view, "difference", whole=True)
         load = by or view.decisive
         view.load(load)  # which refuses what is none
         sets.check_code(store)
-        lines = [*LINES[each](view.study), *widths.named(view.study, group)]
+        lines = [*LINES[each](view.study), *widths.named(view.study, group or ())]
         if not lines:
             remedy = 'name what a study can change: --group "tilts = pin*.tilt_*, hole*.tilt_*"'
-            raise store_error(path, "has no line that can be changed", remedy)
+            raise store_error(source, "has no line that can be changed", remedy)
         warm_up()
         work.tell("each change is one line of the drawing; all else of the joint stays as drawn")
         work.tell(_Looks(store, view, lines, load, work, budget, most).run())
-    return [path]
+    return [source]
 
 
 def points_of(view: View, by: str) -> tuple[str, ...]:
     """Operating points that a load, a limit or joints in the file are about; all of them if there is no limit."""
     every = tuple(view.store.points)
-    asked = () if by == ANY_LIMIT else (by,)
-    names = [*asked, *(view.limits or ("",)), *(name for one in view.altered.values() for name in one.names)]
+    names = [*(() if by == ANY_LIMIT else (by,)), *(view.limits or ("",))]
+    names += [name for change in view.altered.values() for name in change.names]
     chosen = {point for name in names for point in names_of(split(name)[1], every, name)}
     return tuple(point for point in every if point in chosen)
 
@@ -120,11 +153,11 @@ class _Looks:
         self._budget, self._end, self._most = budget, time.monotonic() + budget, most
         self._store, self._view, self._lines, self._load, self._work = store, view, lines, load, work
         self._workers = work.workers or available_cores()
-        self._held, self._asked = what_if.read(store), Asked(view.kept_loads, points_of(view, load))
+        self._altered, self._asked = what_if.read(store), Asked(view.kept_loads, points_of(view, load))
         options = sets.options_of(view.study, store)
         self._seconds = sets.seconds_per_joint(view.study, options, PILOT, self._asked.points) / self._workers
         self._own = own_joints(view)
-        self._looks, self._simulated, self._cut = 0, 0, False
+        self._looks, self._simulated, self._is_cut = 0, 0, False
 
     @property
     def _left(self) -> float:
@@ -137,19 +170,19 @@ class _Looks:
         affordable = int(0.5 * self._budget / (self._seconds * changes))
         n = max(LEAST, min(self._own if LEAST < self._own < FIRST else FIRST, affordable, self._most))
         confidence = 1.0 - 0.05 / (1 + math.ceil(math.log2(max(self._most / n, 1.0))))
-        settled = self._look(n, confidence)
-        while not settled:
+        is_settled = self._look(n, confidence)
+        while not is_settled:
             affordable = n + int(0.9 * self._left / (self._seconds * (len(self._lines) + 1.0)))
             more = min(2 * n, affordable, self._most)
             if more <= 1.1 * n:
                 break
-            n, settled = more, self._look(more, confidence, decisive=True)
+            n, is_settled = more, self._look(more, confidence, decisive=True)
         if self._simulated and self._left > 0.0:
-            settled = self._look(n, confidence)
+            is_settled = self._look(n, confidence)
         more_of = "a larger --most" if n >= self._most else "a longer --budget"
-        order = "settled" if settled else f"not settled: {more_of} goes on"
+        order = "settled" if is_settled else f"not settled: {more_of} goes on"
         done = f"simulated {self._simulated} joints in {self._budget - self._left:.0f} s"
-        return f"{done}, {'up to ' if self._cut else ''}{n} of each change; order of lines {order}"
+        return f"{done}, {'up to ' if self._is_cut else ''}{n} of each change; order of lines {order}"
 
     def _look(self, n: int, confidence: float, decisive: bool = False) -> bool:
         """Simulate what is missing of `n` joints of each line after all its steps, or after its `decisive` one.
@@ -159,41 +192,41 @@ class _Looks:
         bool
             Whether the order of the lines is settled then.
         """
-        wanted, left = self._wanted(n, decisive), self._left
+        study, left, names = self._view.study, self._left, self._asked.names(self._view.study)
+        wanted = self._wanted(n, decisive)
+
+        def lacking() -> int:
+            return sum(len(sets.missing(self._altered, change, names)) for change in wanted)
+
         self._looks += 1
-        if lacking := self._lacking(wanted):
-            needed, points = self._seconds * lacking, self._asked.points
-            where = f" at {', '.join(points)}" if all(points) else ""
+        if missing := lacking():
+            needed, points, n_lines = self._seconds * missing, self._asked.points, len(self._lines)
+            at = f" at {', '.join(points)}" if all(points) else ""
             cost = f"about {clock(needed)} on {self._workers} processes"
             cost += f", of which {clock(max(left, 0.0))} are left" if needed > left else ""
-            lines = f"{len(self._lines)} lines, {n} joints of each change"
-            self._work.tell(f"{lines}: {lacking} joints to simulate{where}, {cost}")
+            self._work.tell(f"{n_lines} lines, {n} joints of each change: {missing} joints to simulate{at}, {cost}")
             self._work.display.stage(f"look {self._looks}", left)
-            stop, shown = (lambda: self._left <= 0.0), self._work.display
-            self._held = sets.simulate(self._view.study, self._store, wanted, self._asked, self._workers, stop, shown)
-            done = lacking - (still := self._lacking(wanted))
-            self._cut = still > 0
+            stop, progress = (lambda: self._left <= 0.0), self._work.display
+            self._altered = sets.simulate(study, self._store, wanted, self._asked, self._workers, stop, progress)
+            still = lacking()
+            self._is_cut, done = still > 0, missing - still
             if done > RELIABLE:
                 self._seconds = (left - self._left) / done
             self._simulated += done
-        return shares.Joints(self._view, self._load, self._held).settled(self._lines, confidence)
-
-    def _lacking(self, wanted: Sequence[Change]) -> int:
-        names = self._asked.names(self._view.study)
-        return sum(len(sets.missing(self._held, one, names)) for one in wanted)
+        return shares.Joints(self._view, self._load, self._altered).settled(self._lines, confidence)
 
     def _wanted(self, n: int, decisive: bool) -> list[Change]:
         """Sets of a look, what the order needs first."""
         study, lines = self._view.study, self._lines
-        found = [sets.as_drawn(study, range(self._own, n))] if n > self._own else []
+        wanted = [sets.as_drawn(study, range(self._own, n))] if n > self._own else []
         if decisive:
-            joints = shares.Joints(self._view, self._load, self._held)
-            return found + [sets.stepped(study, line, joints.decisive(line)[0], range(n)) for line in lines]
-        each = [(line, step) for line in lines for step in widths.steps(study, line)]
-        each.sort(key=lambda own: STEPS.index(own[1]) if own[1] in STEPS else 0)
-        found += [sets.stepped(study, line, step, range(n)) for line, step in each]
+            joints = shares.Joints(self._view, self._load, self._altered)
+            return wanted + [sets.stepped(study, line, joints.decisive(line)[0], range(n)) for line in lines]
+        changes = [(line, step) for line in lines for step in widths.steps(study, line)]
+        changes.sort(key=lambda change: STEPS.index(change[1]) if change[1] in STEPS else 0)
+        wanted += [sets.stepped(study, line, step, range(n)) for line, step in changes]
         for line in lines:
             inside = np.array([name in line.names for name in study.copula.names], bool)
             if not study.copula.matrix[inside][:, ~inside].any():  # else an exchange would break the correlation
-                found.append(sets.exchanged(study, line, range(n // 2)))
-        return found
+                wanted.append(sets.exchanged(study, line, range(n // 2)))
+        return wanted

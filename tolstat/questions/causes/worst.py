@@ -20,6 +20,7 @@ from tolstat.display import drawing, style, text
 from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Part, Row, Rows, Sentence, Table
 from tolstat.display.options import Load, Top
 from tolstat.questions.causes import angles
+from tolstat.questions.shares import rows_of, value, word
 from tolstat.store import revolutions
 from tolstat.store.view import View
 
@@ -37,10 +38,10 @@ ERRORS_ON_PAGE = 4
 """Number of errors of each joint on the page."""
 KEYS = ("load", "unit", "row", "value", "point", "status")
 """Keys of a row that are no errors."""
-ROW = Column("row", lambda row: str(row["row"]))
+ROW = Column("row", word("row"))
 WHERE = (
-    Column("at", lambda row: str(row["point"]), words=True, shown=lambda rows: any(row["point"] for row in rows)),
-    Column("status", lambda row: str(row["status"]), words=True),
+    Column("at", word("point"), words=True, shown=lambda rows: any(row["point"] for row in rows)),
+    Column("status", word("status"), words=True),
 )
 """Operating point and status of a joint."""
 
@@ -81,13 +82,12 @@ def worst(view: View, by: Load = None, top: Top = 10) -> Answer:
         ROW,
         Column(f"{load} [{unit}]" if unit != "1" else load, lambda row: f"{row['value']:.6g}"),
         *WHERE,
-        *(Column(head, partial(_error, place=i), True, rank=i) for i, head in enumerate(ERRORS)),
+        *(Column(head, partial(_error, rank=i), True, rank=i) for i, head in enumerate(ERRORS)),
     ]
     parts: list[Part] = [Table("joints", f"Joints with the largest {load}", columns, rows)]
     if rows:
-        first = rows[0]
-        where = f" --point {quote(first['point'])}" if first["point"] else ""
-        command = f"tolstat replay {quote(str(view.path))} --row {first['row']}{where} --out trace.csv"
+        at = f" --point {quote(rows[0]['point'])}" if rows[0]["point"] else ""
+        command = f"tolstat replay {quote(str(view.path))} --row {rows[0]['row']}{at} --out trace.csv"
         parts.append(Sentence(f"next: {command}"))
     return Answer("worst", "The worst joints", parts, {"by": load, "unit": unit})
 
@@ -103,9 +103,9 @@ def worst_on_page(view: View, asked: Asked) -> Answer:
         spreads = angles.spreads(view, followed, asked.replay) if followed else {}
     panels = [_panel(view, [row for row in rows if row["load"] == load], spreads.get(load)) for load in followed]
     columns = [
-        Column("load", lambda row: str(row["load"])),
+        Column("load", word("load")),
         ROW,
-        Column("largest", lambda row: text.value(row["value"], row["unit"])),
+        Column("largest", value("value")),
         *WHERE,
         Column("largest errors, in standard deviations", _errors, words=True),
     ]
@@ -146,16 +146,14 @@ def joint_rows(view: View, by: str, n: int = 10) -> Rows:
         When the study is not that of the file.
     """
     samples, values, unit = _largest(view, by, n)
-    part, name = view.narrowed(by)
-    points = [part.points[0]] * len(samples)
-    if len(part.parts) > 1:  # a load, whose largest value is at one of them
-        each = np.stack([LOADS[name].of(own.results)[samples] for own in part.parts])
-        points = [part.points[k] for k in np.argmax(each, axis=0)]
-    about = zip(view.rows(samples).tolist(), values.tolist(), points, view.status[samples], strict=True)
-    return [
-        {"load": by, "unit": unit, "row": row, "value": value, "point": point, "status": Status(status).label} | scores
-        for (row, value, point, status), scores in zip(about, _scores(view, samples), strict=True)
-    ]
+    narrowed, name = view.narrowed(by)
+    points = [narrowed.points[0]] * len(samples)
+    if len(narrowed.parts) > 1:  # a load, whose largest value is at one of them
+        each = np.stack([LOADS[name].of(part.results)[samples] for part in narrowed.parts])
+        points = [narrowed.points[k] for k in np.argmax(each, axis=0)]
+    columns = {"row": view.rows(samples).tolist(), "value": values.tolist(), "point": points}
+    columns["status"] = [Status(status).label for status in view.status[samples]]
+    return [{"load": by, "unit": unit} | row for row in rows_of(columns | _scores(view, samples))]
 
 
 def begin_replay(view: View, asked: Asked) -> None:
@@ -194,25 +192,24 @@ def _largest(view: View, by: str, n: int) -> tuple[NDArray[np.intp], FloatArray,
     else:
         known = [*view.kept_loads, *columns]
         if name in LOADS or name in [column.name for column in RESULT_COLUMNS]:
-            found, remedy = f"is not kept in {view.path}, see [output] results of its study", ", ".join(known)
-            raise InputError([Fault(name, found, f"give one of: {remedy}")])
+            lacking = f"is not kept in {view.path}, see [output] results of its study"
+            raise InputError([Fault(name, lacking, f"give one of: {', '.join(known)}")])
         raise InputError([Fault(name, "is neither a load nor a column of the results", did_you_mean(name, known))])
     samples = np.flatnonzero(np.isin(view.status, SIMULATED) & np.isfinite(values))
     samples = samples[np.argsort(-values[samples], kind="stable")][:n]
     return samples, values[samples], unit
 
 
-def _scores(view: View, samples: NDArray[np.intp]) -> list[dict[str, float]]:
-    """Each error of joints that scatters, in sigma."""
-    ascending, place = np.unique(samples, return_inverse=True)
-    errors = view.errors(ascending, sampling.columns(view.study))[place]
-    scores = sampling.normal_scores(view.study, errors)
-    return [{name: float(z[i]) for name, z in scores.items()} for i in range(len(samples))]
+def _scores(view: View, samples: NDArray[np.intp]) -> dict[str, list[float]]:
+    """Each error that scatters, of some joints, in sigma."""
+    ascending, order = np.unique(samples, return_inverse=True)
+    errors = view.errors(ascending, sampling.columns(view.study))[order]
+    return {name: z.tolist() for name, z in sampling.normal_scores(view.study, errors).items()}
 
 
-def _error(row: Row, place: int) -> str:
+def _error(row: Row, rank: int) -> str:
     errors = largest_errors(row)
-    return f"{errors[place][0]} {errors[place][1]:+.2f}" if place < len(errors) else "-"
+    return f"{errors[rank][0]} {errors[rank][1]:+.2f}" if rank < len(errors) else "-"
 
 
 def _errors(row: Row) -> str:
@@ -221,14 +218,14 @@ def _errors(row: Row) -> str:
 
 def _panel(view: View, rows: Rows, spread: tuple[FloatArray, FloatArray] | None) -> Panel:
     load, rows = rows[0]["load"], rows[:DRAWN]
-    ascending, place = np.unique(drawn(view, load), return_inverse=True)
-    found = revolutions.read(view.store, view.slots(ascending), [load], ANGLES)
-    lines = {f"row {row['row']}": line for row, line in zip(rows, found.loads[load][place], strict=True)}
+    ascending, order = np.unique(drawn(view, load), return_inverse=True)
+    histories = revolutions.read(view.store, view.slots(ascending), [load], ANGLES)
+    lines = {f"row {row['row']}": line for row, line in zip(rows, histories.loads[load][order], strict=True)}
     highest = ", ".join(f"row {row['row']} up to {text.value(row['value'], row['unit'])}" for row in rows)
     limit = view.limits.get(load)
 
     def draw(ax: Axes) -> None:
-        degrees = angles.theta_axis(ax, found.angles)
+        degrees = angles.theta_axis(ax, histories.angles)
         for i, (label, line) in enumerate(lines.items()):
             ax.plot(degrees, angles.closed(line), color=style.COLOURS[i], ls=style.DASHES[i], lw=1.3, label=label)
         if spread is not None:

@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from functools import partial
-from typing import Any
 
-from tolstat.common.errors import Fault, NotApplicable
+from tolstat.common.errors import NotApplicable
 from tolstat.common.tables import VALID, Status
 from tolstat.display import text
 from tolstat.display.answer import Answer, Asked, Panels, Part, Sentence, Table, Text
 from tolstat.display.options import Accepted
-from tolstat.display.table import Column, Row, Rows, has, has_unresolved
+from tolstat.display.table import Column, Row, by_share, has, has_unresolved
 from tolstat.display.verdict import WORDS
 from tolstat.joint.arms import one_force
 from tolstat.questions import shares
@@ -23,40 +22,26 @@ from tolstat.store import known_parts
 from tolstat.store.recorded import joint_of
 from tolstat.store.view import View
 
-
-def _span(row: Row, ends: str) -> str:
-    return text.span(row[f"{ends}_lower"], row[f"{ends}_upper"])
-
-
-def _differs(rows: Rows) -> bool:
-    """Whether the interval of sampling says something beside the total one."""
-    return any(text.span(row["lower"], row["upper"]) != _span(row, "total") for row in rows)
+SAMPLED, TOTAL, BOTH = (shares.shares(f"{kind}lower", f"{kind}upper") for kind in ("", "total_", "both_"))
+"""Cells of the interval of sampling, the total one (the first is shown where it differs), and that of parts, too."""
 
 
 def _outer(row: Row) -> str:
-    return _span(row, "bound" if math.isnan(row["outer_lower"]) else "outer")
-
-
-def _has_parts(rows: Rows) -> bool:
-    return "both_lower" in rows[0]
-
-
-def above(row: Row) -> str:
-    """Joints above a limit, and of how many with a valid load."""
-    return f"{row['count']} of {row['n'] - row['n_failed'] - row['n_unsettled']}"
+    kind = "bound" if math.isnan(row["outer_lower"]) else "outer"
+    return text.span(row[f"{kind}_lower"], row[f"{kind}_upper"])
 
 
 LIMITS = (
-    Column("load", lambda row: str(row["load"])),
-    Column("kept by itself", lambda row: str(row["verdict"]), shown=has("verdict")),
-    Column("limit", lambda row: text.value(row["level"], row["unit"])),
-    Column("nominal", lambda row: text.value(row["nominal"], row["unit"]), rank=1),
-    Column("above", above),
+    Column("load", shares.word("load")),
+    Column("kept by itself", shares.word("verdict"), shown=has("verdict")),
+    Column("limit", shares.value("level")),
+    Column("nominal", shares.value("nominal"), rank=1),
+    Column("above", shares.above),
     Column("share", shares.share("estimate")),
-    Column("95 % interval", shares.shares("lower", "upper"), shown=_differs, rank=3),
+    Column("95 % interval", SAMPLED, shown=lambda rows: any(SAMPLED(row) != TOTAL(row) for row in rows), rank=3),
     Column("with unresolved joints", _outer, shown=has_unresolved, rank=2),
-    Column("total interval", shares.shares("total_lower", "total_upper"), shown=has("numerical_error")),
-    Column("with measured parts", shares.shares("both_lower", "both_upper"), shown=_has_parts, rank=1),
+    Column("total interval", TOTAL, shown=has("numerical_error")),
+    Column("with measured parts", BOTH, shown=lambda rows: "both_lower" in rows[0], rank=1),
     Column("at most, if ways are missed", shares.share("unsearched_upper"), shown=has("unsearched_upper")),
 )
 """Columns of the table ``limits``. Joints above are counted among the valid ones, as the share is; the last columns
@@ -69,6 +54,7 @@ BUDGET = (
     Column("failed and unsettled, width", lambda row: text.percent(row["bound_upper"] - row["bound_lower"])),
 )
 """Contributions to the uncertainty of each share above a limit."""
+TITLE = "Which load is exceeded by which share"
 NOTABLE = 0.1
 """Part of the interval of sampling from which on another contribution to the uncertainty is shown."""
 
@@ -96,17 +82,23 @@ def exceedance(view: View, accepted: Accepted = math.nan) -> Answer:
     """
     if view.method in ("sweep", "cases"):
         remedy = 'give the result file of a study with sampling.method "random", "sobol" or "lhs"'
-        raise NotApplicable(str(Fault(str(view.path), "its joints are no sample of a production", remedy)))
+        raise shares.inapplicable(view, "its joints are no sample of a production", remedy)
     parts = [*limit_tables(view, accepted), *quantile_tables(view), *_pictures(view), Sentence(note(view))]
-    return Answer("exceedance", "Which load is exceeded by which share", parts)
+    return Answer("exceedance", TITLE, parts)
 
 
 def exceedance_on_page(view: View, asked: Asked) -> Answer:
     """Curves of the leading loads, and the reader."""
     if not (view.method != "sweep" and view.shown_loads and view.count(*VALID)):
         raise NotApplicable
-    parts = [*_pictures(view), Sentence(_note(view)), reader(view)]
-    return Answer("exceedance", "Which load is exceeded by which share", parts)
+    words = text.sentence(note(view))
+    if len(view.nominal):
+        words += f" Triangle: the joint without errors.{_beyond(view)}"
+    if len(view.points) > 1:
+        words += " Loads are the largest over all operating points, unless they name some."
+    if missing := of.not_kept(view):
+        words += f" {text.sentence(missing)}"
+    return Answer("exceedance", TITLE, [*_pictures(view), Sentence(words), reader(view)])
 
 
 def _pictures(view: View) -> list[Part]:
@@ -137,7 +129,7 @@ def limits(view: View, accepted: Accepted = math.nan) -> Answer:
     """
     if not (view.sampled and view.limits):
         remedy = "give the result file of a study with [limits] whose joints are drawn from tolerances"
-        raise NotApplicable(str(Fault(str(view.path), "has no limits, or its joints are no sample", remedy)))
+        raise shares.inapplicable(view, "has no limits, or its joints are no sample", remedy)
     table, *others = limit_tables(view, accepted)
     panel = forest_panel(table.for_people, accepted)
     how = [Text(line, small=True) for line in _how(view, accepted)]
@@ -168,7 +160,7 @@ def quantiles(view: View) -> Answer:
         When the joints are those of a sweep, or none is valid.
     """
     if not (view.method != "sweep" and view.shown_loads and view.count(*VALID)):
-        raise NotApplicable(str(Fault(str(view.path), "has no sample of valid loads", "simulate more joints")))
+        raise shares.inapplicable(view, "has no sample of valid loads", "simulate more joints")
     title = f"Quantiles with 95 % intervals {view.design.of_quantiles}, and one-sided tolerance limits (Wilks)"
     title = title if view.design.has_interval("quantile") else "Quantiles"
     return Answer("quantiles", "Quantiles", [_quantiles(view, title, True)])
@@ -178,19 +170,17 @@ def limit_tables(view: View, accepted: float = math.nan) -> list[Table]:
     """Tables of the share above each limit, and at each operating point; none without limits."""
     if not view.limits:
         return []
-    rows = of.limit_rows(view)
-    if not math.isnan(accepted):
+    rows, is_judged = of.limit_rows(view), not math.isnan(accepted)
+    if is_judged:
         rows = [{**row, "verdict": WORDS[verdict(row, accepted)]} for row in rows]
     seen = one_force(rows, "level", "estimate")
-    verdicts = [verdict(row, accepted) for row in seen] if not math.isnan(accepted) else ()
-    found = [Table("limits", "Joints above each limit", LIMITS, rows, seen=seen, verdicts=verdicts)]
+    verdicts = [verdict(row, accepted) for row in seen] if is_judged else ()
+    tables = [Table("limits", "Joints above each limit", LIMITS, rows, seen=seen, verdicts=verdicts)]
     if points := of.point_rows(view):
         title = "Share of the joints above each limit at each operating point"
-        columns = [LIMITS[0], Column("limit", lambda row: text.value(row["level"], row["unit"]))]
-        columns += [Column(point, shares.share(point)) for point in view.points]
-        shown = one_force(points, "level", view.points[0])
-        found.append(Table("at_points", title, columns, points, seen=shown))
-    return found
+        columns = [LIMITS[0], LIMITS[2], *(Column(point, shares.share(point)) for point in view.points)]
+        tables.append(Table("at_points", title, columns, points, seen=one_force(points, "level", view.points[0])))
+    return tables
 
 
 def quantile_tables(view: View) -> list[Table]:
@@ -201,9 +191,6 @@ def quantile_tables(view: View) -> list[Table]:
 def _quantiles(view: View, title: str, whole: bool) -> Table:
     """Table of quantiles; people see one row per load, `whole` with all intervals and with tolerance limits."""
     rows = of.quantile_rows(view)
-    seen: dict[str, dict[Any, Any]] = {}
-    for row in rows:
-        seen.setdefault(row["load"], {**row})[row["share"]] = row
 
     def quantile(share: float, row: Row) -> str:
         estimate, lower, upper, unit = (row[share][key] for key in ("estimate", "lower", "upper", "unit"))
@@ -218,15 +205,14 @@ def _quantiles(view: View, title: str, whole: bool) -> Table:
         upper = view.load(row["load"]).quantile(of.COVERED, 0.9).upper
         return "needs more joints" if math.isinf(upper) else text.value(upper, row["unit"])
 
-    columns = [
-        Column("load", lambda row: str(row["load"])),
-        Column("nominal", lambda row: text.value(row["nominal"], row["unit"]), rank=1),
-    ]
+    columns = [LIMITS[0], Column("nominal", shares.value("nominal"), rank=1)]
     for share in of.SHARES:
         rank = 3 if share in of.SHARES[1:-1] else 0
         columns.append(Column(f"{100 * share:g} %{whole * ' stay below'}", partial(quantile, share), rank=rank))
     head = "tolerance limit 99 % / 95 %" if whole else f"95 % interval of {100 * of.SHARES[-1]:g} %"
-    return Table("quantiles", title, [*columns, Column(head, last)], rows, seen=list(seen.values()))
+    return Table(
+        "quantiles", title, [*columns, Column(head, last)], rows, seen=by_share(rows, "load", "nominal", "unit")
+    )
 
 
 def note(view: View) -> str:
@@ -240,16 +226,6 @@ def note(view: View) -> str:
         "light bands: with the others counted below and above every x" * (view.count(*VALID, Status.PENDING) < view.n),
     ]
     return "; ".join(clause for clause in clauses if clause)
-
-
-def _note(view: View) -> str:
-    said = text.sentence(note(view))
-    if len(view.nominal):
-        said += f" Triangle: the joint without errors.{_beyond(view)}"
-    if len(view.points) > 1:
-        said += " Loads are the largest over all operating points, unless they name some."
-    missing = of.not_kept(view)
-    return f"{said} {text.sentence(missing)}" if missing else said
 
 
 def _beyond(view: View) -> str:
@@ -270,9 +246,9 @@ def _how(view: View, accepted: float) -> Iterator[str]:
         yield "Points: share of the joints with a valid load. Grey: with failed and unsettled joints below and above."
         yield text.sentence(view.design.without_interval("share"))
         return
-    said = f"{view.design.counting} ".lstrip()
+    counting = f"{view.design.counting} ".lstrip()
     yield (
-        f"{said}Points: share of the joints with a valid load. Blue: its interval ({view.design.interval}), 95 % "
+        f"{counting}Points: share of the joints with a valid load. Blue: its interval ({view.design.interval}), 95 % "
         "for each limit by itself. Grey: the total interval. Failed and unsettled joints are counted below the limit "
         "at its lower end and above it at its upper end; it covers the numerical error, too, where it is known."
     )
@@ -291,10 +267,8 @@ def _how(view: View, accepted: float) -> Iterator[str]:
 def _uncertain(view: View) -> list[Part]:
     """What makes the shares uncertain, where a part exceeds a tenth of sampling."""
     rows = [row for row in of.limit_rows(view) if not math.isnan(row["numerical_lower"])]
-    parts = [
-        (max(_numerical(row), row["bound_upper"] - row["bound_lower"]), row["upper"] - row["lower"]) for row in rows
-    ]
-    if not any(largest > NOTABLE * 0.5 * sampling for largest, sampling in parts):
+    others = [max(_numerical(row), row["bound_upper"] - row["bound_lower"]) for row in rows]
+    if not any(other > NOTABLE * 0.5 * (row["upper"] - row["lower"]) for row, other in zip(rows, others, strict=True)):
         return []
     title = "What makes the shares above limits uncertain, in per cent of the joints"
     return [Table("uncertainty", title, BUDGET, rows, seen=one_force(rows, "level", "estimate"))]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -76,7 +75,13 @@ def _draw(ax: Axes, loads: Mapping[int, Sample], others: Sequence[Sample] = ()) 
         if load.limit is not None:
             limits.setdefault(load.limit, []).append(i)
     levels = np.concatenate([table["level"] for table in (*tables.values(), *thin.values())])
-    low, high = _axis_range(levels, list(limits))
+    # the x axis has the loads, which are not negative, and the limits unless they lie far off
+    low, high = float(levels.min()), float(levels.max())
+    reach = max(high - low, 0.02 * abs(high), 1e-12)
+    near = [limit for limit in limits if low - 0.8 * reach <= limit <= high + 0.8 * reach]
+    low, high = min([low, *near]), max([high, *near])
+    margin = 0.05 * max(high - low, reach)
+    low, high = max(low - margin, min(low, 0.0)), high + margin
     floor = 0.5 * min(loads[i].design.smallest(x["n"][0], x["estimate"]) for i, x in tables.items())
     ax.set_xlim(low, high)
     style.share_axis(ax, floor)
@@ -93,16 +98,6 @@ def _draw(ax: Axes, loads: Mapping[int, Sample], others: Sequence[Sample] = ()) 
         drawing.switched(line, "others")
     _limits(ax, dict(sorted(limits.items())), next(iter(loads.values())).unit, len(loads))
     return high, floor
-
-
-def _axis_range(levels: NDArray[np.float64], marked: list[float]) -> tuple[float, float]:
-    """Range of the x axis: the loads, which are not negative, and the limits unless they lie far off."""
-    low, high = float(levels.min()), float(levels.max())
-    reach = max(high - low, 0.02 * abs(high), 1e-12)
-    near = [x for x in marked if low - 0.8 * reach <= x <= high + 0.8 * reach]
-    low, high = min([low, *near]), max([high, *near])
-    margin = 0.05 * max(high - low, reach)
-    return max(low - margin, min(low, 0.0)), high + margin
 
 
 def _steps(ax: Axes, table: NDArray[np.void]) -> NDArray[np.float64]:
@@ -140,9 +135,9 @@ def _limits(ax: Axes, limits: Mapping[float, Sequence[int]], unit: str, count: i
             colour = style.COLOURS[which[0]] if len(which) == 1 < count else style.INK
             ax.axvline(level, color=colour, lw=1.4, ls=LIMIT_DASH, zorder=2)
     if words:
-        place = float(np.mean(np.clip((np.array([*limits]) - low) / (high - low), 0.0, 1.0)))
-        side = "left" if place < 0.3 else "right" if place > 0.7 else "center"
-        ax.annotate(f"limit {', '.join(words)}", (place, 1.0), (0, 3), "axes fraction", "offset points", ha=side)
+        middle = float(np.mean(np.clip((np.array([*limits]) - low) / (high - low), 0.0, 1.0)))
+        side = "left" if middle < 0.3 else "right" if middle > 0.7 else "center"
+        ax.annotate(f"limit {', '.join(words)}", (middle, 1.0), (0, 3), "axes fraction", "offset points", ha=side)
 
 
 def leading_panel(view: View, name: str) -> Panel:
@@ -157,26 +152,26 @@ def leading_panel(view: View, name: str) -> Panel:
     if load.valid.size:
         half, few = (text.value(load.quantile(share).estimate, load.unit) for share in (0.5, 0.99))
         description = f"half of the joints exceed {half}, 1 % {few}"
-    title, draw = f"{name}: share of the joints above x", partial(_leading, view=view, load=load, others=others)
+
+    def draw(ax: Axes) -> None:
+        """The load with band, limit and nominal joint; other loads as thin lines, and the band for all x, switched."""
+        if not load.valid.size:
+            drawing.empty(ax, "no joint with a valid result")
+            return
+        high, floor = _draw(ax, {0: load}, [other for other in view.loads(others) if other.valid.size])
+        if view.design.has_interval("band"):
+            table, half = curve(load, DRAWN_LEVELS), simultaneous(load.valid.size)
+            for end in (table["bound_upper"] + half, table["bound_lower"] - half):
+                line = _step(ax, table, end, floor, color=style.INK, lw=0.9, ls=(0.0, (4.0, 2.0)))
+                drawing.switched(line, "curve-band")
+        ax.xaxis.set_major_locator(ticker.MaxNLocator(5 if load.unit != "1" else 3))
+        unit = drawing.loads_axis(ax.xaxis, load.limit or high, load.unit)
+        ax.set_xlabel(f"x: {load.name} [{unit or '1'}], largest over the revolution")
+        ax.set_ylabel("share of joints above x")
+
+    title, description = f"{name}: share of the joints above x", f"{name}: {description}"
     looks: Any = {"size": (4.9, 3.7), "reads": (name, *others), "switches": switches}
-    return Panel(f"leading-{name}", title, f"{name}: {description}", draw, **looks)
-
-
-def _leading(ax: Axes, view: View, load: Sample, others: list[str]) -> None:
-    """One load with its band, limit and nominal joint; other loads as thin lines, and the band for all x, switched."""
-    if not load.valid.size:
-        drawing.empty(ax, "no joint with a valid result")
-        return
-    high, floor = _draw(ax, {0: load}, [other for other in view.loads(others) if other.valid.size])
-    if view.design.has_interval("band"):
-        table, half = curve(load, DRAWN_LEVELS), simultaneous(load.valid.size)
-        for end in (table["bound_upper"] + half, table["bound_lower"] - half):
-            line = _step(ax, table, end, floor, color=style.INK, lw=0.9, ls=(0.0, (4.0, 2.0)))
-            drawing.switched(line, "curve-band")
-    ax.xaxis.set_major_locator(ticker.MaxNLocator(5 if load.unit != "1" else 3))
-    unit = drawing.loads_axis(ax.xaxis, load.limit or high, load.unit)
-    ax.set_xlabel(f"x: {load.name} [{unit or '1'}], largest over the revolution")
-    ax.set_ylabel("share of joints above x")
+    return Panel(f"leading-{name}", title, description, draw, **looks)
 
 
 def reader(view: View) -> Reader:
@@ -193,29 +188,28 @@ def forest_panel(rows: Rows, accepted: float) -> Panel:
         f"95 % interval {text.span(row['lower'], row['upper'])}"
         for row in rows
     )
-    draw, size = partial(_forest, rows=rows, labels=labels, accepted=accepted), (4.9, drawing.rows_height(len(rows)))
-    left = max(1.4, drawing.rows_left(labels))
-    return Panel("forest", "Share of the joints above each limit", description, draw, size, left)
-
-
-def _forest(ax: Axes, rows: Rows, labels: list[str], accepted: float) -> None:
-    """Estimate, interval and total interval of each limit, on an axis from the least to the largest of them."""
     spans = [ends(row) if not np.isnan(ends(row)[0]) else (row["bound_lower"], row["bound_upper"]) for row in rows]
     n = max(1, *(row["n"] for row in rows))
     shown = np.array([*(row["estimate"] for row in rows), *np.ravel(spans)], float)
     shown = np.array([*shown[shown >= 0.5 / n], *([accepted] if accepted > 0 else ())])
     high = min(1.4 * shown.max(initial=0.5 / n), 1.0)
-    drawing.rows(ax, labels)
-    style.share_axis(ax, min(0.7 * shown.min(initial=high), 0.3 * high), "x", high)
-    low, blue = ax.get_xlim()[0], style.COLOURS[0]
-    for i, (row, span) in enumerate(zip(rows, spans, strict=True)):
-        ax.plot([max(span[0], 0.1 * low), span[1]], [i, i], color=drawing.GREY, lw=5.0, solid_capstyle="butt")
-        if not np.isnan(row["estimate"] + row["lower"]):
-            ax.plot([max(row["lower"], 0.1 * low), row["upper"]], [i, i], color=blue, lw=2.0)
-        if row["estimate"] >= 0:
-            marker = "o" if row["estimate"] >= low else "<"
-            ax.plot(max(row["estimate"], low), i, marker, color=blue, ms=5.5, clip_on=False)
-    if accepted > 0:
-        ax.axvline(accepted, color=style.INK, lw=1.4, ls=LIMIT_DASH)
-        ax.text(accepted, -0.75, f"accepted: {text.percent(accepted)}", ha="center", va="bottom")
-    ax.set_xlabel("share of the joints above the limit")
+
+    def draw(ax: Axes) -> None:
+        """Estimate, interval and total interval of each limit, on an axis from the least to the largest of them."""
+        drawing.rows(ax, labels)
+        style.share_axis(ax, min(0.7 * shown.min(initial=high), 0.3 * high), "x", high)
+        low, blue = ax.get_xlim()[0], style.COLOURS[0]
+        for i, (row, span) in enumerate(zip(rows, spans, strict=True)):
+            ax.plot([max(span[0], 0.1 * low), span[1]], [i, i], color=drawing.GREY, lw=5.0, solid_capstyle="butt")
+            if not np.isnan(row["estimate"] + row["lower"]):
+                ax.plot([max(row["lower"], 0.1 * low), row["upper"]], [i, i], color=blue, lw=2.0)
+            if row["estimate"] >= 0:
+                marker = "o" if row["estimate"] >= low else "<"
+                ax.plot(max(row["estimate"], low), i, marker, color=blue, ms=5.5, clip_on=False)
+        if accepted > 0:
+            ax.axvline(accepted, color=style.INK, lw=1.4, ls=LIMIT_DASH)
+            ax.text(accepted, -0.75, f"accepted: {text.percent(accepted)}", ha="center", va="bottom")
+        ax.set_xlabel("share of the joints above the limit")
+
+    size, left = (4.9, drawing.rows_height(len(rows))), max(1.4, drawing.rows_left(labels))
+    return Panel("forest", "Share of the joints above each limit", description, draw, size, left)

@@ -103,7 +103,7 @@ def point_rows(view: View) -> Rows:
         at, plain = view.narrowed(name)
         if len(at.points) > 1:
             loads = {part.points[0]: part.load(plain) for part in at.parts}
-            shares = {p: np.nan if own.doubt(level) else own.above(level).estimate for p, own in loads.items()}
+            shares = {p: np.nan if load.doubt(level) else load.above(level).estimate for p, load in loads.items()}
             blank = dict.fromkeys(view.points, np.nan)
             rows.append({"load": name, "unit": load_of(name).unit, "level": level} | blank | shares)
     return rows
@@ -165,16 +165,15 @@ def readings(view: View) -> dict[str, Any]:
         equal length ``x``, ``count``, ``share`` and, for independent samples, ``lower``, ``upper``, ``outer_lower``,
         ``outer_upper``, otherwise ``bound_lower``, ``bound_upper``.
     """
-    found = {}
-    known = view.design.has_interval("share")
-    ends = ("lower", "upper", "outer_lower", "outer_upper") if known else ("bound_lower", "bound_upper")
+    curves, is_known = {}, view.design.has_interval("share")
+    ends = ("lower", "upper", "outer_lower", "outer_upper") if is_known else ("bound_lower", "bound_upper")
     for load in view.loads(list(dict.fromkeys((*view.shown_loads, *view.limits)))):
         if not load.valid.size:
             continue
         x = _round_levels(float(load.valid[0]), float(load.valid[-1]), load.limit)
         start = load.limit if load.limit is not None else load.quantile(0.9).estimate
         table = load.curve(x)
-        found[load.name] = {
+        curves[load.name] = {
             "unit": unit_text(load.unit),
             "n": int(table["n"][0]),
             "failed": int(table["n_failed"][0]),
@@ -185,7 +184,7 @@ def readings(view: View) -> dict[str, Any]:
             "share": [float(f"{v:.3g}") for v in table["estimate"]],
             **{end: [float(f"{v:.3g}") for v in table[end]] for end in ends},
         }
-    return found
+    return curves
 
 
 def _round_levels(low: float, high: float, limit: float | None) -> NDArray[np.float64]:

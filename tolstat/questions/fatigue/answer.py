@@ -24,7 +24,7 @@ from tolstat.questions.fatigue.duty import ANY, Joints, members, section, settin
 from tolstat.questions.fatigue.loads import SHARES, Loading, channels, load_cycles
 from tolstat.store.revolutions import held
 from tolstat.store.view import View
-from tolstat.study.stress_point import StressPoint
+from tolstat.study.fatigue import StressPoint
 
 JOINTS = 5000
 """Maximum number of samples, the first ones, whose cycles the page evaluates: more add little and take memory."""

@@ -21,8 +21,7 @@ from tolstat.questions.fatigue import duty
 from tolstat.solver import rainflow
 from tolstat.store import reader, revolutions
 from tolstat.store.view import View
-from tolstat.study.fatigue import Fatigue
-from tolstat.study.stress_point import StressPoint
+from tolstat.study.fatigue import Fatigue, StressPoint
 
 SHARE = 0.1
 """Share of the parts that have failed at the end of the life given, B10."""

@@ -1,19 +1,31 @@
-"""Correlated errors: ``[[correlation]]`` entries assembled to one Gaussian copula."""
+"""Errors that depend on each other: ``[[correlation]]`` and lots as one Gaussian copula; groups of them.
+
+Parts that are made together deviate together: with the key ``lot`` of an entry the normal score of an error is
+``sqrt(share) z_lot + sqrt(1 - share) z_part``, so that its distribution stays that of the entry. `sampling` draws the
+scores; how many joints a lot has is ``sampling.joints_per_lot``. Where each joint is its own lot, the score of the lot
+only correlates errors of the joint that share it, as `correlated` does.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from tolstat.common.errors import Fault, InputError, gather
-from tolstat.common.strict import Strict, described
+from tolstat.common.late import special
+from tolstat.common.strict import Strict, dotted
 from tolstat.common.units import Number
 from tolstat.study.axes import is_zone
 from tolstat.study.selection import select
+
+if TYPE_CHECKING:
+    from tolstat.study.tolerances.entry import Toleranced
+from tolstat.study.tolerances.entry import Toleranced
 
 Array = NDArray[np.float64]
 
@@ -24,23 +36,10 @@ MIN_EIGENVALUE = 1e-9
 class Correlation(Strict):
     """Correlation of every pair of some errors."""
 
-    between: Annotated[
-        list[str],
-        described(
-            "names or patterns of errors that have a tolerance; every pair of them has the correlation `rho`",
-            ["pin*.diameter"],
-            min_length=1,
-        ),
-    ]
-    rho: Annotated[
-        Number,
-        described(
-            "correlation of the normal scores (Gaussian copula), and of the errors themselves if normal",
-            0.6,
-            gt=-1,
-            lt=1,
-        ),
-    ]
+    between: list[str] = Field(min_length=1, examples=[["pin*.diameter"]])
+    """names or patterns of errors that have a tolerance; every pair of them has the correlation `rho`"""
+    rho: Annotated[Number, Field(gt=-1, lt=1)] = Field(examples=[0.6])
+    """correlation of the normal scores (Gaussian copula), and of the errors themselves if normal"""
 
 
 @dataclass(frozen=True)
@@ -72,14 +71,12 @@ class Copula:
         ndarray, (n, m)
             Uniform in each column, correlated across; the first column is unchanged but for rounding.
         """
-        from scipy.special import ndtr, ndtri
-
-        scores, factor = ndtri(u), np.linalg.cholesky(self.matrix)
+        scores, factor = special.ndtri(u), np.linalg.cholesky(self.matrix)
         # term by term: in a matrix product the rounding of a row depends on the number of rows
         mixed = np.zeros_like(scores)
         for i, j in zip(*np.nonzero(factor), strict=True):
             mixed[:, i] += factor[i, j] * scores[:, j]
-        correlated: Array = ndtr(mixed)
+        correlated: Array = special.ndtr(mixed)
         return np.clip(correlated, np.finfo(float).tiny, 1 - np.finfo(float).epsneg)
 
 
@@ -157,3 +154,112 @@ def _positive_definite(names: tuple[str, ...], rho: dict[frozenset[str], float],
             remedy = "give a smaller |rho|, or add the missing pairs (they have rho = 0)"
             raise InputError([Fault(f"{place}: correlation", found, remedy)])
     return Copula(names, matrix)
+
+
+class Lot(NamedTuple):
+    """How an error depends on the lot of its joint.
+
+    Attributes
+    ----------
+    share : float
+        Share of the variance of the normal score that is between lots.
+    score : str
+        Name of the score of the lot: that of the error itself, or the first error of the entry that shares it.
+    """
+
+    share: float
+    score: str
+
+
+def of_entries(entries: Iterable[Toleranced]) -> dict[str, Lot]:
+    """Lots of the errors, by name, in the order of the entries."""
+    found: dict[str, Lot] = {}
+    for entry in entries:
+        names = [site.name for site, _ in entry.models]
+        for site, model in entry.models:
+            lot = getattr(model, "lot", None)
+            if lot is not None:
+                found[site.name] = Lot(lot.share, names[0] if lot.shared else site.name)
+    return found
+
+
+def correlated(copula: Copula, lots: Mapping[str, Lot], place: str) -> Copula:
+    """Correlation of the errors of a joint, with that of errors that share the score of their lot.
+
+    Parameters
+    ----------
+    copula : Copula
+        Of ``[[correlation]]``.
+    lots : mapping of str to Lot
+        Lot of each error that has one.
+    place : str
+        File name shown in faults.
+
+    Raises
+    ------
+    InputError
+        When an error has a lot and a correlation.
+    """
+    both = [name for name in copula.names if name in lots]
+    if both:
+        remedy = "remove one of the two; errors of one entry are correlated by lot = { share = ..., shared = true }"
+        raise InputError([Fault(f"{place}: {dotted(('correlation',))}", f"{both[0]} has a lot already", remedy)])
+    every = [lot.score for lot in lots.values()]
+    names = [name for name, lot in lots.items() if every.count(lot.score) > 1]
+    own = np.eye(len(names))
+    for i, one in enumerate(names):
+        for j, other in enumerate(names):
+            if i != j and lots[one].score == lots[other].score:
+                own[i, j] = lots[one].share
+    matrix = np.eye(len(copula.names) + len(names))
+    matrix[: len(copula.names), : len(copula.names)] = copula.matrix
+    matrix[len(copula.names) :, len(copula.names) :] = own
+    return Copula((*copula.names, *names), matrix)
+
+
+class Group(NamedTuple):
+    """Errors that are taken together from another joint; groups are independent of each other.
+
+    Attributes
+    ----------
+    label : str
+        Name of the error, or pattern of the entry of ``[tolerances]``; a group without a pattern is labelled by its
+        first error and the number of others.
+    names : tuple of str
+        The errors.
+    """
+
+    label: str
+    names: tuple[str, ...]
+
+
+def groups(entries: Sequence[Toleranced], copula: Copula, by: str) -> tuple[Group, ...]:
+    """Groups of the errors of a study.
+
+    Parameters
+    ----------
+    entries : sequence of Toleranced
+        ``[tolerances]`` of the study.
+    copula : Copula
+        Their correlation: groups that it links become one.
+    by : str
+        ``error``: every error by itself, of a zone every vector; ``tolerance``: those of an entry together.
+
+    Returns
+    -------
+    tuple of Group
+        In the order of the table.
+    """
+    if by == "error":
+        parts = [Group(name, (name,)) for entry in entries for name in entry.quantities]
+    else:
+        parts = [Group(entry.pattern, tuple(entry.quantities)) for entry in entries]
+    for i, j in np.argwhere(np.triu(copula.matrix, 1)):
+        first, second = (next(p for p in parts if copula.names[k] in p.names) for k in (i, j))
+        if first is not second:
+            parts[parts.index(first)] = Group(first.label, first.names + second.names)
+            parts.remove(second)
+    return tuple(
+        p if "*" in p.label or len(p.names) == 1 else p._replace(label=f"{p.names[0]} and {len(p.names) - 1} more")
+        for p in parts
+    )

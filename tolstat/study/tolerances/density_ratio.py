@@ -8,8 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from tolstat.common.late import integrate
 from tolstat.study.tolerances.distributions import Distribution, Normal
-from tolstat.study.tolerances.radial import Rayleigh
+from tolstat.study.tolerances.zone_laws import Rayleigh
 
 MIDPOINTS = 1000
 """Number of midpoints in probability, for the mean square on a band."""
@@ -89,8 +90,6 @@ def _integrated(new: Distribution, old: Distribution) -> tuple[float, float]:
     probability that it follows in the last decade: it has no bound if it still grows there, and with an exponent of -1
     or less the mean is infinite.
     """
-    from scipy.integrate import simpson
-
     u, total, largest = np.geomspace(END, 0.5, NODES), 0.0, -math.inf
     decade = int(np.searchsorted(u, 10.0 * END))
     for x in (new.ppf(u), new.ppf(1.0 - u)):
@@ -98,6 +97,6 @@ def _integrated(new: Distribution, old: Distribution) -> tuple[float, float]:
         if np.isposinf(logs).any() or logs[0] - logs[decade] >= math.log(u[decade] / END):
             return math.inf, math.inf
         exponent = (logs[decade] - logs[0]) / math.log(u[decade] / END)
-        total += simpson(np.exp(logs) * u, x=np.log(u)) + math.exp(logs[0]) * END / (1.0 + exponent)
+        total += integrate.simpson(np.exp(logs) * u, x=np.log(u)) + math.exp(logs[0]) * END / (1.0 + exponent)
         largest = max(largest, math.inf if logs[0] > logs[decade] + GROWTH else float(np.nanmax(logs)))
     return math.log(total), largest

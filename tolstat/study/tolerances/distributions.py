@@ -12,6 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tolstat.common.late import special
+
 Array = NDArray[np.float64]
 
 NODES = np.linspace(-8.5, 8.5, 6801)
@@ -66,10 +68,8 @@ class Distribution(ABC):
 
     def expect(self, function: Callable[[Array], Array]) -> float:
         """Return the mean of a function of the values, by the trapezoidal rule over their normal scores."""
-        from scipy.special import ndtr
-
         # the upper half from its own tail would need a survival function: beyond a score of 8 ndtr rounds to 1
-        values = self.ppf(np.minimum(ndtr(NODES), 1.0 - 2.0**-53))
+        values = self.ppf(np.minimum(special.ndtr(NODES), 1.0 - 2.0**-53))
         return float(np.average(function(values), weights=np.exp(-0.5 * NODES**2)))
 
     def outside(self, lower: float, upper: float) -> float:
@@ -97,6 +97,11 @@ class Described(Distribution):
         return {"distribution": type(self).__name__.lower(), **asdict(self)}
 
 
+def share_between(a: float | Array, b: float | Array) -> Array:
+    """Probability of normal scores from a to b, elementwise; from the nearer tail, which keeps digits."""
+    return np.where(np.asarray(a) > 0, special.ndtr(-a) - special.ndtr(-b), special.ndtr(b) - special.ndtr(a))
+
+
 def _within(band: TruncatedNormal | Uniform | Triangular | Beta, x: Array, density: Array) -> Array:
     """Logarithmic density where x is in the band, -inf elsewhere."""
     return np.where((x >= band.lower) & (x <= band.upper), density, -np.inf)
@@ -111,15 +116,11 @@ class Normal(Described):
 
     def ppf(self, u: Array) -> Array:
         """See `Distribution.ppf`."""
-        from scipy.special import ndtri
-
-        return self.mean + self.sigma * ndtri(u)
+        return self.mean + self.sigma * special.ndtri(u)
 
     def cdf(self, x: Array) -> Array:
         """See `Distribution.cdf`."""
-        from scipy.special import ndtr
-
-        return np.asarray(ndtr((x - self.mean) / self.sigma))
+        return np.asarray(special.ndtr((x - self.mean) / self.sigma))
 
     def logpdf(self, x: Array) -> Array:
         """See `Distribution.logpdf`."""
@@ -143,28 +144,22 @@ class TruncatedNormal(Described):
     @property
     def _span(self) -> tuple[float, float, float]:
         """Scores of both ends before the truncation, and the share between them."""
-        from scipy.special import ndtr
-
         a, b = (self.lower - self.mean) / self.sigma, (self.upper - self.mean) / self.sigma
-        return a, b, float(ndtr(b) - ndtr(a) if a <= 0 else ndtr(-a) - ndtr(-b))
+        return a, b, float(share_between(a, b))
 
     def ppf(self, u: Array) -> Array:
         """See `Distribution.ppf`."""
-        from scipy.special import ndtr, ndtri
-
         a, b, _ = self._span
         # each half from its own tail: probabilities near 1 have fewer significant digits than those near 0
-        low = ndtri(ndtr(a) + u * (ndtr(b) - ndtr(a)))
-        high = -ndtri(ndtr(-b) + (1 - u) * (ndtr(-a) - ndtr(-b)))
+        low = special.ndtri(special.ndtr(a) + u * (special.ndtr(b) - special.ndtr(a)))
+        high = -special.ndtri(special.ndtr(-b) + (1 - u) * (special.ndtr(-a) - special.ndtr(-b)))
         return np.clip(self.mean + self.sigma * np.where(low <= 0, low, high), self.lower, self.upper)
 
     def cdf(self, x: Array) -> Array:
         """See `Distribution.cdf`."""
-        from scipy.special import ndtr
-
         a, b, share = self._span
         z = np.clip((x - self.mean) / self.sigma, a, b)
-        return np.asarray((ndtr(z) - ndtr(a) if a <= 0 else ndtr(-a) - ndtr(-z)) / share)
+        return share_between(a, z) / share
 
     def logpdf(self, x: Array) -> Array:
         """See `Distribution.logpdf`."""
@@ -267,25 +262,19 @@ class Beta(Described):
 
     def ppf(self, u: Array) -> Array:
         """See `Distribution.ppf`."""
-        from scipy.special import betaincinv
-
-        return self.lower + (self.upper - self.lower) * betaincinv(self.a, self.b, u)
+        return self.lower + (self.upper - self.lower) * special.betaincinv(self.a, self.b, u)
 
     def cdf(self, x: Array) -> Array:
         """See `Distribution.cdf`."""
-        from scipy.special import betainc
-
         t = np.clip((x - self.lower) / (self.upper - self.lower), 0.0, 1.0)
-        return np.asarray(betainc(self.a, self.b, t))
+        return np.asarray(special.betainc(self.a, self.b, t))
 
     def logpdf(self, x: Array) -> Array:
         """See `Distribution.logpdf`."""
-        from scipy.special import betaln, xlog1py, xlogy
-
         width = self.upper - self.lower
         t = np.clip((x - self.lower) / width, 0.0, 1.0)
-        density = xlogy(self.a - 1, t) + xlog1py(self.b - 1, -t) - betaln(self.a, self.b) - math.log(width)
-        return _within(self, x, np.asarray(density, dtype=float))
+        power = special.xlogy(self.a - 1, t) + special.xlog1py(self.b - 1, -t)
+        return _within(self, x, np.asarray(power - special.betaln(self.a, self.b) - math.log(width)))
 
     @property
     def moments(self) -> Moments:
@@ -370,11 +359,9 @@ def score(distribution: Distribution, values: Array) -> Array:
         z with ``ppf(Phi(z)) = value``, within +-9; for a normal distribution (value - mean) / sigma. Where a range of
         probabilities has one value (`Measured`), the score of the middle of that range.
     """
-    from scipy.special import ndtri
-
     if isinstance(distribution, Normal):  # from the values: a probability near 1 has few digits of its tail
         return np.clip((values - distribution.mean) / distribution.sigma, -9.0, 9.0)
-    return np.clip(ndtri(probability(distribution, values)), -9.0, 9.0)
+    return np.clip(special.ndtri(probability(distribution, values)), -9.0, 9.0)
 
 
 def sigma_of(lower: float, upper: float, mean: float, cpk: float) -> float:

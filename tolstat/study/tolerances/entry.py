@@ -8,19 +8,18 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple, Self
 
 import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, WithJsonSchema, model_validator
 
-from tolstat.common import strict, units
+from tolstat.common import json_schema, strict, units
 from tolstat.common.notation import PLUS_MINUS
 from tolstat.common.strict import refuse
-from tolstat.study.tolerances import iso2768
+from tolstat.study.tolerances import iso
 from tolstat.study.tolerances.distributions import Distribution
-from tolstat.study.tolerances.lots import LotEntry
 
 
 class Diameter(NamedTuple):
@@ -101,7 +100,8 @@ def _read(value: object, info: ValidationInfo) -> float:
     return units.to_si(value, site.unit)
 
 
-Value = Annotated[float, BeforeValidator(_read), WithJsonSchema({"x-unit": "error"})]
+OF_ERROR = WithJsonSchema(json_schema.quantity("error", units.EXAMPLES["m"]))
+Value = Annotated[float, BeforeValidator(_read), OF_ERROR]
 """Quantity in the unit of the error that the entry is for."""
 
 
@@ -123,9 +123,7 @@ def _not_negative(value: float) -> float:
 
 NotNegative = Annotated[Value, AfterValidator(_not_negative)]
 Positive = Annotated[Value, AfterValidator(units.positive)]
-HalfWidth = Annotated[
-    float, BeforeValidator(_read_half_width), AfterValidator(units.positive), WithJsonSchema({"x-unit": "error"})
-]
+HalfWidth = Annotated[float, BeforeValidator(_read_half_width), AfterValidator(units.positive), OF_ERROR]
 PositiveNumber = Annotated[units.Number, AfterValidator(units.positive)]
 Truncate = Annotated[
     bool, Field(strict=True, description="whether parts outside the band are sorted out", examples=[True])
@@ -158,12 +156,21 @@ class ToleranceEntry(strict.Strict):
         return self
 
 
+class LotEntry(strict.Strict):
+    """Key ``lot`` of an entry: parts of one lot deviate together."""
+
+    share: Annotated[units.Number, Field(gt=0, lt=1)] = Field(examples=[0.3])
+    """share of the variance of the normal score that is between lots"""
+    shared: bool = Field(default=False, strict=True, examples=[True])
+    """whether all errors that the pattern selects have one score of the lot, so that they are correlated in each
+    joint; else each error has its own"""
+
+
 class SingleEntry(ToleranceEntry):
     """Entry for one error: one model for each distribution."""
 
-    lot: Annotated[
-        LotEntry | None, Field(description="parts of one lot deviate together", examples=[{"share": 0.3}])
-    ] = None
+    lot: LotEntry | None = Field(default=None, examples=[{"share": 0.3}])
+    """parts of one lot deviate together"""
 
     @abstractmethod
     def build(self, site: Site) -> Distribution:
@@ -225,20 +232,39 @@ class Toleranced(NamedTuple):
         return model.measured_parts(site)
 
 
+class KnownEntry(NamedTuple):
+    """An entry that is known from measured parts.
+
+    Attributes
+    ----------
+    pattern : str
+        Pattern as written in the study.
+    names : tuple of str
+        Errors that it draws, all from one process.
+    parts : int
+        Number of measured parts.
+    """
+
+    pattern: str
+    names: tuple[str, ...]
+    parts: int
+
+
+def known_of(entries: Sequence[Toleranced]) -> tuple[KnownEntry, ...]:
+    """Entries of a study that are known from measured parts, in the order of the file."""
+    measured = ((entry, entry.measured_parts) for entry in entries)
+    return tuple(KnownEntry(e.pattern, tuple(e.quantities), parts) for e, parts in measured if parts is not None)
+
+
 class HalfBand(SingleEntry):
     """Entry with a band that may be given by its half width."""
 
-    plus_minus: Annotated[
-        HalfWidth | None, Field(description="half width of the band about the nominal value", examples=["0.1 mm"])
-    ] = None
-    iso2768: Annotated[
-        Literal["f", "m"] | None,
-        Field(description="band of this class of ISO 2768-1, for the size `nominal`", examples=["f"]),
-    ] = None
-    nominal: Annotated[
-        PositiveLength | None,
-        Field(description="size for `iso2768`; for an angle its shorter leg", examples=["72.8 mm"]),
-    ] = None
+    plus_minus: HalfWidth | None = Field(default=None, examples=["0.1 mm"])
+    """half width of the band about the nominal value"""
+    iso2768: Literal["f", "m"] | None = Field(default=None, examples=["f"])
+    """band of this class of ISO 2768-1, for the size `nominal`"""
+    nominal: PositiveLength | None = Field(default=None, examples=["72.8 mm"])
+    """size for `iso2768`; for an angle its shorter leg"""
 
     def half_width(self, site: Site) -> float | None:
         """Half width of the band; None where none is given."""
@@ -253,7 +279,7 @@ class HalfBand(SingleEntry):
             raise refuse(f"ISO 2768 has no tolerance for {site.name}", "give plus_minus")
         kind = "angular" if site.unit == "rad" else "linear"
         try:
-            return iso2768.deviation(kind, self.iso2768, self.nominal)
+            return iso.deviation(kind, self.iso2768, self.nominal)
         except ValueError as error:
             raise refuse(f"nominal = {{nominal}}: {error}", "give plus_minus", "nominal") from error
 
@@ -268,14 +294,10 @@ class HalfBand(SingleEntry):
 class Banded(HalfBand):
     """Entry with a band."""
 
-    lower: Annotated[
-        Value | None,
-        Field(
-            description="lower limit of the band",
-            examples=["0 mm"],
-        ),
-    ] = None
-    upper: Annotated[Value | None, Field(description="upper limit of the band", examples=["0.030 mm"])] = None
+    lower: Value | None = Field(default=None, examples=["0 mm"])
+    """lower limit of the band"""
+    upper: Value | None = Field(default=None, examples=["0.030 mm"])
+    """upper limit of the band"""
 
     def band(self, site: Site) -> tuple[float, float] | None:
         """Lower and upper limit; None where none is given."""

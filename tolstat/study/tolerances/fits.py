@@ -21,7 +21,7 @@ from tolstat.common.tables import HOLES
 from tolstat.display.text import percent
 from tolstat.study import selection
 from tolstat.study.selection import Entry
-from tolstat.study.tolerances import iso286, kinds
+from tolstat.study.tolerances import iso, kinds
 from tolstat.study.tolerances.distributions import Distribution
 from tolstat.study.tolerances.entry import PositiveLength, PositiveNumber, Site
 
@@ -40,14 +40,14 @@ NEGLIGIBLE = 1e-8
 
 
 def _check_size(basic: float) -> float:
-    if not 0.0 < 1e3 * basic <= iso286.LARGEST:
-        raise strict.refuse("{input} is outside the tables of ISO 286", f"give at most {iso286.LARGEST:g} mm")
+    if not 0.0 < 1e3 * basic <= iso.LARGEST:
+        raise strict.refuse("{input} is outside the tables of ISO 286", f"give at most {iso.LARGEST:g} mm")
     return basic
 
 
 def _check_code(code: str) -> str:
     try:
-        iso286.parse(code)
+        iso.parse(code)
     except ValueError as error:
         remedy = 'write for example "H7/f7", or give tolerances of hole*.diameter and pin*.diameter in place of fit'
         raise strict.refuse(str(error), remedy) from error
@@ -57,25 +57,20 @@ def _check_code(code: str) -> str:
 class FitEntry(Strict):
     """``fit`` of ``[tolerances]``: basic size and classes of a fit, and how diameters scatter in their zones."""
 
-    basic: Annotated[
-        PositiveLength, AfterValidator(_check_size), Field(description="basic size of the fit", examples=["76 mm"])
-    ]
-    code: Annotated[
-        str, AfterValidator(_check_code), Field(description="class of hole and pin by ISO 286", examples=["H7/f7"])
-    ]
-    distribution: Annotated[
-        Literal["normal", "uniform", "triangular", "beta"],
-        Field(description="distribution of the diameters, centred in their zones", examples=["normal"]),
-    ]
-    cpk: Annotated[
-        PositiveNumber | None, Field(description="Cpk of both diameters, for normal; 1 unless given", examples=[1.33])
-    ] = None
-    truncate: Annotated[
-        bool | None,
-        Field(strict=True, description="whether parts outside the zone are sorted out, for normal", examples=[True]),
-    ] = None
-    a: Annotated[PositiveNumber | None, Field(description="shape, for beta", examples=[2.0])] = None
-    b: Annotated[PositiveNumber | None, Field(description="shape, for beta", examples=[4.0])] = None
+    basic: Annotated[PositiveLength, AfterValidator(_check_size)] = Field(examples=["76 mm"])
+    """basic size of the fit"""
+    code: Annotated[str, AfterValidator(_check_code)] = Field(examples=["H7/f7"])
+    """class of hole and pin by ISO 286"""
+    distribution: Literal["normal", "uniform", "triangular", "beta"] = Field(examples=["normal"])
+    """distribution of the diameters, centred in their zones"""
+    cpk: PositiveNumber | None = Field(default=None, examples=[1.33])
+    """Cpk of both diameters, for normal; 1 unless given"""
+    truncate: bool | None = Field(default=None, strict=True, examples=[True])
+    """whether parts outside the zone are sorted out, for normal"""
+    a: PositiveNumber | None = Field(default=None, examples=[2.0])
+    """shape, for beta"""
+    b: PositiveNumber | None = Field(default=None, examples=[4.0])
+    """shape, for beta"""
 
     @field_validator(*_KEYS_OF)
     @classmethod
@@ -91,11 +86,11 @@ class FitEntry(Strict):
         return round(1e3 * self.basic, 9)
 
     @property
-    def zones(self) -> iso286.Zones:
+    def zones(self) -> iso.Zones:
         """Tolerance zones of hole and pin, um."""
-        return iso286.zones(iso286.parse(self.code), self.size)
+        return iso.zones(iso.parse(self.code), self.size)
 
-    def scatter(self, zone: iso286.Zone) -> dict[str, Any]:
+    def scatter(self, zone: iso.Zone) -> dict[str, Any]:
         """Return the entry of a diameter: half of its zone on both sides of the nominal diameter."""
         return {"plus_minus": _written(zone.half)} | self.model_dump(exclude={"basic", "code"}, exclude_none=True)
 
@@ -199,7 +194,7 @@ def stand_in(table: object) -> Fit | None:
     return None
 
 
-def _refusal(entry: FitEntry, zones: iso286.Zones, share: float, where: str) -> Fault:
+def _refusal(entry: FitEntry, zones: iso.Zones, share: float, where: str) -> Fault:
     article = "an" if zones.kind == "interference" else "a"
     found = (
         f"{entry.code} is {article} {zones.kind} fit, clearance {_signed(zones.least)} to {_signed(zones.largest)} um: "

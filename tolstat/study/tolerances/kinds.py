@@ -9,6 +9,8 @@ import json
 import math
 from typing import Annotated, Literal
 
+from pydantic import Field
+
 from tolstat.analysis.process import LEAST_PARTS, MOST_PARTS
 from tolstat.common import strict
 from tolstat.common.errors import Fault, InputError
@@ -27,9 +29,8 @@ from tolstat.study.tolerances.entry import (
     Truncate,
     Value,
 )
-from tolstat.study.tolerances.measured import MeasuredEntry
-from tolstat.study.tolerances.radial import Rayleigh
-from tolstat.study.tolerances.scipy_law import PREFIX, ScipyEntry
+from tolstat.study.tolerances.external import PREFIX, MeasuredEntry, ScipyEntry
+from tolstat.study.tolerances.zone_laws import Rayleigh
 from tolstat.study.tolerances.zones import CoaxialityEntry, OrientationEntry, PositionEntry
 
 CPK = "capability index Cpk of the process: sigma is the distance from the mean to the nearer limit over 3 Cpk"
@@ -41,26 +42,16 @@ class NormalEntry(Banded):
 
     distribution: Literal["normal"]
     cpk: Cpk = None
-    mean: Annotated[Value | None, described("mean; the middle of the band unless given", "0.01 mm")] = None
-    std: Annotated[Positive | None, described("standard deviation, in place of `cpk`", "0.05 mm")] = None
+    mean: Value | None = Field(default=None, examples=["0.01 mm"])
+    """mean; the middle of the band unless given"""
+    std: Positive | None = Field(default=None, examples=["0.05 mm"])
+    """standard deviation, in place of `cpk`"""
     truncate: Truncate = False
-    known_from: Annotated[
-        int | None,
-        described(
-            "number of measured parts that mean and sigma were estimated from; affects no result",
-            50,
-            strict=True,
-            ge=LEAST_PARTS,
-            le=MOST_PARTS,
-        ),
-    ] = None
+    known_from: int | None = Field(default=None, strict=True, ge=LEAST_PARTS, le=MOST_PARTS, examples=[50])
+    """number of measured parts that mean and sigma were estimated from; affects no result"""
 
-    gauge: Annotated[
-        NotNegative | None,
-        described(
-            "parts outside the band are scrapped, by a gauge of this standard deviation; affects no result", "0.01 mm"
-        ),
-    ] = None
+    gauge: NotNegative | None = Field(default=None, examples=["0.01 mm"])
+    """parts outside the band are scrapped, by a gauge of this standard deviation; affects no result"""
 
     def measured_parts(self, site: Site) -> int | None:
         """See `ToleranceEntry.measured_parts`."""
@@ -122,7 +113,8 @@ class TriangularEntry(Banded):
     """Most likely at `peak`, none is outside the band."""
 
     distribution: Literal["triangular"]
-    peak: Annotated[Value | None, described("most likely value; the middle of the band unless given", "0 mm")] = None
+    peak: Value | None = Field(default=None, examples=["0 mm"])
+    """most likely value; the middle of the band unless given"""
 
     def build(self, site: Site) -> tolerance.Triangular:
         """See `ToleranceEntry.build`."""
@@ -137,13 +129,13 @@ class LogNormalEntry(Banded):
     """The logarithm of the value above `threshold` is normal: by band and Cpk of the logarithm, or by mean and std."""
 
     distribution: Literal["lognormal"]
-    threshold: Annotated[Value, described("least possible value; 0 unless given", "-0.01 mm")] = 0.0
+    threshold: Value = Field(default=0.0, examples=["-0.01 mm"])
+    """least possible value; 0 unless given"""
     cpk: Cpk = None
-    mean: Annotated[Value | None, described("mean of the value, with `std` in place of a band", "0.02 mm")] = None
-    std: Annotated[
-        Positive | None,
-        described("standard deviation of the value, with `mean` in place of a band", "0.01 mm"),
-    ] = None
+    mean: Value | None = Field(default=None, examples=["0.02 mm"])
+    """mean of the value, with `std` in place of a band"""
+    std: Positive | None = Field(default=None, examples=["0.01 mm"])
+    """standard deviation of the value, with `mean` in place of a band"""
     truncate: Truncate = False
 
     def build(self, site: Site) -> tolerance.LogNormal:
@@ -181,8 +173,10 @@ class BetaEntry(Banded):
     """Beta distribution with shapes `a`, `b`, stretched over the band."""
 
     distribution: Literal["beta"]
-    a: Annotated[PositiveNumber, described("shape at the lower limit", 2.0)]
-    b: Annotated[PositiveNumber, described("shape at the upper limit", 5.0)]
+    a: PositiveNumber = Field(examples=[2.0])
+    """shape at the lower limit"""
+    b: PositiveNumber = Field(examples=[5.0])
+    """shape at the upper limit"""
 
     def build(self, site: Site) -> tolerance.Beta:
         """See `ToleranceEntry.build`."""
@@ -194,10 +188,8 @@ class RayleighEntry(HalfBand):
 
     distribution: Literal["rayleigh"]
     cpk: Cpk = None
-    sigma: Annotated[
-        Positive | None,
-        described("standard deviation of each coordinate, in place of `cpk`", "0.03 mm"),
-    ] = None
+    sigma: Positive | None = Field(default=None, examples=["0.03 mm"])
+    """standard deviation of each coordinate, in place of `cpk`"""
     truncate: Truncate = False
 
     def build(self, site: Site) -> Rayleigh:

@@ -5,16 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from itertools import combinations
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from tolstat.common.late import pandas as pd
+from tolstat.common.late import special
 from tolstat.study.tolerances.correlation import Copula
 from tolstat.study.tolerances.distributions import Array, Distribution, Normal
 from tolstat.study.tolerances.entry import Toleranced
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 NODES = 64
 """Number of Gauss–Hermite nodes of each of two normal scores."""
@@ -35,8 +34,6 @@ def table(entries: Sequence[Toleranced]) -> pd.DataFrame:
         and ``sigma``, standard deviation of each of these errors, SI (where several entries set an error, the part of
         this one); ``outside``, share of the parts outside the band or zone, NaN without either.
     """
-    import pandas as pd
-
     rows: dict[tuple[Any, ...], dict[str, None]] = {}
     for entry in entries:
         for site, model in entry.models:
@@ -66,8 +63,6 @@ def correlations(copula: Copula, tolerances: Mapping[str, Distribution]) -> pd.D
         ``errors``, the first pair; ``pairs``, number of pairs; ``rho`` of their normal scores, as the study gives it;
         ``pearson``, linear correlation of the errors themselves; ``spearman``, rank correlation.
     """
-    import pandas as pd
-
     rows: dict[tuple[float, float], list[str]] = {}
     for (i, one), (j, other) in combinations(enumerate(copula.names), 2):
         if rho := float(copula.matrix[i, j]):
@@ -85,15 +80,13 @@ def pearson(one: Distribution, other: Distribution, rho: float) -> float:
 
     Gauss–Hermite quadrature over both scores.
     """
-    from scipy.special import ndtr
-
     if isinstance(one, Normal) and isinstance(other, Normal):
         return rho
     z, weight = np.polynomial.hermite_e.hermegauss(NODES)
     weight = weight / weight.sum()
 
     def values(found: Distribution, scores: Array) -> Array:
-        return found.ppf(np.clip(ndtr(scores), 2.0**-53, 1.0 - 2.0**-53)) - found.moments.mean
+        return found.ppf(np.clip(special.ndtr(scores), 2.0**-53, 1.0 - 2.0**-53)) - found.moments.mean
 
     second = rho * z[:, None] + math.sqrt(1.0 - rho**2) * z
     y = values(other, second.ravel()).reshape(second.shape)

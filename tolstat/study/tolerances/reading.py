@@ -10,14 +10,13 @@ from typing import NamedTuple
 from tolstat.common.errors import Fault, gather
 from tolstat.common.tables import FACTORS
 from tolstat.joint import Joint
-from tolstat.study.axes import ORIENTATIONS, Axis
-from tolstat.study.bonus import REJECT, Bonus
+from tolstat.study.axes import ORIENTATIONS, REJECT, Axis, Bonus
 from tolstat.study.selection import TOLERANCED, Entry
-from tolstat.study.tolerances.accepted import Accepted
+from tolstat.study.tolerances.correlation import Lot, of_entries
 from tolstat.study.tolerances.distributions import Distribution
 from tolstat.study.tolerances.entry import Diameter, SingleEntry, Site, Toleranced, ToleranceEntry
 from tolstat.study.tolerances.kinds import entry
-from tolstat.study.tolerances.lots import Lot, of_entries
+from tolstat.study.tolerances.zone_laws import Accepted
 from tolstat.study.tolerances.zones import axes_of
 
 

@@ -12,16 +12,14 @@ from abc import abstractmethod
 from collections.abc import Iterator, Sequence
 from typing import Annotated, Any, Literal, NamedTuple
 
-from pydantic import BeforeValidator, ValidationInfo, WithJsonSchema
+from pydantic import BeforeValidator, Field, ValidationInfo, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
 from tolstat.common import json_schema, notation, units
 from tolstat.common.errors import Fault, InputError
-from tolstat.common.strict import described, dotted, refuse
+from tolstat.common.strict import dotted, refuse
 from tolstat.study import axes
-from tolstat.study.axes import ORIENTATIONS, PAIRS, Axis
-from tolstat.study.bonus import REJECT, Bonus
-from tolstat.study.tolerances.accepted import Accepted
+from tolstat.study.axes import ORIENTATIONS, PAIRS, REJECT, Axis, Bonus
 from tolstat.study.tolerances.distributions import Distribution, Normal, TruncatedNormal, Uniform, sigma_of
 from tolstat.study.tolerances.entry import (
     Meaning,
@@ -32,7 +30,7 @@ from tolstat.study.tolerances.entry import (
     ToleranceEntry,
     Truncate,
 )
-from tolstat.study.tolerances.radial import Disc, Rayleigh
+from tolstat.study.tolerances.zone_laws import Accepted, Disc, Rayleigh
 
 
 class Zone(NamedTuple):
@@ -72,32 +70,19 @@ def _band(written: notation.Written, name: str) -> PydanticCustomError:
 class ZoneEntry(ToleranceEntry):
     """Entry with a zone that the axis lies in over a length."""
 
-    zone: Annotated[
-        Zone,
-        BeforeValidator(_read),
-        WithJsonSchema(json_schema.quantity("m", "⌀0.1 mm")),
-        described("size of the zone; ⌀ or dia before the number say that it is a diameter", "⌀0.1 mm"),
-    ]
-    over: Annotated[
-        PositiveLength,
-        described(
-            "length over which the zone holds: of a pin or hole; of the common axis of a pair from face to "
-            "face, with the joint's centre in the middle, such as 2 (R + z/2) (coaxiality: of each pin or hole)",
-            "22 mm",
-        ),
-    ]
-    distribution: Annotated[
-        Literal["normal", "uniform"],
-        described("`uniform`: by area in a circle; `normal`: in a circle bivariate", "normal"),
-    ]
-    cp: Annotated[
-        PositiveNumber | None,
-        described("for normal: sigma of a coordinate is zone / (6 Cp); 1 unless given", 1.33),
-    ] = None
-    truncate: Annotated[
-        Truncate | None,
-        described("for normal: whether parts outside the zone are sorted out; true unless given", False),
-    ] = None
+    zone: Annotated[Zone, BeforeValidator(_read), WithJsonSchema(json_schema.quantity("m", "⌀0.1 mm"))] = Field(
+        examples=["⌀0.1 mm"]
+    )
+    """size of the zone; ⌀ or dia before the number say that it is a diameter"""
+    over: PositiveLength = Field(examples=["22 mm"])
+    """length over which the zone holds: of a pin or hole; of the common axis of a pair from face to face, with the
+    joint's centre in the middle, such as 2 (R + z/2) (coaxiality: of each pin or hole)"""
+    distribution: Literal["normal", "uniform"] = Field(examples=["normal"])
+    """`uniform`: by area in a circle; `normal`: in a circle bivariate"""
+    cp: PositiveNumber | None = Field(default=None, examples=[1.33])
+    """for normal: sigma of a coordinate is zone / (6 Cp); 1 unless given"""
+    truncate: Truncate | None = Field(default=None, examples=[False])
+    """for normal: whether parts outside the zone are sorted out; true unless given"""
 
     @abstractmethod
     def names(self, site: Site) -> tuple[str, ...]:
@@ -159,14 +144,9 @@ def _round(entry: ZoneEntry) -> None:
 class PositionEntry(ZoneEntry):
     """Position: a cylinder around the ideal axis, in which both of its ends lie."""
 
-    material_condition: Annotated[
-        Literal["reject", "fills"] | None,
-        described(
-            "bonus by maximum material: parts outside the grown zone are rejected (`reject`, also where "
-            "`zone` ends in Ⓜ), or the process fills it (`fills`)",
-            "fills",
-        ),
-    ] = None
+    material_condition: Literal["reject", "fills"] | None = Field(default=None, examples=["fills"])
+    """bonus by maximum material: parts outside the grown zone are rejected (`reject`, also where `zone` ends in Ⓜ), or
+    the process fills it (`fills`)"""
 
     def bonus(self, site: Site) -> Bonus | None:
         """See `ZoneEntry.bonus`."""
@@ -229,10 +209,8 @@ class PositionEntry(ZoneEntry):
 class OrientationEntry(ZoneEntry):
     """Perpendicularity or angularity: a cylinder, or the space between two planes, along the ideal direction."""
 
-    about: Annotated[
-        Literal["t", "z"] | None,
-        described("for two planes (`zone` without ⌀): axis of the rotation that they bound", "z"),
-    ] = None
+    about: Literal["t", "z"] | None = Field(default=None, examples=["z"])
+    """for two planes (`zone` without ⌀): axis of the rotation that they bound"""
 
     @property
     def band(self) -> float:

@@ -1,0 +1,150 @@
+"""Which joints are simulated, when they have settled, and how their results are written (docs/model.md, Results)."""
+
+import math
+
+import numpy as np
+
+from tolstat.common.tables import MAX_ITERATIONS, Fidelity, Start, Status
+from tolstat.kernel.mechanics.loads import DECIDING, N_AVERAGED, N_LOADS
+from tolstat.kernel.revolution.settle import ALL_LOADS, OWN, closure_error, step_error
+from tolstat.kernel.revolution.trail import closure_trend, note_closure, with_slow_decay
+from tolstat.kernel.simd.jit import njit
+
+OK, NOT_SETTLED, NEWTON_FAILED = int(Status.OK), int(Status.NOT_SETTLED), int(Status.NEWTON_FAILED)
+NOT_FINITE, OUTSIDE_MODEL = int(Status.NOT_FINITE), int(Status.OUTSIDE_MODEL)
+RAMP = int(Start.RAMP)
+DYNAMIC, QUASISTATIC = int(Fidelity.DYNAMIC), int(Fidelity.QUASISTATIC)
+CHECKS_PER_REV = 12
+"""Checks of the closure error per revolution, once two revolutions are recorded."""
+EARLY_CLOSURE, EARLY_SUMS, EARLY_STEP_ERROR = 0.1, 0.2, 0.02
+"""A joint whose motion at one twelfth to two twelfths of a revolution is repeated a revolution later has settled: the
+start is forgotten within the first twelfth. The first number is the closure error of bushing loads there, in units of
+``settle_tol``, the second that of all loads, since a shaft carries the sum of two of them, the third the step error, up
+to which that holds. Of 12 000 joints none was settled by bushing loads alone that would not have been at the end of the
+second revolution (docs/notes/steps.md)."""
+
+
+@njit
+def inside_model(par):
+    """Whether a joint lies within the scope of the model; written so that NaN does not."""
+    good = abs(par.alpha) < 0.5 * math.pi and 0 < abs(par.omega) < 1e300 and abs(par.torque) < 1e300
+    swing = 0.0
+    for i in range(par.n_orders):
+        swing += par.order[i] * math.hypot(par.speed_order[i, 0], par.speed_order[i, 1])
+        good = good and math.hypot(par.torque_order[i, 0], par.torque_order[i, 1]) < 1e300
+    good = good and swing < 1
+    good = good and par.k_cross[0] > 0 and par.k_fork[0] > 0
+    good = good and par.needle_b >= 0
+    bears = False
+    for j in range(par.n_stations):
+        good = good and par.station_k1[j] >= 0 and par.station_k2[j] >= 0 and par.station_k3[j] >= 0
+        good = good and (par.needle_b > 0 or par.station_k3[j] == 0)
+        bears = bears or par.station_k2[j] > 0 or par.station_k3[j] > 0
+    good = good and bears
+    for pin in range(4):
+        good = good and par.clearance[pin] >= 0
+    return good
+
+
+@njit
+def clear_results(out):
+    """Reset a row of KERNEL_RESULT: NaN in what may not be computed, zero in the counters."""
+    nan = np.nan
+    out.settled, out.steps, out.newton_iterations, out.halvings, out.factorisations = 0, 0, 0, 0, 0
+    out.period, out.failed_step = 0, -1
+    out.closure = out.closure_trend = out.failed_theta = out.revolutions = nan
+    out.step_error = out.refinement_change = nan
+    for i in range(N_LOADS):
+        out.largest[i] = nan
+    for i in range(N_AVERAGED):
+        out.average[i] = out.range[i] = nan
+    for pin in range(4):
+        for k in range(4):
+            out.mode_share[pin, k] = nan
+        out.equivalent_load[pin] = nan
+
+
+@njit
+def clear_samples(samples, notes):
+    """Reset samples and notes for another joint."""
+    for s in range(samples.size):
+        for i in DECIDING:
+            samples[s].loads[i] = np.nan
+        samples[s].s = np.nan
+    notes.count = 0
+
+
+@njit
+def check_settled(k, iterations, par, options, samples, notes, out):
+    """Check closure error and work at grid point `k`; return `NOT_SETTLED` while the joint is to continue.
+
+    Parameters
+    ----------
+    k : int
+        Number of the grid point, counted from the start.
+    iterations : int
+        Newton iterations so far.
+    par : record of PARAM
+        The joint.
+    options : Options
+        Numerical settings.
+    samples, notes
+        As in all kernels; the closure error is noted.
+    out : record of KERNEL_RESULT
+        ``closure`` and ``revolutions`` are written.
+    """
+    n, twelfth = options.steps_per_rev, options.steps_per_rev // CHECKS_PER_REV
+    out.revolutions = k / n
+    if k == n + 2 * twelfth:
+        first, last, bound = twelfth + 1, 2 * twelfth + 1, options.settle_tol
+        own, closure = closure_error(first, last, OWN, samples), closure_error(first, last, ALL_LOADS, samples)
+        out.closure = with_slow_decay(closure, out.revolutions, par, notes)
+        small = with_slow_decay(own, out.revolutions, par, notes) <= EARLY_CLOSURE * bound
+        small = small and out.closure <= EARLY_SUMS * bound
+        if small and step_error(par, samples) <= EARLY_STEP_ERROR:
+            return OK
+    if k >= 2 * n and (k * CHECKS_PER_REV) % n < CHECKS_PER_REV:
+        closure = closure_error(0, n, ALL_LOADS, samples)
+        note_closure(out.revolutions, closure, notes)
+        out.closure = with_slow_decay(closure, out.revolutions, par, notes)
+        if out.closure <= options.settle_tol:
+            return OK
+    return NEWTON_FAILED if iterations > MAX_ITERATIONS * n * options.max_revs else NOT_SETTLED
+
+
+@njit
+def is_finite(out):
+    """Whether the statistics of the bushing loads of a joint are finite."""
+    good = True
+    for i in range(N_AVERAGED):
+        good = good and out.largest[i] < 1e300 and out.average[i] < 1e300
+    return good
+
+
+@njit
+def finish(status, failed, steps_per_rev, options, out):
+    """Write how a joint ended; one without results is reset, with its failed step and angle.
+
+    `failed` is the step of the output grid at which the joint failed, -1 if at none; `steps_per_rev` counts those of
+    the last revolution.
+    """
+    if status not in (OK, NOT_SETTLED):
+        clear_results(out)
+        if failed > 0:
+            out.failed_step = failed
+            out.failed_theta = 2 * math.pi * ((failed - 1) % options.steps_per_rev) / options.steps_per_rev
+    out.status, out.settled, out.steps_per_rev = status, status == OK, steps_per_rev
+
+
+@njit
+def write_diagnostics(status, par, options, notes, samples, out):
+    """Write step error, closure trend and period, unless steps are error-controlled.
+
+    The closure trend of a joint that has not settled is fitted over the second half of ``max_revs``.
+    """
+    if options.fidelity == DYNAMIC:
+        out.step_error = step_error(par, samples)
+    since = 0.0 if status == OK else 0.5 * options.max_revs
+    out.closure_trend, _ = closure_trend(since, notes)
+    if status == OK:
+        out.period = 1

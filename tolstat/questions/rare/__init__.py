@@ -1,1 +1,0 @@
-"""Probabilities of rare loads, by subset simulation."""

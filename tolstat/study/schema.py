@@ -1,0 +1,315 @@
+"""JSON schemas of study, joint and case files for editors, from the input models and the registries of names.
+
+Inside this module a schema may have keywords of `common.json_schema`, which `_finished` replaces. What stands before or
+behind the dot of a key is a name, or has a wildcard: whether a pattern selects something, an editor does not tell.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Iterable, Mapping
+from functools import cache
+from typing import Any
+
+from pydantic import BaseModel
+
+from tolstat.analysis.process import LEAST_PARTS, MOST_PARTS
+from tolstat.common import json_schema, loads, strict
+from tolstat.common.channels import UNIT_OF_CHANNEL
+from tolstat.common.files import data_dir
+from tolstat.common.loads import UNIT_OF_LOAD
+from tolstat.common.units import EXAMPLES
+from tolstat.joint import Joint, Operation
+from tolstat.joint.model import Assumed
+from tolstat.joint.reading import DEFAULT_JOINT
+from tolstat.study.axes import is_zone, vectors_of
+from tolstat.study.design import KEYS
+from tolstat.study.fatigue import LineEntry, Settings, StressPointEntry
+from tolstat.study.file import OF_CASE
+from tolstat.study.listing import CaseEntry, Range, VariantEntry
+from tolstat.study.model import Output, Sampling, Solver, SweepEntry
+from tolstat.study.points import PointEntry
+from tolstat.study.proposal import MAX_SHIFT, MAX_WIDEN, ProposalEntry
+from tolstat.study.selection import TOLERANCED, UNITS
+from tolstat.study.sorting import MEASURABLE, RejectEntry
+from tolstat.study.tolerances import fits
+from tolstat.study.tolerances.correlation import Correlation
+from tolstat.study.tolerances.kinds import KINDS as TOLERANCES
+from tolstat.study.tolerances.kinds import ZONE_KINDS
+
+Schema = dict[str, Any]
+DRAFT = "http://json-schema.org/draft-07/schema#"
+"""The newest draft that all editors read."""
+WILD = r"[^.]*[*?\[][^.]*"
+"""Half of a name with a wildcard."""
+REQUIRED = ("joint", "operation", "sampling")
+"""Tables that every study has; a case has those of `OF_CASE`."""
+
+
+@cache
+def of_model(model: type[BaseModel]) -> Schema:
+    """JSON schema of a model, with the models inside it in place of references; only the first part of docstrings."""
+    made = model.model_json_schema(by_alias=True)
+    definitions = made.pop("$defs", {})
+
+    def inlined(part: Any) -> Any:
+        if isinstance(part, list):
+            return [inlined(item) for item in part]
+        if not isinstance(part, dict):
+            return part
+        part = {key: inlined(value) for key, value in part.items()}
+        if "$ref" in part:
+            part = inlined(definitions[part.pop("$ref").rpartition("/")[2]]) | part
+        if isinstance(part.get("description"), str):
+            part["description"] = " ".join(part["description"].partition("\n\n")[0].split())
+        return part
+
+    schema: Schema = inlined(made)
+    return schema
+
+
+@cache
+def joint() -> Schema:
+    """JSON schema of a joint file, with the values of the default joint as examples."""
+    values = strict.read_toml(data_dir() / "joints" / f"{DEFAULT_JOINT}.toml")
+    del values["assumed"], values["shaft"]["axial"]  # their fields have shorter and more telling examples
+    return {"title": "Joint of tolstat"} | _with_examples(of_model(Joint), values) | {"description": "Nominal joint."}
+
+
+def _with_examples(part: Schema, values: Mapping[str, Any]) -> Schema:
+    """Take the values of a file as examples of its keys."""
+    properties = {}
+    for key, schema in part["properties"].items():
+        value = values.get(key)
+        if isinstance(value, Mapping):
+            properties[key] = _with_examples(schema, value)
+        else:
+            properties[key] = schema if value is None else schema | {"examples": [value]}
+    return part | {"properties": properties}
+
+
+def _overriding(part: Schema, quantity: Schema | None = None) -> Schema:
+    """Schema of a table that replaces some keys of another; of its quantities alone, each by `quantity`, if given."""
+    properties = {}
+    for key, schema in part["properties"].items():
+        if schema.get("type") == "object":
+            properties[key] = _overriding(schema, quantity)
+        elif quantity is None or "x-unit" in schema:
+            properties[key] = quantity or schema
+    return {key: value for key, value in part.items() if key not in ("title", "required")} | {"properties": properties}
+
+
+def _table(description: str, entries: Mapping[str, Schema], end: str = "") -> Schema:
+    """Schema of a table by names, quoted (``"pin1.offset_t"``) or dotted, and patterns; `end` may follow a pattern."""
+    features: dict[str, dict[str, Schema]] = {}
+    names_of: dict[str, list[str]] = {}
+    for name, schema in entries.items():
+        feature, _, half = name.partition(".")
+        features.setdefault(feature, {})[half] = schema
+        names_of.setdefault(json.dumps(schema), []).append(name)
+    wild = {"anyOf": _different(schema for name, schema in entries.items() if not is_zone(name))}
+    nested = {
+        feature: halves.get("", _closed(halves, {f"^{WILD}$": wild}) if wild["anyOf"] else _closed(halves, {}))
+        for feature, halves in features.items()
+    }
+    patterns = {f"^(?:{_keys(names)}){end}$": json.loads(schema) for schema, names in names_of.items()}
+    return _closed(nested, patterns | {rf"^(?:{'|'.join(features)}|{WILD})\.{WILD}{end}$": wild}) | {
+        "description": description
+    }
+
+
+def _closed(properties: Mapping[str, Schema], patterns: Mapping[str, Schema]) -> Schema:
+    """Schema of a table without other keys."""
+    return {
+        "type": "object",
+        "properties": dict(properties),
+        "patternProperties": dict(patterns),
+        "additionalProperties": False,
+    }
+
+
+def _different(schemas: Iterable[Schema]) -> list[Schema]:
+    return [json.loads(text) for text in dict.fromkeys(map(json.dumps, schemas))]
+
+
+def _keys(names: Iterable[str]) -> str:
+    """Regular expression of names, and of patterns with a wildcard before the dot alone."""
+    halves_of: dict[str, list[str]] = {}
+    for name in names:
+        feature, dot, half = name.partition(".")
+        halves_of.setdefault(feature, []).append(re.escape(dot + half))
+    features_of: dict[str, list[str]] = {}
+    for feature, halves in halves_of.items():
+        features_of.setdefault("|".join(halves), []).append(feature)
+    return "|".join(f"(?:{'|'.join(features)}|{WILD})(?:{ends})" for ends, features in features_of.items())
+
+
+def _entries(name: str, units: Mapping[str, str]) -> dict[str, Schema]:
+    """Reference, by name of a quantity, to the definition of an entry that has quantities of its unit."""
+    return {quantity: {"x-table": f"{name}_1" if unit == "1" else name} for quantity, unit in units.items()}
+
+
+def _pure(part: Any) -> Any:
+    """Entry of an error that is a pure number."""
+    if isinstance(part, list):
+        return [_pure(item) for item in part]
+    if not isinstance(part, dict):
+        return part
+    kept = {key: _pure(value) for key, value in part.items()}
+    if part.get("x-unit") != "error":
+        return kept
+    return {key: value for key, value in kept.items() if key not in ("examples", "not")} | json_schema.quantity("1", "")
+
+
+def _numbers(low: float, high: float, kind: str = "number") -> Schema:
+    """JSON schema of numbers by name of what is drawn: errors, and vectors of zones."""
+    drawn = [own for name in TOLERANCED for own in (vectors_of(name) if is_zone(name) else (name,))]
+    return _table("", {name: {"type": kind, "minimum": low, "maximum": high} for name in drawn})
+
+
+def tolerances() -> Schema:
+    """JSON schema of the errors that scatter: the entry of each error is one of its kinds."""
+    entries = _entries("tolerance", TOLERANCED)
+    entries |= {name: {"x-table": key} for name in TOLERANCED if (key := name.partition(".")[2]) in ZONE_KINDS}
+    made = _table("How errors scatter, by name or pattern.", entries)
+    return made | {"properties": {fits.KEY: {"x-table": fits.KEY}} | made["properties"]}
+
+
+def limits() -> Schema:
+    """JSON schema of the limits of loads, which may name operating points."""
+    text = "Values that loads must not exceed, by name or pattern of loads; they affect no result."
+    return _table(text, _entries("limit", UNIT_OF_LOAD), end=f"(?:{loads.AT}[A-Za-z].*)?")
+
+
+def sections() -> dict[str, Schema]:
+    """JSON schema of each table of a study, in the order of the reference."""
+    text = "Joint file, and keys that replace some of its own, such as contact.clearance."
+    given = {name: unit for name, unit in UNITS.items() if not name.startswith("operation.")}
+    swept = "Errors by name or pattern, and keys of the joint, that take equally spaced values; several make a grid."
+    gauged = "Joints that are rejected at assembly by a measured error or clearance; affects no result."
+    grid = {
+        name: {"type": "array", "minItems": 1, "items": schema} for name, schema in _entries("quantity", UNITS).items()
+    }
+    points = [of_model(Operation), _listed(PointEntry) | {"minItems": 1}]
+    return {
+        "joint": _definitions()["overrides"] | {"description": text, "required": ["base"]},
+        "operation": {"anyOf": points, "description": points[0]["description"]},
+        "solver": of_model(Solver),
+        "errors": _table(
+            "Errors that every joint has, by name or pattern: deviations from nominal.", _entries("quantity", given)
+        ),
+        "tolerances": tolerances(),
+        "correlation": _listed(Correlation),
+        "sampling": of_model(Sampling),
+        "proposal": _listed(ProposalEntry),
+        "sweep": _table(swept, _entries("sweep", UNITS | KEYS)),
+        "grid": _table("Values at which all cases are run, by name or pattern; several entries make a grid.", grid),
+        "case": _listed(CaseEntry),
+        "variant": _listed(VariantEntry),
+        "assumed": _listed(Assumed),
+        "reject": _table(gauged, _entries("reject", MEASURABLE)),
+        "limits": limits(),
+        "fatigue": of_model(Settings),
+        "output": of_model(Output),
+    }
+
+
+def _listed(model: type[BaseModel]) -> Schema:
+    made = of_model(model)
+    return {"type": "array", "items": made, "description": made["description"]}
+
+
+def _definitions() -> dict[str, Schema]:
+    """JSON schemas of the tables that stand in place of a property with ``x-table``."""
+    keys = _overriding(joint())
+    del keys["properties"]["assumed"]
+    base: Schema = {
+        "type": "string",
+        "description": "name of a joint that comes with tolstat, or path of a joint file from the folder of this file",
+        "examples": [DEFAULT_JOINT],
+    }
+    factor: Schema = {"type": "number", "minimum": 1 / MAX_WIDEN, "maximum": MAX_WIDEN}
+    given = {name: unit for name, unit in UNITS.items() if not name.startswith("operation.")}
+    entries: dict[str, Schema] = {
+        "tolerance": {"anyOf": [of_model(model) for model in TOLERANCES.values()]},
+        "quantity": json_schema.quantity("error", EXAMPLES["m"]),
+        "sweep": of_model(SweepEntry),
+        "reject": of_model(RejectEntry),
+        "limit": json_schema.positive(json_schema.quantity("error", EXAMPLES["N"])),
+    }
+    return {
+        **entries,
+        **{f"{name}_1": _pure(schema) for name, schema in entries.items()},
+        **{key: {"anyOf": _different(map(of_model, kinds.values()))} for key, kinds in ZONE_KINDS.items()},
+        "errors": _table("", _entries("quantity", given)),
+        "keys": keys,
+        "overrides": keys | {"properties": {"base": base} | keys["properties"]},
+        "vary": _overriding(joint(), {"x-table": "range"}),
+        "range": of_model(Range),
+        "operation": _overriding(of_model(Operation)),
+        "solver": of_model(Solver),
+        "widen": {"anyOf": [factor, _numbers(1 / MAX_WIDEN, MAX_WIDEN)]},
+        "shift": _numbers(-MAX_SHIFT, MAX_SHIFT),
+        "parts": _numbers(LEAST_PARTS, MOST_PARTS, "integer"),
+        fits.KEY: of_model(fits.FitEntry),
+        "points": {"type": "object", "additionalProperties": of_model(StressPointEntry)},
+        "line": of_model(LineEntry),
+        "lines": _table("", _entries("line", UNIT_OF_CHANNEL)),
+    }
+
+
+def study() -> Schema:
+    """JSON schema of a study."""
+    return _file("Study of tolstat", sections(), REQUIRED)
+
+
+def case() -> Schema:
+    """JSON schema of a case file."""
+    of_case = {name: made for name, made in sections().items() if name in OF_CASE} | {"operation": of_model(Operation)}
+    return _file("Case of tolstat: one joint", of_case, REQUIRED[:2])
+
+
+def _file(title: str, sections: Mapping[str, Schema], required: Iterable[str]) -> Schema:
+    return _closed(sections, {}) | {"title": title, "required": list(required)}
+
+
+KINDS: dict[str, Callable[[], Schema]] = {"study": study, "joint": joint, "case": case}
+"""Files that have a JSON schema."""
+
+
+def schema(kind: str) -> Schema:
+    """JSON schema of a file, draft 7, for editors.
+
+    Parameters
+    ----------
+    kind : str
+        ``"study"``, ``"joint"`` or ``"case"``.
+
+    Returns
+    -------
+    dict
+    """
+    made: Schema = _finished(KINDS[kind]())
+    definitions = {name: _finished(part) for name, part in _definitions().items()}
+    used: dict[str, Schema] = {}
+    referring: list[Schema] = [made]
+    while referring:
+        names = dict.fromkeys(re.findall(r'"#/definitions/([^"]+)"', json.dumps(referring)))
+        referring = [used.setdefault(name, definitions[name]) for name in names if name not in used]
+    return {"$schema": DRAFT} | made | ({"definitions": used} if used else {})
+
+
+def _finished(part: Any) -> Any:
+    """Schema for editors, of draft 7: without keywords of this package."""
+    if isinstance(part, list):
+        return [_finished(item) for item in part]
+    if not isinstance(part, dict):
+        return part
+    if isinstance(part.get("x-table"), str):
+        kept = {key: part[key] for key in ("description", "default", "examples") if key in part}
+        return {"allOf": [{"$ref": f"#/definitions/{part['x-table']}"}]} | kept
+    part = {key: _finished(value) for key, value in part.items() if key != "x-unit"}
+    if isinstance(part.get("prefixItems"), list):
+        part["items"] = part.pop("prefixItems")[0]
+    return part

@@ -1,0 +1,276 @@
+"""Laws of scipy.stats: ``distribution = "scipy:weibull_min(c=1.8, scale=0.012)"``, a call with literal numbers.
+
+The text is parsed, never evaluated; scipy.stats is imported for studies that have such an entry only.
+"""
+
+from __future__ import annotations
+
+import ast
+import csv
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from importlib import import_module
+from io import StringIO
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import Field
+
+from tolstat.analysis.process import LEAST_PARTS
+from tolstat.common import strict, units
+from tolstat.common.files import about_encoding, read_input
+from tolstat.common.late import stats
+from tolstat.common.strict import did_you_mean, refuse
+from tolstat.study.tolerances import distributions as tolerance
+from tolstat.study.tolerances.distributions import Array, Distribution
+from tolstat.study.tolerances.entry import SingleEntry, Site, Value
+
+PREFIX = "scipy:"
+EXAMPLE = 'write "scipy:weibull_min(c=1.8, scale=0.012)", numbers only'
+MAX_LENGTH = 200
+"""Maximum length of the text of a law, characters."""
+
+
+@dataclass(frozen=True)
+class ScipyLaw(Distribution):
+    """Law of scipy.stats, with parts outside a band rejected.
+
+    Attributes
+    ----------
+    name : str
+        Its name there.
+    parameters : tuple of (str, float)
+        Shapes, and ``loc`` and ``scale`` in units of `unit`.
+    unit : float
+        SI.
+    lower, upper : float, optional
+        Ends of the band, SI.
+    """
+
+    name: str
+    parameters: tuple[tuple[str, float], ...]
+    unit: float
+    lower: float | None = None
+    upper: float | None = None
+
+    @cached_property
+    def whole(self) -> Any:
+        """The law of scipy.stats before parts are rejected, in units of `unit`."""
+        return getattr(stats, self.name)(**dict(self.parameters))
+
+    @cached_property
+    def ends(self) -> Array:
+        """Ends of the band in units of `unit`."""
+        lower, upper = self.lower, self.upper
+        return np.array([-math.inf if lower is None else lower, math.inf if upper is None else upper]) / self.unit
+
+    @cached_property
+    def share(self) -> float:
+        """Share of the parts that is not rejected; from the upper tail if the band lies there."""
+        (below, up_to), (above, beyond) = self.whole.cdf(self.ends), self.whole.sf(self.ends)
+        return float(up_to - below if below < 0.5 else above - beyond)
+
+    def ppf(self, u: Array) -> Array:
+        """See `Distribution.ppf`."""
+        below, beyond = self.whole.cdf(self.ends[0]), self.whole.sf(self.ends[1])
+        # each half from its own tail: probabilities near 1 have fewer significant digits than those near 0
+        low, high = below + u * self.share, beyond + (1.0 - u) * self.share
+        x = np.where(low <= 0.5, self.whole.ppf(np.minimum(low, 1.0)), self.whole.isf(np.minimum(high, 1.0)))
+        return np.asarray(self.unit * np.clip(x, *self.ends))
+
+    def cdf(self, x: Array) -> Array:
+        """See `Distribution.cdf`."""
+        x, below = np.clip(x / self.unit, *self.ends), self.whole.cdf(self.ends[0])
+        own = self.whole.cdf(x) - below if below < 0.5 else self.whole.sf(self.ends[0]) - self.whole.sf(x)
+        return np.asarray(np.clip(own / self.share, 0.0, 1.0))
+
+    def logpdf(self, x: Array) -> Array:
+        """See `Distribution.logpdf`."""
+        x = np.asarray(x) / self.unit
+        inside = (x >= self.ends[0]) & (x <= self.ends[1])
+        return np.where(inside, self.whole.logpdf(x) - math.log(self.unit * self.share), -np.inf)
+
+    def describe(self) -> dict[str, Any]:
+        """See `Distribution.describe`."""
+        band = {key: end for key, end in (("lower", self.lower), ("upper", self.upper)) if end is not None}
+        return {"distribution": f"{PREFIX}{self.name}", **dict(self.parameters), "unit": self.unit, **band}
+
+
+class ScipyEntry(SingleEntry):
+    """Continuous law of scipy.stats with literal numbers, such as `"scipy:weibull_min(c=1.8, scale=0.012)"`.
+
+    `loc` and `scale` have the unit `unit`. Parts outside `lower` and `upper` are sorted out.
+    """
+
+    distribution: str = Field(pattern=f"^{PREFIX}", examples=["scipy:weibull_min(c=1.8, scale=0.012)"])
+    """name and parameters of the law"""
+    unit: str | None = Field(default=None, examples=["mm"])
+    """unit of `loc` and `scale`; needed unless the error is a pure number"""
+    lower: Value | None = Field(default=None, examples=["0 mm"])
+    """parts below are sorted out"""
+    upper: Value | None = Field(default=None, examples=["0.030 mm"])
+    """parts above are sorted out"""
+
+    def build(self, site: Site) -> ScipyLaw:
+        """See `SingleEntry.build`."""
+        name, parameters = _parsed(self.distribution.removeprefix(PREFIX))
+        if self.unit is None and site.unit != "1":
+            raise refuse("missing key unit", 'add the unit of loc and scale, for example unit = "mm"')
+        unit = units.to_si(1.0 if self.unit is None else f"1 {self.unit}", site.unit)
+        law = ScipyLaw(name, parameters, unit, self.lower, self.upper)
+        if not np.isfinite(law.whole.ppf(0.5)):
+            raise refuse(f"{self.distribution!r} has a parameter that the law does not allow", "see scipy.stats")
+        if not law.ends[0] < law.ends[1] or not law.share > 0.0:
+            raise refuse("no part lies between lower and upper", "give lower < upper, where the law has parts")
+        if not np.isfinite(law.ends).all() and not np.isfinite(law.whole.std()):
+            raise refuse("the law has no finite standard deviation", "add lower and upper")
+        return law
+
+    def number(self, site: Site) -> str:
+        """See `SingleEntry.number`."""
+        return f"{self.distribution.removeprefix(PREFIX)} {self.unit or ''}".rstrip()
+
+    def band(self, site: Site) -> tuple[float, float] | None:
+        """See `SingleEntry.band`."""
+        return None if self.lower is None or self.upper is None else (self.lower, self.upper)
+
+
+def _parsed(text: str) -> tuple[str, tuple[tuple[str, float], ...]]:
+    """Name and parameters of a law from a call with literal numbers."""
+    try:
+        call = ast.parse(text.strip() if len(text) <= MAX_LENGTH else "", mode="eval").body
+        if not (isinstance(call, ast.Call) and isinstance(call.func, ast.Name)):
+            raise ValueError("no call of a name")
+        given = [(str(keyword.arg), ast.literal_eval(keyword.value)) for keyword in call.keywords]
+        placed = [ast.literal_eval(value) for value in call.args]
+        name = call.func.id
+        if any(type(value) not in (int, float) for value in (*placed, *(value for _, value in given))):
+            raise ValueError("not only numbers")
+    except (SyntaxError, ValueError, TypeError, MemoryError, RecursionError) as error:
+        raise refuse(f"{text[:MAX_LENGTH]!r} is no law with numbers", EXAMPLE) from error
+    laws = {key: law for key, law in vars(import_module("scipy.stats")).items() if isinstance(law, stats.rv_continuous)}
+    if name not in laws:
+        raise refuse(f"scipy.stats has no continuous law {name!r}", did_you_mean(name, sorted(laws)))
+    shapes = laws[name].shapes.split(", ") if laws[name].shapes else []
+    allowed = [*shapes, "loc", "scale"]
+    pairs = [*zip(allowed, placed, strict=False), *given]
+    names = [key for key, _ in pairs]
+    if len(placed) > len(allowed) or len(set(names)) < len(names) or not set(shapes) <= set(names) <= set(allowed):
+        raise refuse(f"{text!r} does not give each parameter once", f"{name} has {', '.join(allowed)}")
+    return name, tuple(
+        (str(key), float(value)) for key, value in sorted(pairs, key=lambda pair: allowed.index(pair[0]))
+    )
+
+
+RARE = 0.005
+"""Share of the parts beyond a value that a reader of a tail asks about."""
+
+
+class MeasuredEntry(SingleEntry):
+    """Measured parts of a CSV file with a header row, drawn with equal probability; or, with `law`, its sample.
+
+    With `law` mean and deviation of the sample are those of the parts, and the study knows that they are estimates.
+    """
+
+    distribution: Literal["measured"]
+    file: str | None = Field(default=None, examples=["rattle.csv"])
+    """path of the CSV file, from the study's folder"""
+    column: str | None = Field(default=None, examples=["speed_rpm"])
+    """name of the column in the header row"""
+    values: list[float] | None = Field(default=None, examples=[[0.012, -0.004, 0.007]])
+    """the measured values, in place of a file; needs `law`"""
+    unit: str | None = Field(default=None, examples=["rpm"])
+    """unit of the values; needed unless the error is a pure number"""
+    law: Literal["normal", "lognormal"] | None = Field(default=None, examples=["normal"])
+    """law that the parts are a sample of, for shares far out; without it each joint has one of the measured values"""
+
+    def measured_parts(self, site: Site) -> int | None:
+        """See `ToleranceEntry.measured_parts`."""
+        return len(self._values(site)) if self.law else None
+
+    def build(self, site: Site) -> tolerance.Measured | tolerance.Normal | tolerance.LogNormal:
+        """See `ToleranceEntry.build`."""
+        values = self._values(site)
+        if self.values is not None and self.law is None:
+            beyond = f"a value that {100 * RARE:g} % of the parts exceed lies beyond all of them with probability"
+            found = f"a sample of {len(values)} has no tail: {beyond} {100 * (1.0 - RARE) ** len(values):.0f} %"
+            raise refuse(found, 'add law = "normal" or "lognormal"')
+        if self.unit is None and site.unit != "1":
+            raise refuse("missing key unit", 'add the unit of the values, for example unit = "mm"')
+        factor = units.to_si(1.0 if self.unit is None else f"1 {self.unit}", site.unit)
+        if self.law is None:
+            return tolerance.Measured.of(factor * value for value in values)
+        return _fitted(self.law, factor * np.array(values))
+
+    def number(self, site: Site) -> str:
+        """See `SingleEntry.number`."""
+        return f"{len(self._values(site))} measured parts"
+
+    def band(self, site: Site) -> None:
+        """See `SingleEntry.band`."""
+
+    def _values(self, site: Site) -> Sequence[float]:
+        if (self.values is None) == (self.file is None):
+            raise refuse("needs either file and column, or values", "give one of the two")
+        if self.values is not None:
+            if self.column is not None:
+                raise refuse("column without file", "remove it")
+            if not all(map(math.isfinite, self.values)):
+                raise refuse("a value is not a finite number", "give finite numbers")
+            return self.values
+        if self.file is None or self.column is None:
+            raise refuse("file without column", "add the name of the column")
+        return _read(site.folder / self.file, self.column)
+
+
+def _fitted(law: str, values: tolerance.Array) -> tolerance.Normal | tolerance.LogNormal:
+    """Law with the mean and deviation of the sample; of its logarithms for the lognormal law."""
+    if len(values) < LEAST_PARTS:
+        raise refuse(f"{len(values)} parts are too few for a law", f"give at least {LEAST_PARTS} parts")
+    if law == "lognormal":
+        if not values.min() > 0.0:
+            raise refuse("a value is not above zero, which a lognormal law needs", 'write law = "normal"')
+        values = np.log(values)
+    normal = tolerance.Normal(float(values.mean()), float(values.std(ddof=1)))
+    if not normal.sigma > 0.0:
+        raise refuse("all measured values are equal", "give the values as they were measured")
+    return normal if law == "normal" else tolerance.LogNormal(0.0, normal)
+
+
+def _read(path: Path, column: str) -> list[float]:
+    try:
+        lines = StringIO(read_input(path), newline="")
+        rows = csv.DictReader(line for line in lines if line.strip() and not line.startswith("#"))
+        cells = [row.get(column) for row in rows]
+        columns = rows.fieldnames or ()
+    except UnicodeDecodeError as error:
+        found, remedy = about_encoding(error)
+        raise refuse(f"{path} {found}", remedy) from error
+    except (OSError, csv.Error) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise refuse(
+            f"{path} cannot be read: {reason}", "give a CSV file; its path starts from the study's folder"
+        ) from error
+    if column not in columns:
+        remedy = strict.did_you_mean(column, list(columns))
+        raise refuse(f"{path} has no column {column!r}", remedy)
+    values = []
+    for number, cell in enumerate(cells, start=1):
+        value = _number(cell)
+        if value is None:
+            raise refuse(f"{path}: row {number} of {column!r} is {cell!r}", "give a finite number in each row")
+        values.append(value)
+    if len(values) < 2:
+        raise refuse(f"{path} has {len(values)} values in {column!r}", "give at least two measured parts")
+    return values
+
+
+def _number(cell: str | None) -> float | None:
+    try:
+        value = float(cell or "")
+    except ValueError:
+        return None
+    return value if math.isfinite(value) else None

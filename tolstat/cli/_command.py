@@ -239,7 +239,7 @@ def function_of(question: Question) -> Callable[..., None]:
         takes_study, into_file = source.annotation is not Path, source.annotation is not studies.Study
     reads = "pair" if len(views) == 2 else "views" if several else "view"
     if takes_study:
-        reads = "study" if several else "either"
+        reads = "study" if several and not into_file else "either"
 
     def run(**given: Any) -> None:
         named = [given[name] for name in READS[reads]]

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from tolstat import store as stores
     from tolstat import study as studies
     from tolstat.analysis import accuracy as numerical
-    from tolstat.analysis import design as design
+    from tolstat.analysis import design as designs
     from tolstat.campaign import extend as growth
     from tolstat.campaign import function as functions
     from tolstat.campaign import plan as plans
@@ -58,7 +58,7 @@ if TYPE_CHECKING:
 else:
     np = Late("numpy")
     stores, studies = (Late(f"tolstat.{name}") for name in ("store", "study"))
-    design, numerical = (Late(f"tolstat.analysis.{name}") for name in ("design", "accuracy"))
+    designs, numerical = (Late(f"tolstat.analysis.{name}") for name in ("design", "accuracy"))
     growth, functions, plans, pool, remedies, replays, campaigns, stop_rule, checks, works = (
         Late(f"tolstat.campaign.{name}")
         for name in ("extend", "function", "plan", "pool", "remedy", "replay", "run", "stop_rule", "verify", "work")

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TextIO
 import typer
 
 from tolstat import __version__
-from tolstat.cli._library import answers, assumptions, campaigns, compilation, design, mounting, pool, tables, works
+from tolstat.cli._library import answers, assumptions, campaigns, compilation, designs, mounting, pool, tables, works
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.files import atomic_write, make_parent
 from tolstat.display.options import Opt
@@ -233,5 +233,5 @@ def print_study_notes(path: Path, study: Study) -> None:
     print_warnings(path, study.joints, study.variants)
     for fault in assumptions.warnings(study):
         warn(f"warning: {fault}")
-    if not study.sampling.has_replicates and (reason := design.without_interval(study.sampling.method)):
+    if not study.sampling.has_replicates and (reason := designs.without_interval(study.sampling.method)):
         warn(f"warning: {reason}")

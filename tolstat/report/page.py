@@ -17,8 +17,7 @@ from tolstat.display import html, progress, table, text
 from tolstat.display.answer import Asked
 from tolstat.display.blocks import Card, Decision, Facts, Listing, Page, Panels, Section, Table, Text
 from tolstat.display.verdict import WORDS, Verdict
-from tolstat.joint import Joint, derived, load, model
-from tolstat.joint.overrides import leaves
+from tolstat.joint import Joint, derived, load, model, overrides
 from tolstat.joint.reading import DEFAULT_JOINT, examples
 from tolstat.joint.sections import mounting_and_law, quantities
 from tolstat.questions import accuracy, shares
@@ -220,7 +219,7 @@ def joint_values(store: Reader) -> Listing:
         When this version cannot read the joint in the file.
     """
     joint = strict.validate(Joint, store.joint, f"{store.path}: joint")
-    given, values = leaves(joint.given()), _values(joint)
+    given, values = overrides.leaves(joint.given()), _values(joint)
     default = _values(load(DEFAULT_JOINT, {}, DEFAULT_JOINT))
     rows = [
         (key, value, default.get(key, "-"), "given" if key in given else derived.DERIVED[key].formula)
@@ -237,7 +236,7 @@ def _values(joint: Joint) -> dict[str, str]:
     """Values by dotted key, in the unit in which a joint file has them."""
     values: dict[str, str] = {}
     units_of = derived.UNITS | quantities(Joint)
-    for key, value in leaves(joint.model_dump(exclude=set(model.TOLD))).items():
+    for key, value in overrides.leaves(joint.model_dump(exclude=set(model.TOLD))).items():
         if isinstance(value, (float, tuple)):
             unit = units_of.get(key, "1")
             like = examples().get(key, units.EXAMPLES[unit])

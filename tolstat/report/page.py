@@ -179,7 +179,7 @@ def scene(view: View) -> tuple[str, str]:
     def marked(words: str, key: str) -> str:
         if assumed is None:
             return words
-        return f"{words} ({'assumed' if any(assumption.startswith(key) for assumption in assumed) else 'given'})"
+        return f"{words} ({'assumed' if any(name.startswith(key) for name in assumed) else 'given'})"
 
     first = f"{marked(at, 'operation.')}; {marked(bearing, 'bearing.')}."
     second = f"{marked(mounting, variations.AXIAL)}; {marked(law, variations.LAW)}."

@@ -197,12 +197,12 @@ def shortage(error: MemoryError | OSError | ImportError) -> Fault | None:
     return None
 
 
-def _memory(found: str) -> Fault:
+def _memory(short: str) -> Fault:
     limit, remedy = _limit_mb(), "use fewer workers (--workers 1), keep fewer results ([output]), or end other programs"
     if not limit:
-        return Fault("memory", found, remedy)
+        return Fault("memory", short, remedy)
     allowed = f"a process may use {limit} MB (ulimit -v) and needs {LIBRARIES_MB} MB before any joints"
-    return Fault("memory", f"{found}; {allowed}", f"{remedy}, or raise ulimit -v")
+    return Fault("memory", f"{short}; {allowed}", f"{remedy}, or raise ulimit -v")
 
 
 def _limit_mb() -> int:
@@ -239,7 +239,7 @@ def function_of(question: Question) -> Callable[..., None]:
         takes_study, into_file = source.annotation is not Path, source.annotation is not studies.Study
     reads = "pair" if len(views) == 2 else "views" if several else "view"
     if takes_study:
-        reads = "study" if several else "either"
+        reads = "study" if several and not into_file else "either"
 
     def run(**given: Any) -> None:
         named = [given[name] for name in READS[reads]]

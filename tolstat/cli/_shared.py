@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TextIO
 import typer
 
 from tolstat import __version__
-from tolstat.cli._library import answers, assumptions, campaigns, compilation, designs, mounting, pool, tables, works
+from tolstat.cli._library import answers, assumptions, compilation, design, mounting, pool, run, table, works
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.files import atomic_write, make_parent
 from tolstat.display.options import Opt
@@ -160,7 +160,7 @@ def deliver(answer: Answer, wide: bool, as_json: bool = False) -> None:
 
 def print_table(columns: Sequence[Column], rows: Rows, wide: bool) -> None:
     """Print a table on standard output, and on standard error the columns left out to fit the line."""
-    text, missing = tables.fitted(columns, rows, None if wide else tables.WIDTH)
+    text, missing = table.fitted(columns, rows, None if wide else table.WIDTH)
     typer.echo(text)
     if missing:
         say(missing)
@@ -195,7 +195,7 @@ def work(**settings: Any) -> Iterator[works.Work]:
     try:
         with progress() as shown:
             yield works.Work(display=shown, tell=say, **settings)
-    except campaigns.Interrupted as stop:
+    except run.Interrupted as stop:
         fail(str(stop))
         raise typer.Exit(stop.exit_code) from stop
     except pool.WorkerDied as error:
@@ -233,5 +233,5 @@ def print_study_notes(path: Path, study: Study) -> None:
     print_warnings(path, study.joints, study.variants)
     for fault in assumptions.warnings(study):
         warn(f"warning: {fault}")
-    if study.sampling.replicates == 1 and (reason := designs.without_interval(study.sampling.method)):
+    if study.sampling.replicates == 1 and (reason := design.without_interval(study.sampling.method)):
         warn(f"warning: {reason}")

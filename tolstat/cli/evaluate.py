@@ -9,7 +9,7 @@ from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from tolstat.cli._library import functions, load_units, np, records, strict, studies, texts, units
+from tolstat.cli._library import function, load_units, np, strict, studies, tables, text, units
 from tolstat.cli._shared import say, work, write
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.files import check_target
@@ -56,16 +56,16 @@ def evaluate(
     """
     if out != "-":
         check_target(Path(out), errors)
-    f = functions.function(studies.load(study), loads, point=point, workers=workers)
-    si = {field.name: "1" if uniform else field.unit for field in records.ERROR_FIELDS}
+    f = function.function(studies.load(study), loads, point=point, workers=workers)
+    si = {field.name: "1" if uniform else field.unit for field in tables.ERROR_FIELDS}
     given = read_table(errors, {name: si.get(name, "1") for name in (f.cube_names if uniform else f.names)})
     with work(workers=workers) as shown:
         shown.display.stage("simulation")
         y = f(f.uniform(given) if uniform else given)
     head = [["status", *f.loads], ["", *(load_units.UNIT_OF_LOAD[name] for name in f.loads)]]
-    rows = texts.csv_rows([[records.Status(number).label for number in f.status], *y.T.tolist()])
+    rows = text.csv_rows([[tables.Status(number).label for number in f.status], *y.T.tolist()])
     write(out, lambda stream: csv.writer(stream, lineterminator="\n").writerows([*head, *rows]))
-    without = int((~np.isin(f.status, records.VALID)).sum())
+    without = int((~np.isin(f.status, tables.VALID)).sum())
     say(f"{'' if out == '-' else f'wrote {out}: '}{len(y)} joints, {without} of them without a valid load")
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, TextIO
 
 import typer
 
-from tolstat.cli._library import causes, pylife, reports, result_files, stores, texts, workbook
+from tolstat.cli._library import causes, pylife, reports, result_file, stores, text, workbook
 from tolstat.cli._shared import json_of, progress, say, write
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.files import atomic_write
@@ -109,12 +109,12 @@ def export(
             _tell(statistics, "all statistics")
         if joints is not None:
             if joints == "-":
-                list(result_files.in_blocks(store, nominal))  # damage is found before anything is printed
+                list(result_file.in_blocks(store, nominal))  # damage is found before anything is printed
             write(joints, partial(_write_csv, store, nominal))
             _tell(joints, number)
         if parquet is None and xlsx is None:
             return
-        frame = result_files.to_pandas(store, nominal)
+        frame = result_file.to_pandas(store, nominal)
         writers = {xlsx: partial(workbook.write, store, frame), parquet: partial(frame.to_parquet, engine="pyarrow")}
         for name, write_file in writers.items():
             if name is not None:
@@ -131,7 +131,7 @@ def _tell(target: str, content: str) -> None:
 def _write_csv(store: Reader, nominal: bool, stream: TextIO) -> None:
     """Write errors and results block by block."""
     out = csv.writer(stream, lineterminator="\n")
-    for k, frame in enumerate(result_files.in_blocks(store, nominal)):
+    for k, frame in enumerate(result_file.in_blocks(store, nominal)):
         if k == 0:
             out.writerows([["row", *frame.columns], ["1", *frame.attrs["units"].values()]])
-        out.writerows(texts.csv_rows([frame.index.tolist(), *(frame[name].tolist() for name in frame)]))
+        out.writerows(text.csv_rows([frame.index.tolist(), *(frame[name].tolist() for name in frame)]))

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from tolstat.cli._library import np, schemas, spectra, starter, strict, studies, texts
+from tolstat.cli._library import np, schemas, spectra, starter, strict, studies, text
 from tolstat.cli._shared import json_of, say
 from tolstat.common.errors import Fault, InputError
 from tolstat.display.options import Opt
@@ -60,7 +60,7 @@ def schema(
     if out is None:
         typer.echo(content)
         return
-    say(f"wrote {texts.write(content + chr(10), out)}")
+    say(f"wrote {text.write(content + chr(10), out)}")
 
 
 def spectrum(
@@ -93,20 +93,18 @@ def spectrum(
     cycle = spectra.read(signal, exponent)
     content = spectra.text(cycle, signal, out, base)
     studies.load(out, text=content)  # its faults, before anything is written
-    texts.write(content, out)
+    text.write(content, out)
     rows = [("point", "alpha", "speed", "torque", "time", "damage")]
     values = (cycle.alpha, cycle.speed, cycle.torque, cycle.time, cycle.damage)
     for name, alpha, speed, torque, time, damage in zip(spectra.names(cycle), *values, strict=True):
         operation = f"{np.degrees(alpha):.4g} deg", f"{speed * 30 / np.pi:.4g} rpm", f"{torque:.4g} N m"
-        rows.append((name, *operation, texts.percent(time), texts.percent(damage)))
-    typer.echo(texts.align(rows))
-    share, rest = texts.percent(1.0 - cycle.time.sum()), texts.percent(max(0.0, 1.0 - cycle.damage.sum()))
+        rows.append((name, *operation, text.percent(time), text.percent(damage)))
+    typer.echo(text.align(rows))
+    share, rest = text.percent(1.0 - cycle.time.sum()), text.percent(max(0.0, 1.0 - cycle.damage.sum()))
     what = f"{rest} of the damage by revolutions (exponent {exponent:g})"
     say(f"left out: {share} of the time in which the shaft turns, with {what}")
-    say(
-        f"shares in the study are of the time at the points; the shaft stands still for {texts.percent(cycle.standing)}"
-    )
-    changes = f"their cycles of the torque do {texts.percent(cycle.changes)} of the damage of those in the signal"
+    say(f"shares in the study are of the time at the points; the shaft stands still for {text.percent(cycle.standing)}")
+    changes = f"their cycles of the torque do {text.percent(cycle.changes)} of the damage of those in the signal"
     others = f", {cycle.left_out} with smaller changes of the torque left out" if cycle.left_out else ""
     say(f"{len(cycle.visits)} visits of the points in {cycle.turns:.4g} revolutions{others}; {changes}")
     say(f"wrote {out}")

@@ -47,7 +47,7 @@ def plan(
     print_study_notes(study_file, loaded)
     library.compilation.announce()
     with progress() as shown:
-        made = library.plans.plan(loaded, workers, pilot or library.plans.PILOT, shown.stage)
+        made = library.plan.plan(loaded, workers, pilot or library.plan.PILOT, shown.stage)
     if as_json:
         print_json(asdict(made) | {"seconds": made.seconds})
     else:
@@ -55,7 +55,7 @@ def plan(
         meanings = {library.joints.ENTRIES: made.tolerances, library.joints.CORRELATED: made.correlations}
         for columns, rows in meanings.items():
             if rows:
-                typer.echo(f"\n{library.tables.as_text(columns, rows)}")
+                typer.echo(f"\n{library.table.as_text(columns, rows)}")
     say(f"next: tolstat run {quote(str(study_file))}" + ("" if n is None else f" --n {n}"))
 
 
@@ -128,7 +128,7 @@ def run(
     with gather(faults):
         text = library.rewriting.with_settings(library.strict.read_text(study_file), changes) if changes else None
         plan = library.studies.load(study_file, n=n, text=text)
-        again = None if retry is None else library.remedies.parse_retry(retry, retried, plan)
+        again = None if retry is None else library.remedy.parse_retry(retry, retried, plan)
     if faults:
         raise InputError(faults)
     print_study_notes(study_file, plan)
@@ -164,7 +164,7 @@ def extend(
         New number of joints, without the nominal joint.
     """
     with progress("drawing the errors"):
-        plan = library.growth.extend(file, n, study_file)
+        plan = library.extend.extend(file, n, study_file)
     say(f"{file}: extended to {n} joints")
     simulate(plan, file, workers=workers)
     conclude(file, report, wide)
@@ -188,7 +188,7 @@ def merge(files: Annotated[list[Path], Opt("SLICE")], *, out: Annotated[Path, Op
         Result file to create; must not exist.
     """
     with progress("merging"):
-        merged = library.growth.merge(files, out)
+        merged = library.extend.merge(files, out)
     counts = merged.counts
     pending = counts.total - counts.done
     say(f"{out}: {counts.done} {counts.counted}, {counts.shortfall}")
@@ -218,7 +218,7 @@ def simulate(plan: Study, path: Path, until: str | None = None, **choices: Any) 
     """Simulate a campaign with progress on standard error; `choices` go to `campaign.run`."""
     with work() as running:
         shown = running.display
-        run = partial(library.campaigns.run, plan, path, progress=shown, tell=say, stage=shown.stage, **choices)
+        run = partial(library.run.run, plan, path, progress=shown, tell=say, stage=shown.stage, **choices)
         if until is None:
             counts = run()
         else:
@@ -254,7 +254,7 @@ def conclude(path: Path, report: bool, wide: bool, study_file: str = "STUDY") ->
             deliver(answer, wide)
             for file in files:
                 say(f"wrote {file}")
-        without_load = library.remedies.reasons(store, {at.point or "": at.status() for at in store.each()})
+        without_load = library.remedy.reasons(store, {at.point or "": at.status() for at in store.each()})
         for reason in without_load:
             say(reason.text)
         for options in dict.fromkeys(reason.retry for reason in without_load if reason.retry):
@@ -264,7 +264,7 @@ def conclude(path: Path, report: bool, wide: bool, study_file: str = "STUDY") ->
         say(f"next: tolstat {following if store.whole else f'merge {source} OTHER_SLICES --out WHOLE.h5'}")
 
 
-def _lines(made: library.plans.Plan) -> Iterator[str]:
+def _lines(made: library.plan.Plan) -> Iterator[str]:
     yield f"joints: {made.rows}" + (f", each at {', '.join(made.points)}" if all(made.points) else "")
     yield f"random numbers a joint: {made.dimensions}"
     yield f"pilot: {made.pilot} joints, {made.failed} failed, {made.unsettled} not settled"

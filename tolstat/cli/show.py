@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tolstat.cli._library import drawings, style, tables, views
+from tolstat.cli._library import drawings, style, table, views
 from tolstat.cli._shared import say
 from tolstat.common.errors import Fault, InputError, gather
 from tolstat.common.files import check_target
@@ -65,5 +65,5 @@ def show(
     else:
         figure, rows = drawings.draw_joint(joint, own_alpha, title, columns), drawings.lengths(joint, own_alpha)
     (path,) = style.save(figure, target.with_suffix(""), (target.suffix.lower(),))
-    typer.echo(tables.as_text(tables.plain(rows), rows))
+    typer.echo(table.as_text(table.plain(rows), rows))
     say(f"wrote {path}")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tolstat.cli._library import compilation, load_units, records, replays, sections, stores, studies, texts
+from tolstat.cli._library import compilation, load_units, replays, sections, stores, studies, tables, text
 from tolstat.cli._shared import print_json, print_warnings, progress, say, warn
 from tolstat.common.files import atomic_write
 from tolstat.display.options import AsJson, Opt, Point, ResultPath, Trace
@@ -79,10 +79,10 @@ def _deliver(result: CaseResult, facts: dict[str, Any], out: Path | None, as_jso
         print_json(summary)
     else:
         lines = [f"{name}: {value}" for name, value in summary.items() if name != "max"]
-        typer.echo("\n".join([*lines, texts.align(_largest(summary["max"]))]))
-    state = records.Status[str(summary["status"]).upper()]
-    if state != records.Status.OK:
-        warn(f"warning: {state.label}: {records.STATUS_TEXT[state]}\n  hint: {result.remedy()}")
+        typer.echo("\n".join([*lines, text.align(_largest(summary["max"]))]))
+    state = tables.Status[str(summary["status"]).upper()]
+    if state != tables.Status.OK:
+        warn(f"warning: {state.label}: {tables.STATUS_TEXT[state]}\n  hint: {result.remedy()}")
     if out is not None:
         with atomic_write(out) as temporary:
             result.to_pandas().to_csv(temporary, index=False, lineterminator="\n")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from tolstat.cli._library import np, records, remedies, stores, tables, texts, verification, what_if
+from tolstat.cli._library import np, remedy, stores, table, tables, text, verification, what_if
 from tolstat.cli._shared import print_json, print_table, progress, wrapped
 from tolstat.common.errors import Fault, StoreError
 from tolstat.display.options import AsJson, ResultPath, Wide
@@ -43,19 +43,19 @@ def status(file: ResultPath, *, check: bool = False, wide: Wide = False, as_json
         facts, shares = _facts(store, states), _shares(store.view())
         if check:
             facts["checked"] = _checked(store)
-        reasons = remedies.reasons(store, states)
+        reasons = remedy.reasons(store, states)
     if as_json:
         causes = {f"{r.status.label} at {r.point}" if r.point else r.status.label: r for r in reasons}
         hints = {name: {"row": reason.row, "remedy": reason.remedy} for name, reason in causes.items()}
-        print_json(texts.plain(facts | {"exceedance": shares, "causes": hints}))
+        print_json(text.plain(facts | {"exceedance": shares, "causes": hints}))
         return
     typer.echo("\n".join([*_lines(facts), *(wrapped(reason.text) for reason in reasons)]))
     if shares:
         columns = (
-            tables.Column("load > limit", lambda row: texts.limit({**row, "level": row["limit"]})),
-            tables.Column("above", lambda row: f"{row['above']} of {row['of']}"),
-            tables.Column("share", lambda row: texts.percent(row["estimate"])),
-            tables.Column("95 % interval", lambda row: texts.span(row["lower"], row["upper"])),
+            table.Column("load > limit", lambda row: text.limit({**row, "level": row["limit"]})),
+            table.Column("above", lambda row: f"{row['above']} of {row['of']}"),
+            table.Column("share", lambda row: text.percent(row["estimate"])),
+            table.Column("95 % interval", lambda row: text.span(row["lower"], row["upper"])),
         )
         typer.echo()
         print_table(columns, shares, wide)
@@ -64,17 +64,13 @@ def status(file: ResultPath, *, check: bool = False, wide: Wide = False, as_json
 def _facts(store: ResultFile, states: dict[str, NDArray[np.uint8]]) -> dict[str, Any]:
     """Study, counts by status, in all and by point, and the pace of the run under way; `states` by point."""
     facts: dict[str, Any] = {"study": store.study_name, "joints": store.n}
-    facts |= _counts(records.worst_status(list(states.values())))
+    facts |= _counts(tables.worst_status(list(states.values())))
     counts = {point: _counts(status) for point, status in states.items()}
     if len(counts) > 1:
-        facts["points"] = {
-            point: {k: n for k, n in number_by_status.items() if n} for point, number_by_status in counts.items()
-        }
-    points, pending = (
-        store.each(),
-        sum(number_by_status[records.Status.PENDING.label] for number_by_status in counts.values()),
-    )
-    stored = sum(_counts(at.column("results", "status", slice(None)))[records.Status.PENDING.label] for at in points)
+        facts["points"] = {point: {k: n for k, n in numbers.items() if n} for point, numbers in counts.items()}
+    points, waiting = store.each(), tables.Status.PENDING.label
+    pending = sum(numbers[waiting] for numbers in counts.values())
+    stored = sum(_counts(at.column("results", "status", slice(None)))[waiting] for at in points)
     again = sum(int(np.count_nonzero(at.attempt())) for at in points)
     condition = {"damaged": pending - stored, "simulated_again": again}
     facts |= {name: number for name, number in condition.items() if number}
@@ -87,7 +83,7 @@ def _facts(store: ResultFile, states: dict[str, NDArray[np.uint8]]) -> dict[str,
 
 
 def _counts(states: NDArray[np.uint8]) -> dict[str, int]:
-    return {state.label: int(np.count_nonzero(states == state)) for state in records.Status}
+    return {state.label: int(np.count_nonzero(states == state)) for state in tables.Status}
 
 
 def _shares(view: View) -> list[dict[str, Any]]:

@@ -119,7 +119,7 @@ class Answer:
     facts: Mapping[str, Any] = field(default_factory=dict)
 
     def __repr__(self) -> str:
-        names = [f"{kind} {', '.join(held)}" for kind, held in (("frames", self.tables), ("facts", self.facts)) if held]
+        names = [f"{kind} {', '.join(keys)}" for kind, keys in (("frames", self.tables), ("facts", self.facts)) if keys]
         return f"<answer {self.name!r}: {'; '.join([self.title, *names])}>"
 
     @property

@@ -97,9 +97,7 @@ def with_variables(svg: str) -> str:
     """
     names = {colour: f"var(--{name})" for colour, (name, _) in _schemes().items()}
     svg = re.sub(r' fill="(#[0-9a-f]{6})"', r' style="fill: \1"', svg)
-    return re.sub(
-        r'style="[^"]+"', lambda attribute: re.sub("#[0-9a-f]{6}", lambda m: names.get(m[0], m[0]), attribute[0]), svg
-    )
+    return re.sub(r'style="[^"]+"', lambda look: re.sub("#[0-9a-f]{6}", lambda m: names.get(m[0], m[0]), look[0]), svg)
 
 
 def style_sheet() -> str:
@@ -156,12 +154,10 @@ def share_axis(ax: Axes, low: float, which: str = "y", high: float = 1.0) -> Non
     if high < 100.0 * low:
         axis.set_major_locator(ticker.LogLocator(subs=(1.0, 2.0, 5.0)))
     axis.set_major_formatter(ticker.FuncFormatter(lambda x, _: f"{100.0 * x:g} %"))
-    view_low, view_high = sorted(axis.get_view_interval())
-    decades = np.arange(np.floor(np.log10(view_low)), np.ceil(np.log10(view_high)))
+    left, right = sorted(axis.get_view_interval())
+    decades = np.arange(np.floor(np.log10(left)), np.ceil(np.log10(right)))
     marks = np.outer(10.0**decades, np.arange(2.0, 10.0)).ravel()  # those beyond the view would be made but not drawn
-    axis.set_minor_locator(
-        ticker.FixedLocator(marks[(marks > 0.999 * view_low) & (marks < 1.001 * view_high)].tolist())
-    )
+    axis.set_minor_locator(ticker.FixedLocator(marks[(marks > 0.999 * left) & (marks < 1.001 * right)].tolist()))
     axis.set_minor_formatter(ticker.NullFormatter())
 
 

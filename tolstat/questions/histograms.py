@@ -10,10 +10,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tolstat.analysis.sample import Sample
+from tolstat.common import loads, units
 from tolstat.common.errors import TolstatError
-from tolstat.common.loads import FloatArray
 from tolstat.common.tables import VALID
-from tolstat.common.units import DISPLAY_UNITS
 from tolstat.display import drawing, style, text
 from tolstat.display.answer import Answer, Axes, Panel, Panels, Part, Sentence
 from tolstat.questions.shares import inapplicable
@@ -59,8 +58,8 @@ class Drawn(NamedTuple):
     band: tuple[float, float] | None
     outside: float
     others: tuple[str, ...]
-    edges: FloatArray
-    share: FloatArray
+    edges: loads.FloatArray
+    share: loads.FloatArray
 
 
 def histograms(view: View) -> Answer:
@@ -137,7 +136,7 @@ def drawn(view: View) -> list[Drawn]:
     return histograms
 
 
-def of_load(load: Sample) -> tuple[FloatArray, FloatArray]:
+def of_load(load: Sample) -> tuple[loads.FloatArray, loads.FloatArray]:
     """Histogram of a load over its valid joints, counted by weight; bins of equal ratio where it has a long tail.
 
     Returns
@@ -156,8 +155,8 @@ def of_load(load: Sample) -> tuple[FloatArray, FloatArray]:
 
 
 def _counted(
-    values: FloatArray, weights: FloatArray, band: tuple[float, float] | None
-) -> tuple[float, FloatArray, FloatArray]:
+    values: loads.FloatArray, weights: loads.FloatArray, band: tuple[float, float] | None
+) -> tuple[float, loads.FloatArray, loads.FloatArray]:
     """Share outside the band, edges, and shares in the bins; the bins cover values and band."""
     ends = band or ()
     outside = weights[(values < band[0]) | (values > band[1])].sum() / weights.sum() if band else np.nan
@@ -166,7 +165,7 @@ def _counted(
     return float(outside), edges, _shares(values, edges, weights)
 
 
-def _shares(values: FloatArray, edges: FloatArray, weights: FloatArray) -> FloatArray:
+def _shares(values: loads.FloatArray, edges: loads.FloatArray, weights: loads.FloatArray) -> loads.FloatArray:
     return np.asarray(np.histogram(values, edges, weights=weights)[0] / weights.sum())
 
 
@@ -212,7 +211,7 @@ def _drawn_panel(drawn: Drawn, k: int, every: Sequence[Drawn]) -> Panel:
 
 
 def _draw_errors(ax: Axes, drawn: Drawn) -> None:
-    unit, factor = DISPLAY_UNITS.get(drawn.unit, (drawn.unit, 1.0))
+    unit, factor = units.DISPLAY_UNITS.get(drawn.unit, (drawn.unit, 1.0))
     _bars(ax, factor * drawn.edges, drawn.share)
     ends = factor * np.array(drawn.band or ())
     for end in ends:
@@ -228,7 +227,7 @@ def _draw_errors(ax: Axes, drawn: Drawn) -> None:
     ax.set_xlabel(f"[{unit or '1'}]")
 
 
-def _bars(ax: Axes, edges: FloatArray, share: FloatArray) -> None:
+def _bars(ax: Axes, edges: loads.FloatArray, share: loads.FloatArray) -> None:
     ax.stairs(share, edges, fill=True, color=style.COLOURS[0], alpha=0.55)
     ax.stairs(share, edges, color=style.COLOURS[0], lw=1.0)
     ax.set_ylim(0.0, 1.08 * max(float(share.max()), 1e-10))

@@ -147,13 +147,14 @@ def orders(view: View, orbits: bool = False) -> Answer:
     read, origin, apart = _orbits(view) if orbits else ([], "", 0.0)
     if read:
         facts |= {"origin": origin, "apart": apart}
-        points, units = [row for orbit in read for row in _points(orbit)], {"theta": "rad", "f_x": "N", "f_y": "N"}
+        points = [row for shaft in read for orbit in shaft for row in _points(orbit)]
+        units = {"theta": "rad", "f_x": "N", "f_y": "N"}
         parts.append(Table("orbits", "Lateral force over one revolution", (), points, units))
-        notes.append(f"orbits: {'; '.join(_which(read))}; nearest in the largest lateral force; {ORIGIN[origin]}")
+        notes.append(f"orbits: {'; '.join(map(_which, read))}; nearest in the largest lateral force; {ORIGIN[origin]}")
     if apart:
         words = f"largest loads of these joints differ by up to {apart:.1e} (relative) from the stored ones"
         notes.append(f"{words}, which another machine or version computed")
-    drawn = Panels([*_amplitude_panels(rows), *_orbit_panels(read)])
+    drawn = Panels([*_amplitude_panels(rows), *map(_orbit_panel, read)])
     return Answer("orders", "Orders of what the shafts carry", [drawn, *parts, *map(Sentence, notes)], facts)
 
 
@@ -183,9 +184,9 @@ def _amplitude(view: View, name: str) -> Row:
     return row
 
 
-def _orbits(view: View) -> tuple[list[Orbit], str, float]:
+def _orbits(view: View) -> tuple[list[list[Orbit]], str, float]:
     """Orbits of each shaft whose lateral force is kept, their source, and how far from the stored values."""
-    orbits, origin, apart = list[Orbit](), "", 0.0
+    orbits, origin, apart = list[list[Orbit]](), "", 0.0
     for shaft in SHAFTS:
         name = f"{shaft}.lateral"
         if name not in view.kept_loads or not view.load(name).valid.size:
@@ -196,11 +197,12 @@ def _orbits(view: View) -> tuple[list[Orbit], str, float]:
             away = np.abs(load.values - load.quantile(share).estimate)
             slots |= {near: int(at.slots(np.nanargmin(away)))} if np.isfinite(away).any() else {}
         names, samples = [f"{shaft}.f_x", f"{shaft}.f_y"], int(at.store.options["steps_per_rev"])
+        orbits.append([])
         for near, slot in slots.items():
             turn = revolutions.read(at.store, np.array([slot]), names, samples)
             force = np.column_stack([turn.loads[component][0] for component in names])
             origin, apart = turn.origin, max(apart, turn.apart)
-            orbits.append(Orbit(shaft, near, int(at.store.row(slot)), at.points[0], force))
+            orbits[-1].append(Orbit(shaft, near, int(at.store.row(slot)), at.points[0], force))
     return orbits, origin, apart
 
 
@@ -211,17 +213,10 @@ def _points(orbit: Orbit) -> Rows:
     return [head | {"theta": angle, "f_x": x, "f_y": y} for angle, (x, y) in zip(theta, orbit.force, strict=True)]
 
 
-def _which(orbits: Sequence[Orbit]) -> Iterator[str]:
-    """Words on which joints the orbits of each shaft are of."""
-    for (shaft, point), group in _by_shaft(orbits).items():
-        where = f"{shaft} shaft{f' at {point}' if point else ''}"
-        yield f"{where} {', '.join(f'{orbit.label} row {orbit.row}' for orbit in group)}"
-
-
-def _by_shaft(orbits: Sequence[Orbit]) -> dict[tuple[str, str], list[Orbit]]:
-    """Orbits by shaft and operating point."""
-    places = dict.fromkeys((orbit.shaft, orbit.point) for orbit in orbits)
-    return {place: [orbit for orbit in orbits if (orbit.shaft, orbit.point) == place] for place in places}
+def _which(orbits: Sequence[Orbit]) -> str:
+    """Words on which joints the orbits of a shaft are of."""
+    where = f"{orbits[0].shaft} shaft{f' at {orbits[0].point}' if orbits[0].point else ''}"
+    return f"{where} {', '.join(f'{orbit.label} row {orbit.row}' for orbit in orbits)}"
 
 
 def _amplitude_panels(rows: Rows) -> Iterator[Panel]:
@@ -235,14 +230,14 @@ def _amplitude_panels(rows: Rows) -> Iterator[Panel]:
         yield Panel(f"amplitude-{name}", title, words, draw, (drawing.WIDTH, 2.7), top=room)
 
 
-def _orbit_panels(orbits: Sequence[Orbit]) -> Iterator[Panel]:
-    """Pictures of the lateral force on each shaft."""
-    for (shaft, point), group in _by_shaft(orbits).items():
-        title = f"Lateral force on the {shaft} shaft over one revolution{f', at {point}' if point else ''}"
-        words = "Orbit of the force in axes that do not turn, of the nominal joint and of two others. "
-        words += " ".join(f"{orbit.label}: up to {text.value(orbit.largest, 'N')}." for orbit in group)
-        draw, room = partial(_draw_orbits, orbits=group), drawing.legend_room([orbit.label for orbit in group])
-        yield Panel(f"orbit-{shaft}", title, words, draw, (drawing.WIDTH, 4.6), top=room)
+def _orbit_panel(orbits: Sequence[Orbit]) -> Panel:
+    """Picture of the lateral force on a shaft."""
+    shaft, point = orbits[0].shaft, orbits[0].point
+    title = f"Lateral force on the {shaft} shaft over one revolution{f', at {point}' if point else ''}"
+    words = "Orbit of the force in axes that do not turn, of the nominal joint and of two others. "
+    words += " ".join(f"{orbit.label}: up to {text.value(orbit.largest, 'N')}." for orbit in orbits)
+    draw, room = partial(_draw_orbits, orbits=orbits), drawing.legend_room([orbit.label for orbit in orbits])
+    return Panel(f"orbit-{shaft}", title, words, draw, (drawing.WIDTH, 4.6), top=room)
 
 
 def _bars(ax: Axes, rows: Rows) -> None:

@@ -12,8 +12,7 @@ from tolstat.analysis import binomial
 from tolstat.common.errors import TolstatError
 from tolstat.common.loads import ANY_LIMIT
 from tolstat.common.tables import FAILED, STATUS_TEXT, UNSETTLED, VALID
-from tolstat.display import text
-from tolstat.display.table import Row
+from tolstat.display import table, text
 from tolstat.display.verdict import WORDS, Verdict
 from tolstat.questions import joints, shares
 from tolstat.questions.assumptions import sentences, variations
@@ -57,7 +56,7 @@ def headline(view: View, accepted: float = np.nan) -> Verdict | None:
     return judged._replace(notes=(*unresolved, *judged.notes, *_pending(view)))
 
 
-def _deciding(row: Row, accepted: float) -> str:
+def _deciding(row: table.Row, accepted: float) -> str:
     """Words on the number of simulated joints whose interval excludes the accepted share, those without a load too."""
     low, high = row["bound_lower"], row["bound_upper"]
     if not np.isnan(row["numerical_lower"]):
@@ -70,7 +69,7 @@ def _deciding(row: Row, accepted: float) -> str:
     return f"{f'{text.number(joints)} joints' if joints < 1e7 else 'more than 1e7 joints'} would decide it"
 
 
-def _judged(view: View, records: Sequence[Row], accepted: float, standing: Standing | None) -> Verdict:
+def _judged(view: View, records: Sequence[table.Row], accepted: float, standing: Standing | None) -> Verdict:
     row, worst = _decisive(view, records), exceedance.most_exceeded(view, records)
     several, answers = len(records) > 1, [verdict(record, accepted) for record in records]
     answer = verdict(row, accepted)
@@ -99,7 +98,7 @@ def _judged(view: View, records: Sequence[Row], accepted: float, standing: Stand
     return Verdict(answer, value, words, notes, worst["load"])
 
 
-def _sentence(view: View, row: Row, accepted: float, answer: str, standing: Standing | None) -> tuple[str, str]:
+def _sentence(view: View, row: table.Row, accepted: float, answer: str, standing: Standing | None) -> tuple[str, str]:
     """First words and rest of the sentence of a verdict, with what it stands on."""
     most, share, limit = text.percent(accepted), share_of(row), _words(view, row)
     exceed = "" if row["load"] == ANY_LIMIT else f" exceed {limit}"
@@ -144,36 +143,36 @@ def tells_yield(view: View) -> bool:
     return view.design.refuses("index") is None and known_parts.of(view) is None and bool(view.count(*VALID))
 
 
-def _decisive(view: View, records: Sequence[Row]) -> Row:
+def _decisive(view: View, records: Sequence[table.Row]) -> table.Row:
     """Row on which the verdict is: that of the joints above at least one limit, or of the only limit."""
     return exceedance.all_limits(view) if len(records) > 1 else records[0]
 
 
-def _untold(view: View, records: Sequence[Row]) -> str:
+def _untold(view: View, records: Sequence[table.Row]) -> str:
     """Why the verdict is on one of several limits."""
     return f"No share of the joints that exceed at least one limit: {_reason(view, [_decisive(view, records)])}"
 
 
-def _words(view: View, row: Row) -> str:
+def _words(view: View, row: table.Row) -> str:
     """What joints exceed, in words: one limit, or ``at least one limit``."""
     return "at least one limit" if row["load"] == ANY_LIMIT else _limit(view, row)
 
 
-def _limit(view: View, row: Row) -> str:
+def _limit(view: View, row: table.Row) -> str:
     """Limit in words: ``1500 N on cross1.F (most often at start)`` where it holds at several operating points."""
     limit = f"{text.value(row['level'], row['unit'])} on {row['load']}"
     several = row["count"] and len(view.narrowed(row["load"])[0].points) > 1
     return f"{limit} (most often at {points.point_of(view, row['load'])})" if several else limit
 
 
-def _most_often(view: View, records: Sequence[Row], worst: Row) -> str:
+def _most_often(view: View, records: Sequence[table.Row], worst: table.Row) -> str:
     """Sentence on the limit that most joints exceed, and how many others they exceed as often."""
     alike = sum(row["estimate"] == worst["estimate"] for row in records) - 1
     others = f", {alike} other limit{'s' if alike > 1 else ''} as often" if alike else ""
     return f". Most often {_limit(view, worst)}: {share_of(worst)}{others}"
 
 
-def _yield(view: View, records: Sequence[Row], standing: Standing | None) -> Verdict:
+def _yield(view: View, records: Sequence[table.Row], standing: Standing | None) -> Verdict:
     """Without an accepted share: share of the joints that keep all limits; of weighted joints, that exceed any."""
     without = view.design.without_interval("share")
     notes: tuple[str, ...] = (without,) if without else ()
@@ -203,11 +202,11 @@ def _yield(view: View, records: Sequence[Row], standing: Standing | None) -> Ver
     return Verdict("", kept.value, words, notes, exceedance.most_exceeded(view, records)["load"])
 
 
-def _undecided(records: Sequence[Row]) -> bool:
+def _undecided(records: Sequence[table.Row]) -> bool:
     return max(high - low for low, high in map(ends, records)) >= shares.WIDEST
 
 
-def _reason(view: View, records: Sequence[Row]) -> str:
+def _reason(view: View, records: Sequence[table.Row]) -> str:
     """Why there is no verdict on some limits."""
     lost = max(row["n_failed"] + row["n_unsettled"] for row in records)
     n = max(row["n"] for row in records)

@@ -18,7 +18,6 @@ from tolstat.display.answer import Asked
 from tolstat.display.blocks import Card, Decision, Facts, Listing, Page, Panels, Section, Table, Text
 from tolstat.display.verdict import WORDS, Verdict
 from tolstat.joint import Joint, derived, load, model
-from tolstat.joint.model import leaves
 from tolstat.joint.reading import DEFAULT_JOINT, examples
 from tolstat.joint.sections import mounting_and_law, quantities
 from tolstat.questions import accuracy, shares
@@ -93,53 +92,39 @@ def write_page(
             remedy = "leave the ending .html out: tolstat report FILE writes their table"
             raise StoreError(str(Fault(str(view.path), "lists its joints one by one", remedy)))
         asked = Asked(view.path, accepted, replay, stage=stage, processes=processes)
-        made = compose_brief(view.at(point), asked) if brief else compose(view.at(point), asked, full)
+        made = compose(view.at(point), asked, full, brief)
         stage("page: pictures")  # drawn from the view
         html.write(made, Path(out), processes)
     return Path(out)
 
 
-def compose(view: View, asked: Asked, full: bool = False) -> Page:
+def compose(view: View, asked: Asked, full: bool = False, brief: bool = False) -> Page:
     """Compose the page: verdict, open sections, folded sections, provenance.
 
-    What cannot be evaluated is left out, and a note in the first section says why.
+    A brief one has the verdict with its drawing, and the line of the drawing to change. What cannot be evaluated is
+    left out, and a note in the first section says why.
     """
-    worst.begin_replay(view, asked)
+    store, sections, listings = view.store, list[Section](), list[Facts | Listing]()
     asked.notes.extend(_notes(view))
-    if len(view.points) > 1:
-        point = point_of(view, view.most_exceeded) if view.leading else view.points[0]
-        remedy = f"tolstat report {asked.path.name} --point {point} --out PAGE.html"
-        asked.notes.append(f"loads over the input angle are on the page of one operating point: {remedy}")
-    sections = questions.sections(view, asked)
-    sections.sort(key=lambda section: section.folded)
-    listings = (
-        Facts(tuple(_facts(view.store)), "Provenance"),
-        joint_values(view.store),
-        Listing("The study as it was run", view.store.study_text),
-    )
-    return _page(view, [decision(view, asked), *sections], listings, full)
-
-
-def compose_brief(view: View, asked: Asked) -> Page:
-    """Compose the page that prints on one sheet: verdict with its drawing, and the line of the drawing to change."""
-    asked.notes.extend(_notes(view))
-    sections = [decision(view, asked)]
-    with asked.noting("nothing on the lines of the drawing"), suppress(NotApplicable):
-        answer = lines.lines_on_page(view, asked)
-        blocks = [block for block in answer.blocks() if isinstance(block, Text | Panels)]
-        sections.append(Section("lines", answer.title, blocks[:2]))
-    return _page(view, sections)
-
-
-def _page(
-    view: View, sections: Sequence[Section], listings: Sequence[Facts | Listing] = (), full: bool = False
-) -> Page:
-    store = view.store
+    if brief:
+        with asked.noting("nothing on the lines of the drawing"), suppress(NotApplicable):
+            answer = lines.lines_on_page(view, asked)
+            blocks = [block for block in answer.blocks() if isinstance(block, Text | Panels)]
+            sections.append(Section("lines", answer.title, blocks[:2]))
+    else:
+        worst.begin_replay(view, asked)
+        if len(view.points) > 1:
+            point = point_of(view, view.most_exceeded) if view.leading else view.points[0]
+            remedy = f"tolstat report {asked.path.name} --point {point} --out PAGE.html"
+            asked.notes.append(f"loads over the input angle are on the page of one operating point: {remedy}")
+        sections = sorted(questions.sections(view, asked), key=lambda section: section.folded)
+        listings = [Facts(tuple(_facts(store)), "Provenance"), joint_values(store)]
+        listings.append(Listing("The study as it was run", store.study_text))
     return Page(
         view.name,
         recorded.joint_of(store, 0).description,
         scene(view),
-        sections,
+        [decision(view, asked), *sections],
         f"{text.sentence(view.head())} Sampling {store.sampling['method']}, seed {store.sampling['seed']}; "
         f"begun {store.created}; tolstat {store.versions.get('tolstat', 'of unknown version')}; "
         f"result file {view.path.name}.",
@@ -148,16 +133,14 @@ def _page(
     )
 
 
-def _notes(view: View) -> Iterator[str]:
+def _notes(view: View) -> list[str]:
     """What restricts the numbers of the whole page."""
-    for note in (
-        exact(view),
-        fidelity.sentence(view.store.options, view.store.fidelity),
-        stopped(view),
-        recorded.note_on_mounting(view.store),
-    ):
-        if note:
-            yield note
+    names: Sequence[str] = ()
+    with suppress(TolstatError):  # a study that can no longer be read
+        names = unselected(view.study)
+    exact = f"no tolerance, taken as exact: {', '.join(names)}" if names else ""
+    model = fidelity.sentence(view.store.options, view.store.fidelity)
+    return [note for note in (exact, model, stopped(view), recorded.note_on_mounting(view.store)) if note]
 
 
 def _facts(store: Reader) -> Iterator[tuple[str, str]]:
@@ -196,19 +179,11 @@ def scene(view: View) -> tuple[str, str]:
     def marked(words: str, key: str) -> str:
         if assumed is None:
             return words
-        return f"{words} ({'assumed' if any(assumption.startswith(key) for assumption in assumed) else 'given'})"
+        return f"{words} ({'assumed' if any(name.startswith(key) for name in assumed) else 'given'})"
 
     first = f"{marked(at, 'operation.')}; {marked(bearing, 'bearing.')}."
     second = f"{marked(mounting, variations.AXIAL)}; {marked(law, variations.LAW)}."
     return text.capital(first), text.capital(second)
-
-
-def exact(view: View) -> str:
-    """Note on errors that no tolerance mentions; empty where there are none."""
-    with suppress(TolstatError):
-        if names := unselected(view.study):
-            return f"no tolerance, taken as exact: {', '.join(names)}"
-    return ""
 
 
 def joint_values(store: Reader) -> Listing:

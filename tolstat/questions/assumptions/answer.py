@@ -24,7 +24,6 @@ from tolstat.display import drawing, progress, style, text
 from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Row, Sentence, Table
 from tolstat.display.options import Accepted, Opt
 from tolstat.questions.assumptions import sentences, variations
-from tolstat.questions.assumptions.variations import Standing, Variation, applicable, evaluate
 from tolstat.questions.shares import inapplicable, own_joints, unusable
 from tolstat.solver.compilation import warm_up
 from tolstat.store import Writer, what_if
@@ -89,7 +88,7 @@ def assumptions(view: View, accepted: Accepted = math.nan) -> Answer:
     StoreError
         When the joints are not those of one joint, not drawn from tolerances, differ in weight, or have no limits.
     """
-    standing = evaluate(view, accepted)
+    standing = variations.evaluate(view, accepted)
     if not standing.rows:
         remedy = f"simulate them: tolstat assumptions {quote(str(view.path))} --run"
         raise inapplicable(view, "holds no joints with other values of what is assumed", remedy)
@@ -105,13 +104,13 @@ def assumptions(view: View, accepted: Accepted = math.nan) -> Answer:
 
 def assumptions_on_page(view: View, asked: Asked) -> Answer:
     """Table of the variations; their picture is beside the verdict."""
-    standing = applicable(view, asked.accepted)
+    standing = variations.applicable(view, asked.accepted)
     if standing is None or not standing.rows:
         raise NotApplicable
     return _answer(view, standing)
 
 
-def _answer(view: View, standing: Standing) -> Answer:
+def _answer(view: View, standing: variations.Standing) -> Answer:
     """Table, notes and facts."""
     most = max(row["n"] for row in standing.rows)
     each = f"{standing.n} joints of each" + (f", {most} of those left open" if most > standing.n else "")
@@ -136,7 +135,7 @@ _ACCEPTED: dict[str, Any] = {"color": style.COLOURS[2], "lw": 1.4, "ls": (0.0, (
 """Style of the accepted share."""
 
 
-def bars(standing: Standing) -> Panel:
+def bars(standing: variations.Standing) -> Panel:
     """Share as drawn, then with each value that moves it, on one axis with the accepted share."""
     rows = standing.moving
     moving = "; ".join(f"{row['label']} {text.percent(row['share'])}" for row in rows)
@@ -156,7 +155,7 @@ def _label(row: Any) -> str:
     return words.replace(" (", "\n(") if len(words) > _LONGEST else words
 
 
-def _bars(ax: Axes, standing: Standing, labels: list[str]) -> None:
+def _bars(ax: Axes, standing: variations.Standing, labels: list[str]) -> None:
     (share, lower, upper), accepted, rows = standing.drawn, standing.accepted, standing.moving
     ends = [lower, upper, *(row[f"share{end}"] for row in rows for end in ("", "_lower", "_upper"))]
     shown = np.array([share, accepted, *ends])
@@ -250,9 +249,9 @@ def simulate(
     return [path]
 
 
-def _further(view: View, accepted: float, n: int) -> tuple[list[Variation], int]:
+def _further(view: View, accepted: float, n: int) -> tuple[list[variations.Variation], int]:
     """Variations that would turn the verdict if more joints, at most `FURTHER` times `n`, decided them; that number."""
-    standing = evaluate(view, accepted)
+    standing = variations.evaluate(view, accepted)
     second = (1.0 + standing.confidence) / 2.0
     needed = {row["label"]: MARGIN * binomial.needed(row["share"], accepted, second) for row in standing.undecided}
     numbers = {label: number for label, number in needed.items() if number <= FURTHER * n}
@@ -288,7 +287,7 @@ class _Run:
         each = f"{self.n} of each of {len(self._variations)} variations"
         return f"simulated {self.simulated} joints in {spent:.0f} s, {each}{self._more}"
 
-    def simulate(self, wanted: Sequence[Variation], number: int = 0) -> None:
+    def simulate(self, wanted: Sequence[variations.Variation], number: int = 0) -> None:
         """Simulate what the file lacks of the first joints of some variations: `n` of each unless a number is given."""
         n = number or self.n
         if number:

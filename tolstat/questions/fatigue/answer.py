@@ -317,9 +317,7 @@ def _draw_failures(ax: Axes, stressed: parts.Stressed, life: float) -> None:
     first, last = sorted([service, life if math.isfinite(life) and life > 0 else service])
     numbers = np.geomspace(first / 10**DECADES, last * 10**DECADES, POINTS)
     curve, has_band = parts.failures_over_life(stressed, numbers.tolist()), stressed.design.has_interval("mean")
-    lower, share, upper = np.array(
-        [(failures.outer_lower, failures.estimate, failures.outer_upper) for failures in curve]
-    ).T
+    lower, share, upper = np.array([(at.outer_lower, at.estimate, at.outer_upper) for at in curve]).T
     if has_band:
         ax.fill_between(numbers, lower, upper, color=style.COLOURS[0], alpha=0.2, lw=0)
     ax.plot(numbers, share, color=style.COLOURS[0])
@@ -342,10 +340,9 @@ def _draw_spectrum(ax: Axes, loading: Loading, channel: str) -> None:
     x = np.concatenate([[0.7 * numbers[0]], numbers])
     handles = []
     for share, colour, dash in zip(SHARES, style.COLOURS, style.DASHES, strict=False):
-        rows_of_share = [row for row in rows if row["share"] == share]
+        curve = [row for row in rows if row["share"] == share]
         lower, estimate, upper, nominal = (  # the first value twice, so that the curve begins at the left edge
-            np.array([row[key] for row in (rows_of_share[0], *rows_of_share)])
-            for key in ("lower", "estimate", "upper", "nominal")
+            np.array([row[key] for row in (curve[0], *curve)]) for key in ("lower", "estimate", "upper", "nominal")
         )
         if np.isfinite(lower).any():
             top = np.where(np.isfinite(upper), upper, estimate)  # too few joints: the upper end is infinite

@@ -8,7 +8,7 @@ from tolstat.common.tables import Status
 from tolstat.display.answer import Asked
 from tolstat.questions.causes.worst import _largest, joint_rows
 from tolstat.questions.exceedance.answer import exceedance, exceedance_on_page, limits_on_page
-from tolstat.report import verdict
+from tolstat.report import page
 from tolstat.report.headline import headline
 from tolstat.solver import stationary
 from tolstat.store import worst
@@ -144,7 +144,7 @@ def test_the_page_names_a_point_without_a_valid_joint(tables):
     """All joints are pending there, as after damage of their only block."""
     tables["two"]["status"] = Status.PENDING
     view = views.at_points(tables, {"cross1.F": 700.0})
-    (table,) = verdict._points(view)
+    (table,) = page._points(view)
     kept = table.head.index("keep all limits there")
     assert table.rows[1][kept] == "no verdict"
     assert table.rows[0][kept] != "no verdict"

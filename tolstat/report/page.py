@@ -18,6 +18,7 @@ from tolstat.display.answer import Asked
 from tolstat.display.blocks import Card, Decision, Facts, Listing, Page, Panels, Section, Table, Text
 from tolstat.display.verdict import WORDS, Verdict
 from tolstat.joint import Joint, derived, load, model
+from tolstat.joint.model import leaves
 from tolstat.joint.reading import DEFAULT_JOINT, examples
 from tolstat.joint.sections import mounting_and_law, quantities
 from tolstat.questions import accuracy, shares

@@ -78,10 +78,10 @@ def test_interval_of_quantiles_covers_for_a_skew_load():
     truth = (limit - load.ppf(0.5)) / (load.ppf(capability.REFERENCE) - load.ppf(0.5))
     samples = np.random.default_rng(6).lognormal(0.0, 0.5, (seeds, n))
     found = [capability_of(row, np.ones(n), limit) for row in samples]
-    lower, upper = (np.array([getattr(c, f"cpk_{end}") for c in found]) for end in ("lower", "upper"))
+    lower, upper = (np.array([getattr(c.cpk, end) for c in found]) for end in ("lower", "upper"))
     assert within(lower, upper, truth) >= 0.95 - slack(seeds)
     assert np.all(lower > 0)
-    normal = (np.array([getattr(c, f"cpk_normal_{end}") for c in found]) for end in ("lower", "upper"))
+    normal = (np.array([getattr(c.cpk_normal, end) for c in found]) for end in ("lower", "upper"))
     assert within(*normal, truth) < 0.95 - slack(seeds)
     assert max(c.normal_p for c in found) < 1e-6
 

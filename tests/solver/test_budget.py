@@ -1,4 +1,4 @@
-"""One budget of Newton iterations for a joint, over lanes, repetition alone and refinement."""
+"""One budget of Newton iterations for a joint, over uniform steps and refinement."""
 
 from __future__ import annotations
 
@@ -46,26 +46,6 @@ def test_a_budget_may_end_in_the_search_for_equilibrium(
     found = simulate_rows(np.concatenate([params(alpha=0.2), params(pin1__clearance=-1.0)]), FAST).results
     assert found["status"].tolist() == [Status.NEWTON_FAILED, Status.OUTSIDE_MODEL]
     assert found["newton_iterations"].tolist() == [iterations, 0]
-
-
-@pytest.mark.slow
-def test_the_repetition_alone_continues_the_budget(params: Params, monkeypatch: pytest.MonkeyPatch) -> None:
-    """At 85 deg lanes give a joint up after some 40 iterations a step, and so does the repetition alone."""
-    table = params(alpha=np.radians(85))
-    each = int(simulate_rows(table, FAST).results["newton_iterations"][0])
-    assert each > MAX_ITERATIONS * 60 * FAST.max_revs
-    allow(monkeypatch, each + each // 2)
-    spent: list[int] = []
-    together = simulation.simulate_together
-
-    def counted(params, options, left, *others):
-        yield from together(params, options, left, *others)
-        spent.append(each + each // 2 - int(left[0]))
-
-    monkeypatch.setattr(simulation, "simulate_together", counted)
-    row = simulate_rows(table, FAST).results[0]
-    assert row["status"] == Status.NEWTON_FAILED
-    assert each + each // 2 <= spent[0] <= each + each // 2 + FAST.newton_max_iter
 
 
 @pytest.mark.slow

@@ -277,7 +277,7 @@ def integrate(
         Bound on the work: sub-steps that may be tried beyond those of the output grid.
     **settings : float
         Fields of `Options`: `newton_tol`, `newton_max_iter`, `max_halvings`, and `rtol` for TR-BDF2: above zero a step
-        is halved until the estimated error in it of every unknown and velocity y is below ``1e-12 + rtol |y|``. With 0,
+        is halved until the estimated error in it of every unknown and velocity y is below ``1e-9 + rtol |y|``. With 0,
         the default here, steps are halved for Newton's iteration alone.
 
     Returns

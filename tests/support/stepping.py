@@ -32,7 +32,7 @@ START_LEVEL = 4
 """Level of the first sub-step of BDF2, 1/2^4 of the step: without earlier points it is implicit Euler."""
 ROUNDING = 2.0**-49
 """Rounding error of an unknown relative to its size, including that of the operations of a step."""
-ABSOLUTE = 1e-12
+ABSOLUTE = 1e-9
 """Absolute tolerance beside ``options.rtol``."""
 
 bdf2_formula, trial, two_stages = bdf2.formula, bdf2.trial, trbdf2.formula

@@ -76,8 +76,17 @@ def read_text(path: Path) -> str:
 
 
 def read_section(place: Path, text: str, name: str) -> dict[str, Any]:
-    """Read a section of the TOML text of a study that a file holds; empty if there is none. Raises as `read_toml`."""
-    section: dict[str, Any] = read_toml(place, text).get(name, {})
+    """Read a section of the TOML text of a study that a file holds; empty if there is none.
+
+    Raises
+    ------
+    InputError
+        When the text is not TOML, or the section is no table.
+    """
+    section = read_toml(place, text).get(name, {})
+    if not isinstance(section, dict):
+        remedy = "the file is damaged: run its study again into another one"
+        raise InputError([Fault(str(place), f"holds a study whose {name} is no table", remedy)])
     return section
 
 

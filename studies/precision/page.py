@@ -30,7 +30,7 @@ OTHERS = {
     "Exudyn": ("#8C8C8C", "p"),
 }
 """Colours of Okabe and Ito (2008), and a grey; each code has a marker of its own too."""
-LABELS = {"loads": "largest |F| and |T|", "contact": "largest contact force", "psi": "largest |Ψ|"}
+LABELS = {"loads": "largest loads of bushings and shafts", "contact": "largest contact force", "psi": "largest |Ψ|"}
 LEVELS = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
 """Errors whose cost is tabulated, as far as they exceed the truth's own error."""
 TOP = 2.0
@@ -130,9 +130,9 @@ def page(points: pd.DataFrame, truth: pd.DataFrame, subtitle: str, image: str) -
         f"![Error against core time]({image})",
         _EXPLANATION.format(own_error=own_error),
         "## Fastest at each error",
-        "The cheapest setting measured whose error of the largest |F| and |T| of the median joint is not larger; times "
-        "in milliseconds of one core a joint. –: no setting reaches the error. Errors below the truth's own are left "
-        "out.",
+        "The cheapest setting measured whose error of the largest loads (of bushings and shafts) of the median joint is "
+        "not larger; times in milliseconds of one core a joint. –: no setting reaches the error. Errors below the "
+        "truth's own are left out.",
         _markdown(_ahead(points, truth, "loads")),
         "The same for the error of the worst joint; the time is still the median over the joints:",
         _markdown(_ahead(points, truth, "loads_worst")),

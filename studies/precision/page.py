@@ -130,7 +130,7 @@ def page(points: pd.DataFrame, truth: pd.DataFrame, subtitle: str, image: str) -
         f"![Error against core time]({image})",
         _EXPLANATION.format(own_error=own_error),
         "## Fastest at each error",
-        "The cheapest setting measured whose error of the largest loads (of bushings and shafts) of the median joint is "
+        "The cheapest setting measured whose error of the largest loads of bushings and shafts of the median joint is "
         "not larger; times in milliseconds of one core a joint. –: no setting reaches the error. Errors below the "
         "truth's own are left out.",
         _markdown(_ahead(points, truth, "loads")),

@@ -115,13 +115,15 @@ def _revolution(first, par, options, work, state):
 
 
 @njit
-def set_apart(state, shadow, R):
-    """Choose the first difference of the two states: `APART`, in all unknowns."""
+def set_apart(state, shadow, par):
+    """Choose the first difference of the two states: `APART`, in all unknowns; a shaft that is held has none."""
     share = APART / math.sqrt(state.q0.size)
     for i in range(state.q0.size):
-        radius = radius_of(i, R)
+        radius = radius_of(i, par.R)
         shadow.q0[i] = state.q0[i] + (share if i % 2 == 0 else -share) / radius
         shadow.v0[i], shadow.a0[i], shadow.weight[i] = state.v0[i], state.a0[i], state.weight[i]
+    if par.slides == 0:
+        shadow.q0[S] = state.q0[S]
     reset(shadow)
 
 
@@ -156,7 +158,7 @@ def exponent(params: Table, options: Options, settling: int, revolutions: int) -
     for r in range(settling):
         if not _revolution(r * n, par, options, work, state):
             return math.nan
-    set_apart(state, shadow, par.R)
+    set_apart(state, shadow, par)
     growth, factor = 0.0, 1.0
     for r in range(revolutions):
         draw_near(state, shadow, factor)

@@ -239,12 +239,15 @@ class _Map(Generic[BlockT, ResultT]):
 
     def _hand_out(self) -> None:
         self.ahead = self.ahead or self._next()
-        while self.ahead is not None and len(self.workers) < self.size:
-            self.workers.append(_kept.pop() if _kept else _Worker(self.work.prepare))
-        for worker in self.workers:
-            if worker.ready and worker.task is None and self.ahead is not None:
-                worker.give(self.work.function, self.ahead)
+        while self.ahead is not None:
+            idle = next((worker for worker in self.workers if worker.ready and worker.task is None), None)
+            if idle is not None:
+                idle.give(self.work.function, self.ahead)
                 self.ahead = self._next()
+            elif len(self.workers) < self.size:
+                self.workers.append(_kept.pop() if _kept else _Worker(self.work.prepare))
+            else:
+                break
 
     def _receive(self, worker: _Worker[BlockT]) -> Iterator[tuple[BlockT, ResultT | Lost]]:
         kind, content = worker.receive()

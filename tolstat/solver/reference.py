@@ -133,10 +133,10 @@ def first_order(params: NDArray[np.void], options: Options, from_start: bool = F
     def largest(times: FloatArray, states: FloatArray, equal: NDArray[np.bool_] | None = None) -> Largest:
         samples = make_samples(1, len(times))[0]
         sample(times, np.ascontiguousarray(states), par, work, samples)
-        found = for_kernels(np.zeros(1, RESULT))[0]
-        write_orders(samples if equal is None else samples[equal], found)
-        found.largest[:N_INSTANT] = samples.loads.max(axis=0)
-        return np.array(found.largest)
+        out = for_kernels(np.zeros(1, RESULT))[0]
+        write_orders(samples if equal is None else samples[equal], out)
+        out.largest[:N_INSTANT] = samples.loads.max(axis=0)
+        return np.array(out.largest)
 
     scale = np.repeat([LENGTH, VELOCITY], N_DOF)
     return FirstOrder(rate, jacobian, t0, y0, period, scale, largest, settled)

@@ -79,33 +79,33 @@ def refine(results: NDArray[np.void], options: Options, simulate: Simulate) -> N
     rows = np.flatnonzero(unsure | np.isin(results["status"], UNSETTLED))
     if not rows.size:
         return
-    found, blocks = simulate(rows, settings(options))
-    stationary.classify(found, blocks, options.duration)
-    known = np.isin(found["status"], SIMULATED)
+    refined, blocks = simulate(rows, settings(options))
+    stationary.classify(refined, blocks, options.duration)
+    known = np.isin(refined["status"], SIMULATED)
     for name in COUNTS:
-        found[name] += results[name][rows]
-    found["step_error"] = results["step_error"][rows]
-    agreed = (results["status"][rows] == Status.OK) & _agree(results[rows], found)
+        refined[name] += results[name][rows]
+    refined["step_error"] = results["step_error"][rows]
+    agreed = (results["status"][rows] == Status.OK) & _agree(results[rows], refined)
     if agreed.any():
         results[rows[agreed]], _ = simulate(rows[agreed], options)  # for the load histories of the uniform steps
     for name in COUNTS:
-        results[name][rows[agreed]] = found[name][agreed]
-    rows, found, known = rows[~agreed], found[~agreed], known[~agreed]
+        results[name][rows[agreed]] = refined[name][agreed]
+    rows, refined, known = rows[~agreed], refined[~agreed], known[~agreed]
     results["status"][rows[~known]] = Status.NOT_RESOLVED
-    results[rows[known]] = found[known]
-    far = np.isin(found["status"], VALID) & (found["refinement_change"] > MAX_CHANGE)
+    results[rows[known]] = refined[known]
+    far = np.isin(refined["status"], VALID) & (refined["refinement_change"] > MAX_CHANGE)
     results["status"][rows[far]] = Status.NOT_RESOLVED
 
 
-def _agree(plain: NDArray[np.void], found: NDArray[np.void]) -> NDArray[np.bool_]:
+def _agree(plain: NDArray[np.void], refined: NDArray[np.void]) -> NDArray[np.bool_]:
     """Whether joints are stationary, with narrow intervals that contain the largest loads of the uniform steps.
 
     Loads that measure others are compared: those of the shafts may be next to nothing.
     """
-    agree: NDArray[np.bool_] = found["status"] == Status.STATIONARY
+    agree: NDArray[np.bool_] = refined["status"] == Status.STATIONARY
     for key in dict.fromkeys(measure_of(kind).key for kind in LOAD_KINDS if kind.decides):
-        lower, upper = found[f"{key}_lower"], found[f"{key}_upper"]
+        lower, upper = refined[f"{key}_lower"], refined[f"{key}_upper"]
         with np.errstate(divide="ignore", invalid="ignore"):
-            ratio = plain[f"{key}_max"].max(axis=1) / found[f"{key}_max"].max(axis=1)
+            ratio = plain[f"{key}_max"].max(axis=1) / refined[f"{key}_max"].max(axis=1)
         agree &= (upper - lower <= MAX_INTERVAL_WIDTH) & (lower <= ratio) & (ratio <= upper)
     return agree

@@ -151,19 +151,19 @@ def simulate_rows(
     left = np.full(len(params), allowed)
 
     def simulate(rows: NDArray[np.intp], settings: Options) -> tuple[NDArray[np.void], NDArray[np.void]]:
-        found = np.zeros(len(rows), RESULT).view(np.recarray)
+        out = np.zeros(len(rows), RESULT).view(np.recarray)
         revolutions = settings.max_revs if follows_error(settings) else 0
         blocks = np.zeros((len(rows) if revolutions else 0, revolutions), RESULT).view(np.recarray)
         run: Run = simulate_ideal if settings.fidelity == Fidelity.IDEAL else simulate_together
         if follows_error(settings):
             run = partial(_resolved, steps[rows])
-        own = left[rows]
-        for i, samples in run(params[rows], settings, own, bool(specs), found, blocks):
-            if found[i].status in SIMULATED:
+        still_allowed = left[rows]
+        for i, samples in run(params[rows], settings, still_allowed, bool(specs), out, blocks):
+            if out[i].status in SIMULATED:
                 for name, values in _sample(samples, histories, specs).items():
                     kept[name][rows[i]] = values
-        left[rows] = own
-        return found.view(np.ndarray), blocks.view(np.ndarray)
+        left[rows] = still_allowed
+        return out.view(np.ndarray), blocks.view(np.ndarray)
 
     steps = explicit_steps(params, options)
     results = np.zeros(len(params), RESULT)
@@ -201,8 +201,8 @@ def simulate_together(
     memory = make_samples(min(max_size, len(params)) if keep else 0, options.steps_per_rev)
     for here in _groups(params, max_size):
         allowed = left[here]
-        own = np.zeros((len(here) if len(blocks) else 0, blocks.shape[1]), KERNEL_RESULT).view(np.recarray)
-        queue = make_queue(params[here], options, allowed, memory[: len(here)].view(np.recarray), own)
+        statistics = np.zeros((len(here) if len(blocks) else 0, blocks.shape[1]), KERNEL_RESULT).view(np.recarray)
+        queue = make_queue(params[here], options, allowed, memory[: len(here)].view(np.recarray), statistics)
         if steps is None:
             run_lanes(queue, options)
         else:
@@ -211,7 +211,7 @@ def simulate_together(
         left[here] = allowed
         for_kernels(results)[here] = queue.results
         if len(blocks):
-            for_kernels(blocks)[here] = own
+            for_kernels(blocks)[here] = statistics
         yield from zip(here.tolist(), memory, strict=False)
 
 
@@ -248,7 +248,8 @@ def run_explicit(queue: Queue, steps: NDArray[np.int64], options: Options) -> No
     from tolstat.kernel.lanes.explicit import explicit
     from tolstat.kernel.simd.lane import WIDTH
 
-    explicit(steps, options, lanes_for(queue, options, width_for(WIDTH)), queue)
+    all_lanes = width_for(WIDTH)  # for a few joints, too: the kernel is compiled for this width alone
+    explicit(steps, options, lanes_for(queue, options, all_lanes), queue)
 
 
 def lanes_for(queue: Queue, options: Options, width: int) -> Batch:
@@ -263,7 +264,8 @@ def equilibrium(params: NDArray[np.void], options: Options) -> NDArray[np.float6
     from tolstat.kernel.lanes.lockstep import START_ONLY
     from tolstat.kernel.revolution.settle import make_samples
 
-    settings = options._replace(max_revs=START_ONLY, start=int(Start.STATIC))
+    dynamic = options._replace(fidelity=int(Fidelity.DYNAMIC), start=int(Start.STATIC))
+    settings = dynamic._replace(max_revs=START_ONLY)
     queue = make_queue(params, settings, np.full(1, 2**31), make_samples(0, options.steps_per_rev), NO_BLOCKS)
     run_lanes(queue, settings)
     return np.asarray(queue.starts[0])
@@ -277,7 +279,7 @@ def simulate_ideal(
     results: NDArray[np.void],
     blocks: NDArray[np.void] = NO_BLOCKS,
 ) -> Iterator[tuple[int, NDArray[np.void]]]:
-    """Evaluate the closed forms of ideal joints; arguments as of `simulate_together`, to which they take no work."""
+    """Evaluate the closed forms of ideal joints; arguments as of `simulate_together`, `left` stays as it is."""
     from tolstat.kernel.revolution.ideal import ideal_revolution
 
     batch, rows, out = lanes(options, 1), params.view(np.recarray), for_kernels(results)
@@ -312,9 +314,9 @@ def explicit_steps(params: NDArray[np.void], options: Options) -> NDArray[np.int
     from tolstat.kernel.lanes.explicit import count_steps
     from tolstat.kernel.revolution.explicit import MOST_STEPS
 
-    own = np.zeros(len(these), np.int64)
-    count_steps(params[these].view(np.recarray), options, lanes(options, 1).one, own)
-    steps[these] = np.where(own <= MOST_STEPS, own, 0)
+    fewest = np.zeros(len(these), np.int64)
+    count_steps(params[these].view(np.recarray), options, lanes(options, 1).one, fewest)
+    steps[these] = np.where(fewest <= MOST_STEPS, fewest, 0)
     return steps
 
 
@@ -345,12 +347,12 @@ def _resolved(
         if not len(rows):
             continue
         out = np.zeros(len(rows), RESULT).view(np.recarray)
-        own, allowed = np.zeros((len(rows), blocks.shape[1]), RESULT).view(np.recarray), left[rows]
+        statistics, allowed = np.zeros((len(rows), blocks.shape[1]), RESULT).view(np.recarray), left[rows]
         these = steps[rows] if explicit else None
-        for i, samples in simulate_together(params[rows], options, allowed, keep, out, own, these):
+        for i, samples in simulate_together(params[rows], options, allowed, keep, out, statistics, these):
             results[rows[i]] = out[i]
             yield int(rows[i]), samples
-        results[rows], blocks[rows], left[rows] = out, own, allowed
+        results[rows], blocks[rows], left[rows] = out, statistics, allowed
         steps[rows[out["status"] == Status.NEWTON_FAILED]] = 0
 
 
@@ -366,9 +368,9 @@ def _groups(params: NDArray[np.void], max_size: int) -> Iterator[NDArray[np.intp
 def _sample(samples: NDArray[np.void], histories: Histories, specs: dict[str, HistorySpec]) -> dict[str, NDArray[Any]]:
     """Extract the histories that are kept from the samples of the recorded revolution."""
     if histories == "full":
-        held = {name: samples["loads"][:, span] for name, span in SPAN.items()}
-        held |= {name: samples[name] for name in samples.dtype.names or ()} | {"loads": samples["components"]}
-        return {name: held[name].reshape(spec.shape) for name, spec in specs.items()}
+        fields = {name: samples["loads"][:, span] for name, span in SPAN.items()}
+        fields |= {name: samples[name] for name in samples.dtype.names or ()} | {"loads": samples["components"]}
+        return {name: fields[name].reshape(spec.shape) for name, spec in specs.items()}
     loads = {
         BUSHING_LOADS.name: np.ascontiguousarray(samples["components"]),
         SHAFT_LOADS.name: np.ascontiguousarray(samples["shafts"]),

@@ -255,8 +255,8 @@ def lockstep(options, patience, batch, queue, tally):
         solved = solved | last
         if controlled and any_of(solved & (control.stage > 0)):
             control.error = load_error(control.h, par, motion)
-        acting = bits_of(solved | failed)
-        arrived = bits_of(solved)
+        acting, arrived = bits_of(solved | failed), bits_of(solved)
+        # what follows stands here, not in a function of its own: passing the lanes to one cost 7 % of the time
         for lane in range(at.joint.size):
             if (acting >> lane) & 1 == 0:
                 continue

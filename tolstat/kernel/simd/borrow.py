@@ -6,7 +6,7 @@ samples; with it, memory is read while other lanes compute.
 """
 
 from llvmlite import ir
-from numba.core import cgutils, types
+from numba.core import cgutils, config, types
 from numba.extending import intrinsic, overload
 from numba.np.arrayobj import make_array
 
@@ -24,7 +24,7 @@ def _borrow(context, builder, ty, value):
 
 
 @intrinsic
-def without_refcount(typingctx, value):
+def _borrowed(typingctx, value):
     """Array, or tuple with arrays in it, without an owner; the caller must keep the memory alive meanwhile."""
 
     def codegen(context, builder, sig, args):
@@ -33,6 +33,11 @@ def without_refcount(typingctx, value):
     return value(value), codegen
 
 
+def _as_it_is(value):
+    return value
+
+
+without_refcount = _as_it_is if config.DISABLE_JIT else _borrowed  # an overload could not return records in tuples
 CACHE_LINE = 64
 """Bytes that the processor fetches at a time."""
 

@@ -71,6 +71,21 @@ def test_each_kind_of_key_has_its_line() -> None:
     assert {path: lines.get(path) for path in expected} == expected
 
 
+def test_a_long_list_is_not_read_again_at_each_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    read: list[int] = []
+    loads = tomllib.loads
+
+    def counted(text: str) -> dict:
+        read.append(len(text))
+        return loads(text)
+
+    monkeypatch.setattr(tomllib, "loads", counted)
+    text = "rows = [\n" + "".join(f"  {{ n = {k} }},\n" for k in range(500)) + "]\n"
+    lines = of_keys(text)
+    assert [lines["rows", k, "n"] for k in (0, 250, 499)] == [2, 252, 501]
+    assert sum(read) < 3 * len(text)
+
+
 def test_a_fault_has_the_line_of_its_key_or_of_the_table_around_it() -> None:
     places = {
         "a.toml: tolerances.pin[12].offset_t.plus_minus": "a.toml:6: tolerances.pin[12].offset_t.plus_minus",

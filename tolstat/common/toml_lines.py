@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from typing import Any
 
 KeyPath = tuple[int | str, ...]
+CLOSING = {"[": "]", "{": "}"}
 
 _STRING_OR_COMMENT = re.compile(
     r'"""(?:[^\\]|\\.)*?"{3,5}(?!")' + r"|'''.*?'{3,5}(?!')" + r"""|"(?:[^"\\\n]|\\.)*"|'[^'\n]*'|#[^\n]*""", re.DOTALL
@@ -83,10 +84,11 @@ def of_keys(text: str) -> dict[KeyPath, int]:
     lines: dict[KeyPath, int] = {}
     sizes: dict[KeyPath, int] = {}
     table: KeyPath = ()
-    statement, first = "", 1
+    statement, first, before = "", 1, 0
     for number, line in enumerate(text.split("\n"), start=1):
         statement += f"{line}\n"
-        closing = _closing(statement)
+        opened = _open(statement)
+        closing = "".join(CLOSING[statement[at]] for at in reversed(opened))
         try:
             data = tomllib.loads(statement + closing)
         except tomllib.TOMLDecodeError:  # inside a text of several lines
@@ -94,9 +96,15 @@ def of_keys(text: str) -> dict[KeyPath, int]:
         if statement.lstrip().startswith("["):
             table = _table(data, lines, sizes, number)
         else:
-            for path in _paths(data):
+            for path in _paths(data, before):
                 lines.setdefault((*table, *path), first)
-        statement, first = statement if closing else "", number + 1
+        if closing == "]" and _blanked(statement).rstrip().endswith(","):
+            # the items of a list so far are known: read on from its bracket, or a long list takes long
+            before += len(_items(data))
+            statement = statement[: opened[0] + 1]
+        elif not closing:
+            statement, before = "", 0
+        first = number + 1
     return lines
 
 
@@ -116,16 +124,37 @@ def _table(header: Any, lines: dict[KeyPath, int], sizes: dict[KeyPath, int], nu
     return path
 
 
-def _closing(statement: str) -> str:
-    """Brackets that are open at the end of a statement, closed."""
-    closing = ""
-    for bracket in re.findall(r"[\[\]{}]", _STRING_OR_COMMENT.sub("", statement)):
-        closing = {"[": "]", "{": "}"}[bracket] + closing if bracket in "[{" else closing[1:]
-    return closing
+def _blanked(statement: str) -> str:
+    """Statement with spaces in place of texts and comments."""
+    return _STRING_OR_COMMENT.sub(lambda match: " " * len(match[0]), statement)
 
 
-def _paths(data: object) -> Iterator[KeyPath]:
-    """Key paths of nested tables and lists."""
-    for key, value in data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ():
-        yield (key,)
-        yield from ((key, *path) for path in _paths(value))
+def _open(statement: str) -> list[int]:
+    """Places of the brackets that are open at the end of a statement."""
+    opened: list[int] = []
+    for bracket in re.finditer(r"[\[\]{}]", _blanked(statement)):
+        if bracket[0] in CLOSING:
+            opened.append(bracket.start())
+        elif opened:
+            opened.pop()
+    return opened
+
+
+def _items(data: Any) -> list[Any]:
+    """The list that a statement gives to its key."""
+    while isinstance(data, dict):
+        (data,) = data.values()
+    items: list[Any] = data
+    return items
+
+
+def _paths(data: object, before: int = 0) -> Iterator[KeyPath]:
+    """Key paths of nested tables and lists; the first item of the outermost list has the index `before`."""
+    if isinstance(data, dict):
+        for key, value in data.items():
+            yield (key,)
+            yield from ((key, *path) for path in _paths(value, before))
+    elif isinstance(data, list):
+        for index, value in enumerate(data, before):
+            yield (index,)
+            yield from ((index, *path) for path in _paths(value))

@@ -31,7 +31,7 @@ PLACES = 24
 """Places around a round section: the stress between two of them is at most 1 - cos(7.5 deg), 0.9 %, above theirs."""
 
 
-def _found(name: str, other: str, value: float | None) -> str:
+def _neither_or_both(name: str, other: str, value: float | None) -> str:
     return f"has neither {name} nor {other}" if value is None else f"has both {name} and {other}"
 
 
@@ -85,10 +85,13 @@ class StressPointEntry(Strict):
         if not any(map(any, self.per_load)):
             raise refuse("no load stresses the point", 'give a stress per load, for example T_e = "0.2 MPa/(N*m)"')
         if (self.S_D is None) == (self.S_aD is None):
-            raise refuse(_found("S_D", "S_aD", self.S_D), "give one of them: S_D is a range, S_aD an amplitude")
+            raise refuse(
+                _neither_or_both("S_D", "S_aD", self.S_D), "give one of them: S_D is a range, S_aD an amplitude"
+            )
         if (self.T_S is None) == (self.T_N is None):
             raise refuse(
-                _found("T_S", "T_N", self.T_S), "give one of them; T_S = 1 is a strength that does not scatter"
+                _neither_or_both("T_S", "T_N", self.T_S),
+                "give one of them; T_S = 1 is a strength that does not scatter",
             )
         return self
 

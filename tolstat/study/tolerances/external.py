@@ -1,6 +1,7 @@
-"""Laws of scipy.stats: ``distribution = "scipy:weibull_min(c=1.8, scale=0.012)"``, a call with literal numbers.
+"""Distributions from outside the study: laws of scipy.stats, and measured parts in a CSV file.
 
-The text is parsed, never evaluated; scipy.stats is imported for studies that have such an entry only.
+A law is a call with literal numbers, ``distribution = "scipy:weibull_min(c=1.8, scale=0.012)"``: its text is parsed,
+never evaluated. scipy.stats is imported for studies that have such an entry only.
 """
 
 from __future__ import annotations

@@ -97,6 +97,14 @@ def test_joints_needed_are_the_first_whose_interval_tells(share, accepted):
     assert binomial.needed(accepted, accepted) == np.inf
 
 
+@pytest.mark.parametrize(("count", "n"), [(0, 61), (2, 14), (38, 395)])
+def test_unresolved_joints_matter_from_half_the_interval_of_the_valid_ones_on(count, n):
+    for unresolved in range(n - count):
+        ends = binomtest(count, n - unresolved).proportion_ci(0.95, "exact")
+        matter = unresolved > 0 and unresolved / n >= 0.5 * (ends.high - ends.low)
+        assert binomial.unresolved_matter(count, n, unresolved) == matter
+
+
 def test_hand_counted_case():
     values = [1.0, 2.0, 3.0, 4.0, np.nan, 9.0, 9.0]
     status = [1, 1, 1, 1, Status.NEWTON_FAILED, Status.NOT_SETTLED, Status.PENDING]

@@ -96,6 +96,13 @@ def test_wider_tolerances_are_refused_however_many_joints_happen_to_be_above():
     assert not found.support.usable
 
 
+@pytest.mark.parametrize(("mean_square", "needed"), [(1.5, 50), (2.0, 50), (4.0, 100), (8.0, 200)])
+def test_the_more_ratios_scatter_the_more_effective_joints_are_needed(mean_square, needed):
+    for effective, usable in ((needed - 1, False), (needed + 1, True)):
+        ratios = Ratios(np.ones(round(effective * mean_square)), np.log(mean_square), heaviest=100.0)
+        assert ratios.usable == usable
+
+
 def test_a_level_that_no_joint_is_above_needs_a_bound_of_the_ratio():
     x = np.random.default_rng(6).standard_normal((1024, ERRORS))
     level, status = x.sum(axis=1).max(), np.ones(1024, int)

@@ -72,6 +72,13 @@ def test_joint_i_does_not_depend_on_n(make: Make, method: str, n: int, more: int
     np.testing.assert_array_equal(few, many[: n + 1])
 
 
+def test_random_numbers_of_a_level_are_the_same_in_parts(make: Make) -> None:
+    s = make(OFFSET, DIAMETER)
+    whole, parts = sampling.noise(s, 2, 0, 30), [sampling.noise(s, 2, first, 10) for first in (0, 10, 20)]
+    np.testing.assert_array_equal(np.concatenate(parts), whole)
+    assert len(np.unique(np.concatenate([whole, sampling.noise(s, 1, 0, 30)]))) == 2 * whole.size
+
+
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("first", [True, False])
 def test_an_added_error_moves_nothing(make: Make, method: str, first: bool) -> None:

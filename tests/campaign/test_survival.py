@@ -291,6 +291,24 @@ def test_failed_joints_are_simulated_again_with_other_settings(tmp_path: Path, h
     assert_same_but(path, before, failed.tolist())
 
 
+def test_a_second_retry_that_was_stopped_goes_on(tmp_path: Path) -> None:
+    run, told = partial(fakes.run, fakes.Study(), tmp_path / "a.h5", simulate_rows=simulate_finely), list[str]()
+    run()
+    run(retry=Retry((Status.NOT_SETTLED,), {"solver.steps_per_rev": 45}, Options(steps_per_rev=45)), tell=told.append)
+
+    def interrupt(counts: Counts) -> None:
+        if counts.done == 38:
+            raise KeyboardInterrupt
+
+    with pytest.raises(campaign.Interrupted):
+        run(1, 1, progress=interrupt, retry=AGAIN, tell=told.append)
+    assert run(retry=AGAIN, tell=told.append).failed == 0
+    assert told == ["4 joints are simulated again"] * 2
+    with ResultFile.open(tmp_path / "a.h5") as store:
+        assert len(store.retries) == 2
+        assert [(store.attempt() == number).sum() for number in (1, 2)] == [4, 4]
+
+
 def test_a_retry_that_changes_the_shape_of_histories_is_refused(tmp_path: Path) -> None:
     study, path = fakes.Study(output=fakes.Output("full")), tmp_path / "a.h5"
     fakes.run(study, path, 1)

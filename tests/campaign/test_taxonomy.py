@@ -88,7 +88,8 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.slow
 def test_a_campaign_reaches_every_state_of_the_kernel(path: Path) -> None:
     with ResultFile.open(path) as store:
-        family = [store.variants[number].family for number in store.design()["variant"]]
+        variant = store.design()["variant"]
+        family = [store.variants[number].family for number in variant]
         ended = {name: Status(s).label for name, s in zip(family, store.status(), strict=True)}  # the last one counts
         results = store.results()
         frame = store.to_pandas()
@@ -100,7 +101,9 @@ def test_a_campaign_reaches_every_state_of_the_kernel(path: Path) -> None:
     assert np.isfinite(results["F_max"][~failed]).all()
     at_a_step = np.isin(results["status"], [Status.NEWTON_FAILED, Status.NOT_FINITE])
     assert (results["failed_step"][at_a_step] >= 1).all()
-    assert (results["failed_theta"][at_a_step] >= 0).all()
+    steps = np.array([solver.steps_per_rev for solver in study.load(path.with_suffix(".toml")).solvers])[variant]
+    begin = 2 * np.pi * ((results["failed_step"] - 1) % steps) / steps  # a step leads from one grid point to the next
+    np.testing.assert_allclose(results["failed_theta"][at_a_step], begin[at_a_step], rtol=1e-12)
     assert (results["failed_step"][~at_a_step] == -1).all()
     assert np.isnan(results["failed_theta"][~at_a_step]).all()
 

@@ -82,6 +82,8 @@ def test_times_of_known_waves_and_joints_told_apart_from_them(path):
         assert row["time"] == pytest.approx(expected.mean(), abs=1e-3), row["load"]
         assert row["time_90"] == pytest.approx(np.quantile(expected, 0.9, method="inverted_cdf"), abs=1e-3)
         assert row["joints_above"] == pytest.approx(np.mean(own > 750.0))
+        ends = [float(end) for end in binomial.clopper_pearson(198 * row["time"], 198, 0.95)]
+        assert (row["time_lower"], row["time_upper"]) == pytest.approx(ends)
         assert row["time_lower"] < row["time"] < row["time_upper"] < row["joints_above"]
         assert row["time_50"] == 0.0
 

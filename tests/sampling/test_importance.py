@@ -176,6 +176,19 @@ def test_the_file_keeps_weights_and_reports_go_by_them(stored):
     assert json.loads(done.stdout)["exceedance"][0]["estimate"] == pytest.approx(found.estimate, rel=1e-2)
 
 
+def test_shares_of_contact_modes_count_joints_by_their_weights(tmp_path):
+    path = synthetic.store(tmp_path, PLAN.replace("n = 4000", "n = 400"), "small", failed=20)
+    shares = np.random.default_rng(2).dirichlet(np.ones(4), (401, 4))
+    with Writer.open(path) as store:
+        results = store.results()
+        results["mode_share"] = shares
+        store.write(np.arange(store.n), Simulation(results, {}))
+        weights = store.origin()["weight"][1:381]
+    with ResultFile.open(path) as store:
+        found = store.view().mode_share
+    np.testing.assert_allclose(found, np.average(shares[1:381], axis=0, weights=weights), rtol=1e-12)
+
+
 def test_statistics_that_count_joints_alike_are_refused(stored):
     for command in ("capability", "causes"):
         done = CliRunner().invoke(app, [command, str(stored)])

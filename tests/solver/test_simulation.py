@@ -148,10 +148,14 @@ class TestSymmetries:
 
     ALPHA = np.radians(12)
 
-    def loads(self, params, errors, alpha=ALPHA, sign=1.0):
-        row, histories = full(params(alpha=alpha, speed=sign * 60.0, torque=sign * 80.0, **errors), settle_tol=1e-6)
+    def histories(self, params, errors, alpha=ALPHA, sign=1.0, **options):
+        par = params(alpha=alpha, speed=sign * 60.0, torque=sign * 80.0, **errors)
+        row, histories = full(par, settle_tol=1e-6, **options)
         assert row["status"] == Status.OK
-        return histories["loads"]
+        return histories
+
+    def loads(self, *given, **options):
+        return self.histories(*given, **options)["loads"]
 
     @staticmethod
     def assert_same(a, b):
@@ -169,16 +173,19 @@ class TestSymmetries:
         there = self.loads(params, errors, alpha=-self.ALPHA)
         self.assert_same(np.roll(self.loads(params, errors), 90, axis=0), there)
 
-    def test_mirror(self, params, random_errors):
+    @pytest.mark.parametrize("fidelity", [Fidelity.DYNAMIC, Fidelity.QUASISTATIC])
+    def test_mirror(self, params, random_errors, fidelity):
         errors = random_errors(5)
         flipped = {
             name: -value if name.endswith(("offset_t", "tilt_z")) else value
             for name, value in permuted(errors, SWAP_OUTPUT).items()
         }
-        there = self.loads(params, flipped, sign=-1.0)
-        here = self.loads(params, errors)
+        there = self.histories(params, flipped, sign=-1.0, fidelity=int(fidelity))
+        here = self.histories(params, errors, fidelity=int(fidelity))
         # both count their samples in their own sense of rotation
-        self.assert_same(here[:, [1, 0, 2, 3, 4, 5, 7, 6]] * [1, -1, 1, -1, 1, -1], there)
+        self.assert_same(here["loads"][:, [1, 0, 2, 3, 4, 5, 7, 6]] * [1, -1, 1, -1, 1, -1], there["loads"])
+        plain = self.histories(params, {}, fidelity=int(fidelity))["tau"]
+        np.testing.assert_allclose(there["tau"], here["tau"], atol=1e-2 * np.abs(here["tau"] - plain).max())
 
 
 def test_the_clearance_of_each_pin_is_a_result_whatever_becomes_of_the_joint(params):

@@ -102,7 +102,7 @@ def test_parquet_has_columns_units_and_rows(tmp_path):
 @pytest.mark.slow
 def test_excel_has_sheets_for_joints_limits_and_units(tmp_path):
     openpyxl = pytest.importorskip("openpyxl")
-    path, out = synthetic.store(tmp_path, failed=2), tmp_path / "x.xlsx"
+    path, out = synthetic.store(tmp_path, failed=2, unsettled=3), tmp_path / "x.xlsx"
     assert export(path, "--xlsx", out).exit_code == 0
     book = openpyxl.load_workbook(out)
     assert book.sheetnames == ["joints", "limits", "units"]
@@ -113,7 +113,7 @@ def test_excel_has_sheets_for_joints_limits_and_units(tmp_path):
         nominal = store.nominal["cross1.F"]
     pd.testing.assert_frame_equal(joints, frame, check_dtype=False, check_index_type=False, check_exact=False)
     limits = pd.read_excel(out, sheet_name="limits", index_col="load").loc["cross1.F"]
-    assert limits[["limit", "unit", "above", "joints"]].tolist() == [700.0, "N", share.count, 58]
+    assert limits[["limit", "unit", "above", "joints"]].tolist() == [700.0, "N", share.count, 55]
     assert limits[["share", "lower", "upper", "nominal"]].tolist() == pytest.approx(
         [share.estimate, share.lower, share.upper, nominal]
     )

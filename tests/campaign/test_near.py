@@ -133,6 +133,8 @@ def test_deliveries_lie_in_their_prediction_interval(p):
     inside = [binom.cdf(high, number, p) - binom.cdf(low - 1, number, p) for low, high in naive]
     assert (binom.pmf(np.arange(n + 1), n, p) * inside).sum() < 0.95
     half = prediction.half(0.95)
+    low, high = prediction.of_share(p, p, 1000)  # half of the allowed error is left for the share
+    assert binom.cdf(high, 1000, p) - binom.cdf(low - 1, 1000, p) >= half
     for k, (low, high) in enumerate(ends[:20]):
         wide = prediction.of_share(*map(float, binomial.clopper_pearson(k, n, half)), number)
         assert wide[0] <= low <= high <= wide[1]

@@ -6,8 +6,18 @@ import numpy as np
 import pytest
 
 from tolstat.common.tables import KERNEL_RESULT, Options, Status
-from tolstat.kernel.mechanics.loads import DECIDING, MEASURES, N_DECIDING
-from tolstat.kernel.revolution.trail import Trail, closure_trend, combine, lag_closure, make_trails, note_closure
+from tolstat.kernel.mechanics.loads import DECIDING, MEASURES, N_DECIDING, OF_FORCES
+from tolstat.kernel.revolution.outcome import check_settled
+from tolstat.kernel.revolution.settle import ALL_LOADS, make_samples
+from tolstat.kernel.revolution.trail import (
+    Trail,
+    closure_trend,
+    combine,
+    lag_closure,
+    make_notes,
+    make_trails,
+    note_closure,
+)
 from tolstat.solver.simulation import simulate_rows
 
 RPM = np.pi / 30
@@ -30,6 +40,17 @@ def test_a_joint_that_settles_is_periodic(params):
     assert (row["status"], row["period"]) == (Status.OK, 1)
     assert row["failed_step"] == -1
     assert one(params(alpha=0.2), settle_tol=1e-9)["closure_trend"] < -0.5
+
+
+def test_a_joint_whose_shafts_loads_still_change_has_not_settled(params):
+    """All bushing loads repeat; a force on a shaft changes by more, then by less, than 1e-4 of the largest force."""
+    samples, out = make_samples(1, 36)[0], np.zeros(1, KERNEL_RESULT).view(np.recarray)[0]
+    samples.loads[:], samples.change[:] = 1000.0, 0.0
+    for change, status in ((0.11, Status.NOT_SETTLED), (0.09, Status.OK)):
+        samples.change[20, OF_FORCES, ALL_LOADS] = change
+        row, notes = params()[0], make_notes(1)[0]
+        assert check_settled(72, 0, row, Options(steps_per_rev=36), samples, notes, out) == status
+        assert out.closure == pytest.approx(change / 1000.0)
 
 
 def test_slow_decay_is_told_from_motion_that_goes_on(params):

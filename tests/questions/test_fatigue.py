@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from tests.support import naive
 from tolstat.analysis import cycles
 from tolstat.analysis.cycles import Cycles
-from tolstat.common.channels import BUSHING_LOADS, SHAFT_LOADS, channels_of
+from tolstat.common.channels import BUSHING_LOADS, LOAD_HISTORIES, SHAFT_LOADS, channels_of
 from tolstat.common.load_kinds import SHAFTS
 from tolstat.solver import rainflow
 
@@ -221,6 +221,21 @@ def largest(signal, k):
     ranges = rainflow.periodic(signal)[0]
     stored = ranges[None, None, :k]
     return Cycles.of_revolution(("cross1.F_e",), stored, stored, np.array([[len(ranges)]])), ranges[k:]
+
+
+def test_small_cycles_are_those_below_a_share_of_the_largest_load_of_their_kind():
+    """Cycles just below and above the gate: forces of 1000 N, torques of 10 N m, on bushings and on shafts."""
+    waves = np.outer(np.tile([0.5, -0.5], 4) * rainflow.GATE, [0.99, 1.02])
+    loads = {history.name: np.zeros((8, len(history.places), 6)) for history in LOAD_HISTORIES}
+    for values in loads.values():
+        values[:, :2, 0], values[:, :2, 5] = 1000.0 * (waves + 0.9), 10.0 * (waves + 0.9)
+    loads["loads"][0, 2, 1], loads["loads"][0, 2, 4] = 1000.0, 10.0
+    counted = rainflow.count(loads)
+    for history in LOAD_HISTORIES:
+        names = [channel.name for channel in channels_of(history)]
+        numbers = dict(zip(names, counted[f"{history.prefix}cycle_count"], strict=True))
+        for component in (history.components[0], history.components[5]):
+            assert [numbers[f"{place}.{component}"] for place in history.places[:2]] == [0, 4]
 
 
 def test_what_is_not_stored_is_bounded():

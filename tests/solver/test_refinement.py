@@ -141,6 +141,24 @@ def test_what_becomes_of_a_joint(before: Status, after: Status, change: float, s
     assert ("solver.max_refinements = 4" in said) == (status == Status.NOT_RESOLVED and after == Status.OK)
 
 
+@pytest.mark.parametrize(("steps", "factor"), [(360, 1), (180, 1), (90, 8), (60, 27), (45, 64)])
+def test_with_fewer_steps_larger_errors_are_allowed_as_the_third_power_of_the_step(steps: int, factor: int) -> None:
+    asked: list[int] = []
+
+    def simulate(rows: np.ndarray, options: Options) -> tuple[np.ndarray, np.ndarray]:
+        asked.extend(rows)
+        made = np.zeros(len(rows), RESULT)
+        made["status"] = Status.OK
+        return made, np.zeros((len(rows), 4), RESULT)
+
+    results = np.zeros(4, RESULT)
+    results["status"], results["psi_max"] = Status.OK, np.array([1, 1, 1.01, 1.01]) * refinement.SWINGING_PSI
+    allowed = [refinement.STEP_ERROR, refinement.SWINGING_STEP_ERROR]
+    results["step_error"] = factor * np.repeat(allowed, 2) * np.array([0.99, 1.01, 0.99, 1.01])
+    refinement.refine(results, Options(steps_per_rev=steps), simulate)
+    assert asked == [1, 3]
+
+
 @pytest.mark.parametrize(
     ("load", "spread", "status"),
     [(5.02, 0.005, Status.OK), (5.2, 0.01, Status.STATIONARY), (5.2, 0.1, Status.STATIONARY)],
@@ -152,9 +170,9 @@ def test_a_motion_that_all_but_repeats_is_taken_as_it_was(load: float, spread: f
         made = np.zeros(len(rows), RESULT)
         if options.method != Method.TR_BDF2:
             made["F_max"] = made["T_max"] = load
-            made["status"] = Status.OK
+            made["status"], made["newton_iterations"] = Status.OK, 3
             return made, np.zeros((0, 0), RESULT)
-        made["status"], made["revolutions"] = Status.NOT_SETTLED, 48
+        made["status"], made["revolutions"], made["newton_iterations"] = Status.NOT_SETTLED, 48, 40
         made["F_max"] = made["T_max"] = 5.0
         blocks = np.zeros((len(rows), 48), RESULT)
         for field in ("F_max", "T_max"):
@@ -165,4 +183,5 @@ def test_a_motion_that_all_but_repeats_is_taken_as_it_was(load: float, spread: f
     results["step_error"] = 2 * refinement.STEP_ERROR
     refinement.refine(results, Options(), simulate)
     assert results["status"] == status
+    assert results["newton_iterations"] == 43  # of all steps, whichever are kept
     assert results["F_max"].max() == pytest.approx(load if status == Status.OK else 5.0 * (1 + spread / 2), rel=1e-2)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import shutil
 import signal
 from functools import partial
 
@@ -83,13 +84,17 @@ def stand_in(params, options, histories="none", n_harmonics=0):
     return Simulation(results, {})
 
 
+def stand_in_with(patch):
+    patch.setattr(blocks, "simulate_rows", stand_in)
+    patch.setattr(runner, "warm_up", lambda: None)
+    patch.setattr(runner, "FIRST", 512)
+    patch.setattr(runner, "MOST", 1024)
+
+
 @pytest.fixture
 def quick(monkeypatch):
     """The stand-in takes the place of the solver, in this process."""
-    monkeypatch.setattr(blocks, "simulate_rows", stand_in)
-    monkeypatch.setattr(runner, "warm_up", lambda: None)
-    monkeypatch.setattr(runner, "FIRST", 512)
-    monkeypatch.setattr(runner, "MOST", 1024)
+    stand_in_with(monkeypatch)
 
 
 def made(folder, text=TEXT, solver=stand_in):
@@ -113,6 +118,23 @@ def simulated(path, **options):
     assert runner.simulate(path, Work(workers=1, tell=told.append), **{"budget": 60.0} | options) == [path]
     assert told[-1].startswith("simulated ")
     return told[-1]
+
+
+@pytest.fixture(scope="module")
+def once(tmp_path_factory):
+    """Campaign of the stand-in with joints of all changes, and what was told at the end; not to be written."""
+    path = made(tmp_path_factory.mktemp("changed"))
+    with pytest.MonkeyPatch.context() as patch:
+        stand_in_with(patch)
+        return path, simulated(path)
+
+
+@pytest.fixture
+def changed(once, tmp_path):
+    """Copy of the campaign with joints of all changes."""
+    for suffix in (".toml", ".h5"):
+        shutil.copy(once[0].with_suffix(suffix), tmp_path)
+    return tmp_path / "made.h5"
 
 
 def evaluated(path, by="cross1.F"):
@@ -342,11 +364,9 @@ def test_an_unchanged_line_gives_the_joints_of_the_campaign(tmp_path):
     assert base[plan.first_sample :].tobytes() == again.tobytes()
 
 
-@pytest.mark.usefixtures("quick")
-def test_shares_are_those_of_a_campaign_of_the_changed_study(path, tmp_path):
-    assert re.fullmatch(
-        r"simulated \d{4,} joints in \d s, (400|800) of each change; order of lines settled", simulated(path)
-    )
+def test_shares_are_those_of_a_campaign_of_the_changed_study(once, tmp_path):
+    path, told = once
+    assert re.fullmatch(r"simulated \d{4,} joints in \d s, (400|800) of each change; order of lines settled", told)
     answer = evaluated(path)
     found = answer.frame("lines")
     assert list(dict.fromkeys(found["line"])) == ["pin*.tilt_t", "pin*.offset_z", "hole*.diameter"]
@@ -363,15 +383,13 @@ def test_shares_are_those_of_a_campaign_of_the_changed_study(path, tmp_path):
     assert indices.loc["hole*.diameter", "in_all"] == pytest.approx(0.0, abs=1e-12)
 
 
-@pytest.mark.usefixtures("quick")
-def test_the_sentence_names_the_best_line_and_what_is_not_enough(path):
-    simulated(path)
-    with ResultFile.open(path) as store:
+def test_the_sentence_names_the_best_line_and_what_is_not_enough(changed):
+    with ResultFile.open(changed) as store:
         found = shares.evaluate(store.view(), "cross1.F")
     best = question.sentence(found)
     assert best.startswith("Halve the tilt tolerance of the pins (±0.5 deg) and ")
     assert best.endswith(" exceed the limit")
-    answer = evaluated(path)
+    answer = evaluated(changed)
     assert (answer.facts["sentence"], lead(answer).endswith(f" joints as drawn. {best}.")) == (best, True)
     half, exact = (values(answer, "pin*.tilt_t", step)["share"] for step in (HALF, EXACT))
     assert question.sentence(found, half) == best
@@ -382,10 +400,8 @@ def test_the_sentence_names_the_best_line_and_what_is_not_enough(path):
     assert none.endswith(f"exact {text.percent(exact)}")
 
 
-@pytest.mark.usefixtures("quick")
-def test_fewer_changed_joints_move_the_share_of_all(path):
-    simulated(path)
-    with ResultFile.open(path) as store:
+def test_fewer_changed_joints_move_the_share_of_all(changed):
+    with ResultFile.open(changed) as store:
         view = store.view()
         whole = shares.evaluate(view, "cross1.F").facts
         view.altered = {
@@ -404,11 +420,9 @@ def shortened(one):
     return one._replace(loads=one.loads[:100], status=one.status[:100])
 
 
-@pytest.mark.usefixtures("quick")
-def test_of_fewer_joints_an_exact_line_is_compared_with_half_of_it(path):
+def test_of_fewer_joints_an_exact_line_is_compared_with_half_of_it(changed):
     """Joint by joint an exact tilt is never above where half of it is not; so is its share, of however few joints."""
-    simulated(path)
-    with ResultFile.open(path) as store:
+    with ResultFile.open(changed) as store:
         view = store.view()
         view.altered = {
             name: shortened(one) if one.about.get("step") == EXACT else one for name, one in view.altered.items()
@@ -429,10 +443,8 @@ def test_of_fewer_joints_an_exact_line_is_compared_with_half_of_it(path):
 
 
 @pytest.mark.usefixtures("quick")
-def test_interrupted_it_goes_on_and_ends_with_the_same_sets(path, tmp_path, monkeypatch):
-    whole, taken = tmp_path / "whole.h5", []
-    whole.write_bytes(path.read_bytes())
-    simulated(whole)
+def test_interrupted_it_goes_on_and_ends_with_the_same_sets(path, once, monkeypatch):
+    taken = []
 
     def failing(*arguments, **options):
         taken.append(1)
@@ -448,7 +460,7 @@ def test_interrupted_it_goes_on_and_ends_with_the_same_sets(path, tmp_path, monk
     assert 0 < sum(len(one.status) for one in begun.values()) < 9 * sets.BLOCK
     monkeypatch.setattr(blocks, "simulate_rows", stand_in)
     simulated(path)
-    with ResultFile.open(path) as store, ResultFile.open(whole) as other:
+    with ResultFile.open(path) as store, ResultFile.open(once[0]) as other:
         found, expected = what_if.read(store), what_if.read(other)
     assert found.keys() == expected.keys()
     for name, one in found.items():
@@ -481,24 +493,20 @@ def test_a_joint_that_kills_its_process_has_no_results(tmp_path, monkeypatch):
     assert [one.status.tolist() for one in held.values()] == [[Status.OK, Status.OK, Status.CRASHED, Status.OK]]
 
 
-@pytest.mark.usefixtures("quick")
-def test_a_damaged_set_is_not_used(path):
-    simulated(path)
-    with h5py.File(path, "r+") as file:
+def test_a_damaged_set_is_not_used(changed):
+    with h5py.File(changed, "r+") as file:
         name = next(iter(file["what_if"]))
         file[f"what_if/{name}/loads"][3, 0] += 1.0
-    with ResultFile.open(path) as store:
+    with ResultFile.open(changed) as store:
         assert name not in what_if.read(store)
         assert len(what_if.read(store)) > 5
 
 
-@pytest.mark.usefixtures("quick")
-def test_a_longer_campaign_keeps_them(path):
-    simulated(path)
-    with ResultFile.open(path) as store:
+def test_a_longer_campaign_keeps_them(changed):
+    with ResultFile.open(changed) as store:
         before = what_if.read(store)
-    extend(path, N + 50)
-    with ResultFile.open(path) as store:
+    extend(changed, N + 50)
+    with ResultFile.open(changed) as store:
         assert what_if.read(store).keys() == before.keys()
         found = tolstat.lines(store.view(), "cross1.F").facts["n"]
     assert found == max(N, *(one.end for one in before.values()))
@@ -656,10 +664,8 @@ def test_of_several_limits_verdict_command_and_page_are_about_all_together(tmp_p
     assert shown[0].stdout.startswith("At least one limit exceeded in 22.2 % ")
 
 
-@pytest.mark.usefixtures("quick")
-def test_whiskers_and_bands_are_the_intervals_of_the_table(path):
-    simulated(path)
-    with ResultFile.open(path) as store:
+def test_whiskers_and_bands_are_the_intervals_of_the_table(changed):
+    with ResultFile.open(changed) as store:
         found = shares.evaluate(store.view(), "cross1.F")
     table = pd.DataFrame(found.by_line)
     ax = Figure().subplots()

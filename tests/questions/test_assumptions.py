@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 import pytest
@@ -96,14 +96,15 @@ def made(folder, text=TEXT, solver=stand_in):
     return file
 
 
+def stand_in_with(patch, **effects):
+    patch.setattr(blocks, "simulate_rows", partial(stand_in, **effects))
+    patch.setattr(run, "warm_up", lambda: None)
+
+
 @pytest.fixture
 def quick(monkeypatch):
     """A stand-in takes the place of the solver, in this process."""
-
-    def use(**effects):
-        monkeypatch.setattr(blocks, "simulate_rows", partial(stand_in, **effects))
-        monkeypatch.setattr(run, "warm_up", lambda: None)
-
+    use = partial(stand_in_with, monkeypatch)
     use()
     return use
 
@@ -113,6 +114,21 @@ def simulated(path, **options):
     told = []
     assert run.simulate(path, Work(workers=1, tell=told.append), **options) == [path]
     return told[-1]
+
+
+@pytest.fixture(scope="module")
+def varied(tmp_path_factory):
+    """Campaign of a stand-in with these effects and all variations of it, made once; not to be written."""
+
+    @cache
+    def campaign(**effects):
+        path = made(tmp_path_factory.mktemp("varied"))
+        with pytest.MonkeyPatch.context() as patch:
+            stand_in_with(patch, **effects)
+            assert simulated(path).startswith(f"simulated {600 * len(standing(path).rows)} joints in ")
+        return path
+
+    return campaign
 
 
 def standing(path, accepted=np.nan):
@@ -129,10 +145,8 @@ def of(found, label):
     return next(row for row in found.rows if row["label"] == label)
 
 
-def test_every_value_is_simulated_and_then_all_together(tmp_path, quick):
-    quick(slides=-60.0, arm=4.0)
-    path = made(tmp_path)
-    assert simulated(path).startswith("simulated 3000 joints in ")
+def test_every_value_is_simulated_and_then_all_together(varied, quick):
+    path = varied(slides=-60.0, arm=4.0)
     found = standing(path)
     assert {row["label"] for row in found.rows} == {*NAMES, BETTER}  # one assumption alone is worse
     assert of(found, BETTER)["because"] == "shaft slides, arm length (l_f 30 mm)"
@@ -155,13 +169,10 @@ def test_a_long_campaign_gives_its_first_thousand_joints(tmp_path):
     assert [(one.first, one.end) for one in drawn] == [(1200, 1500)]
 
 
-def test_a_variation_has_the_results_of_a_study_with_that_key(tmp_path, quick):
-    quick(slides=-60.0, arm=4.0)
-    path = made(tmp_path)
-    simulated(path)
-    (tmp_path / "own").mkdir()
+def test_a_variation_has_the_results_of_a_study_with_that_key(tmp_path, varied):
+    path = varied(slides=-60.0, arm=4.0)
     text = TEXT.replace("[operation]", 'arm.l_f = "30 mm"\n[operation]')
-    own = made(tmp_path / "own", text, partial(stand_in, slides=-60.0, arm=4.0))
+    own = made(tmp_path, text, partial(stand_in, slides=-60.0, arm=4.0))
     with ResultFile.open(path) as store, ResultFile.open(own) as other:
         held = what_if.read(store)[what_if.key(sets.about_joint(store.view().study, {"arm.l_f": "30 mm"}))]
         assert held.valid(["cross1.F"]).tobytes() == other.view().load("cross1.F").values.tobytes()
@@ -184,10 +195,8 @@ def test_the_solver_gives_a_variation_and_a_study_with_that_key_the_same_bytes(t
         assert held.valid(["cross1.F"]).tobytes() != store.view().load("cross1.F").values.tobytes()
 
 
-def test_a_verdict_turns_only_where_share_and_difference_are_beyond_doubt(tmp_path, quick):
-    quick(slides=-60.0, arm=4.0)
-    path = made(tmp_path)
-    simulated(path)
+def test_a_verdict_turns_only_where_share_and_difference_are_beyond_doubt(varied):
+    path = varied(slides=-60.0, arm=4.0)
     share = of(standing(path), "shaft slides")["share"]
     n = len(standing(path).rows)
     low, high = (float(end) for end in clopper_pearson(round(600 * share), 600, 1.0 - 0.05 / n))
@@ -200,10 +209,8 @@ def test_a_verdict_turns_only_where_share_and_difference_are_beyond_doubt(tmp_pa
     assert standing(path, high + 1e-4).turning[0]["label"] == "shaft slides"
 
 
-def test_what_moves_nothing_turns_nothing(tmp_path, quick, monkeypatch):
-    quick(slides=-60.0)
-    path = made(tmp_path)
-    simulated(path)
+def test_what_moves_nothing_turns_nothing(varied, monkeypatch):
+    path = varied(slides=-60.0)
     drawn = standing(path).drawn
     monkeypatch.setattr(variations, "_drawn", lambda view: (drawn[0], 0.0, 0.01))
     found = standing(path, 0.02)
@@ -310,10 +317,8 @@ def test_the_same_words_for_a_verdict_that_is_kept_as_drawn(tmp_path, quick):
     assert (found.answer, found.stands_on["answer"]) == ("yes", "open")
 
 
-def test_a_share_near_the_accepted_one_takes_more_joints(tmp_path, quick):
-    quick(slides=-60.0, arm=0.0)
-    path = made(tmp_path)
-    simulated(path)
+def test_a_share_near_the_accepted_one_takes_more_joints(varied):
+    path = varied(slides=-60.0)
     share = of(standing(path), "shaft slides")["share"]
     found = standing(path, share + 0.004)
     assert [row["label"] for row in found.undecided] == ["shaft slides"]
@@ -409,10 +414,8 @@ def test_what_the_shop_must_hold_has_the_capability_of_zones_too(tmp_path):
         assert "Cp 1 in 1 tolerance and Cpk 1 in 1 tolerance." in sentences.shop(store.view())
 
 
-def test_the_command_prints_shares_changes_and_what_the_shop_holds(tmp_path, quick, monkeypatch):
-    quick(slides=-60.0, arm=4.0)
-    path = made(tmp_path)
-    simulated(path)
+def test_the_command_prints_shares_changes_and_what_the_shop_holds(varied):
+    path = varied(slides=-60.0, arm=4.0)
     done = CliRunner().invoke(app, ["assumptions", str(path), "--accept", "5 %"])
     assert done.exit_code == 0, done.output
     assert "find out how the shaft is held." in done.stdout.replace("\n", " ")

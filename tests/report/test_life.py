@@ -13,6 +13,7 @@ from tests.support import synthetic, views
 from tolstat.display import text
 from tolstat.display.answer import Asked
 from tolstat.display.blocks import Decision
+from tolstat.display.verdict import on_share
 from tolstat.questions.bearing_life import answer as bearing_life
 from tolstat.report import page
 from tolstat.report.headline import life_verdicts
@@ -35,6 +36,12 @@ def test_report_json_and_page_give_the_same_verdict(tmp_path, study, place):
     (head,) = (block for block in section.blocks if isinstance(block, Decision))
     card = head.verdicts[place]
     assert (f"{card.value}: {card.label}", card.verdict) == (found.sentence, found.answer)
+
+
+def test_an_interval_up_to_the_accepted_share_is_kept_and_one_from_it_on_is_open():
+    row = {"estimate": 0.05, "n": 100, "n_failed": 0, "n_unsettled": 0}
+    for ends, answer in (((0.01, 0.05), "yes"), ((0.05, 0.09), "open"), ((0.06, 0.09), "no")):
+        assert on_share("life", "fail", row, ends, 0.05, lambda share: 200.0).answer == answer
 
 
 def test_a_life_that_cannot_be_rated_is_told_with_the_reason(tmp_path):

@@ -96,12 +96,11 @@ def large(x: int) -> bytes:
     return bytes([x % 256]) * 10_000_000
 
 
-@pytest.mark.parametrize("workers", [1, 3])
-def test_every_block_once(workers: int) -> None:
-    pairs = list(map_blocks(Work(square), iter(SQUARES), workers))
+def test_every_block_once() -> None:
+    pairs = list(map_blocks(Work(square), iter(SQUARES), 2))
     assert len(pairs) == 20
     assert dict(pairs) == SQUARES
-    assert list(map_blocks(Work(square), [], workers)) == []
+    assert list(map_blocks(Work(square), [], 2)) == []
     assert multiprocessing.active_children() == []
 
 
@@ -150,12 +149,10 @@ def test_leaving_early_ends_the_workers_at_once() -> None:
     assert time.monotonic() - begin < 50  # not the minute that block 0 takes
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("workers", [1, 2])
-def test_joints_that_fail_twice_are_given_up_alone(workers: int) -> None:
+def test_joints_that_fail_twice_are_given_up_alone() -> None:
     blocks = [list(range(first, first + 5)) for first in range(0, 40, 5)]
     found: dict[int, Any] = {}
-    for block, result in map_blocks(Work(squares, halves), blocks, workers):
+    for block, result in map_blocks(Work(squares, halves), blocks, 2):
         if isinstance(result, Lost):
             assert len(block) == 1
             found[block[0]] = result
@@ -219,9 +216,8 @@ def test_a_kept_worker_that_has_died_is_replaced() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(3))
-def test_workers_that_are_killed_while_they_send_change_nothing(seed: int) -> None:
-    chance, ended = random.Random(seed), threading.Event()
+def test_workers_that_are_killed_while_they_send_change_nothing() -> None:
+    chance, ended = random.Random(0), threading.Event()
 
     def kill() -> None:
         for _ in range(4):
@@ -304,10 +300,9 @@ def raise_often(xs: list[int]) -> list[int]:
     return [x * x for x in xs]
 
 
-@pytest.mark.parametrize("workers", [1, 2])
-def test_many_joints_that_fail_are_given_up_alone(workers: int) -> None:
+def test_many_joints_that_fail_are_given_up_alone() -> None:
     blocks = [list(range(first, first + 16)) for first in range(0, 800, 16)]
-    found = list(map_blocks(Work(raise_often, halves), blocks, workers))
+    found = list(map_blocks(Work(raise_often, halves), blocks, 2))
     lost = [x for xs, result in found if isinstance(result, Lost) for x in xs]
     assert sorted(lost) == list(range(5, 800, 17))
     assert sorted(x for xs, _ in found for x in xs) == list(range(800))

@@ -86,15 +86,21 @@ TABLES = {
 }
 
 
+@pytest.fixture(scope="module")
+def large(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder with two campaigns whose numbers of joints have four digits."""
+    folder = tmp_path_factory.mktemp("large")
+    for name, failed in (("small", 12), ("other", 3)):
+        synthetic.store(folder, STUDY.replace("n = 1024", "n = 1300"), name, failed=failed, unsettled=9)
+    return folder
+
+
 @pytest.mark.parametrize("command", TABLES)
 @pytest.mark.slow
 def test_tables_fit_80_columns_and_wide_ones_have_all(
-    command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    command: str, large: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.chdir(tmp_path)
-    text = STUDY.replace("n = 1024", "n = 1300")
-    for name, failed in (("small", 12), ("other", 3)):
-        synthetic.store(tmp_path, text, name, failed=failed, unsettled=9)
+    monkeypatch.chdir(large)
     args = (command, "small.h5", *TABLES[command])
     done, wide = call(*args), call(*args, "--wide")
     assert (done.exit_code, wide.exit_code) == (0, 0), done.stderr + wide.stderr

@@ -38,6 +38,12 @@ TAIL_STARTS_AT = 0.9
 """Share of the joints below the tail, for a load without a limit."""
 PILOT = 64
 """Number of joints whose time is measured before others are simulated."""
+ORIGIN = {
+    "stored": "from the histories in the file",
+    "harmonics": "restored from the harmonics in the file",
+    "simulated again": "simulated again, since the file holds no histories",
+}
+"""Where `revolutions.Revolutions` have their loads from, in words."""
 NO_INTERVALS = "no intervals: they hold for independent samples only"
 Cell = Callable[[Row], str]
 Estimate = tuple[float, float, float]
@@ -57,6 +63,16 @@ def share(key: str) -> Cell:
 def shares(lower: str, upper: str) -> Cell:
     """Make a `Column.cell` of an interval of shares, in per cent."""
     return lambda row: text.span(row[lower], row[upper])
+
+
+def percent(key: str) -> Cell:
+    """Make a `Column.cell` of a share, in per cent with one digit behind the point; the unit is in the heading."""
+    return lambda row: f"{round(100.0 * row[key], 1) + 0.0:.1f}"  # no -0
+
+
+def between(key: str) -> Cell:
+    """Make a `Column.cell` of the interval ``KEY_lower``, ``KEY_upper`` of a share, as `percent`."""
+    return lambda row: text.ends(100.0 * row[f"{key}_lower"], 100.0 * row[f"{key}_upper"], ".1f")
 
 
 def value(key: str) -> Cell:

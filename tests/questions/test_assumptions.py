@@ -204,8 +204,7 @@ def test_what_moves_nothing_turns_nothing(tmp_path, quick, monkeypatch):
     quick(slides=-60.0)
     path = made(tmp_path)
     simulated(path)
-    drawn = standing(path).drawn
-    monkeypatch.setattr(variations, "_drawn", lambda view: (drawn[0], 0.0, 0.01))
+    monkeypatch.setattr(variations, "total_interval", lambda *given: (0.0, 0.01))
     found = standing(path, 0.02)
     row = of(found, PLACE)
     assert (found.side, row["side"], row["moves"], row["turns"]) == ("yes", "no", False, False)

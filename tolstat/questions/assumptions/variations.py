@@ -164,8 +164,12 @@ def _evaluate(view: View, accepted: float) -> Standing:
         missing = (ALL,) if len(together_in_file) < len(every) else ()
     looks = 2 if len({len(loads) for _, loads in simulated}) > 1 else 1
     confidence = 1.0 - 0.05 / max(looks * len(simulated), 1)
-    drawn = _drawn(view)
-    side = side_of(drawn[1:], accepted)
+    load, parts = joints.load, known_parts.of(view)
+    interval = total_interval(error_budget.with_error(view, load), joints.level, 0.95)
+    if parts is not None:
+        known = parts.share(load.name, 0.95)
+        interval = known.lower, known.upper
+    drawn, side = (load.above(joints.level).estimate, *interval), side_of(interval, accepted)
     rows = [_row(variation, joints, loads, confidence) for variation, loads in simulated]
     for row in rows:
         row["side"] = side_of((row["share_lower"], row["share_upper"]), accepted)
@@ -275,17 +279,6 @@ class _Joints(ChangedJoints):
         """Variations that the file has enough joints of, with the load of each joint, NaN without a valid one, (n,)."""
         each = [(one, self._loads.get(kept.key(sets.about_joint(self._study, one.keys)))) for one in variations]
         return [(one, loads) for one, loads in each if loads is not None and len(loads) >= self._least]
-
-
-def _drawn(view: View) -> Estimate:
-    """Share of the joints as drawn, with the interval that the verdict is from."""
-    load = view.load(view.decisive)
-    assert load.limit is not None
-    low, high = total_interval(error_budget.with_error(view, load), load.limit, 0.95)
-    if (parts := known_parts.of(view)) is not None:
-        known = parts.share(load.name, 0.95)
-        low, high = known.lower, known.upper
-    return load.above(load.limit).estimate, low, high
 
 
 def _row(variation: Variation, joints: _Joints, loads: FloatArray, confidence: float) -> dict[str, Any]:

@@ -352,12 +352,9 @@ class Simulation:
         return sets.seconds_per_joint(self._study, options, PILOT, self._asked.points) / self._workers
 
     def run(self, wanted: Sequence[Change], stage: str, about: str = "", end: float = math.inf) -> int:
-        """Simulate what the file lacks of some changes; messages begin with `about`.
+        """Simulate what the file lacks of some changes until `end` of `time.monotonic`, s; `about` begins the message.
 
-        Returns
-        -------
-        int
-            Number of joints that are still missing: the time was up, `end` of `time.monotonic`, s.
+        Returns the number of joints that are still missing.
         """
         names = self._asked.names(self._study)
 

@@ -98,7 +98,7 @@ def made(folder, text=TEXT, solver=stand_in):
 
 def stand_in_with(patch, **effects):
     patch.setattr(blocks, "simulate_rows", partial(stand_in, **effects))
-    patch.setattr(run, "warm_up", lambda: None)
+    patch.setattr("tolstat.questions.shares.warm_up", lambda: None)
 
 
 @pytest.fixture
@@ -211,8 +211,7 @@ def test_a_verdict_turns_only_where_share_and_difference_are_beyond_doubt(varied
 
 def test_what_moves_nothing_turns_nothing(varied, monkeypatch):
     path = varied(slides=-60.0)
-    drawn = standing(path).drawn
-    monkeypatch.setattr(variations, "_drawn", lambda view: (drawn[0], 0.0, 0.01))
+    monkeypatch.setattr(variations, "total_interval", lambda *given: (0.0, 0.01))
     found = standing(path, 0.02)
     row = of(found, PLACE)
     assert (found.side, row["side"], row["moves"], row["turns"]) == ("yes", "no", False, False)

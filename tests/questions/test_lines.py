@@ -86,7 +86,7 @@ def stand_in(params, options, histories="none", n_harmonics=0):
 
 def stand_in_with(patch):
     patch.setattr(blocks, "simulate_rows", stand_in)
-    patch.setattr(runner, "warm_up", lambda: None)
+    patch.setattr("tolstat.questions.shares.warm_up", lambda: None)
     patch.setattr(runner, "FIRST", 512)
     patch.setattr(runner, "MOST", 1024)
 
@@ -429,10 +429,10 @@ def test_of_fewer_joints_an_exact_line_is_compared_with_half_of_it(changed):
         }
         answer = tolstat.lines(view, "cross1.F")
         halves, exact = (
-            shares.Joints(view, "cross1.F", view.altered).of(one)[:100] > 700.0
+            loads[:100] > 700.0
             for step in (HALF, EXACT)
-            for one in view.altered.values()
-            if (one.about["label"], one.about.get("step")) == ("pin*.tilt_t", step)
+            for about, loads in shares.Joints(view, "cross1.F", view.altered).changes(sets.WIDTH)
+            if (about["label"], about["step"]) == ("pin*.tilt_t", step)
         )
     half, row = (values(answer, "pin*.tilt_t", step) for step in (HALF, EXACT))
     assert (half["n"] >= N, row["n"]) == (True, 100)
@@ -598,7 +598,7 @@ def test_command_and_page(path, monkeypatch):
     shown = run("--top", "2")
     assert "--run" in shown.stderr
     assert f"tolstat causes {path.name} --run; then this page again: tolstat report" in lead(on_page(path))
-    monkeypatch.setattr(runner, "available_cores", lambda: 1)
+    monkeypatch.setattr("tolstat.questions.shares.available_cores", lambda: 1)
     shown = run("--run", "--budget", "1 min", "--top", "2", "--workers", "1")
     assert shown.exit_code == 0, shown.output
     assert "lines, 400 joints of each change" in shown.stderr
@@ -622,14 +622,15 @@ def on_page(path, accepted=np.nan):
 
 def test_of_all_limits_the_largest_ratio_counts(path):
     loads = np.array([[600.0, 900.0], [750.0, 100.0], [np.nan, 1000.0]])
-    one = what_if.Altered({}, 0, ("cross1.F", "cross2.F"), loads, np.full(3, Status.OK, np.uint8))
+    about = {"kind": sets.WIDTH}
+    one = {"": what_if.Altered(about, 0, ("cross1.F", "cross2.F"), loads, np.full(3, Status.OK, np.uint8))}
     with ResultFile.open(path) as store:
         view = store.view()
         view.limits = {"cross1.F": 700.0, "cross2.F": 1000.0}
-        joints, third = (shares.Joints(view, by, {}) for by in ("any limit", "cross3.F"))
-    assert joints.holds(one)
-    np.testing.assert_allclose(joints.of(one), [0.9, 750 / 700, np.nan])
-    assert not third.holds(one)
+        joints, third = (shares.Joints(view, by, one) for by in ("any limit", "cross3.F"))
+    ((_, ratios),) = joints.changes(sets.WIDTH)
+    np.testing.assert_allclose(ratios, [0.9, 750 / 700, np.nan])
+    assert not list(third.changes(sets.WIDTH))
 
 
 @pytest.mark.usefixtures("quick")
@@ -769,7 +770,7 @@ def test_a_joint_that_fails_at_one_point_has_no_worst_load(tmp_path, monkeypatch
 @pytest.mark.slow
 def test_command_and_page_name_the_point(tmp_path, monkeypatch):
     path = written(tmp_path, OWN)
-    monkeypatch.setattr(runner, "available_cores", lambda: 1)
+    monkeypatch.setattr("tolstat.questions.shares.available_cores", lambda: 1)
     shown = CliRunner().invoke(app, ["causes", str(path), "--run", "--budget", "1 min", "--top", "2"])
     assert shown.exit_code == 0, shown.output
     assert "joints to simulate at start, " in shown.stderr

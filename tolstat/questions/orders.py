@@ -17,7 +17,7 @@ from tolstat.common.tables import VALID
 from tolstat.display import drawing, style, text
 from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Part, Row, Rows, Sentence, Table, has
 from tolstat.display.style import lines, patches, ticker
-from tolstat.questions.shares import unusable, value, values, with_ends, word
+from tolstat.questions.shares import ORIGIN, unusable, value, values, with_ends, word
 from tolstat.store import revolutions
 from tolstat.store.points import point_of
 from tolstat.store.view import View
@@ -41,11 +41,6 @@ LOOKS: dict[str, tuple[str, str, style.Dash]] = {
     "95 %": ("near 95 %", style.COLOURS[1], style.DASHES[0]),
 }
 """Label, colour and dash of the orbits, by `Orbit.near`."""
-ORIGIN = {
-    "stored": "from the histories in the file",
-    "harmonics": "restored from the harmonics in the file",
-    revolutions.AGAIN: "simulated again, since the file holds no histories of them",
-}
 
 
 class Orbit(NamedTuple):
@@ -147,10 +142,11 @@ def orders(view: View, orbits: bool = False) -> Answer:
     read, origin, apart = _orbits(view) if orbits else ([], "", 0.0)
     if read:
         facts |= {"origin": origin, "apart": apart}
+        source = f"{ORIGIN[origin]}{' of them' * (origin == revolutions.AGAIN)}"
         points = [row for shaft in read for orbit in shaft for row in _points(orbit)]
         units = {"theta": "rad", "f_x": "N", "f_y": "N"}
         parts.append(Table("orbits", "Lateral force over one revolution", (), points, units))
-        notes.append(f"orbits: {'; '.join(map(_which, read))}; nearest in the largest lateral force; {ORIGIN[origin]}")
+        notes.append(f"orbits: {'; '.join(map(_which, read))}; nearest in the largest lateral force; {source}")
     if apart:
         words = f"largest loads of these joints differ by up to {apart:.1e} (relative) from the stored ones"
         notes.append(f"{words}, which another machine or version computed")

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,20 +17,33 @@ from tolstat.analysis.prediction import DELIVERY
 from tolstat.analysis.reweight import Ratios, Share
 from tolstat.analysis.sample import CONFIDENCE, Sample, total_interval
 from tolstat.campaign import what_if as sets
+from tolstat.campaign.what_if import Change
+from tolstat.campaign.work import Work
+from tolstat.common.cores import available_cores
 from tolstat.common.errors import Fault, NotApplicable, StoreError
-from tolstat.common.loads import ANY_LIMIT, FloatArray
+from tolstat.common.loads import ANY_LIMIT, FloatArray, split
 from tolstat.common.tables import Status
 from tolstat.display import text
+from tolstat.display.progress import clock
 from tolstat.display.table import Column, Row, has
-from tolstat.store import error_budget, what_if
+from tolstat.solver.compilation import warm_up
+from tolstat.store import Writer, error_budget, what_if
 from tolstat.store.view import View
 from tolstat.store.what_if import Altered
-from tolstat.study.points import at
+from tolstat.study.points import at, names_of
 
 WIDEST = 0.5
 """Total interval of a yield, or its bounds without one, from which on it says too little for a verdict."""
 TAIL_STARTS_AT = 0.9
 """Share of the joints below the tail, for a load without a limit."""
+PILOT = 64
+"""Number of joints whose time is measured before others are simulated."""
+ORIGIN = {
+    "stored": "from the histories in the file",
+    "harmonics": "restored from the harmonics in the file",
+    "simulated again": "simulated again, since the file holds no histories",
+}
+"""Where `revolutions.Revolutions` have their loads from, in words."""
 NO_INTERVALS = "no intervals: they hold for independent samples only"
 Cell = Callable[[Row], str]
 Estimate = tuple[float, float, float]
@@ -48,6 +63,16 @@ def share(key: str) -> Cell:
 def shares(lower: str, upper: str) -> Cell:
     """Make a `Column.cell` of an interval of shares, in per cent."""
     return lambda row: text.span(row[lower], row[upper])
+
+
+def percent(key: str) -> Cell:
+    """Make a `Column.cell` of a share, in per cent with one digit behind the point; the unit is in the heading."""
+    return lambda row: f"{round(100.0 * row[key], 1) + 0.0:.1f}"  # no -0
+
+
+def between(key: str) -> Cell:
+    """Make a `Column.cell` of the interval ``KEY_lower``, ``KEY_upper`` of a share, as `percent`."""
+    return lambda row: text.ends(100.0 * row[f"{key}_lower"], 100.0 * row[f"{key}_upper"], ".1f")
 
 
 def value(key: str) -> Cell:
@@ -250,22 +275,28 @@ class ChangedJoints:
     """
 
     def __init__(self, view: View, by: str, altered: Mapping[str, Altered]) -> None:
-        self.load, self._study, self._held = view.load(by), view.study, altered
+        self.load, self._study, self._altered = view.load(by), view.study, altered
         self.level = tail_level(self.load)
         levels = view.limits if by == ANY_LIMIT else {by: 1.0}
         self._parts = [(names_at_points(view, name), level) for name, level in levels.items()]
         n = own_joints(view)
         self.base, more = self.load.values[:n], altered.get(what_if.key(sets.as_drawn(view.study, range(0)).about))
-        if more is not None and self.holds(more) and more.first <= n < more.end:
-            self.base = np.concatenate([self.base, self.of(more)[n - more.first :]])
+        if more is not None and more.first <= n < more.end and (loads := self._of(more)) is not None:
+            self.base = np.concatenate([self.base, loads[n - more.first :]])
 
-    def holds(self, altered: Altered) -> bool:
-        """Whether a change has the load."""
-        return all(altered.holds(names) for names, _ in self._parts)
-
-    def of(self, altered: Altered) -> FloatArray:
-        """Load of each joint with a change, or its largest ratio to all limits; NaN without a valid one, (n,)."""
+    def _of(self, altered: Altered) -> FloatArray | None:
+        if not all(altered.holds(names) for names, _ in self._parts):
+            return None
         return np.asarray(np.maximum.reduce([altered.valid(names) / level for names, level in self._parts]))
+
+    def changes(self, *kinds: str) -> Iterator[tuple[Mapping[str, Any], FloatArray]]:
+        """Yield changes of some kinds that have the load from the first joint on, `Altered.about`, and these loads.
+
+        The load of each joint, or its largest ratio to all limits; NaN without a valid one, (n,).
+        """
+        for change in self._altered.values():
+            if change.about["kind"] in kinds and not change.first and (loads := self._of(change)) is not None:
+                yield change.about, loads
 
     def share(self, values: FloatArray, confidence: float = 0.95) -> Estimate:
         """Share of joints above the level."""
@@ -283,6 +314,65 @@ class ChangedJoints:
         a = a[: len(b)]
         change = difference.shares(sample_of(a), sample_of(b), [self.level], paired=True, confidence=confidence)
         return float(change.estimate[0]), float(change.outer_lower[0]), float(change.outer_upper[0])
+
+
+class Simulation:
+    """Simulation of joints of a campaign with changes, whose loads its file keeps.
+
+    Parameters
+    ----------
+    store, view : Writer, View
+        The file.
+    work : Work
+        Workers, progress and messages.
+    loads : sequence of str
+        Loads whose operating points the joints are simulated at; empty for those without a point.
+
+    Attributes
+    ----------
+    altered : dict of str to Altered
+        What the file holds.
+    simulated : int
+        Number of joints simulated so far, each at every point.
+    """
+
+    def __init__(self, store: Writer, view: View, work: Work, loads: Iterable[str]) -> None:
+        every = tuple(view.store.points)
+        chosen = {point for name in loads for point in names_of(split(name)[1], every, name)}
+        self._asked = sets.Asked(view.kept_loads, [point for point in every if point in chosen])
+        self._store, self._study, self._work = store, view.study, work
+        self._workers = work.workers or available_cores()
+        self.altered, self.simulated = what_if.read(store), 0
+
+    @cached_property
+    def seconds(self) -> float:
+        """Time of a joint at all points, s, divided among the processes; changes as joints are simulated."""
+        warm_up()
+        options = sets.options_of(self._study, self._store)
+        return sets.seconds_per_joint(self._study, options, PILOT, self._asked.points) / self._workers
+
+    def run(self, wanted: Sequence[Change], stage: str, about: str = "", end: float = math.inf) -> int:
+        """Simulate what the file lacks of some changes until `end` of `time.monotonic`, s; `about` begins the message.
+
+        Returns the number of joints that are still missing.
+        """
+        names = self._asked.names(self._study)
+
+        def lacking() -> int:
+            return sum(len(sets.missing(self.altered, change, names)) for change in wanted)
+
+        if not (missing := lacking()):
+            return 0
+        needed, left, points = self.seconds * missing, end - time.monotonic(), ", ".join(self._asked.points)
+        cost = f"about {clock(needed)} on {self._workers} processes"
+        cost += f", of which {clock(max(left, 0.0))} are left" if needed > left else ""
+        self._work.tell(f"{about}{missing} joints to simulate{f' at {points}' if points else ''}, {cost}")
+        self._work.display.stage(stage, left)
+        stop, progress = (lambda: time.monotonic() >= end), self._work.display
+        self.altered = sets.simulate(self._study, self._store, wanted, self._asked, self._workers, stop, progress)
+        still = lacking()
+        self.simulated += missing - still
+        return still
 
 
 def sample_of(values: FloatArray) -> Sample:

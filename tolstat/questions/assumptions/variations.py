@@ -12,14 +12,13 @@ import numpy as np
 from tolstat.analysis.sample import total_interval
 from tolstat.campaign import what_if as sets
 from tolstat.common.errors import InputError, TolstatError
-from tolstat.common.loads import FloatArray, split
+from tolstat.common.loads import FloatArray
 from tolstat.display.table import Row, Rows
 from tolstat.questions.shares import ChangedJoints, Estimate, check_sample, own_joints, unusable, with_ends
 from tolstat.store import error_budget, known_parts
 from tolstat.store import what_if as kept
 from tolstat.store.view import View
 from tolstat.study.assumptions import Assumption, assumptions, given, together
-from tolstat.study.points import names_of
 from tolstat.study.study import Study
 from tolstat.study.widths import lines
 
@@ -155,8 +154,9 @@ def evaluate(view: View, accepted: float = np.nan) -> Standing:
 def _evaluate(view: View, accepted: float) -> Standing:
     check(view)
     study, joints = view.study, _Joints(view)
-    missing = tuple(dict.fromkeys(each.name for each in singles(study) if joints.held(each.keys) is None))
     simulated = joints.simulated(singles(study))
+    in_file = [variation.keys for variation, _ in simulated]
+    missing = tuple(dict.fromkeys(each.name for each in singles(study) if each.keys not in in_file))
     if not missing:
         every = all_together(view)
         together_in_file = joints.simulated(every)
@@ -164,8 +164,12 @@ def _evaluate(view: View, accepted: float) -> Standing:
         missing = (ALL,) if len(together_in_file) < len(every) else ()
     looks = 2 if len({len(loads) for _, loads in simulated}) > 1 else 1
     confidence = 1.0 - 0.05 / max(looks * len(simulated), 1)
-    drawn = _drawn(view)
-    side = side_of(drawn[1:], accepted)
+    load, parts = joints.load, known_parts.of(view)
+    interval = total_interval(error_budget.with_error(view, load), joints.level, 0.95)
+    if parts is not None:
+        known = parts.share(load.name, 0.95)
+        interval = known.lower, known.upper
+    drawn, side = (load.above(joints.level).estimate, *interval), side_of(interval, accepted)
     rows = [_row(variation, joints, loads, confidence) for variation, loads in simulated]
     for row in rows:
         row["side"] = side_of((row["share_lower"], row["share_upper"]), accepted)
@@ -204,13 +208,6 @@ def check(view: View) -> None:
 def joints_of(view: View) -> int:
     """Number of joints of each variation unless more are asked for."""
     return min(JOINTS, own_joints(view) or view.n)
-
-
-def points_of(view: View) -> tuple[str, ...]:
-    """Operating points that the limits are about."""
-    every = tuple(view.store.points)
-    chosen = {point for name in view.limits for point in names_of(split(name)[1], every, name)}
-    return tuple(point for point in every if point in chosen)
 
 
 def all_together(view: View) -> list[Variation]:
@@ -253,8 +250,8 @@ def widths(view: View) -> dict[str, list[tuple[str, float, str]]]:
     shares: dict[str, list[tuple[str, float, str]]] = {}
     entries = {line.label for line in lines(view.study)}
     joints = _Joints(view)
-    for about in (altered.about for altered in view.altered.values()):
-        if about["kind"] == sets.WIDTH and about["label"] in entries and (loads := joints.read(about)) is not None:
+    for about, loads in joints.changes(sets.WIDTH):
+        if about["label"] in entries:
             base = joints.base[: len(loads)]
             change = _share(loads[: len(base)], joints.level) - _share(base, joints.level)
             share = _share(joints.base, joints.level) + change
@@ -275,33 +272,13 @@ class _Joints(ChangedJoints):
 
     def __init__(self, view: View) -> None:
         super().__init__(view, view.decisive, view.altered)
-        self._least = joints_of(view)
-
-    def held(self, keys: Mapping[str, Any]) -> FloatArray | None:
-        """Load of each joint with other keys, NaN without a valid one, (n,); None where the file has too few."""
-        loads = self.read(sets.about_joint(self._study, keys))
-        loads = None if loads is None else loads[: len(self.base)]
-        return None if loads is None or len(loads) < self._least or not len(loads) else loads
+        self._least = max(joints_of(view), 1)
+        self._loads = {kept.key(about): loads[: len(self.base)] for about, loads in self.changes(sets.JOINT)}
 
     def simulated(self, variations: Sequence[Variation]) -> list[tuple[Variation, FloatArray]]:
-        """Variations that the file has enough joints of, each with the load of its joints."""
-        return [(each, loads) for each in variations if (loads := self.held(each.keys)) is not None]
-
-    def read(self, about: Mapping[str, Any]) -> FloatArray | None:
-        """Load of the joints of a change, NaN without a valid one; None where the file lacks it."""
-        altered = self._held.get(kept.key(about))
-        return None if altered is None or altered.first or not self.holds(altered) else self.of(altered)
-
-
-def _drawn(view: View) -> Estimate:
-    """Share of the joints as drawn, with the interval that the verdict is from."""
-    load = view.load(view.decisive)
-    assert load.limit is not None
-    low, high = total_interval(error_budget.with_error(view, load), load.limit, 0.95)
-    if (parts := known_parts.of(view)) is not None:
-        known = parts.share(load.name, 0.95)
-        low, high = known.lower, known.upper
-    return load.above(load.limit).estimate, low, high
+        """Variations that the file has enough joints of, with the load of each joint, NaN without a valid one, (n,)."""
+        each = [(one, self._loads.get(kept.key(sets.about_joint(self._study, one.keys)))) for one in variations]
+        return [(one, loads) for one, loads in each if loads is not None and len(loads) >= self._least]
 
 
 def _row(variation: Variation, joints: _Joints, loads: FloatArray, confidence: float) -> dict[str, Any]:

@@ -20,8 +20,7 @@ from tolstat.common.tables import VALID, Status
 from tolstat.display import drawing, style
 from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Part, Sentence, Table
 from tolstat.display.options import Load, Opt, Top
-from tolstat.display.text import ends
-from tolstat.questions.shares import Cell, check_sample, with_ends, word
+from tolstat.questions.shares import ORIGIN, between, check_sample, percent, with_ends, word
 from tolstat.store import revolutions
 from tolstat.store.hdf5 import store_error
 from tolstat.store.view import View
@@ -37,24 +36,15 @@ LINES = 4
 """Number of errors whose share is drawn."""
 LOADS = ("5 to 95 % of the joints", "median", "without errors")
 """Labels of the lines of a load."""
-ORIGIN = {
-    "stored": "from the histories in the file",
-    "harmonics": "restored from the harmonics in the file",
-    "simulated again": "simulated again, since the file holds no histories",
-}
 OVER_REVOLUTION = "Share of the variance over the whole revolution, every angle weighted by its variance"
-
-
-def _percent(key: str) -> Cell:
-    return lambda row: f"{round(100.0 * row[key], 1) + 0.0:.1f}"  # no -0
 
 
 COLUMNS = (
     Column("load", word("load"), shown=lambda rows: len({row["load"] for row in rows}) > 1),
     Column("error", word("error"), words=True),
-    Column("revolution, %", _percent("share")),
-    Column("95 % interval", lambda row: ends(100.0 * row["share_lower"], 100.0 * row["share_upper"], ".1f")),
-    Column("largest, %", _percent("largest")),
+    Column("revolution, %", percent("share")),
+    Column("95 % interval", between("share")),
+    Column("largest, %", percent("largest")),
     Column("at, deg", lambda row: f"{math.degrees(row['theta']):.0f}"),
 )
 """Columns of the table ``revolution``."""
@@ -137,8 +127,12 @@ class AgainstAngle(NamedTuple):
     ----------
     load : str
         ``cross1.F``: the load at an angle, not its largest over the revolution.
+    unit : str
+        SI unit of the load.
     logarithm : bool
         Whether the variance of the logarithm is decomposed.
+    quantity : str
+        Name of the decomposed quantity: the load, or its logarithm.
     joints : int
         Number of joints evaluated.
     origin, apart
@@ -155,10 +149,14 @@ class AgainstAngle(NamedTuple):
         Shares of the variance at each angle, (d, k); variance (k,).
     overall : FirstOrder
         Shares over the whole revolution, (d,).
+    additive : float
+        Share of the variance over the revolution that all errors explain alone.
     """
 
     load: str
+    unit: str
     logarithm: bool
+    quantity: str
     joints: int
     origin: str
     apart: float
@@ -168,21 +166,7 @@ class AgainstAngle(NamedTuple):
     names: tuple[str, ...]
     first: FirstOrder
     overall: FirstOrder
-
-    @property
-    def unit(self) -> str:
-        """SI unit of the load."""
-        return CHANNELS[self.load].unit
-
-    @property
-    def additive(self) -> float:
-        """Share of the variance over the revolution that all errors explain alone."""
-        return float(np.nansum(self.overall.estimate))
-
-    @property
-    def quantity(self) -> str:
-        """Name of the decomposed quantity: the load, or its logarithm."""
-        return f"log {self.load}" if self.logarithm else self.load
+    additive: float
 
 
 def against_angle(
@@ -225,12 +209,14 @@ def against_angle(
     each = []
     for name in loads:
         without_errors, y = np.split(histories.loads[name], [len(nominal)])
-        of_angles = sensitivity.over_revolution(x, np.log(y) if name in logarithmic else y, iid=iid)
+        is_log, drawn = name in logarithmic, without_errors[0] if len(nominal) else np.full(y.shape[1], np.nan)
+        of_angles = sensitivity.over_revolution(x, np.log(y) if is_log else y, iid=iid)
         order = np.argsort(-of_angles[1].estimate, kind="stable")
-        ordered = [FirstOrder._make((*(end[order] for end in index[:3]), index.variance)) for index in of_angles]
-        head = name, name in logarithmic, len(y), histories.origin, histories.apart, histories.angles
-        drawn = without_errors[0] if len(nominal) else np.full(len(histories.angles), np.nan)
-        each.append(AgainstAngle(*head, drawn, _quantiles(y), tuple(names[i] for i in order), *ordered))
+        first, overall = (FirstOrder._make((*(end[order] for end in i[:3]), i.variance)) for i in of_angles)
+        head = name, CHANNELS[name].unit, is_log, f"log {name}" if is_log else name, len(y)
+        revolution = histories.origin, histories.apart, histories.angles, drawn, _quantiles(y)
+        indices = tuple(names[i] for i in order), first, overall, float(np.nansum(overall.estimate))
+        each.append(AgainstAngle(*head, *revolution, *indices))
     return each
 
 
@@ -284,24 +270,19 @@ def _parts(each: Sequence[AgainstAngle], shown: Container[str]) -> list[Part]:
     ]
     seen = [row for row in rows if row["error"] in shown]
     table = Table("revolution", OVER_REVOLUTION, COLUMNS, rows, {"theta": "rad"}, seen)
-    return [Panels([panel for indices in each for panel in _panels(indices)]), table, Sentence(_note(each))]
-
-
-def _note(each: Sequence[AgainstAngle]) -> str:
-    """Sums of the shares, joints, source of the histories, bias correction."""
-    first = each[0]
-    alone = ", ".join(f"{100 * indices.additive:.0f} % of the variance of {indices.quantity}" for indices in each)
-    sentences = (
-        f"All errors alone explain {alone}. Over the input angle: the first {first.joints} settled joints, "
+    first, alone = (
+        each[0],
+        (f"{100 * indices.additive:.0f} % of the variance of {indices.quantity}" for indices in each),
+    )
+    note = (
+        f"All errors alone explain {', '.join(alone)}. Over the input angle: the first {first.joints} settled joints, "
         f"{ORIGIN[first.origin]}; bands are the 95 % intervals at each angle. Shares are corrected for chance: an "
         "error without effect has the mean share 0, and its estimate may be negative."
     )
     if first.apart:
-        sentences += (
-            f" The largest loads differ by up to {first.apart:.1e} (relative) from the stored ones, which another "
-            "machine or version computed."
-        )
-    return sentences
+        apart = f"The largest loads differ by up to {first.apart:.1e} (relative) from the stored ones"
+        note += f" {apart}, which another machine or version computed."
+    return [Panels([panel for indices in each for panel in _panels(indices)]), table, Sentence(note)]
 
 
 def _panels(indices: AgainstAngle) -> Iterator[Panel]:

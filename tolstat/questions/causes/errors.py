@@ -22,7 +22,6 @@ from tolstat.display import drawing, style
 from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Part, Row, Rows, Sentence, Table, has
 from tolstat.display.options import Costs, Load, Top
 from tolstat.display.style import patches
-from tolstat.display.text import ends
 from tolstat.questions import shares
 from tolstat.questions.causes import lines
 from tolstat.questions.causes.simulation import simulate as simulate
@@ -210,7 +209,7 @@ def _table(name: str, of_errors: Indices, shown: int) -> Table:
     """
     total = shares.estimated("in all, %", "total", ends=(0.0, 1.0))
     if not of_errors.of_design:  # given data yield bounds only
-        total = Column("in all, %", _bounds, shown=_has_narrow_bounds, rank=3)
+        total = Column("in all, %", shares.between("total"), shown=_has_narrow_bounds, rank=3)
     columns = [
         Column("error", shares.word("error")),
         shares.estimated("alone, %", "first", ends=(0.0, 1.0)),
@@ -223,10 +222,6 @@ def _table(name: str, of_errors: Indices, shown: int) -> Table:
     seen = [row for i, row in enumerate(rows) if i < shown or min(row["direction_p"], row["size_p"]) < SIGNIFICANT]
     title = f"Scatter of {of_errors.quantity} over all joints, not of exceeding a limit, by error"
     return Table(name, title, columns, rows, seen=seen)
-
-
-def _bounds(row: Row) -> str:
-    return ends(100.0 * row["total_lower"], 100.0 * row["total_upper"], ".1f")
 
 
 def _tail(row: Row, name: str) -> str:

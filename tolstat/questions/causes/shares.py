@@ -17,7 +17,6 @@ from tolstat.display import text
 from tolstat.display.table import Row, Rows
 from tolstat.questions.shares import ChangedJoints, Estimate, check_sample, sample_of, with_ends
 from tolstat.store.view import View
-from tolstat.store.what_if import Altered
 from tolstat.study import Study, scaling, widths
 from tolstat.study.costs import Cost
 from tolstat.study.costs import of as prices_of
@@ -158,8 +157,8 @@ class Joints(ChangedJoints):
         Of a fit it is the other fit that lowers the share most.
         """
         loads = {
-            about["step"]: self.of(change)
-            for about, change in self._changes(sets.WIDTH, sets.FIT)
+            about["step"]: values
+            for about, values in self.changes(sets.WIDTH, sets.FIT)
             if about["label"] == line.label and is_decisive(about["step"])
         }
         if not loads:
@@ -186,8 +185,8 @@ class Joints(ChangedJoints):
     def rows(self) -> list[dict[str, Any]]:
         """Rows of `Lines.rows`: lines by their decisive share, then by that if exact, those without these behind."""
         by_line: dict[Line, dict[str, Any]] = {}
-        for about, altered in self._changes(sets.WIDTH, sets.FIT):
-            values = self.of(altered)[: len(self.base)]
+        for about, loads in self.changes(sets.WIDTH, sets.FIT):
+            values = loads[: len(self.base)]
             if np.isfinite(values + self.base[: len(values)]).any():
                 by_line.setdefault(Line(about["label"], tuple(about["tolerances"])), {})[about["step"]] = about, values
         rows, ranks = [], dict[str, tuple[int, float]]()
@@ -212,12 +211,12 @@ class Joints(ChangedJoints):
     def indices(self, lines: Sequence[str]) -> list[dict[str, Any]]:
         """Rows of `Lines.indices`, in the order of these lines."""
         rows = []
-        for about, altered in self._changes(sets.EXCHANGE):
-            n = min(altered.end, len(self.base) // 2)
+        for about, exchanged in self.changes(sets.EXCHANGE):
+            n = min(len(exchanged), len(self.base) // 2)
             if about["label"] not in lines or n < pick_freeze.FEWEST:
                 continue
             row: dict[str, Any] = {"line": about["label"], "pairs": n} | dict.fromkeys(INDICES, np.nan)
-            joints = self.base[: 2 * n : 2], self.base[1 : 2 * n : 2], self.of(altered)[:n]
+            joints = self.base[: 2 * n : 2], self.base[1 : 2 * n : 2], exchanged[:n]
             loads = [np.log(values) if self.load.long_tailed else values for values in joints]
             events = [np.where(np.isfinite(values), values > self.level, np.nan) for values in joints]
             pairs = (("", loads, pick_freeze.indices), ("above_", events, pick_freeze.of_event))
@@ -228,11 +227,6 @@ class Joints(ChangedJoints):
                     row |= with_ends(f"{name}in_all", [end[0] for end in indices.total])
             rows.append(row)
         return sorted(rows, key=lambda row: lines.index(row["line"]))
-
-    def _changes(self, *kinds: str) -> list[tuple[Mapping[str, Any], Altered]]:
-        """Changes of some kinds that have the load from the first joint on."""
-        changes = [altered for altered in self._held.values() if altered.about["kind"] in kinds]
-        return [(altered.about, altered) for altered in changes if not altered.first and self.holds(altered)]
 
 
 def _with_costs(study: Study, rows: list[dict[str, Any]], table: Path) -> list[dict[str, Any]]:

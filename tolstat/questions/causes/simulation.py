@@ -16,28 +16,22 @@ import numpy as np
 from tolstat import study
 from tolstat.campaign import what_if as sets
 from tolstat.campaign.pool import kept_workers
-from tolstat.campaign.what_if import Asked, Change
+from tolstat.campaign.what_if import Change
 from tolstat.campaign.work import Work
-from tolstat.common.cores import available_cores
 from tolstat.common.errors import Fault, InputError
-from tolstat.common.loads import ANY_LIMIT, split
+from tolstat.common.loads import ANY_LIMIT
 from tolstat.display.options import Load, Opt
-from tolstat.display.progress import clock
 from tolstat.questions.causes import shares
-from tolstat.questions.shares import check_sample, own_joints
-from tolstat.solver.compilation import warm_up
-from tolstat.store import Writer, what_if
+from tolstat.questions.shares import Simulation, check_sample, own_joints
+from tolstat.store import Writer
 from tolstat.store.hdf5 import store_error
 from tolstat.store.view import View
 from tolstat.study import Study, widths
-from tolstat.study.points import names_of
 from tolstat.study.rewriting import with_keys
 from tolstat.study.widths import STEPS, Line
 
 FIRST, LEAST, MOST = 1024, 128, 16_384
 """Number of joints of each change at the first look, the smallest if time is short, and by default the largest."""
-PILOT = 64
-"""Number of joints whose time is measured."""
 RELIABLE = 2000
 """Number of simulated joints whose time, with the start of the workers, says more than the pilot's."""
 BUDGET_S = 300.0
@@ -125,35 +119,24 @@ def simulate(
         if not lines:
             remedy = 'name what a study can change: --group "tilts = pin*.tilt_*, hole*.tilt_*"'
             raise store_error(source, "has no line that can be changed", remedy)
-        warm_up()
         work.tell("each change is one line of the drawing; all else of the joint stays as drawn")
-        work.tell(_Looks(store, view, lines, load, work, budget, most).run())
+        # at the points that the load, a limit or joints in the file are about; at all of them if there is no limit
+        loads = [*(() if load == ANY_LIMIT else (load,)), *(view.limits or ("",))]
+        loads += [name for change in view.altered.values() for name in change.names]
+        simulation = Simulation(store, view, work, loads)
+        work.tell(_Looks(simulation, view, lines, load, budget, most).run())
     return [source]
-
-
-def points_of(view: View, by: str) -> tuple[str, ...]:
-    """Operating points that a load, a limit or joints in the file are about; all of them if there is no limit."""
-    every = tuple(view.store.points)
-    names = [*(() if by == ANY_LIMIT else (by,)), *(view.limits or ("",))]
-    names += [name for change in view.altered.values() for name in change.names]
-    chosen = {point for name in names for point in names_of(split(name)[1], every, name)}
-    return tuple(point for point in every if point in chosen)
 
 
 class _Looks:
     """Looks at the order of the lines, each with more joints of the changes than the one before."""
 
     def __init__(
-        self, store: Writer, view: View, lines: Sequence[Line], load: str, work: Work, budget: float, most: int
+        self, simulation: Simulation, view: View, lines: Sequence[Line], load: str, budget: float, most: int
     ) -> None:
-        self._budget, self._end, self._most = budget, time.monotonic() + budget, most
-        self._store, self._view, self._lines, self._load, self._work = store, view, lines, load, work
-        self._workers = work.workers or available_cores()
-        self._altered, self._asked = what_if.read(store), Asked(view.kept_loads, points_of(view, load))
-        options = sets.options_of(view.study, store)
-        self._seconds = sets.seconds_per_joint(view.study, options, PILOT, self._asked.points) / self._workers
-        self._own = own_joints(view)
-        self._looks, self._simulated, self._is_cut = 0, 0, False
+        self._simulation, self._budget, self._end, self._most = simulation, budget, time.monotonic() + budget, most
+        self._view, self._lines, self._load, self._own = view, lines, load, own_joints(view)
+        self._looks, self._is_cut = 0, False
 
     @property
     def _left(self) -> float:
@@ -163,21 +146,21 @@ class _Looks:
         """Look until the order is settled, then bring the other steps to as many joints; returns what was done."""
         # those of the campaign at first, fewer if half of the budget does not suffice for them
         changes = sum(len(widths.steps(self._view.study, line)) + 0.5 for line in self._lines) + 1.0
-        affordable = int(0.5 * self._budget / (self._seconds * changes))
+        affordable = int(0.5 * self._budget / (self._simulation.seconds * changes))
         n = max(LEAST, min(self._own if LEAST < self._own < FIRST else FIRST, affordable, self._most))
         confidence = 1.0 - 0.05 / (1 + math.ceil(math.log2(max(self._most / n, 1.0))))
         is_settled = self._look(n, confidence)
         while not is_settled:
-            affordable = n + int(0.9 * self._left / (self._seconds * (len(self._lines) + 1.0)))
+            affordable = n + int(0.9 * self._left / (self._simulation.seconds * (len(self._lines) + 1.0)))
             more = min(2 * n, affordable, self._most)
             if more <= 1.1 * n:
                 break
             n, is_settled = more, self._look(more, confidence, decisive=True)
-        if self._simulated and self._left > 0.0:
+        if self._simulation.simulated and self._left > 0.0:
             is_settled = self._look(n, confidence)
         more_of = "a larger --most" if n >= self._most else "a longer --budget"
         order = "settled" if is_settled else f"not settled: {more_of} goes on"
-        done = f"simulated {self._simulated} joints in {self._budget - self._left:.0f} s"
+        done = f"simulated {self._simulation.simulated} joints in {self._budget - self._left:.0f} s"
         return f"{done}, {'up to ' if self._is_cut else ''}{n} of each change; order of lines {order}"
 
     def _look(self, n: int, confidence: float, decisive: bool = False) -> bool:
@@ -188,35 +171,20 @@ class _Looks:
         bool
             Whether the order of the lines is settled then.
         """
-        study, left, names = self._view.study, self._left, self._asked.names(self._view.study)
-        wanted = self._wanted(n, decisive)
-
-        def lacking() -> int:
-            return sum(len(sets.missing(self._altered, change, names)) for change in wanted)
-
         self._looks += 1
-        if missing := lacking():
-            needed, points, n_lines = self._seconds * missing, self._asked.points, len(self._lines)
-            at = f" at {', '.join(points)}" if all(points) else ""
-            cost = f"about {clock(needed)} on {self._workers} processes"
-            cost += f", of which {clock(max(left, 0.0))} are left" if needed > left else ""
-            self._work.tell(f"{n_lines} lines, {n} joints of each change: {missing} joints to simulate{at}, {cost}")
-            self._work.display.stage(f"look {self._looks}", left)
-            stop, progress = (lambda: self._left <= 0.0), self._work.display
-            self._altered = sets.simulate(study, self._store, wanted, self._asked, self._workers, stop, progress)
-            still = lacking()
-            self._is_cut, done = still > 0, missing - still
-            if done > RELIABLE:
-                self._seconds = (left - self._left) / done
-            self._simulated += done
-        return shares.Joints(self._view, self._load, self._altered).settled(self._lines, confidence)
+        before, left, wanted = self._simulation.simulated, self._left, self._wanted(n, decisive)
+        about = f"{len(self._lines)} lines, {n} joints of each change: "
+        self._is_cut = self._simulation.run(wanted, f"look {self._looks}", about, self._end) > 0
+        if (done := self._simulation.simulated - before) > RELIABLE:
+            self._simulation.seconds = (left - self._left) / done
+        return shares.Joints(self._view, self._load, self._simulation.altered).settled(self._lines, confidence)
 
     def _wanted(self, n: int, decisive: bool) -> list[Change]:
         """Sets of a look, what the order needs first."""
         study, lines = self._view.study, self._lines
         wanted = [sets.as_drawn(study, range(self._own, n))] if n > self._own else []
         if decisive:
-            joints = shares.Joints(self._view, self._load, self._altered)
+            joints = shares.Joints(self._view, self._load, self._simulation.altered)
             return wanted + [sets.stepped(study, line, joints.decisive(line)[0], range(n)) for line in lines]
         changes = [(line, step) for line in lines for step in widths.steps(study, line)]
         changes.sort(key=lambda change: STEPS.index(change[1]) if change[1] in STEPS else 0)

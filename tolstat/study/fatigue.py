@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
@@ -12,12 +12,12 @@ import numpy as np
 from pydantic import AfterValidator, Field, WithJsonSchema, model_validator
 
 from tolstat.analysis.strength import Line
-from tolstat.common import json_schema, strict, units
+from tolstat.common import json_schema, units
 from tolstat.common.channels import UNIT_OF_CHANNEL
 from tolstat.common.errors import Fault, InputError, gather
 from tolstat.common.load_kinds import BUSHINGS
-from tolstat.common.strict import Strict, did_you_mean, read_section, refuse
-from tolstat.study.selection import Assignments, Entry, entries, quantity, resolve, select
+from tolstat.common.strict import Strict, did_you_mean, read_section, read_toml, refuse
+from tolstat.study.selection import Assignments, Entry, Reading, entries, quantity, resolve, select
 
 Positive = Annotated[units.Number, AfterValidator(units.positive)]
 Exponent = Annotated[units.Number, Field(ge=1, le=30)]
@@ -142,29 +142,20 @@ class StressPoint(NamedTuple):
     line: Line
 
 
-def _stress_points(table: Mapping[str, Any], place: str) -> tuple[StressPoint, ...]:
-    """Read ``[fatigue.point]``.
-
-    Raises
-    ------
-    InputError
-        With every fault.
-    """
-    points, faults = list[StressPoint](), list[Fault]()
+def _stress_points(table: Mapping[str, Any], file: Reading) -> tuple[StressPoint, ...]:
+    """Read ``[fatigue.point]``."""
+    points = list[StressPoint]()
     for name, value in table.items():
-        prefix = ("fatigue", "point", name)
-        with gather(faults):
-            entry = strict.validate(StressPointEntry, value, place, prefix=prefix)
+        path = ("fatigue", "point", name)
+        with gather(file.faults):
+            entry = file.model(StressPointEntry, value, *path)
             bushings = select(entry.bushing, BUSHINGS)
             if not bushings:
-                where = f"{place}: {strict.dotted((*prefix, 'bushing'))}"
-                found = f"{entry.bushing!r} is not a bushing"
-                raise InputError([Fault(where, found, did_you_mean(entry.bushing, BUSHINGS))])
+                remedy = did_you_mean(entry.bushing, BUSHINGS)
+                file.fault((*path, "bushing"), f"{entry.bushing!r} is not a bushing", remedy)
             for bushing in bushings:
                 called = name if len(bushings) == 1 else f"{name}, {bushing}"
                 points.append(StressPoint(called, bushing, entry.per_load, entry.line))
-    if faults:
-        raise InputError(faults)
     return tuple(points)
 
 
@@ -303,48 +294,29 @@ class Fatigue:
         return f"{self.hours:g} h ({self.revolutions:.4g} revolutions)"
 
 
-def read(table: object, place: str, names: Sequence[str] = ()) -> Fatigue:
-    """Read ``[fatigue]``.
-
-    Parameters
-    ----------
-    table : object
-        The section as parsed.
-    place : str
-        File name shown in faults.
-    names : sequence of str
-        Operating points of the study, if they are known.
-
-    Raises
-    ------
-    InputError
-        With every fault.
-    """
+def read(file: Reading) -> Fatigue:
+    """Read ``[fatigue]``."""
+    table = file.data.get("fatigue", {})
     settings = Settings()
     lines: dict[str, tuple[float, float, float]] = {}
-    claims, faults = Assignments(place), list[Fault]()
-    with gather(faults):
-        settings = strict.validate(Settings, table, place, prefix=("fatigue",))
-    points: tuple[StressPoint, ...] = ()
+    claims, names = Assignments(file.place), [point.name for point in file.points or ()]
+    with gather(file.faults):
+        settings = file.model(Settings, table, "fatigue")
     visits = tuple(settings.sequence.points.split()) if settings.sequence else ()
     if unknown := sorted(set(visits) - set(names)) if names else []:
-        found = f"no operating point {unknown[0]!r}"
-        faults.append(Fault(f"{place}: fatigue.sequence.points", found, did_you_mean(unknown[0], names)))
+        remedy = did_you_mean(unknown[0], names)
+        file.fault("fatigue.sequence.points", f"no operating point {unknown[0]!r}", remedy)
     for entry in entries(_inner(table, "line"), "fatigue", "line"):
-        with gather(faults):
-            names = resolve(entry, UNIT_OF_CHANNEL, place)
-            claims.claim(entry, names)
-            line = strict.validate(LineEntry, entry.value, place, prefix=entry.path)
+        with gather(file.faults):
+            channels = resolve(entry, UNIT_OF_CHANNEL, file.place)
+            claims.claim(entry, channels)
+            line = file.model(LineEntry, entry.value, *entry.path)
             size = Entry(entry.pattern, (*entry.path, "S0"), line.S0)
-            value = quantity(size, UNIT_OF_CHANNEL[names[0]], place)
+            value = quantity(size, UNIT_OF_CHANNEL[channels[0]], file.place)
             if value <= 0:
-                where = f"{place}: {strict.dotted(size.path)}"
-                raise InputError([Fault(where, f"{line.S0!r} is not positive", "give a range above zero")])
-            lines |= dict.fromkeys(names, (line.m, value, line.N0))
-    with gather(faults):
-        points = _stress_points(_inner(table, "point"), place)
-    if faults:
-        raise InputError(faults)
+                file.fault(size.path, f"{line.S0!r} is not positive", "give a range above zero")
+            lines |= dict.fromkeys(channels, (line.m, value, line.N0))
+    points = _stress_points(_inner(table, "point"), file)
     revolutions = {} if settings.revolutions is None else {"revolutions": settings.revolutions, "required": True}
     return Fatigue(
         tuple(settings.exponents),
@@ -366,7 +338,11 @@ def of_text(text: str, place: str) -> Fatigue:
     InputError
         With every fault.
     """
-    return read(read_section(Path(place), text, "fatigue"), place)
+    read_section(Path(place), text, "fatigue")
+    file = Reading(Path(place), read_toml(Path(place), text), text)
+    settings = read(file)
+    file.finish()
+    return settings
 
 
 def _inner(table: object, key: str) -> Mapping[str, Any]:

@@ -7,22 +7,20 @@ campaign tells the shares before and after.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from pathlib import Path
-from typing import Any, NamedTuple, Self
+from collections.abc import Sequence
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from tolstat.common import strict
-from tolstat.common.errors import Fault, gather
+from tolstat.common.errors import gather
 from tolstat.common.load_kinds import PINS
 from tolstat.common.strict import Strict, refuse
 from tolstat.common.tables import HOLES
 from tolstat.joint import HOLE_OF_PIN, Joint
 from tolstat.study import selection
-from tolstat.study.selection import UNITS, Entry
+from tolstat.study.selection import UNITS, Reading
 from tolstat.study.tolerances.distributions import share_between
 from tolstat.study.tolerances.entry import NotNegative, Site, Toleranced, Value
 
@@ -112,14 +110,14 @@ def of_parts(entries: Sequence[Toleranced]) -> list[Gauge]:
     return [Gauge(site.name, *band) for site, band in each if band is not None]
 
 
-def read(written: Sequence[Entry], folder: Path, place: str, faults: list[Fault]) -> tuple[Gauge, ...]:
-    """Read ``[reject]``: what is measured of assembled joints; faults are added to `faults`."""
+def read(file: Reading) -> tuple[Gauge, ...]:
+    """Read ``[reject]``: what is measured of assembled joints."""
     gauges: list[Gauge] = []
-    for entry in written:
-        with gather(faults):
-            names = selection.resolve(entry, MEASURABLE, place)
-            context: Mapping[str, Any] = {"site": Site(names[0], MEASURABLE[names[0]], 0.0, folder)}
-            limits = strict.validate(RejectEntry, entry.value, place, prefix=entry.path, context=dict(context))
+    for entry in file.entries("reject"):
+        with gather(file.faults):
+            names = selection.resolve(entry, MEASURABLE, file.place)
+            site = Site(names[0], MEASURABLE[names[0]], 0.0, file.folder)
+            limits = file.model(RejectEntry, entry.value, *entry.path, site=site)
             lower = -math.inf if limits.below is None else limits.below
             upper = math.inf if limits.above is None else limits.above
             gauges += [Gauge(name, lower, upper, limits.gauge) for name in names]

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
-from pathlib import Path
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-from tolstat.common.errors import Fault, gather
+from tolstat.common.errors import gather
 from tolstat.common.tables import FACTORS
-from tolstat.joint import Joint
 from tolstat.study.axes import ORIENTATIONS, REJECT, Axis, Bonus
-from tolstat.study.selection import TOLERANCED, Entry
+from tolstat.study.selection import TOLERANCED, Entry, Reading
 from tolstat.study.tolerances.correlation import Lot, of_entries
 from tolstat.study.tolerances.distributions import Distribution
 from tolstat.study.tolerances.entry import Diameter, SingleEntry, Site, Toleranced, ToleranceEntry
@@ -46,51 +44,47 @@ class Tolerances(NamedTuple):
         return of_entries(self.entries)
 
     @property
+    def accepted(self) -> set[str]:
+        """Diameters by which parts are accepted."""
+        return {bonus.diameter for bonus in self.rejecting}
+
+    @property
     def rejecting(self) -> list[Bonus]:
         """Maximum material requirements by which parts are rejected."""
         return [axis.bonus for axis in self.axes.values() if axis.bonus is not None and axis.bonus.rule == REJECT]
 
 
-def read(
-    written: Iterable[tuple[Entry, list[str]]], joint: Joint | None, folder: Path, place: str, faults: list[Fault]
-) -> Tolerances:
+def read(table: Sequence[tuple[Entry, list[str]]], file: Reading) -> Tolerances:
     """Read all entries.
 
     Parameters
     ----------
-    written : iterable of (Entry, list of str)
+    table : sequence of (Entry, list of str)
         Entries of the file, and the errors and zones that each selects.
-    joint : Joint, optional
-        Nominal joint; None if it could not be read.
-    folder : Path
-        Folder of the study file.
-    place : str
-        File name shown in faults.
-    faults : list of Fault
-        Faults are added to it.
+    file : Reading
+        The file, to which faults are added.
 
     Returns
     -------
     Tolerances
         Entries without fault.
     """
-    table = list(written)
     every = {name for _, names in table for name in names}
     shared = {name for name in every if _partners(name) & every}
     directions: dict[str, ToleranceEntry] = {}
     diameters: dict[str, Diameter] = {}
     read: dict[int, Toleranced] = {}
-    reach = math.nan if joint is None else joint.cross.R
+    reach = math.nan if file.joint is None else file.joint.cross.R
     for number in sorted(range(len(table)), key=lambda i: _is_position(table[i][1])):  # what they depend on comes first
         item, names = table[number]
         models = []
-        with gather(faults):
+        with gather(file.faults):
             for name in names:
-                site = Site(name, TOLERANCED[name], 1.0 if name in FACTORS else 0.0, folder, reach, name in shared)
+                site = Site(name, TOLERANCED[name], 1.0 if name in FACTORS else 0.0, file.folder, reach, name in shared)
                 if _is_position([name]):
                     direction = next((directions[zone] for zone in _partners(name) if zone in directions), None)
                     site = site._replace(direction=direction, diameter=diameters.get(name))
-                model = entry(item.value, site, place, item.path)
+                model = entry(item.value, site, file.place, item.path)
                 models.append((site, model))
                 feature, _, key = name.partition(".")
                 if key == "diameter" and isinstance(model, SingleEntry):
@@ -101,9 +95,9 @@ def read(
             read[number] = Toleranced(item.pattern, item.value, tuple(models))
     entries = tuple(read[number] for number in sorted(read))
     axes: dict[str, Axis] = {}
-    if joint is not None:
-        with gather(faults):
-            axes = axes_of(entries, joint.cross.R, place)
+    if file.joint is not None:
+        with gather(file.faults):
+            axes = axes_of(entries, reach, file.place)
     return Tolerances(entries, axes)
 
 

@@ -18,14 +18,13 @@ from tolstat.joint.partner import Partner
 from tolstat.study import schema
 from tolstat.study.costs import CostEntry
 from tolstat.study.fatigue import LineEntry, SequenceEntry, StressPointEntry
-from tolstat.study.loading import OF_CASE
 from tolstat.study.listing import Range
+from tolstat.study.loading import OF_CASE
 from tolstat.study.model import SweepEntry
 from tolstat.study.points import PointEntry
 from tolstat.study.schema import of_model
 from tolstat.study.selection import TOLERANCED
-from tolstat.study.selective import SelectiveEntry
-from tolstat.study.sorting import RejectEntry
+from tolstat.study.selective import RejectEntry, SelectiveEntry
 from tolstat.study.tolerances.entry import Banded, LotEntry, SingleEntry
 from tolstat.study.tolerances.fits import FitEntry
 from tolstat.study.tolerances.kinds import ZONE_KINDS, kinds_of

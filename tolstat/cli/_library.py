@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from tolstat.report import page, workbook
     from tolstat.solver import compilation
     from tolstat.store import recorded, result_file, revolutions, verification, what_if
-    from tolstat.study import assumptions, mounting, points, rewriting, starter
+    from tolstat.study import assumptions, points, rewriting, starter
     from tolstat.study import schema as schemas
     from tolstat.study import spectrum as spectra
 else:
@@ -50,7 +50,5 @@ else:
     reports, page, workbook, compilation = (Late(f"tolstat.{name}") for name in names)
     names = ("recorded", "result_file", "revolutions", "verification", "what_if")
     recorded, result_file, revolutions, verification, what_if = (Late(f"tolstat.store.{name}") for name in names)
-    names = ("assumptions", "mounting", "points", "rewriting", "schema", "spectrum", "starter")
-    assumptions, mounting, points, rewriting, schemas, spectra, starter = (
-        Late(f"tolstat.study.{name}") for name in names
-    )
+    names = ("assumptions", "points", "rewriting", "schema", "spectrum", "starter")
+    assumptions, points, rewriting, schemas, spectra, starter = (Late(f"tolstat.study.{name}") for name in names)

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from tolstat.common.errors import Fault, InputError
+from tolstat.common.errors import input_error
 
 MAX_INPUT_BYTES = 64_000_000
 """Largest size of a text file that is read, bytes."""
@@ -98,14 +98,14 @@ def check_target(path: Path, *inputs: Path) -> None:
     """
     place = str(path)
     if path.is_dir():
-        raise InputError([Fault(place, "cannot be written: is a folder", "give the path of a file in it")])
+        raise input_error(place, "cannot be written: is a folder", "give the path of a file in it")
     above = next((folder for folder in path.parents if folder.exists()), path.parent)
     if not above.is_dir():
-        raise InputError([Fault(place, f"cannot be written: {above} is no folder", "give another folder")])
+        raise input_error(place, f"cannot be written: {above} is no folder", "give another folder")
     if not os.access(above, os.W_OK | os.X_OK):
-        raise InputError([Fault(place, f"cannot be written: {above} is read-only", "give another folder")])
+        raise input_error(place, f"cannot be written: {above} is read-only", "give another folder")
     if any(path.exists() and given.exists() and path.samefile(given) for given in inputs):
-        raise InputError([Fault(place, "cannot be written: it is the input", "give the output another name")])
+        raise input_error(place, "cannot be written: it is the input", "give the output another name")
 
 
 def make_parent(path: Path) -> None:

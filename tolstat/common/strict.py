@@ -17,7 +17,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import CoreSchema, PydanticCustomError
 
 from tolstat.common import json_schema, toml_lines, units
-from tolstat.common.errors import Fault, InputError
+from tolstat.common.errors import Fault, InputError, input_error
 from tolstat.common.files import about_encoding, read_input
 
 
@@ -50,10 +50,10 @@ def read_toml(path: Path, text: str | None = None) -> dict[str, Any]:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         line, cause, remedy = toml_lines.of_syntax(error, text)
-        raise InputError([Fault(f"{path}:{line}", f"is not TOML: {cause}", remedy)]) from error
+        raise input_error(f"{path}:{line}", f"is not TOML: {cause}", remedy) from error
     except RecursionError as error:
         remedy = "no key needs more than a few: remove brackets"
-        raise InputError([Fault(str(path), "has too many tables and lists inside each other", remedy)]) from error
+        raise input_error(path, "has too many tables and lists inside each other", remedy) from error
 
 
 def read_text(path: Path) -> str:
@@ -68,11 +68,9 @@ def read_text(path: Path) -> str:
         return read_input(path)
     except OSError as error:
         reason = error.strerror or str(error)
-        raise InputError(
-            [Fault(str(path), f"cannot be read: {reason}", "check the path and its permissions")]
-        ) from error
+        raise input_error(path, f"cannot be read: {reason}", "check the path and its permissions") from error
     except UnicodeDecodeError as error:
-        raise InputError([Fault(str(path), *about_encoding(error))]) from error
+        raise input_error(path, *about_encoding(error)) from error
 
 
 def read_section(place: Path, text: str, name: str) -> dict[str, Any]:
@@ -86,7 +84,7 @@ def read_section(place: Path, text: str, name: str) -> dict[str, Any]:
     section = read_toml(place, text).get(name, {})
     if not isinstance(section, dict):
         remedy = "the file is damaged: run its study again into another one"
-        raise InputError([Fault(str(place), f"holds a study whose {name} is no table", remedy)])
+        raise input_error(place, f"holds a study whose {name} is no table", remedy)
     return section
 
 

@@ -116,8 +116,7 @@ _NOT_PARSED = (
 
 def _fault(found: str, unit: str, remedy: str = "") -> PydanticCustomError:
     example = f'write "{EXAMPLES.get(unit, "1 " + unit)}"' if unit != "1" else "write a number without unit"
-    remedy = remedy or example
-    return PydanticCustomError("quantity", "{found}", {"found": found, "remedy": remedy})
+    return PydanticCustomError("quantity", "{found}", {"found": found, "remedy": remedy or example})
 
 
 def to_si(value: object, unit: str, mark: str = "") -> float:

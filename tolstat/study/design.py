@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.errors import Fault, InputError
+from tolstat.common.errors import input_error
 from tolstat.common.late import stats
 from tolstat.common.tables import DESIGN, Variant
 from tolstat.common.units import Quantity
@@ -194,7 +194,7 @@ def swept(
     shape = [axes[number].points for number in dimensions]
     if np.prod(shape) > MAX_JOINTS:
         found = f"gives {np.prod(shape)} joints with dimensions of their own"
-        raise InputError([Fault(f"{place}: sweep", found, f"give at most {MAX_JOINTS}")])
+        raise input_error(f"{place}: sweep", found, f"give at most {MAX_JOINTS}")
     made = [(Variant("joint", {}), nominal[0])]
     for values in product(*(np.linspace(axes[k].start, axes[k].stop, axes[k].points).tolist() for k in dimensions)):
         point = {name: value for k, value in zip(dimensions, values, strict=True) for name in axes[k].names}

@@ -14,7 +14,7 @@ from pydantic import AfterValidator, Field, WithJsonSchema, model_validator
 from tolstat.analysis.strength import Line
 from tolstat.common import json_schema, units
 from tolstat.common.channels import UNIT_OF_CHANNEL
-from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.errors import gather, input_error
 from tolstat.common.load_kinds import BUSHINGS
 from tolstat.common.strict import Strict, did_you_mean, read_section, read_toml, refuse
 from tolstat.study.selection import Assignments, Entry, Reading, entries, quantity, resolve, select
@@ -282,8 +282,7 @@ class Fatigue:
             within = replace(self, revolutions=hours * hourly, required=True, hours=hours)
         if within.starts > within.revolutions:
             found = f"{within.starts:g} starts in {within.revolutions:g} revolutions"
-            remedy = "give at most one for each, or more revolutions"
-            raise InputError([Fault(f"{place}: fatigue.starts", found, remedy)])
+            raise input_error(f"{place}: fatigue.starts", found, "give at most one for each, or more revolutions")
         return within
 
     @property
@@ -304,8 +303,7 @@ def read(file: Reading) -> Fatigue:
         settings = file.model(Settings, table, "fatigue")
     visits = tuple(settings.sequence.points.split()) if settings.sequence else ()
     if unknown := sorted(set(visits) - set(names)) if names else []:
-        remedy = did_you_mean(unknown[0], names)
-        file.fault("fatigue.sequence.points", f"no operating point {unknown[0]!r}", remedy)
+        file.fault("fatigue.sequence.points", f"no operating point {unknown[0]!r}", did_you_mean(unknown[0], names))
     for entry in entries(_inner(table, "line"), "fatigue", "line"):
         with gather(file.faults):
             channels = resolve(entry, UNIT_OF_CHANNEL, file.place)

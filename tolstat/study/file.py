@@ -20,18 +20,18 @@ from tolstat.joint import Joint
 from tolstat.joint.derived import BEARING
 from tolstat.joint.model import Assumed, leaves, merged
 from tolstat.joint.reading import faults_of_assumed
-from tolstat.study import fatigue, listing, points, proposal, selection, selective, sorting
+from tolstat.study import fatigue, listing, points, proposal, selection, selective
 from tolstat.study.axes import is_zone, zone_of
 from tolstat.study.design import KEYS, Design, swept
 from tolstat.study.model import MAX_ROWS, Output, Sampling, Solver, SweepAxis, SweepEntry
 from tolstat.study.points import Point
 from tolstat.study.proposal import Proposal, ProposalEntry
 from tolstat.study.selection import TOLERANCED, UNITS, Assignments, Reading
-from tolstat.study.tolerances import fits, reading
+from tolstat.study.tolerances import fits, kinds
 from tolstat.study.tolerances.correlation import Copula, Correlation, Group, assemble, correlated, groups
 from tolstat.study.tolerances.entry import Site, known_of
 from tolstat.study.tolerances.fits import Fit
-from tolstat.study.tolerances.reading import Tolerances
+from tolstat.study.tolerances.kinds import Tolerances
 
 BESIDE_FIT = ("is set by tolerances.fit already", "remove one of the two")
 """Fault and remedy of a diameter."""
@@ -128,7 +128,7 @@ def _scatter(file: Reading) -> Tolerances:
                 file.claims.claim(entry, selected)
             units |= {name: TOLERANCED[name] for name in selected}
             written.append((entry, selected))
-    read = reading.read(written, file)
+    read = kinds.read(written, file)
     drawn: dict[str, list[str]] = {}
     for quantity in read.distributions:
         drawn.setdefault(zone_of(quantity) if is_zone(quantity) else quantity, []).append(quantity)
@@ -235,7 +235,7 @@ READERS: dict[str, Callable[[Reading], Any]] = {
     "sampling": _sampling,
     "sweep": _sweep,
     "limits": _limits,
-    "rejects": sorting.read,
+    "rejects": selective.read,
     "fatigue": fatigue.read,
     "output": lambda file: file.model(Output, file.data.get("output", {}), "output"),
     "groups": _groups,
@@ -267,8 +267,7 @@ def _check_sections(file: Reading, sampling: Sampling) -> None:
         file.fault(used[0], found, f"add {header}, or set another sampling.method")
     for section in dict.fromkeys((*SCATTER, *(name for names in SECTIONS_OF.values() for name in names))):
         if section not in used and section in file.data:
-            remedy = "remove it, or set another sampling.method"
-            file.fault(section, f"has no effect with {sampling.method!r}", remedy)
+            file.fault(section, f"has no effect with {sampling.method!r}", "remove it, or set another sampling.method")
 
 
 def _check_method(file: Reading, sampling: Sampling) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from tolstat.common import selected_results
-from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.errors import Fault, InputError, gather, input_error
 from tolstat.common.loads import LOADS
 from tolstat.common.strict import validate
 from tolstat.joint import Joint, Operation
@@ -17,7 +17,7 @@ from tolstat.study.file import READERS, check
 from tolstat.study.model import Subset
 from tolstat.study.selection import Reading
 from tolstat.study.study import Case, Study
-from tolstat.study.tolerances.reading import Tolerances
+from tolstat.study.tolerances.kinds import Tolerances
 
 OF_CASE = ("joint", "operation", "solver", "errors")
 """Sections that a case may have, too."""
@@ -93,12 +93,11 @@ def load_case(path: str | Path) -> Case:
     """
     file = Reading(Path(path), OF_CASE)
     if "sampling" in file.data:
-        remedy = f"run it with: tolstat run {file.path}"
-        raise InputError([Fault(file.place, "is a study, not a case of one joint", remedy)])
+        raise input_error(file.place, "is a study, not a case of one joint", f"run it with: tolstat run {file.path}")
     _read(file, ["joint"])
     with gather(file.faults):
         if "operation" not in file.data:
-            raise InputError([Fault(f"{file.place}: operation", "missing table", "add [operation]")])
+            raise input_error(f"{file.place}: operation", "missing table", "add [operation]")
         file.parts["operation"] = file.model(Operation, file.data["operation"], "operation")
     _read(file, ["solver", "errors"])
     if file.solver is not None and file.solver.fidelity == "auto":

@@ -23,7 +23,7 @@ from pydantic import Field
 
 from tolstat.analysis import process
 from tolstat.analysis.process import LEAST_PARTS, MOST_PARTS, Known, Sums
-from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.errors import Fault, InputError, gather, input_error
 from tolstat.common.strict import Strict, did_you_mean, dotted
 from tolstat.common.units import Number
 from tolstat.study.axes import streams_of
@@ -176,7 +176,7 @@ def resolve(
                 value = _number(item.value, key, where)
                 names = select(item.pattern, toleranced)
                 if not names:
-                    raise InputError([Fault(where, "has no tolerance", did_you_mean(item.pattern, list(toleranced)))])
+                    raise input_error(where, "has no tolerance", did_you_mean(item.pattern, list(toleranced)))
                 numbers |= dict.fromkeys(names, value)
     scores = {
         streams_of(name)[0]: (means[name], widths[name])
@@ -185,8 +185,7 @@ def resolve(
     }
     whole = f"{place}: {dotted(path)}"
     if scores and parts:
-        remedy = "write a [[proposal]] for each"
-        faults.append(Fault(whole, "has parts beside widen or shift", remedy))
+        faults.append(Fault(whole, "has parts beside widen or shift", "write a [[proposal]] for each"))
     if not (scores or parts) and not faults:
         faults.append(Fault(whole, "does not differ from the tolerances", "add widen, shift or parts"))
     if faults:
@@ -214,8 +213,7 @@ def _number(value: object, key: str, where: str) -> float:
     number = float(value) if isinstance(value, kinds) and not isinstance(value, bool) else math.nan
     if not low <= number <= high:
         whole = "whole " if key == "parts" else ""
-        remedy = f"give a {whole}number from {low:g} to {high:g}"
-        raise InputError([Fault(where, f"{value!r} is not a valid {key}", remedy)])
+        raise input_error(where, f"{value!r} is not a valid {key}", f"give a {whole}number from {low:g} to {high:g}")
     return number
 
 
@@ -231,4 +229,4 @@ def check_shares(proposals: Sequence[Proposal], place: str) -> None:
     if left < MIN_NOMINAL_SHARE - 1e-12:
         found = f"shares leave {left:.3g} of the joints to the tolerances"
         remedy = f"give shares with a sum of at most {1.0 - MIN_NOMINAL_SHARE:g}"
-        raise InputError([Fault(f"{place}: proposal.share", found, remedy)])
+        raise input_error(f"{place}: proposal.share", found, remedy)

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from tolstat.common import units
-from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.errors import Fault, InputError, gather, input_error
 from tolstat.common.notation import DIAMETER, PLUS_MINUS
 from tolstat.common.strict import did_you_mean
 from tolstat.study import rewriting, selection
@@ -307,11 +307,11 @@ def _keys(
             path, equals, value = text.partition("=")
             pattern, dot, key = path.strip().rpartition(".")
             if not (equals and dot and pattern and key and value.strip()):
-                raise InputError([Fault(f"--set {text!r}", "is not a setting", EXAMPLE)])
+                raise input_error(f"--set {text!r}", "is not a setting", EXAMPLE)
             names = selection.select(pattern, keys)
             if not names:
                 remedy = did_you_mean(pattern, list(keys))
-                raise InputError([Fault(f"--set {text!r}", "selects no error that has a tolerance", remedy)])
+                raise input_error(f"--set {text!r}", "selects no error that has a tolerance", remedy)
             for name in names:
                 kept = {k: v for k, v in keys[name].items() if k not in REPLACED_KEYS.get(key, ())}
                 keys[name] = kept | {key: rewriting.given(value)}
@@ -325,7 +325,7 @@ def _check_bonus(study: Study, name: str, place: str) -> None:
         found = "a position with a bonus by maximum material cannot be changed, nor its diameter"
         if study.sampling.is_matched and name.endswith(".diameter"):
             found = "a diameter that is matched by classes cannot be changed"
-        raise InputError([Fault(place, found, "run a study of its own")])
+        raise input_error(place, found, "run a study of its own")
 
 
 def _check_zone(study: Study, site: Site, new: ToleranceEntry, place: str) -> None:
@@ -336,9 +336,7 @@ def _check_zone(study: Study, site: Site, new: ToleranceEntry, place: str) -> No
     changed_length = site.name.endswith(".position") and new.over != old.over
     if changed_length or new.quantities(site).keys() != old.quantities(site).keys():
         found = f"{site.name} gets another shape, not another size"
-        raise InputError(
-            [Fault(place, found, "change zone, cp, truncate or distribution only, or run a study of its own")]
-        )
+        raise input_error(place, found, "change zone, cp, truncate or distribution only, or run a study of its own")
     if site.shared and isinstance(new, zones.PositionEntry) and new.build() != old.build():
         found = f"{site.name} cannot be changed: the axis has a zone of direction, too, which shares its room"
-        raise InputError([Fault(place, found, "run a study of its own")])
+        raise input_error(place, found, "run a study of its own")

@@ -32,7 +32,7 @@ from tolstat.study.model import Output, Sampling, Solver, SweepEntry
 from tolstat.study.points import PointEntry
 from tolstat.study.proposal import MAX_SHIFT, MAX_WIDEN, ProposalEntry
 from tolstat.study.selection import TOLERANCED, UNITS
-from tolstat.study.sorting import MEASURABLE, RejectEntry
+from tolstat.study.selective import MEASURABLE, RejectEntry
 from tolstat.study.tolerances import fits
 from tolstat.study.tolerances.correlation import Correlation
 from tolstat.study.tolerances.kinds import KINDS as TOLERANCES

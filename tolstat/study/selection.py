@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, TypeVar
 from pydantic_core import PydanticCustomError
 
 from tolstat.common import strict
-from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.errors import Fault, InputError, gather, input_error
 from tolstat.common.strict import did_you_mean, dotted, read_text, read_toml
 from tolstat.common.tables import ERROR_FIELDS
 from tolstat.common.units import to_si
@@ -76,7 +76,7 @@ def quantity(entry: Entry, unit: str, place: str) -> float:
         return to_si(entry.value, unit)
     except PydanticCustomError as error:
         context = error.context or {}
-        raise InputError([Fault(f"{place}: {dotted(entry.path)}", context["found"], context["remedy"])]) from error
+        raise input_error(f"{place}: {dotted(entry.path)}", context["found"], context["remedy"]) from error
 
 
 def select(pattern: str, names: Iterable[str]) -> list[str]:
@@ -124,11 +124,11 @@ def resolve(entry: Entry, units: Mapping[str, str], place: str) -> list[str]:
     selected = select(entry.pattern, units)
     where = f"{place}: {dotted(entry.path)}"
     if not selected:
-        raise InputError([Fault(where, "selects nothing", suggestion(entry.pattern, list(units)))])
+        raise input_error(where, "selects nothing", suggestion(entry.pattern, list(units)))
     kinds = sorted({units[name] for name in selected})
     if len(kinds) > 1:
         found = f"selects quantities of different kinds ({', '.join(kinds)})"
-        raise InputError([Fault(where, found, "write one entry for each kind")])
+        raise input_error(where, found, "write one entry for each kind")
     return selected
 
 
@@ -227,7 +227,7 @@ class Reading:
         self.parts: dict[str, Any] = {"signals": ()}
         if is_joint(self.data):
             remedy = f'name it in a study, base = "{path.name}" under [joint]; tolstat new writes one'
-            raise InputError([Fault(self.place, "is a joint file, not a study or case", remedy)])
+            raise input_error(self.place, "is a joint file, not a study or case", remedy)
         if "file" in self.text:
             self.text, self.parts["signals"] = signals.replaced(self.text, self.data, path, self.faults)
             self.data = read_toml(path, self.text)

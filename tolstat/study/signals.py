@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pydantic_core import PydanticCustomError
 
 from tolstat.common import units
-from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.errors import Fault, InputError, gather, input_error
 from tolstat.common.late import interpolate
 from tolstat.common.loads import FloatArray
 from tolstat.common.strict import dotted, read_text
@@ -106,8 +106,7 @@ def read(path: Path, needed: Sequence[str] = ()) -> dict[str, FloatArray]:
         for row in 1 + np.flatnonzero(np.diff(signal.get(name, np.zeros(0))) <= 0):
             faults.append(Fault(f"{path}:{numbers[row]}: {name}", "does not rise", "give samples in their order"))
     if len(numbers) < FEWEST:
-        found = f"has {len(numbers)} samples"
-        faults.append(Fault(str(path), found, f"give at least {FEWEST} lines below the header"))
+        faults.append(Fault(str(path), f"has {len(numbers)} samples", f"give at least {FEWEST} lines below the header"))
     if len(faults) > SHOWN:
         others = Fault(str(path), f"has {len(faults) - SHOWN} more faults", "mend all lines in the same way")
         faults = [*faults[:SHOWN], others]
@@ -250,11 +249,11 @@ def orders_of(path: Path, key: str) -> Orders:
     time, angle, speed = (signal.get(name) for name in ("time", "angle", "speed"))
     if speed is not None and not speed.min() > 0:
         remedy = "give a part in which the shaft turns forwards"
-        raise InputError([Fault(f"{path}: speed", "is not above zero everywhere", remedy)])
+        raise input_error(f"{path}: speed", "is not above zero everywhere", remedy)
     if angle is None and (time is None or speed is None):
-        raise InputError([Fault(str(path), "has no angle", "add a column angle [deg], or time [s] and speed [rpm]")])
+        raise input_error(path, "has no angle", "add a column angle [deg], or time [s] and speed [rpm]")
     if key == "speed" and time is None and speed is None:
-        raise InputError([Fault(str(path), "has no speed", "add a column speed [rpm] or time [s]")])
+        raise input_error(path, "has no speed", "add a column speed [rpm] or time [s]")
     if angle is None:
         angle = _integral(time, speed)
     if time is None:
@@ -262,7 +261,7 @@ def orders_of(path: Path, key: str) -> Orders:
     try:
         return orders(angle, time, signal.get(key))
     except ValueError as error:
-        raise InputError([Fault(str(path), str(error), "give a longer or denser signal")]) from error
+        raise input_error(path, str(error), "give a longer or denser signal") from error
 
 
 def _integral(x: Any, y: Any) -> FloatArray:
@@ -300,10 +299,10 @@ def replaced(text: str, data: Mapping[str, Any], path: Path, faults: list[Fault]
         with gather(faults_of_key):
             if unknown := set(table) - {"file"}:
                 where = f"{path}: {dotted((*path_of_key, min(unknown)))}"
-                raise InputError([Fault(where, "is given beside a file", "remove one of the two")])
+                raise input_error(where, "is given beside a file", "remove one of the two")
             if not isinstance(table["file"], str):
                 where = f"{path}: {dotted((*path_of_key, 'file'))}"
-                raise InputError([Fault(where, "is not a text", 'write file = "engine.csv"')])
+                raise input_error(where, "is not a text", 'write file = "engine.csv"')
             if (table["file"], key) not in known:
                 known[table["file"], key] = orders_of(path.parent / table["file"], key)
             orders_found = known[table["file"], key]

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.errors import Fault, InputError
+from tolstat.common.errors import input_error
 from tolstat.common.late import tomlkit
 from tolstat.common.loads import FloatArray
 from tolstat.common.strict import read_text
@@ -191,7 +191,7 @@ def read(path: Path, m: float) -> DutyCycle:
     try:
         return duty_cycle(signal["time"], signal["torque"], signal["speed"], signal["alpha"], m)
     except ValueError as error:
-        raise InputError([Fault(str(path), str(error), "give the signal of a loaded shaft")]) from error
+        raise input_error(path, str(error), "give the signal of a loaded shaft") from error
 
 
 def names(cycle: DutyCycle) -> list[str]:
@@ -222,7 +222,7 @@ def text(cycle: DutyCycle, source: Path, path: Path, base: Path | None = None) -
     try:
         document = tomlkit.parse(given)
     except tomlkit.exceptions.TOMLKitError as error:
-        raise InputError([Fault(str(base), f"is not TOML: {error}", "give a study that tolstat plan reads")]) from error
+        raise input_error(base, f"is not TOML: {error}", "give a study that tolstat plan reads") from error
     document.pop("operation", None)
     points = tomlkit.aot()
     for number, name in enumerate(names(cycle)):

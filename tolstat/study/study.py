@@ -20,15 +20,14 @@ from tolstat.common.tables import DESIGN, Variant
 from tolstat.joint import Joint, Operation, affecting_results
 from tolstat.joint.model import Assumed
 from tolstat.joint.sections import mounting_and_law
-from tolstat.study import mounting
+from tolstat.study import points
 from tolstat.study.axes import Axis
 from tolstat.study.design import Design, flat
 from tolstat.study.fatigue import Fatigue
 from tolstat.study.model import Output, Sampling, Solver, SweepAxis
-from tolstat.study.mounting import Setting
-from tolstat.study.points import Point, limits_at, only_one
+from tolstat.study.points import Point, Setting, limits_at, only_one
 from tolstat.study.proposal import Proposal
-from tolstat.study.sorting import Gauge
+from tolstat.study.selective import Gauge
 from tolstat.study.tolerances.correlation import Copula, Group, Lot
 from tolstat.study.tolerances.distributions import Distribution
 from tolstat.study.tolerances.entry import KnownEntry, Toleranced, known_of
@@ -73,14 +72,14 @@ class Case:
         return lined
 
     def check_mounting(self) -> None:
-        """Refuse settings without effect, see `mounting.refusals`.
+        """Refuse settings without effect, see `points.refusals`.
 
         Raises
         ------
         InputError
             With every such setting.
         """
-        faults = [self.fault(dotted(path), *texts) for path, *texts in mounting.refusals(self._settings, self._varied)]
+        faults = [self.fault(dotted(path), *texts) for path, *texts in points.refusals(self._settings, self._varied)]
         if faults:
             raise InputError(faults)
 

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tolstat.common import units
-from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.errors import Fault, InputError, gather, input_error
 from tolstat.common.strict import did_you_mean
 from tolstat.joint import HOLE_OF_PIN, varied
 from tolstat.study import rewriting, scaling, selection
@@ -145,13 +145,13 @@ def named(study: Study, texts: Sequence[str]) -> list[Line]:
         with gather(faults):
             if not (label and equals and patterns):
                 remedy = 'write --group "tilts = pin*.tilt_*, hole*.tilt_*"'
-                raise InputError([Fault(f"--group {text!r}", "is not a name with patterns", remedy)])
+                raise input_error(f"--group {text!r}", "is not a name with patterns", remedy)
             for pattern in (one.strip() for one in patterns.split(",")):
                 selected = selection.select(pattern, known)
                 if not selected:
                     entries = [line.label for line in lines(study)]
                     remedy = did_you_mean(pattern, [*entries, *known])
-                    raise InputError([Fault(f"--group {text!r}", f"{pattern!r} selects no line", remedy)])
+                    raise input_error(f"--group {text!r}", f"{pattern!r} selects no line", remedy)
                 names |= dict.fromkeys(selected)
             groups.append(Line(label, tuple(names)))
     if faults:

@@ -8,26 +8,29 @@ only correlates errors of the joint that share it, as `correlated` does.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from itertools import combinations
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.errors import Fault, InputError, gather, input_error
+from tolstat.common.late import pandas as pd
 from tolstat.common.late import special
 from tolstat.common.strict import Strict, dotted
 from tolstat.common.units import Number
 from tolstat.study.axes import is_zone
 from tolstat.study.selection import select
-
-if TYPE_CHECKING:
-    from tolstat.study.tolerances.entry import Toleranced
+from tolstat.study.tolerances.distributions import Distribution, Normal
 from tolstat.study.tolerances.entry import Toleranced
 
 Array = NDArray[np.float64]
+NODES = 64
+"""Number of Gauss–Hermite nodes of each of two normal scores."""
 
 MIN_EIGENVALUE = 1e-9
 """A correlation matrix with a smaller eigenvalue does not count as positive definite."""
@@ -131,11 +134,9 @@ def _named(pattern: str, toleranced: dict[str, str], where: str) -> list[str]:
     names = select(pattern, toleranced)
     if any(is_zone(name) for name in names or [pattern]):
         remedy = "give offset_t, offset_z, tilt_t and tilt_z tolerances of their own, and correlate those"
-        raise InputError([Fault(where, f"{pattern} is a zone: it cannot be correlated", remedy)])
+        raise input_error(where, f"{pattern} is a zone: it cannot be correlated", remedy)
     if not names:
-        raise InputError(
-            [Fault(where, f"{pattern!r} has no tolerance", f"add tolerances.{pattern}, or remove it here")]
-        )
+        raise input_error(where, f"{pattern!r} has no tolerance", f"add tolerances.{pattern}, or remove it here")
     return names
 
 
@@ -152,7 +153,7 @@ def _positive_definite(names: tuple[str, ...], rho: dict[frozenset[str], float],
             guilty = [name for name, share in zip(names, part, strict=True) if share > 0.1 * part.max()]
             found = f"not positive definite: the correlations of {', '.join(guilty)} contradict each other"
             remedy = "give a smaller |rho|, or add the missing pairs (they have rho = 0)"
-            raise InputError([Fault(f"{place}: correlation", found, remedy)])
+            raise input_error(f"{place}: correlation", found, remedy)
     return Copula(names, matrix)
 
 
@@ -203,7 +204,7 @@ def correlated(copula: Copula, lots: Mapping[str, Lot], place: str) -> Copula:
     both = [name for name in copula.names if name in lots]
     if both:
         remedy = "remove one of the two; errors of one entry are correlated by lot = { share = ..., shared = true }"
-        raise InputError([Fault(f"{place}: {dotted(('correlation',))}", f"{both[0]} has a lot already", remedy)])
+        raise input_error(f"{place}: {dotted(('correlation',))}", f"{both[0]} has a lot already", remedy)
     every = [lot.score for lot in lots.values()]
     names = [name for name, lot in lots.items() if every.count(lot.score) > 1]
     shared = np.eye(len(names))
@@ -263,3 +264,50 @@ def groups(entries: Sequence[Toleranced], copula: Copula, by: str) -> tuple[Grou
         p if "*" in p.label or len(p.names) == 1 else p._replace(label=f"{p.names[0]} and {len(p.names) - 1} more")
         for p in parts
     )
+
+
+def correlations(copula: Copula, tolerances: Mapping[str, Distribution]) -> pd.DataFrame:
+    """Make one row for each pair of kinds of errors that are correlated alike.
+
+    Parameters
+    ----------
+    copula : Copula
+        Correlation of the normal scores.
+    tolerances : mapping of str to Distribution
+        Distribution of each error.
+
+    Returns
+    -------
+    DataFrame
+        ``errors``, the first pair; ``pairs``, number of pairs; ``rho`` of their normal scores, as the study gives it;
+        ``pearson``, linear correlation of the errors themselves; ``spearman``, rank correlation.
+    """
+    rows: dict[tuple[float, float], list[str]] = {}
+    for (i, first), (j, second) in combinations(enumerate(copula.names), 2):
+        if rho := float(copula.matrix[i, j]):
+            linear = pearson(tolerances[first], tolerances[second], rho)
+            rows.setdefault((rho, float(f"{linear:.4g}")), []).append(f"{first}, {second}")
+    cells = [
+        (pairs[0], len(pairs), rho, linear, 6.0 / math.pi * math.asin(0.5 * rho))
+        for (rho, linear), pairs in rows.items()
+    ]
+    return pd.DataFrame(cells, columns=["errors", "pairs", "rho", "pearson", "spearman"])
+
+
+def pearson(first: Distribution, other: Distribution, rho: float) -> float:
+    """Linear correlation of two errors whose normal scores have the correlation `rho`: smaller unless both are normal.
+
+    Gauss–Hermite quadrature over both scores.
+    """
+    if isinstance(first, Normal) and isinstance(other, Normal):
+        return rho
+    z, weight = np.polynomial.hermite_e.hermegauss(NODES)
+    weight = weight / weight.sum()
+
+    def values(distribution: Distribution, scores: Array) -> Array:
+        return distribution.ppf(np.clip(special.ndtr(scores), 2.0**-53, 1.0 - 2.0**-53)) - distribution.moments.mean
+
+    second = rho * z[:, None] + math.sqrt(1.0 - rho**2) * z
+    y = values(other, second.ravel()).reshape(second.shape)
+    covariance = float((weight * values(first, z)) @ y @ weight)
+    return covariance / (first.moments.deviation * other.moments.deviation)

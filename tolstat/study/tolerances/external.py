@@ -256,8 +256,7 @@ def _read(path: Path, column: str) -> list[float]:
             f"{path} cannot be read: {reason}", "give a CSV file; its path starts from the study's folder"
         ) from error
     if column not in columns:
-        remedy = strict.did_you_mean(column, list(columns))
-        raise refuse(f"{path} has no column {column!r}", remedy)
+        raise refuse(f"{path} has no column {column!r}", strict.did_you_mean(column, list(columns)))
     values = []
     for number, cell in enumerate(cells, start=1):
         value = _number(cell)

@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator
 
 from tolstat.common import strict
-from tolstat.common.errors import Fault, InputError
+from tolstat.common.errors import Fault, InputError, input_error
 from tolstat.common.load_kinds import PINS
 from tolstat.common.strict import Strict
 from tolstat.common.tables import HOLES
@@ -157,7 +157,7 @@ def read(table: object, place: str) -> Fit | None:
         return None
     data, where = table[KEY], f"{place}: {strict.dotted(PATH)}"
     if not isinstance(data, Mapping):
-        raise InputError([Fault(where, f"{data!r} is not a fit", f"write {EXAMPLE}")])
+        raise input_error(where, f"{data!r} is not a fit", f"write {EXAMPLE}")
     entry = strict.validate(FitEntry, data, place, prefix=PATH)
     zones = entry.zones
     deviations = []

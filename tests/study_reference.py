@@ -6,10 +6,9 @@ import json
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
-from tolstat.common.columns import RESULT_COLUMNS
+from tolstat.common.columns import OPTIONAL_FIELDS, RESULT_COLUMNS
 from tolstat.common.load_kinds import LOAD_KINDS
 from tolstat.common.loads import LOADS
-from tolstat.common.selected_results import OPTIONAL_FIELDS
 from tolstat.common.tables import ERROR_FIELDS
 from tolstat.joint import Operation
 from tolstat.joint.contact import Station

@@ -1,13 +1,20 @@
-"""Flat columns of the tables, as the result file and every CSV have them."""
+"""Flat columns of the tables, as the result file and every CSV have them, and which of the results a campaign keeps.
+
+That is all of them, or those that ``[output] results`` of its study selects. Columns on the course of a simulation
+(status, closure, period, counts) are always kept: results are meaningless without them.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.common.fields import Field
+from tolstat.common.load_kinds import LOAD_KINDS
+from tolstat.common.loads import LOADS
 from tolstat.common.tables import DESIGN_FIELDS, ERROR_FIELDS, LEDGER_FIELDS, RESULT_FIELDS
 
 
@@ -44,3 +51,54 @@ DESIGN_COLUMNS = flat(DESIGN_FIELDS)
 LEDGER_COLUMNS = flat(LEDGER_FIELDS)
 ERROR_COLUMNS = flat(ERROR_FIELDS)
 RESULT_COLUMNS = flat(RESULT_FIELDS)
+KEPT = "output.results"
+"""Key in the identity of a study that holds the names of the selected columns; absent where all are kept."""
+OPTIONAL_FIELDS = (
+    "mode_share",
+    "equivalent_load",
+    "clearance",
+    *(field.name for kind in LOAD_KINDS for field in kind.statistics().values()),
+)
+"""Fields of the results that a study may leave out."""
+RESULT_NAMES = tuple(c.name for c in RESULT_COLUMNS)
+
+
+def kept_names(names: Iterable[str]) -> list[str] | None:
+    """Optional columns among `names`, in the order of the table; None if no optional column is left out."""
+    optional = [c.name for c in RESULT_COLUMNS if c.field in OPTIONAL_FIELDS]
+    among = [name for name in optional if name in set(names)]
+    return None if among == optional else among
+
+
+def kept_columns(identity: Mapping[str, Any]) -> tuple[Column, ...]:
+    """Columns of the results that a campaign keeps, in the order of the table.
+
+    Parameters
+    ----------
+    identity : mapping
+        Identity of the campaign's study, by dotted key.
+
+    Raises
+    ------
+    ValueError
+        When the identity holds anything but a list of column names.
+    """
+    names = identity.get(KEPT)
+    if names is None:
+        return RESULT_COLUMNS
+    if not isinstance(names, list) or any(name not in RESULT_NAMES for name in names):
+        raise ValueError(f"{KEPT} is {names!r}, not a list of columns of the results")
+    return tuple(c for c in RESULT_COLUMNS if c.field not in OPTIONAL_FIELDS or c.name in names)
+
+
+def blank_others(results: NDArray[np.void], kept: Iterable[Column]) -> None:
+    """Write NaN to the columns of a table RESULT that are not in `kept`; all of these have type f8."""
+    names = {c.name for c in kept}
+    for c in RESULT_COLUMNS:
+        if c.name not in names:
+            c.of(results)[:] = np.nan
+
+
+def holds(kept: Iterable[Column], load: str) -> bool:
+    """Whether a load that can have a limit can be read from the columns kept."""
+    return {c.name for c in kept}.issuperset(LOADS[load].columns)

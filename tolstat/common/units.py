@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 from pydantic import AfterValidator, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
-from tolstat.common import json_schema, notation
-from tolstat.common.notation import DIAMETER, PLUS_MINUS, Written
+from tolstat.common import notation
+from tolstat.common.notation import DIAMETER, PLUS_MINUS, Written, schema_of_quantity
 
 if TYPE_CHECKING:
     import pint
@@ -334,7 +334,7 @@ class Quantity:
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         """Return the JSON schema of the quantity as a file writes it."""
-        return json_schema.quantity(self.unit, EXAMPLES[self.unit], self.words)
+        return schema_of_quantity(self.unit, EXAMPLES[self.unit], self.words)
 
 
 def _signed(holds: Callable[[float], bool], must: str, remedy: str) -> Callable[[ValueT], ValueT]:

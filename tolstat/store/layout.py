@@ -15,9 +15,9 @@ import numpy as np
 from h5py import h5d, h5p
 from numpy.typing import NDArray
 
-from tolstat.common import draw_records, selected_results
+from tolstat.common import draw_records
 from tolstat.common.channels import BUSHING_LOADS, MEASURING, SHAFT_LOADS, LoadHistory, channels_of
-from tolstat.common.columns import DESIGN_COLUMNS, ERROR_COLUMNS, LEDGER_COLUMNS, Column
+from tolstat.common.columns import DESIGN_COLUMNS, ERROR_COLUMNS, LEDGER_COLUMNS, Column, kept_columns
 from tolstat.common.load_kinds import BUSHINGS, CONTACTS, PINS, SHAFTS
 from tolstat.common.tables import SCHEMA_VERSION, HistorySpec, Mode, Status
 from tolstat.store import metadata as documents
@@ -94,7 +94,7 @@ def columns(metadata: Metadata) -> dict[str, tuple[Column, ...]]:
         groups["design"] = DESIGN_COLUMNS
     if drawn := draw_records.columns(metadata.sampling):
         groups["origin"] = drawn
-    return groups | {"results": selected_results.columns(metadata.identity), "ledger": LEDGER_COLUMNS}
+    return groups | {"results": kept_columns(metadata.identity), "ledger": LEDGER_COLUMNS}
 
 
 def datasets(metadata: Metadata) -> list[Stored]:

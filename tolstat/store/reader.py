@@ -17,8 +17,8 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common import draw_records, selected_results, tables
-from tolstat.common.columns import DESIGN_COLUMNS, ERROR_COLUMNS, Column
+from tolstat.common import draw_records, tables
+from tolstat.common.columns import DESIGN_COLUMNS, ERROR_COLUMNS, OPTIONAL_FIELDS, Column, kept_columns
 from tolstat.common.counts import Counts, Session
 from tolstat.common.errors import Fault, StoreError
 from tolstat.common.tables import Status
@@ -104,7 +104,7 @@ class Reader:
         self.case_names, self.variants = document.design.cases, document.design.variants
         self.n, self.campaign_rows = document.n, document.campaign_rows
         self.rows = range(document.first_row, document.first_row + document.n)
-        self.columns = selected_results.columns(document.identity)
+        self.columns = kept_columns(document.identity)
         self.points = {name: Point.of(name, values) for name, values in document.points.items()}
 
     def at(self, point: str) -> Self:
@@ -367,7 +367,7 @@ class Reader:
         whole = tuple(fields) == dtype.names
         table = np.zeros(max(0, last - first), dtype if whole else [(name, dtype[name]) for name in fields])
         if group == "results":
-            for name in set(fields) & set(selected_results.OPTIONAL_FIELDS):
+            for name in set(fields) & set(OPTIONAL_FIELDS):
                 table[name] = np.nan
         for c in columns:
             if c.field in fields:

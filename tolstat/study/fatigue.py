@@ -12,10 +12,11 @@ import numpy as np
 from pydantic import AfterValidator, Field, WithJsonSchema, model_validator
 
 from tolstat.analysis.strength import Line
-from tolstat.common import json_schema, units
+from tolstat.common import units
 from tolstat.common.channels import UNIT_OF_CHANNEL
 from tolstat.common.errors import gather, input_error
 from tolstat.common.load_kinds import BUSHINGS
+from tolstat.common.notation import schema_of_positive, schema_of_quantity
 from tolstat.common.strict import Strict, did_you_mean, read_section, read_toml, refuse
 from tolstat.study.selection import Assignments, Entry, Reading, entries, quantity, resolve, select
 
@@ -213,7 +214,7 @@ class LineEntry(Strict):
 
     m: Exponent = Field(examples=[5])
     """exponent"""
-    S0: Annotated[Any, WithJsonSchema(json_schema.positive(json_schema.quantity("", "150 N*m")))] = Field(
+    S0: Annotated[Any, WithJsonSchema(schema_of_positive(schema_of_quantity("", "150 N*m")))] = Field(
         examples=["150 N*m"]
     )
     """range of the load that is borne for N0 cycles, a force or torque"""

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from tolstat.common import selected_results
+from tolstat.common.columns import holds
 from tolstat.common.errors import Fault, InputError, gather, input_error
 from tolstat.common.loads import LOADS
 from tolstat.common.strict import validate
@@ -138,7 +138,7 @@ def subset_of(study: Study, sampling: Mapping[str, Any]) -> Study:
         found = "matches diameters by classes, which a subset simulation does not draw"
         faults.append(study.fault("sampling.selective", found, "remove it"))
     for load in (LOADS[name] for name in sampling["levels"]):
-        if not selected_results.holds(study.output.columns, load.name):
+        if not holds(study.output.columns, load.name):
             remedy = f"add {', '.join(load.columns)}"
             faults.append(study.fault("output.results", f"leaves out {load.name}, which --limit needs", remedy))
     kept = study.sampling.model_dump(include=set(Subset.FROM_STUDY))

@@ -1,6 +1,6 @@
 """JSON schemas of study, joint and case files for editors, from the input models and the registries of names.
 
-Inside this module a schema may have keywords of `common.json_schema`, which `_finished` replaces. What stands before or
+Inside this module a schema may have keywords of `common.notation`, which `_finished` replaces. What stands before or
 behind the dot of a key is a name, or has a wildcard: whether a pattern selects something, an editor does not tell.
 """
 
@@ -15,10 +15,11 @@ from typing import Any
 from pydantic import BaseModel
 
 from tolstat.analysis.process import LEAST_PARTS, MOST_PARTS
-from tolstat.common import json_schema, loads, strict
+from tolstat.common import loads, strict
 from tolstat.common.channels import UNIT_OF_CHANNEL
 from tolstat.common.files import data_dir
 from tolstat.common.loads import UNIT_OF_LOAD
+from tolstat.common.notation import schema_of_positive, schema_of_quantity
 from tolstat.common.units import EXAMPLES
 from tolstat.joint import Joint, Operation
 from tolstat.joint.model import Assumed
@@ -155,7 +156,7 @@ def _pure(part: Any) -> Any:
     kept = {key: _pure(value) for key, value in part.items()}
     if part.get("x-unit") != "error":
         return kept
-    return {key: value for key, value in kept.items() if key not in ("examples", "not")} | json_schema.quantity("1", "")
+    return {key: value for key, value in kept.items() if key not in ("examples", "not")} | schema_of_quantity("1", "")
 
 
 def _numbers(low: float, high: float, kind: str = "number") -> Schema:
@@ -229,10 +230,10 @@ def _definitions() -> dict[str, Schema]:
     given = {name: unit for name, unit in UNITS.items() if not name.startswith("operation.")}
     entries: dict[str, Schema] = {
         "tolerance": {"anyOf": [of_model(model) for model in TOLERANCES.values()]},
-        "quantity": json_schema.quantity("error", EXAMPLES["m"]),
+        "quantity": schema_of_quantity("error", EXAMPLES["m"]),
         "sweep": of_model(SweepEntry),
         "reject": of_model(RejectEntry),
-        "limit": json_schema.positive(json_schema.quantity("error", EXAMPLES["N"])),
+        "limit": schema_of_positive(schema_of_quantity("error", EXAMPLES["N"])),
     }
     return {
         **entries,

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common import selected_results
+from tolstat.common.columns import holds
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import UNIT_OF_LOAD, limits_in_words, split
 from tolstat.common.strict import dotted, with_lines
@@ -299,7 +299,7 @@ class Study(Case):
         """Loads of interest: those with limits, else those that ``output.results`` selects; else none."""
         if self.limits or self.output.results is None:
             return list(dict.fromkeys(split(name)[0] for name in self.limits))
-        return [load for load in UNIT_OF_LOAD if selected_results.holds(self.output.columns, load)]
+        return [load for load in UNIT_OF_LOAD if holds(self.output.columns, load)]
 
     def __repr__(self) -> str:
         parts = [f"{self.samples} joints ({self.sampling.method})", f"{len(self.tolerances)} toleranced errors"]

@@ -15,9 +15,9 @@ from typing import Annotated, Any, Literal, NamedTuple, Self
 import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, WithJsonSchema, model_validator
 
-from tolstat.common import json_schema, strict, units
+from tolstat.common import strict, units
 from tolstat.common.late import pandas as pd
-from tolstat.common.notation import PLUS_MINUS
+from tolstat.common.notation import PLUS_MINUS, schema_of_quantity
 from tolstat.common.strict import refuse
 from tolstat.study.tolerances import iso
 from tolstat.study.tolerances.distributions import Distribution
@@ -100,7 +100,7 @@ def _reader(mark: str) -> BeforeValidator:
     return BeforeValidator(lambda value, info: units.to_si(value, info.context["site"].unit, mark))
 
 
-OF_ERROR = WithJsonSchema(json_schema.quantity("error", units.EXAMPLES["m"]))
+OF_ERROR = WithJsonSchema(schema_of_quantity("error", units.EXAMPLES["m"]))
 Value = Annotated[float, _reader(""), OF_ERROR]
 """Quantity in the unit of the error that the entry is for."""
 

@@ -15,7 +15,7 @@ from importlib import import_module
 from itertools import pairwise
 from pathlib import Path
 from types import NoneType
-from typing import Any, TypeVar, get_args
+from typing import Any, TypeVar, get_args, get_origin
 
 import annotated_types
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, GetJsonSchemaHandler, ValidationError
@@ -258,6 +258,8 @@ def _fields_around(model: type[BaseModel], location: Sequence[int | str]) -> dic
     for part in location[:-1]:
         if isinstance(part, int):
             current = next(iter(get_args(current)), None)
+        elif get_origin(current) is dict:
+            current = get_args(current)[1]
         elif part not in (fields := getattr(current, "model_fields", {})):
             return {}
         else:

@@ -32,8 +32,10 @@ PLACES = 24
 """Places around a round section: the stress between two of them is at most 1 - cos(7.5 deg), 0.9 %, above theirs."""
 
 
-def _neither_or_both(name: str, other: str, value: float | None) -> str:
-    return f"has neither {name} nor {other}" if value is None else f"has both {name} and {other}"
+def _check_bushing(bushing: str) -> str:
+    if not select(bushing, BUSHINGS):
+        raise refuse(f"{bushing!r} is not a bushing", did_you_mean(bushing, BUSHINGS))
+    return bushing
 
 
 class StressPointEntry(Strict):
@@ -42,7 +44,7 @@ class StressPointEntry(Strict):
     A round section has no one point where bending about two axes is largest: it is evaluated all around.
     """
 
-    bushing: str = Field(examples=["fork*"])
+    bushing: Annotated[str, AfterValidator(_check_bushing)] = Field(examples=["fork*"])
     """bushing whose load stresses the point, or pattern of several"""
     F_e: PerForce = Field(default=0.0, examples=["2.5 MPa/kN"])
     """stress at the point by the force along e of the bushing"""
@@ -85,15 +87,13 @@ class StressPointEntry(Strict):
     def _complete(self) -> StressPointEntry:
         if not any(map(any, self.per_load)):
             raise refuse("no load stresses the point", 'give a stress per load, for example T_e = "0.2 MPa/(N*m)"')
-        if (self.S_D is None) == (self.S_aD is None):
-            raise refuse(
-                _neither_or_both("S_D", "S_aD", self.S_D), "give one of them: S_D is a range, S_aD an amplitude"
-            )
-        if (self.T_S is None) == (self.T_N is None):
-            raise refuse(
-                _neither_or_both("T_S", "T_N", self.T_S),
-                "give one of them; T_S = 1 is a strength that does not scatter",
-            )
+        for name, other, remedy in (
+            ("S_D", "S_aD", "give one of them: S_D is a range, S_aD an amplitude"),
+            ("T_S", "T_N", "give one of them; T_S = 1 is a strength that does not scatter"),
+        ):
+            first, second = (getattr(self, key) is None for key in (name, other))
+            if first == second:
+                raise refuse(f"has neither {name} nor {other}" if first else f"has both {name} and {other}", remedy)
         return self
 
     @property
@@ -143,23 +143,6 @@ class StressPoint(NamedTuple):
     line: Line
 
 
-def _stress_points(table: Mapping[str, Any], file: Reading) -> tuple[StressPoint, ...]:
-    """Read ``[fatigue.point]``."""
-    points = list[StressPoint]()
-    for name, value in table.items():
-        path = ("fatigue", "point", name)
-        with gather(file.faults):
-            entry = file.model(StressPointEntry, value, *path)
-            bushings = select(entry.bushing, BUSHINGS)
-            if not bushings:
-                remedy = did_you_mean(entry.bushing, BUSHINGS)
-                file.fault((*path, "bushing"), f"{entry.bushing!r} is not a bushing", remedy)
-            for bushing in bushings:
-                called = name if len(bushings) == 1 else f"{name}, {bushing}"
-                points.append(StressPoint(called, bushing, entry.per_load, entry.line))
-    return tuple(points)
-
-
 class SequenceEntry(Strict):
     """Order in which the operating points of a duty cycle are visited; it repeats."""
 
@@ -191,7 +174,7 @@ class Settings(Strict):
         default=None, examples=[{"points": "drive start drive climb", "revolutions": 9e4}]
     )
     """order in which the operating points are visited, whose changes of load are counted, too"""
-    point: dict[str, Any] = Field(
+    point: dict[str, StressPointEntry] = Field(
         default_factory=dict,
         json_schema_extra={"x-table": "points"},
         examples=[
@@ -296,8 +279,8 @@ class Fatigue:
 
 def read(file: Reading) -> Fatigue:
     """Read ``[fatigue]``."""
-    table = file.data.get("fatigue", {})
-    settings = Settings()
+    table, settings = file.data.get("fatigue", {}), Settings()
+    of_channels = table.get("line") if isinstance(table, Mapping) else None
     lines: dict[str, tuple[float, float, float]] = {}
     claims, names = Assignments(file.place), [point.name for point in file.points or ()]
     with gather(file.faults):
@@ -305,7 +288,7 @@ def read(file: Reading) -> Fatigue:
     visits = tuple(settings.sequence.points.split()) if settings.sequence else ()
     if unknown := sorted(set(visits) - set(names)) if names else []:
         file.fault("fatigue.sequence.points", f"no operating point {unknown[0]!r}", did_you_mean(unknown[0], names))
-    for entry in entries(_inner(table, "line"), "fatigue", "line"):
+    for entry in entries(of_channels if isinstance(of_channels, Mapping) else {}, "fatigue", "line"):
         with gather(file.faults):
             channels = resolve(entry, UNIT_OF_CHANNEL, file.place)
             claims.claim(entry, channels)
@@ -315,17 +298,22 @@ def read(file: Reading) -> Fatigue:
             if value <= 0:
                 file.fault(size.path, f"{line.S0!r} is not positive", "give a range above zero")
             lines |= dict.fromkeys(channels, (line.m, value, line.N0))
-    points = _stress_points(_inner(table, "point"), file)
-    revolutions = {} if settings.revolutions is None else {"revolutions": settings.revolutions, "required": True}
+    points = []
+    for name, point in settings.point.items():
+        bushings = select(point.bushing, BUSHINGS)
+        names_of_points = [name] if len(bushings) == 1 else [f"{name}, {bushing}" for bushing in bushings]
+        points += [
+            StressPoint(*each, point.per_load, point.line) for each in zip(names_of_points, bushings, strict=True)
+        ]
+    given = settings.model_dump(include={"revolutions", "reference_cycles", "starts"}, exclude_none=True)
     return Fatigue(
         tuple(settings.exponents),
-        reference_cycles=settings.reference_cycles,
+        required=settings.revolutions is not None,
         lines=lines,
-        starts=settings.starts,
-        points=points,
+        points=tuple(points),
         visits=visits,
         turns=settings.sequence.revolutions if settings.sequence else 1.0,
-        **revolutions,  # type: ignore[arg-type]
+        **given,
     )
 
 
@@ -342,9 +330,3 @@ def of_text(text: str, place: str) -> Fatigue:
     settings = read(file)
     file.finish()
     return settings
-
-
-def _inner(table: object, key: str) -> Mapping[str, Any]:
-    """Table inside the section; empty where it has none, or something else that validation refuses."""
-    inner = table.get(key, {}) if isinstance(table, Mapping) else {}
-    return inner if isinstance(inner, Mapping) else {}

@@ -24,13 +24,10 @@ from tolstat.study import fatigue, listing, points, proposal, selection, selecti
 from tolstat.study.axes import is_zone, zone_of
 from tolstat.study.design import KEYS, Design, swept
 from tolstat.study.model import MAX_ROWS, Output, Sampling, Solver, SweepAxis, SweepEntry
-from tolstat.study.points import Point
-from tolstat.study.proposal import Proposal, ProposalEntry
 from tolstat.study.selection import TOLERANCED, UNITS, Assignments, Reading
-from tolstat.study.tolerances import fits, kinds
-from tolstat.study.tolerances.correlation import Copula, Correlation, Group, assemble, correlated, groups
+from tolstat.study.tolerances import correlation, fits, kinds
+from tolstat.study.tolerances.correlation import Group, groups
 from tolstat.study.tolerances.entry import Site, known_of
-from tolstat.study.tolerances.fits import Fit
 from tolstat.study.tolerances.kinds import Tolerances
 
 BESIDE_FIT = ("is set by tolerances.fit already", "remove one of the two")
@@ -45,14 +42,6 @@ SECTIONS_OF = {
 """Sections that define the joints of the other sampling methods; the first is required."""
 INDEPENDENT = ("random", "importance")
 """Sampling methods whose joints can be reweighted to the processes that measured parts leave open, with intervals."""
-
-
-def _fit(file: Reading) -> Fit | None:
-    """``tolerances.fit``: the fit of all pins in their holes; another one in place of a fit with faults."""
-    table = file.data.get("tolerances")
-    with gather(file.faults):
-        return fits.read(table, file.place)
-    return fits.stand_in(table)
 
 
 def _joint(file: Reading) -> Joint | None:
@@ -107,16 +96,6 @@ def _sampling(file: Reading) -> Sampling | None:
     return None
 
 
-def _points(file: Reading) -> tuple[Point, ...]:
-    """``[operation]``, or ``[[operation]]``: the operating points; empty if one could not be read."""
-    if "operation" not in file.data:
-        file.fault("operation", "missing table", "add [operation]")
-        return ()
-    with gather(file.faults):
-        return points.read(file.data["operation"], file.place)
-    return ()
-
-
 def _scatter(file: Reading) -> Tolerances:
     """``[tolerances]``: how errors scatter."""
     written = []
@@ -135,34 +114,6 @@ def _scatter(file: Reading) -> Tolerances:
     # those with faults stand for what they would draw, so that others do not seem to lack them
     file.parts["drawn"] = {quantity: unit for name, unit in units.items() for quantity in drawn.get(name, [name])}
     return read
-
-
-def _copula(file: Reading) -> Copula:
-    """``[[correlation]]``, and that of errors that share the score of their lot."""
-    lots, before = file.scatter.lots, len(file.faults)
-    entries = file.models("correlation", Correlation)
-    if len(file.faults) == before:
-        with gather(file.faults):
-            copula = correlated(assemble(entries, file.drawn, file.place), lots, file.place)
-            for name in sorted(file.scatter.accepted & set(copula.names)):
-                found = f"{name} cannot be correlated: parts are accepted by this diameter and the position"
-                remedy = 'remove the correlation or the bonus, or write material_condition = "fills"'
-                file.fault("correlation", found, remedy)
-            return copula
-    return Copula()
-
-
-def _proposals(file: Reading) -> tuple[Proposal, ...]:
-    """``[[proposal]]``: distributions of importance sampling beside the tolerances."""
-    together = [tuple(entry.quantities) for entry in file.scatter.entries]
-    proposals = []
-    for number, entry in enumerate(file.models("proposal", ProposalEntry)):
-        with gather(file.faults):
-            path = ("proposal", number)
-            proposals.append(proposal.resolve(entry, list(file.drawn), together, file.place, path))
-    with gather(file.faults):
-        proposal.check_shares(proposals, file.place)
-    return tuple(proposals)
 
 
 def _sweep(file: Reading) -> tuple[SweepAxis, ...]:
@@ -222,16 +173,16 @@ def _listed(file: Reading) -> Design | None:
 
 
 READERS: dict[str, Callable[[Reading], Any]] = {
-    "fit": _fit,
+    "fit": fits.read,
     "joint": _joint,
     "assumed": _assumed,
-    "points": _points,
+    "points": points.read,
     "operation": lambda file: file.points[0].operation if file.points else None,
     "solver": lambda file: file.model(Solver, file.data.get("solver", {}), "solver"),
     "errors": lambda file: selection.fixed_errors(file, file.table("errors"), ("errors",), file.claims),
     "scatter": _scatter,
-    "copula": _copula,
-    "proposals": _proposals,
+    "copula": correlation.read,
+    "proposals": proposal.read,
     "sampling": _sampling,
     "sweep": _sweep,
     "limits": _limits,

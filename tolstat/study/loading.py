@@ -11,8 +11,8 @@ from tolstat.common.columns import holds
 from tolstat.common.errors import Fault, InputError, gather, input_error
 from tolstat.common.loads import LOADS
 from tolstat.common.strict import validate
-from tolstat.joint import Joint, Operation
-from tolstat.study import rewriting
+from tolstat.joint import Joint
+from tolstat.study import points, rewriting
 from tolstat.study.file import READERS, check
 from tolstat.study.model import Subset
 from tolstat.study.selection import Reading
@@ -96,9 +96,7 @@ def load_case(path: str | Path) -> Case:
         raise input_error(file.place, "is a study, not a case of one joint", f"run it with: tolstat run {file.path}")
     _read(file, ["joint"])
     with gather(file.faults):
-        if "operation" not in file.data:
-            raise input_error(f"{file.place}: operation", "missing table", "add [operation]")
-        file.parts["operation"] = file.model(Operation, file.data["operation"], "operation")
+        file.parts["operation"] = points.operation(file)
     _read(file, ["solver", "errors"])
     if file.solver is not None and file.solver.fidelity == "auto":
         remedy = 'write "dynamic", "quasistatic" or "ideal"'

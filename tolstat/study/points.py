@@ -14,8 +14,8 @@ from typing import Annotated, Any, NamedTuple
 
 from pydantic import AfterValidator, Field
 
-from tolstat.common import loads, strict, units
-from tolstat.common.errors import Fault, InputError, input_error
+from tolstat.common import loads, units
+from tolstat.common.errors import Fault, InputError, gather, input_error
 from tolstat.common.strict import did_you_mean, refuse
 from tolstat.common.toml_lines import KeyPath
 from tolstat.joint import Joint, Operation, orders
@@ -23,6 +23,7 @@ from tolstat.joint.ideal import NO_CLOSED_FORM
 from tolstat.joint.partner import Partner
 from tolstat.joint.sections import RIGID
 from tolstat.study.axes import columns_of
+from tolstat.study.selection import Reading
 
 ORDERS = {"speed_orders": orders.SpeedOrder, "torque_orders": orders.TorqueOrder}
 """Model of the orders in each field of an operating point."""
@@ -95,47 +96,51 @@ class PointEntry(Operation):
     """share of the service time, for lives and fatigue; given for all points or for none"""
 
 
-def read(section: Any, place: str) -> tuple[Point, ...]:
-    """Read ``[operation]`` or ``[[operation]]``.
+def read(file: Reading) -> tuple[Point, ...]:
+    """Read ``[operation]`` or ``[[operation]]``; empty if there are faults."""
+    section, before = file.data.get("operation"), len(file.faults)
+    points: list[Point] = []
+    if not isinstance(section, list):
+        with gather(file.faults):
+            points.append(Point("", operation(file), 1.0))
+        return tuple(points)
+    for number, item in enumerate(section):
+        with gather(file.faults):
+            entry = file.model(PointEntry, item, "operation", number)
+            if entry.name in [point.name for point in points]:
+                found = f"a point {entry.name!r} exists already"
+                file.fault(f"operation[{number}].name", found, "give each point its own name")
+            of_point = Operation.model_construct(**{key: getattr(entry, key) for key in Operation.model_fields})
+            points.append(Point(entry.name, of_point, math.nan if entry.share is None else entry.share))
+    if not section:
+        file.fault("operation", "has no operating point", "add one: [operation]")
+    elif len(file.faults) == before:
+        _note_shares(file, points)
+    return tuple(points) if len(file.faults) == before else ()
+
+
+def operation(file: Reading) -> Operation:
+    """Read ``[operation]``, the only operating point.
 
     Raises
     ------
     InputError
-        With every fault.
+        With its faults.
     """
-    if not isinstance(section, list):
-        return (Point("", strict.validate(Operation, section, place, prefix=("operation",)), 1.0),)
-    faults: list[Fault] = []
-    points: list[Point] = []
-    for number, item in enumerate(section):
-        try:
-            entry = strict.validate(PointEntry, item, place, prefix=("operation", number))
-        except InputError as error:
-            faults += error.faults
-            continue
-        if entry.name in [point.name for point in points]:
-            where = f"{place}: operation[{number}].name"
-            faults.append(Fault(where, f"a point {entry.name!r} exists already", "give each point its own name"))
-        operation = Operation.model_construct(**{key: getattr(entry, key) for key in Operation.model_fields})
-        points.append(Point(entry.name, operation, math.nan if entry.share is None else entry.share))
-    if not section:
-        faults.append(Fault(f"{place}: operation", "has no operating point", "add one: [operation]"))
-    elif not faults:
-        faults += _faults_of_shares(points, place)
-    if faults:
-        raise InputError(faults)
-    return tuple(points)
+    if "operation" not in file.data:
+        raise input_error(f"{file.place}: operation", "missing table", "add [operation]")
+    return file.model(Operation, file.data["operation"], "operation")
 
 
-def _faults_of_shares(points: Sequence[Point], place: str) -> list[Fault]:
+def _note_shares(file: Reading, points: Sequence[Point]) -> None:
+    """Note shares of the time that are given for some points only, or whose sum is not 1."""
     lacking = [number for number, point in enumerate(points) if math.isnan(point.share)]
-    if lacking and len(lacking) < len(points):
-        remedy = "give all operating points their share of the time, or none"
-        return [Fault(f"{place}: operation[{number}].share", "missing key", remedy) for number in lacking]
     total = sum(point.share for point in points)
     if not lacking and abs(total - 1.0) > 1e-6:
-        return [Fault(f"{place}: operation", f"shares of the time sum to {total:.6g}", "give shares whose sum is 1")]
-    return []
+        file.fault("operation", f"shares of the time sum to {total:.6g}", "give shares whose sum is 1")
+    for number in lacking if len(lacking) < len(points) else []:
+        remedy = "give all operating points their share of the time, or none"
+        file.fault(f"operation[{number}].share", "missing key", remedy)
 
 
 def names_of(selection: str, names: Sequence[str], place: str) -> tuple[str, ...]:

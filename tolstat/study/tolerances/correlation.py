@@ -18,13 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from tolstat.common.errors import Fault, InputError, gather, input_error
+from tolstat.common.errors import gather, input_error
 from tolstat.common.late import pandas as pd
 from tolstat.common.late import special
 from tolstat.common.strict import Strict, dotted
 from tolstat.common.units import Number
 from tolstat.study.axes import is_zone
-from tolstat.study.selection import select
+from tolstat.study.selection import Reading, select
 from tolstat.study.tolerances.distributions import Distribution, Normal
 from tolstat.study.tolerances.entry import Toleranced
 
@@ -83,50 +83,40 @@ class Copula:
         return np.clip(correlated, np.finfo(float).tiny, 1 - np.finfo(float).epsneg)
 
 
-def assemble(entries: Sequence[Correlation], toleranced: dict[str, str], place: str) -> Copula:
-    """Assemble the entries of a file.
+def read(file: Reading) -> Copula:
+    """Read ``[[correlation]]``, and the correlation of errors that share the score of their lot.
 
-    Parameters
-    ----------
-    entries : sequence of Correlation
-        In the order of the file.
-    toleranced : dict
-        Names of the errors that have a tolerance, and their units.
-    place : str
-        File name shown in faults.
-
-    Returns
-    -------
-    Copula
-        Of all errors that any entry names.
-
-    Raises
-    ------
-    InputError
-        For a name without tolerance, a pair given twice, and a matrix that is not positive definite.
+    Faults are names without tolerance, a pair given twice, a matrix that is not positive definite, errors with a lot
+    or a bonus.
     """
-    faults: list[Fault] = []
+    lots, before = file.scatter.lots, len(file.faults)
+    entries = file.models("correlation", Correlation)
     rho: dict[frozenset[str], float] = {}
     order: dict[str, None] = {}
-    for number, entry in enumerate(entries):
-        where = f"{place}: correlation[{number}].between"
+    for number, entry in enumerate(entries if len(file.faults) == before else []):
+        where = f"correlation[{number}].between"
         names: dict[str, None] = {}
         for pattern in entry.between:
-            with gather(faults):
-                names.update(dict.fromkeys(_named(pattern, toleranced, where)))
+            with gather(file.faults):
+                names.update(dict.fromkeys(_named(pattern, file.drawn, f"{file.place}: {where}")))
         members = list(names)
-        if len(members) < 2 and not faults:
-            faults.append(Fault(where, f"names only one error, {members[0]}", "name at least two"))
+        if len(members) < 2 and len(file.faults) == before:
+            file.fault(where, f"names only one error, {members[0]}", "name at least two")
         order.update(names)
-        pairs = [frozenset((a, b)) for i, a in enumerate(members) for b in members[:i]]
-        for pair in pairs:
+        for pair in (frozenset((a, b)) for i, a in enumerate(members) for b in members[:i]):
             if pair in rho:
                 text = " and ".join(sorted(pair))
-                faults.append(Fault(where, f"{text} are correlated by an earlier entry", "remove one of the two"))
+                file.fault(where, f"{text} are correlated by an earlier entry", "remove one of the two")
             rho[pair] = entry.rho
-    if faults:
-        raise InputError(faults)
-    return _positive_definite(tuple(order), rho, place)
+    with gather(file.faults):
+        if len(file.faults) == before:
+            copula = correlated(_positive_definite(tuple(order), rho, file.place), lots, file.place)
+            for name in sorted(file.scatter.accepted & set(copula.names)):
+                found = f"{name} cannot be correlated: parts are accepted by this diameter and the position"
+                remedy = 'remove the correlation or the bonus, or write material_condition = "fills"'
+                file.fault("correlation", found, remedy)
+            return copula
+    return Copula()
 
 
 def _named(pattern: str, toleranced: dict[str, str], where: str) -> list[str]:

@@ -229,8 +229,8 @@ def test_every_fault_of_the_section_is_told():
         of_text(as_text({"fatigue": section}), "a.toml")
     places = [fault.place.removeprefix("a.toml: fatigue.") for fault in error.value.faults]
     assert places == [
-        *("exponents[0]", "exponents[1]", "revolution", "line.cross*.F_e.S0", "line.cross1.F_e"),
-        *("line.cross1.X", "line.fork1.T.S0"),
+        *("exponents[0]", "exponents[1]", "revolution", "line.cross*.F_e.S0", "line.cross1.X"),
+        *("line.cross1.F_e", "line.fork1.T.S0"),
     ]
     lines = {"*.F": {"m": 3, "S0": "1 N", "N0": 1}, "fork1.F": {"m": 3, "S0": "1 N", "N0": 1}}
     with pytest.raises(InputError, match="is set by"):

@@ -17,8 +17,8 @@ from tolstat.joint.partner import Partner
 from tolstat.study import schema
 from tolstat.study.costs import CostEntry
 from tolstat.study.fatigue import LineEntry, SequenceEntry, StressPointEntry
+from tolstat.study.file import OF_CASE
 from tolstat.study.listing import Range
-from tolstat.study.loading import OF_CASE
 from tolstat.study.model import SweepEntry
 from tolstat.study.points import PointEntry
 from tolstat.study.schema import of_model

@@ -16,7 +16,7 @@ from tests.support import synthetic
 from tolstat import joint, study
 from tolstat.common.errors import InputError
 from tolstat.study import costs, scaling
-from tolstat.study.loading import SECTIONS as OF_STUDY
+from tolstat.study.file import SECTIONS as OF_STUDY
 
 FILES = int(os.environ.get("TOLSTAT_FUZZ", "40"))
 """Files of each kind; the long run has 10000, each time others."""

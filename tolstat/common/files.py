@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import math
 import os
 import re
 import secrets
@@ -70,6 +71,15 @@ def read_input(path: Path) -> str:
         at = content.index(b"\0")
         raise UnicodeDecodeError("utf-8", content, at, at + 1, "zero byte")
     return content.decode("utf-8-sig")
+
+
+def finite(cell: str | None) -> float:
+    """Number in a cell of a CSV file; NaN where there is no finite one."""
+    try:
+        value = float(cell or "")
+    except ValueError:
+        return math.nan
+    return value if math.isfinite(value) else math.nan
 
 
 def about_encoding(error: UnicodeDecodeError) -> tuple[str, str]:

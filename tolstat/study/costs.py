@@ -18,7 +18,7 @@ from pydantic import Field, model_validator
 
 from tolstat.common import strict, units
 from tolstat.common.errors import Fault, InputError, gather, input_error
-from tolstat.common.files import read_input
+from tolstat.common.files import finite, read_input
 from tolstat.common.strict import Strict, refuse
 from tolstat.study import selection
 from tolstat.study.scaling import Tolerance
@@ -163,8 +163,5 @@ def _value(cell: str) -> object:
     """Convert a cell of a CSV file to the value that TOML would give."""
     if cell in ("true", "false"):
         return cell == "true"
-    try:
-        value = float(cell)
-    except ValueError:
-        return cell
-    return value if math.isfinite(value) else cell
+    value = finite(cell)
+    return cell if math.isnan(value) else value

@@ -1,4 +1,4 @@
-"""The sections of a study or case file: what is made of each, and what does not go together between them.
+"""Studies and cases from their files: what is made of each section, and what does not go together between them.
 
 Each function reads one section, or what follows from several, adds faults to those of the file, and returns what could
 be made, so that all faults are reported at once.
@@ -7,29 +7,39 @@ be made, so that all faults are reported at once.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from functools import partial
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 from tolstat import joint
-from tolstat.common.errors import gather
-from tolstat.common.loads import UNIT_OF_LOAD, load_of, split
-from tolstat.common.strict import dotted
+from tolstat.common.columns import holds
+from tolstat.common.errors import Fault, InputError, gather, input_error
+from tolstat.common.loads import LOADS, UNIT_OF_LOAD, load_of, split
+from tolstat.common.strict import dotted, validate
 from tolstat.common.tables import FINEST_STEPS
 from tolstat.joint import Joint
 from tolstat.joint.derived import BEARING
 from tolstat.joint.model import Assumed, leaves, merged
 from tolstat.joint.reading import faults_of_assumed
-from tolstat.study import fatigue, listing, points, proposal, selection, selective
+from tolstat.study import fatigue, listing, points, proposal, rewriting, selection, selective
 from tolstat.study.axes import is_zone, zone_of
-from tolstat.study.design import KEYS, Design, swept
-from tolstat.study.model import MAX_ROWS, Output, Sampling, Solver, SweepAxis, SweepEntry
-from tolstat.study.selection import TOLERANCED, UNITS, Assignments, Reading
+from tolstat.study.design import Design
+from tolstat.study.model import MAX_ROWS, Output, Sampling, Solver, Subset
+from tolstat.study.selection import TOLERANCED, Assignments, Reading
+from tolstat.study.study import Case, Study
 from tolstat.study.tolerances import correlation, fits, kinds
-from tolstat.study.tolerances.correlation import Group, groups
-from tolstat.study.tolerances.entry import Site, known_of
+from tolstat.study.tolerances.entry import known_of
 from tolstat.study.tolerances.kinds import Tolerances
 
+OF_CASE = ("joint", "operation", "solver", "errors")
+"""Sections that a case may have, too."""
+SECTIONS = (
+    *OF_CASE,
+    *("tolerances", "correlation", "sampling", "proposal", "sweep", "grid", "case", "variant", "assumed", "reject"),
+    *("limits", "fatigue", "output"),
+)
+"""Sections of a study, in the order of the reference."""
 BESIDE_FIT = ("is set by tolerances.fit already", "remove one of the two")
 """Fault and remedy of a diameter."""
 SCATTER = ("tolerances", "correlation", "errors", "reject")
@@ -116,21 +126,6 @@ def _scatter(file: Reading) -> Tolerances:
     return read
 
 
-def _sweep(file: Reading) -> tuple[SweepAxis, ...]:
-    """``[sweep]``: the axes of a grid."""
-    axes = []
-    for entry in file.entries("sweep"):
-        with gather(file.faults):
-            units = UNITS if selection.select(entry.pattern, UNITS) else UNITS | KEYS
-            names = selection.resolve(entry, units, file.place)
-            with gather(file.faults):
-                file.claims.claim(entry, names)
-            site = Site(names[0], units[names[0]], 0.0, file.folder)
-            read = file.model(SweepEntry, entry.value, *entry.path, site=site)
-            axes.append(SweepAxis(tuple(names), read.start, read.stop, read.points))
-    return tuple(axes)
-
-
 def _limits(file: Reading) -> dict[str, float]:
     """``[limits]``: limit of each load that has one (SI), ``cross1.F`` at all points, ``cross1.F at cruise``."""
     limits: dict[str, float] = {}
@@ -151,22 +146,6 @@ def _limits(file: Reading) -> dict[str, float]:
     return limits
 
 
-def _groups(file: Reading) -> tuple[Group, ...]:
-    """What a pick-freeze design exchanges together."""
-    if file.sampling is None or file.sampling.method != "pick_freeze":
-        return ()
-    return groups(file.scatter.entries, file.copula, file.sampling.groups)
-
-
-def _swept(file: Reading) -> Design | None:
-    """Joints of a sweep of dimensions; None if it sweeps errors alone."""
-    nominal = listing.nominal_of(file)
-    if file.sampling is None or file.sampling.method != "sweep" or nominal is None:
-        return None
-    make = partial(listing.swept, file, nominal)
-    return swept(file.sweep, nominal, make, file.sampling.first_sample, file.place)
-
-
 def _listed(file: Reading) -> Design | None:
     """``[grid]``, ``[[case]]`` and ``[[variant]]``: joints listed one by one, variants of the joint."""
     return listing.design(file) if file.sampling is not None and file.sampling.method == "cases" else None
@@ -184,19 +163,19 @@ READERS: dict[str, Callable[[Reading], Any]] = {
     "copula": correlation.read,
     "proposals": proposal.read,
     "sampling": _sampling,
-    "sweep": _sweep,
+    "sweep": listing.axes_of_sweep,
     "limits": _limits,
     "rejects": selective.read,
     "fatigue": fatigue.read,
     "output": lambda file: file.model(Output, file.data.get("output", {}), "output"),
-    "groups": _groups,
+    "groups": correlation.groups,
     "listed": _listed,
-    "swept": _swept,
+    "swept": listing.swept,
 }
 """What makes each part of a study of its file, in the order of the faults."""
 
 
-def check(file: Reading) -> None:
+def _check(file: Reading) -> None:
     """Note sections and keys that do not go together; those that have faults are left out."""
     if file.sampling is not None:
         _check_sections(file, file.sampling)
@@ -296,3 +275,122 @@ def _check_histories(file: Reading, output: Output, solver: Solver) -> None:
     if "harmonics" in output.histories and output.harmonics > most:
         found = f"{steps} steps per revolution do not resolve {output.harmonics} harmonics"
         file.fault("output.harmonics", found, f"give at most {most}, or a larger solver.steps_per_rev")
+
+
+def load(
+    path: str | Path | Mapping[str, Any], n: int | None = None, text: str | None = None, joint: Joint | None = None
+) -> Study:
+    """Read a study file, or make a study of its sections.
+
+    Parameters
+    ----------
+    path : str, Path or mapping
+        TOML file; or the sections of one as nested dictionaries, ``{"joint": {"base": "cirelli2021"}, ...}``, whose
+        paths start from the working directory.
+    n : int, optional
+        Number of joints instead of the file's ``sampling.n``.
+    text : str, optional
+        TOML to read instead of the file's; `path` is then only what faults and relative paths refer to.
+    joint : Joint, optional
+        Nominal joint in place of that of ``[joint]``; variants and swept dimensions are read from the file still.
+
+    Returns
+    -------
+    Study
+        With patterns expanded, units converted and the joint file read.
+
+    Raises
+    ------
+    InputError
+        With every fault of the file, of the joint file and of measured data that it names.
+    """
+    if isinstance(path, Mapping):
+        text = rewriting.as_text(path)
+        path = "study.toml"
+    file = Reading(Path(path), SECTIONS, text)
+    if n is not None and isinstance(file.data.setdefault("sampling", {}), dict):
+        file.data["sampling"]["n"] = n
+    if joint is not None:
+        file.parts["joint"] = joint
+    _read(file, READERS)
+    _check(file)
+    file.finish("sampling.n" if n is not None else "")
+    read: Tolerances = file.scatter
+    parts = {name: part for name, part in file.parts.items() if name not in ("scatter", "drawn")}
+    parts |= {"tolerances": read.distributions, "entries": read.entries, "axes": read.axes, "lots": read.lots}
+    study = Study(file.path, file.text, **parts)
+    study.check_mounting()
+    return study
+
+
+def _read(file: Reading, names: Iterable[str]) -> None:
+    """Make parts of the sections of a file; one that is there already stays."""
+    for name in names:
+        if name not in file.parts:
+            with gather(file.faults):
+                file.parts[name] = READERS[name](file)
+
+
+def load_case(path: str | Path) -> Case:
+    """Read a case file: one joint with its errors.
+
+    Raises
+    ------
+    InputError
+        With every fault of the file.
+    """
+    file = Reading(Path(path), OF_CASE)
+    if "sampling" in file.data:
+        raise input_error(file.place, "is a study, not a case of one joint", f"run it with: tolstat run {file.path}")
+    _read(file, ["joint"])
+    with gather(file.faults):
+        file.parts["operation"] = points.operation(file)
+    _read(file, ["solver", "errors"])
+    if file.solver is not None and file.solver.fidelity == "auto":
+        remedy = 'write "dynamic", "quasistatic" or "ideal"'
+        file.fault("solver.fidelity", "'auto' needs the joints of a campaign, a case has one joint", remedy)
+    file.finish()
+    case = Case(file.path, file.text, file.joint, file.operation, file.solver, file.errors)
+    case.check_mounting()
+    return case
+
+
+def subset_of(study: Study, sampling: Mapping[str, Any]) -> Study:
+    """Make the study of a subset simulation from the study whose tolerances it uses.
+
+    Parameters
+    ----------
+    study : Study
+        Study with any sampling method that draws joints; its histories are not stored.
+    sampling : mapping
+        Fields of `model.Subset` except those that are taken from the study.
+
+    Returns
+    -------
+    Study
+        Study whose ``sampling`` is a `model.Subset`; it can draw the joints of level 0, which are those of a random
+        campaign.
+
+    Raises
+    ------
+    InputError
+        When the study has no tolerances or does not store the load, and with every fault of `sampling`.
+    """
+    faults: list[Fault] = []
+    if not study.tolerances:
+        remedy = 'give a study with [tolerances] and sampling.method = "random"'
+        faults.append(Fault(str(study.path), "has no tolerances to draw joints from", remedy))
+    if study.sampling.is_matched:
+        found = "matches diameters by classes, which a subset simulation does not draw"
+        faults.append(study.fault("sampling.selective", found, "remove it"))
+    for load in (LOADS[name] for name in sampling["levels"]):
+        if not holds(study.output.columns, load.name):
+            remedy = f"add {', '.join(load.columns)}"
+            faults.append(study.fault("output.results", f"leaves out {load.name}, which --limit needs", remedy))
+    kept = study.sampling.model_dump(include=set(Subset.FROM_STUDY))
+    with gather(faults):
+        read = validate(Subset, kept | {"n": sampling["per_level"]} | dict(sampling), "subset simulation")
+    if faults:
+        raise InputError(faults)
+    output = study.output.model_copy(update={"histories": "none"})
+    return replace(study, sampling=read, proposals=(), output=output)

@@ -1,4 +1,4 @@
-"""Reading ``[grid]``, ``[[case]]`` and ``[[variant]]`` of a study whose joints are listed one by one."""
+"""Reading ``[sweep]``; ``[grid]``, ``[[case]]`` and ``[[variant]]`` of a study whose joints are listed one by one."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from itertools import product
 from typing import Any, Literal, NamedTuple, Self
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from tolstat import joint
@@ -13,13 +14,14 @@ from tolstat.common import strict, units
 from tolstat.common.errors import Fault, InputError, gather
 from tolstat.common.notation import DIAMETER
 from tolstat.common.strict import Strict, refuse
-from tolstat.common.tables import Variant
+from tolstat.common.tables import DESIGN, Variant
 from tolstat.joint import Joint, Operation
 from tolstat.joint.model import TOLD, laid_over, nested
 from tolstat.study import selection
-from tolstat.study.design import IDEAL, Design, cube, flat, table
-from tolstat.study.model import MAX_ROWS, Solver
+from tolstat.study.design import IDEAL, KEYS, MAX_JOINTS, Design, cube, flat, table
+from tolstat.study.model import MAX_ROWS, Solver, SweepAxis, SweepEntry
 from tolstat.study.selection import UNITS, Assignments, Entry, Reading
+from tolstat.study.tolerances.entry import Site
 
 Section = tuple[int | str, ...]
 
@@ -133,10 +135,51 @@ def design(file: Reading) -> Design | None:
     return Design(names, joints, operations, solvers, cases, points, table(runs, len(points)))
 
 
-def swept(file: Reading, nominal: Nominal, point: Mapping[str, Any]) -> tuple[Variant, Joint]:
-    """Variant at a point of a sweep, from dotted keys with values as a file writes them, and its joint."""
-    joint = _joint(file, laid_over(file.data["joint"], nested(point)), ("sweep",))
-    return Variant("sweep", _values(nominal[0], joint, list(point))), joint
+def axes_of_sweep(file: Reading) -> tuple[SweepAxis, ...]:
+    """Read ``[sweep]``: the axes of a grid."""
+    axes = []
+    for entry in file.entries("sweep"):
+        with gather(file.faults):
+            units_of = UNITS if selection.select(entry.pattern, UNITS) else UNITS | KEYS
+            names = selection.resolve(entry, units_of, file.place)
+            with gather(file.faults):
+                file.claims.claim(entry, names)
+            site = Site(names[0], units_of[names[0]], 0.0, file.folder)
+            read = file.model(SweepEntry, entry.value, *entry.path, site=site)
+            axes.append(SweepAxis(tuple(names), read.start, read.stop, read.points))
+    return tuple(axes)
+
+
+def swept(file: Reading) -> Design | None:
+    """Joints of a sweep: the study's, then one for each point of the axes of dimensions, the last varying fastest.
+
+    Returns
+    -------
+    Design
+        None if no axis is a dimension of the joint, and for other sampling methods.
+    """
+    nominal, axes = nominal_of(file), file.sweep or ()
+    dimensions = [number for number, axis in enumerate(axes) if axis.names[0] in KEYS]
+    if file.sampling is None or file.sampling.method != "sweep" or nominal is None or not dimensions:
+        return None
+    shape = [axes[number].points for number in dimensions]
+    if np.prod(shape) > MAX_JOINTS:
+        file.fault("sweep", f"gives {np.prod(shape)} joints with dimensions of their own", f"give at most {MAX_JOINTS}")
+        return None
+    joints, variants = [nominal[0]], [Variant("joint", {})]
+    for values in product(*(np.linspace(axes[k].start, axes[k].stop, axes[k].points).tolist() for k in dimensions)):
+        point = {name: value for k, value in zip(dimensions, values, strict=True) for name in axes[k].names}
+        keys = nested({key: units.Quantity(KEYS[key]).written(value) for key, value in point.items()})
+        joints.append(_joint(file, laid_over(file.data["joint"], keys), ("sweep",)))
+        variants.append(Variant("sweep", _values(nominal[0], joints[-1], list(point))))
+    all_points, first = [axis.points for axis in axes], file.sampling.first_sample
+    index = np.unravel_index(np.arange(np.prod(all_points)), all_points)
+    number = 1 + np.ravel_multi_index([index[k] for k in dimensions], shape)
+    rows = np.zeros(first + len(number), DESIGN)
+    rows["variant"][first:] = number
+    rows["group"] = np.arange(len(rows))
+    count = len(joints)
+    return Design(tuple(variants), tuple(joints), nominal[1:2] * count, nominal[2:] * count, {}, (), rows)
 
 
 def _grid(file: Reading) -> Iterator[Axis]:

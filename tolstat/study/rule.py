@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Mapping
-from contextlib import suppress
 from typing import NamedTuple
 
-from tolstat.common.errors import Fault, InputError, gather, input_error
+from tolstat.common.errors import Fault, collected, gather, input_error
+from tolstat.common.files import finite
 from tolstat.common.loads import ANY_LIMIT, AT, UNIT_OF_LOAD, Limit
 from tolstat.common.strict import did_you_mean
 from tolstat.study.selection import Entry, quantity, resolve
@@ -101,14 +100,10 @@ def parse(text: str, what: str, option: str, example: str, limits: Mapping[str, 
     match = _STATEMENT.fullmatch(text)
     if match is None or match["what"] != what:
         raise input_error(option, f"{text!r} is not a rule", example)
-    faults: list[Fault] = []
-    limit, bound = None, math.nan
-    with gather(faults):
-        limit = limit_of(match["limit"], limits, option, example)
-    with suppress(ValueError):
-        bound = float(match["bound"])
-    if not 0.0 < bound < 1.0:
-        faults.append(Fault(option, f"{what} {match['bound']} is not between 0 and 1".strip(), example))
-    if faults or limit is None:
-        raise InputError(faults)
+    bound = finite(match["bound"])
+    with collected() as faults:
+        with gather(faults):
+            limit = limit_of(match["limit"], limits, option, example)
+        if not 0.0 < bound < 1.0:
+            faults.append(Fault(option, f"{what} {match['bound']} is not between 0 and 1".strip(), example))
     return Statement(text.strip(), limit, bound)

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from tolstat.common import units
-from tolstat.common.errors import Fault, InputError, gather, input_error
+from tolstat.common.errors import Fault, InputError, collected, gather, input_error
 from tolstat.common.notation import DIAMETER, PLUS_MINUS
 from tolstat.common.strict import did_you_mean
 from tolstat.study import rewriting, selection
@@ -233,29 +233,25 @@ def changed(study: Study, settings: Sequence[str]) -> dict[str, Distribution]:
     InputError
         With every fault of the settings.
     """
-    faults: list[Fault] = []
-    entries, touched = _keys(study, settings, faults)
     sites = {site.name: site for entry in study.entries for site, _ in entry.models}
     distributions = dict(study.tolerances)
-    reported: set[tuple[str, ...]] = set()
     read: dict[str, tuple[Site, ToleranceEntry]] = {}
-    for name, text in touched.items():
-        site, place = sites[name], f"--set {text!r}"
-        try:
-            _check_bonus(study, name, place)
-            read[name] = site, kinds.entry(entries[name], site, place, ("tolerances", name))
-            _check_zone(study, site, read[name][1], place)
-            distributions |= read[name][1].quantities(site)
-        except InputError as error:
-            key = (text, *(fault.found for fault in error.faults))
-            if key not in reported:  # report a fault once for all errors of a pattern
-                faults.extend(error.faults)
-            reported.add(key)
-    if not faults:
-        new = [e._replace(models=tuple(read.get(m[0].name, m) for m in e.models)) for e in study.entries]
-        zones.axes_of(new, study.joint.cross.R, "--set")
-    if faults:
-        raise InputError(faults)
+    by_setting: dict[tuple[str, str], Fault] = {}  # a fault is reported once for all errors of a pattern
+    with collected() as faults:
+        entries, touched = _keys(study, settings, faults)
+        for name, text in touched.items():
+            site, place = sites[name], f"--set {text!r}"
+            try:
+                _check_bonus(study, name, place)
+                read[name] = site, kinds.entry(entries[name], site, place, ("tolerances", name))
+                _check_zone(study, site, read[name][1], place)
+                distributions |= read[name][1].quantities(site)
+            except InputError as error:
+                for fault in error.faults:
+                    by_setting.setdefault((text, fault.found), fault)
+        faults += by_setting.values()
+    new = [e._replace(models=tuple(read.get(m[0].name, m) for m in e.models)) for e in study.entries]
+    zones.axes_of(new, study.joint.cross.R, "--set")
     return distributions
 
 
@@ -274,10 +270,8 @@ def rewritten_with(study: Study, settings: Sequence[str]) -> str:
     InputError
         With the faults of the settings; see `rewriting.with_keys`.
     """
-    faults: list[Fault] = []
-    keys, touched = _keys(study, settings, faults)
-    if faults:
-        raise InputError(faults)
+    with collected() as faults:
+        keys, touched = _keys(study, settings, faults)
     alike: dict[str, dict[str, Any]] = {}
     parted: list[Toleranced] = []
     for entry in study.entries:

@@ -27,8 +27,8 @@ from tolstat.joint.reading import DEFAULT_JOINT
 from tolstat.study.axes import is_zone, vectors_of
 from tolstat.study.design import KEYS
 from tolstat.study.fatigue import LineEntry, Settings, StressPointEntry
+from tolstat.study.file import OF_CASE
 from tolstat.study.listing import CaseEntry, Range, VariantEntry
-from tolstat.study.loading import OF_CASE
 from tolstat.study.model import Output, Sampling, Solver, SweepEntry
 from tolstat.study.points import PointEntry
 from tolstat.study.proposal import MAX_SHIFT, MAX_WIDEN, ProposalEntry

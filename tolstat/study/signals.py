@@ -15,6 +15,7 @@ from pydantic_core import PydanticCustomError
 
 from tolstat.common import units
 from tolstat.common.errors import Fault, InputError, gather, input_error
+from tolstat.common.files import finite
 from tolstat.common.late import interpolate
 from tolstat.common.loads import FloatArray
 from tolstat.common.strict import dotted, read_text
@@ -91,13 +92,14 @@ def read(path: Path, needed: Sequence[str] = ()) -> dict[str, FloatArray]:
             remedy = f"add one with the header {name} [{HEADS[name]}]"
             faults.append(Fault(f"{path}:{head}", f"has no column {name}", remedy))
     numbers = [number for number, _ in lines[1:]]
-    values = {
-        name: np.array([_number(cells, column) for _, cells in lines[1:]]) for name, (column, _) in columns.items()
+    cells_by_name = {
+        name: [cells[column] if column < len(cells) else None for _, cells in lines[1:]]
+        for name, (column, _) in columns.items()
     }
-    for name, numbers_of in values.items():
-        for row in np.flatnonzero(np.isnan(numbers_of)):
-            cells = lines[1 + row][1]
-            found = repr(cells[columns[name][0]]) if columns[name][0] < len(cells) else "missing"
+    values = {name: np.array([finite(cell) for cell in cells]) for name, cells in cells_by_name.items()}
+    for name, cells in cells_by_name.items():
+        for row in np.flatnonzero(np.isnan(values[name])):
+            found = "missing" if cells[row] is None else repr(cells[row])
             faults.append(Fault(f"{path}:{numbers[row]}: {name}", f"{found} is no finite number", "give a number"))
     signal = {name: factor * values[name] for name, (_, factor) in columns.items()}
     if "angle" in signal:
@@ -113,14 +115,6 @@ def read(path: Path, needed: Sequence[str] = ()) -> dict[str, FloatArray]:
     if faults:
         raise InputError(faults)
     return signal
-
-
-def _number(cells: Sequence[str], place: int) -> float:
-    try:
-        value = float(cells[place])
-    except (ValueError, IndexError):
-        return math.nan
-    return value if math.isfinite(value) else math.nan
 
 
 class Orders(NamedTuple):

@@ -9,7 +9,7 @@ only correlates errors of the joint that share it, as `correlated` does.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from itertools import combinations
 from typing import Annotated, NamedTuple
@@ -224,24 +224,16 @@ class Group(NamedTuple):
     names: tuple[str, ...]
 
 
-def groups(entries: Sequence[Toleranced], copula: Copula, by: str) -> tuple[Group, ...]:
-    """Groups of the errors of a study.
+def groups(file: Reading) -> tuple[Group, ...]:
+    """Groups of errors that a pick-freeze design exchanges together, in the order of ``[tolerances]``.
 
-    Parameters
-    ----------
-    entries : sequence of Toleranced
-        ``[tolerances]`` of the study.
-    copula : Copula
-        Their correlation: groups that it links become one.
-    by : str
-        ``error``: every error by itself, of a zone every vector; ``tolerance``: those of an entry together.
-
-    Returns
-    -------
-    tuple of Group
-        In the order of the table.
+    They are, by ``sampling.groups``: every error by itself, of a zone every vector; or those of an entry together.
+    Groups that a correlation links become one. Other designs have none.
     """
-    if by == "error":
+    if file.sampling is None or file.sampling.method != "pick_freeze":
+        return ()
+    entries, copula = file.scatter.entries, file.copula
+    if file.sampling.groups == "error":
         parts = [Group(name, (name,)) for entry in entries for name in entry.quantities]
     else:
         parts = [Group(entry.pattern, tuple(entry.quantities)) for entry in entries]

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from tolstat.campaign import replay as replays
     from tolstat.campaign import verify as checks
     from tolstat.campaign import work as works
-    from tolstat.common import draw_records, strict, tables, units
+    from tolstat.common import columns, strict, tables, units
     from tolstat.common import loads as load_units
     from tolstat.display import answer as answers
     from tolstat.display import style, table, text
@@ -41,8 +41,8 @@ else:
     extend, function, plan, pool, remedy, replays, run, stop_rule, checks, works = (
         Late(f"tolstat.campaign.{name}") for name in names
     )
-    names = ("common.draw_records", "common.loads", "common.strict", "common.tables", "common.units", "joint.sections")
-    draw_records, load_units, strict, tables, units, sections = (Late(f"tolstat.{name}") for name in names)
+    names = ("common.columns", "common.loads", "common.strict", "common.tables", "common.units", "joint.sections")
+    columns, load_units, strict, tables, units, sections = (Late(f"tolstat.{name}") for name in names)
     answers, style, table, text = (Late(f"tolstat.display.{name}") for name in ("answer", "style", "table", "text"))
     names = ("accuracy", "joints", "causes.errors", "drawings.answer", "drawings.views", "fatigue.pylife")
     accuracy, joints, causes, drawings, views, pylife = (Late(f"tolstat.questions.{name}") for name in names)

@@ -1,7 +1,8 @@
-"""Flat columns of the tables, as the result file and every CSV have them, and which of the results a campaign keeps.
+"""Flat columns of the tables, as the result file and every CSV have them.
 
-That is all of them, or those that ``[output] results`` of its study selects. Columns on the course of a simulation
-(status, closure, period, counts) are always kept: results are meaningless without them.
+A campaign keeps all columns of the results, or those that ``[output] results`` of its study selects. Columns on the
+course of a simulation (status, closure, period, counts) are always kept: results are meaningless without them. Sampling
+methods that need it have a table of how each joint was drawn, which the result file keeps in the group ``origin``.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.fields import Field
+from tolstat.common.fields import Field, dtype_of
 from tolstat.common.load_kinds import LOAD_KINDS
 from tolstat.common.loads import LOADS
 from tolstat.common.tables import DESIGN_FIELDS, ERROR_FIELDS, LEDGER_FIELDS, RESULT_FIELDS
@@ -102,3 +103,44 @@ def blank_others(results: NDArray[np.void], kept: Iterable[Column]) -> None:
 def holds(kept: Iterable[Column], load: str) -> bool:
     """Whether a load that can have a limit can be read from the columns kept."""
     return {c.name for c in kept}.issuperset(LOADS[load].columns)
+
+
+IMPORTANCE_FIELDS = (
+    Field("component", "1", "what it was drawn from: 0 the tolerances, k proposal k; -1 the nominal joint", "i4"),
+    Field("weight", "1", "density of its errors under the tolerances over that under the mixture; 0 if not drawn"),
+)
+SUBSET_FIELDS = (
+    Field("level", "1", "level of the subset simulation: 0 is drawn from the tolerances, -1 the nominal joint", "i4"),
+    Field("parent", "1", "row of the joint whose errors were moved to give these; -1 at level 0", "i8"),
+)
+DRAWN_FIELDS: dict[str, tuple[Field, ...]] = {"importance": IMPORTANCE_FIELDS, "subset": SUBSET_FIELDS}
+"""Columns of the table by sampling method; other methods have no such table."""
+IMPORTANCE, SUBSET = dtype_of(IMPORTANCE_FIELDS), dtype_of(SUBSET_FIELDS)
+
+METHODS = {
+    "random": "random sampling",
+    "sobol": "Sobol' points",
+    "lhs": "Latin hypercube",
+    "sweep": "sweep",
+    "importance": "importance sampling",
+    "pick_freeze": "pick-freeze design",
+}
+"""Sampling methods in words."""
+DRAWN = ("random", "sobol", "lhs")
+"""Sampling methods that draw every joint from the tolerances, all with the same weight."""
+
+
+def drawn_columns(sampling: Mapping[str, Any]) -> tuple[Column, ...]:
+    """Columns of the table; empty where the method needs none.
+
+    Parameters
+    ----------
+    sampling : mapping
+        The attribute ``sampling`` of a result file.
+    """
+    return flat(DRAWN_FIELDS.get(sampling["method"], ()))
+
+
+def drawn_dtype(sampling: Mapping[str, Any]) -> np.dtype[np.void]:
+    """Structured type of a row of the table."""
+    return dtype_of(DRAWN_FIELDS[sampling["method"]])

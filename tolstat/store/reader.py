@@ -17,8 +17,16 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common import draw_records, tables
-from tolstat.common.columns import DESIGN_COLUMNS, ERROR_COLUMNS, OPTIONAL_FIELDS, Column, kept_columns
+from tolstat.common import tables
+from tolstat.common.columns import (
+    DESIGN_COLUMNS,
+    ERROR_COLUMNS,
+    OPTIONAL_FIELDS,
+    Column,
+    drawn_columns,
+    drawn_dtype,
+    kept_columns,
+)
 from tolstat.common.counts import Counts, Session
 from tolstat.common.errors import Fault, StoreError
 from tolstat.common.tables import Status
@@ -287,15 +295,15 @@ class Reader:
         return self._table("design", DESIGN_COLUMNS, tables.DESIGN, slice(None), tables.DESIGN.names or ())
 
     def origin(self, slots: slice = slice(None)) -> NDArray[np.void]:
-        """How every joint was drawn, (n,) table with the columns `draw_records.columns`, or of a slice of file slots.
+        """How every joint was drawn, (n,) table with the columns `columns.drawn_columns`, or of a slice of file slots.
 
         Raises a `StoreError` when the sampling method has no such table, or it is damaged.
         """
-        columns = draw_records.columns(self.sampling)
+        columns = drawn_columns(self.sampling)
         if not columns:
             remedy = 'give a result file with sampling.method = "importance", or of tolstat rare'
             raise store_error(self.path, "has no record of how its joints were drawn", remedy)
-        dtype = draw_records.dtype(self.sampling)
+        dtype = drawn_dtype(self.sampling)
         return self._table("origin", columns, dtype, slots, dtype.names or ())
 
     def histories(self, name: str, slots: NDArray[np.intp] | None = None) -> NDArray[Any]:

@@ -18,9 +18,8 @@ from tolstat.analysis.column import frozen
 from tolstat.analysis.design import SAMPLE, Claim, Design, Independent, Listed, Replicated
 from tolstat.analysis.sample import Sample, largest_of
 from tolstat.analysis.weighted import Weighted
-from tolstat.common.columns import holds
+from tolstat.common.columns import METHODS, holds
 from tolstat.common.counts import Counts
-from tolstat.common.draw_records import METHODS
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import ANY_LIMIT, LOADS, SHOWN_LOADS, FloatArray, Limit, split
 from tolstat.common.strict import did_you_mean

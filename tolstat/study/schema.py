@@ -32,7 +32,7 @@ from tolstat.study.listing import CaseEntry, Range, VariantEntry
 from tolstat.study.model import Output, Sampling, Solver, SweepEntry
 from tolstat.study.points import PointEntry
 from tolstat.study.proposal import MAX_SHIFT, MAX_WIDEN, ProposalEntry
-from tolstat.study.selection import TOLERANCED, UNITS
+from tolstat.study.selection import GIVEN, TOLERANCED, UNITS
 from tolstat.study.selective import MEASURABLE, RejectEntry
 from tolstat.study.tolerances import fits
 from tolstat.study.tolerances.correlation import Correlation
@@ -48,25 +48,29 @@ REQUIRED = ("joint", "operation", "sampling")
 """Tables that every study has; a case has those of `OF_CASE`."""
 
 
+def _changed(part: Any, change: Callable[[Schema], Schema]) -> Any:
+    """Schema with each table in it changed, the innermost ones first."""
+    if isinstance(part, list):
+        return [_changed(item, change) for item in part]
+    if not isinstance(part, dict):
+        return part
+    return change({key: _changed(value, change) for key, value in part.items()})
+
+
 @cache
 def of_model(model: type[BaseModel]) -> Schema:
     """JSON schema of a model, with the models inside it in place of references; only the first part of docstrings."""
     made = model.model_json_schema(by_alias=True)
     definitions = made.pop("$defs", {})
 
-    def inlined(part: Any) -> Any:
-        if isinstance(part, list):
-            return [inlined(item) for item in part]
-        if not isinstance(part, dict):
-            return part
-        part = {key: inlined(value) for key, value in part.items()}
+    def inlined(part: Schema) -> Schema:
         if "$ref" in part:
-            part = inlined(definitions[part.pop("$ref").rpartition("/")[2]]) | part
+            part = _changed(definitions[part.pop("$ref").rpartition("/")[2]], inlined) | part
         if isinstance(part.get("description"), str):
             part["description"] = " ".join(part["description"].partition("\n\n")[0].split())
         return part
 
-    schema: Schema = inlined(made)
+    schema: Schema = _changed(made, inlined)
     return schema
 
 
@@ -147,16 +151,11 @@ def _entries(name: str, units: Mapping[str, str]) -> dict[str, Schema]:
     return {quantity: {"x-table": f"{name}_1" if unit == "1" else name} for quantity, unit in units.items()}
 
 
-def _pure(part: Any) -> Any:
-    """Entry of an error that is a pure number."""
-    if isinstance(part, list):
-        return [_pure(item) for item in part]
-    if not isinstance(part, dict):
-        return part
-    kept = {key: _pure(value) for key, value in part.items()}
+def _pure(part: Schema) -> Schema:
+    """Entry of an error that is a pure number, see `_changed`."""
     if part.get("x-unit") != "error":
-        return kept
-    return {key: value for key, value in kept.items() if key not in ("examples", "not")} | schema_of_quantity("1", "")
+        return part
+    return {key: value for key, value in part.items() if key not in ("examples", "not")} | schema_of_quantity("1", "")
 
 
 def _numbers(low: float, high: float, kind: str = "number") -> Schema:
@@ -182,7 +181,6 @@ def limits() -> Schema:
 def sections() -> dict[str, Schema]:
     """JSON schema of each table of a study, in the order of the reference."""
     text = "Joint file, and keys that replace some of its own, such as contact.clearance."
-    given = {name: unit for name, unit in UNITS.items() if not name.startswith("operation.")}
     swept = "Errors by name or pattern, and keys of the joint, that take equally spaced values; several make a grid."
     gauged = "Joints that are rejected at assembly by a measured error or clearance; affects no result."
     grid = {
@@ -194,7 +192,7 @@ def sections() -> dict[str, Schema]:
         "operation": {"anyOf": points, "description": points[0]["description"]},
         "solver": of_model(Solver),
         "errors": _table(
-            "Errors that every joint has, by name or pattern: deviations from nominal.", _entries("quantity", given)
+            "Errors that every joint has, by name or pattern: deviations from nominal.", _entries("quantity", GIVEN)
         ),
         "tolerances": tolerances(),
         "correlation": _listed(Correlation),
@@ -227,7 +225,6 @@ def _definitions() -> dict[str, Schema]:
         "examples": [DEFAULT_JOINT],
     }
     factor: Schema = {"type": "number", "minimum": 1 / MAX_WIDEN, "maximum": MAX_WIDEN}
-    given = {name: unit for name, unit in UNITS.items() if not name.startswith("operation.")}
     entries: dict[str, Schema] = {
         "tolerance": {"anyOf": [of_model(model) for model in TOLERANCES.values()]},
         "quantity": schema_of_quantity("error", EXAMPLES["m"]),
@@ -237,9 +234,9 @@ def _definitions() -> dict[str, Schema]:
     }
     return {
         **entries,
-        **{f"{name}_1": _pure(schema) for name, schema in entries.items()},
+        **{f"{name}_1": _changed(schema, _pure) for name, schema in entries.items()},
         **{key: {"anyOf": _different(map(of_model, kinds.values()))} for key, kinds in ZONE_KINDS.items()},
-        "errors": _table("", _entries("quantity", given)),
+        "errors": _table("", _entries("quantity", GIVEN)),
         "keys": keys,
         "overrides": keys | {"properties": {"base": base} | keys["properties"]},
         "vary": _overriding(joint(), {"x-table": "range"}),
@@ -287,8 +284,8 @@ def schema(kind: str) -> Schema:
     -------
     dict
     """
-    made: Schema = _finished(KINDS[kind]())
-    definitions = {name: _finished(part) for name, part in _definitions().items()}
+    made: Schema = _changed(KINDS[kind](), _finished)
+    definitions = {name: _changed(part, _finished) for name, part in _definitions().items()}
     used: dict[str, Schema] = {}
     referring: list[Schema] = [made]
     while referring:
@@ -297,16 +294,12 @@ def schema(kind: str) -> Schema:
     return {"$schema": DRAFT} | made | ({"definitions": used} if used else {})
 
 
-def _finished(part: Any) -> Any:
-    """Schema for editors, of draft 7: without keywords of this package."""
-    if isinstance(part, list):
-        return [_finished(item) for item in part]
-    if not isinstance(part, dict):
-        return part
+def _finished(part: Schema) -> Schema:
+    """Schema for editors, of draft 7: without keywords of this package; see `_changed`."""
     if isinstance(part.get("x-table"), str):
         kept = {key: part[key] for key in ("description", "default", "examples") if key in part}
         return {"allOf": [{"$ref": f"#/definitions/{part['x-table']}"}]} | kept
-    part = {key: _finished(value) for key, value in part.items() if key != "x-unit"}
+    part.pop("x-unit", None)
     if isinstance(part.get("prefixItems"), list):
         part["items"] = part.pop("prefixItems")[0]
     return part

@@ -28,6 +28,8 @@ ModelT = TypeVar("ModelT", bound=strict.Strict)
 UNITS = {field.name: field.unit for field in ERROR_FIELDS}
 """SI unit of every error, in the order of the table."""
 
+GIVEN = {name: unit for name, unit in UNITS.items() if not name.startswith("operation.")}
+"""SI unit of the errors that ``[errors]`` and a case can give."""
 TOLERANCED = UNITS | ZONE_UNITS
 """SI unit of all that ``[tolerances]`` can select: errors, and zones that stand for several of them."""
 
@@ -325,14 +327,13 @@ def fixed_errors(
         Error name to deviation (SI).
     """
     fixed: dict[str, float] = {}
-    names = {name: unit for name, unit in UNITS.items() if not name.startswith("operation.")}
     for entry in entries(table, *section):
         if entry.pattern.startswith("operation."):
             file.fault(entry.path, "is not an error", f"set {entry.path[-1]} in [operation]")
             continue
         with gather(file.faults):
-            selected = resolve(entry, names, file.place)
-            value = quantity(entry, names[selected[0]], file.place)
+            selected = resolve(entry, GIVEN, file.place)
+            value = quantity(entry, GIVEN[selected[0]], file.place)
             claims.claim(entry, selected)
             fixed |= dict.fromkeys(selected, value)
     return fixed

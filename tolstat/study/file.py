@@ -12,7 +12,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from tolstat import joint
 from tolstat.common.columns import holds
 from tolstat.common.errors import Fault, InputError, gather, input_error
 from tolstat.common.loads import LOADS, UNIT_OF_LOAD, load_of, split
@@ -56,32 +55,24 @@ INDEPENDENT = ("random", "importance")
 
 def _joint(file: Reading) -> Joint | None:
     """``[joint]``: a joint file by name or path, and keys that replace some of its own; diameters by the fit."""
-    base, overrides = file.table("joint").get("base"), _joint_keys(file)
-    if base is None:
+    keys = file.table("joint")
+    if keys.get("base") is None:
         file.fault("joint.base", "missing key", 'add base, for example base = "cirelli2021"')
-    elif not isinstance(base, str):
-        file.fault("joint.base", f"{base!r} is not a text", "give a name in data/joints or a path")
-    else:
-        if file.fit is not None:
-            overrides = _with_diameters(file, overrides)
-        return joint.load(base, overrides, file.place, file.folder)
-    return None
+        return None
+    if file.fit is not None and isinstance(keys["base"], str):
+        keys = _with_diameters(file, keys)
+    return listing.joint_of(file, keys, ("joint",))
 
 
-def _joint_keys(file: Reading) -> dict[str, Any]:
-    """Keys of ``[joint]`` that replace those of its joint file."""
-    return {key: value for key, value in file.table("joint").items() if key != "base"}
-
-
-def _with_diameters(file: Reading, overrides: Mapping[str, Any]) -> dict[str, Any]:
+def _with_diameters(file: Reading, keys: Mapping[str, Any]) -> dict[str, Any]:
     """Keys of the joint with the fit's diameters; note diameters and clearance that the study sets beside it."""
-    contact, diameters = overrides.get("contact", {}), file.fit.diameters
+    contact, diameters = keys.get("contact", {}), file.fit.diameters
     if not isinstance(contact, Mapping):
-        return merged(overrides, {"contact": diameters})
+        return merged(keys, {"contact": diameters})
     twice = [key for key in (*diameters, "clearance") if key in contact]
     for key in twice:
         file.fault(f"joint.contact.{key}", *BESIDE_FIT)
-    return {**overrides, "contact": merged({k: v for k, v in contact.items() if k not in twice}, diameters)}
+    return {**keys, "contact": merged({k: v for k, v in contact.items() if k not in twice}, diameters)}
 
 
 def _assumed(file: Reading) -> tuple[Assumed, ...]:
@@ -90,7 +81,8 @@ def _assumed(file: Reading) -> tuple[Assumed, ...]:
     entries = file.models("assumed", Assumed)
     if file.joint is None or len(file.faults) > before:
         return ()
-    file.faults += faults_of_assumed(entries, file.joint.given("json"), _joint_keys(file), file.place)
+    keys = {key: value for key, value in file.table("joint").items() if key != "base"}
+    file.faults += faults_of_assumed(entries, file.joint.given("json"), keys, file.place)
     for number, entry in enumerate(entries if file.fit else []):
         for n, value in enumerate(entry.values):
             for key in (key for key in leaves(value) if key in BEARING):

@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 
 from tolstat import joint
 from tolstat.common import strict, units
-from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.errors import Fault, InputError, gather, input_error
 from tolstat.common.notation import DIAMETER
 from tolstat.common.strict import Strict, refuse
 from tolstat.common.tables import DESIGN, Variant
@@ -170,7 +170,7 @@ def swept(file: Reading) -> Design | None:
     for values in product(*(np.linspace(axes[k].start, axes[k].stop, axes[k].points).tolist() for k in dimensions)):
         point = {name: value for k, value in zip(dimensions, values, strict=True) for name in axes[k].names}
         keys = nested({key: units.Quantity(KEYS[key]).written(value) for key, value in point.items()})
-        joints.append(_joint(file, laid_over(file.data["joint"], keys), ("sweep",)))
+        joints.append(joint_of(file, laid_over(file.data["joint"], keys), ("sweep",)))
         variants.append(Variant("sweep", _values(nominal[0], joints[-1], list(point))))
     all_points, first = [axis.points for axis in axes], file.sampling.first_sample
     index = np.unravel_index(np.arange(np.prod(all_points)), all_points)
@@ -259,11 +259,11 @@ def _variants(file: Reading, nominal: Nominal, cases: list[str]) -> list[Listed]
 
 def _expanded(file: Reading, entry: VariantEntry, run: list[int], nominal: Nominal, at: Section) -> list[Listed]:
     keys = laid_over(file.data["joint"], entry.joint)
-    joints = [_joint(file, keys, (*at, "joint"))]
+    joints = [joint_of(file, keys, (*at, "joint"))]
     ranges = dict(_ranges(entry.vary, (*at, "vary"), file.place))
     if ranges:
         members = _members(file, entry, keys, ranges, (*at, "vary"))
-        joints = [_joint(file, laid_over(keys, member), (*at, "vary")) for member in members]
+        joints = [joint_of(file, laid_over(keys, member), (*at, "vary")) for member in members]
     operation, solver = _settings(file, entry, nominal, at)
     values = {f"operation.{key}": getattr(operation, key) for key in entry.operation}
     values |= {f"solver.{key}": getattr(solver, key) for key in entry.solver}
@@ -295,7 +295,7 @@ def _members(
     """Keys of each joint of a family, as a joint file writes them."""
     assert entry.points is not None
     ends = [{key: getattr(r, end) for key, r in ranges.items()} for end in ("start", "stop")]
-    start, stop = (_joint(file, laid_over(keys, nested(end)), at) for end in ends)
+    start, stop = (joint_of(file, laid_over(keys, nested(end)), at) for end in ends)
     low, high = dict(flat(start.model_dump())), dict(flat(stop.model_dump()))
     faults = []
     for key in ranges:
@@ -316,7 +316,17 @@ def _members(
     return members
 
 
-def _joint(file: Reading, keys: Mapping[str, Any], at: Section) -> Joint:
+def joint_of(file: Reading, keys: Mapping[str, Any], at: Section) -> Joint:
+    """Joint of a table ``base`` and keys that replace some of its own.
+
+    Raises
+    ------
+    InputError
+        With its faults.
+    """
+    if not isinstance(keys["base"], str):
+        where = f"{file.place}: {strict.dotted(at)}.base"
+        raise input_error(where, f"{keys['base']!r} is not a text", "give a name in data/joints or a path")
     overrides = {key: value for key, value in keys.items() if key != "base"}
     return joint.load(keys["base"], overrides, file.place, file.folder, strict.dotted(at))
 

@@ -80,11 +80,8 @@ KINDS = (
 DIAMETERS = tuple(name for kind in KINDS for name in kind.errors)
 
 
-class _Diameters(NamedTuple):
-    """Diameters of a kind: all of its features have one distribution and one band."""
-
-    distribution: Distribution
-    band: tuple[float, float] | None
+_Diameters = tuple[Distribution, tuple[float, float] | None]
+"""Distribution and band of all diameters of a kind."""
 
 
 class Range(NamedTuple):
@@ -232,19 +229,19 @@ def matching(
     """
     bands = _bands(entries)
     first = [kind.errors[0] for kind in KINDS]
-    diameters = tuple(_Diameters(distributions[name], bands.get(name)) for name in first)
+    diameters = tuple((distributions[name], bands.get(name)) for name in first)
     return _matching(settings.classes, settings.gauge, settings.split, diameters)
 
 
 @lru_cache(maxsize=32)
 def _matching(classes: int, gauge: float, split: str, diameters: tuple[_Diameters, ...]) -> Matching:
-    edges = np.array([_edges(classes, gauge, split, *measured) for measured in zip(KINDS, diameters, strict=True)])
+    edges = np.array([_edges(classes, gauge, split, *each) for each in zip(KINDS, diameters, strict=True)])
     near, within, shares = [], [], np.empty((len(KINDS), classes))
-    for number, (kind, measured) in enumerate(zip(KINDS, diameters, strict=True)):
+    for number, (kind, (distribution, _)) in enumerate(zip(KINDS, diameters, strict=True)):
         pairs = list(zip(edges[number][:-1].tolist(), edges[number][1:].tolist(), strict=True))
-        within.append(tuple(Range(measured.distribution, gauge, low, high) for low, high in pairs))
+        within.append(tuple(Range(distribution, gauge, low, high) for low, high in pairs))
         harmless = [(-np.inf, low) if kind.worst > 0 else (high, np.inf) for low, high in pairs]
-        near.append(tuple(Range(measured.distribution, gauge, *ends) for ends in harmless))
+        near.append(tuple(Range(distribution, gauge, *ends) for ends in harmless))
         for c in range(classes):
             low = 0.0 if harmless[c][0] == harmless[c][1] else near[-1][c].share
             count = len(kind.errors)
@@ -252,21 +249,19 @@ def _matching(classes: int, gauge: float, split: str, diameters: tuple[_Diameter
     return Matching(edges, shares, shares.min(axis=0), tuple(near), tuple(within))
 
 
-def _edges(classes: int, gauge: float, split: str, kind: Kind, measured: _Diameters) -> NDArray[np.float64]:
+def _edges(classes: int, gauge: float, split: str, kind: Kind, diameters: _Diameters) -> NDArray[np.float64]:
     """Edges of the classes of a kind, (classes + 1,)."""
-    parts = np.arange(1, classes) / classes
+    (distribution, band), parts = diameters, np.arange(1, classes) / classes
     if split == "width":
-        assert measured.band is not None
-        inner = measured.band[0] + (measured.band[1] - measured.band[0]) * parts
+        assert band is not None
+        inner = band[0] + (band[1] - band[0]) * parts
     else:
         count = len(kind.errors)
         below = parts ** (1.0 / count) if kind.worst > 0 else 1.0 - (1.0 - parts) ** (1.0 / count)
-        inner = measured.distribution.ppf(below)
+        inner = distribution.ppf(below)
         if gauge:  # of the measured deviations
-            reach = measured.distribution.ppf(np.array([1e-12, 1.0 - 1e-12])) + 9.0 * gauge * np.array([-1.0, 1.0])
-            upto = np.vectorize(
-                lambda end: Range(measured.distribution, gauge, -np.inf, float(end)).share, otypes=[float]
-            )
+            reach = distribution.ppf(np.array([1e-12, 1.0 - 1e-12])) + 9.0 * gauge * np.array([-1.0, 1.0])
+            upto = np.vectorize(lambda end: Range(distribution, gauge, -np.inf, float(end)).share, otypes=[float])
             inner = first(lambda ends: upto(ends) >= below, reach[0], reach[1], halvings=40)
     return np.concatenate([[-np.inf], inner, [np.inf]])
 

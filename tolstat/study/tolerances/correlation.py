@@ -197,11 +197,9 @@ def correlated(copula: Copula, lots: Mapping[str, Lot], place: str) -> Copula:
         raise input_error(f"{place}: {dotted(('correlation',))}", f"{both[0]} has a lot already", remedy)
     every = [lot.score for lot in lots.values()]
     names = [name for name, lot in lots.items() if every.count(lot.score) > 1]
-    shared = np.eye(len(names))
-    for i, first in enumerate(names):
-        for j, second in enumerate(names):
-            if i != j and lots[first].score == lots[second].score:
-                shared[i, j] = lots[first].share
+    scores, shares = (np.array([lots[name][i] for name in names]) for i in (1, 0))
+    shared = np.where(scores[:, None] == scores, shares[:, None], 0.0)
+    np.fill_diagonal(shared, 1.0)
     matrix = np.eye(len(copula.names) + len(names))
     matrix[: len(copula.names), : len(copula.names)] = copula.matrix
     matrix[len(copula.names) :, len(copula.names) :] = shared

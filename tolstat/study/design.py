@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.common.late import stats
-from tolstat.common.tables import DESIGN, Variant
+from tolstat.common.tables import Variant
 from tolstat.joint import Joint, Operation, affects_results
 from tolstat.joint.sections import quantities
 from tolstat.study.model import Solver, SweepAxis
@@ -74,29 +74,6 @@ class Design:
 
     def _run(self, variant: int) -> list[int]:
         return [int(case) for case in np.unique(self.table["case"][self.table["variant"] == variant])]
-
-
-def table(cases: Sequence[Sequence[int]], points: int) -> NDArray[np.void]:
-    """Make the rows of a design: for each variant, for each point of the grid, for each case.
-
-    Parameters
-    ----------
-    cases : sequence of sequence of int
-        For each variant the indices of the cases that are run with it, in order.
-    points : int
-        Number of points of the grid.
-
-    Returns
-    -------
-    ndarray, (rows,), dtype DESIGN
-    """
-    rows = [
-        (variant, case, variant * points + point)
-        for variant, listed in enumerate(cases)
-        for point in range(points)
-        for case in listed
-    ]
-    return np.array(rows, DESIGN)
 
 
 def sobol(n: int, dimensions: int, seed: int | Sequence[int], first: int = 0) -> NDArray[np.float64]:

@@ -28,7 +28,6 @@ from tolstat.study.model import MAX_ROWS, Output, Sampling, Solver, Subset
 from tolstat.study.selection import TOLERANCED, Assignments, Reading
 from tolstat.study.study import Case, Study
 from tolstat.study.tolerances import correlation, fits, kinds
-from tolstat.study.tolerances.entry import known_of
 from tolstat.study.tolerances.kinds import Tolerances
 
 OF_CASE = ("joint", "operation", "solver", "errors")
@@ -228,7 +227,7 @@ def _check_points(file: Reading, sampling: Sampling) -> None:
 
 def _check_known(file: Reading, method: str) -> None:
     """Note entries known from measured parts whose joints could not be reweighted to other means and deviations."""
-    for entry in known_of(file.scatter.entries):
+    for entry in (entry for entry in file.scatter.entries if entry.parts):
         key, known = dotted(("tolerances", entry.pattern)), f"is known from {entry.parts} measured parts"
         if method not in INDEPENDENT:
             remedy = 'write method = "importance", and a [[proposal]] with parts'

@@ -18,7 +18,7 @@ from tolstat.common.tables import DESIGN, Variant
 from tolstat.joint import Joint, Operation
 from tolstat.joint.model import TOLD, laid_over, nested
 from tolstat.study import selection
-from tolstat.study.design import IDEAL, KEYS, MAX_JOINTS, Design, cube, flat, table
+from tolstat.study.design import IDEAL, KEYS, MAX_JOINTS, Design, cube, flat
 from tolstat.study.model import MAX_ROWS, Solver, SweepAxis, SweepEntry
 from tolstat.study.selection import UNITS, Assignments, Entry, Reading
 from tolstat.study.tolerances.entry import Site
@@ -132,7 +132,14 @@ def design(file: Reading) -> Design | None:
     if nominal is None or len(file.faults) > before:
         return None
     names, joints, operations, solvers, runs = zip(*variants, strict=True)
-    return Design(names, joints, operations, solvers, cases, points, table(runs, len(points)))
+    # for each variant, for each point of the grid, for each of its cases
+    numbers = [
+        (variant, case, variant * len(points) + point)
+        for variant, run in enumerate(runs)
+        for point in range(len(points))
+        for case in run
+    ]
+    return Design(names, joints, operations, solvers, cases, points, np.array(numbers, DESIGN))
 
 
 def axes_of_sweep(file: Reading) -> tuple[SweepAxis, ...]:

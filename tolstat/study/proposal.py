@@ -176,7 +176,7 @@ def _resolved(entry: ProposalEntry, file: Reading, number: int) -> Proposal:
             faults.append(Fault(whole, "has parts beside widen or shift", "write a [[proposal]] for each"))
         if not (scores or parts) and not faults:
             faults.append(Fault(whole, "does not differ from the tolerances", "add widen, shift or parts"))
-    together = [tuple(of_entry.quantities) for of_entry in file.scatter.entries]
+    together = [of_entry.names for of_entry in file.scatter.entries]
     return Proposal(entry.share, scores, tuple(_processes(together, parts)))
 
 

@@ -118,7 +118,6 @@ def tolerances(study: Study) -> list[Tolerance]:
     scalable = []
     for entry in study.entries:
         site, model = entry.models[0]
-        names = tuple(entry.quantities)
         of_parts = not site.name.startswith(("operation.", "material."))
         refined = any(place.shared and place.name.endswith(".position") for place, _ in entry.models)
         refined |= any(study.has_bonus(place.name) for place, _ in entry.models)
@@ -126,10 +125,10 @@ def tolerances(study: Study) -> list[Tolerance]:
             of_parts
             and not refined
             and entry.keys["distribution"] in SCALED
-            and not set(names) & set(study.copula.names)
+            and not set(entry.names) & set(study.copula.names)
         ):
             scalable.append(
-                Tolerance(entry.pattern, names, dict(entry.keys), site, width(entry.keys, site), mark(model))
+                Tolerance(entry.pattern, entry.names, dict(entry.keys), site, width(entry.keys, site), mark(model))
             )
     return scalable
 

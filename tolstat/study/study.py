@@ -30,7 +30,7 @@ from tolstat.study.proposal import Proposal
 from tolstat.study.selective import Gauge
 from tolstat.study.tolerances.correlation import Copula, Group, Lot
 from tolstat.study.tolerances.distributions import Distribution
-from tolstat.study.tolerances.entry import KnownEntry, Toleranced, known_of
+from tolstat.study.tolerances.entry import Toleranced
 from tolstat.study.tolerances.fits import Fit
 
 
@@ -180,9 +180,9 @@ class Study(Case):
     signals: tuple[str, ...] = ()
 
     @property
-    def known(self) -> tuple[KnownEntry, ...]:
+    def known(self) -> tuple[Toleranced, ...]:
         """Entries whose mean and deviation were estimated from measured parts, in the order of the file."""
-        return known_of(self.entries)
+        return tuple(entry for entry in self.entries if entry.parts)
 
     @property
     def has_axial_force(self) -> bool:

@@ -104,7 +104,7 @@ def lines(study: Study) -> list[Line]:
     for entry in study.entries:
         if _free(study, entry):
             label = _fit_label(study) if _is_of_fit(study, entry) else entry.pattern
-            names_of[label] = (*names_of.get(label, ()), *entry.quantities)
+            names_of[label] = (*names_of.get(label, ()), *entry.names)
     return [Line(label, names) for label, names in names_of.items()]
 
 

@@ -232,9 +232,9 @@ def groups(file: Reading) -> tuple[Group, ...]:
         return ()
     entries, copula = file.scatter.entries, file.copula
     if file.sampling.groups == "error":
-        parts = [Group(name, (name,)) for entry in entries for name in entry.quantities]
+        parts = [Group(name, (name,)) for entry in entries for name in entry.names]
     else:
-        parts = [Group(entry.pattern, tuple(entry.quantities)) for entry in entries]
+        parts = [Group(entry.pattern, entry.names) for entry in entries]
     for i, j in np.argwhere(np.triu(copula.matrix, 1)):
         first, second = (next(p for p in parts if copula.names[k] in p.names) for k in (i, j))
         if first is not second:

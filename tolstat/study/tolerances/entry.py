@@ -130,9 +130,9 @@ class ToleranceEntry(strict.Strict):
     def meaning(self, site: Site) -> list[Meaning]:
         """Return what the entry says of the errors that it sets."""
 
-    def measured_parts(self, site: Site) -> int | None:
-        """Return the number of parts that mean and deviation were estimated from; None if they are taken as exact."""
-        return None
+    def measured_parts(self, site: Site) -> int:
+        """Return the number of parts that mean and deviation were estimated from; 0 if they are taken as exact."""
+        return 0
 
     def gauge_of(self, site: Site) -> tuple[float, float, float] | None:
         """Return the band outside which parts are scrapped, and the gauge's deviation, SI; None if none is."""
@@ -214,34 +214,15 @@ class Toleranced(NamedTuple):
         return {name: d for site, model in self.models for name, d in model.quantities(site).items()}
 
     @property
-    def measured_parts(self) -> int | None:
-        """Number of parts that mean and deviation were estimated from; None if they are taken as exact."""
+    def names(self) -> tuple[str, ...]:
+        """Names of the quantities that the entry draws."""
+        return tuple(self.quantities)
+
+    @property
+    def parts(self) -> int:
+        """Number of parts that mean and deviation were estimated from; 0 if they are taken as exact."""
         site, model = self.models[0]
         return model.measured_parts(site)
-
-
-class KnownEntry(NamedTuple):
-    """An entry that is known from measured parts.
-
-    Attributes
-    ----------
-    pattern : str
-        Pattern as written in the study.
-    names : tuple of str
-        Errors that it draws, all from one process.
-    parts : int
-        Number of measured parts.
-    """
-
-    pattern: str
-    names: tuple[str, ...]
-    parts: int
-
-
-def known_of(entries: Sequence[Toleranced]) -> tuple[KnownEntry, ...]:
-    """Entries of a study that are known from measured parts, in the order of the file."""
-    measured = ((entry, entry.measured_parts) for entry in entries)
-    return tuple(KnownEntry(e.pattern, tuple(e.quantities), parts) for e, parts in measured if parts is not None)
 
 
 class HalfBand(SingleEntry):

@@ -193,9 +193,9 @@ class MeasuredEntry(SingleEntry):
     law: Literal["normal", "lognormal"] | None = Field(default=None, examples=["normal"])
     """law that the parts are a sample of, for shares far out; without it each joint has one of the measured values"""
 
-    def measured_parts(self, site: Site) -> int | None:
+    def measured_parts(self, site: Site) -> int:
         """See `ToleranceEntry.measured_parts`."""
-        return len(self._values(site)) if self.law else None
+        return len(self._values(site)) if self.law else 0
 
     def build(self, site: Site) -> tolerance.Measured | tolerance.Normal | tolerance.LogNormal:
         """See `ToleranceEntry.build`."""

@@ -61,9 +61,9 @@ class NormalEntry(Banded):
     gauge: NotNegative | None = Field(default=None, examples=["0.01 mm"])
     """parts outside the band are scrapped, by a gauge of this standard deviation; affects no result"""
 
-    def measured_parts(self, site: Site) -> int | None:
+    def measured_parts(self, site: Site) -> int:
         """See `ToleranceEntry.measured_parts`."""
-        return self.known_from
+        return self.known_from or 0
 
     def gauge_of(self, site: Site) -> tuple[float, float, float] | None:
         """See `ToleranceEntry.gauge_of`."""

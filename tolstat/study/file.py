@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from tolstat.common.columns import holds
-from tolstat.common.errors import Fault, InputError, gather, input_error
+from tolstat.common.errors import Fault, collected, gather, input_error
 from tolstat.common.loads import LOADS, UNIT_OF_LOAD, load_of, split
 from tolstat.common.strict import dotted, validate
 from tolstat.common.tables import FINEST_STEPS
@@ -367,21 +367,19 @@ def subset_of(study: Study, sampling: Mapping[str, Any]) -> Study:
     InputError
         When the study has no tolerances or does not store the load, and with every fault of `sampling`.
     """
-    faults: list[Fault] = []
-    if not study.tolerances:
-        remedy = 'give a study with [tolerances] and sampling.method = "random"'
-        faults.append(Fault(str(study.path), "has no tolerances to draw joints from", remedy))
-    if study.sampling.is_matched:
-        found = "matches diameters by classes, which a subset simulation does not draw"
-        faults.append(study.fault("sampling.selective", found, "remove it"))
-    for load in (LOADS[name] for name in sampling["levels"]):
-        if not holds(study.output.columns, load.name):
-            remedy = f"add {', '.join(load.columns)}"
-            faults.append(study.fault("output.results", f"leaves out {load.name}, which --limit needs", remedy))
-    kept = study.sampling.model_dump(include=set(Subset.FROM_STUDY))
-    with gather(faults):
-        read = validate(Subset, kept | {"n": sampling["per_level"]} | dict(sampling), "subset simulation")
-    if faults:
-        raise InputError(faults)
+    with collected() as faults:
+        if not study.tolerances:
+            remedy = 'give a study with [tolerances] and sampling.method = "random"'
+            faults.append(Fault(str(study.path), "has no tolerances to draw joints from", remedy))
+        if study.sampling.is_matched:
+            found = "matches diameters by classes, which a subset simulation does not draw"
+            faults.append(study.fault("sampling.selective", found, "remove it"))
+        for load in (LOADS[name] for name in sampling["levels"]):
+            if not holds(study.output.columns, load.name):
+                found, remedy = f"leaves out {load.name}, which --limit needs", f"add {', '.join(load.columns)}"
+                faults.append(study.fault("output.results", found, remedy))
+        kept = study.sampling.model_dump(include=set(Subset.FROM_STUDY))
+        with gather(faults):
+            read = validate(Subset, kept | {"n": sampling["per_level"]} | dict(sampling), "subset simulation")
     output = study.output.model_copy(update={"histories": "none"})
     return replace(study, sampling=read, proposals=(), output=output)

@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 
 from tolstat import joint
 from tolstat.common import strict, units
-from tolstat.common.errors import Fault, InputError, gather, input_error
+from tolstat.common.errors import Fault, InputError, collected, gather, input_error
 from tolstat.common.notation import DIAMETER
 from tolstat.common.strict import Strict, refuse
 from tolstat.common.tables import DESIGN, Variant
@@ -121,8 +121,9 @@ def design(file: Reading) -> Design | None:
         axes += _grid(file)
     cases: dict[str, dict[str, float]] = {IDEAL: {}} | _cases(file, axes)
     if nominal is not None:
-        with gather(file.faults):
-            variants = _variants(file, nominal, list(cases))
+        so_far = len(file.faults)
+        variants = _variants(file, nominal, list(cases))
+        if len(file.faults) == so_far:
             _note_clashes(file, axes)
     values = product(*(axis.values for axis in axes))  # one empty point without axes
     points = tuple({name: value for axis, value in zip(axes, at, strict=True) for name in axis.names} for at in values)
@@ -238,29 +239,20 @@ def _note_clashes(file: Reading, axes: list[Axis]) -> None:
 
 
 def _variants(file: Reading, nominal: Nominal, cases: list[str]) -> list[Listed]:
-    """Variants in the order of the file, families expanded.
-
-    Raises
-    ------
-    InputError
-        When there are faults: some of them, the others are those of the file.
-    """
+    """Variants without faults in the order of the file, families expanded."""
     every = list(range(len(cases)))
     entries = file.tables("variant")
     if not entries:
         return [(Variant("joint", {}), *nominal, every)]
-    faults: list[Fault] = []
     variants = []
     for number, item in enumerate(entries):
-        with gather(faults):
+        with gather(file.faults):
             entry = file.model(VariantEntry, item, "variant", number)
             unknown = [name for name in entry.cases or () if name not in cases]
-            where = f"{file.place}: variant[{number}].cases"
-            faults += [Fault(where, f"no case {name!r}", strict.did_you_mean(name, cases)) for name in unknown]
+            for name in unknown:
+                file.fault(f"variant[{number}].cases", f"no case {name!r}", strict.did_you_mean(name, cases))
             run = every if entry.cases is None else sorted({0, *map(cases.index, set(entry.cases) - set(unknown))})
             variants += _expanded(file, entry, run, nominal, ("variant", number))
-    if faults:
-        raise InputError(faults)
     return variants
 
 
@@ -281,18 +273,16 @@ def _expanded(file: Reading, entry: VariantEntry, run: list[int], nominal: Nomin
 
 def _settings(file: Reading, entry: VariantEntry, nominal: Nominal, at: Section) -> tuple[Operation, Solver]:
     """Operating point and numerical settings of a variant: those of the study, with keys replaced by the entry."""
-    faults: list[Fault] = []
     _, operation, solver = nominal
-    with gather(faults):
-        keys = operation.model_dump(mode="json", by_alias=True) | entry.operation
-        operation = file.model(Operation, keys, *at, "operation")
-    if entry.solver.get("fidelity") == "auto":
-        where = f"{file.place}: {strict.dotted((*at, 'solver', 'fidelity'))}"
-        faults.append(Fault(where, "'auto' cannot be set for one variant", "write it in [solver]"))
-    with gather(faults):
-        solver = file.model(Solver, solver.model_dump(exclude_unset=True) | entry.solver, *at, "solver")
-    if faults:
-        raise InputError(faults)
+    with collected() as faults:
+        with gather(faults):
+            keys = operation.model_dump(mode="json", by_alias=True) | entry.operation
+            operation = file.model(Operation, keys, *at, "operation")
+        if entry.solver.get("fidelity") == "auto":
+            where = f"{file.place}: {strict.dotted((*at, 'solver', 'fidelity'))}"
+            faults.append(Fault(where, "'auto' cannot be set for one variant", "write it in [solver]"))
+        with gather(faults):
+            solver = file.model(Solver, solver.model_dump(exclude_unset=True) | entry.solver, *at, "solver")
     return operation, solver
 
 

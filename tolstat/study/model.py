@@ -8,11 +8,11 @@ from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
 from pydantic import AfterValidator, Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from tolstat.analysis.clustered import LEAST
-from tolstat.common import units
 from tolstat.common.columns import KEPT, RESULT_NAMES, Column, kept_columns, kept_names
 from tolstat.common.loads import Limit
 from tolstat.common.strict import Strict, refuse
 from tolstat.common.tables import Options, from_names
+from tolstat.common.units import Number
 from tolstat.study import selection
 from tolstat.study.selective import SelectiveEntry
 from tolstat.study.tolerances.entry import Value
@@ -23,9 +23,6 @@ MAX_ROWS = 10_000_000
 """Maximum number of joints of a list, a grid or a Latin hypercube, whose tables are held in memory."""
 MAX_SAMPLES = 1_000_000_000
 """Maximum number of joints of a campaign that is drawn in parts: 30-bit Sobol' sequences end soon after."""
-
-Number = units.Number
-
 
 Flag = Annotated[bool, Field(strict=True)]
 

@@ -164,20 +164,6 @@ def _numbers(low: float, high: float, kind: str = "number") -> Schema:
     return _table("", {name: {"type": kind, "minimum": low, "maximum": high} for name in drawn})
 
 
-def tolerances() -> Schema:
-    """JSON schema of the errors that scatter: the entry of each error is one of its kinds."""
-    entries = _entries("tolerance", TOLERANCED)
-    entries |= {name: {"x-table": key} for name in TOLERANCED if (key := name.partition(".")[2]) in ZONE_KINDS}
-    made = _table("How errors scatter, by name or pattern.", entries)
-    return made | {"properties": {fits.KEY: {"x-table": fits.KEY}} | made["properties"]}
-
-
-def limits() -> Schema:
-    """JSON schema of the limits of loads, which may name operating points."""
-    text = "Values that loads must not exceed, by name or pattern of loads; they affect no result."
-    return _table(text, _entries("limit", UNIT_OF_LOAD), end=f"(?:{loads.AT}[A-Za-z].*)?")
-
-
 def sections() -> dict[str, Schema]:
     """JSON schema of each table of a study, in the order of the reference."""
     text = "Joint file, and keys that replace some of its own, such as contact.clearance."
@@ -186,6 +172,10 @@ def sections() -> dict[str, Schema]:
     grid = {
         name: {"type": "array", "minItems": 1, "items": schema} for name, schema in _entries("quantity", UNITS).items()
     }
+    limited = "Values that loads must not exceed, by name or pattern of loads; they affect no result."
+    toleranced = _entries("tolerance", TOLERANCED)
+    toleranced |= {name: {"x-table": key} for name in TOLERANCED if (key := name.partition(".")[2]) in ZONE_KINDS}
+    scatter = _table("How errors scatter, by name or pattern.", toleranced)
     points = [of_model(Operation), _listed(PointEntry) | {"minItems": 1}]
     return {
         "joint": _definitions()["overrides"] | {"description": text, "required": ["base"]},
@@ -194,7 +184,7 @@ def sections() -> dict[str, Schema]:
         "errors": _table(
             "Errors that every joint has, by name or pattern: deviations from nominal.", _entries("quantity", GIVEN)
         ),
-        "tolerances": tolerances(),
+        "tolerances": scatter | {"properties": {fits.KEY: {"x-table": fits.KEY}} | scatter["properties"]},
         "correlation": _listed(Correlation),
         "sampling": of_model(Sampling),
         "proposal": _listed(ProposalEntry),
@@ -204,7 +194,7 @@ def sections() -> dict[str, Schema]:
         "variant": _listed(VariantEntry),
         "assumed": _listed(Assumed),
         "reject": _table(gauged, _entries("reject", MEASURABLE)),
-        "limits": limits(),
+        "limits": _table(limited, _entries("limit", UNIT_OF_LOAD), end=f"(?:{loads.AT}[A-Za-z].*)?"),
         "fatigue": of_model(Settings),
         "output": of_model(Output),
     }

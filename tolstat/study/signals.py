@@ -145,16 +145,6 @@ class Orders(NamedTuple):
     turns: int
 
 
-def turns_of(angle: FloatArray) -> int:
-    """Number of whole revolutions in samples of an angle (rad): an even one if there are several.
-
-    A half order changes its sign from one revolution to the next; an even number of them has none of it in the mean.
-    The step from the last sample back to the first may be missing.
-    """
-    turns = math.floor(float(2 * angle[-1] - angle[-2] - angle[0]) / TURN + 1e-9)
-    return turns - turns % 2 if turns > 1 else turns
-
-
 def orders(angle: FloatArray, time: FloatArray, values: FloatArray | None = None) -> Orders:
     """Resample a signal to equal parts of each revolution, and expand its mean revolution.
 
@@ -178,7 +168,10 @@ def orders(angle: FloatArray, time: FloatArray, values: FloatArray | None = None
     ValueError
         When the samples cover less than one revolution, or are fewer than `FEWEST` in one.
     """
-    turns = turns_of(angle)
+    # the step from the last sample back to the first may be missing
+    turns = math.floor(float(2 * angle[-1] - angle[-2] - angle[0]) / TURN + 1e-9)
+    # half orders change their sign from one revolution to the next: the mean of an even number has none of them
+    turns -= turns % 2 if turns > 1 else 0
     if turns < 1:
         raise ValueError(f"covers {(angle[-1] - angle[0]) / TURN:.3g} of a revolution, one at least is needed")
     end = angle[0] + TURN * turns

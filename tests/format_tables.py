@@ -11,8 +11,16 @@ import re
 from pathlib import Path
 
 from tests import study_reference
-from tolstat.common import draw_records, tables
-from tolstat.common.columns import DESIGN_COLUMNS, ERROR_COLUMNS, LEDGER_COLUMNS, RESULT_COLUMNS, Column
+from tolstat.common import tables
+from tolstat.common.columns import (
+    DESIGN_COLUMNS,
+    DRAWN_FIELDS,
+    ERROR_COLUMNS,
+    LEDGER_COLUMNS,
+    RESULT_COLUMNS,
+    Column,
+    drawn_columns,
+)
 from tolstat.joint.derived import DERIVED
 from tolstat.store import layout
 from tolstat.store.layout import SESSION
@@ -90,7 +98,7 @@ def updated(text: str, content: dict[str, str]) -> str:
 
 def documents() -> dict[Path, str]:
     """Up-to-date text of each document."""
-    origin = {f"origin {method}": draw_records.columns({"method": method}) for method in draw_records.FIELDS}
+    origin = {f"origin {method}": drawn_columns({"method": method}) for method in DRAWN_FIELDS}
     parts = {"design": DESIGN_COLUMNS, "ledger": LEDGER_COLUMNS} | origin
     content = {name: field_table(columns) for name, columns in parts.items()}
     content |= {"status": status_table(), "session": session_table(), "axes": axis_table()}

@@ -6,10 +6,9 @@ import json
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
-from tolstat.common.columns import RESULT_COLUMNS
+from tolstat.common.columns import OPTIONAL_FIELDS, RESULT_COLUMNS
 from tolstat.common.load_kinds import LOAD_KINDS
 from tolstat.common.loads import LOADS
-from tolstat.common.selected_results import OPTIONAL_FIELDS
 from tolstat.common.tables import ERROR_FIELDS
 from tolstat.joint import Operation
 from tolstat.joint.contact import Station
@@ -24,8 +23,7 @@ from tolstat.study.model import SweepEntry
 from tolstat.study.points import PointEntry
 from tolstat.study.schema import of_model
 from tolstat.study.selection import TOLERANCED
-from tolstat.study.selective import SelectiveEntry
-from tolstat.study.sorting import RejectEntry
+from tolstat.study.selective import RejectEntry, SelectiveEntry
 from tolstat.study.tolerances.entry import Banded, LotEntry, SingleEntry
 from tolstat.study.tolerances.fits import FitEntry
 from tolstat.study.tolerances.kinds import ZONE_KINDS, kinds_of

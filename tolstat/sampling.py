@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.analysis import process
-from tolstat.common import draw_records
+from tolstat.common.columns import IMPORTANCE, SUBSET
 from tolstat.common.errors import InputError
 from tolstat.common.late import special
 from tolstat.common.tables import ERROR_FIELDS
@@ -81,7 +81,7 @@ def draw_blocks(study: Study, rows: range) -> Iterator[Table]:
 
 
 def origin_blocks(study: Study, rows: range) -> Iterator[Table] | None:
-    """Return tables of how `rows` are drawn (`draw_records`), of at most `BLOCK` rows; None if the method has none."""
+    """Return tables of how `rows` are drawn, of at most `BLOCK` rows each; None if the method has none."""
     if study.sampling.method == "subset":
         return iter([_level_0(study, rows)])
     if study.sampling.method != "importance":
@@ -90,14 +90,14 @@ def origin_blocks(study: Study, rows: range) -> Iterator[Table] | None:
 
 
 def _level_0(study: Study, rows: range) -> Table:
-    table = np.zeros(len(rows), draw_records.SUBSET)
+    table = np.zeros(len(rows), SUBSET)
     table["level"][: len(rows) - len(study.sampling.samples(rows))] = -1  # the nominal joint
     table["parent"] = -1
     return table
 
 
 def _origin(study: Study, rows: range) -> Table:
-    table = np.zeros(len(rows), draw_records.IMPORTANCE)
+    table = np.zeros(len(rows), IMPORTANCE)
     table["component"] = -1  # the nominal joint
     numbers = study.sampling.samples(rows)
     drawn = table[len(rows) - len(numbers) :]

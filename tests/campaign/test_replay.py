@@ -16,7 +16,7 @@ from tests.support import damage, synthetic
 from tolstat import cli, sampling, study
 from tolstat.campaign import replay
 from tolstat.campaign import run as campaign
-from tolstat.common.draw_records import SUBSET
+from tolstat.common.columns import SUBSET
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.files import data_dir
 from tolstat.common.tables import Simulation, Status

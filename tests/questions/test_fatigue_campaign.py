@@ -27,7 +27,8 @@ from tolstat.questions.fatigue.loads import channels, cycles_of
 from tolstat.questions.fatigue.pylife import pylife_series
 from tolstat.solver import rainflow
 from tolstat.store import ResultFile
-from tolstat.study.fatigue import Fatigue, read
+from tolstat.study.fatigue import Fatigue, of_text
+from tolstat.study.rewriting import as_text
 
 STUDY = """
 [joint]
@@ -225,14 +226,15 @@ def test_every_fault_of_the_section_is_told():
         },
     }
     with pytest.raises(InputError) as error:
-        read(section, "a.toml")
+        of_text(as_text({"fatigue": section}), "a.toml")
     places = [fault.place.removeprefix("a.toml: fatigue.") for fault in error.value.faults]
     assert places == [
-        *("exponents[0]", "exponents[1]", "revolution", "line.cross*.F_e.S0", "line.cross1.F_e"),
-        *("line.cross1.X", "line.fork1.T.S0"),
+        *("exponents[0]", "exponents[1]", "revolution", "line.cross*.F_e.S0", "line.cross1.X"),
+        *("line.cross1.F_e", "line.fork1.T.S0"),
     ]
+    lines = {"*.F": {"m": 3, "S0": "1 N", "N0": 1}, "fork1.F": {"m": 3, "S0": "1 N", "N0": 1}}
     with pytest.raises(InputError, match="is set by"):
-        read({"line": {"*.F": {"m": 3, "S0": "1 N", "N0": 1}, "fork1.F": {"m": 3, "S0": "1 N", "N0": 1}}}, "a.toml")
+        of_text(as_text({"fatigue": {"line": lines}}), "a.toml")
 
 
 def test_pylife_series_holds_every_cycle_and_survives_a_file(campaign, tmp_path):

@@ -223,7 +223,7 @@ def test_no_other_fit_interferes_at_any_size(tmp_path):
             if zones.least < 0.0:
                 continue
             scatter = {"basic": f"{size} mm", "code": code, "distribution": "uniform"}
-            for other in widths.other_fits(fits.read({"fit": scatter}, "study")):
+            for other in widths.other_fits(fits.of(scatter, "study")):
                 assert iso.zones(iso.parse(other), size).least >= 0.0
 
 

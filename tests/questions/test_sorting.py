@@ -17,7 +17,7 @@ from tolstat.joint import nominal_errors
 from tolstat.questions import sorting as question
 from tolstat.report import page
 from tolstat.store import ResultFile
-from tolstat.study.sorting import Gauge
+from tolstat.study.selective import Gauge
 
 ENTRY = '"pin*.offset_t" = { plus_minus = "0.1 mm", distribution = "normal", cpk = 0.4, gauge = "GAUGE" }'
 PLAN = (

@@ -18,8 +18,8 @@ from tolstat.common.tables import HOLES
 from tolstat.study import scaling
 from tolstat.study.axes import Bonus
 from tolstat.study.scaling import changed
-from tolstat.study.tolerances import meaning
 from tolstat.study.tolerances.distributions import Array, Distribution, Normal, Uniform
+from tolstat.study.tolerances.entry import meanings
 from tolstat.study.tolerances.zone_laws import Accepted
 
 N = 4096
@@ -113,7 +113,7 @@ def test_rejection_is_that_of_part_by_part() -> None:
     assert told == f"⌀0.1 mm Ⓜ, {100 * (1 - kept.mean()):.2g} % rejected"
     offset = next(one for one in shares.values() if one.number == told)
     middle = np.concatenate([0.5 * (inner + outer)[0] for _, inner, outer in drawn])
-    found = meaning.table(loaded.entries).set_index("errors")["sigma"]
+    found = meanings(loaded.entries).set_index("errors")["sigma"]
     assert found["offset_[tz]"] == pytest.approx(middle.std(), rel=0.03)
     assert offset.outside == 0.0
 

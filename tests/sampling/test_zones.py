@@ -16,7 +16,7 @@ from tolstat.common.load_kinds import PINS
 from tolstat.common.tables import HOLES
 from tolstat.joint.perturbation import ARM_TRIADS, PIN_TRIADS, perturb
 from tolstat.study import Study, axes
-from tolstat.study.tolerances import meaning
+from tolstat.study.tolerances.entry import meanings
 
 OVER = 22e-3
 POSITION = 'position" = { zone = "⌀0.1 mm", over = "22 mm", distribution = "%s" }\n'
@@ -56,7 +56,7 @@ def test_moments_of_a_position(make: Make, kind: str, sigma: float) -> None:
     ends = sigma / np.sqrt(2), np.sqrt(2) * sigma / OVER
     for name, expected in zip(("offset_t", "offset_z", "tilt_t", "tilt_z"), np.repeat(ends, 2), strict=True):
         assert _std(errors, f"pin1.{name}") == pytest.approx(expected, rel=0.03)
-    np.testing.assert_allclose(meaning.table(s.entries)["sigma"], ends, rtol=1e-4)
+    np.testing.assert_allclose(meanings(s.entries)["sigma"], ends, rtol=1e-4)
     moved = {name for name in errors.dtype.names if np.ptp(errors[name]) > 0}
     assert moved == {"pin1.offset_t", "pin1.offset_z", "pin1.tilt_t", "pin1.tilt_z"}
 
@@ -139,7 +139,7 @@ def test_coaxiality_turns_both_features_against_the_line_through_their_middles(m
         assert stats.kstest((angle / (0.02 / 22)) ** 2, stats.uniform.cdf).pvalue > 0.01
     assert abs(np.corrcoef(*angles)[0, 1]) < 0.08
     assert _std(errors, "hole2.tilt_z") == pytest.approx(
-        float(np.sqrt((meaning.table(s.entries)["sigma"].iloc[[1, 2]] ** 2).sum())), rel=0.05
+        float(np.sqrt((meanings(s.entries)["sigma"].iloc[[1, 2]] ** 2).sum())), rel=0.05
     )
 
 

@@ -21,8 +21,7 @@ from tolstat.analysis import accuracy
 from tolstat.campaign import extend, replay, stop_rule, verify
 from tolstat.campaign import run as campaign
 from tolstat.campaign.checks import QUICK_CHECKS
-from tolstat.common import selected_results as kept
-from tolstat.common.columns import RESULT_COLUMNS
+from tolstat.common.columns import KEPT, OPTIONAL_FIELDS, RESULT_COLUMNS, blank_others, kept_columns
 from tolstat.common.errors import InputError, StoreError
 from tolstat.questions import accuracy as question
 from tolstat.questions import sweep
@@ -31,7 +30,7 @@ from tolstat.questions.exceedance import curves, rows
 from tolstat.store import ResultFile, layout, metadata, verification
 
 CROSS_F = [f"cross{i}.F_max" for i in (1, 2, 3, 4)]
-COURSE = [c.name for c in RESULT_COLUMNS if c.field not in kept.OPTIONAL_FIELDS]
+COURSE = [c.name for c in RESULT_COLUMNS if c.field not in OPTIONAL_FIELDS]
 PLAIN = synthetic.STUDY.partition("[limits]")[0]
 
 
@@ -45,7 +44,7 @@ def loaded(folder: Path, content: str) -> study.Study:
 
 
 def columns(*names: str) -> tuple[object, ...]:
-    return kept.columns({kept.KEY: list(names)})
+    return kept_columns({KEPT: list(names)})
 
 
 def fake(**kwargs: object) -> fakes.Study:
@@ -64,7 +63,7 @@ def test_patterns_select_columns(tmp_path: Path) -> None:
     made = loaded(tmp_path, text("psi_max", "cross[12].F_max", "status"))
     names = {*COURSE, "cross1.F_max", "cross2.F_max", "psi_max"}
     assert [c.name for c in made.output.columns] == [c.name for c in RESULT_COLUMNS if c.name in names]
-    assert made.identity()[kept.KEY] == ["cross1.F_max", "cross2.F_max", "psi_max"]
+    assert made.identity()[KEPT] == ["cross1.F_max", "cross2.F_max", "psi_max"]
     assert made.asked == ["cross1.F", "cross2.F", "psi"]
     only_course = loaded(tmp_path, text("status"))
     assert [c.name for c in only_course.output.columns] == COURSE
@@ -75,7 +74,7 @@ def test_the_same_columns_are_the_same_campaign(tmp_path: Path) -> None:
     identity = loaded(tmp_path, text("cross*.F_max", "psi_max")).identity()
     assert loaded(tmp_path, text("psi_max", *reversed(CROSS_F))).identity() == identity
     assert loaded(tmp_path, text("*.*")).identity() == loaded(tmp_path, PLAIN).identity()
-    assert kept.KEY not in loaded(tmp_path, PLAIN).identity()
+    assert KEPT not in loaded(tmp_path, PLAIN).identity()
 
 
 def test_faults_are_told_together(tmp_path: Path) -> None:
@@ -152,7 +151,7 @@ def test_lost_and_unknown_columns_are_damage(tmp_path: Path) -> None:
     with h5py.File(path, "r+") as file:
         file["results"].create_dataset("cross2.F_max", data=held)
         about = metadata.read(file)
-        metadata.write(file, about.changed(identity=about.identity | {kept.KEY: ["cross1.F_max", "psi_max"]}))
+        metadata.write(file, about.changed(identity=about.identity | {KEPT: ["cross1.F_max", "psi_max"]}))
     with ResultFile.open(path) as store, pytest.raises(StoreError, match=r"is damaged or no tolstat result file: .*"):
         store.results()
 
@@ -207,7 +206,7 @@ def test_errors_are_relative_to_the_largest_load_kept() -> None:
     other = base.copy()
     other["F_max"][0, 0] *= 1.01
     for results in (base, other):
-        kept.blank_others(results, columns(*CROSS_F))
+        blank_others(results, columns(*CROSS_F))
     found = accuracy.differences(base, other)
     assert found[0, 0] == pytest.approx(-0.01 * base["F_max"][0, 0] / other["F_max"][0, :4].max())
     assert np.isfinite(found[:, :4]).all()
@@ -219,7 +218,7 @@ def test_errors_are_relative_to_the_largest_load_kept() -> None:
 
 def test_reports_show_what_there_is() -> None:
     held = columns(*CROSS_F, "fork2.T_max")
-    made = view(columns=held, change=lambda results: kept.blank_others(results, held))
+    made = view(columns=held, change=lambda results: blank_others(results, held))
     held = ["cross1.F", "cross2.F", "cross3.F", "cross4.F", "fork2.T"]
     assert list(dict.fromkeys(row["load"] for row in rows.quantile_rows(made))) == held
     assert list(dict.fromkeys(row["load"] for row in rows.curve_rows(made))) == held
@@ -231,7 +230,7 @@ def test_reports_show_what_there_is() -> None:
 @pytest.mark.parametrize("second", [1, 3])
 def test_sweeps_show_what_there_is(second: int) -> None:
     held = columns("cross1.F_max", "fork2.T_max", "psi_max")
-    made = swept(second, columns=held, change=lambda results: kept.blank_others(results, held))
+    made = swept(second, columns=held, change=lambda results: blank_others(results, held))
     loads = [name for name in sweep.sweep(made).frame("sweep").columns if name.startswith(("cross", "fork", "psi"))]
     assert loads == ["cross1.F [N]", "fork2.T [N*m]", "psi"]
     short = sweep.sweep(made).tables["sweep"].for_people

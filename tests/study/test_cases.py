@@ -278,6 +278,10 @@ FAULTS = {
     "grid of nothing": (('"pin*.diameter"', '"pin*.diam"'), "grid.pin*.diam: selects nothing"),
     "unknown law": (('"point"', '"pointy"'), "variant[2].joint.contact.law: 'pointy' is not allowed"),
     "unknown key": (("vary.contact.D_P", "vary.contact.D_X"), "variant[1].vary.contact.D_X: unknown key"),
+    "base that is no text": (
+        ('name = "plain"', 'name = "p"\njoint.base = 3'),
+        "variant[0].joint.base: 3 is not a text",
+    ),
     "unknown base": (('name = "plain"', 'name = "p"\njoint.base = "x"'), "variant[0].joint.base: no joint is named"),
     "vary without unit": (('to = "75.6 mm"', "to = 75.6"), "variant[1].vary.contact.D_P: 75.6 has no unit"),
     "vary beyond": (('to = "75.6 mm"', 'to = "77 mm"'), "variant[1].vary.contact.D_P: a pin of 77 mm does not fit"),

@@ -165,7 +165,7 @@ def test_share_of_pins_that_are_larger_than_their_holes() -> None:
 
 def test_a_clearance_fit_may_reach_beyond_its_zones() -> None:
     text = 'basic = "76 mm", code = "H7/h6", distribution = '
-    found = fits.read({"fit": {"basic": "76 mm", "code": "H7/h6", "distribution": "normal"}}, "x")
+    found = fits.of({"basic": "76 mm", "code": "H7/h6", "distribution": "normal"}, "x")
     assert found is not None
     assert found.misfit == pytest.approx(stats.norm.sf(24.5 / math.hypot(5.0, 19 / 6)), rel=1e-9)
     assert fits.any_pair(found.misfit) == pytest.approx(4 * found.misfit, rel=1e-4)
@@ -174,7 +174,7 @@ def test_a_clearance_fit_may_reach_beyond_its_zones() -> None:
         "fit: hole less pin 0 to 49 um, radial clearance 0 to 24.5 um",
         f"fit: {400 * found.misfit:.3g} % of the joints do not go together",
     ]
-    bounded = fits.read({"fit": {"basic": "76 mm", "code": "H7/h6", "distribution": "uniform"}}, "x")
+    bounded = fits.of({"basic": "76 mm", "code": "H7/h6", "distribution": "uniform"}, "x")
     assert bounded is not None
     assert bounded.misfit == 0.0
     assert len(bounded.meaning) == 2

@@ -13,7 +13,7 @@ from tolstat.common.errors import InputError
 from tolstat.common.tables import Options, Simulation, without_results
 from tolstat.joint import operating, perturb
 from tolstat.solver import fidelity
-from tolstat.study.mounting import note
+from tolstat.study.points import note_on_shafts
 
 HEAD = """[joint]
 base = "cirelli2021"
@@ -180,9 +180,9 @@ def test_auto_tries_closed_forms_where_they_hold(closed_form: bool) -> None:
 
 
 def test_a_note_where_rigid_shafts_decide() -> None:
-    said = note(["pin1.offset_t", "pin1.offset_z"], ["rigid"], "tolstat run x")
+    said = note_on_shafts(["pin1.offset_t", "pin1.offset_z"], ["rigid"], "tolstat run x")
     assert said.endswith("With a free output shaft: tolstat run x")
-    assert note(["hole2.position_inner"], ["rigid", "rigid"], "x")
-    assert not note(["pin1.offset_t", "hole1.tilt_z"], ["rigid"], "x")
-    assert not note(["pin1.offset_z"], ["rigid", "free"], "x")
-    assert not note(["pin1.offset_z"], [2e7], "x")
+    assert note_on_shafts(["hole2.position_inner"], ["rigid", "rigid"], "x")
+    assert not note_on_shafts(["pin1.offset_t", "hole1.tilt_z"], ["rigid"], "x")
+    assert not note_on_shafts(["pin1.offset_z"], ["rigid", "free"], "x")
+    assert not note_on_shafts(["pin1.offset_z"], [2e7], "x")

@@ -186,7 +186,10 @@ def pattern(random_numbers: random.Random, word: str) -> str:
     return made
 
 
-@pytest.mark.parametrize(("units", "made"), [(TOLERANCED, schema.tolerances()), (schema.UNIT_OF_LOAD, schema.limits())])
+@pytest.mark.parametrize(
+    ("units", "made"),
+    [(TOLERANCED, schema.sections()["tolerances"]), (schema.UNIT_OF_LOAD, schema.sections()["limits"])],
+)
 def test_no_pattern_that_selects_something_is_refused(units: dict[str, str], made: dict[str, Any]) -> None:
     numbers, selecting = random.Random(5), 0
     keys = [re.compile(key) for key in made["patternProperties"]]

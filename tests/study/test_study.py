@@ -18,8 +18,7 @@ from tests.support.synthetic import HEAD
 from tolstat import study
 from tolstat.common import tables
 from tolstat.common.errors import Fault, InputError
-from tolstat.study import Study, load_case
-from tolstat.study import file as study_file
+from tolstat.study import Study, load_case, selection
 from tolstat.study.model import Solver
 from tolstat.study.tolerances.distributions import Normal
 from tolstat.study.tolerances.zone_laws import Rayleigh
@@ -415,7 +414,7 @@ def test_no_value_anywhere_gives_anything_but_faults(
         for key in keys[:-1]:
             at = at[key]
         at[keys[-1]] = odd
-        monkeypatch.setattr(study_file, "read_toml", lambda *_, data=data: data)
+        monkeypatch.setattr(selection, "read_toml", lambda *_, data=data: data)
         try:
             accepted = isinstance(study.load(path), Study)
         except InputError as error:

@@ -13,7 +13,7 @@ from tests.support.synthetic import HEAD
 from tolstat import study
 from tolstat.common.errors import InputError
 from tolstat.study.assumptions import unselected
-from tolstat.study.tolerances import distributions, iso, meaning, zones
+from tolstat.study.tolerances import correlation, distributions, iso, zones
 from tolstat.study.tolerances.correlation import Copula
 from tolstat.study.tolerances.distributions import Distribution
 from tolstat.study.tolerances.entry import Site
@@ -217,11 +217,11 @@ def test_pearson_of_correlated_errors_is_that_of_the_errors_themselves():
     z = rng.multivariate_normal([0, 0], [[1, 0.7], [0.7, 1]], n)
     kinds = (distributions.Uniform(-1.0, 2.0), distributions.LogNormal(0.0, distributions.Normal(0.0, 0.6)))
     x, y = (own.ppf(stats.norm.cdf(column)) for own, column in zip(kinds, z.T, strict=True))
-    found = meaning.pearson(*kinds, 0.7)
+    found = correlation.pearson(*kinds, 0.7)
     assert found == pytest.approx(np.corrcoef(x, y)[0, 1], abs=0.005)
     assert found < 0.69
     copula = Copula(("a", "b"), np.array([[1.0, 0.7], [0.7, 1.0]]))
-    row = meaning.correlations(copula, dict(zip("ab", kinds, strict=True))).iloc[0]
+    row = correlation.correlations(copula, dict(zip("ab", kinds, strict=True))).iloc[0]
     assert (row["errors"], row["pairs"], row["rho"]) == ("a, b", 1, 0.7)
     assert row["spearman"] == pytest.approx(stats.spearmanr(x, y).statistic, abs=0.005)
 

@@ -22,8 +22,7 @@ import pytest
 from tests.support.environment import environment as environment
 from tolstat.campaign import blocks, verify
 from tolstat.campaign import run as campaign
-from tolstat.common import selected_results
-from tolstat.common.columns import Column
+from tolstat.common.columns import KEPT, Column, kept_columns
 from tolstat.common.counts import Counts
 from tolstat.common.tables import (
     DESIGN,
@@ -72,11 +71,11 @@ class Output:
     @property
     def columns(self) -> tuple[Column, ...]:
         """Columns of the results that are kept."""
-        return selected_results.columns(self.identity())
+        return kept_columns(self.identity())
 
     def identity(self) -> dict[str, Any]:
         """Return what decides the numbers."""
-        return {"output": self.histories} | ({} if self.results is None else {selected_results.KEY: list(self.results)})
+        return {"output": self.histories} | ({} if self.results is None else {KEPT: list(self.results)})
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,8 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from tolstat.common.columns import drawn_columns
 from tolstat.common.counts import Counts
-from tolstat.common.draw_records import columns
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.tables import Status
 from tolstat.sampling import draw_blocks, origin_blocks
@@ -108,7 +108,7 @@ def grow(
     study : Study
         The study of the larger campaign.
     errors, origin : iterable of tables
-        Errors of the further rows in consecutive blocks; how they were drawn, for methods with `draw_records.columns`.
+        Errors of the further rows in consecutive blocks; how they were drawn, for methods with `columns.drawn_columns`.
 
     Raises
     ------
@@ -164,7 +164,7 @@ def merge(paths: Sequence[Path], out: Path) -> Merged:
         tables = {"errors": (block for store, begin in shares for block in _blocks(store, store.errors, begin))}
         if stores[0].variants:
             tables["design"] = (s.design()[begin:] for s, begin in shares)
-        if columns(stores[0].sampling):
+        if drawn_columns(stores[0].sampling):
             tables["origin"] = (block for store, begin in shares for block in _blocks(store, store.origin, begin))
         write_new(out, document, OTHER_FILE, tables, partial(_copy_results, sources=stores))
         twice = sum(len(store.rows) for store in stores) - rows

@@ -32,7 +32,8 @@ from tolstat.store import layout, metadata, worst
 from tolstat.store.recorded import perturbed, settings, variants
 from tolstat.study import Study, assumptions, design
 from tolstat.study.points import names_of
-from tolstat.study.tolerances import meaning
+from tolstat.study.tolerances.correlation import correlations
+from tolstat.study.tolerances.entry import meanings
 
 PILOT = 128
 """Default number of joints in the pilot: fewer would not fill the lanes as a campaign does."""
@@ -160,11 +161,11 @@ class Plan:
     sweep : list of str
         Axes of a sweep whose values are deviations where a value of the joint is easily meant, as lines of text.
     tolerances : list of dict
-        What each entry of ``[tolerances]`` means: rows of `study.tolerances.meaning.table`.
+        What each entry of ``[tolerances]`` means: rows of `study.tolerances.entry.meanings`.
     exact : list of str
         Errors of pins and holes that nothing sets in a study with tolerances, in words; see `assumptions.unselected`.
     correlations : list of dict
-        What correlations mean for the errors themselves: rows of `study.tolerances.meaning.correlations`.
+        What correlations mean for the errors themselves: rows of `study.tolerances.correlation.correlations`.
     wilks : dict of float to int
         Minimum number of joints for a one-sided bound, by quantile.
     """
@@ -259,9 +260,9 @@ def plan(study: Study, workers: int | None = None, pilot: int = PILOT, stage: Te
         assembly=_assembly(study, iid),
         fit=fit_in_words(study),
         sweep=design.meaning(study.sweep, study.joint),
-        tolerances=text.plain(meaning.table(study.entries).to_dict("records")),
+        tolerances=text.plain(meanings(study.entries).to_dict("records")),
         exact=list(assumptions.unselected(study)),
-        correlations=text.plain(meaning.correlations(study.copula, study.tolerances).to_dict("records")),
+        correlations=text.plain(correlations(study.copula, study.tolerances).to_dict("records")),
     )
 
 

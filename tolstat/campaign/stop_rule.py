@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 from tolstat.analysis import sequential
 from tolstat.analysis.sample import Sample
 from tolstat.campaign.pool import kept_workers
-from tolstat.common import selected_results
+from tolstat.common.columns import holds
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import Limit, load_of
 from tolstat.store import Reader, Writer, worst
@@ -119,7 +119,7 @@ def run_until(study: Study, out: Path, rule: rules.Statement, run: Callable[[int
         found = "joints share lots: the interval of a stop needs independent samples"
         raise InputError([Fault("--until", found, "remove sampling.joints_per_lot, or --until")])
     for load in map(load_of, rule.limit.loads):
-        if not selected_results.holds(study.output.columns, load.name):
+        if not holds(study.output.columns, load.name):
             remedy = f"add {', '.join(load.columns)}"
             raise InputError([study.fault("output.results", f"leaves out {load.name}, which --until needs", remedy)])
     taken: list[int] = []  # looks at the joints of the file so far

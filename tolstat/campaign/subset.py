@@ -21,7 +21,7 @@ from tolstat.analysis.subset import Walk
 from tolstat.campaign import run as campaign
 from tolstat.campaign.extend import grow
 from tolstat.campaign.work import Work
-from tolstat.common.draw_records import SUBSET
+from tolstat.common.columns import SUBSET
 from tolstat.common.errors import Fault, StoreError
 from tolstat.common.loads import FloatArray
 from tolstat.store import ResultFile, Writer

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from tolstat.analysis.accuracy import LEAST_NEAR
 from tolstat.campaign.checks import ALL_CHECKS, QUICK_CHECKS, Progress, no_progress, run_checks, simulate_each
 from tolstat.campaign.what_if import check_code
-from tolstat.common import selected_results
+from tolstat.common.columns import blank_others, holds
 from tolstat.common.errors import Fault, InputError, gather
 from tolstat.common.loads import LOADS, Limit, load_of, split
 from tolstat.common.tables import Options, Status
@@ -70,7 +70,7 @@ def check_slots(store: Reader, slots: NDArray[np.intp], seed: int, make: Make) -
     """Check the joints in file slots, (m,) ascending; parameters otherwise as in `check_campaign`."""
     checks = make(parameters(store, slots), [options_of(store, slot) for slot in slots.tolist()])
     for check in checks.values():
-        selected_results.blank_others(check.results, store.columns)
+        blank_others(check.results, store.columns)
     return Verification(seed, store.row(slots), pick(store.results, slots), checks)
 
 
@@ -208,7 +208,7 @@ def check_near(
         raise InputError([Fault("--joints", found, f"give {LEAST_NEAR} or more")])
     with Writer.open(path) as store:
         limit = rule.limit_of(text, store.limits, "--near", EXAMPLE)
-        lacking = [name for name in limit.loads if not selected_results.holds(store.columns, load_of(name).name)]
+        lacking = [name for name in limit.loads if not holds(store.columns, load_of(name).name)]
         if lacking:
             remedy = "give loads that it keeps, see tolstat status"
             raise InputError([Fault("--near", f"the file does not keep {', '.join(lacking)}", remedy)])
@@ -262,7 +262,7 @@ def check_study(study: Study, joints: int | None = 24, seed: int | None = None, 
         base = simulate_each(params, options)
         checks = make(params, options)
         for results in (base, *(check.results for check in checks.values())):
-            selected_results.blank_others(results, study.output.columns)
+            blank_others(results, study.output.columns)
         each.append(Verification(seed, rows, base, checks))
     return verification.together(each)
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from tolstat.campaign import replay as replays
     from tolstat.campaign import verify as checks
     from tolstat.campaign import work as works
-    from tolstat.common import draw_records, strict, tables, units
+    from tolstat.common import columns, strict, tables, units
     from tolstat.common import loads as load_units
     from tolstat.display import answer as answers
     from tolstat.display import style, table, text
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from tolstat.report import page, workbook
     from tolstat.solver import compilation
     from tolstat.store import recorded, result_file, revolutions, verification, what_if
-    from tolstat.study import assumptions, mounting, points, rewriting, starter
+    from tolstat.study import assumptions, points, rewriting, starter
     from tolstat.study import schema as schemas
     from tolstat.study import spectrum as spectra
 else:
@@ -41,8 +41,8 @@ else:
     extend, function, plan, pool, remedy, replays, run, stop_rule, checks, works = (
         Late(f"tolstat.campaign.{name}") for name in names
     )
-    names = ("common.draw_records", "common.loads", "common.strict", "common.tables", "common.units", "joint.sections")
-    draw_records, load_units, strict, tables, units, sections = (Late(f"tolstat.{name}") for name in names)
+    names = ("common.columns", "common.loads", "common.strict", "common.tables", "common.units", "joint.sections")
+    columns, load_units, strict, tables, units, sections = (Late(f"tolstat.{name}") for name in names)
     answers, style, table, text = (Late(f"tolstat.display.{name}") for name in ("answer", "style", "table", "text"))
     names = ("accuracy", "joints", "causes.errors", "drawings.answer", "drawings.views", "fatigue.pylife")
     accuracy, joints, causes, drawings, views, pylife = (Late(f"tolstat.questions.{name}") for name in names)
@@ -50,7 +50,5 @@ else:
     reports, page, workbook, compilation = (Late(f"tolstat.{name}") for name in names)
     names = ("recorded", "result_file", "revolutions", "verification", "what_if")
     recorded, result_file, revolutions, verification, what_if = (Late(f"tolstat.store.{name}") for name in names)
-    names = ("assumptions", "mounting", "points", "rewriting", "schema", "spectrum", "starter")
-    assumptions, mounting, points, rewriting, schemas, spectra, starter = (
-        Late(f"tolstat.study.{name}") for name in names
-    )
+    names = ("assumptions", "points", "rewriting", "schema", "spectrum", "starter")
+    assumptions, points, rewriting, schemas, spectra, starter = (Late(f"tolstat.study.{name}") for name in names)

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TextIO
 import typer
 
 from tolstat import __version__
-from tolstat.cli._library import answers, assumptions, compilation, design, mounting, pool, run, table, works
+from tolstat.cli._library import answers, assumptions, compilation, design, points, pool, run, table, works
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.files import atomic_write, make_parent
 from tolstat.display.options import Opt
@@ -228,7 +228,9 @@ def print_study_notes(path: Path, study: Study) -> None:
     for note in study.signals:
         say(f"note: {note}")
     axial = [joint.shaft.axial for joint in study.joints]
-    if note := mounting.note(study.tolerances, axial, mounting.command(str(path), path.stem, study.joint)):
+    if note := points.note_on_shafts(
+        study.tolerances, axial, points.with_free_shaft(str(path), path.stem, study.joint)
+    ):
         say(f"note: {note}")
     print_warnings(path, study.joints, study.variants)
     for fault in assumptions.warnings(study):

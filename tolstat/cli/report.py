@@ -6,7 +6,7 @@ import math
 from pathlib import Path
 from typing import Annotated
 
-from tolstat.cli._library import compilation, draw_records, page, recorded, reports, revolutions, stores
+from tolstat.cli._library import columns, compilation, page, recorded, reports, revolutions, stores
 from tolstat.cli._shared import deliver, progress, say
 from tolstat.common.cores import available_cores
 from tolstat.common.files import check_target
@@ -78,7 +78,7 @@ def _page(file: Path, out: Path, accepted: float, again: int | None, point: str,
             again = page.REPLAYED if has_histories or done else 0
             if not again:
                 say(f"{file} has pending joints: the page shows the others, and none over the input angle (--replay)")
-        if again and view.method in draw_records.DRAWN and not has_histories:
+        if again and view.method in columns.DRAWN and not has_histories:
             compilation.announce()
         with progress("page") as shown:
             page.write_page(view, out, accepted, again, shown.stage, point, available_cores(), full, brief)

@@ -1,13 +1,21 @@
-"""Flat columns of the tables, as the result file and every CSV have them."""
+"""Flat columns of the tables, as the result file and every CSV have them.
+
+A campaign keeps all columns of the results, or those that ``[output] results`` of its study selects. Columns on the
+course of a simulation (status, closure, period, counts) are always kept: results are meaningless without them. Sampling
+methods that need it have a table of how each joint was drawn, which the result file keeps in the group ``origin``.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.fields import Field
+from tolstat.common.fields import Field, dtype_of
+from tolstat.common.load_kinds import LOAD_KINDS
+from tolstat.common.loads import LOADS
 from tolstat.common.tables import DESIGN_FIELDS, ERROR_FIELDS, LEDGER_FIELDS, RESULT_FIELDS
 
 
@@ -44,3 +52,95 @@ DESIGN_COLUMNS = flat(DESIGN_FIELDS)
 LEDGER_COLUMNS = flat(LEDGER_FIELDS)
 ERROR_COLUMNS = flat(ERROR_FIELDS)
 RESULT_COLUMNS = flat(RESULT_FIELDS)
+KEPT = "output.results"
+"""Key in the identity of a study that holds the names of the selected columns; absent where all are kept."""
+OPTIONAL_FIELDS = (
+    "mode_share",
+    "equivalent_load",
+    "clearance",
+    *(field.name for kind in LOAD_KINDS for field in kind.statistics().values()),
+)
+"""Fields of the results that a study may leave out."""
+RESULT_NAMES = tuple(c.name for c in RESULT_COLUMNS)
+
+
+def kept_names(names: Iterable[str]) -> list[str] | None:
+    """Optional columns among `names`, in the order of the table; None if no optional column is left out."""
+    optional = [c.name for c in RESULT_COLUMNS if c.field in OPTIONAL_FIELDS]
+    among = [name for name in optional if name in set(names)]
+    return None if among == optional else among
+
+
+def kept_columns(identity: Mapping[str, Any]) -> tuple[Column, ...]:
+    """Columns of the results that a campaign keeps, in the order of the table.
+
+    Parameters
+    ----------
+    identity : mapping
+        Identity of the campaign's study, by dotted key.
+
+    Raises
+    ------
+    ValueError
+        When the identity holds anything but a list of column names.
+    """
+    names = identity.get(KEPT)
+    if names is None:
+        return RESULT_COLUMNS
+    if not isinstance(names, list) or any(name not in RESULT_NAMES for name in names):
+        raise ValueError(f"{KEPT} is {names!r}, not a list of columns of the results")
+    return tuple(c for c in RESULT_COLUMNS if c.field not in OPTIONAL_FIELDS or c.name in names)
+
+
+def blank_others(results: NDArray[np.void], kept: Iterable[Column]) -> None:
+    """Write NaN to the columns of a table RESULT that are not in `kept`; all of these have type f8."""
+    names = {c.name for c in kept}
+    for c in RESULT_COLUMNS:
+        if c.name not in names:
+            c.of(results)[:] = np.nan
+
+
+def holds(kept: Iterable[Column], load: str) -> bool:
+    """Whether a load that can have a limit can be read from the columns kept."""
+    return {c.name for c in kept}.issuperset(LOADS[load].columns)
+
+
+IMPORTANCE_FIELDS = (
+    Field("component", "1", "what it was drawn from: 0 the tolerances, k proposal k; -1 the nominal joint", "i4"),
+    Field("weight", "1", "density of its errors under the tolerances over that under the mixture; 0 if not drawn"),
+)
+SUBSET_FIELDS = (
+    Field("level", "1", "level of the subset simulation: 0 is drawn from the tolerances, -1 the nominal joint", "i4"),
+    Field("parent", "1", "row of the joint whose errors were moved to give these; -1 at level 0", "i8"),
+)
+DRAWN_FIELDS: dict[str, tuple[Field, ...]] = {"importance": IMPORTANCE_FIELDS, "subset": SUBSET_FIELDS}
+"""Columns of the table by sampling method; other methods have no such table."""
+IMPORTANCE, SUBSET = dtype_of(IMPORTANCE_FIELDS), dtype_of(SUBSET_FIELDS)
+
+METHODS = {
+    "random": "random sampling",
+    "sobol": "Sobol' points",
+    "lhs": "Latin hypercube",
+    "sweep": "sweep",
+    "importance": "importance sampling",
+    "pick_freeze": "pick-freeze design",
+}
+"""Sampling methods in words."""
+DRAWN = ("random", "sobol", "lhs")
+"""Sampling methods that draw every joint from the tolerances, all with the same weight."""
+
+
+def drawn_columns(sampling: Mapping[str, Any]) -> tuple[Column, ...]:
+    """Columns of the table; empty where the method needs none.
+
+    Parameters
+    ----------
+    sampling : mapping
+        The attribute ``sampling`` of a result file.
+    """
+    return flat(DRAWN_FIELDS.get(sampling["method"], ()))
+
+
+def drawn_dtype(sampling: Mapping[str, Any]) -> np.dtype[np.void]:
+    """Structured type of a row of the table."""
+    return dtype_of(DRAWN_FIELDS[sampling["method"]])

@@ -52,6 +52,26 @@ class InputError(TolstatError):
         super().__init__("\n".join(str(fault) for fault in self.faults))
 
 
+def input_error(place: object, found: str, remedy: str) -> InputError:
+    """Error with one fault, see `Fault`."""
+    return InputError([Fault(str(place), found, remedy)])
+
+
+@contextmanager
+def collected() -> Iterator[list[Fault]]:
+    """List for the faults found inside, which are raised at the end.
+
+    Raises
+    ------
+    InputError
+        When there are any.
+    """
+    faults: list[Fault] = []
+    yield faults
+    if faults:
+        raise InputError(faults)
+
+
 @contextmanager
 def gather(faults: list[Fault]) -> Iterator[None]:
     """Add the faults of an `InputError` raised inside to `faults` and continue, so that all are reported at once."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import math
 import os
 import re
 import secrets
@@ -11,7 +12,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from tolstat.common.errors import Fault, InputError
+from tolstat.common.errors import input_error
 
 MAX_INPUT_BYTES = 64_000_000
 """Largest size of a text file that is read, bytes."""
@@ -72,6 +73,15 @@ def read_input(path: Path) -> str:
     return content.decode("utf-8-sig")
 
 
+def finite(cell: str | None) -> float:
+    """Number in a cell of a CSV file; NaN where there is no finite one."""
+    try:
+        value = float(cell or "")
+    except ValueError:
+        return math.nan
+    return value if math.isfinite(value) else math.nan
+
+
 def about_encoding(error: UnicodeDecodeError) -> tuple[str, str]:
     """Say what a file is that is not UTF-8 text, and the remedy."""
     content, remedy = error.object, "save it as UTF-8"
@@ -98,14 +108,14 @@ def check_target(path: Path, *inputs: Path) -> None:
     """
     place = str(path)
     if path.is_dir():
-        raise InputError([Fault(place, "cannot be written: is a folder", "give the path of a file in it")])
+        raise input_error(place, "cannot be written: is a folder", "give the path of a file in it")
     above = next((folder for folder in path.parents if folder.exists()), path.parent)
     if not above.is_dir():
-        raise InputError([Fault(place, f"cannot be written: {above} is no folder", "give another folder")])
+        raise input_error(place, f"cannot be written: {above} is no folder", "give another folder")
     if not os.access(above, os.W_OK | os.X_OK):
-        raise InputError([Fault(place, f"cannot be written: {above} is read-only", "give another folder")])
+        raise input_error(place, f"cannot be written: {above} is read-only", "give another folder")
     if any(path.exists() and given.exists() and path.samefile(given) for given in inputs):
-        raise InputError([Fault(place, "cannot be written: it is the input", "give the output another name")])
+        raise input_error(place, "cannot be written: it is the input", "give the output another name")
 
 
 def make_parent(path: Path) -> None:

@@ -1,9 +1,15 @@
-"""Quantities as drawings write them: the sign before the number, angles in minutes, units without a dot between."""
+"""Quantities as drawings write them: the sign before the number, angles in minutes, units without a dot between.
+
+Their JSON schema is for editors, see `study.schema`. Keywords of this package in it: ``x-unit``, the SI unit of a
+quantity, ``"error"`` for that of the error that an entry is for; ``x-table``, the name of a definition that stands in
+place of the property.
+"""
 
 from __future__ import annotations
 
 import re
-from typing import NamedTuple
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 DIAMETER = "⌀"
 PLUS_MINUS = "±"
@@ -29,9 +35,10 @@ class Written(NamedTuple):
     unit: str
 
 
-_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:nan|inf(?:inity)?)(?![a-z])"
+_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+_NOT_FINITE = r"[+-]?(?:nan|inf(?:inity)?)(?![a-z])"
 _QUANTITY = re.compile(
-    rf"\s*(?P<number>{_NUMBER})"
+    rf"\s*(?P<number>{_NUMBER}|{_NOT_FINITE})"
     r"\s*(?P<unit>|(?:1?\s*/\s*)?[A-Za-zµμ°%][\w µμ°%*/^().·⁻¹²³⁴-]{0,40})\s*",
     re.ASCII | re.IGNORECASE,
 )
@@ -102,3 +109,44 @@ def _degrees(text: str) -> float | None:
         return None
     size = degrees + minutes / 60.0 + seconds / 3600.0
     return -size if angle["sign"] == "-" else size
+
+
+PURE = rf"^\s*{_NUMBER}\s*%?\s*$"
+"""Pattern of a text that is a number, for quantities without unit."""
+_SIGN = r"(?:±|\+/?[-−]|[⌀ØøΦφ∅]|[Dd]ia(?:meter|\.)?)?"
+WITH_UNIT = rf"^\s*{_SIGN}\s*{_NUMBER}\s*(?:1\s*/|[eE][^\d+-]|[A-DF-Za-df-zµμ°′'%/(])"
+"""Pattern of the beginning of a quantity with a unit. It accepts more than is read: the unit is checked by `units`.
+Without look-around, which some editors' regular expressions lack."""
+
+
+def schema_of_quantity(unit: str, example: str, words: tuple[str, ...] = ()) -> dict[str, Any]:
+    """JSON schema of a quantity as a file writes it.
+
+    Parameters
+    ----------
+    unit : str
+        SI unit; of unit ``"1"`` are bare numbers, of all others texts with a number and a unit.
+    example : str
+        How such a value is written.
+    words : tuple of str
+        Words that may stand in place of a quantity.
+    """
+    if unit == "1":
+        return {"type": ["number", "string"], "pattern": PURE, "x-unit": unit}
+    if words:
+        written = {"type": "string", "pattern": WITH_UNIT}
+        return {"anyOf": [{"enum": list(words)}, written], "x-unit": unit, "examples": [example]}
+    return {"type": "string", "pattern": WITH_UNIT, "x-unit": unit, "examples": [example]}
+
+
+def schema_of_positive(own: dict[str, Any]) -> dict[str, Any]:
+    """JSON schema of a quantity that must be above zero."""
+    bounded = own | {"exclusiveMinimum": 0}
+    return bounded | schema_of_sign(bounded)
+
+
+def schema_of_sign(own: Mapping[str, Any]) -> dict[str, Any]:
+    """Keyword that refuses a minus sign in the text of a quantity that must not be negative."""
+    if "string" not in str(own.get("type", own)) or 0 not in (own.get("minimum"), own.get("exclusiveMinimum")):
+        return {}
+    return {"not": {"type": "string", "pattern": r"^\s*-"}}

@@ -2,23 +2,30 @@
 
 from __future__ import annotations
 
+import ast
 import difflib
+import inspect
 import json
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import cache
+from importlib import import_module
+from itertools import pairwise
 from pathlib import Path
 from types import NoneType
-from typing import Any, TypeVar, get_args
+from typing import Any, TypeVar, get_args, get_origin
 
-from pydantic import BaseModel, ConfigDict, Field, GetJsonSchemaHandler, ValidationError
+import annotated_types
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, GetJsonSchemaHandler, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import CoreSchema, PydanticCustomError
 
-from tolstat.common import json_schema, toml_lines, units
-from tolstat.common.errors import Fault, InputError
+from tolstat.common import toml_lines, units
+from tolstat.common.errors import Fault, InputError, input_error
 from tolstat.common.files import about_encoding, read_input
+from tolstat.common.notation import schema_of_sign
 
 
 class Strict(BaseModel):
@@ -28,9 +35,9 @@ class Strict(BaseModel):
 
     @classmethod
     def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        """Return the JSON schema with bounds of quantities, see `json_schema.complete`."""
+        """Return the JSON schema with bounds of quantities."""
         schema = handler(core)
-        json_schema.complete(handler.resolve_ref_schema(schema), cls, units.SIGNS)
+        _complete(handler.resolve_ref_schema(schema), cls)
         return schema
 
 
@@ -50,10 +57,10 @@ def read_toml(path: Path, text: str | None = None) -> dict[str, Any]:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         line, cause, remedy = toml_lines.of_syntax(error, text)
-        raise InputError([Fault(f"{path}:{line}", f"is not TOML: {cause}", remedy)]) from error
+        raise input_error(f"{path}:{line}", f"is not TOML: {cause}", remedy) from error
     except RecursionError as error:
         remedy = "no key needs more than a few: remove brackets"
-        raise InputError([Fault(str(path), "has too many tables and lists inside each other", remedy)]) from error
+        raise input_error(path, "has too many tables and lists inside each other", remedy) from error
 
 
 def read_text(path: Path) -> str:
@@ -68,11 +75,9 @@ def read_text(path: Path) -> str:
         return read_input(path)
     except OSError as error:
         reason = error.strerror or str(error)
-        raise InputError(
-            [Fault(str(path), f"cannot be read: {reason}", "check the path and its permissions")]
-        ) from error
+        raise input_error(path, f"cannot be read: {reason}", "check the path and its permissions") from error
     except UnicodeDecodeError as error:
-        raise InputError([Fault(str(path), *about_encoding(error))]) from error
+        raise input_error(path, *about_encoding(error)) from error
 
 
 def read_section(place: Path, text: str, name: str) -> dict[str, Any]:
@@ -86,7 +91,7 @@ def read_section(place: Path, text: str, name: str) -> dict[str, Any]:
     section = read_toml(place, text).get(name, {})
     if not isinstance(section, dict):
         remedy = "the file is damaged: run its study again into another one"
-        raise InputError([Fault(str(place), f"holds a study whose {name} is no table", remedy)])
+        raise input_error(place, f"holds a study whose {name} is no table", remedy)
     return section
 
 
@@ -253,6 +258,8 @@ def _fields_around(model: type[BaseModel], location: Sequence[int | str]) -> dic
     for part in location[:-1]:
         if isinstance(part, int):
             current = next(iter(get_args(current)), None)
+        elif get_origin(current) is dict:
+            current = get_args(current)[1]
         elif part not in (fields := getattr(current, "model_fields", {})):
             return {}
         else:
@@ -289,3 +296,84 @@ def refuse(found: str, remedy: str, *keys: str) -> PydanticCustomError:
     has it: faults show the numbers and units of the user.
     """
     return PydanticCustomError("refused", "{found}", {"found": found, "remedy": remedy, "keys": keys})
+
+
+def _complete(schema: dict[str, Any], model: type[BaseModel]) -> None:
+    """Add to the JSON schema of a model what pydantic leaves out of it.
+
+    Parameters
+    ----------
+    schema : dict
+        Schema of the model, changed in place: meanings that are docstrings, bounds of quantities, defaults that are
+        made by a function; titles and null, which TOML does not have, are removed.
+    model : type
+        The model.
+    """
+    schema.pop("title", None)
+    meanings = _meanings(model)
+    for name, field in model.model_fields.items():
+        own = schema["properties"][field.alias or name]
+        if name in meanings:
+            own.setdefault("description", meanings[name])
+        own.pop("title", None)
+        rest = [inner for inner in own.get("anyOf", []) if inner != {"type": "null"}]
+        if len(rest) == 1:
+            del own["anyOf"]
+            own |= rest[0] | own
+        elif rest:
+            own["anyOf"] = rest
+        own |= _bounds(field, own)
+        if field.default_factory and (made := field.get_default(call_default_factory=True)):
+            own["default"] = made
+        if own.get("default", 0) is None or isinstance(field.default, BaseModel):
+            own.pop("default", None)
+
+
+def _meanings(model: type[BaseModel]) -> dict[str, str]:
+    """Docstring of each field, of the model itself and of those that it extends.
+
+    Pydantic's ``use_attribute_docstrings`` reads them while a model is defined, which all commands would wait for.
+    """
+    bases = [base for base in reversed(model.__mro__) if issubclass(base, BaseModel) and base is not BaseModel]
+    return {name: text for base in bases for name, text in _docstrings(base.__module__).get(base.__name__, {}).items()}
+
+
+@cache
+def _docstrings(module: str) -> dict[str, dict[str, str]]:
+    """Docstrings below the attributes of each class of a module."""
+    return {
+        node.name: {
+            field.target.id: " ".join(str(below.value.value).split())
+            for field, below in pairwise(node.body)
+            if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name)
+            if isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant)
+        }
+        for node in ast.parse(inspect.getsource(import_module(module))).body
+        if isinstance(node, ast.ClassDef)
+    }
+
+
+def _bounds(field: FieldInfo, own: Mapping[str, Any]) -> dict[str, Any]:
+    """Bounds of a quantity, or of a quantity that may be left out."""
+    found: dict[str, Any] = {}
+    for item in _metadata(field.annotation, field.metadata):
+        match item:
+            case annotated_types.Gt(gt=bound):
+                found["exclusiveMinimum"] = bound
+            case annotated_types.Ge(ge=bound):
+                found["minimum"] = bound
+            case annotated_types.Lt(lt=bound):
+                found["exclusiveMaximum"] = bound
+            case annotated_types.Le(le=bound):
+                found["maximum"] = bound
+            case AfterValidator(func=func) if func in units.SIGNS:
+                found[units.SIGNS[func]] = 0
+    return found | schema_of_sign({**own, **found})
+
+
+def _metadata(annotation: Any, metadata: list[Any]) -> Iterator[Any]:
+    """Metadata of an annotation, and of those inside it that it is a union of."""
+    yield from metadata
+    for inner in get_args(annotation):
+        if hasattr(inner, "__metadata__"):
+            yield from inner.__metadata__

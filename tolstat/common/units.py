@@ -17,36 +17,41 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 from pydantic import AfterValidator, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
-from tolstat.common import json_schema, notation
-from tolstat.common.notation import DIAMETER, PLUS_MINUS, Written
+from tolstat.common import notation
+from tolstat.common.notation import DIAMETER, PLUS_MINUS, Written, schema_of_quantity
 
 if TYPE_CHECKING:
     import pint
 
 ValueT = TypeVar("ValueT", bound=float | str)
 
-EXAMPLES = {
-    "m": "0.1 mm",
-    "m^2": "11.34 cm^2",
-    "m^4": "1.02e-7 m^4",
-    "rad": "0.5 deg",
-    "rad/s": "500 rpm",
-    "s": "5000 h",
-    "N": "700 N",
-    "N*m": "100 N*m",
-    "N*m/rad": "5.9e5 N*m/rad",
-    "N/m": "1.2e6 N/mm",
-    "N/m^2": "7.5e7 N/mm^2",
-    "N*s/m": "200 N*s/m",
-    "Pa": "210 GPa",
-    "1/m^2": "2.5 MPa/kN",
-    "1/m^3": "0.2 MPa/(N*m)",
-    "kg": "0.32 kg",
-    "kg*m^2": "0.01 kg*m^2",
-    "kg/m^3": "7700 kg/m^3",
-    "1": "0.5",
+_USUAL: dict[str, tuple[str, dict[str, float]]] = {
+    "m": ("0.1 mm", {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "μm": 1e-6, "cm": 1e-2}),
+    "m^2": ("11.34 cm^2", {"m^2": 1.0, "cm^2": 1e-4, "mm^2": 1e-6}),
+    "m^4": ("1.02e-7 m^4", {"m^4": 1.0, "cm^4": 1e-8}),
+    "rad": ("0.5 deg", {"rad": 1.0, "mrad": 1e-3, "deg": 0.017453292519943295, "°": 0.017453292519943295}),
+    "rad/s": ("500 rpm", {"rad/s": 1.0, "rpm": 0.10471975511965977}),
+    "s": ("5000 h", {"s": 1.0, "min": 60.0, "h": 3600.0}),
+    "N": ("700 N", {"N": 1.0, "kN": 1e3}),
+    "N*m": ("100 N*m", {"N*m": 1.0, "Nm": 1.0, "kN*m": 1e3}),
+    "N*m/rad": ("5.9e5 N*m/rad", {"N*m/rad": 1.0}),
+    "N/m": ("1.2e6 N/mm", {"N/m": 1.0, "N/mm": 1e3}),
+    "N/m^2": ("7.5e7 N/mm^2", {"N/m^2": 1.0, "N/mm^2": 1e6}),
+    "N*s/m": ("200 N*s/m", {"N*s/m": 1.0}),
+    "Pa": ("210 GPa", {"Pa": 1.0, "MPa": 1e6, "GPa": 1e9, "N/mm^2": 1e6}),
+    "1/m^2": ("2.5 MPa/kN", {"MPa/kN": 1e3}),
+    "1/m^3": ("0.2 MPa/(N*m)", {"MPa/Nm": 1e6, "MPa/(N*m)": 1e6}),
+    "kg": ("0.32 kg", {"kg": 1.0, "g": 1e-3}),
+    "kg*m^2": ("0.01 kg*m^2", {"kg*m^2": 1.0}),
+    "kg/m^3": ("7700 kg/m^3", {"kg/m^3": 1.0}),
+    "1": ("0.5", {"": 1.0, "%": 1e-2, "ppm": 1e-6}),
 }
+"""By SI unit, how a value is written, and units as studies usually write them: the value times the factor has the bits
+that pint gives it. Pint, which knows all others, takes 0.2 s to load."""
+EXAMPLES = {unit: example for unit, (example, _) in _USUAL.items()}
 """How a value of each unit is written; shown in the remedy of a fault."""
+FACTORS = {unit: factors for unit, (_, factors) in _USUAL.items()}
+"""Factors of the units of `_USUAL`."""
 DISPLAY_UNITS = {
     "m": ("mm", 1e3),
     "rad": ("deg", 180.0 / math.pi),
@@ -56,33 +61,6 @@ DISPLAY_UNITS = {
     "1": ("", 1.0),
 }
 """Unit in which figures show errors of each SI unit, and the factor to it."""
-
-
-FACTORS: dict[str, dict[str, float]] = {
-    "m": {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "μm": 1e-6, "cm": 1e-2},
-    "m^2": {"m^2": 1.0, "cm^2": 1e-4, "mm^2": 1e-6},
-    "m^4": {"m^4": 1.0, "cm^4": 1e-8},
-    "rad": {"rad": 1.0, "mrad": 1e-3, "deg": 0.017453292519943295, "°": 0.017453292519943295},
-    "rad/s": {"rad/s": 1.0, "rpm": 0.10471975511965977},
-    "s": {"s": 1.0, "min": 60.0, "h": 3600.0},
-    "N": {"N": 1.0, "kN": 1e3},
-    "N*m": {"N*m": 1.0, "Nm": 1.0, "kN*m": 1e3},
-    "N*m/rad": {"N*m/rad": 1.0},
-    "N/m": {"N/m": 1.0, "N/mm": 1e3},
-    "N/m^2": {"N/m^2": 1.0, "N/mm^2": 1e6},
-    "N*s/m": {"N*s/m": 1.0},
-    "Pa": {"Pa": 1.0, "MPa": 1e6, "GPa": 1e9, "N/mm^2": 1e6},
-    "1/m^2": {"MPa/kN": 1e3},
-    "1/m^3": {"MPa/Nm": 1e6, "MPa/(N*m)": 1e6},
-    "kg": {"kg": 1.0, "g": 1e-3},
-    "kg*m^2": {"kg*m^2": 1.0},
-    "kg/m^3": {"kg/m^3": 1.0},
-    "1": {"": 1.0, "%": 1e-2, "ppm": 1e-6},
-}
-"""By SI unit, units as studies usually write them: the value times the factor has the bits that pint gives it.
-
-Pint, which knows all others, takes 0.2 s to load.
-"""
 
 
 def shown(value: float, unit: str, digits: int = 3) -> str:
@@ -116,8 +94,7 @@ _NOT_PARSED = (
 
 def _fault(found: str, unit: str, remedy: str = "") -> PydanticCustomError:
     example = f'write "{EXAMPLES.get(unit, "1 " + unit)}"' if unit != "1" else "write a number without unit"
-    remedy = remedy or example
-    return PydanticCustomError("quantity", "{found}", {"found": found, "remedy": remedy})
+    return PydanticCustomError("quantity", "{found}", {"found": found, "remedy": remedy or example})
 
 
 def to_si(value: object, unit: str, mark: str = "") -> float:
@@ -335,7 +312,7 @@ class Quantity:
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         """Return the JSON schema of the quantity as a file writes it."""
-        return json_schema.quantity(self.unit, EXAMPLES[self.unit], self.words)
+        return schema_of_quantity(self.unit, EXAMPLES[self.unit], self.words)
 
 
 def _signed(holds: Callable[[float], bool], must: str, remedy: str) -> Callable[[ValueT], ValueT]:

@@ -17,7 +17,7 @@ from tolstat.analysis import allocation, reweight
 from tolstat.analysis.prediction import DELIVERY
 from tolstat.analysis.reweight import Ratios
 from tolstat.analysis.sample import CONFIDENCE, Sample
-from tolstat.common import selected_results
+from tolstat.common.columns import holds
 from tolstat.common.errors import Fault, InputError, gather
 from tolstat.common.loads import ANY_LIMIT, FloatArray, split, unit_text
 from tolstat.common.tables import Status
@@ -300,7 +300,7 @@ def _read_request(view: View, targets: Sequence[str], costs: Path | None, keep: 
         with gather(faults):
             statements.append(rule.parse(target, "", "--target", EXAMPLE, view.limits))
             loads = statements[-1].limit.loads
-            lacking = [name for name in loads if not selected_results.holds(view.columns, split(name)[0])]
+            lacking = [name for name in loads if not holds(view.columns, split(name)[0])]
             if lacking:
                 kept = f"give one of: {', '.join(view.kept_loads)}"
                 faults.append(Fault("--target", f"the file does not keep {', '.join(lacking)}", kept))

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tolstat.analysis import accuracy
 from tolstat.campaign.remedy import remedy
-from tolstat.common import selected_results
+from tolstat.common.columns import holds
 from tolstat.common.load_kinds import BUSHINGS
 from tolstat.common.tables import Status
 from tolstat.display.answer import Answer, Document, Part, Row, Rows, Sentence, Table, plain
@@ -85,7 +85,7 @@ def _rows(store: Reader) -> Rows:
     gamma = relative_errors(results, design["group"])
     for b, bushing in enumerate(BUSHINGS):
         for load, (letter, unit) in enumerate((("F", "N"), ("T", "N*m"))):
-            if selected_results.holds(store.columns, f"{bushing}.{letter}"):
+            if holds(store.columns, f"{bushing}.{letter}"):
                 columns[f"{bushing}.{letter} [{unit}]"] = results[f"{letter}_max"][:, b].tolist()
                 columns[f"{bushing}.Gamma_{letter} [%]"] = gamma[:, b, load].tolist()
     return rows_of(columns | _reference(store))

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from tolstat.analysis import difference
 from tolstat.analysis.design import Claim
 from tolstat.analysis.sample import Sample
+from tolstat.common.columns import DRAWN
 from tolstat.common.counts import Counts
-from tolstat.common.draw_records import DRAWN
 from tolstat.common.errors import Fault, InputError, StoreError
 from tolstat.common.loads import ANY_LIMIT, unit_text
 from tolstat.common.strict import did_you_mean

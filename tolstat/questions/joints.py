@@ -17,7 +17,8 @@ from tolstat.display import drawing, style, text
 from tolstat.display.answer import Answer, Axes, Column, Panel, Panels, Part, Rows, Sentence, Table, plain
 from tolstat.questions.shares import inapplicable, rows_of, share, word
 from tolstat.store.view import View
-from tolstat.study.tolerances import meaning
+from tolstat.study.tolerances.correlation import correlations
+from tolstat.study.tolerances.entry import meanings
 
 MAX_JOINTS = 20_000
 """Number of joints (the first ones) whose errors are compared."""
@@ -44,7 +45,7 @@ ENTRIES = (
     Column("sigma", lambda row: units.shown(row["sigma"], row["unit"])),
     Column("outside", lambda row: "-" if row["outside"] is None else text.percent(row["outside"])),
 )
-"""Columns of the table ``entries``, see `meaning.table`."""
+"""Columns of the table ``entries``, see `meanings`."""
 CORRELATED = (
     Column("correlated errors", word("errors")),
     Column("pairs", word("pairs")),
@@ -52,7 +53,7 @@ CORRELATED = (
     Column("Pearson", lambda row: f"{row['pearson']:.3f}"),
     Column("Spearman", lambda row: f"{row['spearman']:.3f}"),
 )
-"""Columns of the table ``correlations``, see `meaning.correlations`."""
+"""Columns of the table ``correlations``, see `correlations`."""
 
 
 def modes(view: View) -> Answer:
@@ -137,8 +138,8 @@ def tolerances(view: View) -> Answer:
     Returns
     -------
     Answer
-        Table ``entries``, see `study.tolerances.meaning.table`, and of correlated errors table ``correlations``, see
-        `study.tolerances.meaning.correlations`.
+        Table ``entries``, see `meanings`, and of correlated errors table ``correlations``, see
+        `correlations`.
 
     Raises
     ------
@@ -150,8 +151,8 @@ def tolerances(view: View) -> Answer:
     if not view.sampled:
         remedy = 'give the result file of a study with [tolerances] and sampling.method "random", "sobol" or "lhs"'
         raise inapplicable(view, "holds joints that are no random sample", remedy)
-    entries = meaning.table(view.study.entries).to_dict("records")
-    correlated = meaning.correlations(view.study.copula, view.study.tolerances).to_dict("records")
+    entries = meanings(view.study.entries).to_dict("records")
+    correlated = correlations(view.study.copula, view.study.tolerances).to_dict("records")
     parts: list[Part] = [Table("entries", "Entries of [tolerances]", ENTRIES, entries, {"outside": "1"})]
     words = "Sigma: standard deviation of one error. Outside: share of the parts outside the drawing's band or zone."
     if correlated:

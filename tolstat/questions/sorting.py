@@ -22,8 +22,8 @@ from tolstat.store.recorded import mentions
 from tolstat.store.view import View
 from tolstat.study import costs as cost_tables
 from tolstat.study import scaling
-from tolstat.study import sorting as gauges
-from tolstat.study.sorting import PARTS, Gauge
+from tolstat.study import selective as gauges
+from tolstat.study.selective import PARTS, Gauge
 
 MADE, SCRAPPED, INSPECTED = "all joints", "parts scrapped", "joints rejected"
 """Stages: parts as they are made; without those that are scrapped; without joints that are rejected, too."""

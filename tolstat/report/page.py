@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from tolstat import questions
-from tolstat.common import draw_records, loads, notation, strict, units
+from tolstat.common import loads, notation, strict, units
+from tolstat.common.columns import METHODS
 from tolstat.common.errors import Fault, NotApplicable, StoreError, TolstatError
 from tolstat.common.tables import SCHEMA_VERSION, VALID
 from tolstat.display import html, progress, table, text
@@ -280,9 +281,7 @@ def _card(verdict: Verdict) -> Card:
 
 
 def _without_verdict(view: View) -> Card:
-    why = (
-        "The study sets no limits" if view.sampled else f"Joints of a {draw_records.METHODS[view.method]} are no sample"
-    )
+    why = "The study sets no limits" if view.sampled else f"Joints of a {METHODS[view.method]} are no sample"
     return Card("", f"{why}, so there is no verdict.", "")
 
 

@@ -19,7 +19,7 @@ from tolstat.store.recorded import mentions
 from tolstat.store.view import View
 from tolstat.study.axes import streams_of
 from tolstat.study.tolerances.distributions import score
-from tolstat.study.tolerances.entry import KnownEntry
+from tolstat.study.tolerances.entry import Toleranced
 
 KEYS = ("known_from", "law")
 """Keys of an entry of ``[tolerances]`` that is known from measured parts."""
@@ -45,12 +45,12 @@ class KnownParts:
     ----------
     view : View
         The file.
-    entries : tuple of KnownEntry
+    entries : tuple of Toleranced
         Entries of its study that are known from measured parts.
     """
 
     view: View
-    entries: tuple[KnownEntry, ...]
+    entries: tuple[Toleranced, ...]
 
     def share(self, name: str, confidence: float) -> KnownShare:
         """Share above the limit of a load, or above at least one limit (`ANY_LIMIT`).

@@ -15,9 +15,8 @@ import numpy as np
 from h5py import h5d, h5p
 from numpy.typing import NDArray
 
-from tolstat.common import draw_records, selected_results
 from tolstat.common.channels import BUSHING_LOADS, MEASURING, SHAFT_LOADS, LoadHistory, channels_of
-from tolstat.common.columns import DESIGN_COLUMNS, ERROR_COLUMNS, LEDGER_COLUMNS, Column
+from tolstat.common.columns import DESIGN_COLUMNS, ERROR_COLUMNS, LEDGER_COLUMNS, Column, drawn_columns, kept_columns
 from tolstat.common.load_kinds import BUSHINGS, CONTACTS, PINS, SHAFTS
 from tolstat.common.tables import SCHEMA_VERSION, HistorySpec, Mode, Status
 from tolstat.store import metadata as documents
@@ -92,9 +91,9 @@ def columns(metadata: Metadata) -> dict[str, tuple[Column, ...]]:
     groups = {"errors": ERROR_COLUMNS}
     if metadata.design.variants:
         groups["design"] = DESIGN_COLUMNS
-    if drawn := draw_records.columns(metadata.sampling):
+    if drawn := drawn_columns(metadata.sampling):
         groups["origin"] = drawn
-    return groups | {"results": selected_results.columns(metadata.identity), "ledger": LEDGER_COLUMNS}
+    return groups | {"results": kept_columns(metadata.identity), "ledger": LEDGER_COLUMNS}
 
 
 def datasets(metadata: Metadata) -> list[Stored]:
@@ -143,7 +142,7 @@ def create(file: h5py.File, metadata: Metadata, tables: Tables) -> None:
     metadata : Metadata
         What it says of itself.
     tables : Tables
-        ``errors``; ``design`` of a study that lists its joints; ``origin`` for methods with `draw_records.columns`.
+        ``errors``; ``design`` of a study that lists its joints; ``origin`` for methods with `columns.drawn_columns`.
     """
     n, first, codes, groups = metadata.n, metadata.first_row, meanings_of(metadata), columns(metadata)
     put_attributes(file, {"filetype": FILETYPE, "schema_version": SCHEMA_VERSION, "description": ABOUT})

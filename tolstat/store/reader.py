@@ -17,8 +17,16 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common import draw_records, selected_results, tables
-from tolstat.common.columns import DESIGN_COLUMNS, ERROR_COLUMNS, Column
+from tolstat.common import tables
+from tolstat.common.columns import (
+    DESIGN_COLUMNS,
+    ERROR_COLUMNS,
+    OPTIONAL_FIELDS,
+    Column,
+    drawn_columns,
+    drawn_dtype,
+    kept_columns,
+)
 from tolstat.common.counts import Counts, Session
 from tolstat.common.errors import Fault, StoreError
 from tolstat.common.tables import Status
@@ -104,7 +112,7 @@ class Reader:
         self.case_names, self.variants = document.design.cases, document.design.variants
         self.n, self.campaign_rows = document.n, document.campaign_rows
         self.rows = range(document.first_row, document.first_row + document.n)
-        self.columns = selected_results.columns(document.identity)
+        self.columns = kept_columns(document.identity)
         self.points = {name: Point.of(name, values) for name, values in document.points.items()}
 
     def at(self, point: str) -> Self:
@@ -287,15 +295,15 @@ class Reader:
         return self._table("design", DESIGN_COLUMNS, tables.DESIGN, slice(None), tables.DESIGN.names or ())
 
     def origin(self, slots: slice = slice(None)) -> NDArray[np.void]:
-        """How every joint was drawn, (n,) table with the columns `draw_records.columns`, or of a slice of file slots.
+        """How every joint was drawn, (n,) table with the columns `columns.drawn_columns`, or of a slice of file slots.
 
         Raises a `StoreError` when the sampling method has no such table, or it is damaged.
         """
-        columns = draw_records.columns(self.sampling)
+        columns = drawn_columns(self.sampling)
         if not columns:
             remedy = 'give a result file with sampling.method = "importance", or of tolstat rare'
             raise store_error(self.path, "has no record of how its joints were drawn", remedy)
-        dtype = draw_records.dtype(self.sampling)
+        dtype = drawn_dtype(self.sampling)
         return self._table("origin", columns, dtype, slots, dtype.names or ())
 
     def histories(self, name: str, slots: NDArray[np.intp] | None = None) -> NDArray[Any]:
@@ -367,7 +375,7 @@ class Reader:
         whole = tuple(fields) == dtype.names
         table = np.zeros(max(0, last - first), dtype if whole else [(name, dtype[name]) for name in fields])
         if group == "results":
-            for name in set(fields) & set(selected_results.OPTIONAL_FIELDS):
+            for name in set(fields) & set(OPTIONAL_FIELDS):
                 table[name] = np.nan
         for c in columns:
             if c.field in fields:

@@ -20,7 +20,7 @@ from tolstat.joint.sections import RIGID
 from tolstat.solver import fidelity
 from tolstat.store.hdf5 import store_error
 from tolstat.store.reader import Reader
-from tolstat.study import Study, load, mounting, subset_of
+from tolstat.study import Study, load, points, subset_of
 from tolstat.study.design import KEYS
 from tolstat.study.model import Solver
 
@@ -114,10 +114,10 @@ def mountings(store: Reader) -> tuple[list[float | str], list[str]]:
 
 
 def note_on_mounting(store: Reader) -> str:
-    """Note where rigid shafts meet errors along them, see `mounting.note`; empty for other files."""
+    """Note where rigid shafts meet errors along them, see `points.note_on_shafts`; empty for other files."""
     names = {".".join(key.split(".")[1:3]) for key in store.identity if key.startswith("tolerances.")}
     joint, name = joint_of(store, 0), store.study_name
-    return mounting.note(names, mountings(store)[0], mounting.command(f"{name}.toml", name, joint))
+    return points.note_on_shafts(names, mountings(store)[0], points.with_free_shaft(f"{name}.toml", name, joint))
 
 
 def parameters(store: Reader, rows: NDArray[np.intp]) -> NDArray[np.void]:

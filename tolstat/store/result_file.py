@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common import draw_records
-from tolstat.common.columns import ERROR_COLUMNS, Column
+from tolstat.common.columns import ERROR_COLUMNS, Column, drawn_columns
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.late import pandas as pd
 from tolstat.common.loads import LOADS
@@ -172,7 +171,7 @@ class NamedLoads(Mapping[str, "pd.Series[float]"]):
 def described(store: Reader) -> dict[str, Column]:
     """Columns with unit and description that an export has, by name; see `to_pandas` for the others."""
     errors = [c._replace(description=OPERATING.get(c.name, c.description)) for c in ERROR_COLUMNS]
-    return {c.name: c for c in (*draw_records.columns(store.sampling), *errors, *store.columns)}
+    return {c.name: c for c in (*drawn_columns(store.sampling), *errors, *store.columns)}
 
 
 def to_pandas(store: Reader, nominal: bool) -> pd.DataFrame:
@@ -194,7 +193,7 @@ def _frame(store: Reader, rows: slice, nominal: bool, listed: Mapping[str, NDArr
     if nominal:
         data["nominal"] = np.arange(rows.start, rows.stop) < store.first_sample
     data |= {name: values[rows] for name, values in listed.items()}
-    drawn = draw_records.columns(store.sampling)
+    drawn = drawn_columns(store.sampling)
     if drawn:
         origin = store.origin(rows)
         data |= {c.name: c.of(origin) for c in drawn}

@@ -11,7 +11,8 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common import selected_results, tables
+from tolstat.common import tables
+from tolstat.common.columns import blank_others
 from tolstat.store import layout
 from tolstat.store.hdf5 import pick, put_attributes, put_scale, text, told_as_damage
 from tolstat.store.metadata import CHECKSUM
@@ -74,7 +75,7 @@ def read(store: Reader, name: str = VERIFY) -> Verification | None:
         checks = {}
         for check in text(group.attrs, "checks").split():
             table = np.empty(len(rows), tables.RESULT)
-            selected_results.blank_others(table, store.columns)
+            blank_others(table, store.columns)
             for c in store.columns:
                 c.of(table)[:] = group[check][c.name][:]
             attrs = group[check].attrs

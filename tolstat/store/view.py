@@ -18,9 +18,8 @@ from tolstat.analysis.column import frozen
 from tolstat.analysis.design import SAMPLE, Claim, Design, Independent, Listed, Replicated
 from tolstat.analysis.sample import Sample, largest_of
 from tolstat.analysis.weighted import Weighted
-from tolstat.common import selected_results
+from tolstat.common.columns import METHODS, holds
 from tolstat.common.counts import Counts
-from tolstat.common.draw_records import METHODS
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import ANY_LIMIT, LOADS, SHOWN_LOADS, FloatArray, Limit, split
 from tolstat.common.strict import did_you_mean
@@ -202,7 +201,7 @@ class View:
                 return self._loads[name]
             if name not in LOADS:
                 raise InputError([Fault(name, "is not a load", did_you_mean(name, list(LOADS)))])
-            if not selected_results.holds(self.columns, name):
+            if not holds(self.columns, name):
                 found = f"is not kept in {self.path}, see [output] results of its study"
                 raise InputError([Fault(name, found, f"give one of: {', '.join(self.kept_loads)}")])
             load, limit = LOADS[name], self.limits.get(name)
@@ -222,7 +221,7 @@ class View:
     @cached_property
     def kept_loads(self) -> tuple[str, ...]:
         """Loads that the study keeps."""
-        return tuple(name for name in LOADS if selected_results.holds(self.columns, name))
+        return tuple(name for name in LOADS if holds(self.columns, name))
 
     @cached_property
     def bushing_loads(self) -> tuple[str, ...]:

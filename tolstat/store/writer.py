@@ -70,7 +70,7 @@ class Writer(Reader):
         options, fidelity : Options and mapping, optional
             Settings that ``solver.fidelity = "auto"`` chose, and the record of that choice.
         origin : iterable of tables, optional
-            How the joints were drawn, in consecutive blocks, for methods that have `draw_records.columns`.
+            How the joints were drawn, in consecutive blocks, for methods that have `columns.drawn_columns`.
 
         Raises
         ------

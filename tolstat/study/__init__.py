@@ -1,6 +1,6 @@
 """Studies and cases: the only reader of their TOML files."""
 
-from tolstat.study.loading import load, load_case, subset_of
+from tolstat.study.file import load, load_case, subset_of
 from tolstat.study.study import Case, Study
 
 __all__ = ["Case", "Study", "load", "load_case", "subset_of"]

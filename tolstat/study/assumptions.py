@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 from tolstat.common import units
-from tolstat.common.errors import Fault, InputError
+from tolstat.common.errors import Fault, input_error
 from tolstat.common.load_kinds import PINS
 from tolstat.common.tables import HOLES
 from tolstat.joint import derived
@@ -96,7 +96,7 @@ def with_value(study: Study, keys: Mapping[str, Any]) -> Study:
     """
     if study.variants:
         found = "has joints with dimensions of their own: they are no variations of one joint"
-        raise InputError([Fault(str(study.path), found, "vary the joint of a study with tolerances")])
+        raise input_error(study.path, found, "vary the joint of a study with tolerances")
     joint = with_keys(study.joint.given("json"), _keys_of_study(study), nested(keys), f"{study.path}: joint")
     changed = replace(study, joint=joint)
     changed.check_mounting()

@@ -17,8 +17,8 @@ from typing import Annotated, Any, NamedTuple
 from pydantic import Field, model_validator
 
 from tolstat.common import strict, units
-from tolstat.common.errors import Fault, InputError, gather
-from tolstat.common.files import read_input
+from tolstat.common.errors import Fault, InputError, gather, input_error
+from tolstat.common.files import finite, read_input
 from tolstat.common.strict import Strict, refuse
 from tolstat.study import selection
 from tolstat.study.scaling import Tolerance
@@ -147,11 +147,9 @@ def _read_csv(path: Path) -> dict[str, dict[str, Any]]:
     try:
         rows = list(csv.DictReader(StringIO(strict.read_text(path)), restval=""))
     except csv.Error as error:
-        raise InputError([Fault(str(path), f"cannot be read: {error}", "give a TOML or CSV file")]) from error
+        raise input_error(path, f"cannot be read: {error}", "give a TOML or CSV file") from error
     if not rows or "tolerance" not in rows[0]:
-        raise InputError(
-            [Fault(str(path), "has no column tolerance", "write the header line: tolerance,cost,fixed,at,power")]
-        )
+        raise input_error(path, "has no column tolerance", "write the header line: tolerance,cost,fixed,at,power")
     if faults := [
         Fault(f"{path}: row {number}", "has more cells than the header line", "write decimals with a point: 0.5")
         for number, row in enumerate(rows, start=2)
@@ -165,8 +163,5 @@ def _value(cell: str) -> object:
     """Convert a cell of a CSV file to the value that TOML would give."""
     if cell in ("true", "false"):
         return cell == "true"
-    try:
-        value = float(cell)
-    except ValueError:
-        return cell
-    return value if math.isfinite(value) else cell
+    value = finite(cell)
+    return cell if math.isnan(value) else value

@@ -5,18 +5,16 @@ Listed is every variant of the joint, at every point of a grid, with the errors 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import groupby, product
+from itertools import groupby
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.errors import Fault, InputError
 from tolstat.common.late import stats
-from tolstat.common.tables import DESIGN, Variant
-from tolstat.common.units import Quantity
+from tolstat.common.tables import Variant
 from tolstat.joint import Joint, Operation, affects_results
 from tolstat.joint.sections import quantities
 from tolstat.study.model import Solver, SweepAxis
@@ -78,29 +76,6 @@ class Design:
         return [int(case) for case in np.unique(self.table["case"][self.table["variant"] == variant])]
 
 
-def table(cases: Sequence[Sequence[int]], points: int) -> NDArray[np.void]:
-    """Make the rows of a design: for each variant, for each point of the grid, for each case.
-
-    Parameters
-    ----------
-    cases : sequence of sequence of int
-        For each variant the indices of the cases that are run with it, in order.
-    points : int
-        Number of points of the grid.
-
-    Returns
-    -------
-    ndarray, (rows,), dtype DESIGN
-    """
-    rows = [
-        (variant, case, variant * points + point)
-        for variant, listed in enumerate(cases)
-        for point in range(points)
-        for case in listed
-    ]
-    return np.array(rows, DESIGN)
-
-
 def sobol(n: int, dimensions: int, seed: int | Sequence[int], first: int = 0) -> NDArray[np.float64]:
     """Scrambled Sobol' points `first` and following in the unit cube, (n, dimensions), at the middle of their cells."""
     engine = stats.qmc.Sobol(dimensions, scramble=True, bits=SOBOL_BITS, seed=np.random.default_rng(seed))
@@ -154,56 +129,3 @@ def meaning(axes: Sequence[SweepAxis], joint: Joint) -> list[str]:
             lines.append(f"sweep of {what}: deviations from {' to '.join(ends)} mm,")
             lines.append(f"  the {kind} is {' to '.join(whole)} mm; to sweep it itself: contact.{key}")
     return lines
-
-
-def swept(
-    axes: Sequence[SweepAxis],
-    nominal: tuple[Joint, Operation, Solver],
-    make: Callable[[Mapping[str, Any]], tuple[Variant, Joint]],
-    first: int,
-    place: str,
-) -> Design | None:
-    """Make the joints of a sweep: that of the study, then one for each point of the axes of dimensions.
-
-    Parameters
-    ----------
-    axes : sequence of SweepAxis
-        All axes of the sweep, the last varying fastest.
-    nominal : tuple
-        Joint, operating point and settings of the study.
-    make : callable
-        Returns the variant, and its joint, with some keys of the joint set, by dotted key.
-    first : int
-        Row of the first joint of the grid; the study's joint, without errors, is before it.
-    place : str
-        File name shown in faults.
-
-    Returns
-    -------
-    Design
-        None if no axis is a dimension of the joint.
-
-    Raises
-    ------
-    InputError
-        When there are too many joints, or one of them is not valid.
-    """
-    dimensions = [number for number, axis in enumerate(axes) if axis.names[0] in KEYS]
-    if not dimensions:
-        return None
-    shape = [axes[number].points for number in dimensions]
-    if np.prod(shape) > MAX_JOINTS:
-        found = f"gives {np.prod(shape)} joints with dimensions of their own"
-        raise InputError([Fault(f"{place}: sweep", found, f"give at most {MAX_JOINTS}")])
-    made = [(Variant("joint", {}), nominal[0])]
-    for values in product(*(np.linspace(axes[k].start, axes[k].stop, axes[k].points).tolist() for k in dimensions)):
-        point = {name: value for k, value in zip(dimensions, values, strict=True) for name in axes[k].names}
-        made.append(make({key: Quantity(KEYS[key]).written(value) for key, value in point.items()}))
-    all_points = [axis.points for axis in axes]
-    index = np.unravel_index(np.arange(np.prod(all_points)), all_points)
-    number = 1 + np.ravel_multi_index([index[k] for k in dimensions], shape)
-    table = np.zeros(first + len(number), DESIGN)
-    table["variant"][first:] = number
-    table["group"] = np.arange(len(table))
-    variants, joints = zip(*made, strict=True)
-    return Design(variants, joints, (nominal[1],) * len(made), (nominal[2],) * len(made), {}, (), table)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
@@ -12,12 +12,13 @@ import numpy as np
 from pydantic import AfterValidator, Field, WithJsonSchema, model_validator
 
 from tolstat.analysis.strength import Line
-from tolstat.common import json_schema, strict, units
+from tolstat.common import units
 from tolstat.common.channels import UNIT_OF_CHANNEL
-from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.errors import gather, input_error
 from tolstat.common.load_kinds import BUSHINGS
-from tolstat.common.strict import Strict, did_you_mean, read_section, refuse
-from tolstat.study.selection import Assignments, Entry, entries, quantity, resolve, select
+from tolstat.common.notation import schema_of_positive, schema_of_quantity
+from tolstat.common.strict import Strict, did_you_mean, read_section, read_toml, refuse
+from tolstat.study.selection import Assignments, Entry, Reading, entries, quantity, resolve, select
 
 Positive = Annotated[units.Number, AfterValidator(units.positive)]
 Exponent = Annotated[units.Number, Field(ge=1, le=30)]
@@ -31,8 +32,10 @@ PLACES = 24
 """Places around a round section: the stress between two of them is at most 1 - cos(7.5 deg), 0.9 %, above theirs."""
 
 
-def _neither_or_both(name: str, other: str, value: float | None) -> str:
-    return f"has neither {name} nor {other}" if value is None else f"has both {name} and {other}"
+def _check_bushing(bushing: str) -> str:
+    if not select(bushing, BUSHINGS):
+        raise refuse(f"{bushing!r} is not a bushing", did_you_mean(bushing, BUSHINGS))
+    return bushing
 
 
 class StressPointEntry(Strict):
@@ -41,7 +44,7 @@ class StressPointEntry(Strict):
     A round section has no one point where bending about two axes is largest: it is evaluated all around.
     """
 
-    bushing: str = Field(examples=["fork*"])
+    bushing: Annotated[str, AfterValidator(_check_bushing)] = Field(examples=["fork*"])
     """bushing whose load stresses the point, or pattern of several"""
     F_e: PerForce = Field(default=0.0, examples=["2.5 MPa/kN"])
     """stress at the point by the force along e of the bushing"""
@@ -84,15 +87,13 @@ class StressPointEntry(Strict):
     def _complete(self) -> StressPointEntry:
         if not any(map(any, self.per_load)):
             raise refuse("no load stresses the point", 'give a stress per load, for example T_e = "0.2 MPa/(N*m)"')
-        if (self.S_D is None) == (self.S_aD is None):
-            raise refuse(
-                _neither_or_both("S_D", "S_aD", self.S_D), "give one of them: S_D is a range, S_aD an amplitude"
-            )
-        if (self.T_S is None) == (self.T_N is None):
-            raise refuse(
-                _neither_or_both("T_S", "T_N", self.T_S),
-                "give one of them; T_S = 1 is a strength that does not scatter",
-            )
+        for name, other, remedy in (
+            ("S_D", "S_aD", "give one of them: S_D is a range, S_aD an amplitude"),
+            ("T_S", "T_N", "give one of them; T_S = 1 is a strength that does not scatter"),
+        ):
+            first, second = (getattr(self, key) is None for key in (name, other))
+            if first == second:
+                raise refuse(f"has neither {name} nor {other}" if first else f"has both {name} and {other}", remedy)
         return self
 
     @property
@@ -142,32 +143,6 @@ class StressPoint(NamedTuple):
     line: Line
 
 
-def _stress_points(table: Mapping[str, Any], place: str) -> tuple[StressPoint, ...]:
-    """Read ``[fatigue.point]``.
-
-    Raises
-    ------
-    InputError
-        With every fault.
-    """
-    points, faults = list[StressPoint](), list[Fault]()
-    for name, value in table.items():
-        prefix = ("fatigue", "point", name)
-        with gather(faults):
-            entry = strict.validate(StressPointEntry, value, place, prefix=prefix)
-            bushings = select(entry.bushing, BUSHINGS)
-            if not bushings:
-                where = f"{place}: {strict.dotted((*prefix, 'bushing'))}"
-                found = f"{entry.bushing!r} is not a bushing"
-                raise InputError([Fault(where, found, did_you_mean(entry.bushing, BUSHINGS))])
-            for bushing in bushings:
-                called = name if len(bushings) == 1 else f"{name}, {bushing}"
-                points.append(StressPoint(called, bushing, entry.per_load, entry.line))
-    if faults:
-        raise InputError(faults)
-    return tuple(points)
-
-
 class SequenceEntry(Strict):
     """Order in which the operating points of a duty cycle are visited; it repeats."""
 
@@ -199,7 +174,7 @@ class Settings(Strict):
         default=None, examples=[{"points": "drive start drive climb", "revolutions": 9e4}]
     )
     """order in which the operating points are visited, whose changes of load are counted, too"""
-    point: dict[str, Any] = Field(
+    point: dict[str, StressPointEntry] = Field(
         default_factory=dict,
         json_schema_extra={"x-table": "points"},
         examples=[
@@ -222,7 +197,7 @@ class LineEntry(Strict):
 
     m: Exponent = Field(examples=[5])
     """exponent"""
-    S0: Annotated[Any, WithJsonSchema(json_schema.positive(json_schema.quantity("", "150 N*m")))] = Field(
+    S0: Annotated[Any, WithJsonSchema(schema_of_positive(schema_of_quantity("", "150 N*m")))] = Field(
         examples=["150 N*m"]
     )
     """range of the load that is borne for N0 cycles, a force or torque"""
@@ -291,8 +266,7 @@ class Fatigue:
             within = replace(self, revolutions=hours * hourly, required=True, hours=hours)
         if within.starts > within.revolutions:
             found = f"{within.starts:g} starts in {within.revolutions:g} revolutions"
-            remedy = "give at most one for each, or more revolutions"
-            raise InputError([Fault(f"{place}: fatigue.starts", found, remedy)])
+            raise input_error(f"{place}: fatigue.starts", found, "give at most one for each, or more revolutions")
         return within
 
     @property
@@ -303,58 +277,43 @@ class Fatigue:
         return f"{self.hours:g} h ({self.revolutions:.4g} revolutions)"
 
 
-def read(table: object, place: str, names: Sequence[str] = ()) -> Fatigue:
-    """Read ``[fatigue]``.
-
-    Parameters
-    ----------
-    table : object
-        The section as parsed.
-    place : str
-        File name shown in faults.
-    names : sequence of str
-        Operating points of the study, if they are known.
-
-    Raises
-    ------
-    InputError
-        With every fault.
-    """
-    settings = Settings()
+def read(file: Reading) -> Fatigue:
+    """Read ``[fatigue]``."""
+    table, settings = file.data.get("fatigue", {}), Settings()
+    of_channels = table.get("line") if isinstance(table, Mapping) else None
     lines: dict[str, tuple[float, float, float]] = {}
-    claims, faults = Assignments(place), list[Fault]()
-    with gather(faults):
-        settings = strict.validate(Settings, table, place, prefix=("fatigue",))
-    points: tuple[StressPoint, ...] = ()
+    claims, names = Assignments(file.place), [point.name for point in file.points or ()]
+    with gather(file.faults):
+        settings = file.model(Settings, table, "fatigue")
     visits = tuple(settings.sequence.points.split()) if settings.sequence else ()
     if unknown := sorted(set(visits) - set(names)) if names else []:
-        found = f"no operating point {unknown[0]!r}"
-        faults.append(Fault(f"{place}: fatigue.sequence.points", found, did_you_mean(unknown[0], names)))
-    for entry in entries(_inner(table, "line"), "fatigue", "line"):
-        with gather(faults):
-            names = resolve(entry, UNIT_OF_CHANNEL, place)
-            claims.claim(entry, names)
-            line = strict.validate(LineEntry, entry.value, place, prefix=entry.path)
+        file.fault("fatigue.sequence.points", f"no operating point {unknown[0]!r}", did_you_mean(unknown[0], names))
+    for entry in entries(of_channels if isinstance(of_channels, Mapping) else {}, "fatigue", "line"):
+        with gather(file.faults):
+            channels = resolve(entry, UNIT_OF_CHANNEL, file.place)
+            claims.claim(entry, channels)
+            line = file.model(LineEntry, entry.value, *entry.path)
             size = Entry(entry.pattern, (*entry.path, "S0"), line.S0)
-            value = quantity(size, UNIT_OF_CHANNEL[names[0]], place)
+            value = quantity(size, UNIT_OF_CHANNEL[channels[0]], file.place)
             if value <= 0:
-                where = f"{place}: {strict.dotted(size.path)}"
-                raise InputError([Fault(where, f"{line.S0!r} is not positive", "give a range above zero")])
-            lines |= dict.fromkeys(names, (line.m, value, line.N0))
-    with gather(faults):
-        points = _stress_points(_inner(table, "point"), place)
-    if faults:
-        raise InputError(faults)
-    revolutions = {} if settings.revolutions is None else {"revolutions": settings.revolutions, "required": True}
+                file.fault(size.path, f"{line.S0!r} is not positive", "give a range above zero")
+            lines |= dict.fromkeys(channels, (line.m, value, line.N0))
+    points = []
+    for name, point in settings.point.items():
+        bushings = select(point.bushing, BUSHINGS)
+        names_of_points = [name] if len(bushings) == 1 else [f"{name}, {bushing}" for bushing in bushings]
+        points += [
+            StressPoint(*each, point.per_load, point.line) for each in zip(names_of_points, bushings, strict=True)
+        ]
+    given = settings.model_dump(include={"revolutions", "reference_cycles", "starts"}, exclude_none=True)
     return Fatigue(
         tuple(settings.exponents),
-        reference_cycles=settings.reference_cycles,
+        required=settings.revolutions is not None,
         lines=lines,
-        starts=settings.starts,
-        points=points,
+        points=tuple(points),
         visits=visits,
         turns=settings.sequence.revolutions if settings.sequence else 1.0,
-        **revolutions,  # type: ignore[arg-type]
+        **given,
     )
 
 
@@ -366,10 +325,8 @@ def of_text(text: str, place: str) -> Fatigue:
     InputError
         With every fault.
     """
-    return read(read_section(Path(place), text, "fatigue"), place)
-
-
-def _inner(table: object, key: str) -> Mapping[str, Any]:
-    """Table inside the section; empty where it has none, or something else that validation refuses."""
-    inner = table.get(key, {}) if isinstance(table, Mapping) else {}
-    return inner if isinstance(inner, Mapping) else {}
+    read_section(Path(place), text, "fatigue")
+    file = Reading(Path(place), read_toml(Path(place), text), text)
+    settings = read(file)
+    file.finish()
+    return settings

@@ -1,38 +1,34 @@
-"""Reading a study or case file section by section, so that all of its faults are reported at once."""
+"""Studies and cases from their files: what is made of each section, and what does not go together between them.
+
+Each function reads one section, or what follows from several, adds faults to those of the file, and returns what could
+be made, so that all faults are reported at once.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from functools import cached_property
+import math
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
-from tolstat import joint
-from tolstat.common import strict
-from tolstat.common.errors import Fault, InputError, gather
-from tolstat.common.files import read_input
-from tolstat.common.loads import UNIT_OF_LOAD, split
-from tolstat.common.strict import read_toml
-from tolstat.joint import Joint, Operation
+from tolstat.common.columns import holds
+from tolstat.common.errors import Fault, collected, gather, input_error
+from tolstat.common.loads import LOADS, UNIT_OF_LOAD, load_of, split
+from tolstat.common.strict import dotted, validate
+from tolstat.common.tables import FINEST_STEPS
+from tolstat.joint import Joint
 from tolstat.joint.derived import BEARING
 from tolstat.joint.model import Assumed, leaves, merged
-from tolstat.joint.reading import faults_of_assumed, is_joint
-from tolstat.study import fatigue, listing, points, proposal, selection, signals, sorting
+from tolstat.joint.reading import faults_of_assumed
+from tolstat.study import fatigue, listing, points, proposal, rewriting, selection, selective
 from tolstat.study.axes import is_zone, zone_of
-from tolstat.study.design import KEYS, Design, swept
-from tolstat.study.fatigue import Fatigue
-from tolstat.study.model import Output, Sampling, Solver, SweepAxis, SweepEntry
-from tolstat.study.points import Point
-from tolstat.study.proposal import Proposal, ProposalEntry
-from tolstat.study.selection import TOLERANCED, UNITS, Assignments, Entry
-from tolstat.study.sorting import Gauge
-from tolstat.study.tolerances import fits, reading
-from tolstat.study.tolerances.correlation import Copula, Correlation, Group, assemble, correlated, groups
-from tolstat.study.tolerances.entry import Site
-from tolstat.study.tolerances.fits import Fit
-from tolstat.study.tolerances.reading import Tolerances
-
-ModelT = TypeVar("ModelT", bound=strict.Strict)
+from tolstat.study.design import Design
+from tolstat.study.model import MAX_ROWS, Output, Sampling, Solver, Subset
+from tolstat.study.selection import TOLERANCED, Assignments, Reading
+from tolstat.study.study import Case, Study
+from tolstat.study.tolerances import correlation, fits, kinds
+from tolstat.study.tolerances.kinds import Tolerances
 
 OF_CASE = ("joint", "operation", "solver", "errors")
 """Sections that a case may have, too."""
@@ -44,328 +40,346 @@ SECTIONS = (
 """Sections of a study, in the order of the reference."""
 BESIDE_FIT = ("is set by tolerances.fit already", "remove one of the two")
 """Fault and remedy of a diameter."""
+SCATTER = ("tolerances", "correlation", "errors", "reject")
+"""Sections that define the joints of most sampling methods; the first is required."""
+SECTIONS_OF = {
+    "sweep": ("sweep", "errors"),
+    "cases": ("case", "grid", "variant"),
+    "importance": (*SCATTER, "proposal"),
+}
+"""Sections that define the joints of the other sampling methods; the first is required."""
+INDEPENDENT = ("random", "importance")
+"""Sampling methods whose joints can be reweighted to the processes that measured parts leave open, with intervals."""
 
 
-class StudyFile:
-    """A TOML file, its sections as parts of a study, and the faults found in them so far.
+def _joint(file: Reading) -> Joint | None:
+    """``[joint]``: a joint file by name or path, and keys that replace some of its own; diameters by the fit."""
+    keys = file.table("joint")
+    if keys.get("base") is None:
+        file.fault("joint.base", "missing key", 'add base, for example base = "cirelli2021"')
+        return None
+    if file.fit is not None and isinstance(keys["base"], str):
+        keys = _with_diameters(file, keys)
+    return listing.joint_of(file, keys, ("joint",))
 
-    Each property reads one section when it is first used, adds its faults to `faults` and gives what could be read;
-    `finish` raises them. `text` has mean and orders in place of measured signals.
+
+def _with_diameters(file: Reading, keys: Mapping[str, Any]) -> dict[str, Any]:
+    """Keys of the joint with the fit's diameters; note diameters and clearance that the study sets beside it."""
+    contact, diameters = keys.get("contact", {}), file.fit.diameters
+    if not isinstance(contact, Mapping):
+        return merged(keys, {"contact": diameters})
+    twice = [key for key in (*diameters, "clearance") if key in contact]
+    for key in twice:
+        file.fault(f"joint.contact.{key}", *BESIDE_FIT)
+    return {**keys, "contact": merged({k: v for k, v in contact.items() if k not in twice}, diameters)}
+
+
+def _assumed(file: Reading) -> tuple[Assumed, ...]:
+    """``[[assumed]]``: assumptions that the study adds to those of its joint file."""
+    before = len(file.faults)
+    entries = file.models("assumed", Assumed)
+    if file.joint is None or len(file.faults) > before:
+        return ()
+    keys = {key: value for key, value in file.table("joint").items() if key != "base"}
+    file.faults += faults_of_assumed(entries, file.joint.given("json"), keys, file.place)
+    for number, entry in enumerate(entries if file.fit else []):
+        for n, value in enumerate(entry.values):
+            for key in (key for key in leaves(value) if key in BEARING):
+                file.fault(f"assumed[{number}].values[{n}].{key}", *BESIDE_FIT)
+    return tuple(entries)
+
+
+def _sampling(file: Reading) -> Sampling | None:
+    """``[sampling]``."""
+    if "sampling" in file.data:
+        return file.model(Sampling, file.data["sampling"], "sampling")
+    file.fault("sampling", "missing table", f"add [sampling]; to simulate one joint: tolstat simulate {file.place}")
+    return None
+
+
+def _scatter(file: Reading) -> Tolerances:
+    """``[tolerances]``: how errors scatter."""
+    written = []
+    units = dict[str, str]()
+    for entry in fits.entries(file.table("tolerances"), file.fit):
+        with gather(file.faults):
+            selected = selection.resolve(entry, TOLERANCED, file.place)
+            with gather(file.faults):
+                file.claims.claim(entry, selected)
+            units |= {name: TOLERANCED[name] for name in selected}
+            written.append((entry, selected))
+    read = kinds.read(written, file)
+    drawn: dict[str, list[str]] = {}
+    for quantity in read.distributions:
+        drawn.setdefault(zone_of(quantity) if is_zone(quantity) else quantity, []).append(quantity)
+    # those with faults stand for what they would draw, so that others do not seem to lack them
+    file.parts["drawn"] = {quantity: unit for name, unit in units.items() for quantity in drawn.get(name, [name])}
+    return read
+
+
+def _limits(file: Reading) -> dict[str, float]:
+    """``[limits]``: limit of each load that has one (SI), ``cross1.F`` at all points, ``cross1.F at cruise``."""
+    limits: dict[str, float] = {}
+    claims = Assignments(file.place)
+    every = [point.name for point in file.points]
+    for entry in file.entries("limits"):
+        with gather(file.faults):
+            pattern, where = split(entry.pattern)
+            names = selection.resolve(entry._replace(pattern=pattern), UNIT_OF_LOAD, file.place)
+            value = selection.quantity(entry, UNIT_OF_LOAD[names[0]], file.place)
+            if every:  # if not, the points have faults of their own
+                chosen = points.names_of(where, every, f"{file.place}: {dotted(entry.path)}")
+                names = [points.at(name, chosen, every) for name in names]
+            claims.claim(entry, names)
+            if value <= 0:
+                file.fault(entry.path, f"{entry.value!r} is not positive", "give a limit above zero")
+            limits |= dict.fromkeys(names, value)
+    return limits
+
+
+def _listed(file: Reading) -> Design | None:
+    """``[grid]``, ``[[case]]`` and ``[[variant]]``: joints listed one by one, variants of the joint."""
+    return listing.design(file) if file.sampling is not None and file.sampling.method == "cases" else None
+
+
+READERS: dict[str, Callable[[Reading], Any]] = {
+    "fit": fits.read,
+    "joint": _joint,
+    "assumed": _assumed,
+    "points": points.read,
+    "operation": lambda file: file.points[0].operation if file.points else None,
+    "solver": lambda file: file.model(Solver, file.data.get("solver", {}), "solver"),
+    "errors": lambda file: selection.fixed_errors(file, file.table("errors"), ("errors",), file.claims),
+    "scatter": _scatter,
+    "copula": correlation.read,
+    "proposals": proposal.read,
+    "sampling": _sampling,
+    "sweep": listing.axes_of_sweep,
+    "limits": _limits,
+    "rejects": selective.read,
+    "fatigue": fatigue.read,
+    "output": lambda file: file.model(Output, file.data.get("output", {}), "output"),
+    "groups": correlation.groups,
+    "listed": _listed,
+    "swept": listing.swept,
+}
+"""What makes each part of a study of its file, in the order of the faults."""
+
+
+def _check(file: Reading) -> None:
+    """Note sections and keys that do not go together; those that have faults are left out."""
+    if file.sampling is not None:
+        _check_sections(file, file.sampling)
+        _check_method(file, file.sampling)
+        _check_points(file, file.sampling)
+        _check_known(file, file.sampling.method)
+    if file.output is not None:
+        _check_output(file, file.output)
+    if file.output is not None and file.solver is not None:
+        _check_histories(file, file.output, file.solver)
+
+
+def _check_sections(file: Reading, sampling: Sampling) -> None:
+    """Note sections that the sampling method needs or does not use."""
+    used = SECTIONS_OF.get(sampling.method, SCATTER)
+    if not file.data.get(used[0]):
+        header = "[[case]]" if used[0] == "case" else f"[{used[0]}]"
+        found = "missing table: no error has a tolerance" if used[0] == "tolerances" else "missing table"
+        file.fault(used[0], found, f"add {header}, or set another sampling.method")
+    for section in dict.fromkeys((*SCATTER, *(name for names in SECTIONS_OF.values() for name in names))):
+        if section not in used and section in file.data:
+            file.fault(section, f"has no effect with {sampling.method!r}", "remove it, or set another sampling.method")
+
+
+def _check_method(file: Reading, sampling: Sampling) -> None:
+    """Note keys that the sampling method needs or does not use."""
+    if sampling.joints_per_lot > 1 and not file.scatter.lots:
+        remedy = "write lot = { share = 0.3 } in an entry of [tolerances], or remove the key"
+        file.fault("sampling.joints_per_lot", "has no effect: no tolerance has a lot", remedy)
+    if sampling.is_matched and sampling.selective is not None:
+        depending = {*file.copula.names, *file.scatter.lots, *file.scatter.accepted}
+        for found, remedy in selective.faults(sampling.selective, file.scatter, depending):
+            file.fault("sampling.selective", found, remedy)
+    if sampling.method == "cases" and file.data.get("limits"):
+        file.fault("limits", "has no effect with 'cases'", "remove it: listed joints have no exceedance")
+    if sampling.method == "subset":
+        remedy = 'write "random", and run: tolstat rare STUDY --limit "cross1.F > 900 N"'
+        file.fault("sampling.method", "'subset' is set by tolstat rare, not in a study", remedy)
+    if sampling.method == "importance" and not file.data.get("proposal"):
+        remedy = "add [[proposal]] with share, and widen, shift or parts"
+        file.fault("proposal", "missing table: distributions to draw joints from beside the tolerances", remedy)
+    joints = math.prod(axis.points for axis in file.sweep)
+    if joints > MAX_ROWS:
+        file.fault("sweep", f"gives {joints} joints", f"give at most {MAX_ROWS}")
+
+
+def _check_points(file: Reading, sampling: Sampling) -> None:
+    """Note several operating points where the joints have points of their own."""
+    if len(file.points) < 2:
+        return
+    if sampling.method == "cases":
+        remedy = "write one [operation], and the others in [[variant]]: operation = { ... }"
+        file.fault("operation", "several operating points are not possible with 'cases'", remedy)
+    for name in (name for axis in file.sweep for name in axis.names if name.startswith("operation.")):
+        remedy = "write one [operation], or sweep other errors"
+        file.fault(f"sweep.{name}", "is given by several [[operation]] already", remedy)
+
+
+def _check_known(file: Reading, method: str) -> None:
+    """Note entries known from measured parts whose joints could not be reweighted to other means and deviations."""
+    for entry in (entry for entry in file.scatter.entries if entry.parts):
+        key, known = dotted(("tolerances", entry.pattern)), f"is known from {entry.parts} measured parts"
+        if method not in INDEPENDENT:
+            remedy = 'write method = "importance", and a [[proposal]] with parts'
+            file.fault(key, f"{known}, which needs independent joints, not {method!r}", remedy)
+        if correlated := sorted(set(entry.names) & set(file.copula.names)):
+            file.fault(key, f"{known}, and {correlated[0]} is correlated", "remove the correlation, or known_from")
+        if accepted := sorted(set(entry.names) & file.scatter.accepted):
+            remedy = 'remove known_from or the bonus, or write material_condition = "fills"'
+            file.fault(key, f"{known}, and parts are accepted by {accepted[0]} and a position", remedy)
+
+
+def _check_output(file: Reading, output: Output) -> None:
+    """Note a fatigue section where no cycles are stored, but for points, and limits of loads that are not stored."""
+    given = file.data.get("fatigue")
+    if output.histories == "none" and isinstance(given, Mapping) and "point" not in given:
+        file.fault("fatigue", "has no effect without histories", 'write histories = "cycles" in [output]')
+    stored = {column.name for column in output.columns}
+    lacking = [name for load in file.limits for name in load_of(load).columns if name not in stored]
+    if lacking:
+        found = f"leaves out columns that [limits] needs: {', '.join(lacking)}"
+        file.fault("output.results", found, "add these columns, or remove their limits")
+
+
+def _check_histories(file: Reading, output: Output, solver: Solver) -> None:
+    """Note histories of different lengths, and more harmonics than the steps per revolution resolve.
+
+    ``auto`` chooses enough steps for the harmonics.
+    """
+    different = {variant.steps_per_rev for variant in file.listed.solvers} if file.listed else set()
+    if output.histories != "none" and len(different) > 1:
+        found = f"variants have different steps per revolution: {', '.join(map(str, sorted(different)))}"
+        remedy = 'give all variants the same solver.steps_per_rev, or write histories = "none"'
+        file.fault("output.histories", found, remedy)
+    steps = FINEST_STEPS if solver.fidelity == "auto" else solver.steps_per_rev
+    most = (steps - 1) // 2
+    if "harmonics" in output.histories and output.harmonics > most:
+        found = f"{steps} steps per revolution do not resolve {output.harmonics} harmonics"
+        file.fault("output.harmonics", found, f"give at most {most}, or a larger solver.steps_per_rev")
+
+
+def load(
+    path: str | Path | Mapping[str, Any], n: int | None = None, text: str | None = None, joint: Joint | None = None
+) -> Study:
+    """Read a study file, or make a study of its sections.
 
     Parameters
     ----------
-    path : Path
-        The file.
-    sections : iterable of str
-        Top-level keys that it may have.
+    path : str, Path or mapping
+        TOML file; or the sections of one as nested dictionaries, ``{"joint": {"base": "cirelli2021"}, ...}``, whose
+        paths start from the working directory.
+    n : int, optional
+        Number of joints instead of the file's ``sampling.n``.
     text : str, optional
-        TOML to read instead of the file's content.
+        TOML to read instead of the file's; `path` is then only what faults and relative paths refer to.
+    joint : Joint, optional
+        Nominal joint in place of that of ``[joint]``; variants and swept dimensions are read from the file still.
+
+    Returns
+    -------
+    Study
+        With patterns expanded, units converted and the joint file read.
 
     Raises
     ------
     InputError
-        When the file is not readable TOML, or a joint file.
+        With every fault of the file, of the joint file and of measured data that it names.
     """
+    if isinstance(path, Mapping):
+        text = rewriting.as_text(path)
+        path = "study.toml"
+    file = Reading(Path(path), SECTIONS, text)
+    if n is not None and isinstance(file.data.setdefault("sampling", {}), dict):
+        file.data["sampling"]["n"] = n
+    if joint is not None:
+        file.parts["joint"] = joint
+    _read(file, READERS)
+    _check(file)
+    file.finish("sampling.n" if n is not None else "")
+    read: Tolerances = file.scatter
+    parts = {name: part for name, part in file.parts.items() if name not in ("scatter", "drawn")}
+    parts |= {"tolerances": read.distributions, "entries": read.entries, "axes": read.axes, "lots": read.lots}
+    study = Study(file.path, file.text, **parts)
+    study.check_mounting()
+    return study
 
-    def __init__(self, path: Path, sections: Iterable[str], text: str | None = None) -> None:
-        self.path = path
-        self.place = str(path)
-        self.data = read_toml(path, text)
-        if is_joint(self.data):
-            remedy = f'name it in a study, base = "{path.name}" under [joint]; tolstat new writes one'
-            raise InputError([Fault(self.place, "is a joint file, not a study or case", remedy)])
-        self._source = read_input(path) if text is None else text
-        self._lined = text is None
-        self._overridden = ""
-        self.faults: list[Fault] = []
-        self.text, self.signals = self._source, tuple[str, ...]()
-        if "file" in self._source:
-            self.text, self.signals = signals.replaced(self._source, self.data, self.path, self.faults)
-            self.data = read_toml(path, self.text)
-        self._claims = Assignments(self.place)
-        allowed = list(sections)
-        for key in self.data:
-            if key not in allowed:
-                self.fault(key, "unknown key", strict.did_you_mean(key, allowed))
 
-    def finish(self) -> None:
-        """Raise an error if faults were found.
+def _read(file: Reading, names: Iterable[str]) -> None:
+    """Make parts of the sections of a file; one that is there already stays."""
+    for name in names:
+        if name not in file.parts:
+            with gather(file.faults):
+                file.parts[name] = READERS[name](file)
 
-        Raises
-        ------
-        InputError
-            With every fault; those of the file have its lines, unless their value is from the command line.
-        """
-        if not self.faults:
-            return
-        lined = strict.with_lines(self.faults, self.place, self._source) if self._lined else self.faults
-        pairs = zip(self.faults, lined, strict=True)
-        raise InputError([plain if plain.place == self._overridden else with_line for plain, with_line in pairs])
 
-    def override_n(self, n: int) -> None:
-        """Set the number of joints from the command line."""
-        if isinstance(self.data.setdefault("sampling", {}), dict):
-            self.data["sampling"]["n"] = n
-        self._overridden = f"{self.place}: sampling.n"
+def load_case(path: str | Path) -> Case:
+    """Read a case file: one joint with its errors.
 
-    @cached_property
-    def fit(self) -> Fit | None:
-        """``tolerances.fit``: the fit of all pins in their holes; another one in place of a fit with faults."""
-        table = self.data.get("tolerances")
-        with gather(self.faults):
-            return fits.read(table, self.place)
-        return fits.stand_in(table)
+    Raises
+    ------
+    InputError
+        With every fault of the file.
+    """
+    file = Reading(Path(path), OF_CASE)
+    if "sampling" in file.data:
+        raise input_error(file.place, "is a study, not a case of one joint", f"run it with: tolstat run {file.path}")
+    _read(file, ["joint"])
+    with gather(file.faults):
+        file.parts["operation"] = points.operation(file)
+    _read(file, ["solver", "errors"])
+    if file.solver is not None and file.solver.fidelity == "auto":
+        remedy = 'write "dynamic", "quasistatic" or "ideal"'
+        file.fault("solver.fidelity", "'auto' needs the joints of a campaign, a case has one joint", remedy)
+    file.finish()
+    case = Case(file.path, file.text, file.joint, file.operation, file.solver, file.errors)
+    case.check_mounting()
+    return case
 
-    @cached_property
-    def joint(self) -> Joint | None:
-        """``[joint]``: a joint file by name or path, and keys that replace some of its own; diameters by the fit."""
-        base, overrides = self._table("joint").get("base"), self._joint_keys
-        if base is None:
-            self.fault("joint.base", "missing key", 'add base, for example base = "cirelli2021"')
-        elif not isinstance(base, str):
-            self.fault("joint.base", f"{base!r} is not a text", "give a name in data/joints or a path")
-        else:
-            if self.fit is not None:
-                overrides = self._with_diameters(self.fit, overrides)
-            with gather(self.faults):
-                return joint.load(base, overrides, self.place, self.path.parent)
-        return None
 
-    @property
-    def _joint_keys(self) -> dict[str, Any]:
-        """Keys of ``[joint]`` that replace those of its joint file."""
-        return {key: value for key, value in self._table("joint").items() if key != "base"}
+def subset_of(study: Study, sampling: Mapping[str, Any]) -> Study:
+    """Make the study of a subset simulation from the study whose tolerances it uses.
 
-    def _with_diameters(self, fit: Fit, overrides: Mapping[str, Any]) -> dict[str, Any]:
-        """Keys of the joint with the fit's diameters; note diameters and clearance that the study sets beside it."""
-        contact = overrides.get("contact", {})
-        if not isinstance(contact, Mapping):
-            return merged(overrides, {"contact": fit.diameters})
-        twice = [key for key in (*fit.diameters, "clearance") if key in contact]
-        for key in twice:
-            self.fault(f"joint.contact.{key}", *BESIDE_FIT)
-        return {**overrides, "contact": merged({k: v for k, v in contact.items() if k not in twice}, fit.diameters)}
+    Parameters
+    ----------
+    study : Study
+        Study with any sampling method that draws joints; its histories are not stored.
+    sampling : mapping
+        Fields of `model.Subset` except those that are taken from the study.
 
-    @cached_property
-    def assumed(self) -> tuple[Assumed, ...]:
-        """``[[assumed]]``: assumptions that the study adds to those of its joint file."""
-        before = len(self.faults)
-        entries = self._list("assumed", Assumed)
-        if self.joint is None or len(self.faults) > before:
-            return ()
-        self.faults += faults_of_assumed(entries, self.joint.given("json"), self._joint_keys, self.place)
-        for number, entry in enumerate(entries if self.fit else []):
-            for n, value in enumerate(entry.values):
-                for key in (key for key in leaves(value) if key in BEARING):
-                    self.fault(f"assumed[{number}].values[{n}].{key}", *BESIDE_FIT)
-        return tuple(entries)
+    Returns
+    -------
+    Study
+        Study whose ``sampling`` is a `model.Subset`; it can draw the joints of level 0, which are those of a random
+        campaign.
 
-    @cached_property
-    def points(self) -> tuple[Point, ...]:
-        """``[operation]``, or ``[[operation]]``: the operating points; empty if one could not be read."""
-        if "operation" not in self.data:
-            self.fault("operation", "missing table", "add [operation]")
-            return ()
-        with gather(self.faults):
-            return points.read(self.data["operation"], self.place)
-        return ()
-
-    @property
-    def operation(self) -> Operation | None:
-        """The first operating point."""
-        return self.points[0].operation if self.points else None
-
-    @cached_property
-    def solver(self) -> Solver | None:
-        """``[solver]``."""
-        return self.model("solver", Solver)
-
-    @cached_property
-    def sampling(self) -> Sampling | None:
-        """``[sampling]``."""
-        remedy = f"add [sampling]; to simulate one joint: tolstat simulate {self.place}"
-        return self.model("sampling", Sampling, remedy)
-
-    @cached_property
-    def output(self) -> Output | None:
-        """``[output]``."""
-        return self.model("output", Output)
-
-    @cached_property
-    def errors(self) -> dict[str, float]:
-        """``[errors]``: the errors that every joint has."""
-        with gather(self.faults):
-            return selection.fixed_errors(self._table("errors"), ("errors",), self.place, self._claims)
-        return {}
-
-    @cached_property
-    def scatter(self) -> Tolerances:
-        """``[tolerances]``: how errors scatter."""
-        written = []
-        units = dict[str, str]()
-        for entry in fits.entries(self._table("tolerances"), self.fit):
-            with gather(self.faults):
-                selected = selection.resolve(entry, TOLERANCED, self.place)
-                with gather(self.faults):
-                    self._claims.claim(entry, selected)
-                units |= {name: TOLERANCED[name] for name in selected}
-                written.append((entry, selected))
-        read = reading.read(written, self.joint, self.path.parent, self.place, self.faults)
-        drawn: dict[str, list[str]] = {}
-        for quantity in read.distributions:
-            drawn.setdefault(zone_of(quantity) if is_zone(quantity) else quantity, []).append(quantity)
-        # those with faults stand for what they would draw, so that others do not seem to lack them
-        self._toleranced = {quantity: unit for name, unit in units.items() for quantity in drawn.get(name, [name])}
-        return read
-
-    @property
-    def accepted(self) -> set[str]:
-        """Diameters by which parts are accepted."""
-        return {bonus.diameter for bonus in self.scatter.rejecting}
-
-    @cached_property
-    def copula(self) -> Copula:
-        """``[[correlation]]``, and that of errors that share the score of their lot."""
-        lots, before = self.scatter.lots, len(self.faults)
-        entries = self._list("correlation", Correlation)
-        if len(self.faults) == before:
-            with gather(self.faults):
-                copula = correlated(assemble(entries, self._toleranced, self.place), lots, self.place)
-                for name in sorted(self.accepted & set(copula.names)):
-                    found = f"{name} cannot be correlated: parts are accepted by this diameter and the position"
-                    remedy = 'remove the correlation or the bonus, or write material_condition = "fills"'
-                    self.fault("correlation", found, remedy)
-                return copula
-        return Copula()
-
-    @cached_property
-    def proposals(self) -> tuple[Proposal, ...]:
-        """``[[proposal]]``: distributions of importance sampling beside the tolerances."""
-        together = [tuple(entry.quantities) for entry in self.scatter.entries]
-        proposals = []
-        for number, entry in enumerate(self._list("proposal", ProposalEntry)):
-            with gather(self.faults):
-                path = ("proposal", number)
-                proposals.append(proposal.resolve(entry, list(self._toleranced), together, self.place, path))
-        with gather(self.faults):
-            proposal.check_shares(proposals, self.place)
-        return tuple(proposals)
-
-    @cached_property
-    def sweep(self) -> tuple[SweepAxis, ...]:
-        """``[sweep]``: the axes of a grid."""
-        axes = []
-        for entry in self._entries("sweep"):
-            with gather(self.faults):
-                units = UNITS if selection.select(entry.pattern, UNITS) else UNITS | KEYS
-                names = selection.resolve(entry, units, self.place)
-                with gather(self.faults):
-                    self._claims.claim(entry, names)
-                context = {"site": Site(names[0], units[names[0]], 0.0, self.path.parent)}
-                read = strict.validate(SweepEntry, entry.value, self.place, prefix=entry.path, context=context)
-                axes.append(SweepAxis(tuple(names), read.start, read.stop, read.points))
-        return tuple(axes)
-
-    @cached_property
-    def rejects(self) -> tuple[Gauge, ...]:
-        """``[reject]``: joints that are rejected at assembly."""
-        return sorting.read(self._entries("reject"), self.path.parent, self.place, self.faults)
-
-    @cached_property
-    def limits(self) -> dict[str, float]:
-        """``[limits]``: limit of each load that has one (SI), ``cross1.F`` at all points, ``cross1.F at cruise``."""
-        limits: dict[str, float] = {}
-        claims = Assignments(self.place)
-        every = [point.name for point in self.points]
-        for entry in self._entries("limits"):
-            with gather(self.faults):
-                pattern, where = split(entry.pattern)
-                names = selection.resolve(entry._replace(pattern=pattern), UNIT_OF_LOAD, self.place)
-                value = selection.quantity(entry, UNIT_OF_LOAD[names[0]], self.place)
-                if every:  # if not, the points have faults of their own
-                    chosen = points.names_of(where, every, f"{self.place}: {strict.dotted(entry.path)}")
-                    names = [points.at(name, chosen, every) for name in names]
-                claims.claim(entry, names)
-                if value <= 0:
-                    self.fault(strict.dotted(entry.path), f"{entry.value!r} is not positive", "give a limit above zero")
-                limits |= dict.fromkeys(names, value)
-        return limits
-
-    @cached_property
-    def fatigue(self) -> Fatigue:
-        """``[fatigue]``: settings for the evaluation of load cycles."""
-        with gather(self.faults):
-            return fatigue.read(self.data.get("fatigue", {}), self.place, [point.name for point in self.points])
-        return Fatigue()
-
-    @cached_property
-    def groups(self) -> tuple[Group, ...]:
-        """What a pick-freeze design exchanges together."""
-        sampling = self.sampling
-        if sampling is None or sampling.method != "pick_freeze":
-            return ()
-        return groups(self.scatter.entries, self.copula, sampling.groups)
-
-    @property
-    def _nominal(self) -> listing.Nominal | None:
-        if self.joint is None or self.operation is None or self.solver is None:
-            return None
-        return listing.Nominal(self.joint, self.operation, self.solver)
-
-    @property
-    def _listing(self) -> listing.Listing:
-        return listing.Listing(self.data, self._nominal, self.place, self.path.parent)
-
-    @cached_property
-    def listed(self) -> Design | None:
-        """``[grid]``, ``[[case]]`` and ``[[variant]]``: joints listed one by one, variants of the joint."""
-        with gather(self.faults):
-            if self.sampling is not None and self.sampling.method == "cases":
-                return self._listing.design()
-        return None
-
-    @cached_property
-    def swept(self) -> Design | None:
-        """Joints of a sweep of dimensions; None if it sweeps errors alone."""
-        if self.sampling is None or self.sampling.method != "sweep" or self._nominal is None:
-            return None
-        with gather(self.faults):
-            return swept(self.sweep, self._nominal, self._listing.swept, self.sampling.first_sample, self.place)
-        return None
-
-    def model(self, section: str, model: type[ModelT], if_missing: str = "") -> ModelT | None:
-        """Read a section that is one model; of one that may be missing the model has its defaults."""
-        if if_missing and section not in self.data:
-            self.fault(section, "missing table", if_missing)
-            return None
-        with gather(self.faults):
-            return strict.validate(model, self.data.get(section, {}), self.place, prefix=(section,))
-        return None
-
-    def _list(self, section: str, model: type[ModelT]) -> list[ModelT]:
-        """Read a section that is a list of tables; return the valid ones."""
-        data = self.data.get(section, [])
-        if not isinstance(data, list):
-            self.fault(section, "is not a list of tables", f"write [[{section}]]")
-            return []
-        valid = []
-        for number, item in enumerate(data):
-            with gather(self.faults):
-                valid.append(strict.validate(model, item, self.place, prefix=(section, number)))
-        return valid
-
-    def _table(self, section: str) -> Mapping[str, Any]:
-        table = self.data.get(section, {})
-        if isinstance(table, Mapping):
-            return table
-        self.fault(section, f"{table!r} is not a table", f"write [{section}]")
-        return {}
-
-    def _entries(self, section: str) -> list[Entry]:
-        return list(selection.entries(self._table(section), section))
-
-    def fault(self, key: str, found: str, remedy: str) -> None:
-        """Note a fault of a key, once: several properties may read one section."""
-        fault = Fault(f"{self.place}: {key}", found, remedy)
-        if fault not in self.faults:
-            self.faults.append(fault)
+    Raises
+    ------
+    InputError
+        When the study has no tolerances or does not store the load, and with every fault of `sampling`.
+    """
+    with collected() as faults:
+        if not study.tolerances:
+            remedy = 'give a study with [tolerances] and sampling.method = "random"'
+            faults.append(Fault(str(study.path), "has no tolerances to draw joints from", remedy))
+        if study.sampling.is_matched:
+            found = "matches diameters by classes, which a subset simulation does not draw"
+            faults.append(study.fault("sampling.selective", found, "remove it"))
+        for load in (LOADS[name] for name in sampling["levels"]):
+            if not holds(study.output.columns, load.name):
+                found, remedy = f"leaves out {load.name}, which --limit needs", f"add {', '.join(load.columns)}"
+                faults.append(study.fault("output.results", found, remedy))
+        kept = study.sampling.model_dump(include=set(Subset.FROM_STUDY))
+        with gather(faults):
+            read = validate(Subset, kept | {"n": sampling["per_level"]} | dict(sampling), "subset simulation")
+    output = study.output.model_copy(update={"histories": "none"})
+    return replace(study, sampling=read, proposals=(), output=output)

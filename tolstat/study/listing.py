@@ -1,26 +1,27 @@
-"""Reading ``[grid]``, ``[[case]]`` and ``[[variant]]`` of a study whose joints are listed one by one."""
+"""Reading ``[sweep]``; ``[grid]``, ``[[case]]`` and ``[[variant]]`` of a study whose joints are listed one by one."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from itertools import product
-from pathlib import Path
 from typing import Any, Literal, NamedTuple, Self
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from tolstat import joint
 from tolstat.common import strict, units
-from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.errors import Fault, InputError, collected, gather, input_error
 from tolstat.common.notation import DIAMETER
 from tolstat.common.strict import Strict, refuse
-from tolstat.common.tables import Variant
+from tolstat.common.tables import DESIGN, Variant
 from tolstat.joint import Joint, Operation
 from tolstat.joint.model import TOLD, laid_over, nested
 from tolstat.study import selection
-from tolstat.study.design import IDEAL, Design, cube, flat, table
-from tolstat.study.model import MAX_ROWS, Solver
-from tolstat.study.selection import UNITS, Assignments, Entry
+from tolstat.study.design import IDEAL, KEYS, MAX_JOINTS, Design, cube, flat
+from tolstat.study.model import MAX_ROWS, Solver, SweepAxis, SweepEntry
+from tolstat.study.selection import UNITS, Assignments, Entry, Reading
+from tolstat.study.tolerances.entry import Site
 
 Section = tuple[int | str, ...]
 
@@ -93,233 +94,245 @@ class Axis(NamedTuple):
     values: list[float]
 
 
-class Nominal(NamedTuple):
-    """Base of the variants: ``[joint]``, ``[operation]`` and ``[solver]`` of the study."""
-
-    joint: Joint
-    operation: Operation
-    solver: Solver
+Nominal = tuple[Joint, Operation, Solver]
+"""Joint, operating point and settings."""
+Listed = tuple[Variant, Joint, Operation, Solver, list[int]]
+"""A variant, its joint, operating point and settings, and the indices of the cases that are run with it."""
 
 
-class Listed(NamedTuple):
-    """A variant, its joint, operating point and settings, and the indices of the cases that are run with it."""
-
-    variant: Variant
-    joint: Joint
-    operation: Operation
-    solver: Solver
-    run: list[int]
+def nominal_of(file: Reading) -> Nominal | None:
+    """Base of the variants: ``[joint]``, ``[operation]`` and ``[solver]``; None if one of them has faults."""
+    nominal: tuple[Any, ...] = file.joint, file.operation, file.solver
+    return None if None in nominal else nominal
 
 
-class Listing:
-    """Joints that a study lists: variants of its joint.
+def design(file: Reading) -> Design | None:
+    """Read ``[grid]``, ``[[case]]`` and ``[[variant]]``: the joints that a study lists.
 
-    Parameters
-    ----------
-    data : mapping
-        The study's file.
-    nominal : Nominal
-        Joint, operating point and settings of the study.
-    place : str
-        File name shown in faults.
-    folder : Path
-        Folder that the path of a joint file is relative to.
+    Returns
+    -------
+    Design
+        None where there are faults, or no nominal joint: variants are not read then.
     """
+    before, nominal = len(file.faults), nominal_of(file)
+    axes: list[Axis] = []
+    variants: list[Listed] = []
+    with gather(file.faults):
+        axes += _grid(file)
+    cases: dict[str, dict[str, float]] = {IDEAL: {}} | _cases(file, axes)
+    if nominal is not None:
+        so_far = len(file.faults)
+        variants = _variants(file, nominal, list(cases))
+        if len(file.faults) == so_far:
+            _note_clashes(file, axes)
+    values = product(*(axis.values for axis in axes))  # one empty point without axes
+    points = tuple({name: value for axis, value in zip(axes, at, strict=True) for name in axis.names} for at in values)
+    rows = len(points) * sum(len(run) for *_, run in variants)
+    if rows > MAX_ROWS:
+        file.fault("variant", f"gives {rows} joints", f"give at most {MAX_ROWS}")
+    if nominal is None or len(file.faults) > before:
+        return None
+    names, joints, operations, solvers, runs = zip(*variants, strict=True)
+    # for each variant, for each point of the grid, for each of its cases
+    numbers = [
+        (variant, case, variant * len(points) + point)
+        for variant, run in enumerate(runs)
+        for point in range(len(points))
+        for case in run
+    ]
+    return Design(names, joints, operations, solvers, cases, points, np.array(numbers, DESIGN))
 
-    def __init__(self, data: Mapping[str, Any], nominal: Nominal | None, place: str, folder: Path) -> None:
-        self._data, self._nominal = data, nominal
-        self._place, self._folder = place, folder
 
-    def design(self) -> Design | None:
-        """Read ``[grid]``, ``[[case]]`` and ``[[variant]]``.
+def axes_of_sweep(file: Reading) -> tuple[SweepAxis, ...]:
+    """Read ``[sweep]``: the axes of a grid."""
+    axes = []
+    for entry in file.entries("sweep"):
+        with gather(file.faults):
+            units_of = UNITS if selection.select(entry.pattern, UNITS) else UNITS | KEYS
+            names = selection.resolve(entry, units_of, file.place)
+            with gather(file.faults):
+                file.claims.claim(entry, names)
+            site = Site(names[0], units_of[names[0]], 0.0, file.folder)
+            read = file.model(SweepEntry, entry.value, *entry.path, site=site)
+            axes.append(SweepAxis(tuple(names), read.start, read.stop, read.points))
+    return tuple(axes)
 
-        Returns
-        -------
-        Design
-            None where there is no nominal joint; variants are not read then.
 
-        Raises
-        ------
-        InputError
-            With every fault of the sections.
-        """
-        faults: list[Fault] = []
-        axes: list[Axis] = []
-        cases: dict[str, dict[str, float]] = {IDEAL: {}}
-        variants: list[Listed] = []
-        with gather(faults):
-            axes += self._grid(faults)
-        with gather(faults):
-            cases |= self._cases(axes, faults)
-        if self._nominal is not None:
-            with gather(faults):
-                variants = self._variants(self._nominal, list(cases))
-                faults += self._clashes(axes)
-        values = product(*(axis.values for axis in axes))  # one empty point without axes
-        points = tuple(
-            {name: value for axis, value in zip(axes, at, strict=True) for name in axis.names} for at in values
-        )
-        rows = len(points) * sum(len(variant.run) for variant in variants)
-        if rows > MAX_ROWS:
-            faults.append(self._fault(("variant",), f"gives {rows} joints", f"give at most {MAX_ROWS}"))
-        if faults:
-            raise InputError(faults)
-        if self._nominal is None:
-            return None
-        names, joints, operations, solvers, runs = zip(*variants, strict=True)
-        return Design(names, joints, operations, solvers, cases, points, table(runs, len(points)))
+def swept(file: Reading) -> Design | None:
+    """Joints of a sweep: the study's, then one for each point of the axes of dimensions, the last varying fastest.
 
-    def swept(self, point: Mapping[str, Any]) -> tuple[Variant, Joint]:
-        """Variant at a point of a sweep, from dotted keys with values as a file writes them, and its joint."""
-        joint = self._joint(laid_over(self._data["joint"], nested(point)), ("sweep",))
-        return Variant("sweep", self._values(joint, list(point))), joint
+    Returns
+    -------
+    Design
+        None if no axis is a dimension of the joint, and for other sampling methods.
+    """
+    nominal, axes = nominal_of(file), file.sweep or ()
+    dimensions = [number for number, axis in enumerate(axes) if axis.names[0] in KEYS]
+    if file.sampling is None or file.sampling.method != "sweep" or nominal is None or not dimensions:
+        return None
+    shape = [axes[number].points for number in dimensions]
+    if np.prod(shape) > MAX_JOINTS:
+        file.fault("sweep", f"gives {np.prod(shape)} joints with dimensions of their own", f"give at most {MAX_JOINTS}")
+        return None
+    joints, variants = [nominal[0]], [Variant("joint", {})]
+    for values in product(*(np.linspace(axes[k].start, axes[k].stop, axes[k].points).tolist() for k in dimensions)):
+        point = {name: value for k, value in zip(dimensions, values, strict=True) for name in axes[k].names}
+        keys = nested({key: units.Quantity(KEYS[key]).written(value) for key, value in point.items()})
+        joints.append(joint_of(file, laid_over(file.data["joint"], keys), ("sweep",)))
+        variants.append(Variant("sweep", _values(nominal[0], joints[-1], list(point))))
+    all_points, first = [axis.points for axis in axes], file.sampling.first_sample
+    index = np.unravel_index(np.arange(np.prod(all_points)), all_points)
+    number = 1 + np.ravel_multi_index([index[k] for k in dimensions], shape)
+    rows = np.zeros(first + len(number), DESIGN)
+    rows["variant"][first:] = number
+    rows["group"] = np.arange(len(rows))
+    count = len(joints)
+    return Design(tuple(variants), tuple(joints), nominal[1:2] * count, nominal[2:] * count, {}, (), rows)
 
-    def _grid(self, faults: list[Fault]) -> Iterator[Axis]:
-        section = self._data.get("grid", {})
-        if not isinstance(section, Mapping):
-            raise InputError([self._fault(("grid",), "is not a table", "write [grid]")])
-        claims = Assignments(self._place)
-        for entry in selection.entries(section, "grid"):
-            with gather(faults):
-                names = selection.resolve(entry, UNITS, self._place)
-                claims.claim(entry, names)
-                if not isinstance(entry.value, list) or not entry.value:
-                    found = f"{entry.value!r} is not a list of values"
-                    raise InputError([self._fault(entry.path, found, 'write ["0 deg", "15 deg"]')])
-                values = []
-                for number, value in enumerate(entry.value):
-                    with gather(faults):
-                        item = Entry(entry.pattern, (*entry.path, number), value)
-                        values.append(selection.quantity(item, UNITS[names[0]], self._place))
-                yield Axis(entry, names, values)
 
-    def _cases(self, axes: list[Axis], faults: list[Fault]) -> dict[str, dict[str, float]]:
-        """Errors of each case; empty for a case with faults, so that variants can refer to it."""
-        cases: dict[str, dict[str, float]] = {}
-        for number, item in enumerate(self._tables("case")):
-            name = item.get("name") if isinstance(item, Mapping) else None
-            if isinstance(name, str):
-                if name in cases or name == IDEAL:
-                    remedy = "remove it: it is always run" if name == IDEAL else "give each case its own name"
-                    faults.append(self._fault(("case", number, "name"), f"a case {name!r} exists already", remedy))
-                cases[name] = {}
-            with gather(faults):
-                entry = strict.validate(CaseEntry, item, self._place, prefix=("case", number))
-                claims = Assignments(self._place)
-                for axis in axes:
-                    claims.claim(axis.entry, axis.names)
-                section = ("case", number, "errors")
-                cases[entry.name] = selection.fixed_errors(entry.errors, section, self._place, claims)
-        return cases
+def _grid(file: Reading) -> Iterator[Axis]:
+    section = file.data.get("grid", {})
+    if not isinstance(section, Mapping):
+        return file.fault("grid", "is not a table", "write [grid]")
+    claims = Assignments(file.place)
+    for entry in selection.entries(section, "grid"):
+        with gather(file.faults):
+            names = selection.resolve(entry, UNITS, file.place)
+            claims.claim(entry, names)
+            if not isinstance(entry.value, list) or not entry.value:
+                file.fault(entry.path, f"{entry.value!r} is not a list of values", 'write ["0 deg", "15 deg"]')
+                continue
+            values = []
+            for number, value in enumerate(entry.value):
+                with gather(file.faults):
+                    item = Entry(entry.pattern, (*entry.path, number), value)
+                    values.append(selection.quantity(item, UNITS[names[0]], file.place))
+            yield Axis(entry, names, values)
 
-    def _clashes(self, axes: list[Axis]) -> list[Fault]:
-        """Keys of the operating point that a variant and the grid both give."""
-        taken = {name for axis in axes for name in axis.names}
-        return [
-            self._fault(("variant", number, "operation", key), "is set by grid already", "remove one of the two")
-            for number, item in enumerate(self._tables("variant"))
-            for key in item.get("operation", {})
-            if f"operation.{key}" in taken
-        ]
 
-    def _variants(self, nominal: Nominal, cases: list[str]) -> list[Listed]:
-        """Variants in the order of the file, families expanded."""
-        every = list(range(len(cases)))
-        entries = self._tables("variant")
-        if not entries:
-            return [Listed(Variant("joint", {}), *nominal, every)]
-        faults: list[Fault] = []
-        variants = []
-        for number, item in enumerate(entries):
-            with gather(faults):
-                at: Section = ("variant", number)
-                entry = strict.validate(VariantEntry, item, self._place, prefix=at)
-                unknown = [name for name in entry.cases or () if name not in cases]
-                faults += [
-                    self._fault((*at, "cases"), f"no case {name!r}", strict.did_you_mean(name, cases))
-                    for name in unknown
-                ]
-                run = every if entry.cases is None else sorted({0, *map(cases.index, set(entry.cases) - set(unknown))})
-                variants += self._expanded(entry, run, nominal, at)
-        if faults:
-            raise InputError(faults)
-        return variants
+def _cases(file: Reading, axes: list[Axis]) -> dict[str, dict[str, float]]:
+    """Errors of each case; empty for a case with faults, so that variants can refer to it."""
+    cases: dict[str, dict[str, float]] = {}
+    for number, item in enumerate(file.tables("case")):
+        name = item.get("name") if isinstance(item, Mapping) else None
+        if isinstance(name, str):
+            if name in cases or name == IDEAL:
+                remedy = "remove it: it is always run" if name == IDEAL else "give each case its own name"
+                file.fault(("case", number, "name"), f"a case {name!r} exists already", remedy)
+            cases[name] = {}
+        with gather(file.faults):
+            entry = file.model(CaseEntry, item, "case", number)
+            claims = Assignments(file.place)
+            for axis in axes:
+                claims.claim(axis.entry, axis.names)
+            cases[entry.name] = selection.fixed_errors(file, entry.errors, ("case", number, "errors"), claims)
+    return cases
 
-    def _expanded(self, entry: VariantEntry, run: list[int], nominal: Nominal, at: Section) -> list[Listed]:
-        keys = laid_over(self._data["joint"], entry.joint)
-        joints = [self._joint(keys, (*at, "joint"))]
-        ranges = dict(_ranges(entry.vary, (*at, "vary"), self._place))
-        if ranges:
-            members = self._members(entry, keys, ranges, (*at, "vary"))
-            joints = [self._joint(laid_over(keys, member), (*at, "vary")) for member in members]
-        operation, solver = self._settings(entry, nominal, at)
-        values = {f"operation.{key}": getattr(operation, key) for key in entry.operation}
-        values |= {f"solver.{key}": getattr(solver, key) for key in entry.solver}
-        written = [key for key, _ in flat(entry.joint)] + list(ranges)
-        variants = [Variant(entry.name, self._values(made, written) | values, entry.note) for made in joints]
-        return [Listed(*pair, operation, solver, run) for pair in zip(variants, joints, strict=True)]
 
-    def _settings(self, entry: VariantEntry, nominal: Nominal, at: Section) -> tuple[Operation, Solver]:
-        """Operating point and numerical settings of a variant: those of the study, with keys replaced by the entry."""
-        faults: list[Fault] = []
-        operation, solver = nominal.operation, nominal.solver
+def _note_clashes(file: Reading, axes: list[Axis]) -> None:
+    """Note keys of the operating point that a variant and the grid both give."""
+    taken = {name for axis in axes for name in axis.names}
+    for number, item in enumerate(file.tables("variant")):
+        for key in item.get("operation", {}):
+            if f"operation.{key}" in taken:
+                file.fault(("variant", number, "operation", key), "is set by grid already", "remove one of the two")
+
+
+def _variants(file: Reading, nominal: Nominal, cases: list[str]) -> list[Listed]:
+    """Variants without faults in the order of the file, families expanded."""
+    every = list(range(len(cases)))
+    entries = file.tables("variant")
+    if not entries:
+        return [(Variant("joint", {}), *nominal, every)]
+    variants = []
+    for number, item in enumerate(entries):
+        with gather(file.faults):
+            entry = file.model(VariantEntry, item, "variant", number)
+            unknown = [name for name in entry.cases or () if name not in cases]
+            for name in unknown:
+                file.fault(f"variant[{number}].cases", f"no case {name!r}", strict.did_you_mean(name, cases))
+            run = every if entry.cases is None else sorted({0, *map(cases.index, set(entry.cases) - set(unknown))})
+            variants += _expanded(file, entry, run, nominal, ("variant", number))
+    return variants
+
+
+def _expanded(file: Reading, entry: VariantEntry, run: list[int], nominal: Nominal, at: Section) -> list[Listed]:
+    keys = laid_over(file.data["joint"], entry.joint)
+    joints = [joint_of(file, keys, (*at, "joint"))]
+    ranges = dict(_ranges(entry.vary, (*at, "vary"), file.place))
+    if ranges:
+        members = _members(file, entry, keys, ranges, (*at, "vary"))
+        joints = [joint_of(file, laid_over(keys, member), (*at, "vary")) for member in members]
+    operation, solver = _settings(file, entry, nominal, at)
+    values = {f"operation.{key}": getattr(operation, key) for key in entry.operation}
+    values |= {f"solver.{key}": getattr(solver, key) for key in entry.solver}
+    written = [key for key, _ in flat(entry.joint)] + list(ranges)
+    variants = [Variant(entry.name, _values(nominal[0], made, written) | values, entry.note) for made in joints]
+    return [(*pair, operation, solver, run) for pair in zip(variants, joints, strict=True)]
+
+
+def _settings(file: Reading, entry: VariantEntry, nominal: Nominal, at: Section) -> tuple[Operation, Solver]:
+    """Operating point and numerical settings of a variant: those of the study, with keys replaced by the entry."""
+    _, operation, solver = nominal
+    with collected() as faults:
         with gather(faults):
             keys = operation.model_dump(mode="json", by_alias=True) | entry.operation
-            operation = strict.validate(Operation, keys, self._place, prefix=(*at, "operation"))
+            operation = file.model(Operation, keys, *at, "operation")
         if entry.solver.get("fidelity") == "auto":
-            found = "'auto' cannot be set for one variant"
-            faults.append(self._fault((*at, "solver", "fidelity"), found, "write it in [solver]"))
+            where = f"{file.place}: {strict.dotted((*at, 'solver', 'fidelity'))}"
+            faults.append(Fault(where, "'auto' cannot be set for one variant", "write it in [solver]"))
         with gather(faults):
-            keys = solver.model_dump(exclude_unset=True) | entry.solver
-            solver = strict.validate(Solver, keys, self._place, prefix=(*at, "solver"))
-        if faults:
-            raise InputError(faults)
-        return operation, solver
+            solver = file.model(Solver, solver.model_dump(exclude_unset=True) | entry.solver, *at, "solver")
+    return operation, solver
 
-    def _members(
-        self, entry: VariantEntry, keys: Mapping[str, Any], ranges: Mapping[str, Range], at: Section
-    ) -> list[dict[str, Any]]:
-        """Keys of each joint of a family, as a joint file writes them."""
-        assert entry.points is not None
-        ends = [{key: getattr(r, end) for key, r in ranges.items()} for end in ("start", "stop")]
-        start, stop = (self._joint(laid_over(keys, nested(end)), at) for end in ends)
-        low, high = dict(flat(start.model_dump())), dict(flat(stop.model_dump()))
-        faults = []
-        for key in ranges:
-            words = [end[key] for end in (low, high) if not isinstance(end[key], float)]
-            if words:
-                found = f"{words[0]!r} is not a quantity that can vary"
-                faults.append(self._fault((*at, key), found, "write one variant for each value"))
-            elif low[key] == high[key]:
-                faults.append(self._fault((*at, key), "from and to are equal", "write a constant value in joint"))
-        if faults:
-            raise InputError(faults)
-        text = dict(flat(start.model_dump(mode="json")))
-        members = []
-        for shares in cube(entry.design, entry.points, len(ranges), entry.seed):
-            values = {key: low[key] + s * (high[key] - low[key]) for key, s in zip(ranges, shares, strict=True)}
-            members.append(nested({key: _written(values[key], text[key], ranges[key].start) for key in ranges}))
-        return members
 
-    def _joint(self, keys: Mapping[str, Any], at: Section) -> Joint:
-        overrides = {key: value for key, value in keys.items() if key != "base"}
-        return joint.load(keys["base"], overrides, self._place, self._folder, strict.dotted(at))
+def _members(
+    file: Reading, entry: VariantEntry, keys: Mapping[str, Any], ranges: Mapping[str, Range], at: Section
+) -> list[dict[str, Any]]:
+    """Keys of each joint of a family, as a joint file writes them."""
+    assert entry.points is not None
+    ends = [{key: getattr(r, end) for key, r in ranges.items()} for end in ("start", "stop")]
+    start, stop = (joint_of(file, laid_over(keys, nested(end)), at) for end in ends)
+    low, high = dict(flat(start.model_dump())), dict(flat(stop.model_dump()))
+    faults = []
+    for key in ranges:
+        where = f"{file.place}: {strict.dotted((*at, key))}"
+        words = [end[key] for end in (low, high) if not isinstance(end[key], float)]
+        if words:
+            found = f"{words[0]!r} is not a quantity that can vary"
+            faults.append(Fault(where, found, "write one variant for each value"))
+        elif low[key] == high[key]:
+            faults.append(Fault(where, "from and to are equal", "write a constant value in joint"))
+    if faults:
+        raise InputError(faults)
+    text = dict(flat(start.model_dump(mode="json")))
+    members = []
+    for shares in cube(entry.design, entry.points, len(ranges), entry.seed):
+        values = {key: low[key] + s * (high[key] - low[key]) for key, s in zip(ranges, shares, strict=True)}
+        members.append(nested({key: _written(values[key], text[key], ranges[key].start) for key in ranges}))
+    return members
 
-    def _values(self, made: Joint, written: list[str]) -> dict[str, Any]:
-        """Return the keys `written` and all others in which a joint differs from the study's, see `Variant.values`."""
-        assert self._nominal is not None
-        nominal, values = (dict(flat(joint.given())) for joint in (self._nominal.joint, made))
-        keys = [key for key in nominal | values if key not in TOLD]
-        return {key: values.get(key) for key in keys if key in written or nominal.get(key) != values.get(key)}
 
-    def _tables(self, name: str) -> list[Any]:
-        section = self._data.get(name, [])
-        if not isinstance(section, list):
-            raise InputError([self._fault((name,), "is not a list of tables", f"write [[{name}]]")])
-        return section
+def joint_of(file: Reading, keys: Mapping[str, Any], at: Section) -> Joint:
+    """Joint of a table ``base`` and keys that replace some of its own.
 
-    def _fault(self, path: Section, found: str, remedy: str) -> Fault:
-        return Fault(f"{self._place}: {strict.dotted(path)}", found, remedy)
+    Raises
+    ------
+    InputError
+        With its faults.
+    """
+    if not isinstance(keys["base"], str):
+        where = f"{file.place}: {strict.dotted(at)}.base"
+        raise input_error(where, f"{keys['base']!r} is not a text", "give a name in data/joints or a path")
+    overrides = {key: value for key, value in keys.items() if key != "base"}
+    return joint.load(keys["base"], overrides, file.place, file.folder, strict.dotted(at))
+
+
+def _values(nominal: Joint, made: Joint, written: list[str]) -> dict[str, Any]:
+    """Return the keys `written` and all others in which a joint differs from the study's, see `Variant.values`."""
+    before, values = (dict(flat(joint.given())) for joint in (nominal, made))
+    keys = [key for key in before | values if key not in TOLD]
+    return {key: values.get(key) for key in keys if key in written or before.get(key) != values.get(key)}
 
 
 def _ranges(section: Mapping[str, Any], at: Section, place: str, before: str = "") -> Iterator[tuple[str, Range]]:

@@ -8,11 +8,11 @@ from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
 from pydantic import AfterValidator, Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from tolstat.analysis.clustered import LEAST
-from tolstat.common import selected_results, units
-from tolstat.common.columns import Column
+from tolstat.common.columns import KEPT, RESULT_NAMES, Column, kept_columns, kept_names
 from tolstat.common.loads import Limit
 from tolstat.common.strict import Strict, refuse
 from tolstat.common.tables import Options, from_names
+from tolstat.common.units import Number
 from tolstat.study import selection
 from tolstat.study.selective import SelectiveEntry
 from tolstat.study.tolerances.entry import Value
@@ -23,9 +23,6 @@ MAX_ROWS = 10_000_000
 """Maximum number of joints of a list, a grid or a Latin hypercube, whose tables are held in memory."""
 MAX_SAMPLES = 1_000_000_000
 """Maximum number of joints of a campaign that is drawn in parts: 30-bit Sobol' sequences end soon after."""
-
-Number = units.Number
-
 
 Flag = Annotated[bool, Field(strict=True)]
 
@@ -222,11 +219,11 @@ class Subset(Sampling):
 
 
 def _check_pattern(pattern: str) -> str:
-    if selection.select(pattern, selected_results.NAMES):
+    if selection.select(pattern, RESULT_NAMES):
         return pattern
     anywhere = f"*.{pattern}"
-    halves = selection.select(anywhere, selected_results.NAMES)
-    remedy = f"did you mean {anywhere!r}?" if halves else selection.suggestion(pattern, selected_results.NAMES)
+    halves = selection.select(anywhere, RESULT_NAMES)
+    remedy = f"did you mean {anywhere!r}?" if halves else selection.suggestion(pattern, RESULT_NAMES)
     raise refuse(f"{pattern!r} selects nothing", remedy)
 
 
@@ -246,17 +243,15 @@ class Output(Strict):
 
     def identity(self) -> dict[str, Any]:
         """Settings that determine what is stored: names instead of patterns, no names if all results are kept."""
-        selected = [
-            name for pattern in self.results or () for name in selection.select(pattern, selected_results.NAMES)
-        ]
-        names = selected_results.chosen(selected) if self.results else None
+        selected = [name for pattern in self.results or () for name in selection.select(pattern, RESULT_NAMES)]
+        names = kept_names(selected) if self.results else None
         rest = self.model_dump(exclude={"results"})
         return rest if names is None else rest | {"results": names}
 
     @property
     def columns(self) -> tuple[Column, ...]:
         """Columns of the results that are kept."""
-        return selected_results.columns({selected_results.KEY: self.identity().get("results")})
+        return kept_columns({KEPT: self.identity().get("results")})
 
 
 class SweepEntry(Strict):

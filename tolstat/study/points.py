@@ -1,19 +1,29 @@
-"""Operating points of a study: one in ``[operation]``, or several in ``[[operation]]``, each with a name."""
+"""Operating points of a study: one in ``[operation]``, or several in ``[[operation]]``, each with a name.
+
+Then settings of joints at them without effect: axial forces on a rigid shaft, swings without orders; and a note where
+rigid shafts decide.
+"""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from shlex import quote
 from typing import Annotated, Any, NamedTuple
 
 from pydantic import AfterValidator, Field
 
-from tolstat.common import loads, strict, units
-from tolstat.common.errors import Fault, InputError
+from tolstat.common import loads, units
+from tolstat.common.errors import Fault, InputError, gather, input_error
 from tolstat.common.strict import did_you_mean, refuse
-from tolstat.joint import Operation, orders
+from tolstat.common.toml_lines import KeyPath
+from tolstat.joint import Joint, Operation, orders
+from tolstat.joint.ideal import NO_CLOSED_FORM
 from tolstat.joint.partner import Partner
+from tolstat.joint.sections import RIGID
+from tolstat.study.axes import columns_of
+from tolstat.study.selection import Reading
 
 ORDERS = {"speed_orders": orders.SpeedOrder, "torque_orders": orders.TorqueOrder}
 """Model of the orders in each field of an operating point."""
@@ -86,47 +96,51 @@ class PointEntry(Operation):
     """share of the service time, for lives and fatigue; given for all points or for none"""
 
 
-def read(section: Any, place: str) -> tuple[Point, ...]:
-    """Read ``[operation]`` or ``[[operation]]``.
+def read(file: Reading) -> tuple[Point, ...]:
+    """Read ``[operation]`` or ``[[operation]]``; empty if there are faults."""
+    section, before = file.data.get("operation"), len(file.faults)
+    points: list[Point] = []
+    if not isinstance(section, list):
+        with gather(file.faults):
+            points.append(Point("", operation(file), 1.0))
+        return tuple(points)
+    for number, item in enumerate(section):
+        with gather(file.faults):
+            entry = file.model(PointEntry, item, "operation", number)
+            if entry.name in [point.name for point in points]:
+                found = f"a point {entry.name!r} exists already"
+                file.fault(f"operation[{number}].name", found, "give each point its own name")
+            of_point = Operation.model_construct(**{key: getattr(entry, key) for key in Operation.model_fields})
+            points.append(Point(entry.name, of_point, math.nan if entry.share is None else entry.share))
+    if not section:
+        file.fault("operation", "has no operating point", "add one: [operation]")
+    elif len(file.faults) == before:
+        _note_shares(file, points)
+    return tuple(points) if len(file.faults) == before else ()
+
+
+def operation(file: Reading) -> Operation:
+    """Read ``[operation]``, the only operating point.
 
     Raises
     ------
     InputError
-        With every fault.
+        With its faults.
     """
-    if not isinstance(section, list):
-        return (Point("", strict.validate(Operation, section, place, prefix=("operation",)), 1.0),)
-    faults: list[Fault] = []
-    points: list[Point] = []
-    for number, item in enumerate(section):
-        try:
-            entry = strict.validate(PointEntry, item, place, prefix=("operation", number))
-        except InputError as error:
-            faults += error.faults
-            continue
-        if entry.name in [point.name for point in points]:
-            where = f"{place}: operation[{number}].name"
-            faults.append(Fault(where, f"a point {entry.name!r} exists already", "give each point its own name"))
-        operation = Operation.model_construct(**{key: getattr(entry, key) for key in Operation.model_fields})
-        points.append(Point(entry.name, operation, math.nan if entry.share is None else entry.share))
-    if not section:
-        faults.append(Fault(f"{place}: operation", "has no operating point", "add one: [operation]"))
-    elif not faults:
-        faults += _faults_of_shares(points, place)
-    if faults:
-        raise InputError(faults)
-    return tuple(points)
+    if "operation" not in file.data:
+        raise input_error(f"{file.place}: operation", "missing table", "add [operation]")
+    return file.model(Operation, file.data["operation"], "operation")
 
 
-def _faults_of_shares(points: Sequence[Point], place: str) -> list[Fault]:
+def _note_shares(file: Reading, points: Sequence[Point]) -> None:
+    """Note shares of the time that are given for some points only, or whose sum is not 1."""
     lacking = [number for number, point in enumerate(points) if math.isnan(point.share)]
-    if lacking and len(lacking) < len(points):
-        remedy = "give all operating points their share of the time, or none"
-        return [Fault(f"{place}: operation[{number}].share", "missing key", remedy) for number in lacking]
     total = sum(point.share for point in points)
     if not lacking and abs(total - 1.0) > 1e-6:
-        return [Fault(f"{place}: operation", f"shares of the time sum to {total:.6g}", "give shares whose sum is 1")]
-    return []
+        file.fault("operation", f"shares of the time sum to {total:.6g}", "give shares whose sum is 1")
+    for number in lacking if len(lacking) < len(points) else []:
+        remedy = "give all operating points their share of the time, or none"
+        file.fault(f"operation[{number}].share", "missing key", remedy)
 
 
 def names_of(selection: str, names: Sequence[str], place: str) -> tuple[str, ...]:
@@ -150,7 +164,7 @@ def names_of(selection: str, names: Sequence[str], place: str) -> tuple[str, ...
     unknown = [name for name in wanted if name not in names]
     if unknown and not any(names):
         found, remedy = f"no operating point {unknown[0]!r}: there is one, without a name", "leave the point out"
-        raise InputError([Fault(place, found, remedy)])
+        raise input_error(place, found, remedy)
     if unknown:
         raise InputError([Fault(place, f"no operating point {n!r}", did_you_mean(n, list(names))) for n in unknown])
     return tuple(name for name in names if name in wanted)
@@ -167,7 +181,7 @@ def only_one(name: str, names: Sequence[str], place: str) -> None:
     if name not in names:
         names_of(name, names, place)
         found = f"{name!r} is no single operating point" if name else "has several operating points"
-        raise InputError([Fault(place, found, f"give one of them: --point {names[0]}")])
+        raise input_error(place, found, f"give one of them: --point {names[0]}")
 
 
 def limits_at(limits: Mapping[str, float], chosen: Sequence[str], names: Sequence[str]) -> dict[str, float]:
@@ -204,3 +218,102 @@ def at(load: str, chosen: Iterable[str], names: Sequence[str]) -> str:
     points = list(chosen)
     selection = "" if len(points) == len(names) else "+".join(points)
     return f"{load}{loads.AT}{selection}" if selection else load
+
+
+FORCE = "operation.axial_force"
+Varied = Mapping[str, Collection[str]]
+
+
+class Setting(NamedTuple):
+    """A joint at an operating point.
+
+    Attributes
+    ----------
+    path : tuple
+        Key path of the operating point in the file.
+    joint, operation : Joint, Operation
+        The joint and the point.
+    fidelity : str
+        ``solver.fidelity``.
+    """
+
+    path: KeyPath
+    joint: Joint
+    operation: Operation
+    fidelity: str
+
+    def moved(self, varied: Varied) -> bool:
+        """Whether an axial force moves the output shaft; `varied` as in `refusals`."""
+        return self.joint.shaft.slides and (FORCE in varied or self.operation.axial_force != 0.0)
+
+
+def refusals(settings: Sequence[Setting], varied: Varied) -> Iterator[tuple[KeyPath, str, str]]:
+    """Refuse axial forces and swings without effect, and closed forms where an axial force moves the output shaft.
+
+    Parameters
+    ----------
+    settings : sequence of Setting
+        All joints of a study at all of their operating points.
+    varied : mapping
+        Errors of the operating point that scatter or are swept, to the sections of the study in which they do.
+
+    Yields
+    ------
+    tuple
+        Key path, what was found, remedy.
+    """
+    if not any(setting.joint.shaft.slides for setting in settings):
+        paths = [(*setting.path, "axial_force") for setting in settings if setting.operation.axial_force]
+        remedy = 'write shaft.axial = "free" or a stiffness under [joint], or remove it'
+        for path in dict.fromkeys([*paths, *((section, *FORCE.split(".")) for section in varied.get(FORCE, ()))]):
+            yield path, "has no effect: the output shaft is rigid along its axis", remedy
+    for key in ("speed", "torque"):
+        if not any(getattr(setting.operation, f"{key}_orders") for setting in settings):
+            remedy = f"write operation.{key} = {{ mean = ..., orders = [...] }}, or remove it"
+            for section in varied.get(f"operation.{key}_swing", ()):
+                yield (section, "operation", f"{key}_swing"), f"has no effect: the {key} has no orders", remedy
+    if any(setting.fidelity == "ideal" and setting.moved(varied) for setting in settings):
+        yield ("solver", "fidelity"), *NO_CLOSED_FORM
+
+
+def with_free_shaft(study: str, stem: str, joint: Joint) -> str:
+    """Command that runs a study with an output shaft that is free along its axis.
+
+    Parameters
+    ----------
+    study, stem : str
+        Study file, and its name without ending.
+    joint : Joint
+        The study's joint; what a free shaft needs and it lacks is in the command, too.
+    """
+    needed = {"mass": "5 kg", "axial_damping": "2e4 N*s/m"}
+    lacking = [f'"joint.shaft.{key}={value}"' for key, value in needed.items() if getattr(joint.shaft, key) is None]
+    settings = " ".join(f"--set {setting}" for setting in ("joint.shaft.axial=free", *lacking))
+    return f"tolstat run {quote(study)} {settings} --out {quote(f'{stem}_free.h5')}"
+
+
+def note_on_shafts(toleranced: Iterable[str], axial: Iterable[float | str], command: str) -> str:
+    """Say what rigid shafts do to errors along them, and the command that tries a free one.
+
+    Parameters
+    ----------
+    toleranced : iterable of str
+        Errors and zones that scatter.
+    axial : iterable of float or str
+        ``shaft.axial`` of each variant.
+    command : str
+        The command.
+
+    Returns
+    -------
+    str
+        Empty where a shaft may move, or no error along the shafts scatters.
+    """
+    along = any(column.endswith(".offset_z") for name in toleranced for column in columns_of(name))
+    if not along or any(value != RIGID for value in axial):
+        return ""
+    return (
+        "errors along the shafts (offset_z) scatter, and shafts that are rigid along their axes cannot give way to "
+        "them: some loads are larger than with a spline.\n"
+        f"With a free output shaft: {command}"
+    )

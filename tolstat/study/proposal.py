@@ -23,11 +23,11 @@ from pydantic import Field
 
 from tolstat.analysis import process
 from tolstat.analysis.process import LEAST_PARTS, MOST_PARTS, Known, Sums
-from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.errors import Fault, collected, gather, input_error
 from tolstat.common.strict import Strict, did_you_mean, dotted
 from tolstat.common.units import Number
 from tolstat.study.axes import streams_of
-from tolstat.study.selection import entries, select
+from tolstat.study.selection import Reading, entries, select
 
 Array = NDArray[np.float64]
 
@@ -136,61 +136,47 @@ def component(proposals: Sequence[Proposal], u: Array) -> NDArray[np.intp]:
     return np.minimum(np.searchsorted(ends, u, side="right"), len(proposals))
 
 
-def resolve(
-    entry: ProposalEntry,
-    toleranced: Sequence[str],
-    together: Sequence[Sequence[str]],
-    place: str,
-    path: tuple[int | str, ...],
-) -> Proposal:
-    """Expand the patterns of an entry.
+def read(file: Reading) -> tuple[Proposal, ...]:
+    """Read ``[[proposal]]``: distributions of importance sampling beside the tolerances."""
+    proposals = []
+    for number, entry in enumerate(file.models("proposal", ProposalEntry)):
+        with gather(file.faults):
+            proposals.append(_resolved(entry, file, number))
+    left = 1.0 - math.fsum(p.share for p in proposals)
+    if left < MIN_NOMINAL_SHARE - 1e-12:
+        found = f"shares leave {left:.3g} of the joints to the tolerances"
+        file.fault("proposal.share", found, f"give shares with a sum of at most {1.0 - MIN_NOMINAL_SHARE:g}")
+    return tuple(proposals)
 
-    Parameters
-    ----------
-    entry : ProposalEntry
-        Entry as read from the file.
-    toleranced : sequence of str
-        Quantities that are drawn; of a zone the entry applies to the scores of the radii.
-    together : sequence of sequence of str
-        Those that each entry of the tolerances draws.
-    place, path
-        File name and key path shown in faults.
 
-    Raises
-    ------
-    InputError
-        For names without tolerance, values out of range, and an entry that changes nothing.
-    """
-    faults: list[Fault] = []
+def _resolved(entry: ProposalEntry, file: Reading, number: int) -> Proposal:
+    """Expand the patterns of an entry; of a zone it applies to the scores of the radii."""
+    toleranced, whole = list(file.drawn), f"{file.place}: proposal[{number}]"
     means = dict.fromkeys(toleranced, 0.0)
     widths = dict.fromkeys(toleranced, 1.0)
     widen = entry.widen if isinstance(entry.widen, dict) else {}
-    if not widen:
-        with gather(faults):
-            widths = dict.fromkeys(toleranced, _number(entry.widen, "widen", f"{place}: {dotted((*path, 'widen'))}"))
-    parts: dict[str, float] = {}
-    for key, table, numbers in (("widen", widen, widths), ("shift", entry.shift, means), ("parts", entry.parts, parts)):
-        for item in entries(table, *path, key):
-            where = f"{place}: {dotted(item.path)}"
+    with collected() as faults:
+        if not widen:
             with gather(faults):
-                value = _number(item.value, key, where)
-                names = select(item.pattern, toleranced)
-                if not names:
-                    raise InputError([Fault(where, "has no tolerance", did_you_mean(item.pattern, list(toleranced)))])
-                numbers |= dict.fromkeys(names, value)
-    scores = {
-        streams_of(name)[0]: (means[name], widths[name])
-        for name in toleranced
-        if (means[name], widths[name]) != (0.0, 1.0)
-    }
-    whole = f"{place}: {dotted(path)}"
-    if scores and parts:
-        remedy = "write a [[proposal]] for each"
-        faults.append(Fault(whole, "has parts beside widen or shift", remedy))
-    if not (scores or parts) and not faults:
-        faults.append(Fault(whole, "does not differ from the tolerances", "add widen, shift or parts"))
-    if faults:
-        raise InputError(faults)
+                widths = dict.fromkeys(toleranced, _number(entry.widen, "widen", f"{whole}.widen"))
+        parts: dict[str, float] = {}
+        tables = (("widen", widen, widths), ("shift", entry.shift, means), ("parts", entry.parts, parts))
+        for key, table, numbers in tables:
+            for item in entries(table, "proposal", number, key):
+                where = f"{file.place}: {dotted(item.path)}"
+                with gather(faults):
+                    value = _number(item.value, key, where)
+                    names = select(item.pattern, toleranced)
+                    if not names:
+                        raise input_error(where, "has no tolerance", did_you_mean(item.pattern, toleranced))
+                    numbers |= dict.fromkeys(names, value)
+        pairs = {name: (means[name], widths[name]) for name in toleranced}
+        scores = {streams_of(name)[0]: pair for name, pair in pairs.items() if pair != (0.0, 1.0)}
+        if scores and parts:
+            faults.append(Fault(whole, "has parts beside widen or shift", "write a [[proposal]] for each"))
+        if not (scores or parts) and not faults:
+            faults.append(Fault(whole, "does not differ from the tolerances", "add widen, shift or parts"))
+    together = [of_entry.names for of_entry in file.scatter.entries]
     return Proposal(entry.share, scores, tuple(_processes(together, parts)))
 
 
@@ -214,21 +200,5 @@ def _number(value: object, key: str, where: str) -> float:
     number = float(value) if isinstance(value, kinds) and not isinstance(value, bool) else math.nan
     if not low <= number <= high:
         whole = "whole " if key == "parts" else ""
-        remedy = f"give a {whole}number from {low:g} to {high:g}"
-        raise InputError([Fault(where, f"{value!r} is not a valid {key}", remedy)])
+        raise input_error(where, f"{value!r} is not a valid {key}", f"give a {whole}number from {low:g} to {high:g}")
     return number
-
-
-def check_shares(proposals: Sequence[Proposal], place: str) -> None:
-    """Refuse a mixture with too small a share of the tolerances.
-
-    Raises
-    ------
-    InputError
-        When less than `MIN_NOMINAL_SHARE` is left for them.
-    """
-    left = 1.0 - math.fsum(p.share for p in proposals)
-    if left < MIN_NOMINAL_SHARE - 1e-12:
-        found = f"shares leave {left:.3g} of the joints to the tolerances"
-        remedy = f"give shares with a sum of at most {1.0 - MIN_NOMINAL_SHARE:g}"
-        raise InputError([Fault(f"{place}: proposal.share", found, remedy)])

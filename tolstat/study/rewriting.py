@@ -11,7 +11,7 @@ from functools import reduce
 from operator import getitem
 from typing import Any
 
-from tolstat.common.errors import Fault, InputError
+from tolstat.common.errors import input_error
 from tolstat.common.late import tomlkit
 
 SETTABLE = ("joint", "operation", "sampling", "output")
@@ -43,10 +43,10 @@ def with_settings(text: str, settings: Sequence[str]) -> str:
         name, equals, value = setting.partition("=")
         section, *path = (part.strip() for part in name.split("."))
         if not (equals and value.strip() and path and all(path)):
-            raise InputError([Fault(place, "is not a setting", "write --set joint.shaft.axial=free")])
+            raise input_error(place, "is not a setting", "write --set joint.shaft.axial=free")
         if section not in SETTABLE:
             allowed = f"set keys of {', '.join(SETTABLE)}; edit the study for others"
-            raise InputError([Fault(place, f"is in section {section!r}", allowed)])
+            raise input_error(place, f"is in section {section!r}", allowed)
         text = _set(text, [section, *path], given(value), place)
     return text
 
@@ -63,9 +63,7 @@ def as_text(sections: Mapping[str, Any]) -> str:
         return tomlkit.dumps(sections)
     except (tomlkit.exceptions.TOMLKitError, TypeError, ValueError) as error:
         found = f"a value cannot be written to a study: {error}"
-        raise InputError(
-            [Fault("study", found, "give texts, numbers, true or false, lists and dictionaries")]
-        ) from error
+        raise input_error("study", found, "give texts, numbers, true or false, lists and dictionaries") from error
 
 
 def given(value: str) -> Any:
@@ -87,7 +85,7 @@ def _set(text: str, path: Sequence[str], value: Any, place: str) -> str:
         inner = inner[path[depth]]
         depth += 1
     if not isinstance(inner, Mapping):
-        raise InputError([Fault(place, f"{'.'.join(path[:depth])} is no single table", "edit the study")])
+        raise input_error(place, f"{'.'.join(path[:depth])} is no single table", "edit the study")
     for key in reversed(path[depth + 1 :]):
         value = {key: value}
     return with_keys(text, {tuple(path[:depth]): {path[depth]: value}}, place)
@@ -122,7 +120,7 @@ def with_keys(text: str, changes: Mapping[tuple[int | str, ...], Mapping[str, An
         document = None
     if document is None or document.as_string() != text:
         remedy = "write tables such as [a.b] and [a.c], or two [[a]], below each other, with no other table between"
-        raise InputError([Fault(place, "cannot be changed in place: its tables are interlaced", remedy)])
+        raise input_error(place, "cannot be changed in place: its tables are interlaced", remedy)
     for path, values in changes.items():
         for key, value in values.items():
             _put(reduce(getitem, path, document), key, value)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Mapping
-from contextlib import suppress
 from typing import NamedTuple
 
-from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.errors import Fault, collected, gather, input_error
+from tolstat.common.files import finite
 from tolstat.common.loads import ANY_LIMIT, AT, UNIT_OF_LOAD, Limit
 from tolstat.common.strict import did_you_mean
 from tolstat.study.selection import Entry, quantity, resolve
@@ -57,21 +56,20 @@ def limit_of(text: str, limits: Mapping[str, float], option: str, example: str) 
     """
     if text.split() == ANY_LIMIT.split():
         if not limits:
-            raise InputError([Fault(option, "the study has no limits", f"add [limits] to it, or {example}")])
+            raise input_error(option, "the study has no limits", f"add [limits] to it, or {example}")
         return Limit(ANY_LIMIT, tuple(limits), tuple(limits.values()))
     if text.split() == ["all", "limits"]:
         remedy = f'write "{ANY_LIMIT}": a joint counts if it is above at least one'
-        raise InputError([Fault(option, f"{text.strip()!r} is not a limit", remedy)])
+        raise input_error(option, f"{text.strip()!r} is not a limit", remedy)
     match = _LIMIT.fullmatch(text)
     if match is None and AT in text:
         remedy = "name the load alone: at several operating points the largest counts, with --point that at one of them"
-        raise InputError([Fault(option, f"{text.strip()!r} names an operating point", remedy)])
+        raise input_error(option, f"{text.strip()!r} names an operating point", remedy)
     if match is None:
-        raise InputError([Fault(option, f"{text.strip()!r} is not a limit", example)])
+        raise input_error(option, f"{text.strip()!r} is not a limit", example)
     entry = Entry(match["load"], (match["load"],), match["level"])
     if not set(entry.pattern) & set("*?[") and entry.pattern not in UNIT_OF_LOAD:
-        remedy = did_you_mean(entry.pattern, list(UNIT_OF_LOAD))
-        raise InputError([Fault(option, f"{entry.pattern!r} is not a load", remedy)])
+        raise input_error(option, f"{entry.pattern!r} is not a load", did_you_mean(entry.pattern, list(UNIT_OF_LOAD)))
     loads = resolve(entry, UNIT_OF_LOAD, option)
     level = quantity(entry, UNIT_OF_LOAD[loads[0]], option)
     return Limit(entry.pattern, tuple(loads), (level,) * len(loads))
@@ -101,15 +99,11 @@ def parse(text: str, what: str, option: str, example: str, limits: Mapping[str, 
     """
     match = _STATEMENT.fullmatch(text)
     if match is None or match["what"] != what:
-        raise InputError([Fault(option, f"{text!r} is not a rule", example)])
-    faults: list[Fault] = []
-    limit, bound = None, math.nan
-    with gather(faults):
-        limit = limit_of(match["limit"], limits, option, example)
-    with suppress(ValueError):
-        bound = float(match["bound"])
-    if not 0.0 < bound < 1.0:
-        faults.append(Fault(option, f"{what} {match['bound']} is not between 0 and 1".strip(), example))
-    if faults or limit is None:
-        raise InputError(faults)
+        raise input_error(option, f"{text!r} is not a rule", example)
+    bound = finite(match["bound"])
+    with collected() as faults:
+        with gather(faults):
+            limit = limit_of(match["limit"], limits, option, example)
+        if not 0.0 < bound < 1.0:
+            faults.append(Fault(option, f"{what} {match['bound']} is not between 0 and 1".strip(), example))
     return Statement(text.strip(), limit, bound)

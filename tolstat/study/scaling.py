@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from tolstat.common import units
-from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.errors import Fault, InputError, collected, gather, input_error
 from tolstat.common.notation import DIAMETER, PLUS_MINUS
 from tolstat.common.strict import did_you_mean
 from tolstat.study import rewriting, selection
@@ -118,7 +118,6 @@ def tolerances(study: Study) -> list[Tolerance]:
     scalable = []
     for entry in study.entries:
         site, model = entry.models[0]
-        names = tuple(entry.quantities)
         of_parts = not site.name.startswith(("operation.", "material."))
         refined = any(place.shared and place.name.endswith(".position") for place, _ in entry.models)
         refined |= any(study.has_bonus(place.name) for place, _ in entry.models)
@@ -126,10 +125,10 @@ def tolerances(study: Study) -> list[Tolerance]:
             of_parts
             and not refined
             and entry.keys["distribution"] in SCALED
-            and not set(names) & set(study.copula.names)
+            and not set(entry.names) & set(study.copula.names)
         ):
             scalable.append(
-                Tolerance(entry.pattern, names, dict(entry.keys), site, width(entry.keys, site), mark(model))
+                Tolerance(entry.pattern, entry.names, dict(entry.keys), site, width(entry.keys, site), mark(model))
             )
     return scalable
 
@@ -233,29 +232,25 @@ def changed(study: Study, settings: Sequence[str]) -> dict[str, Distribution]:
     InputError
         With every fault of the settings.
     """
-    faults: list[Fault] = []
-    entries, touched = _keys(study, settings, faults)
     sites = {site.name: site for entry in study.entries for site, _ in entry.models}
     distributions = dict(study.tolerances)
-    reported: set[tuple[str, ...]] = set()
     read: dict[str, tuple[Site, ToleranceEntry]] = {}
-    for name, text in touched.items():
-        site, place = sites[name], f"--set {text!r}"
-        try:
-            _check_bonus(study, name, place)
-            read[name] = site, kinds.entry(entries[name], site, place, ("tolerances", name))
-            _check_zone(study, site, read[name][1], place)
-            distributions |= read[name][1].quantities(site)
-        except InputError as error:
-            key = (text, *(fault.found for fault in error.faults))
-            if key not in reported:  # report a fault once for all errors of a pattern
-                faults.extend(error.faults)
-            reported.add(key)
-    if not faults:
-        new = [e._replace(models=tuple(read.get(m[0].name, m) for m in e.models)) for e in study.entries]
-        zones.axes_of(new, study.joint.cross.R, "--set")
-    if faults:
-        raise InputError(faults)
+    by_setting: dict[tuple[str, str], Fault] = {}  # a fault is reported once for all errors of a pattern
+    with collected() as faults:
+        entries, touched = _keys(study, settings, faults)
+        for name, text in touched.items():
+            site, place = sites[name], f"--set {text!r}"
+            try:
+                _check_bonus(study, name, place)
+                read[name] = site, kinds.entry(entries[name], site, place, ("tolerances", name))
+                _check_zone(study, site, read[name][1], place)
+                distributions |= read[name][1].quantities(site)
+            except InputError as error:
+                for fault in error.faults:
+                    by_setting.setdefault((text, fault.found), fault)
+        faults += by_setting.values()
+    new = [e._replace(models=tuple(read.get(m[0].name, m) for m in e.models)) for e in study.entries]
+    zones.axes_of(new, study.joint.cross.R, "--set")
     return distributions
 
 
@@ -274,10 +269,8 @@ def rewritten_with(study: Study, settings: Sequence[str]) -> str:
     InputError
         With the faults of the settings; see `rewriting.with_keys`.
     """
-    faults: list[Fault] = []
-    keys, touched = _keys(study, settings, faults)
-    if faults:
-        raise InputError(faults)
+    with collected() as faults:
+        keys, touched = _keys(study, settings, faults)
     alike: dict[str, dict[str, Any]] = {}
     parted: list[Toleranced] = []
     for entry in study.entries:
@@ -307,11 +300,11 @@ def _keys(
             path, equals, value = text.partition("=")
             pattern, dot, key = path.strip().rpartition(".")
             if not (equals and dot and pattern and key and value.strip()):
-                raise InputError([Fault(f"--set {text!r}", "is not a setting", EXAMPLE)])
+                raise input_error(f"--set {text!r}", "is not a setting", EXAMPLE)
             names = selection.select(pattern, keys)
             if not names:
                 remedy = did_you_mean(pattern, list(keys))
-                raise InputError([Fault(f"--set {text!r}", "selects no error that has a tolerance", remedy)])
+                raise input_error(f"--set {text!r}", "selects no error that has a tolerance", remedy)
             for name in names:
                 kept = {k: v for k, v in keys[name].items() if k not in REPLACED_KEYS.get(key, ())}
                 keys[name] = kept | {key: rewriting.given(value)}
@@ -325,7 +318,7 @@ def _check_bonus(study: Study, name: str, place: str) -> None:
         found = "a position with a bonus by maximum material cannot be changed, nor its diameter"
         if study.sampling.is_matched and name.endswith(".diameter"):
             found = "a diameter that is matched by classes cannot be changed"
-        raise InputError([Fault(place, found, "run a study of its own")])
+        raise input_error(place, found, "run a study of its own")
 
 
 def _check_zone(study: Study, site: Site, new: ToleranceEntry, place: str) -> None:
@@ -336,9 +329,7 @@ def _check_zone(study: Study, site: Site, new: ToleranceEntry, place: str) -> No
     changed_length = site.name.endswith(".position") and new.over != old.over
     if changed_length or new.quantities(site).keys() != old.quantities(site).keys():
         found = f"{site.name} gets another shape, not another size"
-        raise InputError(
-            [Fault(place, found, "change zone, cp, truncate or distribution only, or run a study of its own")]
-        )
+        raise input_error(place, found, "change zone, cp, truncate or distribution only, or run a study of its own")
     if site.shared and isinstance(new, zones.PositionEntry) and new.build() != old.build():
         found = f"{site.name} cannot be changed: the axis has a zone of direction, too, which shares its room"
-        raise InputError([Fault(place, found, "run a study of its own")])
+        raise input_error(place, found, "run a study of its own")

@@ -1,6 +1,6 @@
 """JSON schemas of study, joint and case files for editors, from the input models and the registries of names.
 
-Inside this module a schema may have keywords of `common.json_schema`, which `_finished` replaces. What stands before or
+Inside this module a schema may have keywords of `common.notation`, which `_finished` replaces. What stands before or
 behind the dot of a key is a name, or has a wildcard: whether a pattern selects something, an editor does not tell.
 """
 
@@ -15,10 +15,11 @@ from typing import Any
 from pydantic import BaseModel
 
 from tolstat.analysis.process import LEAST_PARTS, MOST_PARTS
-from tolstat.common import json_schema, loads, strict
+from tolstat.common import loads, strict
 from tolstat.common.channels import UNIT_OF_CHANNEL
 from tolstat.common.files import data_dir
 from tolstat.common.loads import UNIT_OF_LOAD
+from tolstat.common.notation import schema_of_positive, schema_of_quantity
 from tolstat.common.units import EXAMPLES
 from tolstat.joint import Joint, Operation
 from tolstat.joint.model import Assumed
@@ -31,8 +32,8 @@ from tolstat.study.listing import CaseEntry, Range, VariantEntry
 from tolstat.study.model import Output, Sampling, Solver, SweepEntry
 from tolstat.study.points import PointEntry
 from tolstat.study.proposal import MAX_SHIFT, MAX_WIDEN, ProposalEntry
-from tolstat.study.selection import TOLERANCED, UNITS
-from tolstat.study.sorting import MEASURABLE, RejectEntry
+from tolstat.study.selection import GIVEN, TOLERANCED, UNITS
+from tolstat.study.selective import MEASURABLE, RejectEntry
 from tolstat.study.tolerances import fits
 from tolstat.study.tolerances.correlation import Correlation
 from tolstat.study.tolerances.kinds import KINDS as TOLERANCES
@@ -47,25 +48,29 @@ REQUIRED = ("joint", "operation", "sampling")
 """Tables that every study has; a case has those of `OF_CASE`."""
 
 
+def _changed(part: Any, change: Callable[[Schema], Schema]) -> Any:
+    """Schema with each table in it changed, the innermost ones first."""
+    if isinstance(part, list):
+        return [_changed(item, change) for item in part]
+    if not isinstance(part, dict):
+        return part
+    return change({key: _changed(value, change) for key, value in part.items()})
+
+
 @cache
 def of_model(model: type[BaseModel]) -> Schema:
     """JSON schema of a model, with the models inside it in place of references; only the first part of docstrings."""
     made = model.model_json_schema(by_alias=True)
     definitions = made.pop("$defs", {})
 
-    def inlined(part: Any) -> Any:
-        if isinstance(part, list):
-            return [inlined(item) for item in part]
-        if not isinstance(part, dict):
-            return part
-        part = {key: inlined(value) for key, value in part.items()}
+    def inlined(part: Schema) -> Schema:
         if "$ref" in part:
-            part = inlined(definitions[part.pop("$ref").rpartition("/")[2]]) | part
+            part = _changed(definitions[part.pop("$ref").rpartition("/")[2]], inlined) | part
         if isinstance(part.get("description"), str):
             part["description"] = " ".join(part["description"].partition("\n\n")[0].split())
         return part
 
-    schema: Schema = inlined(made)
+    schema: Schema = _changed(made, inlined)
     return schema
 
 
@@ -146,16 +151,11 @@ def _entries(name: str, units: Mapping[str, str]) -> dict[str, Schema]:
     return {quantity: {"x-table": f"{name}_1" if unit == "1" else name} for quantity, unit in units.items()}
 
 
-def _pure(part: Any) -> Any:
-    """Entry of an error that is a pure number."""
-    if isinstance(part, list):
-        return [_pure(item) for item in part]
-    if not isinstance(part, dict):
-        return part
-    kept = {key: _pure(value) for key, value in part.items()}
+def _pure(part: Schema) -> Schema:
+    """Entry of an error that is a pure number, see `_changed`."""
     if part.get("x-unit") != "error":
-        return kept
-    return {key: value for key, value in kept.items() if key not in ("examples", "not")} | json_schema.quantity("1", "")
+        return part
+    return {key: value for key, value in part.items() if key not in ("examples", "not")} | schema_of_quantity("1", "")
 
 
 def _numbers(low: float, high: float, kind: str = "number") -> Schema:
@@ -164,38 +164,27 @@ def _numbers(low: float, high: float, kind: str = "number") -> Schema:
     return _table("", {name: {"type": kind, "minimum": low, "maximum": high} for name in drawn})
 
 
-def tolerances() -> Schema:
-    """JSON schema of the errors that scatter: the entry of each error is one of its kinds."""
-    entries = _entries("tolerance", TOLERANCED)
-    entries |= {name: {"x-table": key} for name in TOLERANCED if (key := name.partition(".")[2]) in ZONE_KINDS}
-    made = _table("How errors scatter, by name or pattern.", entries)
-    return made | {"properties": {fits.KEY: {"x-table": fits.KEY}} | made["properties"]}
-
-
-def limits() -> Schema:
-    """JSON schema of the limits of loads, which may name operating points."""
-    text = "Values that loads must not exceed, by name or pattern of loads; they affect no result."
-    return _table(text, _entries("limit", UNIT_OF_LOAD), end=f"(?:{loads.AT}[A-Za-z].*)?")
-
-
 def sections() -> dict[str, Schema]:
     """JSON schema of each table of a study, in the order of the reference."""
     text = "Joint file, and keys that replace some of its own, such as contact.clearance."
-    given = {name: unit for name, unit in UNITS.items() if not name.startswith("operation.")}
     swept = "Errors by name or pattern, and keys of the joint, that take equally spaced values; several make a grid."
     gauged = "Joints that are rejected at assembly by a measured error or clearance; affects no result."
     grid = {
         name: {"type": "array", "minItems": 1, "items": schema} for name, schema in _entries("quantity", UNITS).items()
     }
+    limited = "Values that loads must not exceed, by name or pattern of loads; they affect no result."
+    toleranced = _entries("tolerance", TOLERANCED)
+    toleranced |= {name: {"x-table": key} for name in TOLERANCED if (key := name.partition(".")[2]) in ZONE_KINDS}
+    scatter = _table("How errors scatter, by name or pattern.", toleranced)
     points = [of_model(Operation), _listed(PointEntry) | {"minItems": 1}]
     return {
         "joint": _definitions()["overrides"] | {"description": text, "required": ["base"]},
         "operation": {"anyOf": points, "description": points[0]["description"]},
         "solver": of_model(Solver),
         "errors": _table(
-            "Errors that every joint has, by name or pattern: deviations from nominal.", _entries("quantity", given)
+            "Errors that every joint has, by name or pattern: deviations from nominal.", _entries("quantity", GIVEN)
         ),
-        "tolerances": tolerances(),
+        "tolerances": scatter | {"properties": {fits.KEY: {"x-table": fits.KEY}} | scatter["properties"]},
         "correlation": _listed(Correlation),
         "sampling": of_model(Sampling),
         "proposal": _listed(ProposalEntry),
@@ -205,7 +194,7 @@ def sections() -> dict[str, Schema]:
         "variant": _listed(VariantEntry),
         "assumed": _listed(Assumed),
         "reject": _table(gauged, _entries("reject", MEASURABLE)),
-        "limits": limits(),
+        "limits": _table(limited, _entries("limit", UNIT_OF_LOAD), end=f"(?:{loads.AT}[A-Za-z].*)?"),
         "fatigue": of_model(Settings),
         "output": of_model(Output),
     }
@@ -226,19 +215,18 @@ def _definitions() -> dict[str, Schema]:
         "examples": [DEFAULT_JOINT],
     }
     factor: Schema = {"type": "number", "minimum": 1 / MAX_WIDEN, "maximum": MAX_WIDEN}
-    given = {name: unit for name, unit in UNITS.items() if not name.startswith("operation.")}
     entries: dict[str, Schema] = {
         "tolerance": {"anyOf": [of_model(model) for model in TOLERANCES.values()]},
-        "quantity": json_schema.quantity("error", EXAMPLES["m"]),
+        "quantity": schema_of_quantity("error", EXAMPLES["m"]),
         "sweep": of_model(SweepEntry),
         "reject": of_model(RejectEntry),
-        "limit": json_schema.positive(json_schema.quantity("error", EXAMPLES["N"])),
+        "limit": schema_of_positive(schema_of_quantity("error", EXAMPLES["N"])),
     }
     return {
         **entries,
-        **{f"{name}_1": _pure(schema) for name, schema in entries.items()},
+        **{f"{name}_1": _changed(schema, _pure) for name, schema in entries.items()},
         **{key: {"anyOf": _different(map(of_model, kinds.values()))} for key, kinds in ZONE_KINDS.items()},
-        "errors": _table("", _entries("quantity", given)),
+        "errors": _table("", _entries("quantity", GIVEN)),
         "keys": keys,
         "overrides": keys | {"properties": {"base": base} | keys["properties"]},
         "vary": _overriding(joint(), {"x-table": "range"}),
@@ -286,8 +274,8 @@ def schema(kind: str) -> Schema:
     -------
     dict
     """
-    made: Schema = _finished(KINDS[kind]())
-    definitions = {name: _finished(part) for name, part in _definitions().items()}
+    made: Schema = _changed(KINDS[kind](), _finished)
+    definitions = {name: _changed(part, _finished) for name, part in _definitions().items()}
     used: dict[str, Schema] = {}
     referring: list[Schema] = [made]
     while referring:
@@ -296,16 +284,12 @@ def schema(kind: str) -> Schema:
     return {"$schema": DRAFT} | made | ({"definitions": used} if used else {})
 
 
-def _finished(part: Any) -> Any:
-    """Schema for editors, of draft 7: without keywords of this package."""
-    if isinstance(part, list):
-        return [_finished(item) for item in part]
-    if not isinstance(part, dict):
-        return part
+def _finished(part: Schema) -> Schema:
+    """Schema for editors, of draft 7: without keywords of this package; see `_changed`."""
     if isinstance(part.get("x-table"), str):
         kept = {key: part[key] for key in ("description", "default", "examples") if key in part}
         return {"allOf": [{"$ref": f"#/definitions/{part['x-table']}"}]} | kept
-    part = {key: _finished(value) for key, value in part.items() if key != "x-unit"}
+    part.pop("x-unit", None)
     if isinstance(part.get("prefixItems"), list):
         part["items"] = part.pop("prefixItems")[0]
     return part

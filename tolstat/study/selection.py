@@ -1,4 +1,4 @@
-"""Names of errors and results in a file: ``"pin*.offset_t"`` selects the same error of all pins.
+"""A file that is being read, and names of errors and results in it: ``"pin*.offset_t"`` selects an error of all pins.
 
 In TOML a name may be written as one quoted key or dotted: ``pin1.tilt_z = "0.5 deg"`` arrives as a table in
 a table.
@@ -8,20 +8,28 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fnmatch import fnmatchcase
-from typing import Any, NamedTuple
+from pathlib import Path
+from typing import Any, NamedTuple, TypeVar
 
 from pydantic_core import PydanticCustomError
 
-from tolstat.common.errors import Fault, InputError, gather
-from tolstat.common.strict import did_you_mean, dotted
+from tolstat.common import strict
+from tolstat.common.errors import Fault, InputError, gather, input_error
+from tolstat.common.strict import did_you_mean, dotted, read_text, read_toml
 from tolstat.common.tables import ERROR_FIELDS
 from tolstat.common.units import to_si
 from tolstat.joint import HOLE_OF_PIN
+from tolstat.joint.reading import is_joint
+from tolstat.study import signals
 from tolstat.study.axes import PAIRS, ZONE_UNITS, columns_of, compatible, is_zone, zone_of
+
+ModelT = TypeVar("ModelT", bound=strict.Strict)
 
 UNITS = {field.name: field.unit for field in ERROR_FIELDS}
 """SI unit of every error, in the order of the table."""
 
+GIVEN = {name: unit for name, unit in UNITS.items() if not name.startswith("operation.")}
+"""SI unit of the errors that ``[errors]`` and a case can give."""
 TOLERANCED = UNITS | ZONE_UNITS
 """SI unit of all that ``[tolerances]`` can select: errors, and zones that stand for several of them."""
 
@@ -70,51 +78,7 @@ def quantity(entry: Entry, unit: str, place: str) -> float:
         return to_si(entry.value, unit)
     except PydanticCustomError as error:
         context = error.context or {}
-        raise InputError([Fault(f"{place}: {dotted(entry.path)}", context["found"], context["remedy"])]) from error
-
-
-def fixed_errors(
-    table: Mapping[str, Any], section: Sequence[int | str], place: str, claims: Assignments
-) -> dict[str, float]:
-    """Read a table of errors that are given, not drawn.
-
-    Parameters
-    ----------
-    table : mapping
-        Names or patterns to quantities.
-    section : sequence
-        Key path of the table in its file.
-    place : str
-        File name shown in faults.
-    claims : Assignments
-        Errors that earlier entries set; those of this table are added.
-
-    Returns
-    -------
-    dict
-        Error name to deviation (SI).
-
-    Raises
-    ------
-    InputError
-        With every fault of the table.
-    """
-    fixed: dict[str, float] = {}
-    faults: list[Fault] = []
-    names = {name: unit for name, unit in UNITS.items() if not name.startswith("operation.")}
-    for entry in entries(table, *section):
-        if entry.pattern.startswith("operation."):
-            where = f"{place}: {dotted(entry.path)}"
-            faults.append(Fault(where, "is not an error", f"set {entry.path[-1]} in [operation]"))
-            continue
-        with gather(faults):
-            selected = resolve(entry, names, place)
-            value = quantity(entry, names[selected[0]], place)
-            claims.claim(entry, selected)
-            fixed |= dict.fromkeys(selected, value)
-    if faults:
-        raise InputError(faults)
-    return fixed
+        raise input_error(f"{place}: {dotted(entry.path)}", context["found"], context["remedy"]) from error
 
 
 def select(pattern: str, names: Iterable[str]) -> list[str]:
@@ -162,11 +126,11 @@ def resolve(entry: Entry, units: Mapping[str, str], place: str) -> list[str]:
     selected = select(entry.pattern, units)
     where = f"{place}: {dotted(entry.path)}"
     if not selected:
-        raise InputError([Fault(where, "selects nothing", suggestion(entry.pattern, list(units)))])
+        raise input_error(where, "selects nothing", suggestion(entry.pattern, list(units)))
     kinds = sorted({units[name] for name in selected})
     if len(kinds) > 1:
         found = f"selects quantities of different kinds ({', '.join(kinds)})"
-        raise InputError([Fault(where, found, "write one entry for each kind")])
+        raise input_error(where, found, "write one entry for each kind")
     return selected
 
 
@@ -219,3 +183,157 @@ class Assignments:
         if about not in ("t", "z") or name.partition(".")[0] in PAIRS:
             return columns_of(name)
         return tuple(column for column in columns_of(name) if column.endswith(f"tilt_{about}"))
+
+
+class Reading:
+    """A study or case file that is being read: its tables, what was made of them, and the faults found so far.
+
+    What was made of the sections are attributes, too; what could not be made is None.
+
+    Parameters
+    ----------
+    path : Path
+        The file; paths in it start from its folder.
+    sections : iterable of str
+        Top-level keys that it may have.
+    text : str, optional
+        TOML to read instead of the file's content.
+
+    Attributes
+    ----------
+    text : str
+        TOML with mean and orders in place of measured signals.
+    data : dict
+        Its tables as parsed.
+    place : str
+        What stands before the key path in the place of a fault.
+    faults : list of Fault
+        Those found so far.
+    claims : Assignments
+        Entries that set errors.
+    parts : dict
+        What was made of the sections.
+
+    Raises
+    ------
+    InputError
+        When the file is not readable TOML, or a joint file.
+    """
+
+    def __init__(self, path: Path, sections: Iterable[str], text: str | None = None) -> None:
+        self.path, self.place, self.folder = path, str(path), path.parent
+        self._source, self._has_lines = read_text(path) if text is None else text, text is None
+        self.text, self.data = self._source, read_toml(path, self._source)
+        self.faults: list[Fault] = []
+        self.claims = Assignments(self.place)
+        self.parts: dict[str, Any] = {"signals": ()}
+        if is_joint(self.data):
+            remedy = f'name it in a study, base = "{path.name}" under [joint]; tolstat new writes one'
+            raise input_error(self.place, "is a joint file, not a study or case", remedy)
+        if "file" in self.text:
+            self.text, self.parts["signals"] = signals.replaced(self.text, self.data, path, self.faults)
+            self.data = read_toml(path, self.text)
+        allowed = list(sections)
+        for key in self.data:
+            if key not in allowed:
+                self.fault(key, "unknown key", did_you_mean(key, allowed))
+
+    def __getattr__(self, name: str) -> Any:
+        return self.parts.get(name)
+
+    def fault(self, key: str | Sequence[int | str], found: str, remedy: str) -> None:
+        """Note a fault of a key or key path, once: several parts may read one section."""
+        fault = Fault(f"{self.place}: {key if isinstance(key, str) else dotted(key)}", found, remedy)
+        if fault not in self.faults:
+            self.faults.append(fault)
+
+    def finish(self, from_command_line: str = "") -> None:
+        """Raise an error if faults were found.
+
+        Parameters
+        ----------
+        from_command_line : str
+            Key whose value is not from the file.
+
+        Raises
+        ------
+        InputError
+            With every fault; those of the file have its lines.
+        """
+        if self.faults:
+            lined = strict.with_lines(self.faults, self.place, self._source) if self._has_lines else self.faults
+            other = f"{self.place}: {from_command_line}"
+            pairs = zip(self.faults, lined, strict=True)
+            raise InputError([fault if fault.place == other else with_line for fault, with_line in pairs])
+
+    def table(self, section: str) -> Mapping[str, Any]:
+        """Section that is a table; empty if it is missing or something else."""
+        table = self.data.get(section, {})
+        if isinstance(table, Mapping):
+            return table
+        self.fault(section, f"{table!r} is not a table", f"write [{section}]")
+        return {}
+
+    def tables(self, section: str) -> list[Any]:
+        """Section that is a list of tables; empty if it is missing or something else."""
+        tables = self.data.get(section, [])
+        if isinstance(tables, list):
+            return tables
+        self.fault(section, "is not a list of tables", f"write [[{section}]]")
+        return []
+
+    def entries(self, section: str) -> Iterator[Entry]:
+        """Entries of a section whose keys are names."""
+        return entries(self.table(section), section)
+
+    def model(self, model: type[ModelT], data: object, *path: int | str, **context: Any) -> ModelT:
+        """Read the table at a key path.
+
+        Raises
+        ------
+        InputError
+            With its faults.
+        """
+        return strict.validate(model, data, self.place, prefix=path, context=context)
+
+    def models(self, section: str, model: type[ModelT]) -> list[ModelT]:
+        """Tables of a section that are valid."""
+        valid = []
+        for number, item in enumerate(self.tables(section)):
+            with gather(self.faults):
+                valid.append(self.model(model, item, section, number))
+        return valid
+
+
+def fixed_errors(
+    file: Reading, table: Mapping[str, Any], section: Sequence[int | str], claims: Assignments
+) -> dict[str, float]:
+    """Read a table of errors that are given, not drawn.
+
+    Parameters
+    ----------
+    file : Reading
+        The file, to which faults are added.
+    table : mapping
+        Names or patterns to quantities.
+    section : sequence
+        Key path of the table in the file.
+    claims : Assignments
+        Errors that earlier entries set; those of this table are added.
+
+    Returns
+    -------
+    dict
+        Error name to deviation (SI).
+    """
+    fixed: dict[str, float] = {}
+    for entry in entries(table, *section):
+        if entry.pattern.startswith("operation."):
+            file.fault(entry.path, "is not an error", f"set {entry.path[-1]} in [operation]")
+            continue
+        with gather(file.faults):
+            selected = resolve(entry, GIVEN, file.place)
+            value = quantity(entry, GIVEN[selected[0]], file.place)
+            claims.claim(entry, selected)
+            fixed |= dict.fromkeys(selected, value)
+    return fixed

@@ -1,28 +1,38 @@
-"""Selective assembly: pins and holes are measured, sorted in classes, and matched class to class.
+"""Parts that are measured: matched class to class, scrapped, or their joints rejected at assembly by a gauge.
 
-A cross is one part with four pins, a fork one with two holes. A part is in the class of its worst measured diameter:
-that of the largest pin, of the smallest hole. Classes are numbered from small to large diameters; crosses of class c go
-with forks of class c. Of the parts of a class as many are matched as the rarest of the three kinds has.
+Selective assembly matches pins and holes class to class. A cross is one part with four pins, a fork one with two holes.
+A part is in the class of its worst measured diameter: that of the largest pin, of the smallest hole. Classes are
+numbered from small to large diameters; crosses of class c go with forks of class c. Of the parts of a class as many are
+matched as the rarest of the three kinds has.
+
+Parts that are scrapped, and joints that are rejected, are drawn all the same: a joint counts by the probability that
+its parts and itself are accepted, so that one campaign tells the shares before and after.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping
+import math
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, model_validator
 
 from tolstat.common import units
 from tolstat.common.bisection import first
+from tolstat.common.errors import gather
 from tolstat.common.late import special
 from tolstat.common.load_kinds import PINS
-from tolstat.common.strict import Strict
-from tolstat.study.tolerances.distributions import Array, Distribution, probability
-from tolstat.study.tolerances.entry import Toleranced
-from tolstat.study.tolerances.reading import Tolerances
+from tolstat.common.strict import Strict, refuse
+from tolstat.common.tables import HOLES
+from tolstat.joint import HOLE_OF_PIN, Joint
+from tolstat.study import selection
+from tolstat.study.selection import UNITS, Reading
+from tolstat.study.tolerances.distributions import Array, Distribution, probability, share_between
+from tolstat.study.tolerances.entry import NotNegative, Site, Toleranced, Value
+from tolstat.study.tolerances.kinds import Tolerances
 from tolstat.study.tolerances.zone_laws import scores_among
 
 MAX_CLASSES = 20
@@ -70,11 +80,8 @@ KINDS = (
 DIAMETERS = tuple(name for kind in KINDS for name in kind.errors)
 
 
-class _Diameters(NamedTuple):
-    """Diameters of a kind: all of its features have one distribution and one band."""
-
-    distribution: Distribution
-    band: tuple[float, float] | None
+_Diameters = tuple[Distribution, tuple[float, float] | None]
+"""Distribution and band of all diameters of a kind."""
 
 
 class Range(NamedTuple):
@@ -222,19 +229,19 @@ def matching(
     """
     bands = _bands(entries)
     first = [kind.errors[0] for kind in KINDS]
-    diameters = tuple(_Diameters(distributions[name], bands.get(name)) for name in first)
+    diameters = tuple((distributions[name], bands.get(name)) for name in first)
     return _matching(settings.classes, settings.gauge, settings.split, diameters)
 
 
 @lru_cache(maxsize=32)
 def _matching(classes: int, gauge: float, split: str, diameters: tuple[_Diameters, ...]) -> Matching:
-    edges = np.array([_edges(classes, gauge, split, *measured) for measured in zip(KINDS, diameters, strict=True)])
+    edges = np.array([_edges(classes, gauge, split, *each) for each in zip(KINDS, diameters, strict=True)])
     near, within, shares = [], [], np.empty((len(KINDS), classes))
-    for number, (kind, measured) in enumerate(zip(KINDS, diameters, strict=True)):
+    for number, (kind, (distribution, _)) in enumerate(zip(KINDS, diameters, strict=True)):
         pairs = list(zip(edges[number][:-1].tolist(), edges[number][1:].tolist(), strict=True))
-        within.append(tuple(Range(measured.distribution, gauge, low, high) for low, high in pairs))
+        within.append(tuple(Range(distribution, gauge, low, high) for low, high in pairs))
         harmless = [(-np.inf, low) if kind.worst > 0 else (high, np.inf) for low, high in pairs]
-        near.append(tuple(Range(measured.distribution, gauge, *ends) for ends in harmless))
+        near.append(tuple(Range(distribution, gauge, *ends) for ends in harmless))
         for c in range(classes):
             low = 0.0 if harmless[c][0] == harmless[c][1] else near[-1][c].share
             count = len(kind.errors)
@@ -242,21 +249,19 @@ def _matching(classes: int, gauge: float, split: str, diameters: tuple[_Diameter
     return Matching(edges, shares, shares.min(axis=0), tuple(near), tuple(within))
 
 
-def _edges(classes: int, gauge: float, split: str, kind: Kind, measured: _Diameters) -> NDArray[np.float64]:
+def _edges(classes: int, gauge: float, split: str, kind: Kind, diameters: _Diameters) -> NDArray[np.float64]:
     """Edges of the classes of a kind, (classes + 1,)."""
-    parts = np.arange(1, classes) / classes
+    (distribution, band), parts = diameters, np.arange(1, classes) / classes
     if split == "width":
-        assert measured.band is not None
-        inner = measured.band[0] + (measured.band[1] - measured.band[0]) * parts
+        assert band is not None
+        inner = band[0] + (band[1] - band[0]) * parts
     else:
         count = len(kind.errors)
         below = parts ** (1.0 / count) if kind.worst > 0 else 1.0 - (1.0 - parts) ** (1.0 / count)
-        inner = measured.distribution.ppf(below)
+        inner = distribution.ppf(below)
         if gauge:  # of the measured deviations
-            reach = measured.distribution.ppf(np.array([1e-12, 1.0 - 1e-12])) + 9.0 * gauge * np.array([-1.0, 1.0])
-            upto = np.vectorize(
-                lambda end: Range(measured.distribution, gauge, -np.inf, float(end)).share, otypes=[float]
-            )
+            reach = distribution.ppf(np.array([1e-12, 1.0 - 1e-12])) + 9.0 * gauge * np.array([-1.0, 1.0])
+            upto = np.vectorize(lambda end: Range(distribution, gauge, -np.inf, float(end)).share, otypes=[float])
             inner = first(lambda ends: upto(ends) >= below, reach[0], reach[1], halvings=40)
     return np.concatenate([[-np.inf], inner, [np.inf]])
 
@@ -271,8 +276,7 @@ def faults(settings: SelectiveEntry, scatter: Tolerances, depending: Collection[
     distributions, bands = scatter.distributions, _bands(scatter.entries)
     missing = [name for name in DIAMETERS if name not in distributions]
     if missing:
-        remedy = 'add "pin*.diameter" and "hole*.diameter" to [tolerances], or fit'
-        yield f"{missing[0]} has no tolerance", remedy
+        yield f"{missing[0]} has no tolerance", 'add "pin*.diameter" and "hole*.diameter" to [tolerances], or fit'
         return
     for kind in KINDS:
         if len({(str(distributions[name].describe()), bands[name]) for name in kind.errors}) > 1:
@@ -284,3 +288,103 @@ def faults(settings: SelectiveEntry, scatter: Tolerances, depending: Collection[
     if both:
         found = f"{both[0]} depends on other parts or errors: by a correlation, a lot or a bonus with reject"
         yield found, "remove that, or selective"
+
+
+MEASURABLE = {name: unit for name, unit in UNITS.items() if name.startswith(("pin", "hole"))}
+"""Errors that can be measured at assembly, and their units; of ``pin1.clearance`` the radial clearance itself."""
+CROSS, INPUT, OUTPUT = PARTS = ("cross", "input fork", "output fork")
+"""Parts of a joint. The four pins are of one part: the worst of them scraps the cross."""
+
+
+class RejectEntry(Strict):
+    """Joints that are rejected at assembly by a measured value."""
+
+    below: Value | None = Field(default=None, examples=["0.06 mm"])
+    """smaller measured values are rejected"""
+    above: Value | None = Field(default=None, examples=["0.14 mm"])
+    """larger measured values are rejected"""
+    gauge: NotNegative = Field(default=0.0, examples=["0.005 mm"])
+    """standard deviation of the measurement; exact by default"""
+
+    @model_validator(mode="after")
+    def _has_a_limit(self) -> Self:
+        if self.below is None and self.above is None:
+            raise refuse("rejects nothing", "add below or above")
+        if self.below is not None and self.above is not None and not self.below < self.above:
+            raise refuse("below is not smaller than above: every joint is rejected", "give below < above")
+        return self
+
+
+class Gauge(NamedTuple):
+    """What is measured, and which values are accepted.
+
+    Attributes
+    ----------
+    name : str
+        An error, or ``pin1.clearance``, the radial clearance of a pin.
+    lower, upper : float
+        Accepted values, SI.
+    deviation : float
+        Standard deviation of the gauge, SI.
+    """
+
+    name: str
+    lower: float
+    upper: float
+    deviation: float
+
+    @property
+    def part(self) -> str:
+        """Part that the error is of."""
+        return part_of(self.name)
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Columns of the errors that it measures."""
+        pin, _, key = self.name.partition(".")
+        return (self.name, f"{pin}.diameter", f"{HOLE_OF_PIN[pin]}.diameter") if key == "clearance" else (self.name,)
+
+    def accepted(self, errors: NDArray[np.void], joint: Joint) -> NDArray[np.float64]:
+        """Probability that each joint is accepted, (n,), from its errors.
+
+        The error of the gauge is normal with mean zero; without deviation the gauge is exact.
+        """
+        values = np.asarray(errors[self.name])
+        if self.name.endswith(".clearance"):
+            _, pin, hole = self.columns
+            nominal = joint.contact.D_H - joint.contact.D_P
+            values = values + 0.5 * (nominal + np.asarray(errors[hole]) - np.asarray(errors[pin]))
+        if self.deviation == 0.0:
+            return ((values >= self.lower) & (values <= self.upper)).astype(float)
+        low, high = (self.lower - values) / self.deviation, (self.upper - values) / self.deviation
+        return share_between(low, high)
+
+
+def part_of(name: str) -> str:
+    """Part that an error or zone is of; empty for operating point and material."""
+    feature = name.partition(".")[0]
+    if feature in PINS or feature.endswith("_pins"):
+        return CROSS
+    if feature in (*HOLES[:2], "input_holes"):
+        return INPUT
+    return OUTPUT if feature in (*HOLES[2:], "output_holes") else ""
+
+
+def of_parts(entries: Sequence[Toleranced]) -> list[Gauge]:
+    """Gauges that scrap parts: those of the entries of ``[tolerances]``."""
+    each = ((site, model.gauge_of(site)) for entry in entries for site, model in entry.models)
+    return [Gauge(site.name, *band) for site, band in each if band is not None]
+
+
+def read(file: Reading) -> tuple[Gauge, ...]:
+    """Read ``[reject]``: what is measured of assembled joints."""
+    gauges: list[Gauge] = []
+    for entry in file.entries("reject"):
+        with gather(file.faults):
+            names = selection.resolve(entry, MEASURABLE, file.place)
+            site = Site(names[0], MEASURABLE[names[0]], 0.0, file.folder)
+            limits = file.model(RejectEntry, entry.value, *entry.path, site=site)
+            lower = -math.inf if limits.below is None else limits.below
+            upper = math.inf if limits.above is None else limits.above
+            gauges += [Gauge(name, lower, upper, limits.gauge) for name in names]
+    return tuple(gauges)

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from pydantic_core import PydanticCustomError
 
 from tolstat.common import units
-from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.errors import Fault, InputError, gather, input_error
+from tolstat.common.files import finite
 from tolstat.common.late import interpolate
 from tolstat.common.loads import FloatArray
 from tolstat.common.strict import dotted, read_text
@@ -91,13 +92,14 @@ def read(path: Path, needed: Sequence[str] = ()) -> dict[str, FloatArray]:
             remedy = f"add one with the header {name} [{HEADS[name]}]"
             faults.append(Fault(f"{path}:{head}", f"has no column {name}", remedy))
     numbers = [number for number, _ in lines[1:]]
-    values = {
-        name: np.array([_number(cells, column) for _, cells in lines[1:]]) for name, (column, _) in columns.items()
+    cells_by_name = {
+        name: [cells[column] if column < len(cells) else None for _, cells in lines[1:]]
+        for name, (column, _) in columns.items()
     }
-    for name, numbers_of in values.items():
-        for row in np.flatnonzero(np.isnan(numbers_of)):
-            cells = lines[1 + row][1]
-            found = repr(cells[columns[name][0]]) if columns[name][0] < len(cells) else "missing"
+    values = {name: np.array([finite(cell) for cell in cells]) for name, cells in cells_by_name.items()}
+    for name, cells in cells_by_name.items():
+        for row in np.flatnonzero(np.isnan(values[name])):
+            found = "missing" if cells[row] is None else repr(cells[row])
             faults.append(Fault(f"{path}:{numbers[row]}: {name}", f"{found} is no finite number", "give a number"))
     signal = {name: factor * values[name] for name, (_, factor) in columns.items()}
     if "angle" in signal:
@@ -106,22 +108,13 @@ def read(path: Path, needed: Sequence[str] = ()) -> dict[str, FloatArray]:
         for row in 1 + np.flatnonzero(np.diff(signal.get(name, np.zeros(0))) <= 0):
             faults.append(Fault(f"{path}:{numbers[row]}: {name}", "does not rise", "give samples in their order"))
     if len(numbers) < FEWEST:
-        found = f"has {len(numbers)} samples"
-        faults.append(Fault(str(path), found, f"give at least {FEWEST} lines below the header"))
+        faults.append(Fault(str(path), f"has {len(numbers)} samples", f"give at least {FEWEST} lines below the header"))
     if len(faults) > SHOWN:
         others = Fault(str(path), f"has {len(faults) - SHOWN} more faults", "mend all lines in the same way")
         faults = [*faults[:SHOWN], others]
     if faults:
         raise InputError(faults)
     return signal
-
-
-def _number(cells: Sequence[str], place: int) -> float:
-    try:
-        value = float(cells[place])
-    except (ValueError, IndexError):
-        return math.nan
-    return value if math.isfinite(value) else math.nan
 
 
 class Orders(NamedTuple):
@@ -152,16 +145,6 @@ class Orders(NamedTuple):
     turns: int
 
 
-def turns_of(angle: FloatArray) -> int:
-    """Number of whole revolutions in samples of an angle (rad): an even one if there are several.
-
-    A half order changes its sign from one revolution to the next; an even number of them has none of it in the mean.
-    The step from the last sample back to the first may be missing.
-    """
-    turns = math.floor(float(2 * angle[-1] - angle[-2] - angle[0]) / TURN + 1e-9)
-    return turns - turns % 2 if turns > 1 else turns
-
-
 def orders(angle: FloatArray, time: FloatArray, values: FloatArray | None = None) -> Orders:
     """Resample a signal to equal parts of each revolution, and expand its mean revolution.
 
@@ -185,7 +168,10 @@ def orders(angle: FloatArray, time: FloatArray, values: FloatArray | None = None
     ValueError
         When the samples cover less than one revolution, or are fewer than `FEWEST` in one.
     """
-    turns = turns_of(angle)
+    # the step from the last sample back to the first may be missing
+    turns = math.floor(float(2 * angle[-1] - angle[-2] - angle[0]) / TURN + 1e-9)
+    # half orders change their sign from one revolution to the next: the mean of an even number has none of them
+    turns -= turns % 2 if turns > 1 else 0
     if turns < 1:
         raise ValueError(f"covers {(angle[-1] - angle[0]) / TURN:.3g} of a revolution, one at least is needed")
     end = angle[0] + TURN * turns
@@ -250,11 +236,11 @@ def orders_of(path: Path, key: str) -> Orders:
     time, angle, speed = (signal.get(name) for name in ("time", "angle", "speed"))
     if speed is not None and not speed.min() > 0:
         remedy = "give a part in which the shaft turns forwards"
-        raise InputError([Fault(f"{path}: speed", "is not above zero everywhere", remedy)])
+        raise input_error(f"{path}: speed", "is not above zero everywhere", remedy)
     if angle is None and (time is None or speed is None):
-        raise InputError([Fault(str(path), "has no angle", "add a column angle [deg], or time [s] and speed [rpm]")])
+        raise input_error(path, "has no angle", "add a column angle [deg], or time [s] and speed [rpm]")
     if key == "speed" and time is None and speed is None:
-        raise InputError([Fault(str(path), "has no speed", "add a column speed [rpm] or time [s]")])
+        raise input_error(path, "has no speed", "add a column speed [rpm] or time [s]")
     if angle is None:
         angle = _integral(time, speed)
     if time is None:
@@ -262,7 +248,7 @@ def orders_of(path: Path, key: str) -> Orders:
     try:
         return orders(angle, time, signal.get(key))
     except ValueError as error:
-        raise InputError([Fault(str(path), str(error), "give a longer or denser signal")]) from error
+        raise input_error(path, str(error), "give a longer or denser signal") from error
 
 
 def _integral(x: Any, y: Any) -> FloatArray:
@@ -300,10 +286,10 @@ def replaced(text: str, data: Mapping[str, Any], path: Path, faults: list[Fault]
         with gather(faults_of_key):
             if unknown := set(table) - {"file"}:
                 where = f"{path}: {dotted((*path_of_key, min(unknown)))}"
-                raise InputError([Fault(where, "is given beside a file", "remove one of the two")])
+                raise input_error(where, "is given beside a file", "remove one of the two")
             if not isinstance(table["file"], str):
                 where = f"{path}: {dotted((*path_of_key, 'file'))}"
-                raise InputError([Fault(where, "is not a text", 'write file = "engine.csv"')])
+                raise input_error(where, "is not a text", 'write file = "engine.csv"')
             if (table["file"], key) not in known:
                 known[table["file"], key] = orders_of(path.parent / table["file"], key)
             orders_found = known[table["file"], key]

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.errors import Fault, InputError
+from tolstat.common.errors import input_error
 from tolstat.common.late import tomlkit
 from tolstat.common.loads import FloatArray
 from tolstat.common.strict import read_text
@@ -191,7 +191,7 @@ def read(path: Path, m: float) -> DutyCycle:
     try:
         return duty_cycle(signal["time"], signal["torque"], signal["speed"], signal["alpha"], m)
     except ValueError as error:
-        raise InputError([Fault(str(path), str(error), "give the signal of a loaded shaft")]) from error
+        raise input_error(path, str(error), "give the signal of a loaded shaft") from error
 
 
 def names(cycle: DutyCycle) -> list[str]:
@@ -222,30 +222,27 @@ def text(cycle: DutyCycle, source: Path, path: Path, base: Path | None = None) -
     try:
         document = tomlkit.parse(given)
     except tomlkit.exceptions.TOMLKitError as error:
-        raise InputError([Fault(str(base), f"is not TOML: {error}", "give a study that tolstat plan reads")]) from error
+        raise input_error(base, f"is not TOML: {error}", "give a study that tolstat plan reads") from error
     document.pop("operation", None)
-    points = tomlkit.aot()
-    for number, name in enumerate(names(cycle)):
-        point = tomlkit.table()
-        values = {
+    points = [
+        {
             "name": name,
-            "share": float(f"{cycle.time[number] / cycle.time.sum():.9g}"),
-            "alpha": f"{math.degrees(cycle.alpha[number]):.6g} deg",
-            "speed": f"{cycle.speed[number] * 30 / math.pi:.6g} rpm",
-            "torque": f"{cycle.torque[number]:.6g} N*m",
+            "share": float(f"{time / cycle.time.sum():.9g}"),
+            "alpha": f"{math.degrees(alpha):.6g} deg",
+            "speed": f"{speed * 30 / math.pi:.6g} rpm",
+            "torque": f"{torque:.6g} N*m",
         }
-        for key, value in values.items():
-            point.add(key, value)
-        points.append(point)
-    document.append(tomlkit.key("operation"), points)
+        for name, time, alpha, speed, torque in zip(
+            names(cycle), cycle.time, cycle.alpha, cycle.speed, cycle.torque, strict=True
+        )
+    ]
+    document.append(tomlkit.key("operation"), tomlkit.item(points))
     output = document.setdefault("output", tomlkit.table())
     if output.get("histories", "none") == "none":
         output["histories"] = "cycles"
     if len(set(cycle.visits.tolist())) > 1:
-        sequence = tomlkit.table()
         visits = textwrap.fill(" ".join(names(cycle)[visit] for visit in cycle.visits), 100)
-        sequence.add("points", tomlkit.string(visits, multiline=True))
-        sequence.add("revolutions", float(f"{cycle.turns:.6g}"))
+        sequence = {"points": tomlkit.string(visits, multiline=True), "revolutions": float(f"{cycle.turns:.6g}")}
         document.setdefault("fatigue", tomlkit.table())["sequence"] = sequence
     head = f"# Operating points, their shares and the order of their visits are from {source.name}.\n"
     return head + document.as_string()

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from tolstat.common import strict
-from tolstat.common.errors import Fault, InputError
+from tolstat.common.errors import Fault, InputError, input_error
 from tolstat.common.files import atomic_write, data_dir
 from tolstat.study import rewriting
 from tolstat.study.schema import KINDS, schema
@@ -47,8 +47,7 @@ def write(path: Path, joint: str) -> list[Path]:
     """
     names = sorted(file.stem for file in (data_dir() / "joints").glob("*.toml"))
     if joint not in (*names, OWN):
-        remedy = strict.did_you_mean(joint, [*names, OWN])
-        raise InputError([Fault("--joint", f"no joint is named {joint!r}", remedy)])
+        raise input_error("--joint", f"no joint is named {joint!r}", strict.did_you_mean(joint, [*names, OWN]))
     files = dict(_files(path, joint))
     faults = [
         Fault(str(file), "exists", "give the study another name") for file in files if file.exists() and not _made(file)
@@ -61,8 +60,8 @@ def write(path: Path, joint: str) -> list[Path]:
             with atomic_write(file) as temporary:
                 temporary.write_text(text, encoding="utf-8")
     except OSError as error:
-        raise InputError(
-            [Fault(str(path), f"cannot be written: {error.strerror or error}", "give a folder that is writable")]
+        raise input_error(
+            path, f"cannot be written: {error.strerror or error}", "give a folder that is writable"
         ) from error
     return list(files)
 

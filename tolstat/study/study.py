@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common import selected_results
+from tolstat.common.columns import holds
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import UNIT_OF_LOAD, limits_in_words, split
 from tolstat.common.strict import dotted, with_lines
@@ -20,18 +20,17 @@ from tolstat.common.tables import DESIGN, Variant
 from tolstat.joint import Joint, Operation, affecting_results
 from tolstat.joint.model import Assumed
 from tolstat.joint.sections import mounting_and_law
-from tolstat.study import mounting
+from tolstat.study import points
 from tolstat.study.axes import Axis
 from tolstat.study.design import Design, flat
 from tolstat.study.fatigue import Fatigue
 from tolstat.study.model import Output, Sampling, Solver, SweepAxis
-from tolstat.study.mounting import Setting
-from tolstat.study.points import Point, limits_at, only_one
+from tolstat.study.points import Point, Setting, limits_at, only_one
 from tolstat.study.proposal import Proposal
-from tolstat.study.sorting import Gauge
+from tolstat.study.selective import Gauge
 from tolstat.study.tolerances.correlation import Copula, Group, Lot
 from tolstat.study.tolerances.distributions import Distribution
-from tolstat.study.tolerances.entry import KnownEntry, Toleranced, known_of
+from tolstat.study.tolerances.entry import Toleranced
 from tolstat.study.tolerances.fits import Fit
 
 
@@ -73,14 +72,14 @@ class Case:
         return lined
 
     def check_mounting(self) -> None:
-        """Refuse settings without effect, see `mounting.refusals`.
+        """Refuse settings without effect, see `points.refusals`.
 
         Raises
         ------
         InputError
             With every such setting.
         """
-        faults = [self.fault(dotted(path), *texts) for path, *texts in mounting.refusals(self._settings, self._varied)]
+        faults = [self.fault(dotted(path), *texts) for path, *texts in points.refusals(self._settings, self._varied)]
         if faults:
             raise InputError(faults)
 
@@ -181,9 +180,9 @@ class Study(Case):
     signals: tuple[str, ...] = ()
 
     @property
-    def known(self) -> tuple[KnownEntry, ...]:
+    def known(self) -> tuple[Toleranced, ...]:
         """Entries whose mean and deviation were estimated from measured parts, in the order of the file."""
-        return known_of(self.entries)
+        return tuple(entry for entry in self.entries if entry.parts)
 
     @property
     def has_axial_force(self) -> bool:
@@ -300,7 +299,7 @@ class Study(Case):
         """Loads of interest: those with limits, else those that ``output.results`` selects; else none."""
         if self.limits or self.output.results is None:
             return list(dict.fromkeys(split(name)[0] for name in self.limits))
-        return [load for load in UNIT_OF_LOAD if selected_results.holds(self.output.columns, load)]
+        return [load for load in UNIT_OF_LOAD if holds(self.output.columns, load)]
 
     def __repr__(self) -> str:
         parts = [f"{self.samples} joints ({self.sampling.method})", f"{len(self.tolerances)} toleranced errors"]

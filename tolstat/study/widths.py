@@ -17,12 +17,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tolstat.common import units
-from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.errors import collected, gather, input_error
 from tolstat.common.strict import did_you_mean
 from tolstat.joint import HOLE_OF_PIN, varied
 from tolstat.study import rewriting, scaling, selection
 from tolstat.study.axes import is_zone
-from tolstat.study.loading import load
+from tolstat.study.file import load
 from tolstat.study.study import Study
 from tolstat.study.tolerances import fits, iso
 from tolstat.study.tolerances.distributions import Array, Distribution
@@ -104,7 +104,7 @@ def lines(study: Study) -> list[Line]:
     for entry in study.entries:
         if _free(study, entry):
             label = _fit_label(study) if _is_of_fit(study, entry) else entry.pattern
-            names_of[label] = (*names_of.get(label, ()), *entry.quantities)
+            names_of[label] = (*names_of.get(label, ()), *entry.names)
     return [Line(label, names) for label, names in names_of.items()]
 
 
@@ -138,24 +138,22 @@ def named(study: Study, texts: Sequence[str]) -> list[Line]:
     InputError
         With every fault of the texts.
     """
-    groups, faults, known = [], list[Fault](), list(_drawn(study))
-    for text in texts:
-        label, equals, patterns = (part.strip() for part in text.partition("="))
-        names: dict[str, None] = {}
-        with gather(faults):
-            if not (label and equals and patterns):
-                remedy = 'write --group "tilts = pin*.tilt_*, hole*.tilt_*"'
-                raise InputError([Fault(f"--group {text!r}", "is not a name with patterns", remedy)])
-            for pattern in (one.strip() for one in patterns.split(",")):
-                selected = selection.select(pattern, known)
-                if not selected:
-                    entries = [line.label for line in lines(study)]
-                    remedy = did_you_mean(pattern, [*entries, *known])
-                    raise InputError([Fault(f"--group {text!r}", f"{pattern!r} selects no line", remedy)])
-                names |= dict.fromkeys(selected)
-            groups.append(Line(label, tuple(names)))
-    if faults:
-        raise InputError(faults)
+    groups, known = [], list(_drawn(study))
+    with collected() as faults:
+        for text in texts:
+            label, equals, patterns = (part.strip() for part in text.partition("="))
+            names: dict[str, None] = {}
+            with gather(faults):
+                if not (label and equals and patterns):
+                    remedy = 'write --group "tilts = pin*.tilt_*, hole*.tilt_*"'
+                    raise input_error(f"--group {text!r}", "is not a name with patterns", remedy)
+                for pattern in map(str.strip, patterns.split(",")):
+                    selected = selection.select(pattern, known)
+                    if not selected:
+                        remedy = did_you_mean(pattern, [*(line.label for line in lines(study)), *known])
+                        raise input_error(f"--group {text!r}", f"{pattern!r} selects no line", remedy)
+                    names |= dict.fromkeys(selected)
+                groups.append(Line(label, tuple(names)))
     return groups
 
 

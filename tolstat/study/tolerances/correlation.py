@@ -8,26 +8,29 @@ only correlates errors of the joint that share it, as `correlated` does.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+import math
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from itertools import combinations
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.errors import gather, input_error
+from tolstat.common.late import pandas as pd
 from tolstat.common.late import special
 from tolstat.common.strict import Strict, dotted
 from tolstat.common.units import Number
 from tolstat.study.axes import is_zone
-from tolstat.study.selection import select
-
-if TYPE_CHECKING:
-    from tolstat.study.tolerances.entry import Toleranced
+from tolstat.study.selection import Reading, select
+from tolstat.study.tolerances.distributions import Distribution, Normal
 from tolstat.study.tolerances.entry import Toleranced
 
 Array = NDArray[np.float64]
+NODES = 64
+"""Number of Gauss–Hermite nodes of each of two normal scores."""
 
 MIN_EIGENVALUE = 1e-9
 """A correlation matrix with a smaller eigenvalue does not count as positive definite."""
@@ -80,50 +83,40 @@ class Copula:
         return np.clip(correlated, np.finfo(float).tiny, 1 - np.finfo(float).epsneg)
 
 
-def assemble(entries: Sequence[Correlation], toleranced: dict[str, str], place: str) -> Copula:
-    """Assemble the entries of a file.
+def read(file: Reading) -> Copula:
+    """Read ``[[correlation]]``, and the correlation of errors that share the score of their lot.
 
-    Parameters
-    ----------
-    entries : sequence of Correlation
-        In the order of the file.
-    toleranced : dict
-        Names of the errors that have a tolerance, and their units.
-    place : str
-        File name shown in faults.
-
-    Returns
-    -------
-    Copula
-        Of all errors that any entry names.
-
-    Raises
-    ------
-    InputError
-        For a name without tolerance, a pair given twice, and a matrix that is not positive definite.
+    Faults are names without tolerance, a pair given twice, a matrix that is not positive definite, errors with a lot
+    or a bonus.
     """
-    faults: list[Fault] = []
+    lots, before = file.scatter.lots, len(file.faults)
+    entries = file.models("correlation", Correlation)
     rho: dict[frozenset[str], float] = {}
     order: dict[str, None] = {}
-    for number, entry in enumerate(entries):
-        where = f"{place}: correlation[{number}].between"
+    for number, entry in enumerate(entries if len(file.faults) == before else []):
+        where = f"correlation[{number}].between"
         names: dict[str, None] = {}
         for pattern in entry.between:
-            with gather(faults):
-                names.update(dict.fromkeys(_named(pattern, toleranced, where)))
+            with gather(file.faults):
+                names.update(dict.fromkeys(_named(pattern, file.drawn, f"{file.place}: {where}")))
         members = list(names)
-        if len(members) < 2 and not faults:
-            faults.append(Fault(where, f"names only one error, {members[0]}", "name at least two"))
+        if len(members) < 2 and len(file.faults) == before:
+            file.fault(where, f"names only one error, {members[0]}", "name at least two")
         order.update(names)
-        pairs = [frozenset((a, b)) for i, a in enumerate(members) for b in members[:i]]
-        for pair in pairs:
+        for pair in (frozenset((a, b)) for i, a in enumerate(members) for b in members[:i]):
             if pair in rho:
                 text = " and ".join(sorted(pair))
-                faults.append(Fault(where, f"{text} are correlated by an earlier entry", "remove one of the two"))
+                file.fault(where, f"{text} are correlated by an earlier entry", "remove one of the two")
             rho[pair] = entry.rho
-    if faults:
-        raise InputError(faults)
-    return _positive_definite(tuple(order), rho, place)
+    with gather(file.faults):
+        if len(file.faults) == before:
+            copula = correlated(_positive_definite(tuple(order), rho, file.place), lots, file.place)
+            for name in sorted(file.scatter.accepted & set(copula.names)):
+                found = f"{name} cannot be correlated: parts are accepted by this diameter and the position"
+                remedy = 'remove the correlation or the bonus, or write material_condition = "fills"'
+                file.fault("correlation", found, remedy)
+            return copula
+    return Copula()
 
 
 def _named(pattern: str, toleranced: dict[str, str], where: str) -> list[str]:
@@ -131,11 +124,9 @@ def _named(pattern: str, toleranced: dict[str, str], where: str) -> list[str]:
     names = select(pattern, toleranced)
     if any(is_zone(name) for name in names or [pattern]):
         remedy = "give offset_t, offset_z, tilt_t and tilt_z tolerances of their own, and correlate those"
-        raise InputError([Fault(where, f"{pattern} is a zone: it cannot be correlated", remedy)])
+        raise input_error(where, f"{pattern} is a zone: it cannot be correlated", remedy)
     if not names:
-        raise InputError(
-            [Fault(where, f"{pattern!r} has no tolerance", f"add tolerances.{pattern}, or remove it here")]
-        )
+        raise input_error(where, f"{pattern!r} has no tolerance", f"add tolerances.{pattern}, or remove it here")
     return names
 
 
@@ -152,7 +143,7 @@ def _positive_definite(names: tuple[str, ...], rho: dict[frozenset[str], float],
             guilty = [name for name, share in zip(names, part, strict=True) if share > 0.1 * part.max()]
             found = f"not positive definite: the correlations of {', '.join(guilty)} contradict each other"
             remedy = "give a smaller |rho|, or add the missing pairs (they have rho = 0)"
-            raise InputError([Fault(f"{place}: correlation", found, remedy)])
+            raise input_error(f"{place}: correlation", found, remedy)
     return Copula(names, matrix)
 
 
@@ -203,14 +194,12 @@ def correlated(copula: Copula, lots: Mapping[str, Lot], place: str) -> Copula:
     both = [name for name in copula.names if name in lots]
     if both:
         remedy = "remove one of the two; errors of one entry are correlated by lot = { share = ..., shared = true }"
-        raise InputError([Fault(f"{place}: {dotted(('correlation',))}", f"{both[0]} has a lot already", remedy)])
+        raise input_error(f"{place}: {dotted(('correlation',))}", f"{both[0]} has a lot already", remedy)
     every = [lot.score for lot in lots.values()]
     names = [name for name, lot in lots.items() if every.count(lot.score) > 1]
-    shared = np.eye(len(names))
-    for i, first in enumerate(names):
-        for j, second in enumerate(names):
-            if i != j and lots[first].score == lots[second].score:
-                shared[i, j] = lots[first].share
+    scores, shares = (np.array([lots[name][i] for name in names]) for i in (1, 0))
+    shared = np.where(scores[:, None] == scores, shares[:, None], 0.0)
+    np.fill_diagonal(shared, 1.0)
     matrix = np.eye(len(copula.names) + len(names))
     matrix[: len(copula.names), : len(copula.names)] = copula.matrix
     matrix[len(copula.names) :, len(copula.names) :] = shared
@@ -233,27 +222,19 @@ class Group(NamedTuple):
     names: tuple[str, ...]
 
 
-def groups(entries: Sequence[Toleranced], copula: Copula, by: str) -> tuple[Group, ...]:
-    """Groups of the errors of a study.
+def groups(file: Reading) -> tuple[Group, ...]:
+    """Groups of errors that a pick-freeze design exchanges together, in the order of ``[tolerances]``.
 
-    Parameters
-    ----------
-    entries : sequence of Toleranced
-        ``[tolerances]`` of the study.
-    copula : Copula
-        Their correlation: groups that it links become one.
-    by : str
-        ``error``: every error by itself, of a zone every vector; ``tolerance``: those of an entry together.
-
-    Returns
-    -------
-    tuple of Group
-        In the order of the table.
+    They are, by ``sampling.groups``: every error by itself, of a zone every vector; or those of an entry together.
+    Groups that a correlation links become one. Other designs have none.
     """
-    if by == "error":
-        parts = [Group(name, (name,)) for entry in entries for name in entry.quantities]
+    if file.sampling is None or file.sampling.method != "pick_freeze":
+        return ()
+    entries, copula = file.scatter.entries, file.copula
+    if file.sampling.groups == "error":
+        parts = [Group(name, (name,)) for entry in entries for name in entry.names]
     else:
-        parts = [Group(entry.pattern, tuple(entry.quantities)) for entry in entries]
+        parts = [Group(entry.pattern, entry.names) for entry in entries]
     for i, j in np.argwhere(np.triu(copula.matrix, 1)):
         first, second = (next(p for p in parts if copula.names[k] in p.names) for k in (i, j))
         if first is not second:
@@ -263,3 +244,50 @@ def groups(entries: Sequence[Toleranced], copula: Copula, by: str) -> tuple[Grou
         p if "*" in p.label or len(p.names) == 1 else p._replace(label=f"{p.names[0]} and {len(p.names) - 1} more")
         for p in parts
     )
+
+
+def correlations(copula: Copula, tolerances: Mapping[str, Distribution]) -> pd.DataFrame:
+    """Make one row for each pair of kinds of errors that are correlated alike.
+
+    Parameters
+    ----------
+    copula : Copula
+        Correlation of the normal scores.
+    tolerances : mapping of str to Distribution
+        Distribution of each error.
+
+    Returns
+    -------
+    DataFrame
+        ``errors``, the first pair; ``pairs``, number of pairs; ``rho`` of their normal scores, as the study gives it;
+        ``pearson``, linear correlation of the errors themselves; ``spearman``, rank correlation.
+    """
+    rows: dict[tuple[float, float], list[str]] = {}
+    for (i, first), (j, second) in combinations(enumerate(copula.names), 2):
+        if rho := float(copula.matrix[i, j]):
+            linear = pearson(tolerances[first], tolerances[second], rho)
+            rows.setdefault((rho, float(f"{linear:.4g}")), []).append(f"{first}, {second}")
+    cells = [
+        (pairs[0], len(pairs), rho, linear, 6.0 / math.pi * math.asin(0.5 * rho))
+        for (rho, linear), pairs in rows.items()
+    ]
+    return pd.DataFrame(cells, columns=["errors", "pairs", "rho", "pearson", "spearman"])
+
+
+def pearson(first: Distribution, other: Distribution, rho: float) -> float:
+    """Linear correlation of two errors whose normal scores have the correlation `rho`: smaller unless both are normal.
+
+    Gauss–Hermite quadrature over both scores.
+    """
+    if isinstance(first, Normal) and isinstance(other, Normal):
+        return rho
+    z, weight = np.polynomial.hermite_e.hermegauss(NODES)
+    weight = weight / weight.sum()
+
+    def values(distribution: Distribution, scores: Array) -> Array:
+        return distribution.ppf(np.clip(special.ndtr(scores), 2.0**-53, 1.0 - 2.0**-53)) - distribution.moments.mean
+
+    second = rho * z[:, None] + math.sqrt(1.0 - rho**2) * z
+    y = values(other, second.ravel()).reshape(second.shape)
+    covariance = float((weight * values(first, z)) @ y @ weight)
+    return covariance / (first.moments.deviation * other.moments.deviation)

@@ -15,8 +15,9 @@ from typing import Annotated, Any, Literal, NamedTuple, Self
 import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, WithJsonSchema, model_validator
 
-from tolstat.common import json_schema, strict, units
-from tolstat.common.notation import PLUS_MINUS
+from tolstat.common import strict, units
+from tolstat.common.late import pandas as pd
+from tolstat.common.notation import PLUS_MINUS, schema_of_quantity
 from tolstat.common.strict import refuse
 from tolstat.study.tolerances import iso
 from tolstat.study.tolerances.distributions import Distribution
@@ -99,7 +100,7 @@ def _reader(mark: str) -> BeforeValidator:
     return BeforeValidator(lambda value, info: units.to_si(value, info.context["site"].unit, mark))
 
 
-OF_ERROR = WithJsonSchema(json_schema.quantity("error", units.EXAMPLES["m"]))
+OF_ERROR = WithJsonSchema(schema_of_quantity("error", units.EXAMPLES["m"]))
 Value = Annotated[float, _reader(""), OF_ERROR]
 """Quantity in the unit of the error that the entry is for."""
 
@@ -129,9 +130,9 @@ class ToleranceEntry(strict.Strict):
     def meaning(self, site: Site) -> list[Meaning]:
         """Return what the entry says of the errors that it sets."""
 
-    def measured_parts(self, site: Site) -> int | None:
-        """Return the number of parts that mean and deviation were estimated from; None if they are taken as exact."""
-        return None
+    def measured_parts(self, site: Site) -> int:
+        """Return the number of parts that mean and deviation were estimated from; 0 if they are taken as exact."""
+        return 0
 
     def gauge_of(self, site: Site) -> tuple[float, float, float] | None:
         """Return the band outside which parts are scrapped, and the gauge's deviation, SI; None if none is."""
@@ -213,34 +214,15 @@ class Toleranced(NamedTuple):
         return {name: d for site, model in self.models for name, d in model.quantities(site).items()}
 
     @property
-    def measured_parts(self) -> int | None:
-        """Number of parts that mean and deviation were estimated from; None if they are taken as exact."""
+    def names(self) -> tuple[str, ...]:
+        """Names of the quantities that the entry draws."""
+        return tuple(self.quantities)
+
+    @property
+    def parts(self) -> int:
+        """Number of parts that mean and deviation were estimated from; 0 if they are taken as exact."""
         site, model = self.models[0]
         return model.measured_parts(site)
-
-
-class KnownEntry(NamedTuple):
-    """An entry that is known from measured parts.
-
-    Attributes
-    ----------
-    pattern : str
-        Pattern as written in the study.
-    names : tuple of str
-        Errors that it draws, all from one process.
-    parts : int
-        Number of measured parts.
-    """
-
-    pattern: str
-    names: tuple[str, ...]
-    parts: int
-
-
-def known_of(entries: Sequence[Toleranced]) -> tuple[KnownEntry, ...]:
-    """Entries of a study that are known from measured parts, in the order of the file."""
-    measured = ((entry, entry.measured_parts) for entry in entries)
-    return tuple(KnownEntry(e.pattern, tuple(e.quantities), parts) for e, parts in measured if parts is not None)
 
 
 class HalfBand(SingleEntry):
@@ -314,3 +296,41 @@ class Banded(HalfBand):
         ends = [units.shown(end, site.unit) for end in (self.lower, self.upper)]
         numbers = [end.partition(" ")[0] for end in ends]
         return f"{numbers[0]} to {ends[1]}" if numbers[0] != ends[0] else " to ".join(ends)
+
+
+def meanings(entries: Sequence[Toleranced]) -> pd.DataFrame:
+    """Make one row for each entry and kind of error that it sets.
+
+    Parameters
+    ----------
+    entries : sequence of Toleranced
+        Entries of a study.
+
+    Returns
+    -------
+    DataFrame
+        ``entry``, its pattern; ``number``, what its number is; ``errors``, keys of the errors as a pattern; ``unit``
+        and ``sigma``, standard deviation of each of these errors, SI (where several entries set an error, the part of
+        this one); ``outside``, share of the parts outside the band or zone, NaN without either.
+    """
+    rows: dict[tuple[Any, ...], dict[str, None]] = {}
+    for entry in entries:
+        for site, model in entry.models:
+            for meaning in model.meaning(site):
+                sigma = float(f"{meaning.sigma:.6g}")
+                key = (entry.pattern, meaning.number, meaning.unit, sigma, f"{meaning.outside:.6g}")
+                rows.setdefault(key, {}).update(dict.fromkeys(name.partition(".")[2] for name in meaning.errors))
+    columns = ["entry", "number", "unit", "sigma", "outside", "errors"]
+    cells = [(*key[:4], float(key[4]), _pattern(list(keys))) for key, keys in rows.items()]
+    made = pd.DataFrame(cells, columns=columns)
+    return made[["entry", "number", "errors", "unit", "sigma", "outside"]]
+
+
+def _pattern(keys: Sequence[str]) -> str:
+    """Keys as one pattern where they have the same kind: ``offset_[tz]``."""
+    kinds: dict[str, str] = {}
+    for key in keys:
+        kind, dash, part = key.rpartition("_")
+        name = f"{kind}{dash}" if len(part) == 1 else key
+        kinds[name] = kinds.get(name, "") + (part if len(part) == 1 else "")
+    return ", ".join(f"{kind}[{parts}]" if len(parts) > 1 else f"{kind}{parts}" for kind, parts in kinds.items())

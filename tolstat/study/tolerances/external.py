@@ -22,7 +22,7 @@ from pydantic import Field
 
 from tolstat.analysis.process import LEAST_PARTS
 from tolstat.common import strict, units
-from tolstat.common.files import about_encoding, read_input
+from tolstat.common.files import about_encoding, finite, read_input
 from tolstat.common.late import stats
 from tolstat.common.strict import did_you_mean, refuse
 from tolstat.study.tolerances import distributions as tolerance
@@ -118,9 +118,7 @@ class ScipyEntry(SingleEntry):
     def build(self, site: Site) -> ScipyLaw:
         """See `SingleEntry.build`."""
         name, parameters = _parsed(self.distribution.removeprefix(PREFIX))
-        if self.unit is None and site.unit != "1":
-            raise refuse("missing key unit", 'add the unit of loc and scale, for example unit = "mm"')
-        unit = units.to_si(1.0 if self.unit is None else f"1 {self.unit}", site.unit)
+        unit = _factor(self.unit, site, "loc and scale")
         law = ScipyLaw(name, parameters, unit, self.lower, self.upper)
         if not np.isfinite(law.whole.ppf(0.5)):
             raise refuse(f"{self.distribution!r} has a parameter that the law does not allow", "see scipy.stats")
@@ -137,6 +135,13 @@ class ScipyEntry(SingleEntry):
     def band(self, site: Site) -> tuple[float, float] | None:
         """See `SingleEntry.band`."""
         return None if self.lower is None or self.upper is None else (self.lower, self.upper)
+
+
+def _factor(unit: str | None, site: Site, of: str) -> float:
+    """SI value of the unit that numbers have; needed unless the error is a pure number."""
+    if unit is None and site.unit != "1":
+        raise refuse("missing key unit", f'add the unit of {of}, for example unit = "mm"')
+    return units.to_si(1.0 if unit is None else f"1 {unit}", site.unit)
 
 
 def _parsed(text: str) -> tuple[str, tuple[tuple[str, float], ...]]:
@@ -188,9 +193,9 @@ class MeasuredEntry(SingleEntry):
     law: Literal["normal", "lognormal"] | None = Field(default=None, examples=["normal"])
     """law that the parts are a sample of, for shares far out; without it each joint has one of the measured values"""
 
-    def measured_parts(self, site: Site) -> int | None:
+    def measured_parts(self, site: Site) -> int:
         """See `ToleranceEntry.measured_parts`."""
-        return len(self._values(site)) if self.law else None
+        return len(self._values(site)) if self.law else 0
 
     def build(self, site: Site) -> tolerance.Measured | tolerance.Normal | tolerance.LogNormal:
         """See `ToleranceEntry.build`."""
@@ -199,9 +204,7 @@ class MeasuredEntry(SingleEntry):
             beyond = f"a value that {100 * RARE:g} % of the parts exceed lies beyond all of them with probability"
             found = f"a sample of {len(values)} has no tail: {beyond} {100 * (1.0 - RARE) ** len(values):.0f} %"
             raise refuse(found, 'add law = "normal" or "lognormal"')
-        if self.unit is None and site.unit != "1":
-            raise refuse("missing key unit", 'add the unit of the values, for example unit = "mm"')
-        factor = units.to_si(1.0 if self.unit is None else f"1 {self.unit}", site.unit)
+        factor = _factor(self.unit, site, "the values")
         if self.law is None:
             return tolerance.Measured.of(factor * value for value in values)
         return _fitted(self.law, factor * np.array(values))
@@ -256,22 +259,11 @@ def _read(path: Path, column: str) -> list[float]:
             f"{path} cannot be read: {reason}", "give a CSV file; its path starts from the study's folder"
         ) from error
     if column not in columns:
-        remedy = strict.did_you_mean(column, list(columns))
-        raise refuse(f"{path} has no column {column!r}", remedy)
-    values = []
-    for number, cell in enumerate(cells, start=1):
-        value = _number(cell)
-        if value is None:
-            raise refuse(f"{path}: row {number} of {column!r} is {cell!r}", "give a finite number in each row")
-        values.append(value)
+        raise refuse(f"{path} has no column {column!r}", strict.did_you_mean(column, list(columns)))
+    values = list(map(finite, cells))
+    if any(map(math.isnan, values)):
+        row = list(map(math.isnan, values)).index(True)
+        raise refuse(f"{path}: row {row + 1} of {column!r} is {cells[row]!r}", "give a finite number in each row")
     if len(values) < 2:
         raise refuse(f"{path} has {len(values)} values in {column!r}", "give at least two measured parts")
     return values
-
-
-def _number(cell: str | None) -> float | None:
-    try:
-        value = float(cell or "")
-    except ValueError:
-        return None
-    return value if math.isfinite(value) else None

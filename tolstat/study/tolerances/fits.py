@@ -14,13 +14,13 @@ from typing import Annotated, Any, Literal, NamedTuple
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator
 
 from tolstat.common import strict
-from tolstat.common.errors import Fault, InputError
+from tolstat.common.errors import Fault, InputError, gather, input_error
 from tolstat.common.load_kinds import PINS
 from tolstat.common.strict import Strict
 from tolstat.common.tables import HOLES
 from tolstat.display.text import percent
 from tolstat.study import selection
-from tolstat.study.selection import Entry
+from tolstat.study.selection import Entry, Reading
 from tolstat.study.tolerances import iso, kinds
 from tolstat.study.tolerances.distributions import Distribution
 from tolstat.study.tolerances.entry import PositiveLength, PositiveNumber, Site
@@ -132,20 +132,34 @@ class Fit(NamedTuple):
         return lines
 
 
-def read(table: object, place: str) -> Fit | None:
-    """Read the fit of ``[tolerances]``.
+def read(file: Reading) -> Fit | None:
+    """Read the fit of ``[tolerances]``; None where the table has none.
+
+    A fit with faults is replaced by another one, so that other faults of the file are those of the file: without
+    diameters those of the joint, correlations of diameters and bonuses would seem to lack them.
+    """
+    table = file.data.get("tolerances")
+    if not isinstance(table, Mapping) or KEY not in table:
+        return None
+    data = table[KEY]
+    with gather(file.faults):
+        return of(data, file.place)
+    sizes = [data.get("basic"), STAND_IN["basic"]] if isinstance(data, Mapping) else [STAND_IN["basic"]]
+    for basic in sizes:
+        with suppress(InputError):
+            return of(STAND_IN | {"basic": basic}, "")
+    return None
+
+
+def of(data: object, place: str) -> Fit:
+    """Read a fit.
 
     Parameters
     ----------
-    table : object
-        ``[tolerances]`` as parsed from TOML.
+    data : object
+        Value of the key ``fit``.
     place : str
         File name shown in faults.
-
-    Returns
-    -------
-    Fit or None
-        None where the table has no fit.
 
     Raises
     ------
@@ -153,11 +167,9 @@ def read(table: object, place: str) -> Fit | None:
         With the faults of the entry; for a transition or interference fit, with the share of joints that would not go
         together.
     """
-    if not isinstance(table, Mapping) or KEY not in table:
-        return None
-    data, where = table[KEY], f"{place}: {strict.dotted(PATH)}"
+    where = f"{place}: {strict.dotted(PATH)}"
     if not isinstance(data, Mapping):
-        raise InputError([Fault(where, f"{data!r} is not a fit", f"write {EXAMPLE}")])
+        raise input_error(where, f"{data!r} is not a fit", f"write {EXAMPLE}")
     entry = strict.validate(FitEntry, data, place, prefix=PATH)
     zones = entry.zones
     deviations = []
@@ -169,24 +181,6 @@ def read(table: object, place: str) -> Fit | None:
     if zones.kind != "clearance":
         raise InputError([_refusal(entry, zones, share, f"{where}.code")])
     return Fit(entry, share)
-
-
-def stand_in(table: object) -> Fit | None:
-    """Fit in place of one with faults, so that other faults of the file are those of the file.
-
-    Without diameters those of the joint, correlations of diameters and bonuses would seem to lack them.
-
-    Parameters
-    ----------
-    table : object
-        ``[tolerances]`` as parsed from TOML.
-    """
-    data = table.get(KEY) if isinstance(table, Mapping) else None
-    sizes = [data.get("basic"), STAND_IN["basic"]] if isinstance(data, Mapping) else [STAND_IN["basic"]]
-    for basic in sizes:
-        with suppress(InputError):
-            return read({KEY: STAND_IN | {"basic": basic}}, "")
-    return None
 
 
 def _refusal(entry: FitEntry, zones: iso.Zones, share: float, where: str) -> Fault:

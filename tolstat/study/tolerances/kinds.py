@@ -7,31 +7,39 @@ from __future__ import annotations
 
 import json
 import math
-from typing import Annotated, Literal
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Literal, NamedTuple
 
 from pydantic import Field
 
 from tolstat.analysis.process import LEAST_PARTS, MOST_PARTS
 from tolstat.common import strict
-from tolstat.common.errors import Fault, InputError
+from tolstat.common.errors import gather, input_error
 from tolstat.common.strict import described, refuse
-from tolstat.study.axes import ORIENTATIONS, columns_of
+from tolstat.common.tables import FACTORS
+from tolstat.study.axes import ORIENTATIONS, REJECT, Axis, Bonus, columns_of
+from tolstat.study.selection import TOLERANCED, Entry, Reading
 from tolstat.study.tolerances import distributions as tolerance
+from tolstat.study.tolerances.correlation import Lot, of_entries
+from tolstat.study.tolerances.distributions import Distribution
 from tolstat.study.tolerances.entry import (
     Banded,
+    Diameter,
     HalfBand,
     Meaning,
     NotNegative,
     Positive,
     PositiveNumber,
+    SingleEntry,
     Site,
+    Toleranced,
     ToleranceEntry,
     Truncate,
     Value,
 )
 from tolstat.study.tolerances.external import PREFIX, MeasuredEntry, ScipyEntry
-from tolstat.study.tolerances.zone_laws import Rayleigh
-from tolstat.study.tolerances.zones import CoaxialityEntry, OrientationEntry, PositionEntry
+from tolstat.study.tolerances.zone_laws import Accepted, Rayleigh
+from tolstat.study.tolerances.zones import CoaxialityEntry, OrientationEntry, PositionEntry, axes_of
 
 CPK = "capability index Cpk of the process: sigma is the distance from the mean to the nearer limit over 3 Cpk"
 Cpk = Annotated[PositiveNumber | None, described(f"{CPK}; 1 unless given", 1.33)]
@@ -53,9 +61,9 @@ class NormalEntry(Banded):
     gauge: NotNegative | None = Field(default=None, examples=["0.01 mm"])
     """parts outside the band are scrapped, by a gauge of this standard deviation; affects no result"""
 
-    def measured_parts(self, site: Site) -> int | None:
+    def measured_parts(self, site: Site) -> int:
         """See `ToleranceEntry.measured_parts`."""
-        return self.known_from
+        return self.known_from or 0
 
     def gauge_of(self, site: Site) -> tuple[float, float, float] | None:
         """See `ToleranceEntry.gauge_of`."""
@@ -263,15 +271,109 @@ def entry(data: object, site: Site, place: str, path: tuple[int | str, ...]) -> 
         remedy = f'write {{ plus_minus = {half}, distribution = "normal", cpk = 1.0 }}'
         if "normal" in kinds and kinds is not KINDS:
             remedy = ZONE_EXAMPLE
-        raise InputError([Fault(where, f"{data!r} is not a tolerance", remedy)])
+        raise input_error(where, f"{data!r} is not a tolerance", remedy)
     kind = data.get("distribution")
     if kind is None:
-        remedy = f"add distribution, one of {', '.join(kinds)}"
-        raise InputError([Fault(f"{where}.distribution", "missing key", remedy)])
+        raise input_error(f"{where}.distribution", "missing key", f"add distribution, one of {', '.join(kinds)}")
     if isinstance(kind, str) and kind.startswith(PREFIX):
         kind = PREFIX.rstrip(":")
     if not isinstance(kind, str) or kind not in kinds:
         also = " (rayleigh is for offset_radial)" if kind == "rayleigh" else ""
         remedy = strict.did_you_mean(str(kind), list(kinds))
-        raise InputError([Fault(f"{where}.distribution", f"{kind!r} is not allowed here{also}", remedy)])
+        raise input_error(f"{where}.distribution", f"{kind!r} is not allowed here{also}", remedy)
     return strict.validate(kinds[kind], data, place, prefix=path, context={"site": site})
+
+
+class Tolerances(NamedTuple):
+    """``[tolerances]`` as read.
+
+    Attributes
+    ----------
+    entries : tuple of Toleranced
+        In the order of the file.
+    axes : dict of str to Axis
+        Features and pairs that have zones.
+    """
+
+    entries: tuple[Toleranced, ...] = ()
+    axes: Mapping[str, Axis] = {}
+
+    @property
+    def distributions(self) -> dict[str, Distribution]:
+        """Distribution of each quantity that is drawn: of the diameters of pins and holes that are accepted."""
+        made = {name: law for entry in self.entries for name, law in entry.quantities.items()}
+        return made | {bonus.diameter: Accepted(made[bonus.diameter], bonus) for bonus in self.rejecting}
+
+    @property
+    def lots(self) -> dict[str, Lot]:
+        """Lot of each error that has one."""
+        return of_entries(self.entries)
+
+    @property
+    def accepted(self) -> set[str]:
+        """Diameters by which parts are accepted."""
+        return {bonus.diameter for bonus in self.rejecting}
+
+    @property
+    def rejecting(self) -> list[Bonus]:
+        """Maximum material requirements by which parts are rejected."""
+        return [axis.bonus for axis in self.axes.values() if axis.bonus is not None and axis.bonus.rule == REJECT]
+
+
+def read(table: Sequence[tuple[Entry, list[str]]], file: Reading) -> Tolerances:
+    """Read all entries.
+
+    Parameters
+    ----------
+    table : sequence of (Entry, list of str)
+        Entries of the file, and the errors and zones that each selects.
+    file : Reading
+        The file, to which faults are added.
+
+    Returns
+    -------
+    Tolerances
+        Entries without fault.
+    """
+    every = {name for _, names in table for name in names}
+    shared = {name for name in every if _partners(name) & every}
+    directions: dict[str, ToleranceEntry] = {}
+    diameters: dict[str, Diameter] = {}
+    read: dict[int, Toleranced] = {}
+    reach = math.nan if file.joint is None else file.joint.cross.R
+    for number in sorted(range(len(table)), key=lambda i: _is_position(table[i][1])):  # what they depend on comes first
+        item, names = table[number]
+        models = []
+        with gather(file.faults):
+            for name in names:
+                site = Site(name, TOLERANCED[name], 1.0 if name in FACTORS else 0.0, file.folder, reach, name in shared)
+                if _is_position([name]):
+                    direction = next((directions[zone] for zone in _partners(name) if zone in directions), None)
+                    site = site._replace(direction=direction, diameter=diameters.get(name))
+                model = entry(item.value, site, file.place, item.path)
+                models.append((site, model))
+                feature, _, key = name.partition(".")
+                if key == "diameter" and isinstance(model, SingleEntry):
+                    diameters[f"{feature}.position"] = Diameter(model.band(site), model.build(site))
+                if key in ORIENTATIONS:
+                    directions[name] = model
+        if models and len(models) == len(names):
+            read[number] = Toleranced(item.pattern, item.value, tuple(models))
+    entries = tuple(read[number] for number in sorted(read))
+    axes: dict[str, Axis] = {}
+    if file.joint is not None:
+        with gather(file.faults):
+            axes = axes_of(entries, reach, file.place)
+    return Tolerances(entries, axes)
+
+
+def _is_position(names: list[str]) -> bool:
+    return any(name.endswith(".position") for name in names)
+
+
+def _partners(name: str) -> set[str]:
+    """Names of the zones that share position and direction of an axis with this one."""
+    feature, _, key = name.partition(".")
+    if key == "position":
+        return {f"{feature}.{other}" for other in ORIENTATIONS}
+    return {f"{feature}.position"} if key in ORIENTATIONS else set()

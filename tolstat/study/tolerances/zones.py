@@ -15,8 +15,9 @@ from typing import Annotated, Any, Literal, NamedTuple
 from pydantic import BeforeValidator, Field, ValidationInfo, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
-from tolstat.common import json_schema, notation, units
+from tolstat.common import notation, units
 from tolstat.common.errors import Fault, InputError
+from tolstat.common.notation import schema_of_quantity
 from tolstat.common.strict import dotted, refuse
 from tolstat.study import axes
 from tolstat.study.axes import ORIENTATIONS, PAIRS, REJECT, Axis, Bonus
@@ -70,7 +71,7 @@ def _band(written: notation.Written, name: str) -> PydanticCustomError:
 class ZoneEntry(ToleranceEntry):
     """Entry with a zone that the axis lies in over a length."""
 
-    zone: Annotated[Zone, BeforeValidator(_read), WithJsonSchema(json_schema.quantity("m", "⌀0.1 mm"))] = Field(
+    zone: Annotated[Zone, BeforeValidator(_read), WithJsonSchema(schema_of_quantity("m", "⌀0.1 mm"))] = Field(
         examples=["⌀0.1 mm"]
     )
     """size of the zone; ⌀ or dia before the number say that it is a diameter"""

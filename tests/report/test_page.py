@@ -14,13 +14,15 @@ import pytest
 from typer.testing import CliRunner
 
 from tests.support import exceedance, synthetic
+from tests.support.cells import body
 from tolstat.cli import app
 from tolstat.common.errors import StoreError
 from tolstat.common.tables import Status
 from tolstat.display import html as writer
 from tolstat.display.answer import Asked
-from tolstat.display.blocks import Section
+from tolstat.display.blocks import Section, Sentence
 from tolstat.display.html import bound, grouped
+from tolstat.display.table import Table
 from tolstat.questions import accuracy, joints
 from tolstat.questions.exceedance import rows
 from tolstat.report import headline as verdict
@@ -346,8 +348,8 @@ def words(path, accepted=np.nan):
         made = page.compose(store.view(), Asked(path, accepted))
     found = [*made.scene, made.provenance]
     for block in (block for section in made.sections for block in section.blocks):
-        found += [block.text] if block.kind == "text" else []
-        found += [cell for row in block.rows for cell in row] if block.kind == "table" else []
+        found += [block.text] if isinstance(block, Sentence) else []
+        found += [cell for row in body(block) for cell in row] if isinstance(block, Table) else []
     return [section.key for section in made.sections], found
 
 

@@ -17,7 +17,7 @@ from shlex import quote
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from tolstat.common.errors import NotApplicable, StoreError
-from tolstat.display.blocks import Block, Section, Text
+from tolstat.display.blocks import Block, Section, Sentence
 
 if TYPE_CHECKING:
     from tolstat.display.answer import Answer, Asked
@@ -126,7 +126,7 @@ def sections(view: View, asked: Asked) -> list[Section]:
 
 def _without_folder(block: Block, path: Path) -> Block:
     """Name the file without its folder in a paragraph, so that the page does not depend on the folder."""
-    if not isinstance(block, Text):
+    if not isinstance(block, Sentence):
         return block
     return replace(block, text=block.text.replace(quote(str(path)), quote(path.name)).replace(str(path), path.name))
 

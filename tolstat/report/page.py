@@ -15,7 +15,7 @@ from tolstat.common.errors import Fault, NotApplicable, StoreError, TolstatError
 from tolstat.common.tables import SCHEMA_VERSION, VALID
 from tolstat.display import html, progress, table, text
 from tolstat.display.answer import Asked
-from tolstat.display.blocks import Card, Decision, Facts, Listing, Page, Panels, Section, Table, Text
+from tolstat.display.blocks import Card, Decision, Facts, Listing, Page, Panels, Section, Sentence
 from tolstat.display.verdict import WORDS, Verdict
 from tolstat.joint import Joint, derived, load, model
 from tolstat.joint.model import leaves
@@ -110,7 +110,7 @@ def compose(view: View, asked: Asked, full: bool = False, brief: bool = False) -
     if brief:
         with asked.noting("nothing on the lines of the drawing"), suppress(NotApplicable):
             answer = lines.lines_on_page(view, asked)
-            blocks = [block for block in answer.blocks() if isinstance(block, Text | Panels)]
+            blocks = [block for block in answer.blocks() if isinstance(block, Sentence | Panels)]
             sections.append(Section("lines", answer.title, blocks[:2]))
     else:
         worst.begin_replay(view, asked)
@@ -242,11 +242,11 @@ def decision(view: View, asked: Asked) -> Section:
         answer.bars(standing) if standing and standing.rows else None,
         [line for line in below if line],
     )
-    notes = (Text(f"{text.capital(note)}.", small=True) for note in asked.notes)
+    notes = map(Sentence, asked.notes)
     return Section("verdict", "Verdict", [head, *_points(view), *notes])
 
 
-def _points(view: View) -> list[Table]:
+def _points(view: View) -> list[table.Table]:
     """Operating points, and of the joints that keep all limits there; none of a file with one point."""
     if len(view.parts) == 1:
         return []
@@ -264,7 +264,7 @@ def _points(view: View) -> list[Table]:
         table.Column("of the time", shares.share("share"), shown=table.has("share")),
         table.Column("keep all limits there", lambda row: row.get("kept", WORDS["none"]), shown=table.has("kept")),
     )
-    return [table.as_block("Operating points", columns, rows)]
+    return [table.Table("points", "Operating points", columns, rows)]
 
 
 def question_of(study: str) -> str:

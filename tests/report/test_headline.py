@@ -84,7 +84,7 @@ MISLEADING = {
 def _without_pictures(monkeypatch):
     monkeypatch.setattr("tolstat.display.style.save", lambda figure, stem: [])
     monkeypatch.setattr("tolstat.questions.exceedance.curves.sheet", lambda view, subtitle: None)
-    monkeypatch.setattr("tolstat.questions.sections", lambda view, asked: [])
+    monkeypatch.setattr("tolstat.report.page.sections_of", lambda view, asked: [])
 
 
 @pytest.fixture(autouse=True)

@@ -200,7 +200,7 @@ def test_other_bushings_and_the_band_of_the_whole_curve_are_drawn_on_switches(vi
 
 def test_folded_sections_stand_below_the_others_and_open_where_all_is_asked_for(path, tmp_path, monkeypatch):
     found = [Section("one", "One", folded=True), Section("two", "Two")]
-    monkeypatch.setattr("tolstat.questions.sections", lambda view, asked: list(found))
+    monkeypatch.setattr("tolstat.report.page.sections_of", lambda view, asked: list(found))
     for full in (False, True):
         page.write_page(path, tmp_path / "page.html", full=full)
         made = (tmp_path / "page.html").read_text(encoding="utf-8")
@@ -222,7 +222,7 @@ def test_text_of_the_study_is_shown_and_not_run(html):
 
 
 def test_names_and_comments_are_escaped_and_unseen_characters_shown(tmp_path, monkeypatch):
-    monkeypatch.setattr("tolstat.questions.sections", lambda view, asked: [])
+    monkeypatch.setattr("tolstat.report.page.sections_of", lambda view, asked: [])
     text = "# Question: \u202ewhy</p><script>1</script>\n" + TEXT
     path = synthetic.store(tmp_path, text, name="""a"b'<script>c&\u202d""")
     page.write_page(path, tmp_path / "page.html", replay=0)

@@ -78,7 +78,7 @@ def write(runs: Sequence[Run], setup: Setup, stem: Path) -> str:
         temporary.write_text(page(points, truth, subtitle, f"{stem.name}.png"), encoding="utf-8")
     ahead = _ahead(points, truth, "loads")
     rows = ahead.to_dict("records")
-    return table.as_text(table.plain(rows), rows)
+    return table.fitted(table.plain(rows), rows)[0]
 
 
 def short(runs: Sequence[Run]) -> str:

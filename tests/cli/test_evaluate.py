@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tolstat.cli.evaluate import MAX_FAULTS, read_table
+from tolstat.cli.simulate import MAX_FAULTS, read_table
 from tolstat.common.errors import InputError
 
 NAMES = {"pin1.tilt_t": "rad", "pin1.offset_t": "m", "material.E_factor": "1"}

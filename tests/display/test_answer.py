@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from matplotlib.axes import Axes
 
+from tests.support.cells import body, head
 from tolstat.display.answer import Answer, Document, Sentence, Table
-from tolstat.display.blocks import Panel, Panels, Text
-from tolstat.display.blocks import Table as Block
+from tolstat.display.blocks import Panel, Panels
 from tolstat.display.table import Column
 
 COLUMNS = (
@@ -55,9 +55,9 @@ def test_json_has_all_rows_in_plain_numbers_and_null_for_what_is_not_finite(answ
 
 def test_people_see_the_rows_meant_for_them_in_columns_that_have_something_to_show(answer: Answer) -> None:
     lead, table, panels, note = answer.blocks()
-    assert (lead, note) == (Text("One load is known."), Text("N: joints.", small=True))
-    assert isinstance(table, Block)
-    assert (table.head, table.rows) == (["load", "largest"], [["cross1.F", "700 N"]])
+    assert (lead, note) == (Sentence("One load is known.", "lead"), Sentence("n: joints"))
+    assert isinstance(table, Table)
+    assert (head(table), body(table)) == (["load", "largest"], [["cross1.F", "700 N"]])
     assert isinstance(panels, Panels)
 
 

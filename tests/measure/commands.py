@@ -223,10 +223,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
     rows = measure(given.study, given.joints, given.workers, given.folder)
     load = next(iter(study.load(given.study).asked), "cross1.F")
     about = f"{given.study.name}, causes of {load}; {given.workers} workers on {cores} cores, {busy}.\n{machine()}."
-    print(table.as_text(COLUMNS, records(rows)))
+    print(table.fitted(COLUMNS, records(rows))[0])
     say(about)
     if given.into is not None:
-        filled = markdown(table.cells(COLUMNS, records(rows)))
+        cells = ([column.cell(row) for column in COLUMNS] for row in records(rows))
+        filled = markdown([[column.head for column in COLUMNS], *cells])
         insert(given.into, MARK, "\n\n".join([filled, LEGEND, about]))
     if given.plot is not None:
         style.save(figure(rows, about), given.plot.with_suffix(""), (given.plot.suffix,))

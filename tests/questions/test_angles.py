@@ -14,7 +14,7 @@ from tolstat.common.channels import CHANNELS
 from tolstat.common.errors import InputError, StoreError
 from tolstat.common.load_kinds import BUSHINGS
 from tolstat.common.loads import LOADS, SHOWN_LOADS
-from tolstat.display.answer import Asked
+from tolstat.display.answer import Asked, Panels
 from tolstat.questions.causes import angles
 from tolstat.questions.causes.angles import against_angle, angles_on_page
 from tolstat.questions.causes.errors import causes_on_page
@@ -133,7 +133,7 @@ def test_page_draws_loads_over_the_revolution(known):
         panel.key: panel
         for answer in found
         for block in answer.blocks()
-        if block.kind == "panels"
+        if isinstance(block, Panels)
         for panel in block.panels
     }
     keys = [name.replace(".", "-") for name in bushings]

@@ -19,7 +19,7 @@ from tolstat.common.load_kinds import PINS
 from tolstat.common.tables import Mode, Status
 from tolstat.display import text
 from tolstat.display.answer import Asked, Sentence, Table
-from tolstat.display.blocks import Panels, Text
+from tolstat.display.blocks import Panels
 from tolstat.joint import Operation
 from tolstat.questions.bearing_life import answer as question
 from tolstat.questions.bearing_life.lives import LOADED, PLACES, below_rows, lives_of
@@ -341,7 +341,7 @@ def test_without_independent_joints_there_are_no_intervals():
 def test_the_page_and_the_json():
     made = view()
     blocks = question.bearing_life_on_page(made, Asked(made.path)).blocks()
-    assert isinstance(blocks[0], Text)
+    assert isinstance(blocks[0], Sentence)
     assert blocks[0].text.endswith("do not reach the required 8000000 h.")
     assert sum(isinstance(block, Panels) for block in blocks) == 1
     found = tolstat.bearing_life(made).values()

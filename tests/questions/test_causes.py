@@ -10,12 +10,13 @@ import pytest
 from typer.testing import CliRunner
 
 from tests.support import exceedance, synthetic
+from tests.support.cells import body
 from tolstat.analysis import sensitivity
 from tolstat.cli import app
 from tolstat.common.errors import NotApplicable
 from tolstat.common.loads import ANY_LIMIT
 from tolstat.common.tables import SIMULATED, Simulation, Status
-from tolstat.display.answer import Asked, Sentence
+from tolstat.display.answer import Asked, Sentence, Table
 from tolstat.display.text import value
 from tolstat.questions import QUESTIONS, Question
 from tolstat.questions.capability import capability
@@ -171,7 +172,7 @@ def shown(path):
 
 
 def tables(blocks):
-    return [block for block in blocks if block.kind == "table"]
+    return [block for block in blocks if isinstance(block, Table)]
 
 
 def test_page_has_causes_and_worst_joints_of_the_leading_loads(tmp_path):
@@ -179,17 +180,17 @@ def test_page_has_causes_and_worst_joints_of_the_leading_loads(tmp_path):
     assert (list(found), notes) == (["causes", "worst"], [])
     assert leading[0].name == "cross1.F"
     assert [table.title.split()[2] for table in tables(found["causes"])] == [load.name for load in leading]
-    assert [len(table.rows) for table in tables(found["causes"])] == [8] * len(leading)
-    said = [block.text for block in found["causes"] if block.kind == "text"]
+    assert [len(table.for_people) for table in tables(found["causes"])] == [8] * len(leading)
+    said = [block.text for block in found["causes"] if isinstance(block, Sentence)]
     assert sum(": 373 joints, 27 without a valid load left out" in line for line in said) == len(leading)
     assert [panel.key for panel in found["causes"][1].panels] == [
         f"tornado-{load.name.replace('.', '-')}" for load in leading
     ]
     (table,) = tables(found["worst"])
-    assert list(dict.fromkeys(row[0] for row in table.rows)) == [load.name for load in leading]
+    assert list(dict.fromkeys(row[0] for row in body(table))) == [load.name for load in leading]
     for load in leading:
         values = np.sort(load.values[np.isin(load.status, SIMULATED) & np.isfinite(load.values)])[::-1]
-        own = [row[2] for row in table.rows if row[0] == load.name]
+        own = [row[2] for row in body(table) if row[0] == load.name]
         assert own == [value(x, load.unit) for x in values[: worst.ON_PAGE]]
 
 
@@ -209,7 +210,7 @@ def test_page_leaves_out_what_a_file_cannot_tell(tmp_path):
     design = synthetic.STUDY.replace("n = 60", 'method = "pick_freeze"\ngroups = "error"\nn = 100')
     found, notes, _ = shown(synthetic.store(tmp_path, design, "design"))
     assert (list(found), notes) == (["causes", "worst"], [])
-    assert {row[0] for row in tables(found["causes"])[0].rows} == {f"pin{k}.offset_t" for k in (1, 2, 3, 4)}
+    assert {row[0] for row in body(tables(found["causes"])[0])} == {f"pin{k}.offset_t" for k in (1, 2, 3, 4)}
     for path in (
         synthetic.store(tmp_path, synthetic.SWEEP, "sweep"),
         synthetic.store(tmp_path, name="no_valid_joint", failed=40, unsettled=20),

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from tests.support import synthetic
-from tolstat.display.blocks import Table
+from tests.support.cells import body, head
+from tolstat.display.table import Table
 from tolstat.questions.exceedance.answer import quantiles
 from tolstat.store import ResultFile
 
@@ -17,8 +18,8 @@ def tolerance_limit(folder, joints):
         blocks = quantiles(view).blocks()
         loads = np.sort(view.load("cross1.F").values)
     (table,) = [block for block in blocks if isinstance(block, Table) and "tolerance limits (Wilks)" in block.title]
-    (row,) = [row for row in table.rows if row[0] == "cross1.F"]
-    return row[table.head.index("tolerance limit 99 % / 95 %")], loads
+    (row,) = [row for row in body(table) if row[0] == "cross1.F"]
+    return row[head(table).index("tolerance limit 99 % / 95 %")], loads
 
 
 @pytest.mark.parametrize(("joints", "from_above"), [(299, 1), (472, 1), (473, 2), (1000, 5)])

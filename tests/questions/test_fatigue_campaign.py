@@ -14,12 +14,14 @@ from matplotlib.figure import Figure
 import tolstat
 from tests.questions.test_fatigue import needs
 from tests.support import synthetic
+from tests.support.cells import body
 from tests.support.environment import ROOT
 from tolstat.analysis.cycles import Line, damage, equivalent_load, moment
 from tolstat.common.channels import CHANNELS
 from tolstat.common.errors import InputError, NotApplicable, StoreError
 from tolstat.display.answer import Asked
-from tolstat.display.blocks import Panels, Table, Text
+from tolstat.display.blocks import Panels, Sentence
+from tolstat.display.table import Table
 from tolstat.questions.fatigue import loads as fatigue
 from tolstat.questions.fatigue import pylife
 from tolstat.questions.fatigue.answer import fatigue_on_page, life_verdicts
@@ -346,10 +348,10 @@ def test_the_section_shows_what_is_loaded_most(campaign, tmp_path):
     assert table.equals(pd.DataFrame(fatigue.equivalent_loads(loading)))
     own = table[table["channel"] == leading].set_index("share")
     assert isinstance(loads, Table)
-    row = next(row for row in loads.rows if row[0] == f"{leading}, m = 4")
+    row = next(row for row in body(loads) if row[0] == f"{leading}, m = 4")
     assert row[1:5] == [f"{x:.4g} N" for x in (own["nominal"][0.5], *own["estimate"])]
-    assert (len(loads.rows), len(damages.rows), damages.rows[0][4]) == (4, 9, f"0 of {loading.valid.sum()}")
-    assert isinstance(note, Text)
+    assert (len(body(loads)), len(damages.rows), body(damages)[0][4]) == (4, 9, f"0 of {loading.valid.sum()}")
+    assert isinstance(note, Sentence)
     assert note.text.startswith(f"{loading.valid.sum()} of 12 joints settled; loads are ranges: 1e+06 cycles of them")
     assert [text.split(":")[0] for text in asked.notes] == ["load cycles are left out"]
     for path in (campaign("none"), synthetic.store(tmp_path, synthetic.SWEEP, "sweep")):

@@ -31,7 +31,7 @@ from tolstat.common.errors import InputError, NotApplicable, StoreError
 from tolstat.common.loads import LOADS
 from tolstat.common.tables import RESULT, Simulation, Status
 from tolstat.display import text
-from tolstat.display.answer import Asked, Sentence
+from tolstat.display.answer import Asked, Panels, Sentence, Table
 from tolstat.display.progress import Display
 from tolstat.joint import perturb
 from tolstat.questions.causes import lines as question
@@ -610,7 +610,7 @@ def test_command_and_page(path, monkeypatch):
     assert told["facts"]["lines"]["load"] == told["facts"]["load"] == "cross1.F"
     assert len(told["tables"]["lines"]["rows"]) == 12
     answer = on_page(path, 0.01)
-    assert [block.kind for block in answer.blocks()] == ["text", "panels", "table", "table", *["text"] * 3]
+    assert [type(block) for block in answer.blocks()] == [Sentence, Panels, Table, Table, *[Sentence] * 3]
     assert "Halving a single line is not enough: halving the tilt tolerance of the pins" in lead(answer)
     assert run("--each", "error").exit_code == 2
 

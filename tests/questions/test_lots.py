@@ -20,7 +20,7 @@ from tolstat.common.loads import ANY_LIMIT
 from tolstat.common.tables import Status
 from tolstat.display import drawing
 from tolstat.display.answer import Asked
-from tolstat.display.table import as_text
+from tolstat.display.table import fitted
 from tolstat.questions import lots as question
 from tolstat.questions.capability import capability
 
@@ -66,8 +66,8 @@ def test_table_counts_lots_and_predicts_the_next_delivery():
     assert row["bad"] == predicted.more_than(0.1)
     assert "bad deliveries: more than 10 % of the joints above" in [getattr(part, "text", "") for part in answer.parts]
     table, plain = answer.tables["limits"], question.lots(made).tables["limits"]
-    assert "bad deliveries" in as_text(table.columns, table.rows)
-    assert "bad deliveries" not in as_text(plain.columns, plain.rows)
+    assert "bad deliveries" in fitted(table.columns, table.rows)[0]
+    assert "bad deliveries" not in fitted(plain.columns, plain.rows)[0]
 
 
 def test_joints_without_a_load_count_both_ways():

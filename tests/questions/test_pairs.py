@@ -16,7 +16,7 @@ from tolstat.cli import app
 from tolstat.common.errors import NotApplicable, StoreError
 from tolstat.common.load_kinds import PINS
 from tolstat.common.tables import ERROR, Simulation
-from tolstat.display.answer import Asked
+from tolstat.display.answer import Asked, Panels, Sentence, Table
 from tolstat.joint import HOLE_OF_PIN, load, perturb
 from tolstat.questions.causes.pairs import MISSED, combinations, pairs_on_page
 from tolstat.store import ResultFile, Writer
@@ -111,7 +111,7 @@ def test_equal_tilts_of_pin_and_hole_use_no_clearance():
 def test_the_page_shows_the_scatter_with_the_limit(path):
     with ResultFile.open(path) as store:
         blocks = pairs_on_page(store.view(), Asked(path)).blocks()
-    assert [block.kind for block in blocks] == ["text", "panels", "table", "text"]
+    assert [type(block) for block in blocks] == [Sentence, Panels, Table, Sentence]
     assert MISSED in blocks[0].text
     assert "of the others" in blocks[0].text
 

@@ -9,12 +9,13 @@ from typer.testing import CliRunner
 
 import tolstat
 from tests.support import fakes, synthetic
+from tests.support.cells import body
 from tolstat import sampling
 from tolstat.campaign.extend import merge
 from tolstat.cli import app
 from tolstat.common.errors import InputError, NotApplicable
 from tolstat.display.answer import Asked
-from tolstat.display.table import as_text
+from tolstat.display.table import fitted
 from tolstat.questions import selective as question
 
 STUDY = (
@@ -64,7 +65,7 @@ def test_table_has_yield_and_unmatched_parts_by_number_of_classes(folder):
     assert three["good_lower"] < three["good"] < three["good_upper"]
     assert three["of_all"] == (1.0 - three["unmatched"]) * three["good"]
     assert three["clearance"] < one["clearance"]
-    assert "of all crosses" in as_text(table.columns, table.rows)
+    assert "of all crosses" in fitted(table.columns, table.rows)[0]
     ax = Figure().add_subplot()
     pictures.panels[0].draw(ax)
     assert [line.get_ydata()[1] for line in ax.lines] == [100.0 * three[key] for key in ("good", "unmatched", "of_all")]
@@ -74,7 +75,7 @@ def test_page_has_the_classes_and_other_campaigns_have_no_section(folder):
     with tolstat.open(folder / "k3.h5") as store:
         words, table = question.selective_on_page(store.view(), Asked(store.path)).blocks()[:2]
     assert "of the crosses and forks have no partner" in words.text
-    assert [row[0] for row in table.rows] == ["1", "2", "3"]
+    assert [row[0] for row in body(table)] == ["1", "2", "3"]
     with tolstat.open(folder / "k1.h5") as store, pytest.raises(NotApplicable):
         question.selective_on_page(store.view(), Asked(store.path))
 

@@ -141,7 +141,7 @@ def test_the_checks_see_a_page_that_is_too_wide_and_an_error(made, tmp_path):
 
 
 def test_names_with_markup_are_text_and_run_nothing(tmp_path, monkeypatch):
-    monkeypatch.setattr("tolstat.questions.sections", lambda view, asked: [])
+    monkeypatch.setattr("tolstat.report.page.sections_of", lambda view, asked: [])
     named = """<img src=x onerror="missing()"> '\u202e<script>missing();"""
     path = synthetic.store(tmp_path, name=named)
     page.write_page(path, tmp_path / "page.html", replay=0)

@@ -16,6 +16,7 @@ from tolstat.analysis.sample import Sample
 from tolstat.cli import app
 from tolstat.common.tables import RESULT, Simulation, Status
 from tolstat.display.answer import Asked
+from tolstat.display.blocks import Decision
 from tolstat.display.verdict import WORDS
 from tolstat.questions.exceedance import rows as exceedance
 from tolstat.questions.exceedance.rows import ends, verdict
@@ -83,7 +84,7 @@ MISLEADING = {
 def _without_pictures(monkeypatch):
     monkeypatch.setattr("tolstat.display.style.save", lambda figure, stem: [])
     monkeypatch.setattr("tolstat.questions.exceedance.curves.sheet", lambda view, subtitle: None)
-    monkeypatch.setattr("tolstat.questions.sections", lambda view, asked: [])
+    monkeypatch.setattr("tolstat.report.page.sections_of", lambda view, asked: [])
 
 
 @pytest.fixture(autouse=True)
@@ -99,7 +100,7 @@ def everywhere(path, accepted):
         made = store.view()
         json_ = statistics(made, accepted=accepted)["verdict"]
         first = page.compose(made, Asked(path, accepted)).sections[0]
-    decision = next(block for block in first.blocks if block.kind == "decision")
+    decision = next(block for block in first.blocks if isinstance(block, Decision))
     card, place = decision.verdicts[0], decision.picture.title.partition(":")[0]
     assert place == "The joint" if card.value == "no verdict" else f" on {place}." in card.label or "keep" in card.label
     separator = ":" if card.verdict else ""

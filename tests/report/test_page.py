@@ -14,13 +14,15 @@ import pytest
 from typer.testing import CliRunner
 
 from tests.support import exceedance, synthetic
+from tests.support.cells import body
 from tolstat.cli import app
 from tolstat.common.errors import StoreError
 from tolstat.common.tables import Status
 from tolstat.display import html as writer
 from tolstat.display.answer import Asked
-from tolstat.display.blocks import Section
+from tolstat.display.blocks import Section, Sentence
 from tolstat.display.html import bound, grouped
+from tolstat.display.table import Table
 from tolstat.questions import accuracy, joints
 from tolstat.questions.exceedance import rows
 from tolstat.report import headline as verdict
@@ -198,7 +200,7 @@ def test_other_bushings_and_the_band_of_the_whole_curve_are_drawn_on_switches(vi
 
 def test_folded_sections_stand_below_the_others_and_open_where_all_is_asked_for(path, tmp_path, monkeypatch):
     found = [Section("one", "One", folded=True), Section("two", "Two")]
-    monkeypatch.setattr("tolstat.questions.sections", lambda view, asked: list(found))
+    monkeypatch.setattr("tolstat.report.page.sections_of", lambda view, asked: list(found))
     for full in (False, True):
         page.write_page(path, tmp_path / "page.html", full=full)
         made = (tmp_path / "page.html").read_text(encoding="utf-8")
@@ -220,7 +222,7 @@ def test_text_of_the_study_is_shown_and_not_run(html):
 
 
 def test_names_and_comments_are_escaped_and_unseen_characters_shown(tmp_path, monkeypatch):
-    monkeypatch.setattr("tolstat.questions.sections", lambda view, asked: [])
+    monkeypatch.setattr("tolstat.report.page.sections_of", lambda view, asked: [])
     text = "# Question: \u202ewhy</p><script>1</script>\n" + TEXT
     path = synthetic.store(tmp_path, text, name="""a"b'<script>c&\u202d""")
     page.write_page(path, tmp_path / "page.html", replay=0)
@@ -346,8 +348,8 @@ def words(path, accepted=np.nan):
         made = page.compose(store.view(), Asked(path, accepted))
     found = [*made.scene, made.provenance]
     for block in (block for section in made.sections for block in section.blocks):
-        found += [block.text] if block.kind == "text" else []
-        found += [cell for row in block.rows for cell in row] if block.kind == "table" else []
+        found += [block.text] if isinstance(block, Sentence) else []
+        found += [cell for row in body(block) for cell in row] if isinstance(block, Table) else []
     return [section.key for section in made.sections], found
 
 

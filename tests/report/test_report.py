@@ -18,7 +18,7 @@ from tolstat.common.errors import InputError, StoreError
 from tolstat.common.load_kinds import BUSHINGS
 from tolstat.common.tables import Status
 from tolstat.display import style
-from tolstat.display.table import as_text
+from tolstat.display.table import fitted
 from tolstat.joint.derived import DERIVED
 from tolstat.questions import sweep
 from tolstat.questions.exceedance import answer as exceedance
@@ -55,8 +55,8 @@ def test_failed_and_unsettled_joints_are_counted_both_ways():
     row = table.iloc[0]
     assert (row["n"], row["n_failed"], row["n_unsettled"]) == (200, 7, 5)
     assert row["bound_upper"] - row["bound_lower"] == pytest.approx(12 / 200)
-    assert "with unresolved joints" in as_text(exceedance.LIMITS, table.to_dict("records"), None)
-    assert "with unresolved joints" not in as_text(exceedance.LIMITS, rows.limit_rows(view()), None)
+    assert "with unresolved joints" in fitted(exceedance.LIMITS, table.to_dict("records"), None)[0]
+    assert "with unresolved joints" not in fitted(exceedance.LIMITS, rows.limit_rows(view()), None)[0]
 
 
 def test_dependent_samples_have_no_interval_and_the_note_says_why():
@@ -158,7 +158,7 @@ def test_a_campaign_without_a_valid_joint_still_gets_a_page(status):
     assert not rows.curve_rows(made)
     share = exceedance.limits(made).frame("limits")["estimate"]
     assert share.isna().all()
-    assert "-" in as_text(exceedance.LIMITS, rows.limit_rows(made))
+    assert "-" in fitted(exceedance.LIMITS, rows.limit_rows(made))[0]
 
 
 def test_joints_that_are_all_alike_can_be_drawn():

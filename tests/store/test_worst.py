@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from tests.support import synthetic, views
+from tests.support.cells import body, head
 from tolstat.common.tables import Status
 from tolstat.display.answer import Asked
 from tolstat.questions.causes.worst import _largest, joint_rows
@@ -130,7 +131,7 @@ def test_the_page_names_points(tables):
     limits = {"cross1.F": 700.0, "fork1.T at one": 50.0, "fork1.T at two": 50.0}
     view = views.at_points(tables, limits)
     (panels, _, at_each, *_) = limits_on_page(view, Asked(view.path)).blocks()
-    assert at_each.head == ["load", "limit", "one", "two"]
+    assert head(at_each) == ["load", "limit", "one", "two"]
     assert any("largest load over all of them" in text.text for text in panels.beside)
     found = exceedance_on_page(view, Asked(view.path)).blocks()
     leading = found[0].panels
@@ -145,9 +146,9 @@ def test_the_page_names_a_point_without_a_valid_joint(tables):
     tables["two"]["status"] = Status.PENDING
     view = views.at_points(tables, {"cross1.F": 700.0})
     (table,) = page._points(view)
-    kept = table.head.index("keep all limits there")
-    assert table.rows[1][kept] == "no verdict"
-    assert table.rows[0][kept] != "no verdict"
+    kept = head(table).index("keep all limits there")
+    assert body(table)[1][kept] == "no verdict"
+    assert body(table)[0][kept] != "no verdict"
 
 
 def test_contact_modes_of_several_points_are_not_averaged(view):

@@ -5,6 +5,7 @@ Functions of questions are made by `_command`, those of the other commands from 
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Callable
 from importlib import import_module
 from typing import Annotated, Any
@@ -45,7 +46,7 @@ PLAIN = {
 }
 """Commands that are no question, by heading of the help: functions of this package, and their first lines."""
 FILES = {"schema": "new", "spectrum": "new", "plan": "run", "extend": "run", "merge": "run"}
-FILES |= {"replay": "simulate", "cache": "docs"}
+FILES |= {"replay": "simulate", "evaluate": "simulate", "cache": "docs"}
 """Files of commands that have none of their own name."""
 ASKED = {question.name.replace("_", "-"): question for question in QUESTIONS if question.heading}
 """Questions by the names of their commands."""
@@ -126,6 +127,7 @@ app = typer.Typer(
 def main() -> None:
     """Run the command line; the entry point of ``tolstat`` and ``python -m tolstat``."""
     limit_threads()
+    gc.disable()  # until the command begins: modules are no garbage, and to look at them takes a fifth of their import
     app(prog_name="tolstat")
 
 

@@ -14,6 +14,7 @@ that `replay` does not reproduce; 2 input that cannot be used; 128 + N stopped b
 from __future__ import annotations
 
 import errno
+import gc
 import inspect
 import re
 import resource
@@ -60,6 +61,7 @@ def command_of(function: Callable[..., None]) -> Callable[..., None]:
     parameters_of_function, common = _parameters(function), _parameters(session)
 
     def run(**given: Any) -> None:
+        gc.enable()  # see `cli.main`
         shared = {name: given.pop(name) for name in common}
         with exit_codes(), session(**shared), exit_codes():  # those inside are written to the log, too
             function(**_values(parameters_of_function, given))

@@ -26,9 +26,10 @@ if TYPE_CHECKING:
     from tolstat.questions.causes import errors as causes
     from tolstat.questions.drawings import answer as drawings
     from tolstat.questions.drawings import views
+    from tolstat.questions.exceedance import rows as exceedance
     from tolstat.questions.fatigue import pylife
     from tolstat.report import answer as reports
-    from tolstat.report import page, workbook
+    from tolstat.report import page
     from tolstat.solver import compilation
     from tolstat.store import recorded, result_file, revolutions, verification, what_if
     from tolstat.study import assumptions, points, rewriting, starter
@@ -44,10 +45,13 @@ else:
     names = ("common.columns", "common.loads", "common.strict", "common.tables", "common.units", "joint.sections")
     columns, load_units, strict, tables, units, sections = (Late(f"tolstat.{name}") for name in names)
     answers, style, table, text = (Late(f"tolstat.display.{name}") for name in ("answer", "style", "table", "text"))
-    names = ("accuracy", "joints", "causes.errors", "drawings.answer", "drawings.views", "fatigue.pylife")
-    accuracy, joints, causes, drawings, views, pylife = (Late(f"tolstat.questions.{name}") for name in names)
-    names = ("report.answer", "report.page", "report.workbook", "solver.compilation")
-    reports, page, workbook, compilation = (Late(f"tolstat.{name}") for name in names)
+    names = ("accuracy", "joints", "causes.errors", "drawings.answer", "drawings.views")
+    names += ("exceedance.rows", "fatigue.pylife")
+    accuracy, joints, causes, drawings, views, exceedance, pylife = (
+        Late(f"tolstat.questions.{name}") for name in names
+    )
+    names = ("report.answer", "report.page", "solver.compilation")
+    reports, page, compilation = (Late(f"tolstat.{name}") for name in names)
     names = ("recorded", "result_file", "revolutions", "verification", "what_if")
     recorded, result_file, revolutions, verification, what_if = (Late(f"tolstat.store.{name}") for name in names)
     names = ("assumptions", "points", "rewriting", "schema", "spectrum", "starter")

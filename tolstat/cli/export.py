@@ -6,21 +6,28 @@ import csv
 import math
 from functools import partial
 from importlib.util import find_spec
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, TextIO
 
 import typer
 
-from tolstat.cli._library import causes, pylife, reports, result_file, stores, text, workbook
+from tolstat.cli._library import causes, exceedance, load_units, pylife, reports, result_file, stores, text
 from tolstat.cli._shared import json_of, progress, say, write
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.files import atomic_write
+from tolstat.common.late import pandas as pd
 from tolstat.display.options import Accepted, Opt, Point, ResultPath
 
 if TYPE_CHECKING:
-    from tolstat.store import Reader
+    from tolstat.store import Reader, View
 
 Target = Annotated[str | None, Opt("OUT", writes=True)]
+MAX_ROWS = 1_048_575
+"""Number of joints that a sheet of Excel can hold below its heading."""
+LIMITS = {"load": "load", "limit": "level", "unit": "unit", "above": "count", "joints": "valid"}
+LIMITS |= {"share": "estimate"} | {name: name for name in ("lower", "upper", "confidence", "nominal")}
+"""Columns of the sheet ``limits``, and the keys of `exceedance.limit_rows`."""
 
 
 def export(
@@ -95,8 +102,8 @@ def export(
         view = opened.view().at(point or "")
         store = view.store
         number = f"{store.n - (0 if nominal else store.first_sample)} joints"
-        if xlsx is not None and store.n > workbook.MAX_ROWS:
-            too_many = f"{store.path} has {store.n} joints, a sheet of Excel has {workbook.MAX_ROWS} rows"
+        if xlsx is not None and store.n > MAX_ROWS:
+            too_many = f"{store.path} has {store.n} joints, a sheet of Excel has {MAX_ROWS} rows"
             raise InputError([Fault("--xlsx", too_many, "use --parquet OUT or --csv OUT")])
         if cycles is not None:
             table = pylife.table(view, nominal=nominal)
@@ -115,7 +122,7 @@ def export(
         if parquet is None and xlsx is None:
             return
         frame = result_file.to_pandas(store, nominal)
-        writers = {xlsx: partial(workbook.write, store, frame), parquet: partial(frame.to_parquet, engine="pyarrow")}
+        writers = {xlsx: partial(_write_workbook, view, frame), parquet: partial(frame.to_parquet, engine="pyarrow")}
         for name, write_file in writers.items():
             if name is not None:
                 with atomic_write(Path(name)) as temporary:
@@ -135,3 +142,36 @@ def _write_csv(store: Reader, nominal: bool, stream: TextIO) -> None:
         if k == 0:
             out.writerows([["row", *frame.columns], ["1", *frame.attrs["units"].values()]])
         out.writerows(text.csv_rows([frame.index.tolist(), *(frame[name].tolist() for name in frame)]))
+
+
+def _write_workbook(view: View, frame: pd.DataFrame, path: Path) -> None:
+    """Write an Excel workbook, a row at a time: joints in SI units, limits, and unit and meaning of each column.
+
+    Sheet ``limits`` has the share of the joints with a valid load above each limit, and its interval (empty unless
+    joints are independent samples).
+    """
+    from openpyxl import Workbook
+
+    limits = [(name, limit, load_units.load_of(name).unit) for name, limit in view.limits.items()]
+    if view.sampled:  # joints of a sweep or a list are no sample, whose shares would mean something
+        rows = (
+            {**row, "valid": row["n"] - row["n_failed"] - row["n_unsettled"]} for row in exceedance.limit_rows(view)
+        )
+        limits = [tuple(row[key] for key in LIMITS.values()) for row in rows]
+    meanings = {name: column.description for name, column in result_file.described(view.store).items()}
+    units = [(name, unit, meanings.get(name, "")) for name, unit in frame.attrs["units"].items()]
+    sheets = {
+        "joints": (("row", *frame.columns), frame.itertuples(name=None)),
+        "limits": (LIMITS, limits),
+        "units": (("column", "unit", "meaning"), units),
+    }
+    book = Workbook(write_only=True)
+    for name, (heads, cells) in sheets.items():
+        sheet = book.create_sheet(name)
+        sheet.freeze_panes = "B2"
+        sheet.append(list(heads))
+        for row in cells:
+            sheet.append([text.cell(text.plain(value)) for value in row])
+    whole = BytesIO()  # openpyxl does not recover from a full disk
+    book.save(whole)
+    path.write_bytes(whole.getvalue())

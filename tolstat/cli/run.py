@@ -55,7 +55,7 @@ def plan(
         meanings = {library.joints.ENTRIES: made.tolerances, library.joints.CORRELATED: made.correlations}
         for columns, rows in meanings.items():
             if rows:
-                typer.echo(f"\n{library.table.as_text(columns, rows)}")
+                typer.echo(f"\n{library.table.fitted(columns, rows)[0]}")
     say(f"next: tolstat run {quote(str(study_file))}" + ("" if n is None else f" --n {n}"))
 
 

@@ -65,5 +65,5 @@ def show(
     else:
         figure, rows = drawings.draw_joint(joint, own_alpha, title, columns), drawings.lengths(joint, own_alpha)
     (path,) = style.save(figure, target.with_suffix(""), (target.suffix.lower(),))
-    typer.echo(table.as_text(table.plain(rows), rows))
+    typer.echo(table.fitted(table.plain(rows), rows)[0])
     say(f"wrote {path}")

@@ -11,71 +11,17 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from tolstat.common.errors import TolstatError
 from tolstat.common.late import pandas as pd
 from tolstat.display import drawing, progress, style, text
-from tolstat.display.blocks import Artist, Axes, Block, Facts, Figure, Listing, Panel, Panels, Reader, Text
-from tolstat.display.table import Column, Row, Rows, as_block, by_share, has, has_unresolved, of_shares, plain
+from tolstat.display.blocks import Artist, Axes, Block, Facts, Figure, Listing, Panel, Panels, Reader, Sentence
+from tolstat.display.table import Column, Row, Rows, Table, by_share, has, has_unresolved, of_shares, plain
 
 __all__ = ["Answer", "Artist", "Asked", "Axes", "Column", "Document", "Figure", "Listing", "Panel", "Panels", "Part"]
-__all__ += ["Reader", "Row", "Rows", "Sentence", "Sheet", "Table", "Text", "by_share", "has"]
+__all__ += ["Reader", "Row", "Rows", "Sentence", "Sheet", "Table", "by_share", "has"]
 __all__ += ["has_unresolved", "of_shares", "plain"]
-
-Place = Literal["lead", "note", "warning"]
-
-
-@dataclass(frozen=True)
-class Sentence:
-    """One or several sentences.
-
-    Attributes
-    ----------
-    text : str
-        The words; of a note, capital letter and full stop may be missing.
-    place : str
-        ``lead`` (part of the answer itself), ``note`` (definitions, restrictions), ``warning``.
-    """
-
-    text: str
-    place: Place = "note"
-
-
-@dataclass(frozen=True)
-class Table:
-    """A table: all its rows as numbers, and how people see them.
-
-    Attributes
-    ----------
-    name : str
-        Key in JSON, and end of the name of its CSV file.
-    title : str
-        What it shows.
-    columns : sequence of Column
-        Columns that people see; none for a table that only JSON, CSV files and frames have.
-    rows : sequence of mapping
-        Values by key in SI units, the same keys in each row; a row with values of one unit may have a key ``unit``.
-    units : mapping
-        Units by key, where rows have none of their own.
-    seen : sequence of mapping, optional
-        What `columns` take their cells from: some of the rows, or rows arranged for people; by default all rows.
-    verdicts : sequence of str
-        Verdict of each row, see `blocks.Table`.
-    """
-
-    name: str
-    title: str
-    columns: Sequence[Column]
-    rows: Rows
-    units: Mapping[str, str] = field(default_factory=dict)
-    seen: Rows | None = None
-    verdicts: Sequence[str] = ()
-
-    @property
-    def for_people(self) -> Rows:
-        """Rows that people see."""
-        return self.rows if self.seen is None else self.seen
 
 
 @dataclass(frozen=True)
@@ -147,7 +93,9 @@ class Answer:
 
     def blocks(self) -> list[Block]:
         """Blocks of a page."""
-        return [block for part in self.parts if (block := _block(part)) is not None]
+        others = Document | Sheet
+        shown = (part for part in self.parts if not isinstance(part, Table) or part.columns)
+        return [part for part in shown if not isinstance(part, others)]
 
     def write(self, stem: Path) -> list[Path]:
         """Write each table with rows as ``STEM_TABLE.csv``, pictures as PNG and SVG beside them, and documents.
@@ -186,15 +134,6 @@ class Answer:
 
         items = [(key.replace("_", " "), words(value)) for key, value in self.facts.items()]
         return html.fragment(self.title, [*self.blocks(), *([Facts(items)] if items else [])])
-
-
-def _block(part: Part) -> Block | None:
-    if isinstance(part, Sentence):
-        lead = part.place == "lead"
-        return Text(part.text if lead else text.sentence(part.text), small=not lead)
-    if isinstance(part, Table):
-        return as_block(part.title, part.columns, part.for_people, part.verdicts) if part.columns else None
-    return None if isinstance(part, Document | Sheet) else part
 
 
 @dataclass(frozen=True)

@@ -1,11 +1,13 @@
-"""Blocks that a report page is composed of: the decision, text, tables, pictures."""
+"""Blocks that a report page is composed of: the decision, sentences, tables, pictures."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, Literal
+
+from tolstat.display.table import Table
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist as Artist
@@ -16,12 +18,19 @@ else:
 
 
 @dataclass(frozen=True)
-class Text:
-    """A paragraph; `small` sets secondary information in small print."""
+class Sentence:
+    """One or several sentences.
 
-    kind: ClassVar[str] = "text"
+    Attributes
+    ----------
+    text : str
+        The words; of a note, capital letter and full stop may be missing.
+    place : str
+        ``lead`` (part of the answer itself), ``note`` (definitions, restrictions), ``warning``.
+    """
+
     text: str
-    small: bool = False
+    place: Literal["lead", "note", "warning"] = "note"
 
 
 @dataclass(frozen=True)
@@ -62,40 +71,12 @@ class Decision:
         Paragraphs below the chart.
     """
 
-    kind: ClassVar[str] = "decision"
     question: str
     verdicts: Sequence[Card]
     cards: Sequence[Card]
     picture: Panel | None = None
     chart: Panel | None = None
     below: Sequence[str] = ()
-
-
-@dataclass(frozen=True)
-class Table:
-    """A table with cells of text.
-
-    Attributes
-    ----------
-    title : str
-        What it shows.
-    head : sequence of str
-        Headings of the columns.
-    rows : sequence of sequence of str
-        Cells; the first column names the row.
-    words : frozenset of int
-        Indices of columns of words, which are aligned to the left.
-    verdicts : sequence of str
-        Verdict of each row, ``yes``, ``no``, ``open`` or empty, which styles its second cell. Empty if nothing is
-        judged.
-    """
-
-    kind: ClassVar[str] = "table"
-    title: str
-    head: Sequence[str]
-    rows: Sequence[Sequence[str]]
-    words: frozenset[int] = frozenset({0})
-    verdicts: Sequence[str] = ()
 
 
 @dataclass(frozen=True)
@@ -146,10 +127,9 @@ class Panel:
 class Panels:
     """Pictures side by side: two in a row where there is room, `small` ones four; blocks `beside` a single one."""
 
-    kind: ClassVar[str] = "panels"
     panels: Sequence[Panel]
     small: bool = False
-    beside: Sequence[Table | Text] = ()
+    beside: Sequence[Table | Sentence] = ()
 
 
 @dataclass(frozen=True)
@@ -164,7 +144,6 @@ class Reader:
         The load shown first; empty for the first of `curves`.
     """
 
-    kind: ClassVar[str] = "reader"
     curves: Mapping[str, Any]
     start: str = ""
 
@@ -173,7 +152,6 @@ class Reader:
 class Facts:
     """Names and values, one below the other; with a title they are collapsed until the reader opens them."""
 
-    kind: ClassVar[str] = "facts"
     items: Sequence[tuple[str, str]]
     title: str = ""
 
@@ -182,12 +160,11 @@ class Facts:
 class Listing:
     """Verbatim text of a file, collapsed until the reader opens it."""
 
-    kind: ClassVar[str] = "listing"
     title: str
     text: str
 
 
-Block = Text | Decision | Table | Panels | Reader | Facts | Listing
+Block = Sentence | Decision | Table | Panels | Reader | Facts | Listing
 
 
 @dataclass(frozen=True)

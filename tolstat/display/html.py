@@ -19,6 +19,7 @@ from tolstat.common.cores import mapped
 from tolstat.common.files import atomic_write
 from tolstat.display import drawing, style, unseen
 from tolstat.display.blocks import Block, Decision, Page, Panel, Panels
+from tolstat.display.text import sentence
 
 TEMPLATES = Path(__file__).parent / "templates"
 
@@ -37,7 +38,8 @@ def environment(figure: Callable[[Panel], dict[str, Any]]) -> jinja2.Environment
     files = jinja2.FileSystemLoader(TEMPLATES)
     made = jinja2.Environment(loader=files, autoescape=True, trim_blocks=True, lstrip_blocks=True, finalize=_shown)
     made.globals |= {"figure": figure, "schemes": Markup(style.style_sheet())}
-    made.filters |= {"data": _data, "grouped": grouped, "bound": bound}
+    made.filters |= {"data": _data, "grouped": grouped, "bound": bound, "sentence": sentence}
+    made.filters["kind"] = lambda block: type(block).__name__
     return made
 
 

@@ -1,4 +1,4 @@
-"""Tables for people: one list of columns, rendered as text for a terminal and as a block of the page.
+"""Tables: numbers for JSON and files, and columns for people, shown on a terminal and on the page.
 
 Text fits a line of `WIDTH` characters: columns are left out, those of the highest rank first, until it does.
 """
@@ -6,9 +6,9 @@ Text fits a line of `WIDTH` characters: columns are left out, those of the highe
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from tolstat.display.blocks import Table
 from tolstat.display.text import align, formed
 
 Row = Mapping[Any, Any]
@@ -55,6 +55,48 @@ class Column(NamedTuple):
     rank: int = 0
 
 
+@dataclass(frozen=True)
+class Table:
+    """A table: all its rows as numbers, and how people see them.
+
+    Attributes
+    ----------
+    name : str
+        Key in JSON, and end of the name of its CSV file.
+    title : str
+        What it shows.
+    columns : sequence of Column
+        Columns that people see; none for a table that only JSON, CSV files and frames have.
+    rows : sequence of mapping
+        Values by key in SI units, the same keys in each row; a row with values of one unit may have a key ``unit``.
+    units : mapping
+        Units by key, where rows have none of their own.
+    seen : sequence of mapping, optional
+        What `columns` take their cells from: some of the rows, or rows arranged for people; by default all rows.
+    verdicts : sequence of str
+        Verdict of each row, ``yes``, ``no``, ``open`` or empty, which styles its second cell on the page. Empty if
+        nothing is judged.
+    """
+
+    name: str
+    title: str
+    columns: Sequence[Column]
+    rows: Rows
+    units: Mapping[str, str] = field(default_factory=dict)
+    seen: Rows | None = None
+    verdicts: Sequence[str] = ()
+
+    @property
+    def for_people(self) -> Rows:
+        """Rows that people see."""
+        return self.rows if self.seen is None else self.seen
+
+    @property
+    def shown(self) -> list[Column]:
+        """Columns that have something to show."""
+        return [column for column in self.columns if column.shown(self.for_people)]
+
+
 def by_share(rows: Rows, *keys: str) -> Rows:
     """Rows with the same values of `keys` as one: these values, and each row by its ``share``."""
     grouped: dict[tuple[Any, ...], dict[Any, Any]] = {}
@@ -72,21 +114,16 @@ def of_shares(shares: Sequence[float], head: str, cell: Callable[[Row], str], ra
     return list(map(column, shares))
 
 
-def cells(columns: Sequence[Column], rows: Rows) -> list[list[str]]:
-    """Headings, then one row of cells for each row of a table."""
-    return [[column.head for column in columns], *([column.cell(row) for column in columns] for row in rows)]
-
-
-def as_text(columns: Sequence[Column], rows: Rows, width: int | None = WIDTH) -> str:
-    """Aligned text of a table, in lines of at most `width` characters if it can be; None for all columns."""
-    return fitted(columns, rows, width)[0]
-
-
 def fitted(columns: Sequence[Column], rows: Rows, width: int | None = WIDTH) -> tuple[str, str]:
-    """Text as of `as_text`, and a sentence that names the columns that it leaves out; empty if there are none."""
+    """Aligned text of a table in lines of at most `width` characters if it can be, and what it leaves out.
+
+    Without `width` it has all columns. The second text is a sentence that names the columns left out; empty if there
+    are none.
+    """
     able = used = [column for column in columns if column.shown(rows)]
     while True:
-        shown = align(cells(used, rows), [column.words for column in used])
+        cells = [[column.cell(row) for column in used] for row in rows]
+        shown = align([[column.head for column in used], *cells], [column.words for column in used])
         last = max(used, key=lambda column: column.rank)
         if width is None or not last.rank or max(map(len, shown.splitlines())) <= width:
             break
@@ -109,10 +146,3 @@ def plain(rows: Rows, ranked: Sequence[str] = ()) -> list[Column]:
         )
 
     return [column(name) for name in (rows[0] if rows else ())]
-
-
-def as_block(title: str, columns: Sequence[Column], rows: Rows, verdicts: Sequence[str] = ()) -> Table:
-    """Block of the page with a table; see `blocks.Table`."""
-    used = [column for column in columns if column.shown(rows)]
-    head, *body = cells(used, rows)
-    return Table(title, head, body, frozenset({0} | {i for i, column in enumerate(used) if column.words}), verdicts)

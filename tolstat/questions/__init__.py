@@ -1,4 +1,4 @@
-"""Registry of the questions: public names, commands and sections of the page come from here, in this order.
+"""Registry of the questions: public names, commands and sections of the page follow it, in this order.
 
 A question is one file of this package (a folder where parts are shared or figures are large) with a function of its
 name that takes views and returns an `Answer`. Beside it the file may have ``NAME_on_page(view, asked)``, the answer
@@ -10,14 +10,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
-from shlex import quote
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from tolstat.common.errors import NotApplicable, StoreError
-from tolstat.display.blocks import Block, Section, Text
+from tolstat.common.errors import StoreError
 
 if TYPE_CHECKING:
     from tolstat.display.answer import Answer, Asked
@@ -108,27 +105,6 @@ QUESTIONS = (
 
 PUBLIC = {question.name: f"tolstat.questions.{question.file or question.name}" for question in QUESTIONS}
 """Public names, and the modules that they come from."""
-
-
-def sections(view: View, asked: Asked) -> list[Section]:
-    """Sections of the page, in the order of `QUESTIONS`; questions that the file cannot answer have none."""
-    shown: list[Section] = []
-    for question in QUESTIONS:
-        if question.page:
-            asked.stage(f"page: {question.name}")
-            with asked.noting(f"{question.name} is left out"), suppress(NotApplicable):
-                answer = question.on_page(view, asked)
-                key = question.name.replace("_", "-")
-                blocks = [_without_folder(block, view.path) for block in answer.blocks()]
-                shown.append(Section(key, answer.title, blocks, question.page == "folded"))
-    return shown
-
-
-def _without_folder(block: Block, path: Path) -> Block:
-    """Name the file without its folder in a paragraph, so that the page does not depend on the folder."""
-    if not isinstance(block, Text):
-        return block
-    return replace(block, text=block.text.replace(quote(str(path)), quote(path.name)).replace(str(path), path.name))
 
 
 def statistics(view: View) -> dict[str, Any]:

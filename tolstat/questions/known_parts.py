@@ -7,7 +7,7 @@ import math
 from tolstat.analysis.sample import CONFIDENCE
 from tolstat.common.loads import ANY_LIMIT
 from tolstat.display import drawing, style, text
-from tolstat.display.answer import Answer, Axes, Column, Panel, Panels, Part, Row, Rows, Sentence, Table, Text
+from tolstat.display.answer import Answer, Axes, Column, Panel, Panels, Part, Row, Rows, Sentence, Table
 from tolstat.display.style import lines
 from tolstat.questions import shares
 from tolstat.store import known_parts as known
@@ -71,7 +71,7 @@ def known_parts(view: View) -> Answer:
     given = [row for row in rows if not math.isnan(row["both_upper"])][:DRAWN]
     entries = ", ".join(f"{entry.pattern} from {entry.parts}" for entry in process.entries)
     words = (f"Mean and deviation are estimated from measured parts: {entries}.", EXPLANATION)
-    parts: list[Part] = [Panels([_panel(given)], beside=[Text(line, small=True) for line in words])] if given else []
+    parts: list[Part] = [Panels([_panel(given)], beside=list(map(Sentence, words)))] if given else []
     parts.append(Table("intervals", "Shares above the limits, with what leaves them open", COLUMNS, rows))
     if len(given) < min(len(rows), DRAWN):
         most = text.percent(max(row["unsupported"] for row in rows))

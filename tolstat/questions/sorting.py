@@ -14,7 +14,7 @@ from tolstat.analysis.weighted import Weighted
 from tolstat.common.errors import NotApplicable
 from tolstat.common.loads import ANY_LIMIT, FloatArray
 from tolstat.display import drawing, style, text
-from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Row, Rows, Table, Text
+from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Row, Rows, Sentence, Table
 from tolstat.display.options import Costs
 from tolstat.questions import shares
 from tolstat.store import error_budget
@@ -106,7 +106,7 @@ def sorting_on_page(view: View, asked: Asked) -> Answer:
     panel, parts, stages = _parts(view, None)
     shown = {stages.rows[0]["load"], *view.leading}
     seen = [row for row in stages.rows if row["load"] in shown]
-    pictures = Panels([panel], beside=[Text(line, small=True) for line in ON_PAGE])
+    pictures = Panels([panel], beside=list(map(Sentence, ON_PAGE)))
     return Answer("sorting", TITLE, [pictures, parts, replace(stages, seen=seen)])
 
 

@@ -5,24 +5,25 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
+from shlex import quote
 
 import numpy as np
 
-from tolstat import questions
 from tolstat.common import loads, notation, strict, units
 from tolstat.common.columns import METHODS
 from tolstat.common.errors import Fault, NotApplicable, StoreError, TolstatError
 from tolstat.common.tables import SCHEMA_VERSION, VALID
 from tolstat.display import html, progress, table, text
 from tolstat.display.answer import Asked
-from tolstat.display.blocks import Card, Decision, Facts, Listing, Page, Panels, Section, Table, Text
+from tolstat.display.blocks import Block, Card, Decision, Facts, Listing, Page, Panels, Section, Sentence
 from tolstat.display.verdict import WORDS, Verdict
 from tolstat.joint import Joint, derived, load, model
 from tolstat.joint.model import leaves
 from tolstat.joint.reading import DEFAULT_JOINT, examples
 from tolstat.joint.sections import mounting_and_law, quantities
-from tolstat.questions import accuracy, shares
+from tolstat.questions import QUESTIONS, accuracy, shares
 from tolstat.questions.assumptions import answer, sentences, variations
 from tolstat.questions.causes import lines, worst
 from tolstat.questions.drawings.answer import place_of
@@ -111,7 +112,7 @@ def compose(view: View, asked: Asked, full: bool = False, brief: bool = False) -
     if brief:
         with asked.noting("nothing on the lines of the drawing"), suppress(NotApplicable):
             answer = lines.lines_on_page(view, asked)
-            blocks = [block for block in answer.blocks() if isinstance(block, Text | Panels)]
+            blocks = [block for block in answer.blocks() if isinstance(block, Sentence | Panels)]
             sections.append(Section("lines", answer.title, blocks[:2]))
     else:
         worst.begin_replay(view, asked)
@@ -119,7 +120,7 @@ def compose(view: View, asked: Asked, full: bool = False, brief: bool = False) -
             point = point_of(view, view.most_exceeded) if view.leading else view.points[0]
             remedy = f"tolstat report {asked.path.name} --point {point} --out PAGE.html"
             asked.notes.append(f"loads over the input angle are on the page of one operating point: {remedy}")
-        sections = sorted(questions.sections(view, asked), key=lambda section: section.folded)
+        sections = sorted(sections_of(view, asked), key=lambda section: section.folded)
         listings = [Facts(tuple(_facts(store)), "Provenance"), joint_values(store)]
         listings.append(Listing("The study as it was run", store.study_text))
     return Page(
@@ -133,6 +134,26 @@ def compose(view: View, asked: Asked, full: bool = False, brief: bool = False) -
         listings,
         full,
     )
+
+
+def sections_of(view: View, asked: Asked) -> Iterator[Section]:
+    """Sections of the page, in the order of `QUESTIONS`; questions that the file cannot answer have none.
+
+    Sentences name the file without its folder, so that the page does not depend on the folder.
+    """
+    for question in QUESTIONS:
+        if question.page:
+            asked.stage(f"page: {question.name}")
+            with asked.noting(f"{question.name} is left out"), suppress(NotApplicable):
+                answer = question.on_page(view, asked)
+                blocks = [_without_folder(block, view.path) for block in answer.blocks()]
+                yield Section(question.name.replace("_", "-"), answer.title, blocks, question.page == "folded")
+
+
+def _without_folder(block: Block, path: Path) -> Block:
+    if not isinstance(block, Sentence):
+        return block
+    return replace(block, text=block.text.replace(quote(str(path)), quote(path.name)).replace(str(path), path.name))
 
 
 def _notes(view: View) -> list[str]:
@@ -243,11 +264,11 @@ def decision(view: View, asked: Asked) -> Section:
         answer.bars(standing) if standing and standing.rows else None,
         [line for line in below if line],
     )
-    notes = (Text(f"{text.capital(note)}.", small=True) for note in asked.notes)
+    notes = map(Sentence, asked.notes)
     return Section("verdict", "Verdict", [head, *_points(view), *notes])
 
 
-def _points(view: View) -> list[Table]:
+def _points(view: View) -> list[table.Table]:
     """Operating points, and of the joints that keep all limits there; none of a file with one point."""
     if len(view.parts) == 1:
         return []
@@ -265,7 +286,7 @@ def _points(view: View) -> list[Table]:
         table.Column("of the time", shares.share("share"), shown=table.has("share")),
         table.Column("keep all limits there", lambda row: row.get("kept", WORDS["none"]), shown=table.has("kept")),
     )
-    return [table.as_block("Operating points", columns, rows)]
+    return [table.Table("points", "Operating points", columns, rows)]
 
 
 def question_of(study: str) -> str:

@@ -9,7 +9,7 @@ from functools import partial
 from tolstat.common.errors import NotApplicable
 from tolstat.common.tables import VALID, Status
 from tolstat.display import text
-from tolstat.display.answer import Answer, Asked, Panels, Part, Sentence, Table, Text
+from tolstat.display.answer import Answer, Asked, Panels, Part, Sentence, Table
 from tolstat.display.options import Accepted
 from tolstat.display.table import Column, Row, by_share, has, has_unresolved
 from tolstat.display.verdict import WORDS
@@ -132,7 +132,7 @@ def limits(view: View, accepted: Accepted = math.nan) -> Answer:
         raise shares.inapplicable(view, "has no limits, or its joints are no sample", remedy)
     table, *others = limit_tables(view, accepted)
     panel = forest_panel(table.for_people, accepted)
-    how = [Text(line, small=True) for line in _how(view, accepted)]
+    how = list(map(Sentence, _how(view, accepted)))
     parts: list[Part] = [Panels([panel], beside=how), table, *others]
     rows = [row for row in of.limit_rows(view) if not math.isnan(row["numerical_lower"])]
     if any(_is_notable(row) for row in rows):

@@ -27,7 +27,8 @@ from tolstat.joint import ideal
 from tolstat.sampling import dimensions, draw, streams
 from tolstat.solver import fidelity, refinement
 from tolstat.solver.compilation import stage_name, warm_up
-from tolstat.solver.simulation import history_specs, simulate_rows
+from tolstat.solver.histories import history_specs
+from tolstat.solver.simulation import simulate_rows
 from tolstat.store import layout, metadata, worst
 from tolstat.store.recorded import perturbed, settings, variants
 from tolstat.study import Study, assumptions, design

@@ -20,7 +20,7 @@ from tolstat.joint import material, orders
 from tolstat.joint.contact import Contact
 from tolstat.joint.material import Array
 from tolstat.joint.model import Joint
-from tolstat.joint.partner import Partner, add_partner, check_misalignment
+from tolstat.joint.orders import Partner, add_partner, check_misalignment
 from tolstat.kernel.mechanics.topology import ARM, ARM_OF_PIN, PIN, TRIAD
 
 Table = NDArray[np.void]

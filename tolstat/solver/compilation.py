@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from tolstat.common.channels import LOAD_HISTORIES
 from tolstat.common.cores import available_cores
 from tolstat.common.tables import PARAM, RESULT, Fidelity, Options
-from tolstat.solver import rainflow, refinement, simulation
+from tolstat.solver import histories, refinement, simulation
 
 LOG = logging.getLogger("tolstat")
 
@@ -58,7 +58,7 @@ KERNELS: dict[str, Callable[[Options], object]] = {
     "explicit.count_steps": lambda options: simulation.explicit_steps(_outside_model(torque_reverses=True), options),
     "starts.write_starts": lambda options: simulation.starts(np.zeros(1, PARAM).view(np.recarray), options),
     "ideal.ideal_revolution": _ideal,
-    "rainflow.count_joint": lambda options: rainflow.count(
+    "rainflow.count_joint": lambda options: histories.count(
         {of.name: np.zeros((2, *of.shape)) for of in LOAD_HISTORIES}
     ),
 }

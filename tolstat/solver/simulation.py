@@ -5,19 +5,16 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator
 from functools import cache, partial
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.channels import BUSHING_LOADS, SHAFT_LOADS, LoadHistory
-from tolstat.common.load_kinds import CONTACTS, SPAN
 from tolstat.common.tables import (
     KERNEL_RESULT,
     RESULT,
     SIMULATED,
     Fidelity,
-    HistorySpec,
     Method,
     Options,
     Simulation,
@@ -27,7 +24,8 @@ from tolstat.common.tables import (
     iterations_allowed,
 )
 from tolstat.joint import ideal
-from tolstat.solver import harmonics, rainflow, refinement, stationary
+from tolstat.solver import refinement, stationary
+from tolstat.solver.histories import Histories, extracted, history_specs
 
 if TYPE_CHECKING:
     from tolstat.kernel.lanes.batch import Batch, Queue
@@ -35,7 +33,6 @@ if TYPE_CHECKING:
 Table = np.recarray[Any, np.dtype[np.void]]
 Run = Callable[..., Iterator[tuple[int, NDArray[np.void]]]]
 """Simulation of joints, such as `simulate_together`."""
-Histories = Literal["none", "cycles", "harmonics", "harmonics+cycles", "full"]
 
 MAX_KEPT_SAMPLES = 12_000
 """Maximum number of samples in memory at a time, some 1.7 kB each: the last revolution of 66 joints at 180 steps."""
@@ -54,43 +51,6 @@ AT_REST = np.zeros(56)
 """Unknowns of the ideal pose, or velocities of a joint at rest."""
 NO_BLOCKS = np.zeros((0, 0), KERNEL_RESULT).view(np.recarray)
 """Empty statistics of single revolutions, if they are not needed."""
-
-
-def history_specs(options: Options, histories: Histories, n_harmonics: int) -> dict[str, HistorySpec]:
-    """Describe the load histories that are kept of each joint.
-
-    Parameters
-    ----------
-    options : Options
-        ``steps_per_rev`` gives the number of samples; sample k belongs to the input angle 2 pi k / steps_per_rev.
-    histories : {"none", "cycles", "harmonics", "harmonics+cycles", "full"}
-        What is kept.
-    n_harmonics : int
-        Highest multiple of the input speed that ``"harmonics"`` keeps.
-
-    Returns
-    -------
-    dict of str to HistorySpec
-    """
-    n = options.steps_per_rev
-    if histories == "full":
-        contact = "contact force of pins 1-4: of the outermost station, of the innermost one, resultant of all stations"
-        modes = "contact mode of pins 1-4: 0 none, 1 one-point, 2 two-point, 3 uniform"
-        return {
-            "loads": _of_samples(BUSHING_LOADS, n),
-            "contact": HistorySpec((n, 4, len(CONTACTS)), "f4", "N", contact, ("theta", "pin", "contact_force")),
-            "shafts": _of_samples(SHAFT_LOADS, n),
-            "mode": HistorySpec((n, 4), "u1", "1", modes, ("theta", "pin")),
-            "tau": HistorySpec((n,), "f8", "1", "speed ratio", ("theta",)),
-        }
-    specs = rainflow.specs() if "cycles" in histories else {}
-    if "harmonics" in histories:
-        specs |= harmonics.specs(min(n_harmonics, (n - 1) // 2) + 1)
-    return specs
-
-
-def _of_samples(history: LoadHistory, n: int) -> HistorySpec:
-    return HistorySpec((n, *history.shape), "f4", "N, N*m", history.meaning, ("theta", *history.axes))
 
 
 @cache
@@ -160,7 +120,7 @@ def simulate_rows(
         still_allowed = left[rows]
         for i, samples in run(params[rows], settings, still_allowed, bool(specs), out, blocks):
             if out[i].status in SIMULATED:
-                for name, values in _sample(samples, histories, specs).items():
+                for name, values in extracted(samples, histories, specs).items():
                     kept[name][rows[i]] = values
         left[rows] = still_allowed
         return out.view(np.ndarray), blocks.view(np.ndarray)
@@ -363,19 +323,3 @@ def _groups(params: NDArray[np.void], max_size: int) -> Iterator[NDArray[np.intp
         rows = np.flatnonzero(shared == numbers)
         for first in range(0, len(rows), max_size):
             yield rows[first : first + max_size]
-
-
-def _sample(samples: NDArray[np.void], histories: Histories, specs: dict[str, HistorySpec]) -> dict[str, NDArray[Any]]:
-    """Extract the histories that are kept from the samples of the recorded revolution."""
-    if histories == "full":
-        fields = {name: samples["loads"][:, span] for name, span in SPAN.items()}
-        fields |= {name: samples[name] for name in samples.dtype.names or ()} | {"loads": samples["components"]}
-        return {name: fields[name].reshape(spec.shape) for name, spec in specs.items()}
-    loads = {
-        BUSHING_LOADS.name: np.ascontiguousarray(samples["components"]),
-        SHAFT_LOADS.name: np.ascontiguousarray(samples["shafts"]),
-    }
-    sample = rainflow.count(loads) if "cycles" in histories else {}
-    if "harmonics" in histories:
-        sample |= harmonics.of_loads(loads, specs["coefficients_real"].shape[-1])
-    return sample

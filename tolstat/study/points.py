@@ -13,7 +13,7 @@ from tolstat.common import loads, strict, units
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.strict import did_you_mean, refuse
 from tolstat.joint import Operation, orders
-from tolstat.joint.partner import Partner
+from tolstat.joint.orders import Partner
 
 ORDERS = {"speed_orders": orders.SpeedOrder, "torque_orders": orders.TorqueOrder}
 """Model of the orders in each field of an operating point."""

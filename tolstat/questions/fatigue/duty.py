@@ -14,7 +14,7 @@ from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import FloatArray
 from tolstat.common.tables import ERROR_FIELDS, Status, worst_status
 from tolstat.display.text import percent
-from tolstat.solver import rainflow
+from tolstat.solver.histories import between
 from tolstat.store import points, recorded
 from tolstat.store.view import View
 from tolstat.study.fatigue import Fatigue, of_text
@@ -94,7 +94,7 @@ class Joints:
         if not self.visits:
             return None
         levels = (table.reshape(-1, len(self.duty)) for table in (low, high))
-        ranges, means, numbers = (table.reshape(*low.shape[:2], -1) for table in rainflow.between(self.visits, *levels))
+        ranges, means, numbers = (table.reshape(*low.shape[:2], -1) for table in between(self.visits, *levels))
         return Transitions(ranges, means, numbers / self.settings.turns)
 
 

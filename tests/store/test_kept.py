@@ -20,7 +20,7 @@ from tolstat import study
 from tolstat.analysis import accuracy
 from tolstat.campaign import extend, replay, stop_rule, verify
 from tolstat.campaign import run as campaign
-from tolstat.campaign.checks import QUICK_CHECKS
+from tolstat.campaign.verify import QUICK_CHECKS
 from tolstat.common import selected_results as kept
 from tolstat.common.columns import RESULT_COLUMNS
 from tolstat.common.errors import InputError, StoreError
@@ -189,7 +189,7 @@ def test_replay_and_verify_compare_what_is_stored(tmp_path: Path) -> None:
         file["results/cross2.F_max"][2] += 1.0
     with ResultFile.open(path) as store:
         assert [d.name for d in replay.replay(store, 2).differences] == ["cross2.F_max"]
-    found = verify.check_file(path, 2, make=partial(verify.ALL, names=QUICK_CHECKS))
+    found = verify.check_file(path, 2, make=partial(verify.run_checks, names=QUICK_CHECKS))
     with ResultFile.open(path) as store:
         held = verification.read(store)
     assert held is not None

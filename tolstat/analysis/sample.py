@@ -9,9 +9,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tolstat.analysis.column import Column, Inexact, Mask, largest
 from tolstat.analysis.design import Design, Independent
-from tolstat.analysis.estimates import CURVE, Exceedance, Quantile
+from tolstat.analysis.estimates import CURVE, Column, Exceedance, Inexact, Mask, Quantile, largest
 from tolstat.common.loads import FloatArray
 from tolstat.common.tables import UNSETTLED, VALID, Status, worst_status
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from tolstat.analysis import binomial
 from tolstat.analysis.design import Independent
 from tolstat.analysis.sample import Sample
-from tolstat.campaign import checks, verify
+from tolstat.campaign import verify
 from tolstat.campaign.run import choose_fidelity
 from tolstat.common.cores import available_cores
 from tolstat.common.loads import load_of, split
@@ -318,7 +318,7 @@ def _check(study: Study, params: NDArray[np.void], results: NDArray[np.void], op
     if not settled.size:
         return 0.0
     begin = time.process_time()
-    checks.run_checks(params[settled], [options[i] for i in settled.tolist()], checks.QUICK_CHECKS, simulate_rows)
+    verify.run_checks(params[settled], [options[i] for i in settled.tolist()], verify.QUICK_CHECKS, simulate_rows)
     return time.process_time() - begin
 
 
@@ -344,7 +344,7 @@ def simulate_timed(study: Study, params: NDArray[np.void], options: list[Options
         simulate_rows(params[[options.index(distinct)]], distinct)  # compiles, or loads, what these options need
     kept = partial(simulate_rows, histories=study.output.histories, n_harmonics=study.output.harmonics)
     begin = time.process_time()
-    return checks.simulate_each(params, options, kept), time.process_time() - begin
+    return verify.simulate_each(params, options, kept), time.process_time() - begin
 
 
 def _width(share: float, n: int) -> float:

@@ -12,19 +12,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common import strict
+from tolstat.common import strict, tables
 from tolstat.common.errors import Fault, InputError, gather
-from tolstat.common.tables import (
-    FAILED,
-    MAX_ITERATIONS,
-    STATUS_TEXT,
-    UNSETTLED,
-    HistorySpec,
-    Options,
-    Status,
-    iterations_allowed,
-    to_names,
-)
+from tolstat.common.tables import FAILED, UNSETTLED, HistorySpec, Options, Status
 from tolstat.joint.ideal import NO_CLOSED_FORM
 from tolstat.solver import fidelity
 from tolstat.solver.refinement import MIN_MAX_REVS
@@ -70,7 +60,7 @@ class Reason(NamedTuple):
         """Number, status, meaning and remedy, in lines."""
         noun = "joint" if self.joints == 1 else "joints"
         where = f" at {self.point}" if self.point else ""
-        head = f"{self.joints} {noun} {self.status.label}{where}: {STATUS_TEXT[self.status]}"
+        head = f"{self.joints} {noun} {self.status.label}{where}: {tables.STATUS_TEXT[self.status]}"
         return f"{head}\n  hint, for row {self.row}: {self.remedy}"
 
     @property
@@ -155,11 +145,11 @@ def _of_newton_failure(row: np.void, options: Mapping[str, Any]) -> str:
     if row["failed_step"] < 0:
         return 'at an input angle no equilibrium was found: try solver.fidelity = "dynamic"'
     place, steps = _place(row), _more_steps(options)
-    if row["newton_iterations"] == iterations_allowed(options["steps_per_rev"], options["max_revs"]):
+    if row["newton_iterations"] == tables.iterations_allowed(options["steps_per_rev"], options["max_revs"]):
         spent = f"all {row['newton_iterations']} iterations that a joint may take were spent at {place}"
         return f"{spent}: try solver.steps_per_rev = {steps}"
-    if row["newton_iterations"] > MAX_ITERATIONS * options["steps_per_rev"] * options["max_revs"]:
-        return f"{MAX_ITERATIONS} iterations a step were spent at {place}: try solver.steps_per_rev = {steps}"
+    if row["newton_iterations"] > tables.MAX_ITERATIONS * options["steps_per_rev"] * options["max_revs"]:
+        return f"{tables.MAX_ITERATIONS} iterations a step were spent at {place}: try solver.steps_per_rev = {steps}"
     return f"failed at {place}: try solver.steps_per_rev = {steps}, or solver.max_halvings = 20"
 
 
@@ -206,7 +196,7 @@ class Retry(NamedTuple):
     def entry(self) -> dict[str, Any]:
         """Return the entry for `retries` of the result file."""
         status = [state.label for state in self.status]
-        return {"status": status, "settings": self.settings, "options": to_names(self.options)}
+        return {"status": status, "settings": self.settings, "options": tables.to_names(self.options)}
 
 
 def parse_retry(statuses: str, settings: Sequence[str], study: Study) -> Retry:

@@ -12,19 +12,10 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tolstat.common import tables
 from tolstat.common.load_kinds import LOAD_KINDS, SPAN, measure_of
 from tolstat.common.loads import FloatArray, put_largest
-from tolstat.common.tables import (
-    RESULT,
-    SIMULATED,
-    Fidelity,
-    Options,
-    Start,
-    Status,
-    for_kernels,
-    iterations_allowed,
-    without_results,
-)
+from tolstat.common.tables import RESULT, SIMULATED, Fidelity, Options, Start, Status
 from tolstat.solver.simulation import AT_REST, equilibrium, simulate_together
 
 IntegratorName = Literal["Radau", "BDF", "LSODA"]
@@ -105,7 +96,9 @@ def first_order(params: NDArray[np.void], options: Options, from_start: bool = F
 
     par = params.view(np.recarray)[0]
     options = options._replace(fidelity=int(Fidelity.DYNAMIC))
-    settled, revolution = _last_revolution(params, options)
+    settled = np.zeros(1, RESULT)
+    allowed = np.full(1, tables.iterations_allowed(options.steps_per_rev, options.max_revs))
+    ((_, revolution),) = simulate_together(params, options, allowed, True, settled)
     period = 2 * np.pi / abs(float(par.omega))
     last = round(float(np.nan_to_num(settled["revolutions"][0])) * options.steps_per_rev) % options.steps_per_rev
     t0, y0 = period * last / options.steps_per_rev, np.concatenate([revolution[last].q, revolution[last].v])
@@ -133,20 +126,13 @@ def first_order(params: NDArray[np.void], options: Options, from_start: bool = F
     def largest(times: FloatArray, states: FloatArray, equal: NDArray[np.bool_] | None = None) -> Largest:
         samples = make_samples(1, len(times))[0]
         sample(times, np.ascontiguousarray(states), par, work, samples)
-        out = for_kernels(np.zeros(1, RESULT))[0]
+        out = tables.for_kernels(np.zeros(1, RESULT))[0]
         write_orders(samples if equal is None else samples[equal], out)
         out.largest[:N_INSTANT] = samples.loads.max(axis=0)
         return np.array(out.largest)
 
     scale = np.repeat([LENGTH, VELOCITY], N_DOF)
     return FirstOrder(rate, jacobian, t0, y0, period, scale, largest, settled)
-
-
-def _last_revolution(params: NDArray[np.void], options: Options) -> tuple[NDArray[np.void], Any]:
-    """Result of a joint with uniform or error-controlled steps, (1,), and samples of its last revolution."""
-    settled, allowed = np.zeros(1, RESULT), np.full(1, iterations_allowed(options.steps_per_rev, options.max_revs))
-    ((_, samples),) = simulate_together(params, options, allowed, True, settled)
-    return settled, samples
 
 
 def _start(params: NDArray[np.void], options: Options) -> FloatArray:
@@ -195,7 +181,7 @@ def reference_rows(
         within `MAX_REVS` or `max_steps` is ``NOT_SETTLED``, or ``NEWTON_FAILED`` if the integration ended before the
         second revolution did.
     """
-    results = without_results(len(params), Status.NEWTON_FAILED)
+    results = tables.without_results(len(params), Status.NEWTON_FAILED)
     for i in range(len(params)):
         system = first_order(params[i : i + 1], options)
         status = Status(system.settled["status"][0])

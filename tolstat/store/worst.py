@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.analysis.column import Column, Inexact, frozen, largest
+from tolstat.analysis.estimates import Column, Inexact, frozen, largest
 from tolstat.analysis.sample import Sample, is_valid
 from tolstat.common.loads import LOAD_FIELDS, LOADS, FloatArray, Limit, Load, Results, split
 from tolstat.common.tables import FAILED, RESULT, UNSETTLED, VALID, Status, deciding, without_results, worst_status

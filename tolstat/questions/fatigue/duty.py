@@ -15,7 +15,7 @@ from tolstat.common.loads import FloatArray
 from tolstat.common.tables import ERROR_FIELDS, Status, worst_status
 from tolstat.display.text import percent
 from tolstat.solver.histories import between
-from tolstat.store import points, recorded
+from tolstat.store import recorded
 from tolstat.store.view import View
 from tolstat.study.fatigue import Fatigue, of_text
 
@@ -121,7 +121,7 @@ def members(views: Sequence[View], shares: Sequence[float] | None) -> tuple[Sequ
         remedy = "give this file alone, or files with one operating point each" if len(views) > 1 else remedy
         if remedy:
             raise InputError([Fault(str(views[0].path), "has several operating points", remedy)])
-        views, shares = views[0].parts, points.shares_of_revolutions(views[0]).tolist()
+        views, shares = views[0].parts, views[0].shares_of_revolutions.tolist()
     shares = [1.0] if shares is None else shares
     if len(shares) != len(views) or min(shares, default=0.0) <= 0 or abs(sum(shares) - 1) > 1e-6:
         given = f"{list(shares)} for {len(views)} files"

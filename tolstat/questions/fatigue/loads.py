@@ -145,7 +145,7 @@ def load_cycles(
         each operating point.
     shares : sequence of float, optional
         Share of the revolutions in each of several campaigns; the sum is 1. Those of the operating points of one
-        campaign follow from their shares of the time and their speeds, see `points.shares_of_revolutions`.
+        campaign follow from their shares of the time and their speeds, see `View.shares_of_revolutions`.
     names : sequence of str, optional
         Channels to keep, keys of `channels.CHANNELS`; by default those of bushings and those with an S–N line, some
         8 kB per joint.

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.analysis import binomial
-from tolstat.analysis.design import Independent
 from tolstat.analysis.sample import Sample
 from tolstat.campaign import verify
 from tolstat.campaign.run import choose_fidelity
@@ -356,9 +355,8 @@ def _limits(study: Study, results: Mapping[str, NDArray[np.void]]) -> list[Limit
     plans = []
     for name, level in study.limits.items():
         points = names_of(split(name)[1], list(results), "limits")
-        values, status, inexact = worst.load_of([results[point] for point in points], load_of(name))
-        load = Sample(name, load_of(name).unit, level, np.nan, values, inexact, status, Independent())
-        share = load.above(level, CONFIDENCE)
+        values, status, _ = worst.load_of([results[point] for point in points], load_of(name))
+        share = Sample.of(values.values, status).above(level, CONFIDENCE)
         valid = share.n - share.n_failed - share.n_unsettled
         nearest_half = min(max(0.5, share.lower), share.upper)  # the interval is widest at a share of one half
         plans.append(LimitPlan(name, level, share.count, valid, _width(nearest_half, study.samples)))

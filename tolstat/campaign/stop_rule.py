@@ -11,14 +11,14 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from tolstat.analysis import binomial
-from tolstat.analysis.sample import Sample
 from tolstat.campaign.pool import kept_workers
 from tolstat.common import selected_results
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import Limit, load_of
-from tolstat.store import Reader, Writer, worst
-from tolstat.store.hdf5 import BLOCK
+from tolstat.store import Reader, View, Writer
 from tolstat.study import Study
 from tolstat.study import rule as rules
 
@@ -132,7 +132,7 @@ def run_until(study: Study, out: Path, rule: rules.Statement, run: Callable[[int
         while True:
             run(first + joints)
             with Reader.open(out) as store:
-                look = _look(store, rule.limit, range(first, first + joints))
+                look = _look(View(store), rule.limit, joints)
             counts = look.above, look.n_unresolved, joints
             reached = bool(binomial.narrow(rule.bound, *counts))
             if reached or joints == planned[-1]:
@@ -144,13 +144,8 @@ def run_until(study: Study, out: Path, rule: rules.Statement, run: Callable[[int
     return outcome
 
 
-def _look(store: Reader, limit: Limit, rows: range) -> Look:
-    count = unresolved = 0
-    for begin in range(0, len(rows), BLOCK):
-        block = rows[begin : begin + BLOCK]
-        parts = {at_point.point or "": at_point.results(slice(block.start, block.stop)) for at_point in store.each()}
-        part = Sample.of(*worst.limit_of(parts, limit)).above(limit.level)
-        count += part.count
-        unresolved += part.n_failed + part.n_unsettled
-    lower, upper = binomial.stop_interval(count, unresolved, len(rows))
-    return Look(len(rows), unresolved, count, count / max(len(rows) - unresolved, 1), float(lower), float(upper))
+def _look(view: View, limit: Limit, joints: int) -> Look:
+    load = view.load_of(limit).only(np.arange(joints)).above(limit.level)
+    unresolved = load.n_failed + load.n_unsettled
+    lower, upper = binomial.stop_interval(load.count, unresolved, joints)
+    return Look(joints, unresolved, load.count, load.count / max(joints - unresolved, 1), float(lower), float(upper))

@@ -22,12 +22,12 @@ from tolstat.campaign.what_if import check_code
 from tolstat.common import selected_results, tables
 from tolstat.common.counts import Counts
 from tolstat.common.errors import Fault, InputError, gather
-from tolstat.common.loads import LOADS, Limit, load_of, split
+from tolstat.common.loads import Limit, load_of, split
 from tolstat.common.tables import Fidelity, Method, Options, Simulation, Start, Status
 from tolstat.sampling import draw
 from tolstat.solver import compilation
 from tolstat.solver.reference import reference_rows
-from tolstat.store import Reader, Writer, verification
+from tolstat.store import Reader, View, Writer, verification
 from tolstat.store.hdf5 import pick, store_error
 from tolstat.store.recorded import options_of, parameters, perturbed, variants
 from tolstat.store.verification import Check, Verification
@@ -274,18 +274,15 @@ def _stored(store: Reader, name: str) -> Verification:
 
 def nearest(store: Reader, limit: Limit, joints: int) -> NDArray[np.intp]:
     """File slots of the settled joints whose loads are nearest to a limit, ascending: so many for each load of it."""
-    slots = np.arange(store.first_sample, store.n)
-    results = store.results(slice(store.first_sample, None))
-    settled = results["status"] == Status.OK
-    nearest_slots: set[int] = set()
+    view, nearest_samples = View(store), set[int]()
     for name, level in zip(limit.loads, limit.levels, strict=True):
         plain, points = split(name)
         if points and store.point not in points.split("+"):
             continue
-        distance = np.where(settled, np.abs(LOADS[plain].of(results) - level), np.inf)
+        distance = np.where(view.status == Status.OK, np.abs(view.simulated(plain) - level), np.inf)
         order = np.argsort(distance, kind="stable")[:joints]
-        nearest_slots |= set(slots[order[np.isfinite(distance[order])]].tolist())
-    return np.array(sorted(nearest_slots), dtype=np.intp)
+        nearest_samples |= set(order[np.isfinite(distance[order])].tolist())
+    return view.slots(sorted(nearest_samples))
 
 
 def check_near(

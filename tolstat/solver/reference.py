@@ -186,30 +186,17 @@ def reference_rows(
         system = first_order(params[i : i + 1], options)
         status = Status(system.settled["status"][0])
         if status in SIMULATED:
-            status = _periodic(system, rtol, integrator, closure_tol, max_steps, angles, results[i : i + 1])
+            revolutions = _revolutions(system, rtol, integrator, max_steps, angles)
+            status = _periodic(revolutions, closure_tol, results[i : i + 1])
         results["status"][i] = status
     results["settled"] = results["status"] == Status.OK
     return results
 
 
-def _periodic(
-    system: FirstOrder,
-    rtol: float,
-    integrator: IntegratorName,
-    closure_tol: float,
-    max_steps: int,
-    angles: int | None,
-    out: NDArray[np.void],
-) -> Status:
+def _periodic(revolutions: Iterator[tuple[Largest, int]], closure_tol: float, out: NDArray[np.void]) -> Status:
     """Integrate until the largest loads repeat; write them and the work to `out`, (1,); return the status."""
-    import scipy.integrate
-
-    end = system.t0 + (MAX_REVS + 0.5) * system.period
-    settings: dict[str, Any] = {"rtol": rtol, "atol": rtol * system.scale, "jac": system.jacobian}
-    make: Callable[..., Any] = getattr(scipy.integrate, integrator)
-    solver = make(system.rate, system.t0, system.y0, end, max_step=0.1 * system.period, **settings)
     before = None
-    for last, steps in _revolutions(system, solver, max_steps, angles):
+    for last, steps in revolutions:
         out["revolutions"], out["steps"] = 1 + np.nan_to_num(out["revolutions"]), steps
         put_largest(last, out)
         if before is not None:
@@ -225,10 +212,17 @@ def _periodic(
     return Status.NEWTON_FAILED
 
 
-def _revolutions(system: FirstOrder, solver: Any, max_steps: int, angles: int | None) -> Iterator[tuple[Largest, int]]:
+def _revolutions(
+    system: FirstOrder, rtol: float, integrator: IntegratorName, max_steps: int, angles: int | None
+) -> Iterator[tuple[Largest, int]]:
     """Yield the largest loads of each revolution and the steps so far; end early when the integrator gives up."""
-    times, states, equal = np.empty(0), np.empty((0, len(system.y0))), np.empty(0, bool)
-    new_times, new_states, new_equal = [], [], []
+    import scipy.integrate
+
+    end = system.t0 + (MAX_REVS + 0.5) * system.period
+    settings: dict[str, Any] = {"rtol": rtol, "atol": rtol * system.scale, "jac": system.jacobian}
+    make: Callable[..., Any] = getattr(scipy.integrate, integrator)
+    solver = make(system.rate, system.t0, system.y0, end, max_step=0.1 * system.period, **settings)
+    times, states, equal = [], [], []
     spacing, done = system.period / (angles or SAMPLES_PER_REV), 0
     boundary = system.t0 + (1 + 1e-9) * system.period
     for step in range(1, max_steps + 1):
@@ -238,20 +232,18 @@ def _revolutions(system: FirstOrder, solver: Any, max_steps: int, angles: int | 
         reached = int((solver.t - system.t0) / spacing)
         grid = system.t0 + spacing * np.arange(done + 1, reached + 1)
         done = reached
-        new_times.append(grid)
-        new_states.append(solver.dense_output()(grid).T)
-        new_equal.append(np.ones(len(grid), bool))
+        times.append(grid)
+        states.append(solver.dense_output()(grid).T)
+        equal.append(np.ones(len(grid), bool))
         if angles is None:
-            new_times.append(np.array([solver.t]))
-            new_states.append(solver.y[None].copy())
-            new_equal.append(np.zeros(1, bool))
+            times.append(np.array([solver.t]))
+            states.append(solver.y[None].copy())
+            equal.append(np.zeros(1, bool))
         if solver.t >= boundary:
-            times, states = np.concatenate([times, *new_times]), np.concatenate([states, *new_states])
-            equal = np.concatenate([equal, *new_equal])
-            new_times, new_states, new_equal = [], [], []
-            inside = times <= boundary
-            yield system.largest(times[inside], states[inside], equal[inside]), step
-            times, states, equal = times[~inside], states[~inside], equal[~inside]
+            parts = [np.concatenate(part) for part in (times, states, equal)]
+            inside = parts[0] <= boundary
+            yield system.largest(*(part[inside] for part in parts)), step
+            times, states, equal = ([part[~inside]] for part in parts)
             boundary += system.period
         if solver.status == "finished":
             return

@@ -134,7 +134,7 @@ def test_meanings_of_cases_families_and_proposals_are_words(whole: Path, tmp_pat
         held = metadata.read(file)
     variants = [tables.Variant(family, {}) for family in ("a b", "a b", "c")]
     design = metadata.Design(cases=("ideal", "tilted by 1°"), variants=variants)
-    codes = layout.meanings_of(held.changed(design=design, identity={"proposal": [[0.5, {}]]}))
+    codes = layout.meanings_of(held.model_copy(update={"design": design, "identity": {"proposal": [[0.5, {}]]}}))
     with h5py.File(tmp_path / "b.h5", "w") as file:
         for name, meanings in codes.items():
             layout.put_meanings(file.create_dataset(name, (2,), "i4"), meanings)

@@ -152,7 +152,9 @@ def test_lost_and_unknown_columns_are_damage(tmp_path: Path) -> None:
     with h5py.File(path, "r+") as file:
         file["results"].create_dataset("cross2.F_max", data=held)
         about = metadata.read(file)
-        metadata.write(file, about.changed(identity=about.identity | {kept.KEY: ["cross1.F_max", "psi_max"]}))
+        metadata.write(
+            file, about.model_copy(update={"identity": about.identity | {kept.KEY: ["cross1.F_max", "psi_max"]}})
+        )
     with ResultFile.open(path) as store, pytest.raises(StoreError, match=r"is damaged or no tolstat result file: .*"):
         store.results()
 

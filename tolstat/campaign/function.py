@@ -75,7 +75,9 @@ class Function:
         self.names, self.cube_names = sampling.columns(study), sampling.streams(study)
         self.limits = {name: self.study.limits[name] for name in loads if name in self.study.limits}
         self.copula = study.copula
-        self.reason = _reason(study)
+        zones = [name for name in study.tolerances if axes.is_zone(name)]
+        whole = f"{zones[0]} is drawn as a vector, from which errors follow" if zones else ""
+        self.reason = whole or _dependence(study)[1]
         self.distributions = None if self.reason else dict(study.tolerances)
         self.status: NDArray[np.uint8] = np.zeros(0, np.uint8)
         self.simulated = 0
@@ -302,12 +304,6 @@ def _dependence(study: Study) -> tuple[str, str]:
     if study.sampling.joints_per_lot > 1:
         return "sampling.joints_per_lot", "joints of one lot depend on each other"
     return "", ""
-
-
-def _reason(study: Study) -> str:
-    """Why the errors of a study have no distribution each; empty if they have."""
-    zones = [name for name in study.tolerances if axes.is_zone(name)]
-    return f"{zones[0]} is drawn as a vector, from which errors follow" if zones else _dependence(study)[1]
 
 
 def _marginal(ot: Any, own: law.Distribution) -> Any:

@@ -88,10 +88,6 @@ class Metadata(BaseModel):
     created: str
     git_commit: str
 
-    def changed(self, **values: Any) -> Metadata:
-        """Return the metadata with other values."""
-        return self.model_copy(update=values)
-
 
 def of_study(
     study: Study,

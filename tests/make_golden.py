@@ -31,7 +31,7 @@ def make(folder: Path) -> Path:
         store.write(rows, fakes.simulate(params, fakes.Options(), "full", 0))
         store.finish()
     with h5py.File(path, "r+") as file:
-        metadata.write(file, metadata.read(file).changed(git_commit=""))
+        metadata.write(file, metadata.read(file).model_copy(update={"git_commit": ""}))
     with ResultFile.open(path) as store:
         store.to_pandas(nominal=True).to_csv(path.with_suffix(".csv"), lineterminator="\n")
     return path

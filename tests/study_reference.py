@@ -12,8 +12,7 @@ from tolstat.common.loads import LOADS
 from tolstat.common.tables import ERROR_FIELDS
 from tolstat.joint import Operation
 from tolstat.joint.contact import Station
-from tolstat.joint.orders import SpeedOrder, TorqueOrder
-from tolstat.joint.partner import Partner
+from tolstat.joint.orders import Partner, SpeedOrder, TorqueOrder
 from tolstat.study import schema
 from tolstat.study.costs import CostEntry
 from tolstat.study.fatigue import LineEntry, SequenceEntry, StressPointEntry

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import expon, genpareto, norm
 
-from tolstat.analysis import extreme, pareto
+from tolstat.analysis import extreme
 from tolstat.analysis.design import Listed
 from tolstat.analysis.sample import Sample
 from tolstat.common.tables import Status
@@ -21,15 +21,15 @@ def fit(values, status=None, iid=True, **options):
 @pytest.mark.parametrize("k", [-0.4, 0.0, 0.3])
 def test_distribution_is_scipys(k):
     x = np.linspace(0.01, 2.0, 7)
-    assert pareto.upper_share(x, k, 0.9) == pytest.approx(genpareto(k, scale=0.9).sf(x))
-    assert pareto.quantile([0.5, 1e-6], k, 0.9) == pytest.approx(genpareto(k, scale=0.9).isf([0.5, 1e-6]))
-    assert pareto.log_likelihood(x, k, 0.9) == pytest.approx(genpareto(k, scale=0.9).logpdf(x).sum())
+    assert extreme.upper_share(x, k, 0.9) == pytest.approx(genpareto(k, scale=0.9).sf(x))
+    assert extreme.quantile([0.5, 1e-6], k, 0.9) == pytest.approx(genpareto(k, scale=0.9).isf([0.5, 1e-6]))
+    assert extreme.log_likelihood(x, k, 0.9) == pytest.approx(genpareto(k, scale=0.9).logpdf(x).sum())
 
 
 @pytest.mark.slow
 def test_estimates_agree_with_maximum_likelihood():
     x = genpareto.rvs(0.2, scale=3.0, size=(4, 2000), random_state=2)
-    for row, k, sigma in zip(x, *pareto.fit(x), strict=True):
+    for row, k, sigma in zip(x, *extreme.zhang_stephens(x), strict=True):
         best = genpareto.fit(row, floc=0)
         assert (k, sigma) == pytest.approx((best[0], best[2]), abs=0.03)
         # the fit of a tail is maximum likelihood itself, on a grid
@@ -49,16 +49,16 @@ def test_a_uniform_load_is_refused_and_the_others_are_not():
 def test_the_fit_tested_is_the_fit_used():
     rng = np.random.default_rng(13)
     samples = genpareto.rvs(0.1, scale=2.0, size=(3, 200), random_state=rng)
-    for row, k, sigma in zip(samples, *pareto.most_likely(samples), strict=True):
+    for row, k, sigma in zip(samples, *extreme.most_likely(samples), strict=True):
         tail = fit(np.concatenate([np.zeros(1800), row]), share=0.1)
         assert (tail.shape.estimate, tail.scale.estimate) == pytest.approx((k, sigma), rel=1e-6)
-        grid = pareto.log_likelihood(tail.excesses, *tail.region[:, 1:].T)
-        assert pareto.log_likelihood(tail.excesses, k, sigma) >= grid.max() - 1e-6
+        grid = extreme.log_likelihood(tail.excesses, *tail.region[:, 1:].T)
+        assert extreme.log_likelihood(tail.excesses, k, sigma) >= grid.max() - 1e-6
 
 
 def test_the_end_of_a_tail_has_no_likelihood_beyond_it():
-    assert pareto.log_likelihood(np.array([1.0, 2.5]), -0.5, 1.0) == -np.inf
-    assert pareto.upper_share(2.5, -0.5, 1.0) == 0.0
+    assert extreme.log_likelihood(np.array([1.0, 2.5]), -0.5, 1.0) == -np.inf
+    assert extreme.upper_share(2.5, -0.5, 1.0) == 0.0
 
 
 @pytest.mark.slow
@@ -70,7 +70,7 @@ def test_return_loads_cover_over_seeds_and_without_doubt_of_the_shape_they_do_no
         found, odds = tail.level(1e-5), tail.probability(load.isf(1e-4))
         covered.append([found.lower <= load.isf(1e-5) <= found.upper, odds.lower <= 1e-4 <= odds.upper])
         near = np.abs(tail.region[:, 1] - tail.shape.estimate) < 0.01
-        loads = tail.threshold + pareto.quantile(1e-5 / tail.region[near, 0], *tail.region[near, 1:].T)
+        loads = tail.threshold + extreme.quantile(1e-5 / tail.region[near, 0], *tail.region[near, 1:].T)
         narrow.append(loads.min() <= load.isf(1e-5) <= loads.max())
     assert np.all(np.mean(covered, axis=0) >= LEAST)
     assert np.mean(narrow) < LEAST

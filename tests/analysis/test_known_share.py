@@ -5,7 +5,7 @@ import pytest
 from scipy import stats
 
 from tolstat.analysis import known_share, process, weighted
-from tolstat.analysis.column import Column
+from tolstat.analysis.estimates import Column
 from tolstat.analysis.known_share import Mixture
 from tolstat.analysis.process import Draws, Known, Sums
 

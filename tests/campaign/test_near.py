@@ -7,7 +7,7 @@ from typer.testing import CliRunner
 
 from tests.support import exceedance, synthetic
 from tolstat.analysis import accuracy, binomial, prediction
-from tolstat.campaign import checks, verify
+from tolstat.campaign import verify
 from tolstat.cli import app
 from tolstat.common.errors import InputError
 from tolstat.common.tables import Status
@@ -43,7 +43,7 @@ def path(tmp_path, monkeypatch):
         base = store.results()[slots]
         other = base.copy()
         other["F_max"] *= 1.02
-        made = {name: Check("", {}, base.copy()) for name in checks.QUICK_CHECKS} | {"reference": Check("", {}, other)}
+        made = {name: Check("", {}, base.copy()) for name in verify.QUICK_CHECKS} | {"reference": Check("", {}, other)}
         return Verification(0, store.row(slots), base, made)
 
     monkeypatch.setattr(verify, "check_slots", check_slots)

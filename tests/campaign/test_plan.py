@@ -15,7 +15,7 @@ from tests.campaign.test_campaign import datasets
 from tests.support import exceedance, fakes, reports, synthetic
 from tests.support.synthetic import HEAD
 from tolstat import cli, study
-from tolstat.analysis import binomial, sequential
+from tolstat.analysis import binomial
 from tolstat.campaign import plan, stop_rule
 from tolstat.campaign import run as campaign
 from tolstat.common.errors import InputError
@@ -80,7 +80,7 @@ def stopped(path: Path, workers: int = 1, block: int | None = None, n: int = 400
 @pytest.fixture
 def few_looks(monkeypatch: pytest.MonkeyPatch) -> None:
     """Looks that are far apart: each one opens the file and starts a run."""
-    monkeypatch.setattr(sequential, "GROWTH", 1.3)
+    monkeypatch.setattr(binomial, "GROWTH", 1.3)
 
 
 @pytest.mark.slow
@@ -90,7 +90,7 @@ def test_a_campaign_stops_where_the_rule_holds(tmp_path: Path) -> None:
     outcome = stopped(path)
     look = outcome.look
     assert outcome.reached
-    assert outcome.looks == sequential.looks(399)
+    assert outcome.looks == binomial.looks(399)
     assert look.joints in outcome.looks[:-1]
     with ResultFile.open(path) as store:
         status, loads = store.status(), store.results()["F_max"][:, 0]
@@ -101,7 +101,7 @@ def test_a_campaign_stops_where_the_rule_holds(tmp_path: Path) -> None:
         assert store.stop["looks"] == [n for n in outcome.looks if n <= look.joints]
     assert look.n_unresolved == (status[1 : look.joints + 1] != Status.OK).sum()
     shares = [
-        exceedance.exceedance(loads[1 : n + 1], status[1 : n + 1], 0.5, sequential.CONFIDENCE)
+        exceedance.exceedance(loads[1 : n + 1], status[1 : n + 1], 0.5, binomial.LOOK_CONFIDENCE)
         for n in outcome.looks
         if n <= look.joints
     ]
@@ -167,7 +167,7 @@ def test_run_until_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
     assert "biased high if few joints are above" in done.stderr
     with h5py.File("s.h5") as file:
         taken = json.loads(file["metadata"][()])["stop"]["looks"]
-    assert taken == sequential.looks(400)[: len(taken)]
+    assert taken == binomial.looks(400)[: len(taken)]
     done = CliRunner().invoke(cli.app, ["extend", "s.h5", "--n", "500"])
     assert done.exit_code == 0, done.output
     with h5py.File("s.h5") as file:

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import random
 import signal
@@ -26,7 +25,7 @@ from tolstat.campaign.pool import WorkerDied
 from tolstat.campaign.remedy import Retry, parse_retry
 from tolstat.common.counts import Counts
 from tolstat.common.errors import InputError, StoreError
-from tolstat.common.tables import SIMULATED, Fidelity, Options, Simulation, Status
+from tolstat.common.tables import SIMULATED, Fidelity, Options, Simulation, Status, from_names
 from tolstat.joint import Operation
 from tolstat.store import ResultFile, verification
 from tolstat.study.model import Solver
@@ -269,7 +268,9 @@ def test_failed_joints_are_simulated_again_with_other_settings(tmp_path: Path) -
     assert run(retry=AGAIN, tell=told.append).failed == 0
     assert told == [f"{failed.size} joints are simulated again", "0 joints are simulated again"]
     with ResultFile.open(path) as store:
-        assert store.retries == (json.loads(json.dumps(AGAIN.entry())),)
+        (entry,) = store.retries
+        assert (entry["status"], entry["settings"]) == ([state.label for state in AGAIN.status], AGAIN.settings)
+        assert from_names(entry["options"]) == AGAIN.options
         assert store.check() == (True, {})
         assert np.flatnonzero(store.attempt() == 1).tolist() == failed.tolist()
         assert (store.results()["steps"][failed] == 60).all()

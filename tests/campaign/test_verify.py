@@ -14,8 +14,8 @@ from typer.testing import CliRunner
 from tests.support import damage, fakes, synthetic
 from tolstat import cli, joint, sampling, study
 from tolstat.analysis import accuracy
-from tolstat.campaign import checks, verify
 from tolstat.campaign import run as campaign
+from tolstat.campaign import verify
 from tolstat.common.errors import InputError, NotApplicable, StoreError
 from tolstat.common.load_kinds import LOAD_KINDS
 from tolstat.common.tables import Method, Options, Simulation, Start, Status, from_names
@@ -68,7 +68,7 @@ def told():
 @pytest.fixture(scope="module")
 def coarse(plan, told):
     """Joints at 12 steps a revolution, where the steps' error is large; two processes share the references."""
-    return verify.check_study(plan, 6, make=partial(verify.ALL, workers=2, progress=told.append))
+    return verify.check_study(plan, 6, make=partial(verify.run_checks, workers=2, progress=told.append))
 
 
 def force_and_torque(base, other):
@@ -94,7 +94,7 @@ def test_estimate_is_of_the_size_of_the_error(coarse):
 @pytest.mark.slow
 def test_references_are_the_same_in_other_processes_and_are_told_of(plan, coarse, told):
     params = joint.perturb(plan.joint, plan.operation, sampling.draw(plan)[coarse.rows[-1:]])
-    here = checks.run_checks(params, [plan.solver.options()], ("reference",))["reference"].results
+    here = verify.run_checks(params, [plan.solver.options()], ("reference",))["reference"].results
     for name in ("F_max", "T_max"):  # with other threads LAPACK rounds otherwise, and Radau takes other steps
         np.testing.assert_allclose(coarse.checks["reference"].results[name][-1], here[name][0], rtol=1e-6)
     assert [(counts.done, counts.total) for counts in told] == [(k, 6) for k in range(7)]
@@ -108,22 +108,22 @@ def test_coarse_steps_are_seen_and_nothing_else_is_blamed(plan, coarse):
     for name in ("newton", "settling"):
         assert force_and_torque(coarse.base, coarse.checks[name].results).max() < 1e-3 * np.median(true)
     params = joint.perturb(plan.joint, plan.operation, sampling.draw(plan)[coarse.rows])
-    fine = checks.run_checks(params, [Options(steps_per_rev=90)] * len(params), ("half_step",))["half_step"]
+    fine = verify.run_checks(params, [Options(steps_per_rev=90)] * len(params), ("half_step",))["half_step"]
     assert fine.options["steps_per_rev"] == 180
     assert np.median(force_and_torque(fine.results, reference)) < 0.05 * np.median(true)
 
 
 def test_each_check_changes_what_it_says():
     options = Options()
-    assert checks.options_of_check(options, "half_step") == options._replace(steps_per_rev=360)
-    assert checks.options_of_check(options, "newton").newton_tol == pytest.approx(1e-8)
-    settling = checks.options_of_check(options, "settling")
+    assert verify.options_of_check(options, "half_step") == options._replace(steps_per_rev=360)
+    assert verify.options_of_check(options, "newton").newton_tol == pytest.approx(1e-8)
+    settling = verify.options_of_check(options, "settling")
     assert (settling.settle_tol, settling.start) == (pytest.approx(1e-6), Start.RAMP)
     for method in Method:
-        assert checks.options_of_check(options._replace(method=int(method)), "method").method != method
+        assert verify.options_of_check(options._replace(method=int(method)), "method").method != method
     # types of the fields decide which compiled code runs
-    for name in checks.ALL_CHECKS:
-        assert [type(x) for x in checks.options_of_check(options, name)] == [type(x) for x in options]
+    for name in verify.ALL_CHECKS:
+        assert [type(x) for x in verify.options_of_check(options, name)] == [type(x) for x in options]
 
 
 def test_the_seed_chooses_the_joints():
@@ -141,7 +141,7 @@ def test_all_joints_are_those_that_settled_and_the_one_without_errors(tmp_path):
     campaign.run(study.load(written(tmp_path), n=4), tmp_path / "a.h5", workers=1, check=False)
     with damage.rewritten(tmp_path / "a.h5") as file:
         file["results/status"][2] = Status.NOT_SETTLED
-    newton = partial(verify.ALL, names=("newton",))
+    newton = partial(verify.run_checks, names=("newton",))
     assert verify.check_file(tmp_path / "a.h5", None, make=newton).rows.tolist() == [0, 1, 3, 4]
     assert verify.check_file(tmp_path / "a.h5", 9, make=newton).rows.tolist() == [1, 3, 4]
 
@@ -169,13 +169,13 @@ def test_a_run_checks_a_few_joints_and_a_file_gives_them_back(tmp_path):
         assert found is not None
         assert found.rows.tolist() == verify.choose(np.flatnonzero(store.status()[1:] == Status.OK) + 1, 2, 7).tolist()
         assert np.array_equal(found.base, store.results()[found.rows])
-    assert tuple(found.checks) == checks.QUICK_CHECKS
+    assert tuple(found.checks) == verify.QUICK_CHECKS
     for name, check in found.checks.items():
         # the invented solver knows no settings but the number of steps
         expected = found.base.copy()
         expected["steps"] *= 2 if name == "half_step" else 1
         assert np.array_equal(check.results, expected)
-        assert from_names(check.options) == checks.options_of_check(Options(steps_per_rev=30), name)
+        assert from_names(check.options) == verify.options_of_check(Options(steps_per_rev=30), name)
     with Writer.open(path) as store:
         verification.write([(store, found._replace(rows=found.rows[:1], checks={}))])
         again = verification.read(store)
@@ -196,7 +196,7 @@ def test_a_slice_keeps_the_rows_of_the_campaign(tmp_path, monkeypatch):
         store.write(np.arange(10), Simulation(results, {}))
         solve = lambda slots, *_, **__: Simulation(results[slots], {})  # noqa: E731
         monkeypatch.setattr(verify, "parameters", lambda store, slots: slots)
-        checked = verify.check_campaign(store, 3, 7, partial(checks.run_checks, names=("newton",), simulate=solve))
+        checked = verify.check_campaign(store, 3, 7, partial(verify.run_checks, names=("newton",), simulate=solve))
         verification.write([(store, checked)])
     with ResultFile.open(tmp_path / "b.h5") as store:
         found = verification.read(store)
@@ -211,7 +211,7 @@ def off_by(path, factor, rows=(5, 9)):
         true = base.copy()
         for name in ("F_max", "T_max", "contact_max", "psi_max"):
             true[name] *= factor
-        made = {name: Check("", {}, base) for name in checks.QUICK_CHECKS} | {"reference": Check("", {}, true)}
+        made = {name: Check("", {}, base) for name in verify.QUICK_CHECKS} | {"reference": Check("", {}, true)}
         verification.write([(store, Verification(1, np.array(rows), base, made))])
 
 
@@ -280,12 +280,12 @@ def test_command_checks_the_joints_of_a_file(tmp_path):
     found = json.loads(done.stdout)
     facts, tables = found["facts"], found["tables"]
     assert len(facts["rows"]) == 2
-    assert list(facts["checks"]) == list(checks.ALL_CHECKS)
+    assert list(facts["checks"]) == list(verify.ALL_CHECKS)
     errors = {(row["load"], row["error"]): row for name in tables for row in tables[name]["rows"]}
     assert errors["F", "reference"]["joints"] == 2
     assert errors["cross1.T", "half_step"]["worst"] > 0
     table = pd.read_csv(out)
-    assert len(table) == 2 * len(checks.ALL_CHECKS) * len(accuracy.OBSERVABLES)
+    assert len(table) == 2 * len(verify.ALL_CHECKS) * len(accuracy.OBSERVABLES)
     with ResultFile.open(path) as store:
         kept = verification.read(store)
         assert kept is not None
@@ -295,7 +295,7 @@ def test_command_checks_the_joints_of_a_file(tmp_path):
         assert part["value"].tolist() == kept.checks["reference"].results["T_max"][:, 5].tolist()
     lines = call("verify", plan_path, "--joints", 1).stdout.splitlines()
     assert lines[0].split() == ["load", "error", "joints", "median", "95", "%", "below", "worst"]
-    assert len(lines) == 1 + len(LOAD_KINDS) * (len(checks.ALL_CHECKS) + 1)
+    assert len(lines) == 1 + len(LOAD_KINDS) * (len(verify.ALL_CHECKS) + 1)
 
 
 def test_parameters_and_settings_come_back_from_the_file_alone(tmp_path):
@@ -323,7 +323,7 @@ def test_lower_fidelity_is_measured_against_the_dynamic_joint(tmp_path):
     text = REAL.replace("steps_per_rev = 12", 'fidelity = "quasistatic"\nsteps_per_rev = 180').replace(
         "500 rpm", "1000 rpm"
     )
-    without_method = partial(verify.ALL, names=(*checks.QUICK_CHECKS, "reference"))
+    without_method = partial(verify.run_checks, names=(*verify.QUICK_CHECKS, "reference"))
     found = verify.check_study(study.load(written(tmp_path, text)), joints=1, make=without_method)
     true = force_and_torque(found.base, found.checks["reference"].results)
     seen = force_and_torque(found.base, found.checks["fidelity"].results)

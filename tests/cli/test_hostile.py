@@ -59,7 +59,7 @@ def test_standard_error_moves_no_cursor(capsys: pytest.CaptureFixture[str]) -> N
 def test_a_terminal_gets_no_control_characters_and_a_pipe_what_is_there(tmp_path: Path) -> None:
     path = synthetic.store(tmp_path, simulated=0)
     with h5py.File(path, "r+") as file:
-        metadata.write(file, metadata.read(file).changed(study_name="a\x1b]0;title\x07b"))
+        metadata.write(file, metadata.read(file).model_copy(update={"study_name": "a\x1b]0;title\x07b"}))
     command = [sys.executable, "-m", "tolstat", "status", str(path)]
     own, terminal = pty.openpty()
     subprocess.run(command, stdout=terminal, stderr=subprocess.DEVNULL, env=environment(), check=True)

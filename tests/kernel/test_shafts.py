@@ -16,7 +16,7 @@ from tolstat.kernel.mechanics.topology import INPUT_SHAFT
 from tolstat.kernel.mechanics.work import make_work
 from tolstat.kernel.revolution.orders import write_orders
 from tolstat.kernel.revolution.settle import make_samples, write_shaft
-from tolstat.solver.harmonics import restore
+from tolstat.solver.histories import restore
 from tolstat.solver.simulation import simulate_rows
 
 RPM = np.pi / 30

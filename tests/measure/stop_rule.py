@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from tests.support import stops
-from tolstat.analysis import sequential
+from tolstat.analysis import binomial
 from tolstat.analysis.binomial import clopper_pearson
 
 PLANS = ((0.4, 200), (0.2, 500), (0.1, 2000), (0.05, 5000), (0.02, 20_000), (0.01, 50_000), (0.005, 200_000))
-RULES = ((sequential.GROWTH, sequential.CONFIDENCE), (1.05, 0.95), (1.05, 0.96), (2.0, sequential.CONFIDENCE))
+RULES = ((binomial.GROWTH, binomial.LOOK_CONFIDENCE), (1.05, 0.95), (1.05, 0.96), (2.0, binomial.LOOK_CONFIDENCE))
 """Ratio of the joints of two looks, and confidence of a look: the rule itself, then others beside it."""
 SHARES, ENDS = 60, 200
 HEAD = (

@@ -5,13 +5,13 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from tolstat.solver import rainflow
+from tolstat.solver import histories
 
 rfcnt = pytest.importorskip("rfcnt", reason="pip install .[oracles]")
 
 
 def ours(period):
-    ranges, means = rainflow.periodic(period)
+    ranges, means = histories.periodic(period)
     return Counter(zip(ranges.tolist(), means.tolist(), strict=True))
 
 
@@ -62,6 +62,6 @@ def test_periods_that_are_cut_at_the_largest_value():
 def test_gates():
     """With a hysteresis of one class, its default, rfcnt leaves out cycles of one class; so does our gate of 1."""
     period = np.array([0, 8, 7, 9, 1, 5, 4, 6, 2])
-    ranges, means = rainflow.periodic(period, gate=1.0)
+    ranges, means = histories.periodic(period, gate=1.0)
     assert Counter(zip(ranges.tolist(), means.tolist(), strict=True)) == theirs(closed(period, 4), hysteresis=1.0)
     assert sum(ours(period).values()) == len(ranges) + 2

@@ -16,7 +16,7 @@ from tolstat.analysis import cycles
 from tolstat.analysis.cycles import Cycles
 from tolstat.common.channels import BUSHING_LOADS, LOAD_HISTORIES, SHAFT_LOADS, channels_of
 from tolstat.common.load_kinds import SHAFTS
-from tolstat.solver import rainflow
+from tolstat.solver import histories
 
 ASTM = [-2, 1, -3, 5, -1, 3, -4, 4]
 """ASTM E1049-85, Figures 6 and 7."""
@@ -47,23 +47,23 @@ def of_signals(*signals):
     table = np.zeros((len(signals), 1, 300, 2))
     number = np.zeros((len(signals), 1))
     for i, signal in enumerate(signals):
-        ranges, means = rainflow.periodic(signal)
+        ranges, means = histories.periodic(signal)
         table[i, 0, : len(ranges), 0], table[i, 0, : len(ranges), 1] = ranges, means
         number[i] = len(ranges)
     return Cycles.of_revolution(("cross1.F_e",), table[..., 0], table[..., 1], number)
 
 
 def test_the_standards_example():
-    ranges, means = rainflow.periodic(ASTM)
+    ranges, means = histories.periodic(ASTM)
     assert ranges.tolist() == [9, 7, 4, 3]
     assert means.tolist() == [0.5, 0.5, 1.0, -0.5]
-    assert doctest.testmod(rainflow) == (0, 2)
+    assert doctest.testmod(histories) == (0, 2)
 
 
 @settings(max_examples=300, deadline=None)
 @given(SIGNALS)
 def test_cycles_are_those_of_the_naive_twin_and_conserve_reversals(signal):
-    ranges, means = rainflow.periodic(signal)
+    ranges, means = histories.periodic(signal)
     assert pairs(ranges, means) == pairs(*naive.rainflow(signal))
     assert 2 * len(ranges) == len(naive.turns(signal))
     travel = np.abs(np.diff([*signal, signal[0]])).sum()
@@ -74,23 +74,23 @@ def test_cycles_are_those_of_the_naive_twin_and_conserve_reversals(signal):
 @settings(max_examples=100, deadline=None)
 @given(SIGNALS, st.integers(0, 59))
 def test_where_the_revolution_is_cut_does_not_matter(signal, shift):
-    assert pairs(*rainflow.periodic(signal)) == pairs(*rainflow.periodic(np.roll(signal, shift)))
-    ranges, means = rainflow.periodic(signal)
-    assert pairs(ranges, -means) == pairs(*rainflow.periodic(-np.array(signal)))
+    assert pairs(*histories.periodic(signal)) == pairs(*histories.periodic(np.roll(signal, shift)))
+    ranges, means = histories.periodic(signal)
+    assert pairs(ranges, -means) == pairs(*histories.periodic(-np.array(signal)))
 
 
 @settings(max_examples=100, deadline=None)
 @given(SIGNALS, st.integers(0, 12))
 def test_gate_takes_out_the_small_cycles_only(signal, gate):
-    ranges, means = rainflow.periodic(signal)
+    ranges, means = histories.periodic(signal)
     large = ranges > gate
-    assert pairs(*rainflow.periodic(signal, gate)) == pairs(ranges[large], means[large])
+    assert pairs(*histories.periodic(signal, gate)) == pairs(ranges[large], means[large])
 
 
 @pytest.mark.parametrize("bad", [[], [[1.0]], [1.0, np.nan]])
 def test_no_cycles_of_what_is_no_signal(bad):
     with pytest.raises(ValueError, match="finite values of one period expected"):
-        rainflow.periodic(bad)
+        histories.periodic(bad)
 
 
 @needs("rainflow")
@@ -101,7 +101,7 @@ def test_cycles_of_the_package_rainflow():
         whole = Counter()
         for size, mean, number, *_ in package.extract_cycles(closed(signal)):
             whole[round(size, 9), round(mean, 9)] += number
-        assert pairs(*rainflow.periodic(signal)) == whole
+        assert pairs(*histories.periodic(signal)) == whole
 
 
 @needs("fatpack")
@@ -112,7 +112,7 @@ def test_cycles_of_the_package_fatpack():
         whole, residue = fatpack.find_rainflow_cycles(closed(naive.turns(signal.tolist())))
         again, _ = fatpack.find_rainflow_cycles(fatpack.concatenate_reversals(residue, residue))
         ends = np.array([*whole.tolist(), *again.tolist()])
-        assert pairs(*rainflow.periodic(signal)) == pairs(np.ptp(ends, axis=1), ends.mean(axis=1))
+        assert pairs(*histories.periodic(signal)) == pairs(np.ptp(ends, axis=1), ends.mean(axis=1))
 
 
 @needs("pylife")
@@ -126,39 +126,39 @@ def test_cycles_of_pylife():
         rise, fall = np.abs(np.diff(detector.residuals))  # the largest cycle stays open
         assert rise == fall
         ends = np.vstack([ends, detector.residuals[1:]])
-        assert pairs(*rainflow.periodic(signal)) == pairs(np.ptp(ends, axis=1), ends.mean(axis=1))
+        assert pairs(*histories.periodic(signal)) == pairs(np.ptp(ends, axis=1), ends.mean(axis=1))
 
 
 def test_a_joints_channels_are_its_components_and_moduli():
     rng = np.random.default_rng(5)
     loads = rng.normal(size=(40, 8, 6)) + np.arange(6)
     loads[:, 7] *= 1e-6  # cycles below the gate, but not those of the modulus
-    counted = rainflow.count({"loads": loads})
+    counted = histories.count({"loads": loads})
     names = [channel.name for channel in channels_of(BUSHING_LOADS)]
     assert names[5:9] == ["cross1.T_z", "cross1.F", "cross1.T", "cross2.F_e"]
     for c, name in enumerate(names):
         b, i = divmod(c, 8)
         signal = loads[:, b, i] if i < 6 else np.linalg.norm(loads[:, b, 3 * i - 18 : 3 * i - 15], axis=1)
         kind = slice(0, 3) if "F" in name else slice(3, 6)
-        ranges, means = rainflow.periodic(signal, rainflow.GATE * np.linalg.norm(loads[..., kind], axis=-1).max())
+        ranges, means = histories.periodic(signal, histories.GATE * np.linalg.norm(loads[..., kind], axis=-1).max())
         assert counted["cycle_count"][c] == len(ranges), name
-        kept = min(len(ranges), rainflow.KEPT)
+        kept = min(len(ranges), histories.KEPT)
         np.testing.assert_allclose(counted["cycles"][c, :kept, 0], ranges[:kept], rtol=1e-6)
         np.testing.assert_allclose(counted["cycles"][c, :kept, 1], means[:kept], rtol=1e-5, atol=1e-6)
         assert not counted["cycles"][c, kept:].any()
     assert (counted["cycle_count"][:56] > 0).all()
     assert not counted["cycle_count"][56:].any()
     loads[3, 2, 1] = np.nan
-    assert np.isnan(rainflow.count({"loads": loads})["cycles"]).all()
+    assert np.isnan(histories.count({"loads": loads})["cycles"]).all()
 
 
 def test_cycles_of_shafts_are_counted_from_a_fraction_of_the_largest_bushing_load_on():
     rng = np.random.default_rng(8)
     loads, shafts = 1e3 * rng.normal(size=(60, 8, 6)), rng.normal(size=(60, 2, 6))
     shafts[:, 0] *= 0.02  # some of its cycles are below the gate
-    counted = rainflow.count({"loads": loads, "shafts": shafts})
+    counted = histories.count({"loads": loads, "shafts": shafts})
     assert {name: values.shape for name, values in counted.items()} == {
-        name: spec.shape for name, spec in rainflow.specs().items()
+        name: spec.shape for name, spec in histories.cycle_specs().items()
     }
     largest = {"N": np.linalg.norm(loads[..., :3], axis=-1).max(), "N*m": np.linalg.norm(loads[..., 3:], axis=-1).max()}
     expected = {}
@@ -171,12 +171,12 @@ def test_cycles_of_shafts_are_counted_from_a_fraction_of_the_largest_bushing_loa
     channels = channels_of(SHAFT_LOADS)
     assert [channel.name for channel in channels] == list(expected)
     for c, channel in enumerate(channels):
-        signal, gate = expected[channel.name], rainflow.GATE * largest[channel.unit]
-        ranges, _ = rainflow.periodic(signal, gate)
+        signal, gate = expected[channel.name], histories.GATE * largest[channel.unit]
+        ranges, _ = histories.periodic(signal, gate)
         assert counted["shaft_cycle_count"][c] == len(ranges), channel.name
-        kept = min(len(ranges), rainflow.KEPT)
+        kept = min(len(ranges), histories.KEPT)
         np.testing.assert_allclose(counted["shaft_cycles"][c, :kept, 0], ranges[:kept], rtol=1e-6)
-    whole = [len(rainflow.periodic(signal)[0]) for signal in expected.values()]
+    whole = [len(histories.periodic(signal)[0]) for signal in expected.values()]
     assert (counted["shaft_cycle_count"] < whole).any()  # the gate leaves some out
 
 
@@ -208,7 +208,7 @@ def test_spectrum_reads_the_ordered_ranges():
     numbers = [0.5, 1, 2, 3, 100]
     expected = np.zeros((3, 5))
     for i, signal in enumerate(signals):
-        ranges = rainflow.periodic(signal)[0]
+        ranges = histories.periodic(signal)[0]
         for q, number in enumerate(numbers):
             expected[i, q] = next((r for k, r in enumerate(ranges, 1) if k >= number), 0.0)
     np.testing.assert_allclose(cycles.spectrum(here, numbers)[:, 0], expected)
@@ -218,19 +218,19 @@ def test_spectrum_reads_the_ordered_ranges():
 
 def largest(signal, k):
     """Cycles of one joint of which `k` are stored, and the ranges of the others."""
-    ranges = rainflow.periodic(signal)[0]
+    ranges = histories.periodic(signal)[0]
     stored = ranges[None, None, :k]
     return Cycles.of_revolution(("cross1.F_e",), stored, stored, np.array([[len(ranges)]])), ranges[k:]
 
 
 def test_small_cycles_are_those_below_a_share_of_the_largest_load_of_their_kind():
     """Cycles just below and above the gate: forces of 1000 N, torques of 10 N m, on bushings and on shafts."""
-    waves = np.outer(np.tile([0.5, -0.5], 4) * rainflow.GATE, [0.99, 1.02])
+    waves = np.outer(np.tile([0.5, -0.5], 4) * histories.GATE, [0.99, 1.02])
     loads = {history.name: np.zeros((8, len(history.places), 6)) for history in LOAD_HISTORIES}
     for values in loads.values():
         values[:, :2, 0], values[:, :2, 5] = 1000.0 * (waves + 0.9), 10.0 * (waves + 0.9)
     loads["loads"][0, 2, 1], loads["loads"][0, 2, 4] = 1000.0, 10.0
-    counted = rainflow.count(loads)
+    counted = histories.count(loads)
     for history in LOAD_HISTORIES:
         names = [channel.name for channel in channels_of(history)]
         numbers = dict(zip(names, counted[f"{history.prefix}cycle_count"], strict=True))

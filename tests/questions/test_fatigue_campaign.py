@@ -27,7 +27,7 @@ from tolstat.questions.fatigue import pylife
 from tolstat.questions.fatigue.answer import fatigue_on_page, life_verdicts
 from tolstat.questions.fatigue.loads import channels, cycles_of
 from tolstat.questions.fatigue.pylife import pylife_series
-from tolstat.solver import rainflow
+from tolstat.solver import histories
 from tolstat.store import ResultFile
 from tolstat.study.fatigue import Fatigue, of_text
 from tolstat.study.rewriting import as_text
@@ -90,7 +90,7 @@ def load_cycles(files, shares=(1.0,), names=None, samples=None):
 def test_the_same_cycles_from_worker_and_histories(campaign):
     counted, status = cycles(campaign("cycles"))
     with ResultFile.open(campaign("cycles")) as store:
-        assert set(store.history_specs) == set(rainflow.specs())
+        assert set(store.history_specs) == set(histories.cycle_specs())
     assert (status != tolstat.Status.OK).any()
     assert np.isnan(counted.number[status != tolstat.Status.OK]).all()
     valid = status == tolstat.Status.OK
@@ -100,11 +100,11 @@ def test_the_same_cycles_from_worker_and_histories(campaign):
     load = equivalent_load(counted, 4.0)[valid]
     torque = np.array([CHANNELS[name].unit != "N" for name in counted.channels])
     scale = np.where(torque, load[:, torque].max(), load[:, ~torque].max())
-    for histories, tolerance in (("full", 1e-6), ("harmonics", 5e-3)):
-        other, _ = cycles(campaign(histories))
+    for kind, tolerance in (("full", 1e-6), ("harmonics", 5e-3)):
+        other, _ = cycles(campaign(kind))
         difference = np.abs(equivalent_load(other, 4.0)[valid] - load) / scale
         assert difference.max() < tolerance
-        if histories == "harmonics":
+        if kind == "harmonics":
             assert difference.max() > 1e-6  # truncation shows: the comparison sees a difference
 
 
@@ -118,7 +118,7 @@ def test_cycles_of_shafts_are_evaluated_where_they_are_asked_for(campaign, tmp_p
     with ResultFile.open(campaign("full")) as store:
         settled = np.flatnonzero(store.status() == tolstat.Status.OK)
         m_x, m_y = store.histories("shafts", settled)[..., 1, 3:5].astype(float).transpose(2, 0, 1)
-    moment = [rainflow.periodic(own)[0].max() for own in np.hypot(m_x, m_y)]
+    moment = [histories.periodic(own)[0].max() for own in np.hypot(m_x, m_y)]
     with ResultFile.open(campaign("full")) as store:
         assert cycles_of(store, settled, ["output.moment"]).ranges[:, 0, 0] == pytest.approx(moment)
     assert not set(load_cycles([campaign()]).cycles.channels) & set(asked[:2])

@@ -30,7 +30,7 @@ from tolstat.questions.fatigue import parts
 from tolstat.questions.fatigue.answer import _notes_on_parts, _verdict, fatigue_on_page, life_verdicts
 from tolstat.questions.fatigue.duty import ANY, Joints, members, settings_of
 from tolstat.questions.fatigue.parts import Stressed, Stresses, load_stresses
-from tolstat.solver import rainflow
+from tolstat.solver import histories
 from tolstat.store import ResultFile
 from tolstat.study.fatigue import Fatigue, StressPoint, of_text
 
@@ -96,7 +96,7 @@ def stresses(files, shares=(1.0,), samples=None):
 
 def of_signals(signals, names=("a",)):
     """Stresses of joints at one point, Pa, from their signals over a revolution."""
-    counted = [rainflow.periodic(signal) for signal in signals]
+    counted = [histories.periodic(signal) for signal in signals]
     table = np.zeros((2, len(signals), 1, max(1, *(len(ranges) for ranges, _ in counted))))
     for i, pair in enumerate(counted):
         for kind in (0, 1):
@@ -127,7 +127,7 @@ def test_stress_is_formed_before_cycles_are_counted(campaign):
                 if np.isnan(stressed.low[i, p]):
                     assert not found.valid[i]
                     continue
-                ranges, means = rainflow.periodic(signal[first + i], 1e-3 * np.ptp(signal[first + i]))
+                ranges, means = histories.periodic(signal[first + i], 1e-3 * np.ptp(signal[first + i]))
                 cycles = stressed.cycles
                 np.testing.assert_allclose(cycles.ranges[i, p, : len(ranges)], ranges, rtol=1e-9)
                 np.testing.assert_allclose(cycles.means[i, p, : len(ranges)], means, rtol=1e-6, atol=1.0)
@@ -168,7 +168,7 @@ def test_starts_are_the_cycles_of_the_whole_course(offset):
     settings = Fatigue(revolutions=float(n), starts=float(starts), points=(point(line),))
     found = strength.damage_at(*parts.evaluated(of_signals([signal]), settings)[0])[0]
     course = np.concatenate([[0.0], *[np.roll(signal, -int(np.argmax(np.abs(signal))))] * (n // starts)])
-    ranges, means = rainflow.periodic(np.tile(course, starts))
+    ranges, means = histories.periodic(np.tile(course, starts))
     whole = strength.sort_out(strength.at_ratio(ranges, means, line.M)[None], np.ones((1, len(ranges))), line)
     assert found == pytest.approx(strength.damage_at(whole, line)[0], rel=0.03)
     without = strength.damage_at(

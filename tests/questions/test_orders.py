@@ -22,7 +22,7 @@ from tolstat.display.blocks import Panels
 from tolstat.questions import orders as module
 from tolstat.questions import sections
 from tolstat.questions.orders import orders
-from tolstat.solver.simulation import history_specs
+from tolstat.solver.histories import history_specs
 from tolstat.store import ResultFile, Writer
 
 ASKED = synthetic.STUDY.replace("[limits]", '[limits]\n"output.lateral_1x" = "200 N"')

@@ -18,7 +18,7 @@ from tolstat.common.load_kinds import BUSHINGS, SHAFTS
 from tolstat.common.loads import LOADS
 from tolstat.common.tables import Options, Simulation, Status
 from tolstat.questions.time_above import LEVELS, time_above
-from tolstat.solver.simulation import history_specs
+from tolstat.solver.histories import history_specs
 from tolstat.store import ResultFile, Writer
 
 SEEDS = 500

@@ -13,7 +13,7 @@ from tolstat.analysis.design import Independent
 from tolstat.common.tables import Status
 from tolstat.questions.fatigue import loads
 from tolstat.questions.fatigue.duty import Joints
-from tolstat.solver import rainflow
+from tolstat.solver import histories
 from tolstat.study.fatigue import Fatigue
 
 
@@ -31,8 +31,8 @@ def test_cycles_between_points_are_those_of_the_whole_course(seed):
     levels = np.sort(rng.normal(size=(4, 2)) + 3 * rng.normal(size=(4, 1)), axis=1)
     visits, turns = rng.integers(0, 4, 12), 50
     visits = visits[np.flatnonzero(np.diff(visits, append=visits[0] - 9))]
-    ranges, means, numbers = rainflow.between(visits, levels[None, :, 0], levels[None, :, 1])
-    whole, middles = rainflow.periodic(course(levels, visits, turns))
+    ranges, means, numbers = histories.between(visits, levels[None, :, 0], levels[None, :, 1])
+    whole, middles = histories.periodic(course(levels, visits, turns))
     own = {round(high - low, 9) for low, high in levels}
     between = np.array([r for r in whole if round(r, 9) not in own])
     np.testing.assert_allclose(np.sort(np.repeat(ranges[0], numbers[0].astype(int))), np.sort(between))
@@ -45,10 +45,10 @@ def test_cycles_between_points_are_those_of_the_whole_course(seed):
 
 def test_cycles_between_points_by_hand():
     low, high = np.array([[0.0, 10.0, -5.0], [-1.0, -2.0, 0.0]]), np.array([[1.0, 11.0, 5.0], [1.0, 2.0, np.nan]])
-    ranges, means, numbers = rainflow.between([0, 1, 0, 1], low[:1, :2], high[:1, :2])
+    ranges, means, numbers = histories.between([0, 1, 0, 1], low[:1, :2], high[:1, :2])
     assert (ranges.tolist(), means.tolist(), numbers.tolist()) == ([[11.0]], [[5.5]], [[2.0]])
-    assert rainflow.between([0, 1], low[1:, :2], high[1:, :2])[0].tolist() == [[3.0]]  # from 2 to -1
-    assert np.isnan(rainflow.between([0, 1, 2], low, high)[0][1]).all()
+    assert histories.between([0, 1], low[1:, :2], high[1:, :2])[0].tolist() == [[3.0]]  # from 2 to -1
+    assert np.isnan(histories.between([0, 1, 2], low, high)[0][1]).all()
 
 
 def test_a_duty_cycle_with_a_sequence_adds_its_cycles():

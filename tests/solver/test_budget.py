@@ -14,7 +14,7 @@ FAST = Options(steps_per_rev=60, max_revs=4, max_refinements=0)
 
 
 def allow(monkeypatch: pytest.MonkeyPatch, iterations: int) -> None:
-    monkeypatch.setattr(simulation, "iterations_allowed", lambda *_: iterations)
+    monkeypatch.setattr(simulation.tables, "iterations_allowed", lambda *_: iterations)
 
 
 def test_a_budget_suffices_for_uniform_steps_twice_and_a_refinement() -> None:
@@ -55,14 +55,15 @@ def test_a_refinement_takes_what_is_left(params: Params, monkeypatch: pytest.Mon
     table = params(alpha=np.radians(15), speed=3000 * np.pi / 30, torque=20.0)
     uniform = int(simulate_rows(table, options._replace(max_refinements=0)).results["newton_iterations"][0])
     spent: list[int] = []
-    resolved = simulation._resolved
+    together = simulation.simulate_together
 
-    def counted(steps, joints, settings, left, *others):
+    def counted(joints, settings, left, *others):
         before = int(left[0])
-        yield from resolved(steps, joints, settings, left, *others)
-        spent.append(before - int(left[0]))
+        yield from together(joints, settings, left, *others)
+        if simulation.follows_error(settings):
+            spent.append(before - int(left[0]))
 
-    monkeypatch.setattr(simulation, "_resolved", counted)
+    monkeypatch.setattr(simulation, "simulate_together", counted)
     whole = simulate_rows(table, options).results
     needed = uniform + sum(spent)
     assert needed > 3 * uniform

@@ -186,7 +186,7 @@ def test_joints_are_verified_with_the_settings_of_their_variant(tmp_path: Path) 
     s = load(tmp_path)
     campaign.run(s, tmp_path / "s.h5", workers=1)
     assert joint.varied(s.joint, s.variants[1].values) == s.joint
-    halved = partial(verify.ALL, names=("half_step",))
+    halved = partial(verify.run_checks, names=("half_step",))
     for found in (
         verify.check_file(tmp_path / "s.h5", joints=6, make=halved),
         verify.check_study(s, joints=6, make=halved),

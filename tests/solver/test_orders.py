@@ -11,7 +11,7 @@ from tests.support.closed_forms import pin_force
 from tolstat import joint, sampling, study
 from tolstat.common.tables import Fidelity, Method, Options, Status
 from tolstat.joint import ideal
-from tolstat.joint.partner import Partner, add_partner
+from tolstat.joint.orders import Partner, add_partner
 from tolstat.solver.simulation import simulate_rows
 
 SHAFT_LOADS = ("axial", "lateral", "moment", "drive")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from tests.solver.test_refinement import assert_same
 from tests.support import exceedance
 from tests.support.environment import ROOT
 from tolstat import joint, sampling, study
+from tolstat.analysis.estimates import Inexact
 from tolstat.analysis.sample import Sample
 from tolstat.analysis.weighted import Weighted
 from tolstat.campaign import plan
@@ -236,11 +238,11 @@ def test_loads_that_stay_close_to_a_bound_have_a_short_interval() -> None:
 
 def test_a_stationary_joint_counts_on_both_sides_of_a_limit_inside_its_interval() -> None:
     values, status = [5.0, 7.0, 9.0, 8.0], [Status.OK, Status.STATIONARY, Status.OK, Status.STATIONARY]
-    ends = [5.0, 6.0, 9.0, 7.9], [5.0, 8.0, 9.0, 8.1]
+    ends = Inexact(np.array([1, 3]), np.array([6.0, 7.9]), np.array([8.0, 8.1]))
     for level, least, count, most in ((5.5, 3, 3, 3), (6.5, 2, 3, 3), (7.5, 2, 2, 3), (8.0, 1, 1, 2), (8.5, 1, 1, 1)):
-        found = Sample.of(values, status, ends=ends).above(level)
+        found = replace(Sample.of(values, status), inexact=ends).above(level)
         assert (found.bound_lower, found.estimate, found.bound_upper) == (least / 4, count / 4, most / 4)
-        row = Sample.of(values, status, Weighted(np.ones(4)), ends).above(level)
+        row = replace(Sample.of(values, status, Weighted(np.ones(4))), inexact=ends).above(level)
         assert (row.bound_lower, row.bound_upper) == pytest.approx((least / 4, most / 4))
     assert exceedance.exceedance(values, status, 6.5).bound_lower == 0.75
 

@@ -20,7 +20,7 @@ from tolstat.joint import ideal
 from tolstat.kernel.mechanics import dynamics
 from tolstat.kernel.mechanics.work import FORCE, make_work
 from tolstat.solver import simulation
-from tolstat.solver.harmonics import restore
+from tolstat.solver.histories import restore
 from tolstat.solver.simulation import simulate_rows
 
 OPTIONS = Options()

@@ -284,7 +284,7 @@ def test_an_impossible_session_is_no_session(tmp_path: Path, started: float, don
 
 def put_study(path: Path, text: str) -> None:
     with h5py.File(path, "r+") as file:
-        metadata.write(file, metadata.read(file).changed(study=text))
+        metadata.write(file, metadata.read(file).model_copy(update={"study": text}))
 
 
 @pytest.mark.slow

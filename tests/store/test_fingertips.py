@@ -10,7 +10,7 @@ import pytest
 
 import tolstat
 from tests.support import synthetic
-from tolstat.analysis.column import Inexact
+from tolstat.analysis.estimates import Inexact
 from tolstat.analysis.sample import largest_of
 from tolstat.common.errors import InputError
 from tolstat.common.loads import LOADS

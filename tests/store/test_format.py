@@ -134,7 +134,7 @@ def test_meanings_of_cases_families_and_proposals_are_words(whole: Path, tmp_pat
         held = metadata.read(file)
     variants = [tables.Variant(family, {}) for family in ("a b", "a b", "c")]
     design = metadata.Design(cases=("ideal", "tilted by 1°"), variants=variants)
-    codes = layout.meanings_of(held.changed(design=design, identity={"proposal": [[0.5, {}]]}))
+    codes = layout.meanings_of(held.model_copy(update={"design": design, "identity": {"proposal": [[0.5, {}]]}}))
     with h5py.File(tmp_path / "b.h5", "w") as file:
         for name, meanings in codes.items():
             layout.put_meanings(file.create_dataset(name, (2,), "i4"), meanings)
@@ -145,7 +145,7 @@ def test_meanings_of_cases_families_and_proposals_are_words(whole: Path, tmp_pat
 
 
 def test_axes_of_histories_have_names(tmp_path: Path) -> None:
-    from tolstat.solver.simulation import history_specs
+    from tolstat.solver.histories import history_specs
 
     specs = history_specs(fakes.Options(steps_per_rev=36), "full", 0) | history_specs(
         fakes.Options(steps_per_rev=36), "harmonics+cycles", 4
@@ -205,7 +205,7 @@ def test_texts_have_a_fixed_length(whole: Path) -> None:
 
 
 def test_histories_name_their_axes(tmp_path: Path) -> None:
-    from tolstat.solver.simulation import history_specs
+    from tolstat.solver.histories import history_specs
 
     for kind in ("full", "harmonics+cycles"):
         for spec in history_specs(fakes.Options(), kind, 4).values():

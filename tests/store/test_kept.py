@@ -20,7 +20,7 @@ from tolstat import study
 from tolstat.analysis import accuracy
 from tolstat.campaign import extend, replay, stop_rule, verify
 from tolstat.campaign import run as campaign
-from tolstat.campaign.checks import QUICK_CHECKS
+from tolstat.campaign.verify import QUICK_CHECKS
 from tolstat.common.columns import KEPT, OPTIONAL_FIELDS, RESULT_COLUMNS, blank_others, kept_columns
 from tolstat.common.errors import InputError, StoreError
 from tolstat.questions import accuracy as question
@@ -151,7 +151,9 @@ def test_lost_and_unknown_columns_are_damage(tmp_path: Path) -> None:
     with h5py.File(path, "r+") as file:
         file["results"].create_dataset("cross2.F_max", data=held)
         about = metadata.read(file)
-        metadata.write(file, about.changed(identity=about.identity | {KEPT: ["cross1.F_max", "psi_max"]}))
+        metadata.write(
+            file, about.model_copy(update={"identity": about.identity | {KEPT: ["cross1.F_max", "psi_max"]}})
+        )
     with ResultFile.open(path) as store, pytest.raises(StoreError, match=r"is damaged or no tolstat result file: .*"):
         store.results()
 
@@ -188,7 +190,7 @@ def test_replay_and_verify_compare_what_is_stored(tmp_path: Path) -> None:
         file["results/cross2.F_max"][2] += 1.0
     with ResultFile.open(path) as store:
         assert [d.name for d in replay.replay(store, 2).differences] == ["cross2.F_max"]
-    found = verify.check_file(path, 2, make=partial(verify.ALL, names=QUICK_CHECKS))
+    found = verify.check_file(path, 2, make=partial(verify.run_checks, names=QUICK_CHECKS))
     with ResultFile.open(path) as store:
         held = verification.read(store)
     assert held is not None

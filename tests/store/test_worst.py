@@ -13,7 +13,6 @@ from tolstat.report import page
 from tolstat.report.headline import headline
 from tolstat.solver import stationary
 from tolstat.store import worst
-from tolstat.store.points import point_of, shares_of_revolutions
 
 
 @pytest.fixture
@@ -109,7 +108,7 @@ def test_the_verdict_names_the_point(tables, view):
     shares = {name: np.mean(table["F_max"][1:, 0] > 700) for name, table in tables.items()}
     assert shares["two"] != shares["one"]
     most = max(shares, key=shares.__getitem__)
-    assert point_of(view, "cross1.F") == most
+    assert view.point_of("cross1.F") == most
     assert f" exceed 700 N on cross1.F (most often at {most}) (" in headline(view, 0.01).sentence
     assert "most often" not in headline(views.at_points(tables, {"cross1.F at one": 700.0}), 0.01).sentence
     assert view.head() == "200 joints (random sampling), each at one and two, 0 failed, 0 not settled"
@@ -118,7 +117,7 @@ def test_the_verdict_names_the_point(tables, view):
 def test_without_a_limit_the_point_of_the_largest_loads(tables):
     view = views.at_points(tables)
     high = {name: np.nanquantile(view.load(f"cross1.F at {name}").valid, 0.99) for name in tables}
-    assert point_of(view, "cross1.F") == max(high, key=high.__getitem__)
+    assert view.point_of("cross1.F") == max(high, key=high.__getitem__)
 
 
 def test_a_limit_of_all_points_holds_at_each(view):
@@ -160,7 +159,7 @@ def test_revolutions_follow_from_time_and_speed(view):
     points = view.store.points
     fast = points["two"].operation.model_copy(update={"speed": -3 * points["one"].operation.speed})
     points["two"] = points["two"]._replace(operation=fast)
-    assert shares_of_revolutions(view) == pytest.approx([0.25, 0.75])
+    assert view.shares_of_revolutions == pytest.approx([0.25, 0.75])
 
 
 def test_one_point_alone_is_the_worst_of_itself(tables):

@@ -1,4 +1,4 @@
-"""Exact distribution over the stops of a campaign with a stop rule, with SciPy alone: a check of `sequential`.
+"""Exact distribution over the stops of a campaign with a stop rule, with SciPy alone: a check of `analysis.binomial`.
 
 The probability of a pair (look, count above) is the number of paths to it that stop nowhere before, times
 p^count (1 - p)^others (Chen and Chen 2013). Paths more than `REACH` standard deviations from their mean are left out.

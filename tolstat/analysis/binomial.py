@@ -1,6 +1,14 @@
-"""Independent joints, counted or with a value between 0 and 1: exact intervals, and numbers of joints needed."""
+"""Independent joints, counted or with a value between 0 and 1: exact intervals, numbers of joints needed, and stops.
+
+An interval that is inspected repeatedly covers less than its confidence. Looks at a share are at numbers of joints
+fixed beforehand, `GROWTH` apart, and the interval of each has the confidence `LOOK_CONFIDENCE`; the one at the stop
+then covers in 95 % of campaigns at least. That is computed, not assumed: `tests/support/stops.py` has the exact
+distribution over the pairs (look, count above) at which campaigns stop (Chen and Chen 2013).
+"""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,6 +19,14 @@ from tolstat.common.loads import FloatArray
 
 STAKE = 0.75
 """Maximum share of the capital that a value costs in `mean_interval`: with 1, one value of 0 would ruin the gambler."""
+GROWTH = 1.05
+"""Ratio of the numbers of joints of two looks."""
+LOOK_CONFIDENCE = 0.975
+"""Confidence level of the interval of one look, for 95 % at the stop."""
+LEAST_BESIDE = 10
+"""Minimum number of joints on each side of the level at a stop."""
+BIAS = 0.11
+"""Largest relative bias of count over joints at a stop: that of a share for which `LEAST_BESIDE` are above."""
 
 
 def clopper_pearson(count: ArrayLike, n: ArrayLike, confidence: float = 0.95) -> tuple[FloatArray, FloatArray]:
@@ -208,3 +224,72 @@ def _lower_mean(x: FloatArray, confidence: float) -> float:
         return bool(np.log1p(np.minimum(bets, STAKE / m) * (x - m)).sum() >= gain)
 
     return mean - float(first(lambda less: rejected(mean - float(less)), 0.0, mean, halvings=40))
+
+
+def looks(n: int, taken: Sequence[int] = ()) -> list[int]:
+    """Return the numbers of joints at which to look: each `GROWTH` times the one before, rounded up; the last is `n`.
+
+    Parameters
+    ----------
+    n : int
+        Number of joints of the campaign.
+    taken : sequence of int
+        Looks that were taken before, when the campaign was shorter; those below `n` are looks again.
+
+    Returns
+    -------
+    list of int
+        Ascending.
+
+    Examples
+    --------
+    >>> looks(26)
+    [20, 21, 23, 24, 25, 26]
+    """
+    numbers, joints = set(taken), 2.0 * LEAST_BESIDE
+    while joints < n:
+        numbers.add(int(np.ceil(joints)))
+        joints *= GROWTH
+    return [*sorted(number for number in numbers if number < n), n]
+
+
+def stop_interval(count: ArrayLike, others: ArrayLike, joints: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Interval at a look, for arrays of one shape.
+
+    Parameters
+    ----------
+    count, others : array_like of int
+        Joints above the level; joints without a valid load, which count as below it for the lower end of the interval
+        and as above it for the upper end.
+    joints : array_like of int
+        All joints looked at.
+
+    Returns
+    -------
+    lower, upper : ndarray
+    """
+    lower, _ = clopper_pearson(count, joints, LOOK_CONFIDENCE)
+    _, upper = clopper_pearson(np.add(count, others), joints, LOOK_CONFIDENCE)
+    return lower, upper
+
+
+def narrow(width: float, count: ArrayLike, others: ArrayLike, joints: ArrayLike) -> NDArray[np.bool_]:
+    """Whether to stop at a look: its interval is narrower than `width`, with joints on both sides of the level."""
+    lower, upper = stop_interval(count, others, joints)
+    below = np.subtract(joints, np.add(count, others))
+    return np.asarray((upper - lower < width) & (np.minimum(count, below) >= LEAST_BESIDE))
+
+
+def next_look(width: float, planned: Sequence[int], count: int = 0, others: int = 0, joints: int = 0) -> int:
+    """Return the first look after `joints` at which a stop is possible, else the last one.
+
+    The looks before it need not be evaluated: whatever the loads of the joints between, the interval is too wide there.
+    It is narrowest with the least or the largest count that a stop can have.
+    """
+    least = max(count, LEAST_BESIDE)
+    later = [
+        look for look in planned if look >= joints + max(least - count, 1) and look >= least + others + LEAST_BESIDE
+    ]
+    most = np.minimum(count - joints, -others - LEAST_BESIDE) + later
+    possible = narrow(width, least, others, later) | narrow(width, most, others, later)
+    return later[int(possible.argmax())] if possible.any() else planned[-1]

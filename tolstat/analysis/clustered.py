@@ -15,9 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from tolstat.analysis import prediction
 from tolstat.analysis.binomial import clopper_pearson, half_width, log_beta_binomial
-from tolstat.analysis.column import Column
 from tolstat.analysis.design import Design, counts_by_group, or_independent
-from tolstat.analysis.estimates import Estimate
+from tolstat.analysis.estimates import Column, Estimate
 from tolstat.common.late import special
 from tolstat.common.loads import FloatArray
 

@@ -15,8 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tolstat.analysis import prediction
 from tolstat.analysis.binomial import clopper_pearson, half_width
-from tolstat.analysis.column import Column
-from tolstat.analysis.estimates import Estimate
+from tolstat.analysis.estimates import Column, Estimate
 from tolstat.common.loads import FloatArray
 
 Claim = Literal["share", "quantile", "mean", "difference", "index", "tail", "band", "delivery", "reweighting"]

@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tolstat.analysis.binomial import clopper_pearson, half_width
-from tolstat.analysis.column import Column
 from tolstat.analysis.design import Claim, Design
-from tolstat.analysis.estimates import Estimate, Quantile
+from tolstat.analysis.estimates import Column, Estimate, Quantile
 from tolstat.analysis.sample import Sample
 from tolstat.common.late import special
 from tolstat.common.loads import FloatArray

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tolstat.analysis import process
-from tolstat.analysis.column import Mask
+from tolstat.analysis.estimates import Mask
 from tolstat.analysis.process import Draws, Known, Sums
 from tolstat.analysis.reweight import LARGEST_SPREAD, LEAST_ESS
 from tolstat.analysis.weighted import Split

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tolstat.analysis.column import frozen
+from tolstat.analysis.estimates import frozen
 from tolstat.common.late import special, stats
 from tolstat.common.loads import FloatArray
 

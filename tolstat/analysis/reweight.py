@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tolstat.analysis import pareto
+from tolstat.analysis import extreme
 from tolstat.analysis.sample import Sample
 from tolstat.analysis.weighted import Split, Weighted
 from tolstat.common.loads import FloatArray
@@ -76,7 +76,7 @@ class Support(NamedTuple):
     above, below : float
         Effective number of joints on each side, (sum of weights)^2 / sum of squares (Kish 1965).
     k : float
-        Shape of the tail of the weights, the larger of both sides; NaN if unknown, see `pareto.shape_of_weights`.
+        Shape of the tail of the weights, the larger of both sides; NaN if unknown, see `extreme.shape_of_weights`.
     usable : bool
         Whether the share is usable: the ratios are, k is allowed, and `LEAST_BESIDE` effective joints are on both sides
         or the ratio has a bound, which the interval then uses.
@@ -177,7 +177,7 @@ def support(load: Sample, ratios: Ratios, level: float) -> Support:
     variance = float(((part * (above - share)) ** 2).sum())
     ess = share * (1.0 - share) / variance if 0.0 < share < 1.0 and variance > 0 else ratios.effective
     effective = [float(side[0]) for side in Split.by(above, w).effective]
-    k = float(np.fmax(pareto.shape_of_weights(w[above]), pareto.shape_of_weights(w[~above])))
+    k = float(np.fmax(extreme.shape_of_weights(w[above]), extreme.shape_of_weights(w[~above])))
     beside = np.isfinite(ratios.heaviest) or min(effective) >= LEAST_BESIDE
     converged = min(1.0 - 1.0 / np.log10(max(w.size, 11)), 0.7)  # largest k allowed (Vehtari et al. 2024)
     usable = ratios.usable and bool(beside) and not k > converged

@@ -9,9 +9,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tolstat.analysis.column import Column, Inexact, Mask, largest
 from tolstat.analysis.design import Design, Independent
-from tolstat.analysis.estimates import CURVE, Exceedance, Quantile
+from tolstat.analysis.estimates import CURVE, Column, Exceedance, Inexact, Mask, Quantile, largest
 from tolstat.common.loads import FloatArray
 from tolstat.common.tables import UNSETTLED, VALID, Status, worst_status
 
@@ -72,10 +71,8 @@ class Sample:
         values: ArrayLike,
         status: ArrayLike,
         design: Design | None = None,
-        ends: tuple[ArrayLike, ArrayLike] | None = None,
         name: str = "",
         unit: str = "1",
-        limit: float | None = None,
         nominal: float = np.nan,
     ) -> Sample:
         """Make a sample of the loads of all joints.
@@ -88,9 +85,7 @@ class Sample:
             `tables.Status` of each joint. Pending joints are left out.
         design : Design, optional
             How the joints were drawn; by default independently.
-        ends : tuple of array_like, shape (n,), optional
-            Ends of each load; without them, and where an end is not finite, the load is exact.
-        name, unit, limit, nominal
+        name, unit, nominal
             See the attributes.
 
         Raises
@@ -112,13 +107,9 @@ class Sample:
             raise ValueError(f"values {load.shape} and status {state.shape} must be of one length")
         valid = is_valid(load, state)
         value = load if valid.all() else np.where(valid, load, np.nan)
-        lost = ~valid & (state != Status.PENDING)
-        lower, upper = (np.where(np.isfinite(end) & valid, end, value) for end in ends or (value, value))
-        joints = np.flatnonzero(lost | (valid & ((lower != value) | (upper != value))))
-        low, high = np.where(lost, -np.inf, lower)[joints], np.where(lost, np.inf, upper)[joints]
-        return cls(
-            name, unit, limit, nominal, Column(value), Inexact(joints, low, high), state, design or Independent()
-        )
+        lost = np.flatnonzero(~valid & (state != Status.PENDING))
+        inexact = Inexact(lost, np.full(lost.size, -np.inf), np.full(lost.size, np.inf))
+        return cls(name, unit, None, nominal, Column(value), inexact, state, design or Independent())
 
     @property
     def values(self) -> FloatArray:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tolstat.analysis.binomial import clopper_pearson, mean_interval
-from tolstat.analysis.column import Mask
+from tolstat.analysis.estimates import Mask
 from tolstat.common.late import special
 from tolstat.common.loads import FloatArray
 

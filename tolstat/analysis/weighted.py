@@ -16,10 +16,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tolstat.analysis import pareto
-from tolstat.analysis.column import Column
+from tolstat.analysis import extreme
 from tolstat.analysis.design import Claim, Design, Independent
-from tolstat.analysis.estimates import Estimate
+from tolstat.analysis.estimates import Column, Estimate
 from tolstat.common.bisection import first
 from tolstat.common.late import special
 from tolstat.common.loads import FloatArray
@@ -208,7 +207,7 @@ class Weighted(Design):
         """See `Design.doubt`: too few effective joints for weights without a bound, or too heavy a tail of weights."""
         w = self.weights[x.values > level]
         effective = float(w.sum() ** 2 / (w**2).sum()) if w.any() else 0.0
-        k = pareto.shape_of_weights(w)
+        k = extreme.shape_of_weights(w)
         if (effective >= LEAST_EFFECTIVE or np.isfinite(self.heaviest)) and not k >= LARGEST_SHAPE:
             return ""
         tail = "" if np.isnan(k) else f", Pareto k {k:.2f}, {LARGEST_SHAPE:g} allowed"

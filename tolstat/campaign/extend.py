@@ -115,13 +115,14 @@ def grow(
     StoreError
         When the file cannot be replaced.
     """
-    document = store.metadata.changed(
-        identity=json.loads(json.dumps(study.identity())),
-        sampling=study.sampling.model_dump(mode="json") | {"dimensions": store.sampling["dimensions"]},
-        stop={"reached": False, "looks": store.stop["looks"]} if store.stop else {},  # looks of a rule stay looks
-        campaign_rows=study.rows,
-        n=study.rows,
-    )
+    changes = {
+        "identity": json.loads(json.dumps(study.identity())),
+        "sampling": study.sampling.model_dump(mode="json") | {"dimensions": store.sampling["dimensions"]},
+        "stop": {"reached": False, "looks": store.stop["looks"]} if store.stop else {},  # looks of a rule stay looks
+        "campaign_rows": study.rows,
+        "n": study.rows,
+    }
+    document = store.metadata.model_copy(update=changes)
     tables = {"errors": chain(_blocks(store, store.errors), errors)}
     if origin is not None:
         tables["origin"] = chain(_blocks(store, store.origin), origin)
@@ -158,7 +159,7 @@ def merge(paths: Sequence[Path], out: Path) -> Merged:
         stores.sort(key=lambda store: (store.rows[0], store.rows.stop))
         _check_one_campaign(stores)
         rows = stores[0].campaign_rows
-        document = stores[0].metadata.changed(stop={}, first_row=0, n=rows)
+        document = stores[0].metadata.model_copy(update={"stop": {}, "first_row": 0, "n": rows})
         # each file that adds rows to those of the files before it, and the first file slot that does
         shares = [(s, s.slot(end)) for s, end in zip(stores, _ends(stores), strict=False) if s.rows.stop > end]
         tables = {"errors": (block for store, begin in shares for block in _blocks(store, store.errors, begin))}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from contextlib import ExitStack, closing
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
@@ -75,7 +75,9 @@ class Function:
         self.names, self.cube_names = sampling.columns(study), sampling.streams(study)
         self.limits = {name: self.study.limits[name] for name in loads if name in self.study.limits}
         self.copula = study.copula
-        self.reason = _reason(study)
+        zones = [name for name in study.tolerances if axes.is_zone(name)]
+        whole = f"{zones[0]} is drawn as a vector, from which errors follow" if zones else ""
+        self.reason = whole or _dependence(study)[1]
         self.distributions = None if self.reason else dict(study.tolerances)
         self.status: NDArray[np.uint8] = np.zeros(0, np.uint8)
         self.simulated = 0
@@ -219,27 +221,23 @@ class Function:
         self.simulated += n
         joint, operation, options = self.study.joint, self.study.operation, self.options
         loads, self.status = np.full((n, len(self.loads)), np.nan), np.zeros(n, np.uint8)
-
-        def put(block: Block, result: Timed | pool.Lost) -> None:
-            table = results_of(block, result)
-            self.status[block.slots], valid = table["status"], np.isin(table["status"], VALID)
-            values = np.column_stack([LOADS[name].of(table) for name in self.loads])
-            loads[block.slots] = np.where(valid[:, None], values, np.nan)
-
-        size = MAX_BLOCK
-        if n >= LEAST_SHARED and workers > 1:
-            size = min(size, -(-n // (MIN_BLOCKS_PER_WORKER * workers)))
+        is_alone = n < LEAST_SHARED or workers == 1
+        size = MAX_BLOCK if is_alone else min(MAX_BLOCK, -(-n // (MIN_BLOCKS_PER_WORKER * workers)))
         parts = [np.arange(first, min(first + size, n)) for first in range(0, n, size)]
         blocks = (Block("", slots, perturb(joint, operation, errors[slots]), options) for slots in parts)
-        if n < LEAST_SHARED or workers == 1:
-            for block in blocks:
-                put(block, simulate_block(simulate_rows, "none", 0, {}, block))
-            return loads
-        some = np.unique(np.linspace(0, n - 1, min(n, SOME)).astype(np.intp))
-        compile_missing(options, perturb(joint, operation, errors[some]))  # once, before the processes start
-        with closing(pool.map_blocks(work_beside(options), blocks, workers)) as finished:
+        finished: Generator[tuple[Block, Timed | pool.Lost], None, None]
+        if is_alone:
+            finished = ((block, simulate_block(simulate_rows, "none", 0, {}, block)) for block in blocks)
+        else:
+            some = np.unique(np.linspace(0, n - 1, min(n, SOME)).astype(np.intp))
+            compile_missing(options, perturb(joint, operation, errors[some]))  # once, before the processes start
+            finished = pool.map_blocks(work_beside(options), blocks, workers)
+        with closing(finished):
             for block, result in finished:
-                put(block, result)
+                table = results_of(block, result)
+                self.status[block.slots], valid = table["status"], np.isin(table["status"], VALID)
+                values = np.column_stack([LOADS[name].of(table) for name in self.loads])
+                loads[block.slots] = np.where(valid[:, None], values, np.nan)
         return loads
 
 
@@ -306,12 +304,6 @@ def _dependence(study: Study) -> tuple[str, str]:
     if study.sampling.joints_per_lot > 1:
         return "sampling.joints_per_lot", "joints of one lot depend on each other"
     return "", ""
-
-
-def _reason(study: Study) -> str:
-    """Why the errors of a study have no distribution each; empty if they have."""
-    zones = [name for name in study.tolerances if axes.is_zone(name)]
-    return f"{zones[0]} is drawn as a vector, from which errors follow" if zones else _dependence(study)[1]
 
 
 def _marginal(ot: Any, own: law.Distribution) -> Any:

@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.analysis import binomial
-from tolstat.analysis.design import Independent
 from tolstat.analysis.sample import Sample
-from tolstat.campaign import checks, verify
+from tolstat.campaign import verify
 from tolstat.campaign.run import choose_fidelity
 from tolstat.common.cores import available_cores
 from tolstat.common.loads import load_of, split
@@ -27,7 +26,8 @@ from tolstat.joint import ideal
 from tolstat.sampling import dimensions, draw, streams
 from tolstat.solver import fidelity, refinement
 from tolstat.solver.compilation import stage_name, warm_up
-from tolstat.solver.simulation import history_specs, simulate_rows
+from tolstat.solver.histories import history_specs
+from tolstat.solver.simulation import simulate_rows
 from tolstat.store import layout, metadata, worst
 from tolstat.store.recorded import perturbed, settings, variants
 from tolstat.study import Study, assumptions, design
@@ -318,7 +318,7 @@ def _check(study: Study, params: NDArray[np.void], results: NDArray[np.void], op
     if not settled.size:
         return 0.0
     begin = time.process_time()
-    checks.run_checks(params[settled], [options[i] for i in settled.tolist()], checks.QUICK_CHECKS, simulate_rows)
+    verify.run_checks(params[settled], [options[i] for i in settled.tolist()], verify.QUICK_CHECKS, simulate_rows)
     return time.process_time() - begin
 
 
@@ -344,7 +344,7 @@ def simulate_timed(study: Study, params: NDArray[np.void], options: list[Options
         simulate_rows(params[[options.index(distinct)]], distinct)  # compiles, or loads, what these options need
     kept = partial(simulate_rows, histories=study.output.histories, n_harmonics=study.output.harmonics)
     begin = time.process_time()
-    return checks.simulate_each(params, options, kept), time.process_time() - begin
+    return verify.simulate_each(params, options, kept), time.process_time() - begin
 
 
 def _width(share: float, n: int) -> float:
@@ -356,9 +356,8 @@ def _limits(study: Study, results: Mapping[str, NDArray[np.void]]) -> list[Limit
     plans = []
     for name, level in study.limits.items():
         points = names_of(split(name)[1], list(results), "limits")
-        values, status, inexact = worst.load_of([results[point] for point in points], load_of(name))
-        load = Sample(name, load_of(name).unit, level, np.nan, values, inexact, status, Independent())
-        share = load.above(level, CONFIDENCE)
+        values, status, _ = worst.load_of([results[point] for point in points], load_of(name))
+        share = Sample.of(values.values, status).above(level, CONFIDENCE)
         valid = share.n - share.n_failed - share.n_unsettled
         nearest_half = min(max(0.5, share.lower), share.upper)  # the interval is widest at a share of one half
         plans.append(LimitPlan(name, level, share.count, valid, _width(nearest_half, study.samples)))

@@ -12,19 +12,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common import strict
+from tolstat.common import strict, tables
 from tolstat.common.errors import Fault, InputError, gather
-from tolstat.common.tables import (
-    FAILED,
-    MAX_ITERATIONS,
-    STATUS_TEXT,
-    UNSETTLED,
-    HistorySpec,
-    Options,
-    Status,
-    iterations_allowed,
-    to_names,
-)
+from tolstat.common.tables import FAILED, UNSETTLED, HistorySpec, Options, Status
 from tolstat.joint.ideal import NO_CLOSED_FORM
 from tolstat.solver import fidelity
 from tolstat.solver.refinement import MIN_MAX_REVS
@@ -70,7 +60,7 @@ class Reason(NamedTuple):
         """Number, status, meaning and remedy, in lines."""
         noun = "joint" if self.joints == 1 else "joints"
         where = f" at {self.point}" if self.point else ""
-        head = f"{self.joints} {noun} {self.status.label}{where}: {STATUS_TEXT[self.status]}"
+        head = f"{self.joints} {noun} {self.status.label}{where}: {tables.STATUS_TEXT[self.status]}"
         return f"{head}\n  hint, for row {self.row}: {self.remedy}"
 
     @property
@@ -122,61 +112,40 @@ def remedy(row: np.void, options: Mapping[str, Any]) -> str:
         return ""
     if status in WITHOUT_RESULTS:
         return WITHOUT_RESULTS[status]
+    place = f"step {row['failed_step']} ({math.degrees(row['failed_theta']):.0f} deg)"
+    finer = f"try solver.steps_per_rev = {min(4 * int(options['steps_per_rev']), MAX_STEPS)}"
     if status == Status.NEWTON_FAILED:
-        return _of_newton_failure(row, options)
+        return _of_newton_failure(row, options, place, finer)
     if status == Status.NOT_FINITE:
-        return f"the solution overflowed at {_place(row)}: try solver.steps_per_rev = {_more_steps(options)}"
+        return f"the solution overflowed at {place}: {finer}"
+    if status == Status.NOT_RESOLVED and not math.isfinite(row["refinement_change"]):
+        return "finer steps failed: try solver.max_halvings = 20"
     if status == Status.NOT_RESOLVED:
-        return _of_unresolved(row, options)
+        change = f"the last halving of the steps changes largest loads by {float(row['refinement_change']):.1%}"
+        return f"{change}: try solver.max_refinements = {int(options['max_refinements']) + 1}"
     if status == Status.STATIONARY and row["period"] > 1:
         return f"the motion repeats every {row['period']} revolutions; the results cover all of them"
     if status == Status.STATIONARY:
         return f"the motion never repeats; the largest loads of {options['duration']} revolutions have an interval"
     if float(row["closure_trend"]) < -1e-3:
-        return _of_slow(row, options)
+        missing = math.log10(float(row["closure"]) / options["settle_tol"]) / -float(row["closure_trend"])
+        revs = float(row["revolutions"]) + missing
+        if revs > MAX_REVS:
+            return f"would settle in some {revs:.0f} revolutions: give a larger solver.settle_tol"
+        return f"settles in some {revs:.0f} revolutions: try solver.max_revs = {min(math.ceil(1.3 * revs), MAX_REVS)}"
+    more = min(4 * max(int(options["max_revs"]), MIN_MAX_REVS), MAX_REVS)  # more than the refinement has, too
     refine = "" if options["max_refinements"] else ", and solver.max_refinements = 3 if it never repeats"
-    return f"the largest loads still change: try solver.max_revs = {_more_revs(options)}{refine}"
+    return f"the largest loads still change: try solver.max_revs = {more}{refine}"
 
 
-def _place(row: np.void) -> str:
-    return f"step {row['failed_step']} ({math.degrees(row['failed_theta']):.0f} deg)"
-
-
-def _more_steps(options: Mapping[str, Any]) -> int:
-    return min(4 * int(options["steps_per_rev"]), MAX_STEPS)
-
-
-def _more_revs(options: Mapping[str, Any]) -> int:
-    """Return a larger solver.max_revs, also larger than that of the refinement."""
-    return min(4 * max(int(options["max_revs"]), MIN_MAX_REVS), MAX_REVS)
-
-
-def _of_newton_failure(row: np.void, options: Mapping[str, Any]) -> str:
+def _of_newton_failure(row: np.void, options: Mapping[str, Any], place: str, finer: str) -> str:
     if row["failed_step"] < 0:
         return 'at an input angle no equilibrium was found: try solver.fidelity = "dynamic"'
-    place, steps = _place(row), _more_steps(options)
-    if row["newton_iterations"] == iterations_allowed(options["steps_per_rev"], options["max_revs"]):
-        spent = f"all {row['newton_iterations']} iterations that a joint may take were spent at {place}"
-        return f"{spent}: try solver.steps_per_rev = {steps}"
-    if row["newton_iterations"] > MAX_ITERATIONS * options["steps_per_rev"] * options["max_revs"]:
-        return f"{MAX_ITERATIONS} iterations a step were spent at {place}: try solver.steps_per_rev = {steps}"
-    return f"failed at {place}: try solver.steps_per_rev = {steps}, or solver.max_halvings = 20"
-
-
-def _of_unresolved(row: np.void, options: Mapping[str, Any]) -> str:
-    change = float(row["refinement_change"])
-    if not math.isfinite(change):
-        return "finer steps failed: try solver.max_halvings = 20"
-    more = int(options["max_refinements"]) + 1
-    return f"the last halving of the steps changes largest loads by {change:.1%}: try solver.max_refinements = {more}"
-
-
-def _of_slow(row: np.void, options: Mapping[str, Any]) -> str:
-    missing = math.log10(float(row["closure"]) / options["settle_tol"]) / -float(row["closure_trend"])
-    revs = float(row["revolutions"]) + missing
-    if revs > MAX_REVS:
-        return f"would settle in some {revs:.0f} revolutions: give a larger solver.settle_tol"
-    return f"settles in some {revs:.0f} revolutions: try solver.max_revs = {min(math.ceil(1.3 * revs), MAX_REVS)}"
+    if row["newton_iterations"] == tables.iterations_allowed(options["steps_per_rev"], options["max_revs"]):
+        return f"all {row['newton_iterations']} iterations that a joint may take were spent at {place}: {finer}"
+    if row["newton_iterations"] > tables.MAX_ITERATIONS * options["steps_per_rev"] * options["max_revs"]:
+        return f"{tables.MAX_ITERATIONS} iterations a step were spent at {place}: {finer}"
+    return f"failed at {place}: {finer}, or solver.max_halvings = 20"
 
 
 class Retry(NamedTuple):
@@ -202,11 +171,6 @@ class Retry(NamedTuple):
     def chosen(self, record: Mapping[str, Any]) -> Retry:
         """Return the retry with the fidelity and steps that ``auto`` chose for the campaign, if `auto` is true."""
         return self._replace(options=fidelity.apply(self.options, record)) if self.auto else self
-
-    def entry(self) -> dict[str, Any]:
-        """Return the entry for `retries` of the result file."""
-        status = [state.label for state in self.status]
-        return {"status": status, "settings": self.settings, "options": to_names(self.options)}
 
 
 def parse_retry(statuses: str, settings: Sequence[str], study: Study) -> Retry:
@@ -273,7 +237,8 @@ def begin_retry(store: Writer, retry: Retry, specs: Mapping[str, HistorySpec], t
     StoreError
         When there is no room for a second copy of the file.
     """
-    entry = json.loads(json.dumps(retry.entry()))
+    status, options = [state.label for state in retry.status], tables.to_names(retry.options)
+    entry = json.loads(json.dumps({"status": status, "settings": retry.settings, "options": options}))
     each = store.each()
     attempts = np.concatenate([at_point.attempt()[at_point.pending()] for at_point in each])
     if store.retries[-1:] == (entry,) and np.any(attempts == len(store.retries)):

@@ -24,9 +24,9 @@ from tolstat.common.errors import Fault, InputError, StoreError
 from tolstat.common.tables import Simulation, Status
 from tolstat.display.progress import JOINTS, Reporter, Tell, display, note, silent
 from tolstat.sampling import dimensions, draw_blocks, origin_blocks
-from tolstat.solver import fidelity, rainflow
+from tolstat.solver import fidelity
 from tolstat.solver.compilation import stage_name
-from tolstat.solver.simulation import Histories, history_specs
+from tolstat.solver.histories import MIN_SAMPLES, Histories, history_specs
 from tolstat.store import Reader, Writer, metadata
 from tolstat.store.hdf5 import store_error
 from tolstat.store.metadata import differing_code
@@ -280,7 +280,7 @@ def choose_fidelity(study: Study) -> dict[str, Any]:
     each = [perturbed(study.at(point.name), rows, errors) for point in study.points]
     params = np.concatenate(each)  # one choice for all points
     histories, n_harmonics = _history_options(study)
-    least = [2 * n_harmonics + 1] * ("harmonics" in histories) + [rainflow.MIN_SAMPLES] * ("cycles" in histories)
+    least = [2 * n_harmonics + 1] * ("harmonics" in histories) + [MIN_SAMPLES] * ("cycles" in histories)
     budget, min_steps = study.solver.error_budget, max(least, default=0)  # steps from which histories can be computed
     with kept_workers():
         closed_form = not study.has_axial_force

@@ -1,6 +1,6 @@
 """Stop rule: end a campaign when the interval of an exceedance is narrow enough.
 
-When to look, and with which confidence, is in `analysis.sequential`. The looks depend only on the number of joints of
+When to look, and with which confidence, is in `analysis.binomial`. The looks depend only on the number of joints of
 the campaign, not on workers or time: each evaluates the first joints of the sequence, all of them done. Looks of a
 campaign that is extended afterwards stay looks.
 """
@@ -11,19 +11,19 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from tolstat.analysis import sequential
-from tolstat.analysis.sample import Sample
+import numpy as np
+
+from tolstat.analysis import binomial
 from tolstat.campaign.pool import kept_workers
 from tolstat.common.columns import holds
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import Limit, load_of
-from tolstat.store import Reader, Writer, worst
-from tolstat.store.hdf5 import BLOCK
+from tolstat.store import Reader, View, Writer
 from tolstat.study import Study
 from tolstat.study import rule as rules
 
 CONFIDENCE = 0.95
-BIASED = f"biased high if few joints are above ({100 * sequential.BIAS:.0f} % of itself with {sequential.LEAST_BESIDE})"
+BIASED = f"biased high if few joints are above ({100 * binomial.BIAS:.0f} % of itself with {binomial.LEAST_BESIDE})"
 """Sentence on the share at a stop."""
 EXAMPLE = 'write --until "P(cross1.F > 700 N) width < 0.01"'
 
@@ -43,7 +43,7 @@ class Look(NamedTuple):
     estimate : float
         Share of the valid joints above the level. At a stop with few of them it is biased high.
     lower, upper : float
-        Interval with the confidence of one look, `sequential.CONFIDENCE`.
+        Interval with the confidence of one look, `binomial.LOOK_CONFIDENCE`.
     """
 
     joints: int
@@ -74,7 +74,7 @@ class Outcome(NamedTuple):
     def record(self, rule: rules.Statement) -> dict[str, Any]:
         """Return the attribute ``stop`` of the result file."""
         taken = [joints for joints in self.looks if joints <= self.look.joints]
-        how = {"confidence": CONFIDENCE, "confidence_of_a_look": sequential.CONFIDENCE, "looks": taken}
+        how = {"confidence": CONFIDENCE, "confidence_of_a_look": binomial.LOOK_CONFIDENCE, "looks": taken}
         return {"rule": rule.text, "reached": self.reached} | self.look._asdict() | how
 
 
@@ -126,31 +126,26 @@ def run_until(study: Study, out: Path, rule: rules.Statement, run: Callable[[int
     if out.exists():
         with Reader.open(out) as store:
             taken = store.stop.get("looks", [])
-    planned, first = sequential.looks(study.samples, taken), study.first_sample
-    joints = sequential.next_look(rule.bound, planned)  # looks without a possible stop are not taken
+    planned, first = binomial.looks(study.samples, taken), study.first_sample
+    joints = binomial.next_look(rule.bound, planned)  # looks without a possible stop are not taken
     with kept_workers():
         while True:
             run(first + joints)
             with Reader.open(out) as store:
-                look = _look(store, rule.limit, range(first, first + joints))
+                look = _look(View(store), rule.limit, joints)
             counts = look.above, look.n_unresolved, joints
-            reached = bool(sequential.narrow(rule.bound, *counts))
+            reached = bool(binomial.narrow(rule.bound, *counts))
             if reached or joints == planned[-1]:
                 break
-            joints = sequential.next_look(rule.bound, planned, *counts)
+            joints = binomial.next_look(rule.bound, planned, *counts)
     outcome = Outcome(reached, look, planned)
     with Writer.open(out) as file:
         file.change(stop=outcome.record(rule))
     return outcome
 
 
-def _look(store: Reader, limit: Limit, rows: range) -> Look:
-    count = unresolved = 0
-    for begin in range(0, len(rows), BLOCK):
-        block = rows[begin : begin + BLOCK]
-        parts = {at_point.point or "": at_point.results(slice(block.start, block.stop)) for at_point in store.each()}
-        part = Sample.of(*worst.limit_of(parts, limit)).above(limit.level)
-        count += part.count
-        unresolved += part.n_failed + part.n_unsettled
-    lower, upper = sequential.interval(count, unresolved, len(rows))
-    return Look(len(rows), unresolved, count, count / max(len(rows) - unresolved, 1), float(lower), float(upper))
+def _look(view: View, limit: Limit, joints: int) -> Look:
+    load = view.load_of(limit).only(np.arange(joints)).above(limit.level)
+    unresolved = load.n_failed + load.n_unsettled
+    lower, upper = binomial.stop_interval(load.count, unresolved, joints)
+    return Look(joints, unresolved, load.count, load.count / max(joints - unresolved, 1), float(lower), float(upper))

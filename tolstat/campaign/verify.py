@@ -1,35 +1,164 @@
-"""Estimate the numerical error of a campaign: simulate some joints again, any of them or those nearest to a limit."""
+"""Numerical error of a campaign: some joints are simulated again with other settings or another solver.
+
+Any joints of the file are checked, or those nearest to a limit.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import closing
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.analysis.accuracy import LEAST_NEAR
-from tolstat.campaign.checks import ALL_CHECKS, QUICK_CHECKS, Progress, no_progress, run_checks, simulate_each
+from tolstat.campaign import pool
+from tolstat.campaign.blocks import simulate_beside
+from tolstat.campaign.pool import Lost, Work, kept_workers
 from tolstat.campaign.what_if import check_code
+from tolstat.common import tables
 from tolstat.common.columns import blank_others, holds
+from tolstat.common.counts import Counts
 from tolstat.common.errors import Fault, InputError, gather
-from tolstat.common.loads import LOADS, Limit, load_of, split
-from tolstat.common.tables import Options, Status
+from tolstat.common.loads import Limit, load_of, split
+from tolstat.common.tables import Fidelity, Method, Options, Simulation, Start, Status
 from tolstat.sampling import draw
 from tolstat.solver import compilation
-from tolstat.store import Reader, Writer, verification
+from tolstat.solver.reference import reference_rows
+from tolstat.store import Reader, View, Writer, verification
 from tolstat.store.hdf5 import pick, store_error
 from tolstat.store.recorded import options_of, parameters, perturbed, variants
 from tolstat.store.verification import Check, Verification
 from tolstat.study import Study, load, rule
 
-Make = Callable[[NDArray[np.void], Sequence[Options]], dict[str, Check]]
-"""Function that simulates joints again, see `run_checks`."""
-ALL: Make = partial(run_checks, names=ALL_CHECKS)
+QUICK_CHECKS = ("half_step", "newton", "settling")
+"""Checks at the end of every run; they need no code beyond that of the run."""
+ALL_CHECKS = (*QUICK_CHECKS, "method", "reference")
+MIN_STEPS = 180
+"""Minimum steps per revolution of the dynamic simulation that checks one of lower fidelity."""
 EXAMPLE = 'write --near "cross1.F > 700 N", or --near "any limit"'
 JOINTS_PER_CHECKED, MAX_CHECKED = 400, 16
 """At the end of a run one joint in 400 is checked, at least one and at most 16: some 2 % of the run's time."""
+
+Simulate = Callable[..., Simulation]
+Progress = Callable[[Counts], None]
+
+
+def _other_start(options: Options) -> dict[str, Any]:
+    start = Start.RAMP if options.start == Start.STATIC else Start.STATIC
+    return {"settle_tol": 0.01 * options.settle_tol, "start": int(start)}
+
+
+def _other_method(options: Options) -> dict[str, Any]:
+    return {"method": int(Method.BDF2 if options.method == Method.TR_BDF2 else Method.TR_BDF2)}
+
+
+def _dynamic(options: Options) -> dict[str, Any]:
+    if options.fidelity == Fidelity.DYNAMIC:
+        return {}
+    return {"fidelity": int(Fidelity.DYNAMIC), "steps_per_rev": max(options.steps_per_rev, MIN_STEPS)}
+
+
+CHECKS: dict[str, tuple[str, Callable[[Options], dict[str, Any]]]] = {
+    "half_step": ("twice as many steps a revolution", lambda options: {"steps_per_rev": 2 * options.steps_per_rev}),
+    "newton": ("a hundredth of solver.newton_tol", lambda options: {"newton_tol": 0.01 * options.newton_tol}),
+    "settling": ("the other solver.start, and a hundredth of solver.settle_tol", _other_start),
+    "method": ("another solver.method", _other_method),
+    "fidelity": ("dynamic fidelity instead of a lower one", _dynamic),
+    "reference": ("scipy's Radau, rtol 1e-7, largest loads at 2880 angles and all steps", lambda options: {}),
+}
+"""What differs from the campaign, in words and as solver options, by name of the check."""
+
+
+def no_progress(counts: Counts) -> None:
+    """Report no progress."""
+
+
+def options_of_check(options: Options, check: str) -> Options:
+    """Return the solver options of a check, a key of `CHECKS`, for a joint with these options in the campaign."""
+    return options._replace(**CHECKS[check][1](options))
+
+
+def run_checks(
+    params: NDArray[np.void],
+    options: Sequence[Options],
+    names: Iterable[str] = ALL_CHECKS,
+    simulate: Simulate = simulate_beside,
+    workers: int = 1,
+    progress: Progress = no_progress,
+) -> dict[str, Check]:
+    """Simulate joints again, once for each check.
+
+    Parameters
+    ----------
+    params : ndarray of PARAM, shape (m,)
+        Parameters of the joints.
+    options : sequence of Options
+        Solver options of each joint in the campaign.
+    names : iterable of str
+        Names from `ALL_CHECKS`; ``fidelity`` is added if a joint is below dynamic fidelity.
+    simulate : callable
+        As `simulation.simulate_rows`; joints are simulated with it, without histories.
+    workers : int
+        Processes that compute the references, seconds each; their number changes results within the tolerance only.
+    progress : callable
+        Called with the counts of joints whose reference is computed.
+
+    Returns
+    -------
+    dict of str to Check
+    """
+    lower = any(changed.fidelity != Fidelity.DYNAMIC for changed in options)
+    checks = {}
+    with kept_workers():
+        for name in (*names, *(("fidelity",) if lower else ())):
+            changed = [options_of_check(of_joint, name) for of_joint in options]
+            if name == "reference":
+                results = _references(params, changed, workers, progress)
+            else:
+                results = simulate_each(params, changed, simulate)
+            checks[name] = Check(CHECKS[name][0], tables.to_names(changed[0]), results)
+    return checks
+
+
+def _references(
+    params: NDArray[np.void], options: Sequence[Options], workers: int, progress: Progress
+) -> NDArray[np.void]:
+    """Compute the reference of each joint, (m,) table RESULT; each process computes one joint at a time."""
+    joints = [(i, params[i : i + 1], of_joint) for i, of_joint in enumerate(options)]
+    done = pool.map_blocks(Work(_reference), joints, min(workers, len(joints)))
+    results, counts = tables.without_results(len(joints), Status.CRASHED), Counts(len(joints), 0, 0, 0)
+    progress(counts)
+    with closing(done):
+        for (i, _, _), result in done:
+            if not isinstance(result, Lost):
+                results[i] = result[0]
+            counts = counts.after(results["status"][i : i + 1])
+            progress(counts)
+    return results
+
+
+def _reference(joint: tuple[int, NDArray[np.void], Options]) -> NDArray[np.void]:
+    """Reference of a joint, given by its index, its row of PARAM, shape (1,), and its solver options."""
+    return reference_rows(*joint[1:])
+
+
+def simulate_each(
+    params: NDArray[np.void], options: Sequence[Options], simulate: Simulate = simulate_beside
+) -> NDArray[np.void]:
+    """Results of joints, (m,) table RESULT, each with its own options, without histories."""
+    results = np.empty(len(params), tables.RESULT)
+    for distinct in dict.fromkeys(options):
+        here = np.array([each == distinct for each in options])
+        results[here] = simulate(params[here], distinct).results
+    return results
+
+
+Make = Callable[[NDArray[np.void], Sequence[Options]], dict[str, Check]]
+"""Function that simulates joints again, see `run_checks`."""
 
 
 def choose(rows: NDArray[np.intp], joints: int | None, seed: int) -> NDArray[np.intp]:
@@ -41,23 +170,9 @@ def choose(rows: NDArray[np.intp], joints: int | None, seed: int) -> NDArray[np.
 
 
 def check_campaign(store: Reader, joints: int | None, seed: int, make: Make) -> Verification | None:
-    """Check settled joints of a campaign.
+    """Check so many settled joints, all with None, the nominal one included; None if no joint is settled.
 
-    Parameters
-    ----------
-    store : Reader
-        Result file of the campaign.
-    joints : int or None
-        Number of joints; None for all, including the nominal joint.
-    seed : int
-        Seed of the random choice.
-    make : callable
-        Parameters of joints and solver options of each -> checks, see `run_checks`.
-
-    Returns
-    -------
-    Verification or None
-        None if no joint is settled.
+    `make` makes the checks from parameters and solver options of joints; `seed` is that of the random choice.
     """
     settled = np.flatnonzero(store.status() == Status.OK)
     if joints is not None and len(settled) > 1:
@@ -113,11 +228,11 @@ def check(
             study = load(path)
     if faults:
         raise InputError(faults)
-    make = partial(run_checks, names=ALL_CHECKS, workers=workers, progress=progress)
+    make = partial(run_checks, workers=workers, progress=progress)
     return check_study(study, number, seed, make) if path.suffix == ".toml" else check_file(path, number, seed, make)
 
 
-def check_file(path: Path, joints: int | None, seed: int | None = None, make: Make = ALL) -> Verification:
+def check_file(path: Path, joints: int | None, seed: int | None = None, make: Make = run_checks) -> Verification:
     """Check joints of a result file and store the checks in it, replacing an earlier verification.
 
     Parameters
@@ -160,18 +275,15 @@ def _stored(store: Reader, name: str) -> Verification:
 
 def nearest(store: Reader, limit: Limit, joints: int) -> NDArray[np.intp]:
     """File slots of the settled joints whose loads are nearest to a limit, ascending: so many for each load of it."""
-    slots = np.arange(store.first_sample, store.n)
-    results = store.results(slice(store.first_sample, None))
-    settled = results["status"] == Status.OK
-    nearest_slots: set[int] = set()
+    view, nearest_samples = View(store), set[int]()
     for name, level in zip(limit.loads, limit.levels, strict=True):
         plain, points = split(name)
         if points and store.point not in points.split("+"):
             continue
-        distance = np.where(settled, np.abs(LOADS[plain].of(results) - level), np.inf)
+        distance = np.where(view.status == Status.OK, np.abs(view.simulated(plain) - level), np.inf)
         order = np.argsort(distance, kind="stable")[:joints]
-        nearest_slots |= set(slots[order[np.isfinite(distance[order])]].tolist())
-    return np.array(sorted(nearest_slots), dtype=np.intp)
+        nearest_samples |= set(order[np.isfinite(distance[order])].tolist())
+    return view.slots(sorted(nearest_samples))
 
 
 def check_near(
@@ -237,7 +349,9 @@ def _merged(*both: Verification) -> Verification:
     return merged._replace(rows=merged.rows[order], base=merged.base[order], checks=checks)
 
 
-def check_study(study: Study, joints: int | None = 24, seed: int | None = None, make: Make = ALL) -> Verification:
+def check_study(
+    study: Study, joints: int | None = 24, seed: int | None = None, make: Make = run_checks
+) -> Verification:
     """Check joints of a study that has not been run: simulate them with its own settings and for each check.
 
     Parameters and returns as `check_file`; the joints returned include those that do not settle. Of several operating

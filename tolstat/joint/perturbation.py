@@ -20,7 +20,7 @@ from tolstat.joint import material, orders
 from tolstat.joint.contact import Contact
 from tolstat.joint.material import Array
 from tolstat.joint.model import Joint
-from tolstat.joint.partner import Partner, add_partner, check_misalignment
+from tolstat.joint.orders import Partner, add_partner, check_misalignment
 from tolstat.kernel.mechanics.topology import ARM, ARM_OF_PIN, PIN, TRIAD
 
 Table = NDArray[np.void]
@@ -172,18 +172,17 @@ def perturb(joint: Joint, operation: Operation, errors: Table) -> Table:
 
 def _constants(joint: Joint) -> dict[str, Any]:
     """Parameters that do not depend on the errors, at factor 1 on E."""
-    pin, arm = joint.pin, joint.arm
-    stations = joint.contact.springs(joint.bearing)
+    shaft, stations = joint.shaft, joint.contact.springs(joint.bearing)
     n_stations = len(stations.s)
-    columns = {
-        "station_s": stations.s,
-        "station_k1": stations.k1,
-        "station_k2": stations.k2,
-        "station_k3": stations.k3,
-        "station_weight": stations.weight,
-    }
-    xi, shaft = joint.bushing.xi, joint.shaft
-    return {
+    values = {key: getattr(joint.contact, key) for key in ("c_d", "c_t", "delta_d")}
+    for body in ("hub", "pin", "arm"):
+        values |= {f"{body}_{key}": getattr(getattr(joint, body), key) for key in ("mass", "inertia")}
+    for name in ("s", "k1", "k2", "k3", "weight"):
+        values[f"station_{name}"] = np.pad(getattr(stations, name), (0, MAX_STATIONS - n_stations))
+    for place, k, of in (("cross", joint.k_cross, joint.pin), ("fork", joint.k_fork, joint.arm)):
+        damping = material.bushing_damping(k, of.mass, np.array(of.inertia), joint.bushing.xi)
+        values |= {f"k_{place}": k, f"c_{place}": damping}
+    return values | {
         "Js": shaft.Js,
         "slides": shaft.slides,
         "m_s": shaft.mass if shaft.slides else 0.0,
@@ -192,22 +191,9 @@ def _constants(joint: Joint) -> dict[str, Any]:
         "R": joint.cross.R,
         "r_b": joint.cross.r_b,
         "l_f": joint.arm.l_f,
-        "hub_mass": joint.hub.mass,
-        "hub_inertia": joint.hub.inertia,
-        "pin_mass": pin.mass,
-        "pin_inertia": pin.inertia,
-        "arm_mass": arm.mass,
-        "arm_inertia": arm.inertia,
-        "k_cross": joint.k_cross,
-        "c_cross": material.bushing_damping(joint.k_cross, pin.mass, np.array(pin.inertia), xi),
-        "k_fork": joint.k_fork,
-        "c_fork": material.bushing_damping(joint.k_fork, arm.mass, np.array(arm.inertia), xi),
-        "c_d": joint.contact.c_d,
-        "c_t": joint.contact.c_t,
-        "delta_d": joint.contact.delta_d,
         "n_stations": n_stations,
         "needle_b": stations.b,
-    } | {name: np.pad(values, (0, MAX_STATIONS - n_stations)) for name, values in columns.items()}
+    }
 
 
 def _axis(errors: Table, feature: str, triad: Array) -> tuple[Array, Array]:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from tolstat.analysis import clustered, prediction
 from tolstat.analysis.clustered import Clustered, Delivery
-from tolstat.analysis.column import Column as Values
+from tolstat.analysis.estimates import Column as Values
 from tolstat.analysis.sample import CONFIDENCE, Sample, total_interval
 from tolstat.campaign.work import Work
 from tolstat.common.errors import Fault, InputError, NotApplicable, StoreError

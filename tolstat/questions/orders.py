@@ -19,7 +19,6 @@ from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, P
 from tolstat.display.style import lines, patches, ticker
 from tolstat.questions.shares import ORIGIN, unusable, value, values, with_ends, word
 from tolstat.store import revolutions
-from tolstat.store.points import point_of
 from tolstat.store.view import View
 
 SHARES = {"q5": 0.05, "qmedian": 0.5, "q95": 0.95}
@@ -187,7 +186,7 @@ def _orbits(view: View) -> tuple[list[list[Orbit]], str, float]:
         name = f"{shaft}.lateral"
         if name not in view.kept_loads or not view.load(name).valid.size:
             continue
-        at = view.at(point_of(view, name))
+        at = view.at(view.point_of(name))
         load, slots = at.load(name), {"nominal": int(at.nominal_slots[0])} if at.nominal_slots.size else {}
         for near, share in NEAR.items():
             away = np.abs(load.values - load.quantile(share).estimate)

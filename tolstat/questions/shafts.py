@@ -16,7 +16,7 @@ from tolstat.common.loads import ANY_LIMIT
 from tolstat.display import text
 from tolstat.display.answer import Answer, Column, Part, Row, Rows, Sentence, Table
 from tolstat.joint import nominal_errors, perturb
-from tolstat.joint.partner import output_motion
+from tolstat.joint.orders import output_motion
 from tolstat.questions.shares import inapplicable, limit, share, shares, word
 from tolstat.store.recorded import joint_of
 from tolstat.store.view import View

@@ -22,7 +22,7 @@ from tolstat.questions.causes import lines
 from tolstat.questions.exceedance import rows as exceedance
 from tolstat.questions.exceedance.rows import ends, share_of, unresolved_matter, verdict
 from tolstat.questions.fatigue import answer as fatigue
-from tolstat.store import known_parts, points
+from tolstat.store import known_parts
 from tolstat.store.view import View
 
 
@@ -162,7 +162,7 @@ def _limit(view: View, row: table.Row) -> str:
     """Limit in words: ``1500 N on cross1.F (most often at start)`` where it holds at several operating points."""
     limit = f"{text.value(row['level'], row['unit'])} on {row['load']}"
     several = row["count"] and len(view.narrowed(row["load"])[0].points) > 1
-    return f"{limit} (most often at {points.point_of(view, row['load'])})" if several else limit
+    return f"{limit} (most often at {view.point_of(row['load'])})" if several else limit
 
 
 def _most_often(view: View, records: Sequence[table.Row], worst: table.Row) -> str:

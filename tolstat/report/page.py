@@ -32,7 +32,6 @@ from tolstat.report.answer import stopped
 from tolstat.report.headline import headline, life_verdicts, tells_yield
 from tolstat.solver import fidelity
 from tolstat.store import Reader, recorded, viewed
-from tolstat.store.points import point_of
 from tolstat.store.view import View
 from tolstat.study.assumptions import assumptions, unselected
 
@@ -117,7 +116,7 @@ def compose(view: View, asked: Asked, full: bool = False, brief: bool = False) -
     else:
         worst.begin_replay(view, asked)
         if len(view.points) > 1:
-            point = point_of(view, view.most_exceeded) if view.leading else view.points[0]
+            point = view.point_of(view.most_exceeded) if view.leading else view.points[0]
             remedy = f"tolstat report {asked.path.name} --point {point} --out PAGE.html"
             asked.notes.append(f"loads over the input angle are on the page of one operating point: {remedy}")
         sections = sorted(sections_of(view, asked), key=lambda section: section.folded)

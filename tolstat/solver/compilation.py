@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from tolstat.common.channels import LOAD_HISTORIES
 from tolstat.common.cores import available_cores
 from tolstat.common.tables import PARAM, RESULT, Fidelity, Options
-from tolstat.solver import rainflow, refinement, simulation
+from tolstat.solver import histories, refinement, simulation
 
 LOG = logging.getLogger("tolstat")
 
@@ -46,19 +46,14 @@ def _explicit(options: Options) -> None:
     list(simulation.simulate_together(joint, settings, revolutions, False, results, results[:, None], steps))
 
 
-def _ideal(options: Options) -> None:
-    results = np.zeros(1, RESULT).view(np.recarray)
-    list(simulation.simulate_ideal(_outside_model(), options, np.ones(1, np.int64), False, results))
-
-
 KERNELS: dict[str, Callable[[Options], object]] = {
     "lockstep.lockstep": partial(_simulate, simulation.MOST_ALONE + 1),
     "lockstep.one_at_a_time": partial(_simulate, 1),
     "explicit.explicit": _explicit,
     "explicit.count_steps": lambda options: simulation.explicit_steps(_outside_model(torque_reverses=True), options),
     "starts.write_starts": lambda options: simulation.starts(np.zeros(1, PARAM).view(np.recarray), options),
-    "ideal.ideal_revolution": _ideal,
-    "rainflow.count_joint": lambda options: rainflow.count(
+    "ideal.ideal_revolution": partial(_simulate, 1),
+    "rainflow.count_joint": lambda options: histories.count(
         {of.name: np.zeros((2, *of.shape)) for of in LOAD_HISTORIES}
     ),
 }

@@ -94,7 +94,8 @@ def choose(
         rung for rung in RUNGS if rung.steps_per_rev >= min_steps and (closed_form or rung.fidelity != Fidelity.IDEAL)
     ]
     table = [_entry(rung, simulate(params, _at(options, rung)).results, truth, names) for rung in rungs]
-    good = [entry for entry in table if _meets(entry, budget)]
+    settled = [entry for entry in table if entry["differing"] == 0 and entry["worst"] is not None]
+    good = [entry for entry in settled if MARGIN * entry["worst"] <= budget]
     best = min(good, key=lambda entry: float(entry["cost"]), default=table[-1])
     rung, worst = Rung(Fidelity[best["fidelity"].upper()], best["steps_per_rev"]), _figure(best["worst"])
     reason = (
@@ -164,10 +165,6 @@ def _error(results: NDArray[np.void], truth: NDArray[np.void], load: Load) -> Fl
     scale = of_kind(truth, measure_of(load.kind)).max(axis=1)
     error: FloatArray = np.divide(change, scale, out=np.where(change > 0, np.inf, 0.0), where=scale > 0)
     return error
-
-
-def _meets(entry: Mapping[str, Any], budget: float) -> bool:
-    return entry["differing"] == 0 and entry["worst"] is not None and MARGIN * entry["worst"] <= budget
 
 
 def _figure(value: float | None) -> str:

@@ -12,19 +12,10 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tolstat.common import tables
 from tolstat.common.load_kinds import LOAD_KINDS, SPAN, measure_of
 from tolstat.common.loads import FloatArray, put_largest
-from tolstat.common.tables import (
-    RESULT,
-    SIMULATED,
-    Fidelity,
-    Options,
-    Start,
-    Status,
-    for_kernels,
-    iterations_allowed,
-    without_results,
-)
+from tolstat.common.tables import RESULT, SIMULATED, Fidelity, Options, Start, Status
 from tolstat.solver.simulation import AT_REST, equilibrium, simulate_together
 
 IntegratorName = Literal["Radau", "BDF", "LSODA"]
@@ -105,7 +96,9 @@ def first_order(params: NDArray[np.void], options: Options, from_start: bool = F
 
     par = params.view(np.recarray)[0]
     options = options._replace(fidelity=int(Fidelity.DYNAMIC))
-    settled, revolution = _last_revolution(params, options)
+    settled = np.zeros(1, RESULT)
+    allowed = np.full(1, tables.iterations_allowed(options.steps_per_rev, options.max_revs))
+    ((_, revolution),) = simulate_together(params, options, allowed, True, settled)
     period = 2 * np.pi / abs(float(par.omega))
     last = round(float(np.nan_to_num(settled["revolutions"][0])) * options.steps_per_rev) % options.steps_per_rev
     t0, y0 = period * last / options.steps_per_rev, np.concatenate([revolution[last].q, revolution[last].v])
@@ -133,20 +126,13 @@ def first_order(params: NDArray[np.void], options: Options, from_start: bool = F
     def largest(times: FloatArray, states: FloatArray, equal: NDArray[np.bool_] | None = None) -> Largest:
         samples = make_samples(1, len(times))[0]
         sample(times, np.ascontiguousarray(states), par, work, samples)
-        out = for_kernels(np.zeros(1, RESULT))[0]
+        out = tables.for_kernels(np.zeros(1, RESULT))[0]
         write_orders(samples if equal is None else samples[equal], out)
         out.largest[:N_INSTANT] = samples.loads.max(axis=0)
         return np.array(out.largest)
 
     scale = np.repeat([LENGTH, VELOCITY], N_DOF)
     return FirstOrder(rate, jacobian, t0, y0, period, scale, largest, settled)
-
-
-def _last_revolution(params: NDArray[np.void], options: Options) -> tuple[NDArray[np.void], Any]:
-    """Result of a joint with uniform or error-controlled steps, (1,), and samples of its last revolution."""
-    settled, allowed = np.zeros(1, RESULT), np.full(1, iterations_allowed(options.steps_per_rev, options.max_revs))
-    ((_, samples),) = simulate_together(params, options, allowed, True, settled)
-    return settled, samples
 
 
 def _start(params: NDArray[np.void], options: Options) -> FloatArray:
@@ -195,35 +181,22 @@ def reference_rows(
         within `MAX_REVS` or `max_steps` is ``NOT_SETTLED``, or ``NEWTON_FAILED`` if the integration ended before the
         second revolution did.
     """
-    results = without_results(len(params), Status.NEWTON_FAILED)
+    results = tables.without_results(len(params), Status.NEWTON_FAILED)
     for i in range(len(params)):
         system = first_order(params[i : i + 1], options)
         status = Status(system.settled["status"][0])
         if status in SIMULATED:
-            status = _periodic(system, rtol, integrator, closure_tol, max_steps, angles, results[i : i + 1])
+            revolutions = _revolutions(system, rtol, integrator, max_steps, angles)
+            status = _periodic(revolutions, closure_tol, results[i : i + 1])
         results["status"][i] = status
     results["settled"] = results["status"] == Status.OK
     return results
 
 
-def _periodic(
-    system: FirstOrder,
-    rtol: float,
-    integrator: IntegratorName,
-    closure_tol: float,
-    max_steps: int,
-    angles: int | None,
-    out: NDArray[np.void],
-) -> Status:
+def _periodic(revolutions: Iterator[tuple[Largest, int]], closure_tol: float, out: NDArray[np.void]) -> Status:
     """Integrate until the largest loads repeat; write them and the work to `out`, (1,); return the status."""
-    import scipy.integrate
-
-    end = system.t0 + (MAX_REVS + 0.5) * system.period
-    settings: dict[str, Any] = {"rtol": rtol, "atol": rtol * system.scale, "jac": system.jacobian}
-    make: Callable[..., Any] = getattr(scipy.integrate, integrator)
-    solver = make(system.rate, system.t0, system.y0, end, max_step=0.1 * system.period, **settings)
     before = None
-    for last, steps in _revolutions(system, solver, max_steps, angles):
+    for last, steps in revolutions:
         out["revolutions"], out["steps"] = 1 + np.nan_to_num(out["revolutions"]), steps
         put_largest(last, out)
         if before is not None:
@@ -239,10 +212,17 @@ def _periodic(
     return Status.NEWTON_FAILED
 
 
-def _revolutions(system: FirstOrder, solver: Any, max_steps: int, angles: int | None) -> Iterator[tuple[Largest, int]]:
+def _revolutions(
+    system: FirstOrder, rtol: float, integrator: IntegratorName, max_steps: int, angles: int | None
+) -> Iterator[tuple[Largest, int]]:
     """Yield the largest loads of each revolution and the steps so far; end early when the integrator gives up."""
-    times, states, equal = np.empty(0), np.empty((0, len(system.y0))), np.empty(0, bool)
-    new_times, new_states, new_equal = [], [], []
+    import scipy.integrate
+
+    end = system.t0 + (MAX_REVS + 0.5) * system.period
+    settings: dict[str, Any] = {"rtol": rtol, "atol": rtol * system.scale, "jac": system.jacobian}
+    make: Callable[..., Any] = getattr(scipy.integrate, integrator)
+    solver = make(system.rate, system.t0, system.y0, end, max_step=0.1 * system.period, **settings)
+    times, states, equal = [], [], []
     spacing, done = system.period / (angles or SAMPLES_PER_REV), 0
     boundary = system.t0 + (1 + 1e-9) * system.period
     for step in range(1, max_steps + 1):
@@ -252,20 +232,18 @@ def _revolutions(system: FirstOrder, solver: Any, max_steps: int, angles: int | 
         reached = int((solver.t - system.t0) / spacing)
         grid = system.t0 + spacing * np.arange(done + 1, reached + 1)
         done = reached
-        new_times.append(grid)
-        new_states.append(solver.dense_output()(grid).T)
-        new_equal.append(np.ones(len(grid), bool))
+        times.append(grid)
+        states.append(solver.dense_output()(grid).T)
+        equal.append(np.ones(len(grid), bool))
         if angles is None:
-            new_times.append(np.array([solver.t]))
-            new_states.append(solver.y[None].copy())
-            new_equal.append(np.zeros(1, bool))
+            times.append(np.array([solver.t]))
+            states.append(solver.y[None].copy())
+            equal.append(np.zeros(1, bool))
         if solver.t >= boundary:
-            times, states = np.concatenate([times, *new_times]), np.concatenate([states, *new_states])
-            equal = np.concatenate([equal, *new_equal])
-            new_times, new_states, new_equal = [], [], []
-            inside = times <= boundary
-            yield system.largest(times[inside], states[inside], equal[inside]), step
-            times, states, equal = times[~inside], states[~inside], equal[~inside]
+            parts = [np.concatenate(part) for part in (times, states, equal)]
+            inside = parts[0] <= boundary
+            yield system.largest(*(part[inside] for part in parts)), step
+            times, states, equal = ([part[~inside]] for part in parts)
             boundary += system.period
         if solver.status == "finished":
             return

@@ -3,39 +3,23 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
-from functools import cache, partial
-from typing import TYPE_CHECKING, Any, Literal
+from collections.abc import Iterator
+from functools import cache
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.channels import BUSHING_LOADS, SHAFT_LOADS, LoadHistory
-from tolstat.common.load_kinds import CONTACTS, SPAN
-from tolstat.common.tables import (
-    KERNEL_RESULT,
-    RESULT,
-    SIMULATED,
-    Fidelity,
-    HistorySpec,
-    Method,
-    Options,
-    Simulation,
-    Start,
-    Status,
-    for_kernels,
-    iterations_allowed,
-)
+from tolstat.common import tables
+from tolstat.common.tables import RESULT, SIMULATED, Fidelity, Method, Options, Simulation, Start, Status
 from tolstat.joint import ideal
-from tolstat.solver import harmonics, rainflow, refinement, stationary
+from tolstat.solver import refinement, stationary
+from tolstat.solver.histories import Histories, extracted, history_specs
 
 if TYPE_CHECKING:
     from tolstat.kernel.lanes.batch import Batch, Queue
 
 Table = np.recarray[Any, np.dtype[np.void]]
-Run = Callable[..., Iterator[tuple[int, NDArray[np.void]]]]
-"""Simulation of joints, such as `simulate_together`."""
-Histories = Literal["none", "cycles", "harmonics", "harmonics+cycles", "full"]
 
 MAX_KEPT_SAMPLES = 12_000
 """Maximum number of samples in memory at a time, some 1.7 kB each: the last revolution of 66 joints at 180 steps."""
@@ -52,45 +36,8 @@ UNIFORM_REVS = 4
 
 AT_REST = np.zeros(56)
 """Unknowns of the ideal pose, or velocities of a joint at rest."""
-NO_BLOCKS = np.zeros((0, 0), KERNEL_RESULT).view(np.recarray)
+NO_BLOCKS = np.zeros((0, 0), tables.KERNEL_RESULT).view(np.recarray)
 """Empty statistics of single revolutions, if they are not needed."""
-
-
-def history_specs(options: Options, histories: Histories, n_harmonics: int) -> dict[str, HistorySpec]:
-    """Describe the load histories that are kept of each joint.
-
-    Parameters
-    ----------
-    options : Options
-        ``steps_per_rev`` gives the number of samples; sample k belongs to the input angle 2 pi k / steps_per_rev.
-    histories : {"none", "cycles", "harmonics", "harmonics+cycles", "full"}
-        What is kept.
-    n_harmonics : int
-        Highest multiple of the input speed that ``"harmonics"`` keeps.
-
-    Returns
-    -------
-    dict of str to HistorySpec
-    """
-    n = options.steps_per_rev
-    if histories == "full":
-        contact = "contact force of pins 1-4: of the outermost station, of the innermost one, resultant of all stations"
-        modes = "contact mode of pins 1-4: 0 none, 1 one-point, 2 two-point, 3 uniform"
-        return {
-            "loads": _of_samples(BUSHING_LOADS, n),
-            "contact": HistorySpec((n, 4, len(CONTACTS)), "f4", "N", contact, ("theta", "pin", "contact_force")),
-            "shafts": _of_samples(SHAFT_LOADS, n),
-            "mode": HistorySpec((n, 4), "u1", "1", modes, ("theta", "pin")),
-            "tau": HistorySpec((n,), "f8", "1", "speed ratio", ("theta",)),
-        }
-    specs = rainflow.specs() if "cycles" in histories else {}
-    if "harmonics" in histories:
-        specs |= harmonics.specs(min(n_harmonics, (n - 1) // 2) + 1)
-    return specs
-
-
-def _of_samples(history: LoadHistory, n: int) -> HistorySpec:
-    return HistorySpec((n, *history.shape), "f4", "N, N*m", history.meaning, ("theta", *history.axes))
 
 
 @cache
@@ -147,20 +94,17 @@ def simulate_rows(
         ideal.check(params)
     specs = history_specs(options, histories, n_harmonics)
     kept = {name: spec.blank(len(params)) for name, spec in specs.items()}
-    allowed = iterations_allowed(options.steps_per_rev, options.max_revs)
+    allowed = tables.iterations_allowed(options.steps_per_rev, options.max_revs)
     left = np.full(len(params), allowed)
 
     def simulate(rows: NDArray[np.intp], settings: Options) -> tuple[NDArray[np.void], NDArray[np.void]]:
-        out = np.zeros(len(rows), RESULT).view(np.recarray)
-        revolutions = settings.max_revs if follows_error(settings) else 0
-        blocks = np.zeros((len(rows) if revolutions else 0, revolutions), RESULT).view(np.recarray)
-        run: Run = simulate_ideal if settings.fidelity == Fidelity.IDEAL else simulate_together
-        if follows_error(settings):
-            run = partial(_resolved, steps[rows])
-        still_allowed = left[rows]
-        for i, samples in run(params[rows], settings, still_allowed, bool(specs), out, blocks):
+        out, follows = np.zeros(len(rows), RESULT).view(np.recarray), follows_error(settings)
+        blocks = np.zeros((len(rows), settings.max_revs) if follows else (0, 0), RESULT).view(np.recarray)
+        still_allowed, of_rows = left[rows], steps[rows] if follows else None
+        run = simulate_together(params[rows], settings, still_allowed, bool(specs), out, blocks, of_rows)
+        for i, samples in run:
             if out[i].status in SIMULATED:
-                for name, values in _sample(samples, histories, specs).items():
+                for name, values in extracted(samples, histories, specs).items():
                     kept[name][rows[i]] = values
         left[rows] = still_allowed
         return out.view(np.ndarray), blocks.view(np.ndarray)
@@ -192,41 +136,47 @@ def simulate_together(
     """Simulate joints in lanes by numbers of contact stations and orders; yield index and samples of each if `keep`.
 
     `left`: Newton iterations still allowed to each joint, (n,), reduced by those taken. `steps`: number of explicit
-    steps of the first revolution, (n,); without it joints are simulated in lock-step.
+    steps of the first revolution, (n,); joints with 0, all without it, are simulated in lock-step, as are those that
+    turn out too stiff for explicit steps.
     """
+    if options.fidelity == Fidelity.IDEAL:
+        yield from _ideal(params, options, keep, results)
+        return
+    from tolstat.kernel.lanes.explicit import explicit
     from tolstat.kernel.lanes.lockstep import START_ONLY
     from tolstat.kernel.revolution.settle import make_samples
+    from tolstat.kernel.simd.lane import WIDTH
 
+    steps = np.zeros(len(params), np.int64) if steps is None else steps.copy()
     max_size = max(1, MAX_KEPT_SAMPLES // options.steps_per_rev) if keep else len(params)
     memory = make_samples(min(max_size, len(params)) if keep else 0, options.steps_per_rev)
-    for here in _groups(params, max_size):
-        allowed = left[here]
-        statistics = np.zeros((len(here) if len(blocks) else 0, blocks.shape[1]), KERNEL_RESULT).view(np.recarray)
-        queue = make_queue(params[here], options, allowed, memory[: len(here)].view(np.recarray), statistics)
-        if steps is None:
-            run_lanes(queue, options)
-        else:
-            run_lanes(queue._replace(left=allowed.copy(), blocks=NO_BLOCKS), options._replace(max_revs=START_ONLY))
-            run_explicit(queue, steps[here], options)
-        left[here] = allowed
-        for_kernels(results)[here] = queue.results
-        if len(blocks):
-            for_kernels(blocks)[here] = statistics
-        yield from zip(here.tolist(), memory, strict=False)
+    for is_explicit in (True, False):
+        for here in _groups(params, (steps > 0) == is_explicit, max_size):
+            allowed, shape = left[here], (len(here) if len(blocks) else 0, blocks.shape[1])
+            statistics = np.zeros(shape, tables.KERNEL_RESULT).view(np.recarray)
+            queue = make_queue(params[here], options, allowed, memory[: len(here)].view(np.recarray), statistics)
+            if is_explicit:
+                run_lanes(queue._replace(left=allowed.copy(), blocks=NO_BLOCKS), options._replace(max_revs=START_ONLY))
+                all_lanes = width_for(WIDTH)  # for a few joints, too: the kernel is compiled for this width alone
+                explicit(steps[here], options, lanes_for(queue, options, all_lanes), queue)
+                steps[here[queue.results.status == Status.NEWTON_FAILED]] = 0
+            else:
+                run_lanes(queue, options)
+            left[here] = allowed
+            tables.for_kernels(results)[here] = queue.results
+            if len(blocks):
+                tables.for_kernels(blocks)[here] = statistics
+            yield from zip(here.tolist(), memory, strict=False)
 
 
 def make_queue(
-    params: NDArray[np.void],
-    options: Options,
-    left: NDArray[np.int64],
-    samples: Table,
-    blocks: Table,
+    params: NDArray[np.void], options: Options, left: NDArray[np.int64], samples: Table, blocks: Table
 ) -> Queue:
     """Make a queue of joints, see `kernel.lanes.batch.Queue`; their starts are computed."""
     from tolstat.kernel.lanes.batch import Queue
 
-    rows = np.ascontiguousarray(params).view(np.recarray)
-    words, out = rows.view(np.float64).view(np.ndarray).reshape(len(rows), -1), np.zeros(len(rows), KERNEL_RESULT)
+    rows, out = np.ascontiguousarray(params).view(np.recarray), np.zeros(len(params), tables.KERNEL_RESULT)
+    words = rows.view(np.float64).view(np.ndarray).reshape(len(rows), -1)
     return Queue(rows, words, starts(rows, options), left, samples, blocks, out.view(np.recarray))
 
 
@@ -241,15 +191,6 @@ def run_lanes(queue: Queue, options: Options) -> NDArray[np.int64]:
     else:
         lockstep(options, PATIENCE, batch, queue, tally)
     return tally
-
-
-def run_explicit(queue: Queue, steps: NDArray[np.int64], options: Options) -> None:
-    """Simulate the joints of a queue with explicit steps, see `kernel.lanes.explicit.explicit`."""
-    from tolstat.kernel.lanes.explicit import explicit
-    from tolstat.kernel.simd.lane import WIDTH
-
-    all_lanes = width_for(WIDTH)  # for a few joints, too: the kernel is compiled for this width alone
-    explicit(steps, options, lanes_for(queue, options, all_lanes), queue)
 
 
 def lanes_for(queue: Queue, options: Options, width: int) -> Batch:
@@ -271,18 +212,13 @@ def equilibrium(params: NDArray[np.void], options: Options) -> NDArray[np.float6
     return np.asarray(queue.starts[0])
 
 
-def simulate_ideal(
-    params: NDArray[np.void],
-    options: Options,
-    left: NDArray[np.int64],
-    keep: bool,
-    results: NDArray[np.void],
-    blocks: NDArray[np.void] = NO_BLOCKS,
+def _ideal(
+    params: NDArray[np.void], options: Options, keep: bool, results: NDArray[np.void]
 ) -> Iterator[tuple[int, NDArray[np.void]]]:
-    """Evaluate the closed forms of ideal joints; arguments as of `simulate_together`, `left` stays as it is."""
+    """Evaluate the closed forms of ideal joints; arguments as of `simulate_together`."""
     from tolstat.kernel.revolution.ideal import ideal_revolution
 
-    batch, rows, out = lanes(options, 1), params.view(np.recarray), for_kernels(results)
+    batch, rows, out = lanes(options, 1), params.view(np.recarray), tables.for_kernels(results)
     for i in range(len(params)):
         ideal_revolution(rows[i], options, AT_REST, batch.one, batch.samples[0], batch.notes[0], out[i])
         if keep:
@@ -327,55 +263,10 @@ def hitting(params: NDArray[np.void], options: Options) -> NDArray[np.intp]:
     return np.flatnonzero(ideal.reversal_torque(params) > NEARLY_REVERSING * np.abs(params["torque"]))
 
 
-def _resolved(
-    steps: NDArray[np.int64],
-    params: NDArray[np.void],
-    options: Options,
-    left: NDArray[np.int64],
-    keep: bool,
-    results: NDArray[np.void],
-    blocks: NDArray[np.void],
-) -> Iterator[tuple[int, NDArray[np.void]]]:
-    """Simulate joints with explicit steps where `steps`, (n,), is not zero, else with error-controlled steps.
-
-    Joints that turn out too stiff for explicit steps get error-controlled ones. Other arguments are as of
-    `simulate_together`.
-    """
-    steps = steps.copy()
-    for explicit in (True, False):
-        rows = np.flatnonzero((steps > 0) == explicit)
-        if not len(rows):
-            continue
-        out = np.zeros(len(rows), RESULT).view(np.recarray)
-        statistics, allowed = np.zeros((len(rows), blocks.shape[1]), RESULT).view(np.recarray), left[rows]
-        these = steps[rows] if explicit else None
-        for i, samples in simulate_together(params[rows], options, allowed, keep, out, statistics, these):
-            results[rows[i]] = out[i]
-            yield int(rows[i]), samples
-        results[rows], blocks[rows], left[rows] = out, statistics, allowed
-        steps[rows[out["status"] == Status.NEWTON_FAILED]] = 0
-
-
-def _groups(params: NDArray[np.void], max_size: int) -> Iterator[NDArray[np.intp]]:
+def _groups(params: NDArray[np.void], among: NDArray[np.bool_], max_size: int) -> Iterator[NDArray[np.intp]]:
     """Yield the indices of joints with equal numbers of contact stations and orders, at most `max_size` at a time."""
     shared = params[["n_stations", "n_orders"]]
-    for numbers in np.unique(shared):
-        rows = np.flatnonzero(shared == numbers)
+    for numbers in np.unique(shared[among]):
+        rows = np.flatnonzero(among & (shared == numbers))
         for first in range(0, len(rows), max_size):
             yield rows[first : first + max_size]
-
-
-def _sample(samples: NDArray[np.void], histories: Histories, specs: dict[str, HistorySpec]) -> dict[str, NDArray[Any]]:
-    """Extract the histories that are kept from the samples of the recorded revolution."""
-    if histories == "full":
-        fields = {name: samples["loads"][:, span] for name, span in SPAN.items()}
-        fields |= {name: samples[name] for name in samples.dtype.names or ()} | {"loads": samples["components"]}
-        return {name: fields[name].reshape(spec.shape) for name, spec in specs.items()}
-    loads = {
-        BUSHING_LOADS.name: np.ascontiguousarray(samples["components"]),
-        SHAFT_LOADS.name: np.ascontiguousarray(samples["shafts"]),
-    }
-    sample = rainflow.count(loads) if "cycles" in histories else {}
-    if "harmonics" in histories:
-        sample |= harmonics.of_loads(loads, specs["coefficients_real"].shape[-1])
-    return sample

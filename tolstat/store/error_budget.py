@@ -10,7 +10,7 @@ import numpy as np
 
 from tolstat.analysis import prediction
 from tolstat.analysis.accuracy import LEAST_NEAR, OBSERVABLES, corrected, corrections, size
-from tolstat.analysis.column import frozen
+from tolstat.analysis.estimates import frozen
 from tolstat.analysis.sample import Sample, largest_of
 from tolstat.common.load_kinds import Kind
 from tolstat.common.loads import ANY_LIMIT, LOADS, FloatArray

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from tolstat.analysis import known_share, process
-from tolstat.analysis.column import Mask
+from tolstat.analysis.estimates import Mask
 from tolstat.analysis.known_share import KnownShare, Mixture
 from tolstat.analysis.process import Known, Sums
 from tolstat.analysis.weighted import Split, Weighted

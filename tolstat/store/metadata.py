@@ -88,10 +88,6 @@ class Metadata(BaseModel):
     created: str
     git_commit: str
 
-    def changed(self, **values: Any) -> Metadata:
-        """Return the metadata with other values."""
-        return self.model_copy(update=values)
-
 
 def of_study(
     study: Study,
@@ -172,7 +168,7 @@ LIBRARIES = ("numpy", "numba", "scipy", "h5py")
 RESULT_SOURCES = (
     *("kernel", "joint", "common/fields.py", "common/tables.py", "sampling.py"),
     *("study/tolerances", "study/axes.py", "study/design.py", "study/proposal.py", "analysis/process.py"),
-    *("solver/simulation.py", "solver/refinement.py", "solver/stationary.py", "solver/rainflow.py"),
+    *("solver/simulation.py", "solver/refinement.py", "solver/stationary.py", "solver/histories.py"),
 )
 """Sources that, together with the study's identity, determine the results of a campaign."""
 

@@ -15,7 +15,7 @@ from tolstat.common.loads import FloatArray
 from tolstat.joint import perturb
 from tolstat.solver import compilation
 from tolstat.solver.compilation import is_compiled, warm_up
-from tolstat.solver.harmonics import restore
+from tolstat.solver.histories import restore
 from tolstat.solver.simulation import simulate_rows
 from tolstat.store.hdf5 import RUN_AGAIN, pick, store_error
 from tolstat.store.reader import Reader

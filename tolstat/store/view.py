@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Hashable, Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -13,11 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tolstat.analysis import accuracy
-from tolstat.analysis.clustered import Clustered
-from tolstat.analysis.column import frozen
-from tolstat.analysis.design import SAMPLE, Claim, Design, Independent, Listed, Replicated
+from tolstat.analysis.design import SAMPLE, Claim, Design
+from tolstat.analysis.estimates import frozen
 from tolstat.analysis.sample import Sample, largest_of
-from tolstat.analysis.weighted import Weighted
 from tolstat.common.columns import METHODS, holds
 from tolstat.common.counts import Counts
 from tolstat.common.errors import Fault, InputError
@@ -27,7 +24,7 @@ from tolstat.common.tables import Status
 from tolstat.store import verification, what_if, worst
 from tolstat.store.hdf5 import BLOCK, pick, store_error
 from tolstat.store.reader import Reader
-from tolstat.store.recorded import recall
+from tolstat.store.recorded import design_of, recall
 from tolstat.store.verification import Verification
 from tolstat.store.what_if import Altered
 from tolstat.study import Study
@@ -274,6 +271,35 @@ class View:
         known = {name: share for name, share in shares.items() if share == share}
         return max(known, key=lambda name: known[name]) if known else next(iter((*self.leading, "cross1.F")))
 
+    def point_of(self, name: str) -> str:
+        """Operating point at which a load matters most: where most joints exceed its limit, else where it is largest.
+
+        Empty if the file has one point without a name.
+        """
+        at, plain = self.narrowed(name)
+        limit = self.load(name).limit
+        return max(at.parts, key=lambda part: worst.rank(part.load(plain), limit)).points[0]
+
+    @property
+    def shares_of_time(self) -> FloatArray:
+        """Share of the service time at each operating point, (points,), their sum is 1.
+
+        `InputError` when the study does not give the shares of several points.
+        """
+        shares = np.array([self.store.points[name].share for name in self.points] if len(self.parts) > 1 else [1.0])
+        if np.isnan(shares).any():
+            remedy = "write share = ... in each [[operation]] and run the study again, which simulates nothing anew"
+            remedy += f"; or look at one point: --point {self.points[0]}"
+            raise InputError([Fault(str(self.path), "has operating points without a share of the time", remedy)])
+        return np.asarray(shares / shares.sum())
+
+    @property
+    def shares_of_revolutions(self) -> FloatArray:
+        """Share of the revolutions at each operating point: share of the time times speed; see `shares_of_time`."""
+        speeds = np.array([abs(self.store.points[name].operation.speed) for name in self.points])
+        turns = self.shares_of_time * speeds
+        return np.asarray(turns / turns.sum())
+
     @cached_property
     def design(self) -> Design:
         """How the joints were drawn, and what they allow to conclude."""
@@ -354,31 +380,3 @@ class View:
             *others, last = self.points
             text += f", each at {', '.join(others)} and {last}" if others else f" at {last}"
         return f"{text}, {self.counts.shortfall}" + (f", {pending} still pending" if pending else "")
-
-
-def design_of(store: Reader, weights: FloatArray | None, unfinished: bool) -> Design:
-    """Sampling design of a file: the first that recognises how its joints were drawn.
-
-    Parameters
-    ----------
-    store : Reader
-        The file.
-    weights : ndarray, shape (n,), optional
-        Weights of its samples under importance sampling.
-    unfinished : bool
-        Whether joints are pending; replicates are then unequal, and do not count as such.
-    """
-    sampling, skip = store.sampling, store.first_sample
-    method, n = str(sampling["method"]), store.n - skip
-    if weights is not None:
-        shares, changes = zip(*store.identity["proposal"], strict=True)
-        # proposals of processes alone leave out no way to a limit
-        others = any(set(changed) != {"parts"} for changed in changes)
-        from_tolerances = frozen(store.origin()["component"][skip:] == 0) if others else None
-        heaviest = 1.0 / (1.0 - math.fsum(shares))  # one over the share of the tolerances
-        return Weighted(weights, heaviest, from_tolerances)
-    if sampling.get("joints_per_lot", 1) > 1:
-        return Clustered(np.asarray(store.samples) // int(sampling["joints_per_lot"]))
-    if sampling.get("replicates", 1) > 1 and n == sampling["n"] and not unfinished:
-        return Replicated(n, int(sampling["replicates"]), method)
-    return Independent() if method == "random" else Listed(method)

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.analysis.column import Column, Inexact, frozen, largest
+from tolstat.analysis.estimates import Column, Inexact, frozen, largest
 from tolstat.analysis.sample import Sample, is_valid
-from tolstat.common.loads import LOAD_FIELDS, LOADS, FloatArray, Limit, Load, Results, split
+from tolstat.common.loads import LOAD_FIELDS, FloatArray, Load, Results
 from tolstat.common.tables import FAILED, RESULT, UNSETTLED, VALID, Status, deciding, without_results, worst_status
 from tolstat.store.reader import Reader
 
@@ -83,26 +83,6 @@ def _at_point(part: Results, load: Load) -> tuple[Column, Inexact]:
     lower, upper = (np.where(np.isfinite(end), end, exact) for end in ends)
     inexact = Inexact(joints, np.where(lost, -np.inf, lower), np.where(lost, np.inf, upper))
     return Column(values).replaced(others, np.full(others.size, np.nan)), inexact
-
-
-def limit_of(parts: Mapping[str, NDArray[np.void]], limit: Limit) -> tuple[FloatArray, NDArray[np.uint8]]:
-    """Load of a limit, whose names may have operating points, over these: values, (n,), and the status of each joint.
-
-    Parameters
-    ----------
-    parts : mapping of str to (n,) tables
-        Results by operating point, with `LOAD_FIELDS` at least.
-    limit : Limit
-        The limit; its level is compared with the values.
-    """
-    of_loads, states = [], []
-    for name, level in zip(limit.loads, limit.levels, strict=True):
-        where = split(name)[1]
-        chosen = [parts[point] for point in where.split("+")] if where else list(parts.values())
-        values, status, _ = load_of(chosen, LOADS[split(name)[0]])
-        of_loads.append(values.values if limit.has_one_level else values.values / level)
-        states.append(status)
-    return np.maximum.reduce(of_loads), worst_status(states)
 
 
 def rank(load: Sample, limit: float | None) -> tuple[float, float]:

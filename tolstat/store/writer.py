@@ -200,7 +200,7 @@ class Writer(Reader):
         StoreError
             When there is no room for a second copy of the file.
         """
-        document = self.metadata.changed(**values)
+        document = self.metadata.model_copy(update=values)
         if document == self.metadata:
             return
 

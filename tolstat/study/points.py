@@ -20,7 +20,7 @@ from tolstat.common.strict import did_you_mean, refuse
 from tolstat.common.toml_lines import KeyPath
 from tolstat.joint import Joint, Operation, orders
 from tolstat.joint.ideal import NO_CLOSED_FORM
-from tolstat.joint.partner import Partner
+from tolstat.joint.orders import Partner
 from tolstat.joint.sections import RIGID
 from tolstat.study.axes import columns_of
 from tolstat.study.selection import Reading

@@ -19,7 +19,7 @@ from tests.measure.coverage.trial import (
     quantiles_at,
     sample_of,
 )
-from tolstat.analysis import capability, cycles, sequential, strength
+from tolstat.analysis import binomial, capability, cycles, strength
 from tolstat.analysis.binomial import clopper_pearson
 from tolstat.common.loads import FloatArray
 
@@ -118,11 +118,11 @@ def _until(share: float, width: float = 0.02, most: int = 20_000) -> Experiment:
 
     def once(rng: Rng) -> list[Found]:
         above, joints = 0, 0
-        for look in sequential.looks(most):
+        for look in binomial.looks(most):
             above, joints = above + int(rng.binomial(look - joints, share)), look
-            if sequential.narrow(width, above, 0, joints):
+            if binomial.narrow(width, above, 0, joints):
                 break
-        lower, upper = sequential.interval(above, 0, joints)
+        lower, upper = binomial.stop_interval(above, 0, joints)
         return [Found(float(lower), float(upper), share)]
 
     return Experiment((Asked("share at a stop", f"any law, {share:g}, narrower than {width:g}", most),), once)

@@ -17,7 +17,7 @@ from tolstat.display.table import Rows
 from tolstat.joint import Bearing
 from tolstat.joint.bearing import FOR_LIFE
 from tolstat.questions.shares import inapplicable, unusable, with_ends
-from tolstat.store import points, recorded
+from tolstat.store import recorded
 from tolstat.store.view import View
 
 JOINT = "joint"
@@ -119,7 +119,7 @@ def lives_of(view: View) -> Lives:
         When the view has several operating points, and the study does not give their shares of the time.
     """
     view.check("quantile")
-    bearing, duty, stores = _bearing(view), points.shares_of_time(view), [part.store for part in view.parts]
+    bearing, duty, stores = _bearing(view), view.shares_of_time, [part.store for part in view.parts]
     loads = np.stack([store.results(slice(None), ("equivalent_load",))["equivalent_load"] for store in stores])
     operation = [recorded.operating_points(store) for store in stores]
     swings, speeds = (np.abs([rows[name] for rows in operation]) for name in ("alpha", "speed"))  # (points, rows)
@@ -277,7 +277,7 @@ def contact_rows(view: View) -> Rows:
     if sum(column.field == "mode_share" for column in view.columns) < len(PINS) * len(Mode):
         return []
     modes = [part.read_results(("mode_share",))["mode_share"] for part in view.parts]
-    spent = np.tensordot(points.shares_of_revolutions(view), np.stack(modes), 1)
+    spent = np.tensordot(view.shares_of_revolutions, np.stack(modes), 1)
     rows = []
     for pins in (*((pin,) for pin in PINS), PINS):
         row: dict[str, Any] = {"place": pins[0] if len(pins) == 1 else ANY}

@@ -24,7 +24,6 @@ from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, P
 from tolstat.display.options import Load
 from tolstat.joint import HOLE_OF_PIN, perturb
 from tolstat.questions.shares import unusable, word
-from tolstat.store import points
 from tolstat.store.view import View
 
 MOST = 4000
@@ -93,7 +92,7 @@ def pairs(view: View, by: Load = None) -> Answer:
     if samples.size < FEWEST or np.ptp(load.values[samples]) == 0.0:
         few = f"has {samples.size} joints with a valid {load.name} that scatters"
         raise unusable(view, few, f"run {FEWEST} joints or more")
-    errors, values, point = view.errors(samples), load.values[samples], points.point_of(view, load.name)
+    errors, values, point = view.errors(samples), load.values[samples], view.point_of(load.name)
     # what is taken of the parameters, clearances and stations, is the same at every operating point
     used = combinations(errors, perturb(view.study.joint, view.at(point).store.operation, errors))
     rank = sorted(used, key=lambda name: -_spearman(used[name][CHOSEN], values[CHOSEN]))

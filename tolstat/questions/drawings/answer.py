@@ -20,7 +20,7 @@ from tolstat.display import drawing, text
 from tolstat.display.answer import Answer, Asked, Figure, Panel, Panels, Part, Rows, Sentence
 from tolstat.joint import Joint, Operation
 from tolstat.questions.drawings import views
-from tolstat.store import ResultFile, points, recorded
+from tolstat.store import ResultFile, recorded
 from tolstat.store.view import View
 
 LEGEND = (
@@ -65,7 +65,7 @@ def place_of(view: View, load: str, asked: Asked) -> Panel | None:
             if sample.limit is not None:
                 which = f"{'most often above' if sample.above(sample.limit).count else 'nearest to'} its limit"
             title = f"{place.name or load}: {which}"
-            title += f", at {points.point_of(view, load)}" if len(view.points) > 1 else ""
+            title += f", at {view.point_of(load)}" if len(view.points) > 1 else ""
         panel = _joint(view, [place.name], load)[place.view == "side"]
         return replace(panel, key="joint-worst", title=title)
     return None
@@ -73,7 +73,7 @@ def place_of(view: View, load: str, asked: Asked) -> Panel | None:
 
 def _joint(view: View, marked: Collection[str], load: str) -> tuple[Panel, Panel]:
     """Drawings of the joint at the operating point at which a load matters most; at the first one without a load."""
-    point = points.point_of(view, load) if load else view.points[0]
+    point = view.point_of(load) if load else view.points[0]
     front, side = views.views(recorded.joint_of(view.store, 0), view.at(point).store.operation.alpha, marked)
     return front, replace(side, title=f"{side.title}, at {point}") if point else side
 

@@ -14,8 +14,8 @@ from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import FloatArray
 from tolstat.common.tables import ERROR_FIELDS, Status, worst_status
 from tolstat.display.text import percent
-from tolstat.solver import rainflow
-from tolstat.store import points, recorded
+from tolstat.solver.histories import between
+from tolstat.store import recorded
 from tolstat.store.view import View
 from tolstat.study.fatigue import Fatigue, of_text
 
@@ -94,7 +94,7 @@ class Joints:
         if not self.visits:
             return None
         levels = (table.reshape(-1, len(self.duty)) for table in (low, high))
-        ranges, means, numbers = (table.reshape(*low.shape[:2], -1) for table in rainflow.between(self.visits, *levels))
+        ranges, means, numbers = (table.reshape(*low.shape[:2], -1) for table in between(self.visits, *levels))
         return Transitions(ranges, means, numbers / self.settings.turns)
 
 
@@ -121,7 +121,7 @@ def members(views: Sequence[View], shares: Sequence[float] | None) -> tuple[Sequ
         remedy = "give this file alone, or files with one operating point each" if len(views) > 1 else remedy
         if remedy:
             raise InputError([Fault(str(views[0].path), "has several operating points", remedy)])
-        views, shares = views[0].parts, points.shares_of_revolutions(views[0]).tolist()
+        views, shares = views[0].parts, views[0].shares_of_revolutions.tolist()
     shares = [1.0] if shares is None else shares
     if len(shares) != len(views) or min(shares, default=0.0) <= 0 or abs(sum(shares) - 1) > 1e-6:
         given = f"{list(shares)} for {len(views)} files"

@@ -19,7 +19,7 @@ from tolstat.common.tables import SIMULATED, Status
 from tolstat.display.table import Row, Rows
 from tolstat.questions.fatigue import duty
 from tolstat.questions.fatigue.duty import ANY, CONFIDENCE, Joints, only
-from tolstat.solver import rainflow
+from tolstat.solver.histories import KEPT, count
 from tolstat.store import hdf5, reader, revolutions
 from tolstat.store.view import View
 from tolstat.study.selection import select
@@ -86,7 +86,7 @@ def cycles_of(store: reader.Reader, slots: NDArray[np.intp], names: Sequence[str
     lacking = [name for h in histories if (name := f"{h.prefix}cycles") not in store.history_specs]
     if lacking and "cycles" in store.history_specs and not revolutions.held(store, histories):
         raise StoreError(str(Fault(str(store.path), f"holds no {', '.join(lacking)}", hdf5.RUN_AGAIN)))
-    table = np.empty((len(slots), len(names), rainflow.KEPT, 2), np.float32)
+    table = np.empty((len(slots), len(names), KEPT, 2), np.float32)
     number = np.empty((len(slots), len(names)))
     for part in revolutions.blocks(len(slots)):
         counted, counts = _count(store, slots[part], histories)
@@ -102,13 +102,13 @@ def cycles_of(store: reader.Reader, slots: NDArray[np.intp], names: Sequence[str
 def _count(
     store: reader.Reader, slots: NDArray[np.intp], histories: Sequence[LoadHistory]
 ) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Cycles of a few joints, and their numbers, as `rainflow.count` gives them; history after history."""
+    """Cycles of a few joints, and their numbers, as `histories.count` gives them; history after history."""
     names = [[f"{history.prefix}{name}" for history in histories] for name in ("cycles", "cycle_count")]
     if set(names[0]) <= set(store.history_specs):
         counted = {name: store.histories(name, slots) for group in names for name in group}
     else:
         turns = revolutions.loads(store, slots, [BUSHING_LOADS, *(h for h in histories if h != BUSHING_LOADS)])
-        joints = [rainflow.count({name: group[i] for name, group in turns.items()}) for i in range(len(slots))]
+        joints = [count({name: group[i] for name, group in turns.items()}) for i in range(len(slots))]
         counted = {name: np.stack([joint[name] for joint in joints]) for group in names for name in group}
     cycles, counts = (np.concatenate([counted[name] for name in group], axis=1) for group in names)
     return cycles, counts
@@ -145,7 +145,7 @@ def load_cycles(
         each operating point.
     shares : sequence of float, optional
         Share of the revolutions in each of several campaigns; the sum is 1. Those of the operating points of one
-        campaign follow from their shares of the time and their speeds, see `points.shares_of_revolutions`.
+        campaign follow from their shares of the time and their speeds, see `View.shares_of_revolutions`.
     names : sequence of str, optional
         Channels to keep, keys of `channels.CHANNELS`; by default those of bushings and those with an S–N line, some
         8 kB per joint.
@@ -277,8 +277,8 @@ def spectrum(loading: Loading, channel: str) -> Rows:
     values, nominal = (cycles.spectrum(each.of(channel), numbers)[:, 0] for each in (loading.cycles, loading.nominal))
     head, rows = {"channel": channel, "unit": CHANNELS[channel].unit}, list[Row]()
     for number, ranges, ideal in zip(numbers, values.T, nominal.T, strict=True):
-        count = {"nominal": only(ideal), "cycles": number * loading.settings.revolutions}
-        rows += _quantiles(head | count, ranges, loading)
+        columns = {"nominal": only(ideal), "cycles": number * loading.settings.revolutions}
+        rows += _quantiles(head | columns, ranges, loading)
     return rows
 
 

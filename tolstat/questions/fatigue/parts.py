@@ -18,7 +18,7 @@ from tolstat.common.loads import FloatArray
 from tolstat.common.tables import FAILED, Status
 from tolstat.display.table import Rows
 from tolstat.questions.fatigue import duty
-from tolstat.solver import rainflow
+from tolstat.solver import histories
 from tolstat.store import reader, revolutions
 from tolstat.store.view import View
 from tolstat.study.fatigue import Fatigue, StressPoint
@@ -130,7 +130,7 @@ def stresses_of(store: reader.Reader, slots: NDArray[np.intp], points: Sequence[
         signals, noise = zip(*(_signal(loads, *place) for place in places), strict=True)
         low[part], high[part] = (np.stack([end(s, axis=1) for s in signals], axis=1) for end in (np.min, np.max))
         for joint in range(len(loads)):
-            counted += [rainflow.periodic(s[joint], gate[joint]) for s, gate in zip(signals, noise, strict=True)]
+            counted += [histories.periodic(s[joint], gate[joint]) for s, gate in zip(signals, noise, strict=True)]
     number = np.array([len(ranges) for ranges, _ in counted], float).reshape(low.shape)
     table = np.zeros((2, len(counted), max(1, int(number.max(initial=0.0)))))
     for i, joint_cycles in enumerate(counted):
@@ -143,7 +143,7 @@ def stresses_of(store: reader.Reader, slots: NDArray[np.intp], points: Sequence[
 def _signal(loads: NDArray[np.floating], point: StressPoint, factors: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Stress over the revolution, (m, samples), and the range up to which cycles may be numerical noise, (m,), Pa."""
     at_bushing = loads[:, :, channels.BUSHING_LOADS.places.index(point.bushing)].astype(float)
-    return at_bushing @ factors, rainflow.GATE * np.max(np.abs(at_bushing) @ np.abs(factors), axis=1)
+    return at_bushing @ factors, histories.GATE * np.max(np.abs(at_bushing) @ np.abs(factors), axis=1)
 
 
 def _spread(part: Stresses, rows: NDArray[np.intp], n: int) -> Stresses:

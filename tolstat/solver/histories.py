@@ -1,6 +1,6 @@
-"""Rainflow cycles of a settled revolution, for one signal or for all channels of a joint.
+"""What is kept of a joint's loads over the last revolution: samples, Fourier coefficients, rainflow cycles.
 
-The revolution repeats, so counting begins at its largest value and every cycle closes (ASTM E1049-85, 5.4.5). The
+A settled revolution repeats, so counting begins at its largest value and every cycle closes (ASTM E1049-85, 5.4.5). The
 four-point method gives the same cycles when its residue is appended to itself and counted again.
 """
 
@@ -8,15 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import cache
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tolstat.common.channels import BUSHING_LOADS, CHANNELS, LOAD_HISTORIES, MEASURING, LoadHistory, channels_of
-from tolstat.common.load_kinds import measure_of
-from tolstat.common.tables import HistorySpec
+from tolstat.common.channels import BUSHING_LOADS, CHANNELS, LOAD_HISTORIES, SHAFT_LOADS, LoadHistory, channels_of
+from tolstat.common.load_kinds import CONTACTS, SPAN, measure_of
+from tolstat.common.tables import HistorySpec, Options
 
+Histories = Literal["none", "cycles", "harmonics", "harmonics+cycles", "full"]
 KEPT = 16
 """Maximum number of cycles kept per channel: joints made to ISO 2768-f have 1.7 a channel in the mean, 11 at most."""
 GATE = 1e-4
@@ -27,7 +28,127 @@ MIN_SAMPLES = 90
 are within 1 %."""
 
 
-def specs() -> dict[str, HistorySpec]:
+def history_specs(options: Options, histories: Histories, n_harmonics: int) -> dict[str, HistorySpec]:
+    """Describe the load histories that are kept of each joint.
+
+    Parameters
+    ----------
+    options : Options
+        ``steps_per_rev`` gives the number of samples; sample k belongs to the input angle 2 pi k / steps_per_rev.
+    histories : {"none", "cycles", "harmonics", "harmonics+cycles", "full"}
+        What is kept.
+    n_harmonics : int
+        Highest multiple of the input speed that ``"harmonics"`` keeps.
+
+    Returns
+    -------
+    dict of str to HistorySpec
+    """
+    n = options.steps_per_rev
+    if histories == "full":
+        contact = "contact force of pins 1-4: of the outermost station, of the innermost one, resultant of all stations"
+        modes = "contact mode of pins 1-4: 0 none, 1 one-point, 2 two-point, 3 uniform"
+        return {
+            "loads": _of_samples(BUSHING_LOADS, n),
+            "contact": HistorySpec((n, 4, len(CONTACTS)), "f4", "N", contact, ("theta", "pin", "contact_force")),
+            "shafts": _of_samples(SHAFT_LOADS, n),
+            "mode": HistorySpec((n, 4), "u1", "1", modes, ("theta", "pin")),
+            "tau": HistorySpec((n,), "f8", "1", "speed ratio", ("theta",)),
+        }
+    specs = cycle_specs() if "cycles" in histories else {}
+    if "harmonics" in histories:
+        specs |= harmonic_specs(min(n_harmonics, (n - 1) // 2) + 1)
+    return specs
+
+
+def _of_samples(history: LoadHistory, n: int) -> HistorySpec:
+    return HistorySpec((n, *history.shape), "f4", "N, N*m", history.meaning, ("theta", *history.axes))
+
+
+def extracted(
+    samples: NDArray[np.void], histories: Histories, specs: dict[str, HistorySpec]
+) -> dict[str, NDArray[Any]]:
+    """Extract the histories that are kept from the samples of the recorded revolution."""
+    if histories == "full":
+        fields = {name: samples["loads"][:, span] for name, span in SPAN.items()}
+        fields |= {name: samples[name] for name in samples.dtype.names or ()} | {"loads": samples["components"]}
+        return {name: fields[name].reshape(spec.shape) for name, spec in specs.items()}
+    loads = {
+        BUSHING_LOADS.name: np.ascontiguousarray(samples["components"]),
+        SHAFT_LOADS.name: np.ascontiguousarray(samples["shafts"]),
+    }
+    sample = count(loads) if "cycles" in histories else {}
+    if "harmonics" in histories:
+        sample |= coefficients(loads, specs["coefficients_real"].shape[-1])
+    return sample
+
+
+def harmonic_specs(kept: int) -> dict[str, HistorySpec]:
+    """Describe what `coefficients` gives for a joint, as histories of a result file; `kept`: number of coefficients."""
+    result: dict[str, HistorySpec] = {}
+    for history in LOAD_HISTORIES:
+        shape, axes = (*history.shape, kept), (*history.axes, "harmonic")
+        text = f"part of the Fourier coefficients c_h: {history.meaning}; "
+        text += "load(theta) = Re(c_0 + 2 sum c_h exp(i h theta))"
+        error = "largest deviation of the load so restored, relative to the largest |F| and |T| of the joint"
+        result |= {
+            f"{history.prefix}coefficients_real": HistorySpec(shape, "f4", "N, N*m", f"real {text}", axes),
+            f"{history.prefix}coefficients_imag": HistorySpec(shape, "f4", "N, N*m", f"imaginary {text}", axes),
+            f"{history.prefix}harmonics_error": HistorySpec((2,), "f8", "1", error, ("load",)),
+        }
+    return result
+
+
+def coefficients(loads: Mapping[str, NDArray[np.float64]], kept: int) -> dict[str, NDArray[Any]]:
+    """Fourier coefficients of the loads of a joint.
+
+    Parameters
+    ----------
+    loads : mapping of str to ndarray
+        By name of `LOAD_HISTORIES`, (samples, places, components) each, N and N m.
+    kept : int
+        Number of coefficients, the mean included.
+
+    Returns
+    -------
+    dict
+        By name of `specs`. Errors of all loads are relative to the largest bushing force and torque.
+    """
+    bushing = loads[BUSHING_LOADS.name]
+    size = [np.linalg.norm(bushing[..., k : k + 3], axis=-1).max() for k in (0, 3)]
+    coefficients: dict[str, NDArray[Any]] = {}
+    for history in LOAD_HISTORIES:
+        values = loads[history.name]
+        spectrum = np.moveaxis(np.fft.rfft(values, axis=0) / len(values), 0, -1)[..., :kept]
+        real, imag = spectrum.real.astype("f4"), spectrum.imag.astype("f4")
+        difference = np.abs(restore(real, imag, len(values)) - values).max(axis=(0, 1))
+        error = [difference[k : k + 3].max() / s if s > 0 else 0.0 for k, s in zip((0, 3), size, strict=True)]
+        parts = {"coefficients_real": real, "coefficients_imag": imag, "harmonics_error": np.array(error)}
+        coefficients |= {f"{history.prefix}{name}": part for name, part in parts.items()}
+    return coefficients
+
+
+def restore(real: NDArray[Any], imag: NDArray[Any], samples: int) -> NDArray[np.float64]:
+    """Restore load histories from their harmonics.
+
+    Parameters
+    ----------
+    real, imag : ndarray, shape (..., harmonics + 1)
+        Fourier coefficients as stored, N and N m.
+    samples : int
+        Number of equally spaced input angles, from zero.
+
+    Returns
+    -------
+    ndarray, shape (samples, ...)
+    """
+    spectrum = np.zeros((*real.shape[:-1], samples // 2 + 1), complex)
+    kept = min(real.shape[-1], spectrum.shape[-1])
+    spectrum[..., :kept] = real[..., :kept] + 1j * imag[..., :kept].astype(np.float64)
+    return np.moveaxis(np.fft.irfft(spectrum * samples, samples), -1, 0)
+
+
+def cycle_specs() -> dict[str, HistorySpec]:
     """Describe what `count` gives for a joint, as histories of a result file."""
     result: dict[str, HistorySpec] = {}
     for history in LOAD_HISTORIES:
@@ -138,12 +259,12 @@ def count(loads: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
     Returns
     -------
     dict
-        By name of `specs`, for each history given: ``cycles`` (channels, KEPT, 2), N and N m, and ``cycle_count``
+        By name of `cycle_specs`, for each history given: ``cycles`` (channels, KEPT, 2), N and N m, and ``cycle_count``
         (channels,); the channels are `channels_of` the history. NaN and 0 when a load is not finite.
     """
     from tolstat.kernel.revolution import rainflow
 
-    described = specs()
+    described = cycle_specs()
     counted: dict[str, NDArray[Any]] = {}
     finite = all(np.isfinite(values).all() for values in loads.values())
     for history in (history for history in LOAD_HISTORIES if history.name in loads):
@@ -152,23 +273,19 @@ def count(loads: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
         if finite:
             ranges, means = np.empty((2, len(number), KEPT))
             own, cycles = np.ascontiguousarray(loads[history.name], dtype=float), np.empty(len(number), np.int64)
-            gates = GATE * _sizes(loads[BUSHING_LOADS.name])[_measures(history)]
+            gates = _gates(history, loads[BUSHING_LOADS.name])
             rainflow.count_joint(own, _signals(history), gates, ranges, means, cycles)
             table[...], number[...] = np.stack([ranges, means], axis=-1), cycles
         counted |= dict(zip(names, (table, number), strict=True))
     return counted
 
 
-def _sizes(bushing: NDArray[Any]) -> NDArray[np.float64]:
-    """Largest force and torque of the bushings, the measures of all loads in the order of `MEASURING`."""
-    spans = [CHANNELS[f"{BUSHING_LOADS.places[0]}.{kind.symbol}"].components for kind in MEASURING]
-    return np.array([np.linalg.norm(bushing[..., span].astype(float), axis=-1).max() for span in spans])
-
-
-@cache
-def _measures(history: LoadHistory) -> NDArray[np.intp]:
-    """Index in `MEASURING` of what each channel of a history is measured against."""
-    return np.array([MEASURING.index(measure_of(channel.kind)) for channel in channels_of(history)])
+def _gates(history: LoadHistory, bushing: NDArray[Any]) -> NDArray[np.float64]:
+    """Range up to which no cycle of a channel is counted: a share of the bushings' largest force or torque."""
+    kinds = [measure_of(channel.kind) for channel in channels_of(history)]
+    spans = {kind.key: CHANNELS[f"{BUSHING_LOADS.places[0]}.{kind.symbol}"].components for kind in kinds}
+    size = {key: np.linalg.norm(bushing[..., span].astype(float), axis=-1).max() for key, span in spans.items()}
+    return GATE * np.array([size[kind.key] for kind in kinds])
 
 
 @cache

@@ -390,7 +390,7 @@ def test_every_fault_of_the_points_is_told():
         of_text(text, "a.toml")
     found = {fault.place.removeprefix("a.toml: fatigue"): fault.found for fault in error.value.faults}
     assert list(found) == [
-        *("", ".point.a.bushing", ".point.b", ".point.c.T_e", ".point.d", ".point.e"),
+        *(".starts", ".point.a.bushing", ".point.b", ".point.c.T_e", ".point.d", ".point.e"),
         *(".point.f.k", ".point.f.S_D", ".point.f.T_S", ".point.f.x", ".point.g"),
     ]
     assert "has both S_D and S_aD" in found[".point.d"]

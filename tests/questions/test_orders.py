@@ -20,8 +20,8 @@ from tolstat.display import drawing
 from tolstat.display.answer import Asked
 from tolstat.display.blocks import Panels
 from tolstat.questions import orders as module
-from tolstat.questions import sections
 from tolstat.questions.orders import orders
+from tolstat.report import page
 from tolstat.solver.histories import history_specs
 from tolstat.store import ResultFile, Writer
 
@@ -242,7 +242,7 @@ def test_the_page_shows_orders_where_the_study_asks_for_loads_of_the_shafts(tmp_
     with ResultFile.open(path) as store:
         assert module.are_asked(store.view()) == asked
         remarks = Asked(path)
-        found = [own.key for own in sections(store.view(), remarks) if own.key == "orders"]
+        found = [own.key for own in page.sections_of(store.view(), remarks) if own.key == "orders"]
     kept = "results" not in change[1]
     assert found == (["orders"] if asked and kept else [])
     left_out = [note for note in remarks.notes if note.startswith("orders is left out")]

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
-from pydantic import AfterValidator, Field, WithJsonSchema, model_validator
+from pydantic import AfterValidator, Field, ValidationInfo, WithJsonSchema, field_validator, model_validator
 
 from tolstat.analysis.strength import Line
 from tolstat.common import units
@@ -183,13 +183,13 @@ class Settings(Strict):
     )
     """points of the parts by name, with stress per load and S–N line"""
 
-    @model_validator(mode="after")
-    def _starts_take_revolutions(self) -> Settings:
-        if self.revolutions is not None and self.starts > self.revolutions:
-            raise refuse(
-                "{starts} starts in {revolutions} revolutions", "give at most one for each", "starts", "revolutions"
-            )
-        return self
+    @field_validator("starts")
+    @classmethod
+    def _take_revolutions(cls, starts: float, info: ValidationInfo) -> float:
+        revolutions = info.data.get("revolutions")
+        if revolutions is not None and starts > revolutions:
+            raise refuse(f"{starts:g} starts in {revolutions:g} revolutions", "give at most one for each")
+        return starts
 
 
 class LineEntry(Strict):

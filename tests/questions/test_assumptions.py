@@ -157,6 +157,13 @@ def test_every_value_is_simulated_and_then_all_together(varied, quick):
 
 
 @pytest.mark.usefixtures("quick")
+def test_fewer_joints_than_the_campaign_has_are_an_answer(tmp_path):
+    path = made(tmp_path)
+    simulated(path, joints=100)
+    assert {row["n"] for row in standing(path).rows} == {100}
+
+
+@pytest.mark.usefixtures("quick")
 def test_a_long_campaign_gives_its_first_thousand_joints(tmp_path):
     path = made(tmp_path, TEXT.replace("n = 600", "n = 1200"))
     simulated(path)

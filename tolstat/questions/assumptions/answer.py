@@ -172,7 +172,7 @@ MARGIN = 1.2
 def simulate(
     path: Path,
     work: Work,
-    joints: Annotated[int, Opt("N", least=100)] = variations.JOINTS,
+    joints: Annotated[int, Opt("N", least=variations.LEAST)] = variations.JOINTS,
     accepted: Accepted = math.nan,
 ) -> list[Path]:
     """Simulate the first joints of a campaign with each value of what is assumed, and keep their loads in the file.

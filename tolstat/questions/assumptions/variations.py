@@ -24,6 +24,8 @@ from tolstat.study.widths import lines
 
 JOINTS = 1000
 """Default number of joints of each variation: the first of the campaign, or all if it has fewer."""
+LEAST = 100
+"""Least number of joints of a variation, or all of a smaller campaign: what fewer show is no answer."""
 ALL = "all assumptions"
 """Name of the variations of all assumptions together."""
 BETTER, WORSE = "all at better values", "all at worse values"
@@ -272,7 +274,7 @@ class _Joints(ChangedJoints):
 
     def __init__(self, view: View) -> None:
         super().__init__(view, view.decisive, view.altered)
-        self._least = max(joints_of(view), 1)
+        self._least = max(min(LEAST, joints_of(view)), 1)
         self._loads = {kept.key(about): loads[: len(self.base)] for about, loads in self.changes(sets.JOINT)}
 
     def simulated(self, variations: Sequence[Variation]) -> list[tuple[Variation, FloatArray]]:

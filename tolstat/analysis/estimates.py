@@ -161,9 +161,8 @@ class _Replaced(Column):
     def ascending(self) -> FloatArray:
         """Numbers of the joints that count, ascending, in a new array."""
         whole, old, new = self.base.ascending, self._old.ascending, self._new.ascending
-        replaced = (
-            np.searchsorted(whole, old) + np.arange(old.size) - np.searchsorted(old, old)
-        )  # equal ones one by one
+        # equal numbers are replaced one by one
+        replaced = np.searchsorted(whole, old) + np.arange(old.size) - np.searchsorted(old, old)
         kept = np.delete(whole, replaced)
         return frozen(np.insert(kept, np.searchsorted(kept, new), new))
 

@@ -25,7 +25,7 @@ from tolstat.study.widths import lines
 JOINTS = 1000
 """Default number of joints of each variation: the first of the campaign, or all if it has fewer."""
 LEAST = 100
-"""Least number of joints of a variation, or all of a smaller campaign: what fewer show is no answer."""
+"""Number of joints from which on a variation is shown; a smaller campaign needs all of its joints."""
 ALL = "all assumptions"
 """Name of the variations of all assumptions together."""
 BETTER, WORSE = "all at better values", "all at worse values"

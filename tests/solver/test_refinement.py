@@ -8,6 +8,7 @@ import pytest
 from tests.support.environment import ROOT
 from tolstat import joint, sampling, study
 from tolstat.campaign.remedy import remedy
+from tolstat.common.load_kinds import LOAD_KINDS, measure_of
 from tolstat.common.tables import RESULT, Method, Options, Status
 from tolstat.solver import refinement
 from tolstat.solver.simulation import simulate_rows
@@ -57,6 +58,24 @@ def test_ringing_on_a_peak_is_met_by_a_closer_look() -> None:
         low = [row[f"{name}_max"] - row[f"{name}_range"] for row in (near.results, plain)]
         assert (low[0] <= low[1] * (1 + 1e-12)).all()
         np.testing.assert_array_equal(near.results[f"{name}_mean"], plain[f"{name}_mean"])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["iso2768_f", "rigid_shafts"])
+def test_loads_are_within_a_thousandth_in_99_of_100_joints(name: str) -> None:
+    """At the default steps, against TR-BDF2 with 5760, relative to what a load is measured against."""
+    plan = study.load(STUDIES / f"{name}.toml")
+    first = plan.first_sample + 1000
+    params = joint.perturb(plan.joint, plan.operation, sampling.draw(plan, range(first, first + 200)))
+    rows = simulate_rows(params, Options()).results
+    fine = PLAIN._replace(steps_per_rev=5760, method=int(Method.TR_BDF2))
+    expected = simulate_rows(params, fine).results
+    assert (rows["status"] == Status.OK).all()
+    assert (expected["status"] == Status.OK).all()
+    for kind in (kind for kind in LOAD_KINDS if kind.decides):
+        largest, correct = (table[f"{kind.key}_max"].reshape(200, -1) for table in (rows, expected))
+        size = expected[f"{measure_of(kind).key}_max"].reshape(200, -1).max(axis=1)
+        assert np.quantile(np.abs(largest - correct).max(axis=1) / size, 0.99) < 1e-3, kind.key
 
 
 def test_a_joint_that_is_wrong_at_180_steps_is_refined() -> None:

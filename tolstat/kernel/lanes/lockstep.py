@@ -97,25 +97,22 @@ def finish_joint(lane, status, options, batch, queue):
     the joint or step.
     """
     control, joint, samples = batch.control, batch.control.joint[lane], samples_of(lane, batch, queue)
-    par, out, k, failed = queue.rows[joint], queue.results[joint], 0, -1
+    par, out, k, failed, looking = queue.rows[joint], queue.results[joint], 0, -1, False
     if control.phase[lane] == LOOK:
-        if status == NEWTON_FAILED:
-            control.left[lane] = 0
-        status, k = OK, control.k[lane] + 1
+        looking, status, k = status != NEWTON_FAILED, OK, control.k[lane] + 1
     elif status == NEWTON_FAILED:
         failed = control.k[lane] if options.fidelity == DYNAMIC else -1
     else:
         if options.fidelity == QUASISTATIC:
             speed_ratios(par, samples)
         summarise(par, samples, out)
-        control.left[lane] = control.looked[lane] = 0
         if is_finite(out):
             status = OK if status == OK else NOT_SETTLED
             write_diagnostics(status, par, options, batch.notes[lane], samples, out)
         else:
             status, failed = NOT_FINITE, int(control.steps[lane])
     closer = status == OK and options.fidelity == DYNAMIC and options.peak_substeps > 1
-    if closer and next_closeup_step(lane, k, par, options, batch, samples, out):
+    if closer and next_closeup_step(lane, k, looking, par, options, batch, samples, out):
         return
     end_joint(lane, status, failed, options.steps_per_rev, options, batch, queue)
 
@@ -138,26 +135,29 @@ def finish_adaptive_joint(lane, status, options, batch, queue):
 
 
 @njit
-def next_closeup_step(lane, k, par, options, batch, samples, out):
+def next_closeup_step(lane, k, looking, par, options, batch, samples, out):
     """Set up the next step of the recorded revolution that is integrated again, see `closeup`; return if there is one.
 
-    `k`: first step to consider, the one to sample `k`.
+    `k`: first step to consider, the one to sample `k`; `looking`: whether the step before it was integrated again.
     """
     control, n, h = batch.control, options.steps_per_rev, grid_step(par, options)
     while k <= n:
-        if k < n and switches(k, samples) and on_a_peak(k, samples, out):
-            if control.left[lane] == 0:
-                forget_steps(lane, control, batch.motion)
-                recall(k - 1, h, lane, samples, batch.motion)
-                control.looked[lane] = 0
+        switched = k < n and switches(k, samples)
+        rings = k < n and (switched or looking) and on_a_peak(k, samples, out)
+        if rings and not looking:
+            forget_steps(lane, control, batch.motion)
+            recall(k - 1, h, options.newton_tol, lane, samples, batch.motion)
+            control.looked[lane] = 0
+        control.left[lane] = control.left[lane] - 1 if looking else 0
+        if rings and switched:
             control.left[lane] = STEPS_AGAIN
-        if control.left[lane] > 0:
-            control.left[lane] -= 1
+        if rings or control.left[lane] > 0:
             control.phase[lane], control.k[lane], control.part[lane] = LOOK, k, 0
             control.origin[lane], control.grid[lane] = (n + k - 1) * h, h / options.peak_substeps
             control.done[lane] = control.level[lane] = 0
             set_substep(lane, options, control, batch.motion)
             return True
+        looking = False
         k += 1
     return False
 

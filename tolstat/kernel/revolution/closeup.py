@@ -2,12 +2,12 @@
 
 When a contact opens or closes, the bodies ring at kilohertz. The steps of the output grid do not resolve the ringing,
 and need not: it decays within a few degrees. On top of a load's peak, however, it decides the largest load. There the
-step with the switch and the next one are integrated again in smaller parts, from the recorded motion; in place of BDF2,
-which damps the ringing, by the trapezoidal rule. The parts count among the largest and smallest loads; the recorded
-samples stay as they are.
+steps from the switch on are integrated again in smaller parts, from the recorded motion, as long as it rings near the
+peak; in place of BDF2, which damps the ringing, by the trapezoidal rule. The parts count among the largest and smallest
+loads; the recorded samples stay as they are.
 """
 
-from tolstat.kernel.integrators.memory import H_OLD, TRAPEZOIDAL
+from tolstat.kernel.integrators.memory import H_OLD, LAST_ITERATION_BELOW, TRAPEZOIDAL
 from tolstat.kernel.mechanics.loads import (
     DECIDING,
     INTERPOLATED,
@@ -21,13 +21,16 @@ from tolstat.kernel.mechanics.topology import N_DOF
 from tolstat.kernel.revolution.settle import peak
 from tolstat.kernel.simd.jit import njit
 
-NEAR = 0.01
-"""Distance of a load from its largest value, in units of its measure, that ringing may bridge."""
-KINK = 5e-4
-"""Third difference of a load's samples, in the units of `NEAR`, up to which ringing is too weak to bridge that
-distance."""
+KINK = 2e-4
+"""Third difference of a load's samples, in units of its measure, up to which ringing is too weak to count."""
+REACH = 7.0
+"""Distance of a load from its largest value, in units of the third difference of its samples, that ringing may
+bridge."""
 STEPS = 2
-"""Steps of the grid that are integrated again: the one in which the contact switches, and the next."""
+"""Least number of steps of the grid that are integrated again: the one in which the contact switches, and the next."""
+LAST_ITERATION_FACTOR = 1000.0
+"""Residual, in units of `newton_tol`, up to which one more iteration with the same tangent is the last: parts are so
+short that it takes off all but a hundredth."""
 
 
 @njit
@@ -41,7 +44,7 @@ def switches(s, samples):
 
 @njit
 def on_a_peak(s, samples, out):
-    """Whether a load that decides has a kink between samples `s - 1` and `s` and is near its largest value there."""
+    """Whether a load that decides has a kink about samples `s - 1` and `s` and is near its largest value there."""
     n = samples.size
     for measure in range(N_MEASURES):
         size = size_of(measure, out.largest)
@@ -50,7 +53,7 @@ def on_a_peak(s, samples, out):
             m0, m1 = samples[s - 2].loads[i], samples[s - 1].loads[i]
             m2, m3, m4 = samples[s].loads[i], samples[(s + 1) % n].loads[i], samples[(s + 2) % n].loads[i]
             kink = max(abs(m3 - m0 - 3 * (m2 - m1)), abs(m4 - m1 - 3 * (m3 - m2)))
-            if max(m1, m2, m3) > out.largest[i] - NEAR * size and kink > KINK * size:
+            if kink > KINK * size and max(m1, m2, m3) > out.largest[i] - REACH * kink:
                 return True
     return False
 
@@ -84,10 +87,11 @@ def count_in(j, fine, out):
 
 
 @njit
-def recall(s, h, lane, samples, motion):
+def recall(s, h, newton_tol, lane, samples, motion):
     """Restore recorded sample `s` as the last accepted point of a lane; `h` is the step of the output grid, s.
 
-    `motion`: record of MOTION. Accelerations are those of BDF2's formula for equal steps.
+    `motion`: record of MOTION; `newton_tol`: residual that ends Newton's iteration. Accelerations are those of BDF2's
+    formula for equal steps.
     """
     here, before, first = samples[s], samples[s - 1], samples[s - 2]
     for i in range(N_DOF):
@@ -95,3 +99,4 @@ def recall(s, h, lane, samples, motion):
         motion.q1[i, lane], motion.v1[i, lane] = before.q[i], before.v[i]
         motion.a0[i, lane] = (3 * here.v[i] - 4 * before.v[i] + first.v[i]) / (2 * h)
     motion.memory[H_OLD, lane], motion.memory[TRAPEZOIDAL, lane] = h, 1.0
+    motion.memory[LAST_ITERATION_BELOW, lane] = LAST_ITERATION_FACTOR * newton_tol

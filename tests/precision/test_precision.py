@@ -87,17 +87,19 @@ def test_jobs_cover_every_contender_joint_and_setting(there, monkeypatch):
     asked, base = setup.load(STUDY)
     params, count = choose(base, asked.joints, asked.seed, asked.tolstat.block)
     todo = list(setup.jobs(asked, base, said.append))
-    assert len(todo) == count * (1 + 6 + 4 * there + 4) + 1
+    assert len(todo) == count * (1 + 6 + 4 * there + 4) + 2
     by_name = {job.contender: job for job in todo}
     assert ("CVODE" in "".join(said)) == ("Exudyn" in "".join(said)) != there
     for name in {"Exudyn", "Exudyn, our Jacobian"} & set(by_name):
         assert by_name[name].settings == asked.tolstat.steps_per_rev
     assert by_name["LSODA"].settings == asked.others.rtol
-    assert list(by_name)[-5:] == [*("BDF2", "TR-BDF2", "quasistatic", "ideal joint", "BDF2, 64 joints at once")]
+    together = ["BDF2, 64 joints at once", "BDF2, uniform steps alone, 64 joints at once"]
+    assert list(by_name)[-6:] == ["BDF2", "TR-BDF2", "quasistatic", "ideal joint", *together]
     assert len(by_name["quasistatic"].options) == len(asked.tolstat.steps_per_rev)
     assert {o.fidelity for o in by_name["quasistatic"].options} == {1}
     assert {o.method for o in by_name["TR-BDF2"].options} == {1}
-    assert len(by_name["BDF2, 64 joints at once"].params) == 64
+    assert [len(by_name[name].params) for name in together] == [64, 64]
+    assert {o.peak_substeps for o in by_name[together[1]].options} == {1}
     assert by_name["Radau"].params.tobytes() == params[count - 1 : count].tobytes()
 
 

@@ -146,7 +146,7 @@ def next_closeup_step(lane, k, looking, par, options, batch, samples, out):
         rings = k < n and (switched or looking) and on_a_peak(k, samples, out)
         if rings and not looking:
             forget_steps(lane, control, batch.motion)
-            recall(k - 1, h, options.newton_tol, lane, samples, batch.motion)
+            recall(k - 1, lane, par, options, samples, batch.motion)
             control.looked[lane] = 0
         control.left[lane] = control.left[lane] - 1 if looking else 0
         if rings and switched:

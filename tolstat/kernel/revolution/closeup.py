@@ -3,9 +3,11 @@
 When a contact opens or closes, the bodies ring at kilohertz. The steps of the output grid do not resolve the ringing,
 and need not: it decays within a few degrees. On top of a load's peak, however, it decides the largest load. There the
 steps from the switch on are integrated again in smaller parts, from the recorded motion, as long as it rings near the
-peak; in place of BDF2, which damps the ringing, by the trapezoidal rule. The parts count among the largest and smallest
-loads; the recorded samples stay as they are.
+peak; in place of BDF2, which damps the ringing, by the trapezoidal rule, if the parts resolve it. The parts count among
+the largest and smallest loads; the recorded samples stay as they are.
 """
+
+import math
 
 from tolstat.kernel.integrators.memory import H_OLD, LAST_ITERATION_BELOW, TRAPEZOIDAL
 from tolstat.kernel.mechanics.loads import (
@@ -17,8 +19,9 @@ from tolstat.kernel.mechanics.loads import (
     OF_MEASURE,
     size_of,
 )
-from tolstat.kernel.mechanics.topology import N_DOF
-from tolstat.kernel.revolution.settle import peak
+from tolstat.kernel.mechanics.scale import stiffness
+from tolstat.kernel.mechanics.topology import N_DOF, PIN
+from tolstat.kernel.revolution.settle import grid_step, peak
 from tolstat.kernel.simd.jit import njit
 
 KINK = 2e-4
@@ -28,6 +31,9 @@ REACH = 7.0
 bridge."""
 STEPS = 2
 """Least number of steps of the grid that are integrated again: the one in which the contact switches, and the next."""
+LONGEST = 4 * math.pi
+"""Longest part that the trapezoidal rule takes, in units of sqrt(m/k) of a pin on its bushing: two periods. In longer
+ones ringing dies away, but the trapezoidal rule would go on with it."""
 LAST_ITERATION_FACTOR = 1000.0
 """Residual, in units of `newton_tol`, up to which one more iteration with the same tangent is the last: parts are so
 short that it takes off all but a hundredth."""
@@ -87,16 +93,16 @@ def count_in(j, fine, out):
 
 
 @njit
-def recall(s, h, newton_tol, lane, samples, motion):
-    """Restore recorded sample `s` as the last accepted point of a lane; `h` is the step of the output grid, s.
+def recall(s, lane, par, options, samples, motion):
+    """Restore recorded sample `s` as the last accepted point of a lane, for steps in `options.peak_substeps` parts.
 
-    `motion`: record of MOTION; `newton_tol`: residual that ends Newton's iteration. Accelerations are those of BDF2's
-    formula for equal steps.
+    `motion`: record of MOTION. Accelerations are those of BDF2's formula for equal steps.
     """
-    here, before, first = samples[s], samples[s - 1], samples[s - 2]
+    h, here, before, first = grid_step(par, options), samples[s], samples[s - 1], samples[s - 2]
     for i in range(N_DOF):
         motion.q0[i, lane], motion.v0[i, lane] = here.q[i], here.v[i]
         motion.q1[i, lane], motion.v1[i, lane] = before.q[i], before.v[i]
         motion.a0[i, lane] = (3 * here.v[i] - 4 * before.v[i] + first.v[i]) / (2 * h)
-    motion.memory[H_OLD, lane], motion.memory[TRAPEZOIDAL, lane] = h, 1.0
-    motion.memory[LAST_ITERATION_BELOW, lane] = LAST_ITERATION_FACTOR * newton_tol
+    resolved = h / options.peak_substeps <= LONGEST * math.sqrt(par.pin_mass / stiffness(PIN, par)[0])
+    motion.memory[H_OLD, lane], motion.memory[TRAPEZOIDAL, lane] = h, 1.0 if resolved else 0.0
+    motion.memory[LAST_ITERATION_BELOW, lane] = LAST_ITERATION_FACTOR * options.newton_tol

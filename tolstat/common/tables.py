@@ -94,7 +94,7 @@ def deciding(status: Sequence[NDArray[np.uint8]]) -> NDArray[np.intp]:
 def worst_status(status: Sequence[NDArray[np.uint8]]) -> NDArray[np.uint8]:
     """Status of joints over operating points, (n,); see `deciding`."""
     first = status[0]
-    return first if all(own is first for own in status) else np.choose(deciding(status), status)
+    return first if all(codes is first for codes in status) else np.choose(deciding(status), status)
 
 
 STATUS_TEXT = {
@@ -167,6 +167,11 @@ class Options(NamedTuple):
     peak_substeps: int = 40
     max_refinements: int = 3
     duration: int = 100
+
+
+def follows_error(options: Options) -> bool:
+    """Whether steps are error-controlled: dynamic TR-BDF2 with a tolerance."""
+    return options.method == Method.TR_BDF2 and options.rtol > 0 and options.fidelity == Fidelity.DYNAMIC
 
 
 class HistorySpec(NamedTuple):

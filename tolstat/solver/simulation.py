@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.common import tables
-from tolstat.common.tables import RESULT, SIMULATED, Fidelity, Method, Options, Simulation, Start, Status
+from tolstat.common.tables import RESULT, SIMULATED, Fidelity, Options, Simulation, Start, Status
 from tolstat.joint import ideal
 from tolstat.solver import refinement, stationary
 from tolstat.solver.histories import Histories, extracted, history_specs
@@ -59,11 +59,6 @@ def width_for(joints: int) -> int:
     return 1 if switched_off or joints <= MOST_ALONE else WIDTH
 
 
-def follows_error(options: Options) -> bool:
-    """Whether these settings mean error-controlled steps."""
-    return options.fidelity == Fidelity.DYNAMIC and options.method == Method.TR_BDF2 and options.rtol > 0
-
-
 def simulate_rows(
     params: NDArray[np.void], options: Options, histories: Histories = "none", n_harmonics: int = 16
 ) -> Simulation:
@@ -98,7 +93,7 @@ def simulate_rows(
     left = np.full(len(params), allowed)
 
     def simulate(rows: NDArray[np.intp], settings: Options) -> tuple[NDArray[np.void], NDArray[np.void]]:
-        out, follows = np.zeros(len(rows), RESULT).view(np.recarray), follows_error(settings)
+        out, follows = np.zeros(len(rows), RESULT).view(np.recarray), tables.follows_error(settings)
         blocks = np.zeros((len(rows), settings.max_revs) if follows else (0, 0), RESULT).view(np.recarray)
         still_allowed, of_rows = left[rows], steps[rows] if follows else None
         run = simulate_together(params[rows], settings, still_allowed, bool(specs), out, blocks, of_rows)

@@ -6,6 +6,7 @@ point, cell or angle. Lanes never wait for each other's convergence, and a lane 
 one from the queue. What a lane does depends only on its own joint, and so does every bit of the result.
 """
 
+from tolstat.kernel.codes import DYNAMIC, NEWTON_FAILED, NOT_FINITE, NOT_SETTLED, OK, OUTSIDE_MODEL, QUASISTATIC, RAMP
 from tolstat.kernel.integrators.mesh import cells_of, load_error, parts_of
 from tolstat.kernel.lanes.batch import (
     ANGLE,
@@ -41,14 +42,6 @@ from tolstat.kernel.mechanics.topology import N_DOF
 from tolstat.kernel.revolution.closeup import STEPS as STEPS_AGAIN
 from tolstat.kernel.revolution.closeup import on_a_peak, recall, switches
 from tolstat.kernel.revolution.outcome import (
-    DYNAMIC,
-    NEWTON_FAILED,
-    NOT_FINITE,
-    NOT_SETTLED,
-    OK,
-    OUTSIDE_MODEL,
-    QUASISTATIC,
-    RAMP,
     clear_results,
     clear_samples,
     finish,
@@ -118,8 +111,8 @@ def finish_joint(lane, status, options, batch, queue):
 
 
 @njit
-def give_up(lane, options, batch, queue):
-    """Write how a joint without iterations left has ended, and empty its lane."""
+def finish_spent_joint(lane, options, batch, queue):
+    """Write that Newton has failed for a joint without iterations left, and empty its lane."""
     k = batch.control.k[lane]
     if follows_error(options):
         k = -(-k // cells_of(options.steps_per_rev))
@@ -262,7 +255,7 @@ def lockstep(options, patience, batch, queue, tally):
                 continue
             joint, phase, status = at.joint[lane], at.phase[lane], NOT_SETTLED
             if at.iterations[lane] >= queue.left[joint]:
-                give_up(lane, options, batch, queue)
+                finish_spent_joint(lane, options, batch, queue)
                 queued = fill(lane, queued, options, batch, queue)
                 continue
             here, goes_on = samples_of(lane, batch, queue), True

@@ -4,6 +4,7 @@
 lanes that begin a step, stage or angle, and lanes whose trial point is accepted before that.
 """
 
+from tolstat.kernel.codes import QUASISTATIC, TR_BDF2
 from tolstat.kernel.integrators import bdf2, trbdf2
 from tolstat.kernel.integrators.memory import AHEAD, H_OLD, LAST_ITERATION_BELOW, STAGED_STEP, TRAPEZOIDAL
 from tolstat.kernel.lanes.batch import CHECK
@@ -11,14 +12,10 @@ from tolstat.kernel.lanes.equilibrium import CA_REGULAR, CV_REGULAR, CV_STATIC, 
 from tolstat.kernel.mechanics.linsolve import factorise, solve
 from tolstat.kernel.mechanics.tangent import assemble
 from tolstat.kernel.mechanics.topology import N_DOF
-from tolstat.kernel.revolution.outcome import QUASISTATIC
 from tolstat.kernel.revolution.quasistatic import extrapolate, keep
-from tolstat.kernel.revolution.resolve import TR_BDF2
 from tolstat.kernel.simd.jit import njit
 from tolstat.kernel.simd.lane import retain, where
 
-formula, trial = bdf2.formula, bdf2.trial
-first_and_second, first, second = trbdf2.formula, trbdf2.first, trbdf2.second
 SLOW = 0.2
 """Ratio of successive residuals above which the tangent is renewed."""
 ROUNDOFF = 10 * 2.0**-52
@@ -29,7 +26,7 @@ ROUNDOFF = 10 * 2.0**-52
 def begin_steps(begins, passed, motion, control):
     """Accept the last sub-step where it passed; predict the trial point of the next one where one begins (BDF2)."""
     h = control.h
-    of = formula(h, motion.memory[H_OLD], motion.memory[TRAPEZOIDAL])
+    coefficients = bdf2.formula(h, motion.memory[H_OLD], motion.memory[TRAPEZOIDAL])
     known = motion.memory[AHEAD] > 0
     for i in range(N_DOF):
         q, v, a, q0, v0 = motion.q[i], motion.v[i], motion.a[i], motion.q0[i], motion.v0[i]
@@ -37,30 +34,31 @@ def begin_steps(begins, passed, motion, control):
         last = retain(passed, q, q0), retain(passed, v, v0), retain(passed, a, motion.a0[i])
         motion.q1[i], motion.v1[i] = before
         motion.q0[i], motion.v0[i], motion.a0[i] = last
-        guess = trial(h, of, last, before, known, motion.ahead[i])
+        guess = bdf2.trial(h, coefficients, last, before, known, motion.ahead[i])
         motion.q[i] = retain(begins, guess[0], q)
         motion.v[i] = retain(begins, guess[1], v)
         motion.a[i] = retain(begins, guess[2], a)
-    control.cv = where(begins, of[0], control.cv)
-    control.ca = where(begins, of[0] * of[0], control.ca)
+    control.cv = where(begins, coefficients[0], control.cv)
+    control.ca = where(begins, coefficients[0] * coefficients[0], control.ca)
 
 
 @njit
 def begin_parts(begins, passed, motion, control):
     """Accept the last part where it passed; predict the trial point of a stage where one begins (TR-BDF2)."""
-    of, later = first_and_second(control.h, motion.memory[STAGED_STEP]), control.stage > 0
-    held = begins & later
+    coefficients, later = trbdf2.formula(control.h, motion.memory[STAGED_STEP]), control.stage > 0
+    at_second = begins & later
     for i in range(N_DOF):
         q, v, a = motion.q[i], motion.v[i], motion.a[i]
         last = retain(passed, q, motion.q0[i]), retain(passed, v, motion.v0[i]), retain(passed, a, motion.a0[i])
         motion.q0[i], motion.v0[i], motion.a0[i] = last
-        one, two = first(of, last, motion.aux[i]), second(of, last, (q, v, a))
-        motion.v1[i], motion.aux[i] = retain(held, v, motion.v1[i]), retain(held, a, motion.aux[i])
+        one = trbdf2.first(coefficients, last, motion.aux[i])
+        two = trbdf2.second(coefficients, last, (q, v, a))
+        motion.v1[i], motion.aux[i] = retain(at_second, v, motion.v1[i]), retain(at_second, a, motion.aux[i])
         motion.q[i] = retain(begins, where(later, two[0], one[0]), q)
         motion.v[i] = retain(begins, where(later, two[1], one[1]), v)
         motion.a[i] = retain(begins, where(later, two[2], one[2]), a)
-    control.cv = where(begins, of[0], control.cv)
-    control.ca = where(begins, of[0] * of[0], control.ca)
+    control.cv = where(begins, coefficients[0], control.cv)
+    control.ca = where(begins, coefficients[0] * coefficients[0], control.ca)
 
 
 @njit

@@ -9,7 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tolstat.common.tables import KERNEL_RESULT, Fidelity, Method, Options, Status
+from tolstat.common import tables
+from tolstat.common.tables import KERNEL_RESULT, Options
+from tolstat.kernel.codes import NOT_FINITE, NOT_SETTLED, OK
 from tolstat.kernel.integrators.memory import STAGED_STEP, TOLERANCE
 from tolstat.kernel.integrators.mesh import CELL, cells_of, forget_mesh, refine_mesh, set_scale
 from tolstat.kernel.mechanics.loads import FORCES, N_AVERAGED, N_DECIDING, N_INSTANT, TORQUES
@@ -30,10 +32,7 @@ from tolstat.kernel.revolution.trail import (
 )
 from tolstat.kernel.simd.jit import njit
 
-OK, NOT_SETTLED = int(Status.OK), int(Status.NOT_SETTLED)
-TR_BDF2, DYNAMIC = int(Method.TR_BDF2), int(Fidelity.DYNAMIC)
-NEWTON_FAILED, NOT_FINITE = int(Status.NEWTON_FAILED), int(Status.NOT_FINITE)
-
+follows_error = njit(tables.follows_error)
 NEARLY, PATIENT = 1.5e-2, 10
 """Closure error at which the steps are halved, if need be, and number of revolutions after which the first ones are
 halved anyway: a joint need not settle with all steps."""
@@ -109,12 +108,6 @@ def make_pasts(joints: int, options: Options) -> Pasts:
 def revolutions_kept(options: Options) -> int:
     """Number of revolutions kept of a joint: all of them with error-controlled steps, else one."""
     return options.max_revs if follows_error(options) else 1
-
-
-@njit
-def follows_error(options):
-    """Whether steps are error-controlled: dynamic TR-BDF2 with a tolerance."""
-    return options.method == TR_BDF2 and options.rtol > 0 and options.fidelity == DYNAMIC
 
 
 @njit

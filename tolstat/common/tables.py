@@ -326,7 +326,8 @@ def _layouts() -> tuple[np.dtype[np.void], np.dtype[np.void]]:
     """RESULT, and the same bytes with one array for each statistic of all loads."""
     arrays = {"max": "largest", "mean": "average", "range": "range"}
     of_loads = {
-        array: [kind.statistics()[of] for kind in LOAD_KINDS if of in kind.statistics()] for of, array in arrays.items()
+        array: [kind.statistics()[name] for kind in LOAD_KINDS if name in kind.statistics()]
+        for name, array in arrays.items()
     }
     others = [field for field in RESULT_FIELDS if not any(field in fields for fields in of_loads.values())]
     sizes = {array: sum(math.prod(field.shape) for field in fields) for array, fields in of_loads.items()}

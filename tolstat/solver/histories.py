@@ -143,8 +143,8 @@ def restore(real: NDArray[Any], imag: NDArray[Any], samples: int) -> NDArray[np.
     ndarray, shape (samples, ...)
     """
     spectrum = np.zeros((*real.shape[:-1], samples // 2 + 1), complex)
-    kept = min(real.shape[-1], spectrum.shape[-1])
-    spectrum[..., :kept] = real[..., :kept] + 1j * imag[..., :kept].astype(np.float64)
+    known = min(real.shape[-1], spectrum.shape[-1])
+    spectrum[..., :known] = real[..., :known] + 1j * imag[..., :known].astype(np.float64)
     return np.moveaxis(np.fft.irfft(spectrum * samples, samples), -1, 0)
 
 
@@ -231,16 +231,16 @@ def between(
     ranks = np.argsort(np.argsort(levels, axis=1, kind="stable"), axis=1)
     orders, which = np.unique(ranks, axis=0, return_inverse=True)  # which cycles close depends on the order alone
     course = np.column_stack([visits, points + np.asarray(visits), visits]).ravel()
-    found: list[tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]] = []
+    closed: list[tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]] = []
     for order in orders:
         sizes, middles = periodic(order[course])
-        place = np.argsort(order)
-        top, bottom = (place[np.rint(middles + end * sizes).astype(int)] for end in (0.5, -0.5))
+        by_rank = np.argsort(order)
+        top, bottom = (by_rank[np.rint(middles + end * sizes).astype(int)] for end in (0.5, -0.5))
         pairs, times = np.unique((2 * points * top + bottom)[top % points != bottom % points], return_counts=True)
-        found.append((*np.divmod(pairs, 2 * points), times))
-    ranges, means, numbers = np.zeros((3, len(levels), max([1, *(len(times) for *_, times in found)])))
-    for row, own in enumerate(which.ravel()):
-        top, bottom, times = found[own]
+        closed.append((*np.divmod(pairs, 2 * points), times))
+    ranges, means, numbers = np.zeros((3, len(levels), max([1, *(len(times) for *_, times in closed)])))
+    for row, index in enumerate(which.ravel()):
+        top, bottom, times = closed[index]
         upper, lower, k = levels[row, top], levels[row, bottom], len(times)
         ranges[row, :k], means[row, :k], numbers[row, :k] = upper - lower, 0.5 * (upper + lower), times
     ranges[np.isnan(levels).any(axis=1)] = np.nan
@@ -272,9 +272,9 @@ def count(loads: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
         table, number = (described[name].blank(1)[0] for name in names)
         if finite:
             ranges, means = np.empty((2, len(number), KEPT))
-            own, cycles = np.ascontiguousarray(loads[history.name], dtype=float), np.empty(len(number), np.int64)
+            values, cycles = np.ascontiguousarray(loads[history.name], dtype=float), np.empty(len(number), np.int64)
             gates = _gates(history, loads[BUSHING_LOADS.name])
-            rainflow.count_joint(own, _signals(history), gates, ranges, means, cycles)
+            rainflow.count_joint(values, _signals(history), gates, ranges, means, cycles)
             table[...], number[...] = np.stack([ranges, means], axis=-1), cycles
         counted |= dict(zip(names, (table, number), strict=True))
     return counted

@@ -88,7 +88,7 @@ def simulate_rows(
     if options.fidelity == Fidelity.IDEAL:
         ideal.check(params)
     specs = history_specs(options, histories, n_harmonics)
-    kept = {name: spec.blank(len(params)) for name, spec in specs.items()}
+    recorded = {name: spec.blank(len(params)) for name, spec in specs.items()}
     allowed = tables.iterations_allowed(options.steps_per_rev, options.max_revs)
     left = np.full(len(params), allowed)
 
@@ -100,7 +100,7 @@ def simulate_rows(
         for i, samples in run:
             if out[i].status in SIMULATED:
                 for name, values in extracted(samples, histories, specs).items():
-                    kept[name][rows[i]] = values
+                    recorded[name][rows[i]] = values
         left[rows] = still_allowed
         return out.view(np.ndarray), blocks.view(np.ndarray)
 
@@ -116,7 +116,7 @@ def simulate_rows(
     results["newton_iterations"][(results["status"] == Status.NEWTON_FAILED) & (left <= 0)] = allowed
     stationary.fill_intervals(results)
     results["clearance"] = params["clearance"]
-    return Simulation(results, kept)
+    return Simulation(results, recorded)
 
 
 def simulate_together(

@@ -69,7 +69,7 @@ class Batch(NamedTuple):
     par_words: np.ndarray  # the same memory as doubles
     places: np.ndarray  # (words,) index among them of the words of a row of PARAM, in lane 0; -1: shared by all lanes
     work: np.record
-    kept: np.record  # factorised tangents in use; each lane replaces only its own
+    tangent: np.record  # factorised tangents in use; each lane replaces only its own
     motion: np.record
     control: np.record
     peaks: np.record
@@ -97,12 +97,12 @@ def make_batch(options: Options, width: int = WIDTH) -> Batch:
     control = np.dtype([(name, "f8") for name in NUMBERS] + [(name, "i8", width) for name in INTEGERS])
     pars = aligned_zeros(1, lane_dtype(PARAM, width)).view(np.recarray)
     layouts = [lane_dtype(dtype, width) for dtype in (WORK, WORK, MOTION, control, PEAKS)]
-    work, kept, motion, state, peaks = (aligned_zeros(1, layout).view(np.recarray)[0] for layout in layouts)
+    work, tangent, motion, state, peaks = (aligned_zeros(1, layout).view(np.recarray)[0] for layout in layouts)
     words = pars.view(np.float64).view(np.ndarray)
     samples, fine = make_samples(width, options.steps_per_rev), make_samples(width, 3)
     notes, pasts = make_notes(width), make_pasts(width, options)
     one = np.zeros(1, WORK).view(np.recarray)[0]
-    return Batch(pars[0], words, _places(width), work, kept, motion, state, peaks, samples, fine, notes, pasts, one)
+    return Batch(pars[0], words, _places(width), work, tangent, motion, state, peaks, samples, fine, notes, pasts, one)
 
 
 def _places(width):

@@ -256,12 +256,12 @@ def start_cells(lane, par, options, control, motion, past):
 @njit
 def start_cell(lane, c, options, control, motion, past):
     """Set up cell `c` in a lane that is at the end of the previous cell."""
-    own, before = past.mesh[c % past.mesh.size], past.mesh[(c - 1) % past.mesh.size]
+    cell, before = past.mesh[c % past.mesh.size], past.mesh[(c - 1) % past.mesh.size]
     for i in range(N_DOF):
         past.begun[0, i], past.begun[1, i] = motion.q0[i, lane], motion.v0[i, lane]
         past.begun[2, i] = motion.a0[i, lane]
     control.k[lane], control.origin[lane] = c, (c - 1) * control.grid[lane]
-    control.level[lane] = next_level(past.turns.revolution - past.turns.since, own, before)
+    control.level[lane] = next_level(past.turns.revolution - past.turns.since, cell, before)
     control.began[lane] = control.level[lane]
     start_parts(lane, options, control, past)
 

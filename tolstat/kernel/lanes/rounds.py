@@ -140,29 +140,29 @@ def keep_rows(mask, new, old):
 
 
 @njit
-def refactorise(mask, control, par, work, kept):
+def refactorise(mask, control, par, work, tangent):
     """Compute new tangents in the lanes of the mask; return where, of all lanes, the factorisation succeeded."""
     held = control.cv == CV_STATIC
     cv, ca = where(held, CV_REGULAR, control.cv), where(held, CA_REGULAR, control.ca)
     assemble(cv, ca, where(held, 0.0, control.cv), par, work)
     good = factorise(work)
-    keep_blocks(mask, work.block, kept.block)
-    keep_blocks(mask, work.edge, kept.edge)
-    keep_rows(mask, work.corner, kept.corner)
+    keep_blocks(mask, work.block, tangent.block)
+    keep_blocks(mask, work.edge, tangent.edge)
+    keep_rows(mask, work.corner, tangent.corner)
     control.factorised = where(mask, control.cv, control.factorised)
     control.factorisations = where(mask, control.factorisations + 1, control.factorisations)
     return good
 
 
 @njit
-def correct(mask, kept, motion, control):
+def correct(mask, tangent, motion, control):
     """Apply Newton's correction in the lanes of the mask; return in which of them an equilibrium has diverged."""
     for i in range(N_DOF):
-        kept.solution[i] = -motion.residual[i]
-    solve(motion.q, kept)
+        tangent.solution[i] = -motion.residual[i]
+    solve(motion.q, tangent)
     step = largest = 0.0 * control.cv
     for i in range(N_DOF):
-        change = where(mask, kept.solution[i], 0.0)
+        change = where(mask, tangent.solution[i], 0.0)
         motion.q[i] = retain(mask, motion.q[i] + change, motion.q[i])
         motion.v[i] = retain(mask, motion.v[i] + control.cv * change, motion.v[i])
         motion.a[i] = retain(mask, motion.a[i] + control.ca * change, motion.a[i])

@@ -360,12 +360,12 @@ def _proposed(study: Study, names: Sequence[str], numbers: range) -> tuple[dict[
         here = part == number
         for name, (mean, deviation) in proposal.scores.items():
             scores[name][here] = mean + deviation * scores[name][here]
-        for one in proposal.processes:
-            first = one.streams[0]
+        for known in proposal.processes:
+            first = known.streams[0]
             u, v = (_stream(study.sampling.seed, f"{key} {first}", numbers.start) for key in ("deviation", "mean"))
-            spread = process.deviation(np.maximum(u.random(len(numbers))[here], 2.0**-54), one.parts)
-            middle = spread * special.ndtri(np.maximum(v.random(len(numbers))[here], 2.0**-54)) / np.sqrt(one.parts)
-            for name in one.streams:
+            spread = process.deviation(np.maximum(u.random(len(numbers))[here], 2.0**-54), known.parts)
+            middle = spread * special.ndtri(np.maximum(v.random(len(numbers))[here], 2.0**-54)) / np.sqrt(known.parts)
+            for name in known.streams:
                 scores[name][here] = middle + spread * scores[name][here]
     return scores, part
 

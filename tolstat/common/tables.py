@@ -361,10 +361,10 @@ CODES: dict[str, type[IntEnum]] = {"method": Method, "start": Start, "fidelity":
 
 def to_names(options: Options) -> dict[str, Any]:
     """Return the options by name, with ``method``, ``start`` and ``fidelity`` as a study writes them."""
-    held = options._asdict()
-    return held | {name: code(held[name]).name.lower() for name, code in CODES.items()}
+    values = options._asdict()
+    return values | {name: code(values[name]).name.lower() for name, code in CODES.items()}
 
 
-def from_names(held: Mapping[str, Any]) -> Options:
+def from_names(values: Mapping[str, Any]) -> Options:
     """Return the options that `to_names` has written."""
-    return Options(**{k: int(CODES[k][v.upper()]) if k in CODES else v for k, v in held.items()})
+    return Options(**{k: int(CODES[k][v.upper()]) if k in CODES else v for k, v in values.items()})

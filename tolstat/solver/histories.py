@@ -83,11 +83,11 @@ def extracted(
     return sample
 
 
-def harmonic_specs(kept: int) -> dict[str, HistorySpec]:
-    """Describe what `coefficients` gives for a joint, as histories of a result file; `kept`: number of coefficients."""
+def harmonic_specs(n_coefficients: int) -> dict[str, HistorySpec]:
+    """Describe what `coefficients` gives for a joint, as histories of a result file."""
     result: dict[str, HistorySpec] = {}
     for history in LOAD_HISTORIES:
-        shape, axes = (*history.shape, kept), (*history.axes, "harmonic")
+        shape, axes = (*history.shape, n_coefficients), (*history.axes, "harmonic")
         text = f"part of the Fourier coefficients c_h: {history.meaning}; "
         text += "load(theta) = Re(c_0 + 2 sum c_h exp(i h theta))"
         error = "largest deviation of the load so restored, relative to the largest |F| and |T| of the joint"
@@ -99,14 +99,14 @@ def harmonic_specs(kept: int) -> dict[str, HistorySpec]:
     return result
 
 
-def coefficients(loads: Mapping[str, NDArray[np.float64]], kept: int) -> dict[str, NDArray[Any]]:
+def coefficients(loads: Mapping[str, NDArray[np.float64]], n_coefficients: int) -> dict[str, NDArray[Any]]:
     """Fourier coefficients of the loads of a joint.
 
     Parameters
     ----------
     loads : mapping of str to ndarray
         By name of `LOAD_HISTORIES`, (samples, places, components) each, N and N m.
-    kept : int
+    n_coefficients : int
         Number of coefficients, the mean included.
 
     Returns
@@ -119,7 +119,7 @@ def coefficients(loads: Mapping[str, NDArray[np.float64]], kept: int) -> dict[st
     coefficients: dict[str, NDArray[Any]] = {}
     for history in LOAD_HISTORIES:
         values = loads[history.name]
-        spectrum = np.moveaxis(np.fft.rfft(values, axis=0) / len(values), 0, -1)[..., :kept]
+        spectrum = np.moveaxis(np.fft.rfft(values, axis=0) / len(values), 0, -1)[..., :n_coefficients]
         real, imag = spectrum.real.astype("f4"), spectrum.imag.astype("f4")
         difference = np.abs(restore(real, imag, len(values)) - values).max(axis=(0, 1))
         error = [difference[k : k + 3].max() / s if s > 0 else 0.0 for k, s in zip((0, 3), size, strict=True)]

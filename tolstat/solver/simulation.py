@@ -215,7 +215,7 @@ def _ideal(
 
     batch, rows, out = lanes(options, 1), params.view(np.recarray), tables.for_kernels(results)
     for i in range(len(params)):
-        ideal_revolution(rows[i], options, AT_REST, batch.one, batch.samples[0], batch.notes[0], out[i])
+        ideal_revolution(rows[i], options, AT_REST, batch.scratch, batch.samples[0], batch.notes[0], out[i])
         if keep:
             yield i, batch.samples[0]
 
@@ -229,7 +229,7 @@ def starts(rows: NDArray[np.void], options: Options) -> NDArray[np.float64]:
 
     out = np.zeros((len(rows), AT_REST.size))
     if (rows["clearance"] >= 0).all(axis=1).any():
-        write_starts(rows, options, lanes(options, 1).one, AT_REST, out)
+        write_starts(rows, options, lanes(options, 1).scratch, AT_REST, out)
     return out
 
 
@@ -246,7 +246,7 @@ def explicit_steps(params: NDArray[np.void], options: Options) -> NDArray[np.int
     from tolstat.kernel.revolution.explicit import MOST_STEPS
 
     fewest = np.zeros(len(these), np.int64)
-    count_steps(params[these].view(np.recarray), options, lanes(options, 1).one, fewest)
+    count_steps(params[these].view(np.recarray), options, lanes(options, 1).scratch, fewest)
     steps[these] = np.where(fewest <= MOST_STEPS, fewest, 0)
     return steps
 

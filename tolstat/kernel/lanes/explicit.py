@@ -76,7 +76,7 @@ def load_explicit_joint(lane, joint, steps, options, batch, queue, past):
     for i in range(N_DOF):
         start[0, i] = 0.0 if options.start == RAMP else queue.starts[joint, i]
         start[1, i] = 0.0
-    acceleration(0.0, start[0], start[1], par, options, batch.one, start[2])
+    acceleration(0.0, start[0], start[1], par, options, batch.scratch, start[2])
     put_joint(lane, queue.words[joint], batch)
     put_start(lane, par, start[0], control, motion)
     for i in range(N_DOF):
@@ -85,8 +85,8 @@ def load_explicit_joint(lane, joint, steps, options, batch, queue, past):
     control.iterations[lane], control.factorisations[lane] = out.newton_iterations, out.factorisations
     clear_results(out)
     clear_samples(samples_of(lane, batch, queue), batch.notes[lane])
-    begin_explicit(steps[joint], par, options, batch.one, past)
-    begin_revolution((start[0], start[1], start[2]), steps[joint], par, batch.one, past)
+    begin_explicit(steps[joint], par, options, batch.scratch, past)
+    begin_revolution((start[0], start[1], start[2]), steps[joint], par, batch.scratch, past)
     start_revolution(lane, par, options, batch)
 
 
@@ -103,7 +103,7 @@ def arrive(lane, par, lanes, left, options, batch, samples, past, out):
     `left`: work still allowed to the joint, in Newton iterations.
     """
     control, motion, turns = batch.control, batch.motion, past.turns
-    n, work = options.steps_per_rev, batch.one
+    n, work = options.steps_per_rev, batch.scratch
     point = motion.q[:, lane], motion.v[:, lane], motion.a[:, lane]
     steps = steps_of(turns)
     k = int(control.count[lane]) // (steps // n)

@@ -51,12 +51,12 @@ def begin_parts(begins, passed, motion, control):
         q, v, a = motion.q[i], motion.v[i], motion.a[i]
         last = retain(passed, q, motion.q0[i]), retain(passed, v, motion.v0[i]), retain(passed, a, motion.a0[i])
         motion.q0[i], motion.v0[i], motion.a0[i] = last
-        one = trbdf2.first(coefficients, last, motion.aux[i])
-        two = trbdf2.second(coefficients, last, (q, v, a))
+        first = trbdf2.first(coefficients, last, motion.aux[i])
+        second = trbdf2.second(coefficients, last, (q, v, a))
         motion.v1[i], motion.aux[i] = retain(at_second, v, motion.v1[i]), retain(at_second, a, motion.aux[i])
-        motion.q[i] = retain(begins, where(later, two[0], one[0]), q)
-        motion.v[i] = retain(begins, where(later, two[1], one[1]), v)
-        motion.a[i] = retain(begins, where(later, two[2], one[2]), a)
+        motion.q[i] = retain(begins, where(later, second[0], first[0]), q)
+        motion.v[i] = retain(begins, where(later, second[1], first[1]), v)
+        motion.a[i] = retain(begins, where(later, second[2], first[2]), a)
     control.cv = where(begins, coefficients[0], control.cv)
     control.ca = where(begins, coefficients[0] * coefficients[0], control.ca)
 
@@ -91,8 +91,8 @@ def scaled_size(motion):
     """Largest weighted residual; NaN if any residual is NaN."""
     size = total = 0.0
     for i in range(N_DOF):
-        one = abs(motion.residual[i]) * motion.weight[i]
-        size, total = max(size, one), total + one
+        weighted = abs(motion.residual[i]) * motion.weight[i]
+        size, total = max(size, weighted), total + weighted
     return where(total == total, size, total)  # the sum detects NaN; a NaN-safe maximum is slower
 
 
@@ -142,9 +142,9 @@ def keep_rows(mask, new, old):
 @njit
 def refactorise(mask, control, par, work, tangent):
     """Compute new tangents in the lanes of the mask; return where, of all lanes, the factorisation succeeded."""
-    held = control.cv == CV_STATIC
-    cv, ca = where(held, CV_REGULAR, control.cv), where(held, CA_REGULAR, control.ca)
-    assemble(cv, ca, where(held, 0.0, control.cv), par, work)
+    static = control.cv == CV_STATIC
+    cv, ca = where(static, CV_REGULAR, control.cv), where(static, CA_REGULAR, control.ca)
+    assemble(cv, ca, where(static, 0.0, control.cv), par, work)
     good = factorise(work)
     keep_blocks(mask, work.block, tangent.block)
     keep_blocks(mask, work.edge, tangent.edge)

@@ -40,18 +40,18 @@ NOTES = np.dtype([("check", "f8", (MOST_CHECKS, 2)), ("count", "i8")])
 
 
 class Trail(NamedTuple):
-    """Work arrays; revolution r lies at index r modulo the number kept."""
+    """Work arrays; revolution r lies at index r modulo the capacity."""
 
-    loads: np.ndarray  # (kept, angles, N_DECIDING) loads that decide
-    revolution: np.ndarray  # (kept,) record of KERNEL_RESULT: statistics of each revolution
+    loads: np.ndarray  # (capacity, angles, N_DECIDING) loads that decide
+    revolution: np.ndarray  # (capacity,) record of KERNEL_RESULT: statistics of each revolution
     notes: np.record  # NOTES
 
 
-def make_trails(joints: int, steps_per_rev: int, kept: int) -> tuple[np.ndarray, np.recarray, np.recarray]:
-    """Allocate the arrays of several trails, for `kept` revolutions."""
+def make_trails(joints: int, steps_per_rev: int, capacity: int) -> tuple[np.ndarray, np.recarray, np.recarray]:
+    """Allocate the arrays of several trails, for `capacity` revolutions."""
     angles = -(-steps_per_rev // _stride(steps_per_rev))
-    loads = np.full((joints, kept, angles, N_DECIDING), np.nan)
-    return loads, np.zeros((joints, kept), KERNEL_RESULT).view(np.recarray), make_notes(joints)
+    loads = np.full((joints, capacity, angles, N_DECIDING), np.nan)
+    return loads, np.zeros((joints, capacity), KERNEL_RESULT).view(np.recarray), make_notes(joints)
 
 
 def make_notes(joints: int) -> np.recarray:
@@ -144,10 +144,10 @@ def lag_closure(last, lag, trail):
 
 
 @njit
-def keep_deciding(loads, kept):
-    """Copy the loads that decide to `kept`, (N_DECIDING,)."""
+def keep_deciding(loads, deciding):
+    """Copy the loads that decide to `deciding`, (N_DECIDING,)."""
     for j in range(N_DECIDING):
-        kept[j] = loads[DECIDING[j]]
+        deciding[j] = loads[DECIDING[j]]
 
 
 @njit

@@ -119,8 +119,8 @@ def scores(study: Study, numbers: range) -> Array:
 
 def noise(study: Study, level: int, first: int, count: int) -> Array:
     """Independent standard normal numbers of a level of a subset simulation, from number `first` on, (count, d)."""
-    own = (_stream(study.sampling.seed, f"subset {level} {name}", first) for name in streams(study))
-    return np.column_stack([special.ndtri(np.maximum(stream.random(count), 2.0**-54)) for stream in own])
+    of_level = (_stream(study.sampling.seed, f"subset {level} {name}", first) for name in streams(study))
+    return np.column_stack([special.ndtri(np.maximum(stream.random(count), 2.0**-54)) for stream in of_level])
 
 
 def from_scores(study: Study, scores: Array) -> Table:
@@ -189,20 +189,20 @@ def components(study: Study, errors: Table) -> dict[str, Array]:
     dict of str to ndarray, (n,)
         Of each quantity its `values`; of a vector its two `plane_scores`, named ``pin1.position_inner_t``, ``..._z``.
     """
-    found: dict[str, Array] = {}
+    drawn: dict[str, Array] = {}
     for name, distribution in study.tolerances.items():
         if axes.is_zone(name) and not axes.is_component(name):
             both = plane_scores(distribution, _vector(study, errors, name))
-            found |= {f"{name}_{along}": part for along, part in zip("tz", both, strict=True)}
+            drawn |= {f"{name}_{along}": part for along, part in zip("tz", both, strict=True)}
         else:
-            found[name] = values(study, errors, name)
-    return found
+            drawn[name] = values(study, errors, name)
+    return drawn
 
 
 def normal_scores(study: Study, errors: Table) -> dict[str, Array]:
     """Return the standard normal scores of the `components` of joints, (n,) each."""
-    scored = ((name, own, study.tolerances.get(name)) for name, own in components(study, errors).items())
-    return {name: own if distribution is None else score(distribution, own) for name, own, distribution in scored}
+    scored = ((name, drawn, study.tolerances.get(name)) for name, drawn in components(study, errors).items())
+    return {name: drawn if distribution is None else score(distribution, drawn) for name, drawn, distribution in scored}
 
 
 def _vector(study: Study, errors: Table, name: str) -> Array:
@@ -262,9 +262,9 @@ def _fill_frozen(samples: Table, study: Study, numbers: range) -> None:
     a, b = (_uniforms(streams(study), points, study, which) for which in ("", " B"))
     u = {}
     for number, group in enumerate(study.groups, start=2):
-        of_b, own = (part == 1) | (part == number), point - points.start
+        of_b, row = (part == 1) | (part == number), point - points.start
         for stream in (stream for name in group.names for stream in axes.streams_of(name)):
-            u[stream] = np.where(of_b, b[stream][own], a[stream][own])
+            u[stream] = np.where(of_b, b[stream][row], a[stream][row])
     _fill_from(samples, study, u)
 
 
@@ -273,47 +273,47 @@ def _fill_scatter(samples: Table, study: Study, numbers: range) -> None:
     if study.proposals:
         scores, part = _proposed(study, list(u), numbers)
         u = {name: np.where(part == 0, u[name], _probability(scores[name])) for name in u}
-    own = _of_lots(study, u, numbers) if study.sampling.joints_per_lot > 1 else {}
+    depending = _of_lots(study, u, numbers) if study.sampling.joints_per_lot > 1 else {}
     if study.sampling.is_matched and study.sampling.selective is not None:
         u_class = _stream(study.sampling.seed, "selective", numbers.start).random(len(numbers))
         classes = matching(study.sampling.selective, study.entries, study.tolerances)
-        own |= classes.probabilities(u_class, u)
-    _fill_from(samples, study, u, own)
+        depending |= classes.probabilities(u_class, u)
+    _fill_from(samples, study, u, depending)
 
 
 def _of_lots(study: Study, u: dict[str, Array], numbers: range) -> dict[str, Array]:
     """Probabilities of the errors with lots, of samples of which several are of one lot."""
     size = study.sampling.joints_per_lot
     first, last = numbers.start // size, -(-numbers.stop // size)
-    own = np.arange(numbers.start, numbers.stop) // size - first
-    found = {}
+    lot_of_joint = np.arange(numbers.start, numbers.stop) // size - first
+    probabilities = {}
     for name, lot in study.lots.items():
         drawn = _stream(study.sampling.seed, f"lot {lot.score}", first).random(last - first)
-        z_lot, z_part = special.ndtri(np.maximum(drawn, 2.0**-54))[own], special.ndtri(u[name])
-        found[name] = _probability(np.sqrt(lot.share) * z_lot + np.sqrt(1.0 - lot.share) * z_part)
-    return found
+        z_lot, z_part = special.ndtri(np.maximum(drawn, 2.0**-54))[lot_of_joint], special.ndtri(u[name])
+        probabilities[name] = _probability(np.sqrt(lot.share) * z_lot + np.sqrt(1.0 - lot.share) * z_part)
+    return probabilities
 
 
-def _fill_from(samples: Table, study: Study, u: dict[str, Array], own: Mapping[str, Array] | None = None) -> None:
+def _fill_from(samples: Table, study: Study, u: dict[str, Array], depending: Mapping[str, Array] | None = None) -> None:
     """Set the errors that scatter, from independent probabilities `u` of their columns.
 
-    Errors in `own` have these probabilities instead: of those that depend on other joints or on the class.
+    Errors in `depending` have these probabilities instead: of those that depend on other joints or on the class.
     """
     names = study.copula.names
     if names:
         correlated = study.copula.apply(np.column_stack([u[name] for name in names]))
         u |= {name: correlated[:, i] for i, name in enumerate(names)}
-    u |= own or {}
+    u |= depending or {}
     vectors: dict[str, dict[str, Array]] = {}
     for name, distribution in study.tolerances.items():
         if not axes.is_zone(name):
             samples[name] = distribution.ppf(u[name])
             continue
-        of = axes.streams_of(name)
-        drawn = distribution.ppf(u[of[0]])
+        first, *second = axes.streams_of(name)
+        drawn = distribution.ppf(u[first])
         feature, _, key = name.partition(".")
         vectors.setdefault(feature, {})[key] = (
-            axes.of_component(name, drawn) if len(of) == 1 else _in_direction(drawn, 2 * np.pi * u[of[1]])
+            _in_direction(drawn, 2 * np.pi * u[second[0]]) if second else axes.of_component(name, drawn)
         )
     for feature, parts in vectors.items():
         study.axes[feature].fill(samples, parts)
@@ -344,9 +344,9 @@ def _design(names: Sequence[str], study: Study, replicate: int, numbers: range) 
     if study.sampling.method == "sobol":
         points = sobol(len(numbers), len(ERROR_FIELDS), [seed, replicate] if replicate else seed, numbers.start)
         return {name: points[:, dimensions()[name]] for name in names}
-    own = f" {replicate}" if replicate else ""
+    suffix = f" {replicate}" if replicate else ""
     here = slice(numbers.start, numbers.stop)
-    return {name: _stratified(n, _stream(seed, f"lhs {name}{own}"))[here] for name in names}
+    return {name: _stratified(n, _stream(seed, f"lhs {name}{suffix}"))[here] for name in names}
 
 
 def _proposed(study: Study, names: Sequence[str], numbers: range) -> tuple[dict[str, Array], NDArray[np.intp]]:
@@ -360,20 +360,20 @@ def _proposed(study: Study, names: Sequence[str], numbers: range) -> tuple[dict[
         here = part == number
         for name, (mean, deviation) in proposal.scores.items():
             scores[name][here] = mean + deviation * scores[name][here]
-        for one in proposal.processes:
-            first = one.streams[0]
-            u, v = (_stream(study.sampling.seed, f"{of} {first}", numbers.start) for of in ("deviation", "mean"))
-            spread = process.deviation(np.maximum(u.random(len(numbers))[here], 2.0**-54), one.parts)
-            middle = spread * special.ndtri(np.maximum(v.random(len(numbers))[here], 2.0**-54)) / np.sqrt(one.parts)
-            for name in one.streams:
+        for known in proposal.processes:
+            first = known.streams[0]
+            u, v = (_stream(study.sampling.seed, f"{key} {first}", numbers.start) for key in ("deviation", "mean"))
+            spread = process.deviation(np.maximum(u.random(len(numbers))[here], 2.0**-54), known.parts)
+            middle = spread * special.ndtri(np.maximum(v.random(len(numbers))[here], 2.0**-54)) / np.sqrt(known.parts)
+            for name in known.streams:
                 scores[name][here] = middle + spread * scores[name][here]
     return scores, part
 
 
 def _probability(scores: Array) -> Array:
     """Probabilities in (0, 1) of standard normal scores, clipped where double precision would round to 0 or 1."""
-    found: Array = np.clip(special.ndtr(scores), np.finfo(float).tiny, 1 - np.finfo(float).epsneg)
-    return found
+    inside: Array = np.clip(special.ndtr(scores), np.finfo(float).tiny, 1 - np.finfo(float).epsneg)
+    return inside
 
 
 def _stream(seed: int, name: str, first: int = 0) -> np.random.Generator:

@@ -150,7 +150,7 @@ def test_peaks_between_steps_are_met() -> None:
         follow_value(2, value, peaks)
     assert curve.max() < 4 - 1e-3
     assert peaks.top[2] == pytest.approx(4, abs=2e-4)
-    assert (peaks.one[2], peaks.two[2]) == (curve[-1], curve[-2])
+    assert (peaks.last[2], peaks.before[2]) == (curve[-1], curve[-2])
     forget(True, peaks)
     for value in (5.0, 4.0, 3.0):
         follow_value(2, value, peaks)

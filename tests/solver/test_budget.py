@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 
 from tests.conftest import Params
-from tolstat.common.tables import FAILED, MAX_ITERATIONS, MOST_ITERATIONS, Options, Status, iterations_allowed
+from tolstat.common.tables import (
+    FAILED,
+    MAX_ITERATIONS,
+    MOST_ITERATIONS,
+    Options,
+    Status,
+    follows_error,
+    iterations_allowed,
+)
 from tolstat.solver import simulation
 from tolstat.solver.simulation import simulate_rows
 
@@ -60,7 +68,7 @@ def test_a_refinement_takes_what_is_left(params: Params, monkeypatch: pytest.Mon
     def counted(joints, settings, left, *others):
         before = int(left[0])
         yield from together(joints, settings, left, *others)
-        if simulation.follows_error(settings):
+        if follows_error(settings):
             spent.append(before - int(left[0]))
 
     monkeypatch.setattr(simulation, "simulate_together", counted)

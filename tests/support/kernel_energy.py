@@ -15,9 +15,10 @@ no damper, a third dampers of 1 and no spring.
 import math
 
 from tolstat.common.fields import Field, dtype_of
+from tolstat.kernel.codes import RAMP
 from tolstat.kernel.mechanics.bushing import bushing_load
 from tolstat.kernel.mechanics.contact import contact_load, smooth_step
-from tolstat.kernel.mechanics.dynamics import RAMP, forces, mass_of, resisting_torque
+from tolstat.kernel.mechanics.dynamics import forces, mass_of, resisting_torque
 from tolstat.kernel.mechanics.topology import BUSHING_BASE, BUSHING_LUMP, FRAME, HUB, INPUT_SHAFT, N_LUMPS, PSI, S
 from tolstat.kernel.mechanics.triad import to_triad
 from tolstat.kernel.mechanics.vector import add, cross, dot, row, sub, turn_back

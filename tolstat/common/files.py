@@ -106,16 +106,16 @@ def check_target(path: Path, *inputs: Path) -> None:
         When `path` is a folder, or one of `inputs`, or lies in what is no folder. A missing folder is made by
         `atomic_write`.
     """
-    place = str(path)
+    shown = str(path)
     if path.is_dir():
-        raise input_error(place, "cannot be written: is a folder", "give the path of a file in it")
+        raise input_error(shown, "cannot be written: is a folder", "give the path of a file in it")
     above = next((folder for folder in path.parents if folder.exists()), path.parent)
     if not above.is_dir():
-        raise input_error(place, f"cannot be written: {above} is no folder", "give another folder")
+        raise input_error(shown, f"cannot be written: {above} is no folder", "give another folder")
     if not os.access(above, os.W_OK | os.X_OK):
-        raise input_error(place, f"cannot be written: {above} is read-only", "give another folder")
+        raise input_error(shown, f"cannot be written: {above} is read-only", "give another folder")
     if any(path.exists() and given.exists() and path.samefile(given) for given in inputs):
-        raise input_error(place, "cannot be written: it is the input", "give the output another name")
+        raise input_error(shown, "cannot be written: it is the input", "give the output another name")
 
 
 def make_parent(path: Path) -> None:

@@ -312,21 +312,21 @@ def _complete(schema: dict[str, Any], model: type[BaseModel]) -> None:
     schema.pop("title", None)
     meanings = _meanings(model)
     for name, field in model.model_fields.items():
-        own = schema["properties"][field.alias or name]
+        property_schema = schema["properties"][field.alias or name]
         if name in meanings:
-            own.setdefault("description", meanings[name])
-        own.pop("title", None)
-        rest = [inner for inner in own.get("anyOf", []) if inner != {"type": "null"}]
+            property_schema.setdefault("description", meanings[name])
+        property_schema.pop("title", None)
+        rest = [inner for inner in property_schema.get("anyOf", []) if inner != {"type": "null"}]
         if len(rest) == 1:
-            del own["anyOf"]
-            own |= rest[0] | own
+            del property_schema["anyOf"]
+            property_schema |= rest[0] | property_schema
         elif rest:
-            own["anyOf"] = rest
-        own |= _bounds(field, own)
+            property_schema["anyOf"] = rest
+        property_schema |= _bounds(field, property_schema)
         if field.default_factory and (made := field.get_default(call_default_factory=True)):
-            own["default"] = made
-        if own.get("default", 0) is None or isinstance(field.default, BaseModel):
-            own.pop("default", None)
+            property_schema["default"] = made
+        if property_schema.get("default", 0) is None or isinstance(field.default, BaseModel):
+            property_schema.pop("default", None)
 
 
 def _meanings(model: type[BaseModel]) -> dict[str, str]:
@@ -353,22 +353,22 @@ def _docstrings(module: str) -> dict[str, dict[str, str]]:
     }
 
 
-def _bounds(field: FieldInfo, own: Mapping[str, Any]) -> dict[str, Any]:
+def _bounds(field: FieldInfo, property_schema: Mapping[str, Any]) -> dict[str, Any]:
     """Bounds of a quantity, or of a quantity that may be left out."""
-    found: dict[str, Any] = {}
+    bounds: dict[str, Any] = {}
     for item in _metadata(field.annotation, field.metadata):
         match item:
             case annotated_types.Gt(gt=bound):
-                found["exclusiveMinimum"] = bound
+                bounds["exclusiveMinimum"] = bound
             case annotated_types.Ge(ge=bound):
-                found["minimum"] = bound
+                bounds["minimum"] = bound
             case annotated_types.Lt(lt=bound):
-                found["exclusiveMaximum"] = bound
+                bounds["exclusiveMaximum"] = bound
             case annotated_types.Le(le=bound):
-                found["maximum"] = bound
+                bounds["maximum"] = bound
             case AfterValidator(func=func) if func in units.SIGNS:
-                found[units.SIGNS[func]] = 0
-    return found | schema_of_sign({**own, **found})
+                bounds[units.SIGNS[func]] = 0
+    return bounds | schema_of_sign({**property_schema, **bounds})
 
 
 def _metadata(annotation: Any, metadata: list[Any]) -> Iterator[Any]:

@@ -94,7 +94,7 @@ def deciding(status: Sequence[NDArray[np.uint8]]) -> NDArray[np.intp]:
 def worst_status(status: Sequence[NDArray[np.uint8]]) -> NDArray[np.uint8]:
     """Status of joints over operating points, (n,); see `deciding`."""
     first = status[0]
-    return first if all(own is first for own in status) else np.choose(deciding(status), status)
+    return first if all(codes is first for codes in status) else np.choose(deciding(status), status)
 
 
 STATUS_TEXT = {
@@ -167,6 +167,11 @@ class Options(NamedTuple):
     peak_substeps: int = 40
     max_refinements: int = 3
     duration: int = 100
+
+
+def follows_error(options: Options) -> bool:
+    """Whether steps are error-controlled: dynamic TR-BDF2 with a tolerance."""
+    return options.method == Method.TR_BDF2 and options.rtol > 0 and options.fidelity == Fidelity.DYNAMIC
 
 
 class HistorySpec(NamedTuple):
@@ -321,7 +326,8 @@ def _layouts() -> tuple[np.dtype[np.void], np.dtype[np.void]]:
     """RESULT, and the same bytes with one array for each statistic of all loads."""
     arrays = {"max": "largest", "mean": "average", "range": "range"}
     of_loads = {
-        array: [kind.statistics()[of] for kind in LOAD_KINDS if of in kind.statistics()] for of, array in arrays.items()
+        array: [kind.statistics()[name] for kind in LOAD_KINDS if name in kind.statistics()]
+        for name, array in arrays.items()
     }
     others = [field for field in RESULT_FIELDS if not any(field in fields for fields in of_loads.values())]
     sizes = {array: sum(math.prod(field.shape) for field in fields) for array, fields in of_loads.items()}
@@ -355,10 +361,10 @@ CODES: dict[str, type[IntEnum]] = {"method": Method, "start": Start, "fidelity":
 
 def to_names(options: Options) -> dict[str, Any]:
     """Return the options by name, with ``method``, ``start`` and ``fidelity`` as a study writes them."""
-    held = options._asdict()
-    return held | {name: code(held[name]).name.lower() for name, code in CODES.items()}
+    values = options._asdict()
+    return values | {name: code(values[name]).name.lower() for name, code in CODES.items()}
 
 
-def from_names(held: Mapping[str, Any]) -> Options:
+def from_names(values: Mapping[str, Any]) -> Options:
     """Return the options that `to_names` has written."""
-    return Options(**{k: int(CODES[k][v.upper()]) if k in CODES else v for k, v in held.items()})
+    return Options(**{k: int(CODES[k][v.upper()]) if k in CODES else v for k, v in values.items()})

@@ -60,7 +60,7 @@ class Rule(NamedTuple):
 
     def applies(self, joint: Any) -> bool:
         """Whether a joint has the keys that the formula needs."""
-        return any(all(get(joint, of) is not None for of in keys) for keys in self.enough or (self.follows,))
+        return any(all(get(joint, key) is not None for key in keys) for keys in self.enough or (self.follows,))
 
 
 def _beam(body: str, modulus: str, section: str, length: str) -> Rule:
@@ -93,9 +93,9 @@ def _section(name: str, unit: str, of_round: str, of_rectangular: str) -> Rule:
 
 
 def _pin_diameter(joint: Any) -> float:
-    of = joint.contact
-    one_left_out = of.D_H is None or of.clearance is None
-    return float(joint.pin.d if one_left_out else of.D_H - 2.0 * of.clearance)
+    contact = joint.contact
+    one_left_out = contact.D_H is None or contact.clearance is None
+    return float(joint.pin.d if one_left_out else contact.D_H - 2.0 * contact.clearance)
 
 
 def _hub(joint: Any) -> tuple[float | None, tuple[float, ...]]:
@@ -125,10 +125,10 @@ def fitted_load(steel: Any, contact: Any) -> float:
 
 
 def _fitted(joint: Any) -> tuple[float, float] | tuple[None, None]:
-    of, steel = joint.contact, joint.material
-    if not of.D_H > of.D_P > 0.0:
+    contact, steel = joint.contact, joint.material
+    if not contact.D_H > contact.D_P > 0.0:
         return None, None
-    return material.fit_contact(fitted_load(steel, of), of.z, of.D_H, of.D_P, steel.E, steel.nu)
+    return material.fit_contact(fitted_load(steel, contact), contact.z, contact.D_H, contact.D_P, steel.E, steel.nu)
 
 
 def _contact_damping(joint: Any) -> float:
@@ -298,7 +298,9 @@ def missing(name: str, section: BaseModel, others: Mapping[str, Any], exempt: Co
     for key, rule in DERIVED.items():
         if not key.startswith(f"{name}.") or key in exempt or get(joint, key) is not None:
             continue
-        if unknown.intersection(rule.follows) or not all(hasattr(joint, of.partition(".")[0]) for of in rule.follows):
+        if unknown.intersection(rule.follows) or not all(
+            hasattr(joint, other.partition(".")[0]) for other in rule.follows
+        ):
             unknown.add(key)  # a section that it follows from has faults of its own
         else:
             lacking[key] = rule.follows
@@ -333,14 +335,14 @@ def expected(joint: Any, given: Set[str], changed: Set[str], stay: Set[str]) -> 
         ratio = joint.hub.mass / mass if "hub.mass" in changed else 1.0
         values = {"hub.mass": mass, "hub.inertia": tuple(ratio * moment for moment in inertia)}
         disagreeing |= {key: (value, f"{_CYLINDERS}, give", "") for key, value in values.items() if key in stay}
-    of, d = joint.contact, joint.pin.d
+    contact, d = joint.contact, joint.pin.d
     hole, pin, clearance = BEARING
-    if "pin.d" in changed and pin in stay and not math.isclose(of.D_P, d, rel_tol=1e-6):
+    if "pin.d" in changed and pin in stay and not math.isclose(contact.D_P, d, rel_tol=1e-6):
         disagreeing[pin] = d, "pin.d gives", clearance
         if hole in stay:
-            disagreeing[hole] = d + 2.0 * of.clearance, "pin.d and the clearance of these two give", clearance
-    elif changed & {"pin.d", pin} and hole in stay and of.clearance > WIDE * of.D_P:
-        disagreeing[hole] = of.D_P, "that is much clearance; without any contact.D_P gives", clearance
-    if pin in given and {hole, clearance} & given and "pin.d" in stay and abs(of.D_P - d) > WIDE * d:
-        disagreeing["pin.d"] = of.D_P, "contact.D_P gives", ""
+            disagreeing[hole] = d + 2.0 * contact.clearance, "pin.d and the clearance of these two give", clearance
+    elif changed & {"pin.d", pin} and hole in stay and contact.clearance > WIDE * contact.D_P:
+        disagreeing[hole] = contact.D_P, "that is much clearance; without any contact.D_P gives", clearance
+    if pin in given and {hole, clearance} & given and "pin.d" in stay and abs(contact.D_P - d) > WIDE * d:
+        disagreeing["pin.d"] = contact.D_P, "contact.D_P gives", ""
     return disagreeing

@@ -216,7 +216,7 @@ def _lacking(keys: list[str], section: BaseModel) -> tuple[str, str]:
             return "eq. (3) has no value without clearance", "give a clearance above zero, or k1u and k2u"
     names = [key.rpartition(".")[2] for key in keys]
     ways = dict.fromkeys(way for key in keys for way in DERIVED[key].enough or (DERIVED[key].follows,))
-    begun = [way for way in ways if any(derived.get(section, of.partition(".")[2]) is not None for of in way)]
+    begun = [way for way in ways if any(derived.get(section, key.partition(".")[2]) is not None for key in way)]
     them = "it" if len(names) == 1 else "them"
     instead = "".join(f", or {' and '.join(left)}" for way in begun or ways if (left := _left_out(way, keys, section)))
     return f"missing {_keys(names)}", f"give {them}{instead}"
@@ -228,7 +228,7 @@ def _keys(names: Sequence[str]) -> str:
 
 def _left_out(way: tuple[str, ...], keys: list[str], section: BaseModel) -> list[str]:
     """Names of the keys of `way`, without `keys`, that a section has but that are not given."""
-    names = [of.partition(".")[2] for of in way if of not in keys]
+    names = [key.partition(".")[2] for key in way if key not in keys]
     return [name for name in names if name in type(section).model_fields and derived.get(section, name) is None]
 
 

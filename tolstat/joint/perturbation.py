@@ -21,6 +21,7 @@ from tolstat.joint.contact import Contact
 from tolstat.joint.material import Array
 from tolstat.joint.model import Joint
 from tolstat.joint.orders import Partner, add_partner, check_misalignment
+from tolstat.joint.sections import Arm, Bushing, Pin
 from tolstat.kernel.mechanics.topology import ARM, ARM_OF_PIN, PIN, TRIAD
 
 Table = NDArray[np.void]
@@ -172,28 +173,42 @@ def perturb(joint: Joint, operation: Operation, errors: Table) -> Table:
 
 def _constants(joint: Joint) -> dict[str, Any]:
     """Parameters that do not depend on the errors, at factor 1 on E."""
-    shaft, stations = joint.shaft, joint.contact.springs(joint.bearing)
-    n_stations = len(stations.s)
-    values = {key: getattr(joint.contact, key) for key in ("c_d", "c_t", "delta_d")}
-    for body in ("hub", "pin", "arm"):
-        values |= {f"{body}_{key}": getattr(getattr(joint, body), key) for key in ("mass", "inertia")}
-    for name in ("s", "k1", "k2", "k3", "weight"):
-        values[f"station_{name}"] = np.pad(getattr(stations, name), (0, MAX_STATIONS - n_stations))
-    for place, k, of in (("cross", joint.k_cross, joint.pin), ("fork", joint.k_fork, joint.arm)):
-        damping = material.bushing_damping(k, of.mass, np.array(of.inertia), joint.bushing.xi)
-        values |= {f"k_{place}": k, f"c_{place}": damping}
-    return values | {
+    contact, shaft, stations = joint.contact, joint.shaft, joint.contact.springs(joint.bearing)
+    unused = (0, MAX_STATIONS - len(stations.s))
+    return {
+        "R": joint.cross.R,
+        "r_b": joint.cross.r_b,
+        "l_f": joint.arm.l_f,
+        "hub_mass": joint.hub.mass,
+        "hub_inertia": joint.hub.inertia,
+        "pin_mass": joint.pin.mass,
+        "pin_inertia": joint.pin.inertia,
+        "arm_mass": joint.arm.mass,
+        "arm_inertia": joint.arm.inertia,
+        "k_cross": joint.k_cross,
+        "k_fork": joint.k_fork,
+        "c_cross": _bushing_damping(joint.k_cross, joint.pin, joint.bushing),
+        "c_fork": _bushing_damping(joint.k_fork, joint.arm, joint.bushing),
         "Js": shaft.Js,
         "slides": shaft.slides,
         "m_s": shaft.mass if shaft.slides else 0.0,
         "k_a": shaft.k_a,
         "c_a": shaft.axial_damping if shaft.slides else 0.0,
-        "R": joint.cross.R,
-        "r_b": joint.cross.r_b,
-        "l_f": joint.arm.l_f,
-        "n_stations": n_stations,
+        "c_d": contact.c_d,
+        "c_t": contact.c_t,
+        "delta_d": contact.delta_d,
+        "n_stations": len(stations.s),
+        "station_s": np.pad(stations.s, unused),
+        "station_k1": np.pad(stations.k1, unused),
+        "station_k2": np.pad(stations.k2, unused),
+        "station_k3": np.pad(stations.k3, unused),
+        "station_weight": np.pad(stations.weight, unused),
         "needle_b": stations.b,
     }
+
+
+def _bushing_damping(k: Array, body: Pin | Arm, bushing: Bushing) -> Array:
+    return material.bushing_damping(k, body.mass, np.array(body.inertia), bushing.xi)
 
 
 def _axis(errors: Table, feature: str, triad: Array) -> tuple[Array, Array]:

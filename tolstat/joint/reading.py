@@ -229,6 +229,6 @@ def varied(joint: Joint, values: Mapping[str, Any]) -> Joint:
     changed = {key: value for key, value in values.items() if key.partition(".")[0] in Joint.model_fields}
     if not changed:
         return joint
-    kept = {key: value for key, value in leaves(joint.given()).items() if key not in changed}
+    unchanged = {key: value for key, value in leaves(joint.given()).items() if key not in changed}
     new = {key: value for key, value in changed.items() if value is not None}
-    return validate(Joint, laid_over(nested(kept), nested(new)), "joint", context={"si": True})
+    return validate(Joint, laid_over(nested(unchanged), nested(new)), "joint", context={"si": True})

@@ -54,7 +54,7 @@ KERNELS: dict[str, Callable[[Options], object]] = {
     "starts.write_starts": lambda options: simulation.starts(np.zeros(1, PARAM).view(np.recarray), options),
     "ideal.ideal_revolution": partial(_simulate, 1),
     "rainflow.count_joint": lambda options: histories.count(
-        {of.name: np.zeros((2, *of.shape)) for of in LOAD_HISTORIES}
+        {history.name: np.zeros((2, *history.shape)) for history in LOAD_HISTORIES}
     ),
 }
 """Kernels that Python calls, by their names in the cache, each with a call that compiles it."""

@@ -83,11 +83,11 @@ def extracted(
     return sample
 
 
-def harmonic_specs(kept: int) -> dict[str, HistorySpec]:
-    """Describe what `coefficients` gives for a joint, as histories of a result file; `kept`: number of coefficients."""
+def harmonic_specs(n_coefficients: int) -> dict[str, HistorySpec]:
+    """Describe what `coefficients` gives for a joint, as histories of a result file."""
     result: dict[str, HistorySpec] = {}
     for history in LOAD_HISTORIES:
-        shape, axes = (*history.shape, kept), (*history.axes, "harmonic")
+        shape, axes = (*history.shape, n_coefficients), (*history.axes, "harmonic")
         text = f"part of the Fourier coefficients c_h: {history.meaning}; "
         text += "load(theta) = Re(c_0 + 2 sum c_h exp(i h theta))"
         error = "largest deviation of the load so restored, relative to the largest |F| and |T| of the joint"
@@ -99,14 +99,14 @@ def harmonic_specs(kept: int) -> dict[str, HistorySpec]:
     return result
 
 
-def coefficients(loads: Mapping[str, NDArray[np.float64]], kept: int) -> dict[str, NDArray[Any]]:
+def coefficients(loads: Mapping[str, NDArray[np.float64]], n_coefficients: int) -> dict[str, NDArray[Any]]:
     """Fourier coefficients of the loads of a joint.
 
     Parameters
     ----------
     loads : mapping of str to ndarray
         By name of `LOAD_HISTORIES`, (samples, places, components) each, N and N m.
-    kept : int
+    n_coefficients : int
         Number of coefficients, the mean included.
 
     Returns
@@ -119,7 +119,7 @@ def coefficients(loads: Mapping[str, NDArray[np.float64]], kept: int) -> dict[st
     coefficients: dict[str, NDArray[Any]] = {}
     for history in LOAD_HISTORIES:
         values = loads[history.name]
-        spectrum = np.moveaxis(np.fft.rfft(values, axis=0) / len(values), 0, -1)[..., :kept]
+        spectrum = np.moveaxis(np.fft.rfft(values, axis=0) / len(values), 0, -1)[..., :n_coefficients]
         real, imag = spectrum.real.astype("f4"), spectrum.imag.astype("f4")
         difference = np.abs(restore(real, imag, len(values)) - values).max(axis=(0, 1))
         error = [difference[k : k + 3].max() / s if s > 0 else 0.0 for k, s in zip((0, 3), size, strict=True)]
@@ -143,8 +143,8 @@ def restore(real: NDArray[Any], imag: NDArray[Any], samples: int) -> NDArray[np.
     ndarray, shape (samples, ...)
     """
     spectrum = np.zeros((*real.shape[:-1], samples // 2 + 1), complex)
-    kept = min(real.shape[-1], spectrum.shape[-1])
-    spectrum[..., :kept] = real[..., :kept] + 1j * imag[..., :kept].astype(np.float64)
+    known = min(real.shape[-1], spectrum.shape[-1])
+    spectrum[..., :known] = real[..., :known] + 1j * imag[..., :known].astype(np.float64)
     return np.moveaxis(np.fft.irfft(spectrum * samples, samples), -1, 0)
 
 
@@ -231,16 +231,16 @@ def between(
     ranks = np.argsort(np.argsort(levels, axis=1, kind="stable"), axis=1)
     orders, which = np.unique(ranks, axis=0, return_inverse=True)  # which cycles close depends on the order alone
     course = np.column_stack([visits, points + np.asarray(visits), visits]).ravel()
-    found: list[tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]] = []
+    closed: list[tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]] = []
     for order in orders:
         sizes, middles = periodic(order[course])
-        place = np.argsort(order)
-        top, bottom = (place[np.rint(middles + end * sizes).astype(int)] for end in (0.5, -0.5))
+        by_rank = np.argsort(order)
+        top, bottom = (by_rank[np.rint(middles + end * sizes).astype(int)] for end in (0.5, -0.5))
         pairs, times = np.unique((2 * points * top + bottom)[top % points != bottom % points], return_counts=True)
-        found.append((*np.divmod(pairs, 2 * points), times))
-    ranges, means, numbers = np.zeros((3, len(levels), max([1, *(len(times) for *_, times in found)])))
-    for row, own in enumerate(which.ravel()):
-        top, bottom, times = found[own]
+        closed.append((*np.divmod(pairs, 2 * points), times))
+    ranges, means, numbers = np.zeros((3, len(levels), max([1, *(len(times) for *_, times in closed)])))
+    for row, index in enumerate(which.ravel()):
+        top, bottom, times = closed[index]
         upper, lower, k = levels[row, top], levels[row, bottom], len(times)
         ranges[row, :k], means[row, :k], numbers[row, :k] = upper - lower, 0.5 * (upper + lower), times
     ranges[np.isnan(levels).any(axis=1)] = np.nan
@@ -272,9 +272,9 @@ def count(loads: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
         table, number = (described[name].blank(1)[0] for name in names)
         if finite:
             ranges, means = np.empty((2, len(number), KEPT))
-            own, cycles = np.ascontiguousarray(loads[history.name], dtype=float), np.empty(len(number), np.int64)
+            values, cycles = np.ascontiguousarray(loads[history.name], dtype=float), np.empty(len(number), np.int64)
             gates = _gates(history, loads[BUSHING_LOADS.name])
-            rainflow.count_joint(own, _signals(history), gates, ranges, means, cycles)
+            rainflow.count_joint(values, _signals(history), gates, ranges, means, cycles)
             table[...], number[...] = np.stack([ranges, means], axis=-1), cycles
         counted |= dict(zip(names, (table, number), strict=True))
     return counted

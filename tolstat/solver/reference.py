@@ -252,4 +252,6 @@ def _revolutions(
 def _change(before: Largest, last: Largest) -> float:
     """Largest change of any largest load that decides, relative to the largest of its measure."""
     spans = [(SPAN[kind.key], SPAN[measure_of(kind).key]) for kind in LOAD_KINDS if kind.decides]
-    return max(float(np.abs(last[own] - before[own]).max() / max(last[of].max(), 1e-300)) for own, of in spans)
+    return max(
+        float(np.abs(last[span] - before[span]).max() / max(last[measure].max(), 1e-300)) for span, measure in spans
+    )

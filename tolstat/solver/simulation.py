@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.common import tables
-from tolstat.common.tables import RESULT, SIMULATED, Fidelity, Method, Options, Simulation, Start, Status
+from tolstat.common.tables import RESULT, SIMULATED, Fidelity, Options, Simulation, Start, Status
 from tolstat.joint import ideal
 from tolstat.solver import refinement, stationary
 from tolstat.solver.histories import Histories, extracted, history_specs
@@ -59,11 +59,6 @@ def width_for(joints: int) -> int:
     return 1 if switched_off or joints <= MOST_ALONE else WIDTH
 
 
-def follows_error(options: Options) -> bool:
-    """Whether these settings mean error-controlled steps."""
-    return options.fidelity == Fidelity.DYNAMIC and options.method == Method.TR_BDF2 and options.rtol > 0
-
-
 def simulate_rows(
     params: NDArray[np.void], options: Options, histories: Histories = "none", n_harmonics: int = 16
 ) -> Simulation:
@@ -93,19 +88,19 @@ def simulate_rows(
     if options.fidelity == Fidelity.IDEAL:
         ideal.check(params)
     specs = history_specs(options, histories, n_harmonics)
-    kept = {name: spec.blank(len(params)) for name, spec in specs.items()}
+    recorded = {name: spec.blank(len(params)) for name, spec in specs.items()}
     allowed = tables.iterations_allowed(options.steps_per_rev, options.max_revs)
     left = np.full(len(params), allowed)
 
     def simulate(rows: NDArray[np.intp], settings: Options) -> tuple[NDArray[np.void], NDArray[np.void]]:
-        out, follows = np.zeros(len(rows), RESULT).view(np.recarray), follows_error(settings)
+        out, follows = np.zeros(len(rows), RESULT).view(np.recarray), tables.follows_error(settings)
         blocks = np.zeros((len(rows), settings.max_revs) if follows else (0, 0), RESULT).view(np.recarray)
         still_allowed, of_rows = left[rows], steps[rows] if follows else None
         run = simulate_together(params[rows], settings, still_allowed, bool(specs), out, blocks, of_rows)
         for i, samples in run:
             if out[i].status in SIMULATED:
                 for name, values in extracted(samples, histories, specs).items():
-                    kept[name][rows[i]] = values
+                    recorded[name][rows[i]] = values
         left[rows] = still_allowed
         return out.view(np.ndarray), blocks.view(np.ndarray)
 
@@ -121,7 +116,7 @@ def simulate_rows(
     results["newton_iterations"][(results["status"] == Status.NEWTON_FAILED) & (left <= 0)] = allowed
     stationary.fill_intervals(results)
     results["clearance"] = params["clearance"]
-    return Simulation(results, kept)
+    return Simulation(results, recorded)
 
 
 def simulate_together(
@@ -220,7 +215,7 @@ def _ideal(
 
     batch, rows, out = lanes(options, 1), params.view(np.recarray), tables.for_kernels(results)
     for i in range(len(params)):
-        ideal_revolution(rows[i], options, AT_REST, batch.one, batch.samples[0], batch.notes[0], out[i])
+        ideal_revolution(rows[i], options, AT_REST, batch.scratch, batch.samples[0], batch.notes[0], out[i])
         if keep:
             yield i, batch.samples[0]
 
@@ -234,7 +229,7 @@ def starts(rows: NDArray[np.void], options: Options) -> NDArray[np.float64]:
 
     out = np.zeros((len(rows), AT_REST.size))
     if (rows["clearance"] >= 0).all(axis=1).any():
-        write_starts(rows, options, lanes(options, 1).one, AT_REST, out)
+        write_starts(rows, options, lanes(options, 1).scratch, AT_REST, out)
     return out
 
 
@@ -251,7 +246,7 @@ def explicit_steps(params: NDArray[np.void], options: Options) -> NDArray[np.int
     from tolstat.kernel.revolution.explicit import MOST_STEPS
 
     fewest = np.zeros(len(these), np.int64)
-    count_steps(params[these].view(np.recarray), options, lanes(options, 1).one, fewest)
+    count_steps(params[these].view(np.recarray), options, lanes(options, 1).scratch, fewest)
     steps[these] = np.where(fewest <= MOST_STEPS, fewest, 0)
     return steps
 

@@ -69,15 +69,15 @@ def classify(results: Table, blocks: Table, duration: int) -> None:
             results["status"][i] = Status.STATIONARY
             continue
         made = int(results["revolutions"][i])
-        kept = min(made, blocks.shape[1])
-        watched = blocks[i, np.arange(made - kept, made) % blocks.shape[1]][int(DISCARDED_SHARE * kept) :]
+        stored = min(made, blocks.shape[1])
+        watched = blocks[i, np.arange(made - stored, made) % blocks.shape[1]][int(DISCARDED_SHARE * stored) :]
         if len(watched) < MIN_REVOLUTIONS or not is_stationary(watched):
             continue
         results["status"][i] = Status.STATIONARY
         for kind in SPAN:
-            own = results[f"{kind}_max"]
+            loads = results[f"{kind}_max"]
             median, lower, upper = largest(watched[f"{kind}_max"].reshape(len(watched), -1), duration)
-            own[i] = median.reshape(own[i].shape)
+            loads[i] = median.reshape(loads[i].shape)
             size = np.where(median > 0, median, 1.0)
             results[f"{kind}_lower"][i], results[f"{kind}_upper"][i] = (lower / size).min(), (upper / size).max()
 
@@ -93,8 +93,8 @@ def fill_intervals(results: Table) -> None:
     never = (results["status"] == Status.STATIONARY) & (results["period"] <= 1)
     for kind in SPAN:
         for end in ("lower", "upper"):
-            own = results[f"{kind}_{end}"]
-            own[~never] = np.where(np.isin(results["status"][~never], VALID), 1.0, np.nan)
+            ends = results[f"{kind}_{end}"]
+            ends[~never] = np.where(np.isin(results["status"][~never], VALID), 1.0, np.nan)
 
 
 def is_stationary(watched: Table) -> bool:
@@ -181,9 +181,9 @@ def _of_exponential_tails(n: int, count: int, duration: int) -> tuple[float, flo
 def _pareto(excesses: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Scale and shape (negative: bounded) of the generalised Pareto distribution; excesses ascend along axis 0."""
     k = excesses.shape[0]
-    place = (np.arange(1, k + 1) - 0.35) / k
+    plotting_position = (np.arange(1, k + 1) - 0.35) / k
     mean = excesses.mean(axis=0)
-    moment = np.tensordot(1 - place, excesses, axes=(0, 0)) / k
+    moment = np.tensordot(1 - plotting_position, excesses, axes=(0, 0)) / k
     ratio = np.divide(mean, mean - 2 * moment, out=np.full_like(mean, 2.0), where=mean > 2 * moment * (1 + 1e-12))
     shape = np.clip(2 - ratio, -6.0, 0.0)
     return mean * (1 - shape), shape

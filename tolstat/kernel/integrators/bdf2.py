@@ -30,21 +30,21 @@ def formula(h, h_old, trapezoidal):
 
 
 @njit
-def trial(h, of, last, before, known, ahead):
+def trial(h, coefficients, last, before, known, ahead):
     """Trial values (q, v, a) of an unknown that satisfy the formula.
 
     Parameters
     ----------
     h : float
         Step, s.
-    of : tuple
+    coefficients : tuple
         Values returned by `formula`.
     last, before : tuple
         (q, v, a) of the last accepted point, (q, v) of the one before.
     known, ahead : bool, float
         Whether q is predicted by its expected change `ahead`, or else by a Taylor series.
     """
-    cv, b1, b2, b3 = of
+    cv, b1, b2, b3 = coefficients
     q = last[0] + where(known, ahead, h * (last[1] + 0.5 * h * last[2]))
     v = cv * q + (b1 * last[0] + b2 * before[0]) + b3 * last[1]
     return q, v, cv * v + (b1 * last[1] + b2 * before[1]) + b3 * last[2]

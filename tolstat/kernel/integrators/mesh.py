@@ -21,7 +21,6 @@ from tolstat.kernel.mechanics.scale import set_weight, stiffness, typical_force
 from tolstat.kernel.mechanics.topology import N_LUMPS, PSI, S
 from tolstat.kernel.simd.jit import njit
 
-errors = trbdf2.errors
 CELLS = 720
 """Approximate number of cells of a revolution: an impact and its ringing take a degree or two."""
 CELL = np.dtype([("level", "u1"), ("pinned", "u1"), ("worst", "f8")], align=True)
@@ -53,15 +52,15 @@ def load_error(h, par, motion):
         mass, inertia = mass_of(body, par)
         k, k_turn = stiffness(body, par)
         mean_inertia = (inertia[0] + inertia[1] + inertia[2]) / 3
-        of = (force * k, force * math.sqrt(k * mass), torque * k_turn, torque * math.sqrt(k_turn * mean_inertia))
+        factors = (force * k, force * math.sqrt(k * mass), torque * k_turn, torque * math.sqrt(k_turn * mean_inertia))
         for j in range(6):
-            of_q, of_v = errors(6 * body + j, h, motion)
+            error_q, error_v = trbdf2.errors(6 * body + j, h, motion)
             kind = 0 if j < 3 else 2
-            worst = max(worst, max(of[kind] * abs(of_q), of[kind + 1] * abs(of_v)))
-    of_q, of_v = errors(PSI, h, motion)
-    worst = max(worst, max(force * k * par.R * abs(of_q), force * math.sqrt(k * par.Js) * abs(of_v)))
-    of_q, of_v = errors(S, h, motion)
-    return max(worst, max(force * k * abs(of_q), force * math.sqrt(k * par.m_s) * abs(of_v)))
+            worst = max(worst, max(factors[kind] * abs(error_q), factors[kind + 1] * abs(error_v)))
+    error_q, error_v = trbdf2.errors(PSI, h, motion)
+    worst = max(worst, max(force * k * par.R * abs(error_q), force * math.sqrt(k * par.Js) * abs(error_v)))
+    error_q, error_v = trbdf2.errors(S, h, motion)
+    return max(worst, max(force * k * abs(error_q), force * math.sqrt(k * par.m_s) * abs(error_v)))
 
 
 @njit
@@ -71,13 +70,13 @@ def cells_of(steps_per_rev):
 
 
 @njit
-def next_level(revolutions, own, before):
-    """Level to start a cell with, `own`, after `revolutions` with this tolerance; `before`: the preceding cell."""
-    one = before if own.level == UNKNOWN else own
-    if one.level == UNKNOWN:
+def next_level(revolutions, cell, before):
+    """Level to start `cell` with, after `revolutions` with this tolerance; `before`: the preceding cell."""
+    known = before if cell.level == UNKNOWN else cell
+    if known.level == UNKNOWN:
         return FIRST_LEVEL
-    level, error = int(one.level), one.worst
-    while level > 0 and error < COARSEN_BELOW and one.pinned == 0 and revolutions < COARSENING_REVS:
+    level, error = int(known.level), known.worst
+    while level > 0 and error < COARSEN_BELOW and known.pinned == 0 and revolutions < COARSENING_REVS:
         level, error = level - 1, 8 * error
     return level
 

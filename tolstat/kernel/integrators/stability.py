@@ -109,7 +109,7 @@ def eigenvalue(h, depth, par, work):
     work.spin[OUTPUT_SHAFT, 2] = 1 / par.R
     work.vel[OUTPUT_SHAFT, 2] = par.slides
     axial_mass = par.m_s if par.slides > 0 else 1.0
-    found = 0.0
+    largest = 0.0
     for _ in range(ITERATIONS):
         multiply(h, depth, par, work)
         work_done = work.spin[OUTPUT_SHAFT, 2] * work.force[OUTPUT_SHAFT, 5]
@@ -133,14 +133,14 @@ def eigenvalue(h, depth, par, work):
             faster = from_triad(body, faster)
             for k in range(3):
                 work.spin[body, k] = faster[k]
-        found = work_done / energy
-        size = 1 / found
+        largest = work_done / energy
+        size = 1 / largest
         for body in range(N_BODIES):
             for k in range(3):
                 work.vel[body, k], work.spin[body, k] = size * work.vel[body, k], size * work.spin[body, k]
                 if body == INPUT_SHAFT:
                     work.spin[body, k] = 0.0
-    return found
+    return largest
 
 
 @njit

@@ -37,22 +37,22 @@ def formula(h, staged):
 
 
 @njit
-def first(of, last, staged):
+def first(coefficients, last, staged):
     """Trial values (q, v, a) of an unknown in the first stage that satisfy its formula.
 
-    `of`: values returned by `formula`; `last`: (q, v, a) at the start; `staged`: acceleration at the first stage of the
-    last step.
+    `coefficients`: values returned by `formula`; `last`: (q, v, a) at the start; `staged`: acceleration at the first
+    stage of the last step.
     """
-    cv, (ahead, cubic, since), _ = of
+    cv, (ahead, cubic, since), _ = coefficients
     q = last[0] + ahead * (last[1] + (0.5 * ahead * last[2] + cubic * (since * (last[2] - staged))))
     v = cv * (q - last[0]) - last[1]
     return q, v, cv * (v - last[1]) - last[2]
 
 
 @njit
-def second(of, last, stage):
+def second(coefficients, last, stage):
     """Trial values (q, v, a) in the second stage, as in `first`; `stage`: (q, v, a) of the first stage."""
-    cv, _, (on, cubic, weight) = of
+    cv, _, (on, cubic, weight) = coefficients
     q = stage[0] + on * (stage[1] + (0.5 * on * stage[2] + cubic * (stage[2] - last[2])))
     v = cv * (q - last[0] - weight * (last[1] + stage[1]))
     return q, v, cv * (v - last[1] - weight * (last[2] + stage[2]))
@@ -64,6 +64,6 @@ def errors(i, h, motion):
 
     ``motion.v1`` and ``motion.aux`` hold velocity and acceleration of the first stage.
     """
-    of_q = h * (E0 * motion.v0[i] + E1 * motion.v1[i] + E2 * motion.v[i])
-    of_v = h * (E0 * motion.a0[i] + E1 * motion.aux[i] + E2 * motion.a[i])
-    return of_q, of_v
+    error_q = h * (E0 * motion.v0[i] + E1 * motion.v1[i] + E2 * motion.v[i])
+    error_v = h * (E0 * motion.a0[i] + E1 * motion.aux[i] + E2 * motion.a[i])
+    return error_q, error_v

@@ -8,7 +8,7 @@ queue : Queue
     The joints, and where their results are written.
 control, motion : records
     Those of the batch, read joint by joint or, in functions of all lanes, read as lanes.
-kept : record of WORK, read as lanes
+tangent : record of WORK, read as lanes
     Blocks of the factorised tangents.
 lanes : tuple
     Parameters, work and motion of all joints, read as lanes.

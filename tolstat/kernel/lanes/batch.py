@@ -67,9 +67,9 @@ class Batch(NamedTuple):
 
     par: np.record
     par_words: np.ndarray  # the same memory as doubles
-    places: np.ndarray  # (words,) index among them of the words of a row of PARAM, in lane 0; -1: shared by all lanes
+    word_index: np.ndarray  # (words,) where among them a row of PARAM has its words, in lane 0; -1: shared by all lanes
     work: np.record
-    kept: np.record  # factorised tangents in use; each lane replaces only its own
+    tangent: np.record  # factorised tangents in use; each lane replaces only its own
     motion: np.record
     control: np.record
     peaks: np.record
@@ -77,7 +77,7 @@ class Batch(NamedTuple):
     fine: np.recarray  # (width, 3) SAMPLE: last parts of a closer look, or of a cell
     notes: np.recarray  # (width,) NOTES
     pasts: Pasts
-    one: np.record  # WORK: scratch of an evaluation of one joint
+    scratch: np.record  # WORK: scratch of an evaluation of one joint
 
 
 class Queue(NamedTuple):
@@ -97,23 +97,25 @@ def make_batch(options: Options, width: int = WIDTH) -> Batch:
     control = np.dtype([(name, "f8") for name in NUMBERS] + [(name, "i8", width) for name in INTEGERS])
     pars = aligned_zeros(1, lane_dtype(PARAM, width)).view(np.recarray)
     layouts = [lane_dtype(dtype, width) for dtype in (WORK, WORK, MOTION, control, PEAKS)]
-    work, kept, motion, state, peaks = (aligned_zeros(1, layout).view(np.recarray)[0] for layout in layouts)
+    work, tangent, motion, state, peaks = (aligned_zeros(1, layout).view(np.recarray)[0] for layout in layouts)
     words = pars.view(np.float64).view(np.ndarray)
     samples, fine = make_samples(width, options.steps_per_rev), make_samples(width, 3)
     notes, pasts = make_notes(width), make_pasts(width, options)
-    one = np.zeros(1, WORK).view(np.recarray)[0]
-    return Batch(pars[0], words, _places(width), work, kept, motion, state, peaks, samples, fine, notes, pasts, one)
+    scratch = np.zeros(1, WORK).view(np.recarray)[0]
+    return Batch(
+        pars[0], words, _word_index(width), work, tangent, motion, state, peaks, samples, fine, notes, pasts, scratch
+    )
 
 
-def _places(width):
-    """Values of `Batch.places`: integers of PARAM are shared by all lanes."""
+def _word_index(width):
+    """Values of `Batch.word_index`: integers of PARAM are shared by all lanes."""
     lanes = lane_dtype(PARAM, width)
-    places = np.full(PARAM.itemsize // 8, -1)
+    index = np.full(PARAM.itemsize // 8, -1)
     for name in PARAM.names:
         if PARAM[name].base == np.float64:
             first, size = PARAM.fields[name][1] // 8, PARAM[name].itemsize // 8
-            places[first : first + size] = lanes.fields[name][1] // 8 + width * np.arange(size)
-    return places
+            index[first : first + size] = lanes.fields[name][1] // 8 + width * np.arange(size)
+    return index
 
 
 @njit
@@ -125,9 +127,9 @@ def samples_of(lane, batch, queue):
 @njit
 def put_joint(lane, words, batch):
     """Copy a row of PARAM, as doubles, to a lane."""
-    for i in range(batch.places.size):
-        if batch.places[i] >= 0:
-            batch.par_words[batch.places[i] + lane] = words[i]
+    for i in range(batch.word_index.size):
+        if batch.word_index[i] >= 0:
+            batch.par_words[batch.word_index[i] + lane] = words[i]
 
 
 @njit

@@ -1,11 +1,12 @@
 """Transitions of one lane: through equilibrium, sub-steps, grid points, input angles, and cells.
 
 Each function sets up the next trial point of a lane, or returns how the joint has ended: `NOT_SETTLED` while it
-continues, `OK`, `GIVEN_UP`, or `NEWTON_FAILED`. `par`, `samples`, `notes`, `fine`, `past` and `out` are those of the
-lane's joint; `control` and `motion` are read joint by joint.
+continues, `OK`, `OUT_OF_REVOLUTIONS`, or `NEWTON_FAILED`. `par`, `samples`, `notes`, `fine`, `past` and `out` are those
+of the lane's joint; `control` and `motion` are read joint by joint.
 """
 
 from tolstat.common.tables import MAX_ITERATIONS
+from tolstat.kernel.codes import NEWTON_FAILED, NOT_SETTLED, OK, QUASISTATIC, TR_BDF2
 from tolstat.kernel.integrators.memory import AHEAD, H_OLD, STAGED_STEP
 from tolstat.kernel.integrators.mesh import cells_of, next_level, note_cell
 from tolstat.kernel.integrators.trbdf2 import GAMMA
@@ -22,10 +23,9 @@ from tolstat.kernel.lanes.equilibrium import (
 )
 from tolstat.kernel.mechanics.topology import N_DOF, PSI
 from tolstat.kernel.revolution.closeup import count_in
-from tolstat.kernel.revolution.outcome import NEWTON_FAILED, NOT_SETTLED, OK, QUASISTATIC, check_settled
+from tolstat.kernel.revolution.outcome import check_settled
 from tolstat.kernel.revolution.quasistatic import angle_time
 from tolstat.kernel.revolution.resolve import (
-    TR_BDF2,
     adapt_mesh,
     after_revolution,
     begin_mesh,
@@ -36,7 +36,7 @@ from tolstat.kernel.revolution.resolve import (
 from tolstat.kernel.revolution.settle import ALL_LOADS, closure_error, grid_step, predict_increment, record
 from tolstat.kernel.simd.jit import njit
 
-GIVEN_UP = -1
+OUT_OF_REVOLUTIONS = -1
 """Status, in addition to those of a joint, after the last revolution without settling."""
 MAX_RATIO = 2.0
 """Largest ratio of a step to the one before, for the stability of BDF2."""
@@ -151,7 +151,7 @@ def step(lane, par, lanes, options, control, motion, samples, notes, out):
     if status != NOT_SETTLED:
         return status
     if k == options.max_revs * options.steps_per_rev:
-        return GIVEN_UP
+        return OUT_OF_REVOLUTIONS
     control.k[lane], control.origin[lane] = k + 1, k * control.grid[lane]
     set_substep(lane, options, control, motion)
     return NOT_SETTLED
@@ -190,7 +190,7 @@ def finish_angle(lane, par, lanes, options, control, motion, samples, out):
         if control.iterations[lane] > MAX_ITERATIONS * n * options.max_revs:
             return NEWTON_FAILED
         if control.done[lane] == options.max_revs:
-            return GIVEN_UP
+            return OUT_OF_REVOLUTIONS
     set_angle(lane, k + 1, par, options, control)
     return NOT_SETTLED
 
@@ -256,12 +256,12 @@ def start_cells(lane, par, options, control, motion, past):
 @njit
 def start_cell(lane, c, options, control, motion, past):
     """Set up cell `c` in a lane that is at the end of the previous cell."""
-    own, before = past.mesh[c % past.mesh.size], past.mesh[(c - 1) % past.mesh.size]
+    cell, before = past.mesh[c % past.mesh.size], past.mesh[(c - 1) % past.mesh.size]
     for i in range(N_DOF):
         past.begun[0, i], past.begun[1, i] = motion.q0[i, lane], motion.v0[i, lane]
         past.begun[2, i] = motion.a0[i, lane]
     control.k[lane], control.origin[lane] = c, (c - 1) * control.grid[lane]
-    control.level[lane] = next_level(past.turns.revolution - past.turns.since, own, before)
+    control.level[lane] = next_level(past.turns.revolution - past.turns.since, cell, before)
     control.began[lane] = control.level[lane]
     start_parts(lane, options, control, past)
 

@@ -7,6 +7,7 @@ a revolution `resolve` decides how it continues, and a lane whose joint has ende
 import math
 
 from tolstat.common.tables import STEPS_PER_ITERATION
+from tolstat.kernel.codes import NEWTON_FAILED, NOT_SETTLED, RAMP
 from tolstat.kernel.integrators.stability import fewest_steps
 from tolstat.kernel.lanes.batch import empty, put_joint, put_start, samples_of
 from tolstat.kernel.lanes.lane_memory import as_lanes
@@ -22,7 +23,7 @@ from tolstat.kernel.revolution.explicit import (
     steps_of,
     walk,
 )
-from tolstat.kernel.revolution.outcome import NEWTON_FAILED, NOT_SETTLED, RAMP, clear_results, clear_samples
+from tolstat.kernel.revolution.outcome import clear_results, clear_samples
 from tolstat.kernel.revolution.peaks import forget, largest_at_an_end, write_peaks
 from tolstat.kernel.revolution.resolve import Past, after_revolution
 from tolstat.kernel.revolution.settle import record
@@ -64,7 +65,7 @@ def start_revolution(lane, par, options, batch):
 
 
 @njit
-def load_joint(lane, joint, steps, options, batch, queue, past):
+def load_explicit_joint(lane, joint, steps, options, batch, queue, past):
     """Put a joint into a lane, at its start; one that has none has ended.
 
     `steps`: of the first revolution of each joint, (n,).
@@ -75,7 +76,7 @@ def load_joint(lane, joint, steps, options, batch, queue, past):
     for i in range(N_DOF):
         start[0, i] = 0.0 if options.start == RAMP else queue.starts[joint, i]
         start[1, i] = 0.0
-    acceleration(0.0, start[0], start[1], par, options, batch.one, start[2])
+    acceleration(0.0, start[0], start[1], par, options, batch.scratch, start[2])
     put_joint(lane, queue.words[joint], batch)
     put_start(lane, par, start[0], control, motion)
     for i in range(N_DOF):
@@ -84,8 +85,8 @@ def load_joint(lane, joint, steps, options, batch, queue, past):
     control.iterations[lane], control.factorisations[lane] = out.newton_iterations, out.factorisations
     clear_results(out)
     clear_samples(samples_of(lane, batch, queue), batch.notes[lane])
-    begin_explicit(steps[joint], par, options, batch.one, past)
-    begin_revolution((start[0], start[1], start[2]), steps[joint], par, batch.one, past)
+    begin_explicit(steps[joint], par, options, batch.scratch, past)
+    begin_revolution((start[0], start[1], start[2]), steps[joint], par, batch.scratch, past)
     start_revolution(lane, par, options, batch)
 
 
@@ -102,7 +103,7 @@ def arrive(lane, par, lanes, left, options, batch, samples, past, out):
     `left`: work still allowed to the joint, in Newton iterations.
     """
     control, motion, turns = batch.control, batch.motion, past.turns
-    n, work = options.steps_per_rev, batch.one
+    n, work = options.steps_per_rev, batch.scratch
     point = motion.q[:, lane], motion.v[:, lane], motion.a[:, lane]
     steps = steps_of(turns)
     k = int(control.count[lane]) // (steps // n)
@@ -133,7 +134,7 @@ def arrive(lane, par, lanes, left, options, batch, samples, past, out):
 
 
 @njit
-def finish_joint(lane, status, options, batch, queue):
+def finish_explicit_joint(lane, status, options, batch, queue):
     """Write the results of a joint that has ended, and empty its lane."""
     control, joint = batch.control, batch.control.joint[lane]
     control.count[lane] = 0.0  # is part of the steps by now
@@ -178,9 +179,9 @@ def explicit(steps, options, batch, queue):
                 left = queue.left[joint]
                 status, goes_on = arrive(lane, queue.rows[joint], lanes, left, options, batch, samples, past, out)
                 if not goes_on:
-                    finish_joint(lane, status, options, batch, queue)
+                    finish_explicit_joint(lane, status, options, batch, queue)
             while queued < len(queue.rows) and at.live[lane] == 0:
-                load_joint(lane, queued, steps, options, batch, queue, past)
+                load_explicit_joint(lane, queued, steps, options, batch, queue, past)
                 queued += 1
         fresh = control.fresh > 0
         if any_of(fresh):

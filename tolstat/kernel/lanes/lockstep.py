@@ -6,6 +6,7 @@ point, cell or angle. Lanes never wait for each other's convergence, and a lane 
 one from the queue. What a lane does depends only on its own joint, and so does every bit of the result.
 """
 
+from tolstat.kernel.codes import DYNAMIC, NEWTON_FAILED, NOT_FINITE, NOT_SETTLED, OK, OUTSIDE_MODEL, QUASISTATIC, RAMP
 from tolstat.kernel.integrators.mesh import cells_of, load_error, parts_of
 from tolstat.kernel.lanes.batch import (
     ANGLE,
@@ -41,14 +42,6 @@ from tolstat.kernel.mechanics.topology import N_DOF
 from tolstat.kernel.revolution.closeup import STEPS as STEPS_AGAIN
 from tolstat.kernel.revolution.closeup import on_a_peak, recall, switches
 from tolstat.kernel.revolution.outcome import (
-    DYNAMIC,
-    NEWTON_FAILED,
-    NOT_FINITE,
-    NOT_SETTLED,
-    OK,
-    OUTSIDE_MODEL,
-    QUASISTATIC,
-    RAMP,
     clear_results,
     clear_samples,
     finish,
@@ -118,8 +111,8 @@ def finish_joint(lane, status, options, batch, queue):
 
 
 @njit
-def give_up(lane, options, batch, queue):
-    """Write how a joint without iterations left has ended, and empty its lane."""
+def finish_spent_joint(lane, options, batch, queue):
+    """Write that Newton has failed for a joint without iterations left, and empty its lane."""
     k = batch.control.k[lane]
     if follows_error(options):
         k = -(-k // cells_of(options.steps_per_rev))
@@ -226,12 +219,18 @@ def lockstep(options, patience, batch, queue, tally):
         Counters, increased: rounds; lanes with a joint, summed over rounds; rounds with new tangents.
     """
     batch, queue, tally = without_refcount(batch), without_refcount(queue), without_refcount(tally)
-    par, work, kept = as_lanes(batch.par), as_lanes(batch.work), as_lanes(batch.kept)
+    par, work, tangent = as_lanes(batch.par), as_lanes(batch.work), as_lanes(batch.tangent)
     motion, control = as_lanes(batch.motion), as_lanes(batch.control)
-    lanes, own, at, rows, results = (par, work, motion), batch.motion, batch.control, queue.rows, queue.results
+    lanes, motions, controls, rows, results = (
+        (par, work, motion),
+        batch.motion,
+        batch.control,
+        queue.rows,
+        queue.results,
+    )
     pasts = batch.pasts
     queued, waited, controlled = 0, 0, follows_error(options)
-    for lane in range(at.joint.size):
+    for lane in range(controls.joint.size):
         put_joint(lane, queue.words[0], batch)
         empty(lane, batch)
         queued = fill(lane, queued, options, batch, queue)
@@ -246,23 +245,23 @@ def lockstep(options, patience, batch, queue, tally):
         waited += waiting
         nothing_else = waiting > 0 and not any_of(solved | failed | moving)
         if waiting >= patience or waited >= STANDSTILL or nothing_else:
-            good = refactorise(stale, control, par, work, kept)
+            good = refactorise(stale, control, par, work, tangent)
             waited = 0
             tally[2] += 1
             control.before = where(stale, now, control.before)
             failed, moving = failed | (stale & ~good), moving | (stale & good)
-        failed = failed | correct(moving, kept, motion, control)
+        failed = failed | correct(moving, tangent, motion, control)
         solved = solved | last
         if controlled and any_of(solved & (control.stage > 0)):
             control.error = load_error(control.h, par, motion)
         acting, arrived = bits_of(solved | failed), bits_of(solved)
         # what follows stands here, not in a function of its own: passing the lanes to one cost 7 % of the time
-        for lane in range(at.joint.size):
+        for lane in range(controls.joint.size):
             if (acting >> lane) & 1 == 0:
                 continue
-            joint, phase, status = at.joint[lane], at.phase[lane], NOT_SETTLED
-            if at.iterations[lane] >= queue.left[joint]:
-                give_up(lane, options, batch, queue)
+            joint, phase, status = controls.joint[lane], controls.phase[lane], NOT_SETTLED
+            if controls.iterations[lane] >= queue.left[joint]:
+                finish_spent_joint(lane, options, batch, queue)
                 queued = fill(lane, queued, options, batch, queue)
                 continue
             here, goes_on = samples_of(lane, batch, queue), True
@@ -270,35 +269,37 @@ def lockstep(options, patience, batch, queue, tally):
             past = Past(trail, pasts.turns[lane], pasts.extremes[lane], pasts.begun[lane], pasts.mesh[lane])
             if (arrived >> lane) & 1 == 0:
                 if phase == PART:
-                    status = reject_cell(lane, options, at, own, past)
+                    status = reject_cell(lane, options, controls, motions, past)
                     goes_on = status == NOT_SETTLED
                 else:
-                    status = fall_back(lane, rows[joint], options, at, own)
+                    status = fall_back(lane, rows[joint], options, controls, motions)
             elif phase == PART:
                 fine, out = batch.fine[lane], results[joint]
-                status, goes_on = part(lane, rows[joint], lanes, options, at, own, here, fine, past, out)
+                status, goes_on = part(lane, rows[joint], lanes, options, controls, motions, here, fine, past, out)
             elif phase == ANGLE:
-                status = finish_angle(lane, rows[joint], lanes, options, at, own, here, results[joint])
+                status = finish_angle(lane, rows[joint], lanes, options, controls, motions, here, results[joint])
             elif phase < STEP:
-                next_phase(lane, rows[joint], options, at, own)
-            elif advance(lane, options, at, own):
+                next_phase(lane, rows[joint], options, controls, motions)
+            elif advance(lane, options, controls, motions):
                 if phase == STEP:
-                    status = step(lane, rows[joint], lanes, options, at, own, here, batch.notes[lane], results[joint])
+                    status = step(
+                        lane, rows[joint], lanes, options, controls, motions, here, batch.notes[lane], results[joint]
+                    )
                 else:
                     status = finish_closeup_part(
-                        lane, rows[joint], lanes, options, at, own, batch.fine[lane], results[joint]
+                        lane, rows[joint], lanes, options, controls, motions, batch.fine[lane], results[joint]
                     )
-            if options.max_revs == START_ONLY and at.phase[lane] in (STEP, PART):
+            if options.max_revs == START_ONLY and controls.phase[lane] in (STEP, PART):
                 for i in range(N_DOF):
-                    queue.starts[joint, i] = own.q0[i, lane]
+                    queue.starts[joint, i] = motions.q0[i, lane]
                 end_joint(lane, NOT_SETTLED, -1, options.steps_per_rev, options, batch, queue)
             elif not goes_on:
                 finish_adaptive_joint(lane, status, options, batch, queue)
             elif status != NOT_SETTLED:
                 finish_joint(lane, status, options, batch, queue)
             else:
-                if at.phase[lane] == PART and at.k[lane] == 0:
-                    start_cells(lane, rows[joint], options, at, own, past)
+                if controls.phase[lane] == PART and controls.k[lane] == 0:
+                    start_cells(lane, rows[joint], options, controls, motions, past)
                 continue
             queued = fill(lane, queued, options, batch, queue)
 

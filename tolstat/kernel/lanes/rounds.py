@@ -4,6 +4,7 @@
 lanes that begin a step, stage or angle, and lanes whose trial point is accepted before that.
 """
 
+from tolstat.kernel.codes import QUASISTATIC, TR_BDF2
 from tolstat.kernel.integrators import bdf2, trbdf2
 from tolstat.kernel.integrators.memory import AHEAD, H_OLD, LAST_ITERATION_BELOW, STAGED_STEP, TRAPEZOIDAL
 from tolstat.kernel.lanes.batch import CHECK
@@ -11,14 +12,10 @@ from tolstat.kernel.lanes.equilibrium import CA_REGULAR, CV_REGULAR, CV_STATIC, 
 from tolstat.kernel.mechanics.linsolve import factorise, solve
 from tolstat.kernel.mechanics.tangent import assemble
 from tolstat.kernel.mechanics.topology import N_DOF
-from tolstat.kernel.revolution.outcome import QUASISTATIC
 from tolstat.kernel.revolution.quasistatic import extrapolate, keep
-from tolstat.kernel.revolution.resolve import TR_BDF2
 from tolstat.kernel.simd.jit import njit
 from tolstat.kernel.simd.lane import retain, where
 
-formula, trial = bdf2.formula, bdf2.trial
-first_and_second, first, second = trbdf2.formula, trbdf2.first, trbdf2.second
 SLOW = 0.2
 """Ratio of successive residuals above which the tangent is renewed."""
 ROUNDOFF = 10 * 2.0**-52
@@ -29,7 +26,7 @@ ROUNDOFF = 10 * 2.0**-52
 def begin_steps(begins, passed, motion, control):
     """Accept the last sub-step where it passed; predict the trial point of the next one where one begins (BDF2)."""
     h = control.h
-    of = formula(h, motion.memory[H_OLD], motion.memory[TRAPEZOIDAL])
+    coefficients = bdf2.formula(h, motion.memory[H_OLD], motion.memory[TRAPEZOIDAL])
     known = motion.memory[AHEAD] > 0
     for i in range(N_DOF):
         q, v, a, q0, v0 = motion.q[i], motion.v[i], motion.a[i], motion.q0[i], motion.v0[i]
@@ -37,30 +34,31 @@ def begin_steps(begins, passed, motion, control):
         last = retain(passed, q, q0), retain(passed, v, v0), retain(passed, a, motion.a0[i])
         motion.q1[i], motion.v1[i] = before
         motion.q0[i], motion.v0[i], motion.a0[i] = last
-        guess = trial(h, of, last, before, known, motion.ahead[i])
+        guess = bdf2.trial(h, coefficients, last, before, known, motion.ahead[i])
         motion.q[i] = retain(begins, guess[0], q)
         motion.v[i] = retain(begins, guess[1], v)
         motion.a[i] = retain(begins, guess[2], a)
-    control.cv = where(begins, of[0], control.cv)
-    control.ca = where(begins, of[0] * of[0], control.ca)
+    control.cv = where(begins, coefficients[0], control.cv)
+    control.ca = where(begins, coefficients[0] * coefficients[0], control.ca)
 
 
 @njit
 def begin_parts(begins, passed, motion, control):
     """Accept the last part where it passed; predict the trial point of a stage where one begins (TR-BDF2)."""
-    of, later = first_and_second(control.h, motion.memory[STAGED_STEP]), control.stage > 0
-    held = begins & later
+    coefficients, later = trbdf2.formula(control.h, motion.memory[STAGED_STEP]), control.stage > 0
+    at_second = begins & later
     for i in range(N_DOF):
         q, v, a = motion.q[i], motion.v[i], motion.a[i]
         last = retain(passed, q, motion.q0[i]), retain(passed, v, motion.v0[i]), retain(passed, a, motion.a0[i])
         motion.q0[i], motion.v0[i], motion.a0[i] = last
-        one, two = first(of, last, motion.aux[i]), second(of, last, (q, v, a))
-        motion.v1[i], motion.aux[i] = retain(held, v, motion.v1[i]), retain(held, a, motion.aux[i])
-        motion.q[i] = retain(begins, where(later, two[0], one[0]), q)
-        motion.v[i] = retain(begins, where(later, two[1], one[1]), v)
-        motion.a[i] = retain(begins, where(later, two[2], one[2]), a)
-    control.cv = where(begins, of[0], control.cv)
-    control.ca = where(begins, of[0] * of[0], control.ca)
+        first = trbdf2.first(coefficients, last, motion.aux[i])
+        second = trbdf2.second(coefficients, last, (q, v, a))
+        motion.v1[i], motion.aux[i] = retain(at_second, v, motion.v1[i]), retain(at_second, a, motion.aux[i])
+        motion.q[i] = retain(begins, where(later, second[0], first[0]), q)
+        motion.v[i] = retain(begins, where(later, second[1], first[1]), v)
+        motion.a[i] = retain(begins, where(later, second[2], first[2]), a)
+    control.cv = where(begins, coefficients[0], control.cv)
+    control.ca = where(begins, coefficients[0] * coefficients[0], control.ca)
 
 
 @njit
@@ -93,8 +91,8 @@ def scaled_size(motion):
     """Largest weighted residual; NaN if any residual is NaN."""
     size = total = 0.0
     for i in range(N_DOF):
-        one = abs(motion.residual[i]) * motion.weight[i]
-        size, total = max(size, one), total + one
+        weighted = abs(motion.residual[i]) * motion.weight[i]
+        size, total = max(size, weighted), total + weighted
     return where(total == total, size, total)  # the sum detects NaN; a NaN-safe maximum is slower
 
 
@@ -142,29 +140,29 @@ def keep_rows(mask, new, old):
 
 
 @njit
-def refactorise(mask, control, par, work, kept):
+def refactorise(mask, control, par, work, tangent):
     """Compute new tangents in the lanes of the mask; return where, of all lanes, the factorisation succeeded."""
-    held = control.cv == CV_STATIC
-    cv, ca = where(held, CV_REGULAR, control.cv), where(held, CA_REGULAR, control.ca)
-    assemble(cv, ca, where(held, 0.0, control.cv), par, work)
+    static = control.cv == CV_STATIC
+    cv, ca = where(static, CV_REGULAR, control.cv), where(static, CA_REGULAR, control.ca)
+    assemble(cv, ca, where(static, 0.0, control.cv), par, work)
     good = factorise(work)
-    keep_blocks(mask, work.block, kept.block)
-    keep_blocks(mask, work.edge, kept.edge)
-    keep_rows(mask, work.corner, kept.corner)
+    keep_blocks(mask, work.block, tangent.block)
+    keep_blocks(mask, work.edge, tangent.edge)
+    keep_rows(mask, work.corner, tangent.corner)
     control.factorised = where(mask, control.cv, control.factorised)
     control.factorisations = where(mask, control.factorisations + 1, control.factorisations)
     return good
 
 
 @njit
-def correct(mask, kept, motion, control):
+def correct(mask, tangent, motion, control):
     """Apply Newton's correction in the lanes of the mask; return in which of them an equilibrium has diverged."""
     for i in range(N_DOF):
-        kept.solution[i] = -motion.residual[i]
-    solve(motion.q, kept)
+        tangent.solution[i] = -motion.residual[i]
+    solve(motion.q, tangent)
     step = largest = 0.0 * control.cv
     for i in range(N_DOF):
-        change = where(mask, kept.solution[i], 0.0)
+        change = where(mask, tangent.solution[i], 0.0)
         motion.q[i] = retain(mask, motion.q[i] + change, motion.q[i])
         motion.v[i] = retain(mask, motion.v[i] + control.cv * change, motion.v[i])
         motion.a[i] = retain(mask, motion.a[i] + control.ca * change, motion.a[i])

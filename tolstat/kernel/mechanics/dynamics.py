@@ -6,7 +6,7 @@ about the reference points in axes of the ideal frames, in the order of the unkn
 
 import math
 
-from tolstat.common.tables import Start
+from tolstat.kernel.codes import RAMP
 from tolstat.kernel.mechanics.bushing import bushing_load
 from tolstat.kernel.mechanics.contact import contact_load, smooth_step
 from tolstat.kernel.mechanics.motion import ideal_motion
@@ -27,8 +27,6 @@ from tolstat.kernel.mechanics.triad import from_triad, to_triad
 from tolstat.kernel.mechanics.vector import add, axpy, cross, put, row, scale, sub, turn, turn_back
 from tolstat.kernel.simd.jit import njit
 from tolstat.kernel.simd.lane import where
-
-RAMP = int(Start.RAMP)
 
 
 @njit

@@ -183,9 +183,9 @@ def factorise(work):
     """
     m = work.block
     good = True
-    for of in (OF_PSI, OF_S):
+    for unknown in (OF_PSI, OF_S):
         for i in range(6):
-            work.edge[of, HUB_SHAFT, i] = work.edge[of, SHAFT_HUB, i] = 0.0
+            work.edge[unknown, HUB_SHAFT, i] = work.edge[unknown, SHAFT_HUB, i] = 0.0
     for p in range(4):
         pin, a = PIN + p, ARM_OF_PIN[p]
         arm = ARM + a
@@ -206,17 +206,17 @@ def eliminate_into_shaft(p, work):
     """Eliminate pin `p` and its arm from the columns and rows of the output shaft; their blocks are inverted."""
     m, e, corner = work.block, work.edge, work.corner
     pin, a = PIN + p, ARM_OF_PIN[p]
-    for of in (OF_PSI, OF_S):
-        by_arm = product(m, ARM + a, edge(e, of, ARM_SHAFT + a))
-        put_edge(e, of, ARM_SHAFT + a, by_arm)
+    for unknown in (OF_PSI, OF_S):
+        by_arm = product(m, ARM + a, edge(e, unknown, ARM_SHAFT + a))
+        put_edge(e, unknown, ARM_SHAFT + a, by_arm)
         by_pin = product(m, pin, product(m, PIN_ARM + p, minus(by_arm)))
-        put_edge(e, of, PIN_SHAFT + p, by_pin)
-        of_arm = edge(e, of, SHAFT_ARM + a)
+        put_edge(e, unknown, PIN_SHAFT + p, by_pin)
+        of_arm = edge(e, unknown, SHAFT_ARM + a)
         for i in range(6):
-            e[of, SHAFT_PIN + p, i] = -dot(of_arm, column(m, ARM_PIN + p, i))
-        put_edge(e, of, HUB_SHAFT, plus_product(edge(e, of, HUB_SHAFT), m, HUB_PIN + p, minus(by_pin)))
-        of_pin = edge(e, of, SHAFT_PIN + p)
-        put_edge(e, of, SHAFT_HUB, minus_row_product(edge(e, of, SHAFT_HUB), of_pin, m, PIN_HUB + p))
+            e[unknown, SHAFT_PIN + p, i] = -dot(of_arm, column(m, ARM_PIN + p, i))
+        put_edge(e, unknown, HUB_SHAFT, plus_product(edge(e, unknown, HUB_SHAFT), m, HUB_PIN + p, minus(by_pin)))
+        of_pin = edge(e, unknown, SHAFT_PIN + p)
+        put_edge(e, unknown, SHAFT_HUB, minus_row_product(edge(e, unknown, SHAFT_HUB), of_pin, m, PIN_HUB + p))
     for i in (OF_PSI, OF_S):
         of_arm, of_pin = edge(e, i, SHAFT_ARM + a), edge(e, i, SHAFT_PIN + p)
         for j in (OF_PSI, OF_S):
@@ -227,8 +227,8 @@ def eliminate_into_shaft(p, work):
 def factorise_corner(work):
     """Eliminate the hub from psi and s, and psi from s; return False when a pivot is zero or not finite."""
     e, corner = work.edge, work.corner
-    for of in (OF_PSI, OF_S):
-        put_edge(e, of, HUB_SHAFT, product(work.block, HUB, edge(e, of, HUB_SHAFT)))
+    for unknown in (OF_PSI, OF_S):
+        put_edge(e, unknown, HUB_SHAFT, product(work.block, HUB, edge(e, unknown, HUB_SHAFT)))
     for i in (OF_PSI, OF_S):
         for j in (OF_PSI, OF_S):
             corner[i, j] -= dot(edge(e, i, SHAFT_HUB), edge(e, j, HUB_SHAFT))

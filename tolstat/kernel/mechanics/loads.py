@@ -32,13 +32,13 @@ N_MEASURES, OF_FORCES, OF_TORQUES = len(MEASURES), _MEASURES.index("F"), _MEASUR
 
 def _deciding():
     """Loads that decide, by measure: one array of all, and where those of each measure lie in it."""
-    found, bounds = [], [0]
+    deciding, bounds = [], [0]
     for key in _MEASURES:
         kinds = [kind for kind in LOAD_KINDS if kind.decides and measure_of(kind).key == key]
         kinds.sort(key=lambda kind: kind.key != key)
-        found += [i for kind in kinds for i in range(SPAN[kind.key].start, SPAN[kind.key].stop)]
-        bounds.append(len(found))
-    return np.array(found), np.array([bounds[:-1], bounds[1:]]).T
+        deciding += [i for kind in kinds for i in range(SPAN[kind.key].start, SPAN[kind.key].stop)]
+        bounds.append(len(deciding))
+    return np.array(deciding), np.array([bounds[:-1], bounds[1:]]).T
 
 
 DECIDING, OF_MEASURE = _deciding()

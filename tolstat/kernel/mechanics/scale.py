@@ -43,8 +43,8 @@ def centring_stiffness(lane, par):
     an axis act together, and the two axes one after the other: T_r / (2 (R + s_0) c), s_0 the outermost station's s.
     """
     radius = pick(par.R, lane) + pick(par.station_s[0], lane)
-    held = abs(pick(par.torque, lane)) / (2 * radius * mean_clearance(lane, par))
-    return held if pick(par.slides, lane) > 0 else 0.0
+    centring = abs(pick(par.torque, lane)) / (2 * radius * mean_clearance(lane, par))
+    return centring if pick(par.slides, lane) > 0 else 0.0
 
 
 @njit

@@ -44,9 +44,9 @@ def elastic(j, delta, clearance, needles, par):
         lost = par.needle_b * clearance
         share = 1 / (delta + lost)
         secant = par.station_k3[j] * math.sqrt(math.sqrt(math.sqrt(delta))) * math.sqrt(delta * share)
-        own = par.station_k3[j] > 0
-        force += where(own, secant * delta, 0.0)
-        slope += where(own, secant * (1.125 + 0.5 * lost * share), 0.0)
+        on_needles = par.station_k3[j] > 0
+        force += where(on_needles, secant * delta, 0.0)
+        slope += where(on_needles, secant * (1.125 + 0.5 * lost * share), 0.0)
     return force, slope
 
 
@@ -63,14 +63,14 @@ def penetration(force, j, clearance, par):
     """
     k1, k2 = par.station_k1[j], par.station_k2[j]
     slope = k2 + math.sqrt(k2 * k2 + 4 * k1 * force)
-    found = 2 * force / slope if slope > 0 else 0.0
+    delta = 2 * force / slope if slope > 0 else 0.0
     if not (par.station_k3[j] > 0 and force > 0):
-        return found
-    if found == 0:
-        found = (force / par.station_k3[j]) ** (8 / 9)
+        return delta
+    if delta == 0:
+        delta = (force / par.station_k3[j]) ** (8 / 9)
     for _ in range(TRIES):  # Newton's iteration in the logarithms, in which the force is nearly straight
-        own, rise = elastic(j, found, clearance, True, par)
-        found *= (force / own) ** (own / (rise * found))
-        if abs(own - force) <= ACCURATE * force:
+        reached, rise = elastic(j, delta, clearance, True, par)
+        delta *= (force / reached) ** (reached / (rise * delta))
+        if abs(reached - force) <= ACCURATE * force:
             break
-    return found
+    return delta

@@ -52,11 +52,11 @@ def clear(work):
         for i in range(6):
             for j in range(6):
                 work.block[b, i, j] = 0.0
-    for of in (OF_PSI, OF_S):
+    for unknown in (OF_PSI, OF_S):
         for a in range(4):
             for i in range(6):
-                work.edge[of, ARM_SHAFT + a, i] = work.edge[of, SHAFT_ARM + a, i] = 0.0
-        work.corner[of, OF_PSI] = work.corner[of, OF_S] = 0.0
+                work.edge[unknown, ARM_SHAFT + a, i] = work.edge[unknown, SHAFT_ARM + a, i] = 0.0
+        work.corner[unknown, OF_PSI] = work.corner[unknown, OF_S] = 0.0
 
 
 @njit
@@ -182,13 +182,13 @@ def bushing_tangent(i, cv, par, work):
 
 
 @njit
-def connect_shaft(of, arm, f, torque, edge):
-    """Subtract `f` and `torque` from column and row of the shaft's unknown `of` in `edge`, at the places of `arm`."""
+def connect_shaft(unknown, arm, f, torque, edge):
+    """Subtract `f` and `torque` from column and row of the shaft's `unknown` in `edge`, at the places of `arm`."""
     for n in range(3):
-        edge[of, ARM_SHAFT + arm, n] -= f[n]
-        edge[of, SHAFT_ARM + arm, n] -= f[n]
-        edge[of, ARM_SHAFT + arm, 3 + n] -= torque[n]
-        edge[of, SHAFT_ARM + arm, 3 + n] -= torque[n]
+        edge[unknown, ARM_SHAFT + arm, n] -= f[n]
+        edge[unknown, SHAFT_ARM + arm, n] -= f[n]
+        edge[unknown, ARM_SHAFT + arm, 3 + n] -= torque[n]
+        edge[unknown, SHAFT_ARM + arm, 3 + n] -= torque[n]
 
 
 @njit

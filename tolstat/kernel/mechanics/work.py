@@ -19,8 +19,8 @@ N_STATION = 15
 HUB_PIN, PIN_HUB, PIN_ARM, ARM_PIN = N_LUMPS, N_LUMPS + 4, N_LUMPS + 8, N_LUMPS + 12
 """First matrix of each kind in ``work.block``, after those of the lumps: rows hub, columns pin p; and so on."""
 ARM_SHAFT, SHAFT_ARM, PIN_SHAFT, SHAFT_PIN, HUB_SHAFT, SHAFT_HUB = 0, 4, 8, 12, 16, 17
-"""First vector of each kind in ``work.edge[of]``, `OF_PSI` or `OF_S`: column of the output shaft's unknown, rows of an
-arm; its row, columns of an arm; and so on."""
+"""First vector of each kind in ``work.edge[unknown]``, `OF_PSI` or `OF_S`: column of the output shaft's unknown,
+rows of an arm; its row, columns of an arm; and so on."""
 OF_PSI, OF_S = 0, 1
 
 FIELDS = {

@@ -10,7 +10,9 @@ import math
 from tolstat.common.load_kinds import ORDERS, SPAN
 from tolstat.kernel.simd.jit import njit
 
-LATERAL, MOMENT, DRIVE, PSI = (SPAN[f"{key}_orders"].start for key in ("lateral", "moment", "drive", "psi"))
+LATERAL_ORDERS, MOMENT_ORDERS, DRIVE_ORDERS, PSI_ORDERS = (
+    SPAN[f"{key}_orders"].start for key in ("lateral", "moment", "drive", "psi")
+)
 """First element of each kind."""
 
 
@@ -42,9 +44,12 @@ def of_order(i, samples, out):
         drive, psi = plus(drive, one[5], c, s), plus(psi, samples[k].psi, c, s)
         c, s = c * turn_c - s * turn_s, s * turn_c + c * turn_s
     of_output = len(ORDERS) + i
-    out.largest[LATERAL + i], out.largest[LATERAL + of_output] = semi_major(fx, fy, n), semi_major(gx, gy, n)
-    out.largest[MOMENT + i], out.largest[MOMENT + of_output] = semi_major(mx, my, n), semi_major(nx, ny, n)
-    out.largest[DRIVE + i], out.largest[PSI + i] = semi_major(drive, none, n), semi_major(psi, none, n)
+    out.largest[LATERAL_ORDERS + i] = semi_major(fx, fy, n)
+    out.largest[LATERAL_ORDERS + of_output] = semi_major(gx, gy, n)
+    out.largest[MOMENT_ORDERS + i] = semi_major(mx, my, n)
+    out.largest[MOMENT_ORDERS + of_output] = semi_major(nx, ny, n)
+    out.largest[DRIVE_ORDERS + i] = semi_major(drive, none, n)
+    out.largest[PSI_ORDERS + i] = semi_major(psi, none, n)
 
 
 @njit

@@ -4,16 +4,13 @@ import math
 
 import numpy as np
 
-from tolstat.common.tables import MAX_ITERATIONS, Fidelity, Start, Status
+from tolstat.common.tables import MAX_ITERATIONS
+from tolstat.kernel.codes import DYNAMIC, NEWTON_FAILED, NOT_SETTLED, OK
 from tolstat.kernel.mechanics.loads import DECIDING, N_AVERAGED, N_LOADS
-from tolstat.kernel.revolution.settle import ALL_LOADS, OWN, closure_error, step_error
+from tolstat.kernel.revolution.settle import ALL_LOADS, BUSHINGS_ONLY, closure_error, step_error
 from tolstat.kernel.revolution.trail import closure_trend, note_closure, with_slow_decay
 from tolstat.kernel.simd.jit import njit
 
-OK, NOT_SETTLED, NEWTON_FAILED = int(Status.OK), int(Status.NOT_SETTLED), int(Status.NEWTON_FAILED)
-NOT_FINITE, OUTSIDE_MODEL = int(Status.NOT_FINITE), int(Status.OUTSIDE_MODEL)
-RAMP = int(Start.RAMP)
-DYNAMIC, QUASISTATIC = int(Fidelity.DYNAMIC), int(Fidelity.QUASISTATIC)
 CHECKS_PER_REV = 12
 """Checks of the closure error per revolution, once two revolutions are recorded."""
 EARLY_CLOSURE, EARLY_SUMS, EARLY_STEP_ERROR = 0.1, 0.2, 0.02
@@ -97,9 +94,10 @@ def check_settled(k, iterations, par, options, samples, notes, out):
     out.revolutions = k / n
     if k == n + 2 * twelfth:
         first, last, bound = twelfth + 1, 2 * twelfth + 1, options.settle_tol
-        own, closure = closure_error(first, last, OWN, samples), closure_error(first, last, ALL_LOADS, samples)
+        closure_of_bushings = closure_error(first, last, BUSHINGS_ONLY, samples)
+        closure = closure_error(first, last, ALL_LOADS, samples)
         out.closure = with_slow_decay(closure, out.revolutions, par, notes)
-        small = with_slow_decay(own, out.revolutions, par, notes) <= EARLY_CLOSURE * bound
+        small = with_slow_decay(closure_of_bushings, out.revolutions, par, notes) <= EARLY_CLOSURE * bound
         small = small and out.closure <= EARLY_SUMS * bound
         if small and step_error(par, samples) <= EARLY_STEP_ERROR:
             return OK

@@ -22,8 +22,8 @@ from tolstat.kernel.simd.lane import ALL, any_of, pick, retain, where
 
 PEAKS = np.dtype(
     [
-        ("one", "f8", N_INSTANT),  # loads as `write_loads` writes them, at the last step
-        ("two", "f8", N_INSTANT),  # at the step before
+        ("last", "f8", N_INSTANT),  # loads as `write_loads` writes them, at the last step
+        ("before", "f8", N_INSTANT),  # at the step before
         ("top", "f8", N_INSTANT),  # largest so far
         ("low", "f8", N_AVERAGED),  # smallest so far
     ]
@@ -36,15 +36,15 @@ NEAR = 0.9
 @njit
 def follow_value(i, load, peaks):
     """Include the value of load `i` and, where it is interpolated, its peak at the step before, if there is one."""
-    one, two, top = peaks.one[i], peaks.two[i], peaks.top[i]
+    last, before, top = peaks.last[i], peaks.before[i], peaks.top[i]
     if INTERPOLATED[i]:
-        at_peak = (one >= two) & (one >= load) & (one > NEAR * top)
+        at_peak = (last >= before) & (last >= load) & (last > NEAR * top)
         if any_of(at_peak):
-            bend = 2 * one - two - load
+            bend = 2 * last - before - load
             bent = at_peak & (bend > 0)
-            height = one + (load - two) * (load - two) / (8 * where(bent, bend, 1.0))
+            height = last + (load - before) * (load - before) / (8 * where(bent, bend, 1.0))
             top = max(top, where(bent, height, top))
-        peaks.one[i], peaks.two[i] = load, one
+        peaks.last[i], peaks.before[i] = load, last
     peaks.top[i] = max(top, load)
     if i < N_AVERAGED:
         peaks.low[i] = min(peaks.low[i], load)
@@ -63,7 +63,7 @@ def forget(mask, peaks):
     """Reset in the lanes of the mask; NaN stands for steps before the first one, so that it is no peak."""
     for i in range(N_INSTANT):
         peaks.top[i] = retain(mask, 0.0, peaks.top[i])
-        peaks.one[i], peaks.two[i] = retain(mask, np.nan, peaks.one[i]), retain(mask, np.nan, peaks.two[i])
+        peaks.last[i], peaks.before[i] = retain(mask, np.nan, peaks.last[i]), retain(mask, np.nan, peaks.before[i])
         if i < N_AVERAGED:
             peaks.low[i] = retain(mask, np.inf, peaks.low[i])
 

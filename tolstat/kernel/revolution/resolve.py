@@ -9,14 +9,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tolstat.common.tables import KERNEL_RESULT, Fidelity, Method, Options, Status
+from tolstat.common import tables
+from tolstat.common.tables import KERNEL_RESULT, Options
+from tolstat.kernel.codes import NOT_FINITE, NOT_SETTLED, OK
 from tolstat.kernel.integrators.memory import STAGED_STEP, TOLERANCE
 from tolstat.kernel.integrators.mesh import CELL, cells_of, forget_mesh, refine_mesh, set_scale
 from tolstat.kernel.mechanics.loads import FORCES, N_AVERAGED, N_DECIDING, N_INSTANT, TORQUES
 from tolstat.kernel.mechanics.scale import SMALLEST_FORCE, typical_force
 from tolstat.kernel.mechanics.topology import N_DOF
 from tolstat.kernel.revolution.closeup import extend
-from tolstat.kernel.revolution.settle import OWN, closure_error, summarise
+from tolstat.kernel.revolution.settle import BUSHINGS_ONLY, closure_error, summarise
 from tolstat.kernel.revolution.trail import (
     Trail,
     closure_trend,
@@ -30,10 +32,7 @@ from tolstat.kernel.revolution.trail import (
 )
 from tolstat.kernel.simd.jit import njit
 
-OK, NOT_SETTLED = int(Status.OK), int(Status.NOT_SETTLED)
-TR_BDF2, DYNAMIC = int(Method.TR_BDF2), int(Fidelity.DYNAMIC)
-NEWTON_FAILED, NOT_FINITE = int(Status.NEWTON_FAILED), int(Status.NOT_FINITE)
-
+follows_error = njit(tables.follows_error)
 NEARLY, PATIENT = 1.5e-2, 10
 """Closure error at which the steps are halved, if need be, and number of revolutions after which the first ones are
 halved anyway: a joint need not settle with all steps."""
@@ -112,12 +111,6 @@ def revolutions_kept(options: Options) -> int:
 
 
 @njit
-def follows_error(options):
-    """Whether steps are error-controlled: dynamic TR-BDF2 with a tolerance."""
-    return options.method == TR_BDF2 and options.rtol > 0 and options.fidelity == DYNAMIC
-
-
-@njit
 def closure_target(options, turns):
     """Closure error at which a joint is finished with the steps in use: it ends or they are halved."""
     return options.settle_tol if turns.halved > 0 else max(NEARLY, options.settle_tol)
@@ -145,14 +138,14 @@ def clear_extremes(extremes):
 
 
 @njit
-def merge_extremes(one, out):
-    """Include the extremes `one` in those of `out`."""
+def merge_extremes(extremes, out):
+    """Include `extremes` in those of `out`."""
     for i in range(N_AVERAGED):
-        low = one.largest[i] - one.range[i]
-        top, span = extend(one.largest[i], out.largest[i], out.range[i])
+        low = extremes.largest[i] - extremes.range[i]
+        top, span = extend(extremes.largest[i], out.largest[i], out.range[i])
         out.largest[i], out.range[i] = top, max(span, top - low)
     for i in range(N_AVERAGED, N_INSTANT):
-        out.largest[i] = max(out.largest[i], one.largest[i])
+        out.largest[i] = max(out.largest[i], extremes.largest[i])
 
 
 @njit
@@ -161,15 +154,15 @@ def keep_revolution(par, samples, extremes, trail, r):
 
     Largest and smallest loads are those of all parts: parabolas through samples of the grid would overshoot spikes.
     """
-    own = trail.revolution[r % trail.revolution.size]
-    summarise(par, samples, own)
-    clear_extremes(own)
-    merge_extremes(extremes, own)
+    statistics = trail.revolution[r % trail.revolution.size]
+    summarise(par, samples, statistics)
+    clear_extremes(statistics)
+    merge_extremes(extremes, statistics)
     clear_extremes(extremes)
     stride = -(-samples.size // trail.loads.shape[1])
     for s in range(0, samples.size, stride):
         keep_deciding(samples[s].loads, trail.loads[r % trail.revolution.size, s // stride])
-    return own
+    return statistics
 
 
 @njit
@@ -213,8 +206,8 @@ def repeats(last, options, trail, turns, out):
     if turns.halved < options.max_refinements and not change <= RESOLVED:
         halve_steps(period, turns, out)
         return False
-    own = largest_change(False, turns.before, out) if turns.halved > 0 else np.nan
-    period = find_period(last, out.closure, max(ENOUGH * own, options.settle_tol), turns, trail)
+    change_of_bushings = largest_change(False, turns.before, out) if turns.halved > 0 else np.nan
+    period = find_period(last, out.closure, max(ENOUGH * change_of_bushings, options.settle_tol), turns, trail)
     if period == 0:
         return False
     combine(last, period, trail, out)
@@ -227,10 +220,10 @@ def repeats(last, options, trail, turns, out):
 @njit
 def conclude(trail, turns, out):
     """Write the loads of a joint that has not repeated, and the trend of its closure error, zero if it shows none."""
-    last, kept = turns.revolution - 1, min(trail.revolution.size, turns.revolution // 2)
-    slope, scatter = closure_trend(turns.revolution - kept, trail.notes)
-    combine(last, kept, trail, out)
-    falls = -slope * kept > max(MIN_FALL, MIN_FALL_OVER_SCATTER * scatter)
+    last, count = turns.revolution - 1, min(trail.revolution.size, turns.revolution // 2)
+    slope, scatter = closure_trend(turns.revolution - count, trail.notes)
+    combine(last, count, trail, out)
+    falls = -slope * count > max(MIN_FALL, MIN_FALL_OVER_SCATTER * scatter)
     out.closure_trend = slope if falls else 0.0
 
 
@@ -259,20 +252,24 @@ def after_revolution(par, options, samples, past, out):
     trail, turns = past.trail, past.turns
     last = turns.revolution
     turns.revolution += 1
-    own = keep_revolution(par, samples, past.extremes[1], trail, last)
+    statistics = keep_revolution(par, samples, past.extremes[1], trail, last)
     out.revolutions = turns.revolution
-    force, torque = own.largest[FORCES : FORCES + 8].max(), own.largest[TORQUES : TORQUES + 8].max()
+    force, torque = statistics.largest[FORCES : FORCES + 8].max(), statistics.largest[TORQUES : TORQUES + 8].max()
     if not (force < 1e300 and torque < 1e300):
         return NOT_FINITE, False
     turns.force, turns.torque = max(force, SMALLEST_FORCE), max(torque, SMALLEST_FORCE * par.R)
     if last > turns.since:
-        closure = closure_error(0, samples.size, OWN, samples)
+        closure = closure_error(0, samples.size, BUSHINGS_ONLY, samples)
         note_closure(turns.revolution, closure, trail.notes)
         out.closure = with_slow_decay(closure, turns.revolution, par, trail.notes)
         if repeats(last, options, trail, turns, out):
             return (OK if out.period == 1 else NOT_SETTLED), False
-    elif turns.period == 1 and turns.halved < options.max_refinements and largest_change(True, turns.before, own) > FAR:
-        halve_steps(1, turns, own)
+    elif (
+        turns.period == 1
+        and turns.halved < options.max_refinements
+        and largest_change(True, turns.before, statistics) > FAR
+    ):
+        halve_steps(1, turns, statistics)
     if turns.revolution == turns.limit:
         conclude(trail, turns, out)
         return NOT_SETTLED, False

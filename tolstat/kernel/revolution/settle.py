@@ -49,7 +49,7 @@ SAMPLE = np.dtype(
     align=True,
 )
 """Sample k of a revolution belongs to theta = 2 pi k / steps_per_rev."""
-OWN, ALL_LOADS = 0, 1
+BUSHINGS_ONLY, ALL_LOADS = 0, 1
 """Columns of its ``change``: bushing loads, and s as a force; with them what the shafts carry."""
 
 
@@ -117,7 +117,7 @@ def record(k, lane, par, work, v, samples):
         others = first + MEASURES[measure, 1] - MEASURES[measure, 0]
         for j in range(first, others):
             change = larger(change, replace(DECIDING[j], lane, work, sample))
-        sample.change[measure, OWN] = change
+        sample.change[measure, BUSHINGS_ONLY] = change
         for j in range(others, last):
             change = larger(change, replace(DECIDING[j], lane, work, sample))
         sample.change[measure, ALL_LOADS] = change
@@ -180,16 +180,16 @@ def predict_increment(k, q, v, ahead, samples):
 
 
 @njit
-def closure_error(first, last, of, samples):
+def closure_error(first, last, column, samples):
     """Largest change of a load that decides since the revolution before, relative to its measure.
 
-    Changes count at samples `first` to `last` - 1; `of`: those of bushing loads (`OWN`), or of `ALL_LOADS`.
+    Changes count at samples `first` to `last` - 1; `column`: those of bushing loads, `BUSHINGS_ONLY`, or `ALL_LOADS`.
     """
     worst = 0.0
     for measure in range(N_MEASURES):
         change = largest = 0.0
         for s in range(first, last):
-            change = larger(change, samples[s].change[measure, of])
+            change = larger(change, samples[s].change[measure, column])
         for s in range(samples.size):
             largest = max(largest, size_of(measure, samples[s].loads))
         error = change / largest if largest > 0 else change

@@ -40,18 +40,18 @@ NOTES = np.dtype([("check", "f8", (MOST_CHECKS, 2)), ("count", "i8")])
 
 
 class Trail(NamedTuple):
-    """Work arrays; revolution r lies at index r modulo the number kept."""
+    """Work arrays; revolution r lies at index r modulo the capacity."""
 
-    loads: np.ndarray  # (kept, angles, N_DECIDING) loads that decide
-    revolution: np.ndarray  # (kept,) record of KERNEL_RESULT: statistics of each revolution
+    loads: np.ndarray  # (capacity, angles, N_DECIDING) loads that decide
+    revolution: np.ndarray  # (capacity,) record of KERNEL_RESULT: statistics of each revolution
     notes: np.record  # NOTES
 
 
-def make_trails(joints: int, steps_per_rev: int, kept: int) -> tuple[np.ndarray, np.recarray, np.recarray]:
-    """Allocate the arrays of several trails, for `kept` revolutions."""
+def make_trails(joints: int, steps_per_rev: int, capacity: int) -> tuple[np.ndarray, np.recarray, np.recarray]:
+    """Allocate the arrays of several trails, for `capacity` revolutions."""
     angles = -(-steps_per_rev // _stride(steps_per_rev))
-    loads = np.full((joints, kept, angles, N_DECIDING), np.nan)
-    return loads, np.zeros((joints, kept), KERNEL_RESULT).view(np.recarray), make_notes(joints)
+    loads = np.full((joints, capacity, angles, N_DECIDING), np.nan)
+    return loads, np.zeros((joints, capacity), KERNEL_RESULT).view(np.recarray), make_notes(joints)
 
 
 def make_notes(joints: int) -> np.recarray:
@@ -128,8 +128,8 @@ def with_slow_decay(closure, revolutions, par, notes):
 @njit
 def lag_closure(last, lag, trail):
     """Closure error of revolution `last` (from 0) against the one `lag` earlier, of bushing loads."""
-    kept, angles = trail.loads.shape[0], trail.loads.shape[1]
-    now, before = trail.loads[last % kept], trail.loads[(last - lag) % kept]
+    capacity, angles = trail.loads.shape[0], trail.loads.shape[1]
+    now, before = trail.loads[last % capacity], trail.loads[(last - lag) % capacity]
     worst = 0.0
     for measure in range(N_MEASURES):
         change = largest = 0.0
@@ -144,10 +144,10 @@ def lag_closure(last, lag, trail):
 
 
 @njit
-def keep_deciding(loads, kept):
-    """Copy the loads that decide to `kept`, (N_DECIDING,)."""
+def keep_deciding(loads, deciding):
+    """Copy the loads that decide to `deciding`, (N_DECIDING,)."""
     for j in range(N_DECIDING):
-        kept[j] = loads[DECIDING[j]]
+        deciding[j] = loads[DECIDING[j]]
 
 
 @njit
@@ -169,14 +169,14 @@ def largest_change(of_all, before, out):
 @njit
 def combine(last, count, trail, out):
     """Write the statistics over the `count` revolutions up to `last` (from 0) to `out`, a row of KERNEL_RESULT."""
-    kept = trail.revolution.size
+    capacity = trail.revolution.size
     for i in range(N_LOADS):
-        top, low, total = trail.revolution[last % kept].largest[i], np.inf, 0.0
+        top, low, total = trail.revolution[last % capacity].largest[i], np.inf, 0.0
         for r in range(last - count + 1, last + 1):
-            one = trail.revolution[r % kept]
-            top = max(top, one.largest[i])
+            statistics = trail.revolution[r % capacity]
+            top = max(top, statistics.largest[i])
             if i < N_AVERAGED:
-                low, total = min(low, one.largest[i] - one.range[i]), total + one.average[i]
+                low, total = min(low, statistics.largest[i] - statistics.range[i]), total + statistics.average[i]
         out.largest[i] = top
         if i < N_AVERAGED:
             out.average[i], out.range[i] = total / count, top - low
@@ -184,9 +184,9 @@ def combine(last, count, trail, out):
     for r in range(last - count + 1, last + 1):
         for pin in range(4):
             for mode in range(4):
-                out.mode_share[pin, mode] += trail.revolution[r % kept].mode_share[pin, mode] / count
+                out.mode_share[pin, mode] += trail.revolution[r % capacity].mode_share[pin, mode] / count
     for pin in range(4):
         total = 0.0
         for r in range(last - count + 1, last + 1):
-            total += trail.revolution[r % kept].equivalent_load[pin] ** LIFE_EXPONENT
+            total += trail.revolution[r % capacity].equivalent_load[pin] ** LIFE_EXPONENT
         out.equivalent_load[pin] = (total / count) ** (1 / LIFE_EXPONENT)

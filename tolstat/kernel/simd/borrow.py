@@ -18,8 +18,8 @@ def _borrow(context, builder, ty, value):
         return array._getvalue()
     if isinstance(ty, types.BaseTuple):
         for i, member in enumerate(ty):
-            own = _borrow(context, builder, member, builder.extract_value(value, i))
-            value = builder.insert_value(value, own, i)
+            borrowed = _borrow(context, builder, member, builder.extract_value(value, i))
+            value = builder.insert_value(value, borrowed, i)
     return value
 
 

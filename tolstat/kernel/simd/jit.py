@@ -25,8 +25,8 @@ class Locator(UserProvidedCacheLocator):
     @classmethod
     def get_suitable_cache_subpath(cls, py_file: str) -> str:
         """Subfolder of the cache directory; the hash in the directory's name already identifies the sources."""
-        own = Path(py_file).is_relative_to(KERNEL)
-        return KERNEL.name if own else str(super().get_suitable_cache_subpath(py_file))
+        of_kernel = Path(py_file).is_relative_to(KERNEL)
+        return KERNEL.name if of_kernel else str(super().get_suitable_cache_subpath(py_file))
 
     def ensure_cache_path(self) -> None:
         """Require nothing: a folder that can only be read will do."""

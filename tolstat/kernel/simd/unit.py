@@ -27,12 +27,12 @@ class Unit(JITCodeLibrary):
 
     def below(self):
         """Modules of all direct and indirect callees, each once."""
-        found, waiting, others = {self}, [self], []
+        linked, waiting, others = {self}, [self], []
         while waiting:
             for library in waiting.pop()._linking_libraries:
-                if library in found:
+                if library in linked:
                     continue
-                found.add(library)
+                linked.add(library)
                 self._reload_init.update(library._reload_init)
                 if isinstance(library, Unit) and not library._finalized:
                     waiting.append(library)
@@ -46,11 +46,11 @@ class Unit(JITCodeLibrary):
         """Link all callees, optimise, and emit machine code."""
         self._raise_if_finalized()
         module = self._final_module
-        own = {function.name for function in module.functions}
+        before = {function.name for function in module.functions}
         for other in self.below():
             module.link_in(other, preserve=True)
         for function in module.functions:
-            if not function.is_declaration and function.name not in own:
+            if not function.is_declaration and function.name not in before:
                 function.linkage = Linkage.internal  # no other code calls this copy: delete it where it is inlined
         self._optimize_final_module()
         module.verify()

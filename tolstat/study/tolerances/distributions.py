@@ -102,9 +102,9 @@ def share_between(a: float | Array, b: float | Array) -> Array:
     return np.where(np.asarray(a) > 0, special.ndtr(-a) - special.ndtr(-b), special.ndtr(b) - special.ndtr(a))
 
 
-def _within(band: TruncatedNormal | Uniform | Triangular | Beta, x: Array, density: Array) -> Array:
+def _within(lower: float, upper: float, x: Array, density: Array) -> Array:
     """Logarithmic density where x is in the band, -inf elsewhere."""
-    return np.where((x >= band.lower) & (x <= band.upper), density, -np.inf)
+    return np.where((x >= lower) & (x <= upper), density, -np.inf)
 
 
 @dataclass(frozen=True)
@@ -163,7 +163,7 @@ class TruncatedNormal(Described):
 
     def logpdf(self, x: Array) -> Array:
         """See `Distribution.logpdf`."""
-        return _within(self, x, Normal(self.mean, self.sigma).logpdf(x) - math.log(self._span[2]))
+        return _within(self.lower, self.upper, x, Normal(self.mean, self.sigma).logpdf(x) - math.log(self._span[2]))
 
 
 @dataclass(frozen=True)
@@ -183,7 +183,7 @@ class Uniform(Described):
 
     def logpdf(self, x: Array) -> Array:
         """See `Distribution.logpdf`."""
-        return _within(self, x, np.full_like(x, -math.log(self.upper - self.lower)))
+        return _within(self.lower, self.upper, x, np.full_like(x, -math.log(self.upper - self.lower)))
 
 
 @dataclass(frozen=True)
@@ -214,7 +214,7 @@ class Triangular(Described):
         with np.errstate(divide="ignore", invalid="ignore"):
             rising, falling = (x - self.lower) / (self.peak - self.lower), (self.upper - x) / (self.upper - self.peak)
             height = np.log(np.where(x < self.peak, rising, np.where(x > self.peak, falling, 1.0)))
-        return _within(self, x, height + math.log(2.0 / (self.upper - self.lower)))
+        return _within(self.lower, self.upper, x, height + math.log(2.0 / (self.upper - self.lower)))
 
 
 @dataclass(frozen=True)
@@ -263,7 +263,7 @@ class Beta(Described):
         width = self.upper - self.lower
         t = np.clip((x - self.lower) / width, 0.0, 1.0)
         power = special.xlogy(self.a - 1, t) + special.xlog1py(self.b - 1, -t)
-        return _within(self, x, np.asarray(power - special.betaln(self.a, self.b) - math.log(width)))
+        return _within(self.lower, self.upper, x, np.asarray(power - special.betaln(self.a, self.b) - math.log(width)))
 
 
 @dataclass(frozen=True)

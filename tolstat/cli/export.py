@@ -121,7 +121,7 @@ def export(
             _tell(joints, number)
         if parquet is None and xlsx is None:
             return
-        frame = result_file.to_pandas(store, nominal)
+        (frame,) = result_file.in_blocks(store, nominal, store.n)
         writers = {xlsx: partial(_write_workbook, view, frame), parquet: partial(frame.to_parquet, engine="pyarrow")}
         for name, write_file in writers.items():
             if name is not None:

@@ -9,7 +9,7 @@ only correlates errors of the joint that share it, as `correlated` does.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
 from typing import Annotated, NamedTuple
@@ -98,7 +98,7 @@ def read(file: Reading) -> Copula:
         names: dict[str, None] = {}
         for pattern in entry.between:
             with gather(file.faults):
-                names.update(dict.fromkeys(_named(pattern, file.drawn, f"{file.place}: {where}")))
+                names.update(dict.fromkeys(_named(pattern, file.scatter.drawn, f"{file.place}: {where}")))
         members = list(names)
         if len(members) < 2 and len(file.faults) == before:
             file.fault(where, f"names only one error, {members[0]}", "name at least two")
@@ -119,7 +119,7 @@ def read(file: Reading) -> Copula:
     return Copula()
 
 
-def _named(pattern: str, toleranced: dict[str, str], where: str) -> list[str]:
+def _named(pattern: str, toleranced: Sequence[str], where: str) -> list[str]:
     """Errors of one name or pattern in `between`."""
     names = select(pattern, toleranced)
     if any(is_zone(name) for name in names or [pattern]):
@@ -207,15 +207,15 @@ def correlated(copula: Copula, lots: Mapping[str, Lot], place: str) -> Copula:
 
 
 class Group(NamedTuple):
-    """Errors that are taken together from another joint; groups are independent of each other.
+    """Errors that are taken from another joint, or changed, together: a line of the drawing, or errors that correlate.
 
     Attributes
     ----------
     label : str
-        Name of the error, or pattern of the entry of ``[tolerances]``; a group without a pattern is labelled by its
-        first error and the number of others.
+        Pattern of the entry of ``[tolerances]``, name of a group, feature or error; correlated errors without a pattern
+        are labelled by the first and the number of others.
     names : tuple of str
-        The errors.
+        The errors, or zones.
     """
 
     label: str

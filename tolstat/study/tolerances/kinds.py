@@ -293,10 +293,13 @@ class Tolerances(NamedTuple):
         In the order of the file.
     axes : dict of str to Axis
         Features and pairs that have zones.
+    drawn : sequence of str
+        Quantities that are drawn, those of entries with faults included.
     """
 
     entries: tuple[Toleranced, ...] = ()
     axes: Mapping[str, Axis] = {}
+    drawn: Sequence[str] = ()
 
     @property
     def distributions(self) -> dict[str, Distribution]:
@@ -364,7 +367,9 @@ def read(table: Sequence[tuple[Entry, list[str]]], file: Reading) -> Tolerances:
     if file.joint is not None:
         with gather(file.faults):
             axes = axes_of(entries, reach, file.place)
-    return Tolerances(entries, axes)
+    # those with faults stand for what they would draw, so that others do not seem to lack them
+    drawn = [quantity for i, (_, names) in enumerate(table) for quantity in (read[i].names if i in read else names)]
+    return Tolerances(entries, axes, list(dict.fromkeys(drawn)))
 
 
 def _is_position(names: list[str]) -> bool:

@@ -1,4 +1,4 @@
-"""``tolstat simulate``, ``replay`` and ``evaluate``: joints of a case, of a campaign, and of another program."""
+"""``tolstat simulate``, ``replay``, ``evaluate``, ``show``: joints of a case, a campaign, another program; drawings."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import typer
 from tolstat.cli import _library as library
 from tolstat.cli._library import np
 from tolstat.cli._shared import print_json, print_warnings, progress, say, warn, work, write
-from tolstat.common.errors import Fault, InputError
+from tolstat.common.errors import Fault, InputError, gather
 from tolstat.common.files import atomic_write, check_target, finite
 from tolstat.display.options import AsJson, Opt, Point, ResultPath, SimulatedPath, Trace, Workers
 
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
     from tolstat.campaign.replay import CaseResult, Replay
 
+FORMATS = (".svg", ".png", ".pdf")
 MAX_FAULTS = 20
 """Most faults of a table that a message lists."""
 
@@ -230,3 +231,59 @@ def read_table(path: Path, names: Mapping[str, str]) -> NDArray[np.float64]:
     if faults:
         raise InputError(faults)
     return values * list(factors.values())
+
+
+def show(
+    source: Annotated[str, Opt("SOURCE")],
+    *,
+    errors: bool = False,
+    row: Annotated[int | None, Opt("I", least=0)] = None,
+    alpha: Annotated[str | None, Opt("ANGLE")] = None,
+    columns: Annotated[int, Opt("N", least=1, most=2)] = 2,
+    out: Annotated[Path | None, Opt("PICTURE")] = None,
+) -> None:
+    """Draw a joint, its errors, or one joint of a campaign.
+
+    Draws cross, forks, bushings, pins in their holes and the axes e, t, z from the joint's own dimensions. Prints the
+    dimensions; with --errors the kinds of errors (to errors.svg), with --row the errors of that joint (to rowI.svg).
+
+    Example: tolstat show studies/iso2768_f.toml --out joint.svg
+
+    Parameters
+    ----------
+    source : str
+        Joint file, study or case (TOML), result file (HDF5), or name of a joint: cirelli2021.
+    errors : bool
+        Draw what a positive error of each kind means instead of the joint.
+    row : int, optional
+        Draw the errors of this row of a result file, enlarged.
+    alpha : str, optional
+        Misalignment in place of the source's; "15 deg".
+    columns : int
+        Drawings of the joint side by side: 1 or 2.
+    out : Path, optional
+        File to write: .svg, .png or .pdf; default: joint.svg.
+    """
+    target = out or Path("errors.svg" if errors else "joint.svg" if row is None else f"row{row}.svg")
+    faults = []
+    if errors and row is not None:
+        faults.append(Fault("--errors", "cannot be used together with --row", "give one of them"))
+    if target.suffix.lower() not in FORMATS:
+        faults.append(Fault(f"--out {target}", "is not a picture", f"end its name in {', '.join(FORMATS)}"))
+    with gather(faults):
+        check_target(target)
+    if faults:
+        raise InputError(faults)
+    joint, own_alpha, title, own_errors = library.drawings.read(source, row, alpha)
+    if errors:
+        figure, rows = library.drawings.draw_errors(joint), library.drawings.meanings()
+    elif own_errors is not None:
+        figure, rows = library.drawings.draw_row(joint, own_errors, title), library.views.numbers(joint, own_errors)
+    else:
+        figure, rows = (
+            library.drawings.draw_joint(joint, own_alpha, title, columns),
+            library.drawings.lengths(joint, own_alpha),
+        )
+    (path,) = library.style.save(figure, target.with_suffix(""), (target.suffix.lower(),))
+    typer.echo(library.table.fitted(library.table.plain(rows), rows)[0])
+    say(f"wrote {path}")

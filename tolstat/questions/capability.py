@@ -20,7 +20,7 @@ from tolstat.display import text
 from tolstat.display.answer import Answer, Asked, Column, Part, Rows, Sentence, Table
 from tolstat.display.options import Delivery, Opt
 from tolstat.questions import shares
-from tolstat.store import error_budget, known_parts
+from tolstat.store import error_budget
 from tolstat.store.view import View
 
 NOT_NORMAL = 0.01
@@ -124,7 +124,7 @@ def capability_on_page(view: View, asked: Asked) -> Answer:
     if not (view.sampled and view.count(*VALID)) or view.design.refuses("index"):
         raise NotApplicable
     parts = list(capability(view).parts) if view.limits else []
-    if known_parts.of(view) is not None:
+    if error_budget.known_parts(view) is not None:
         parts.append(Sentence("for the tolerances as stated: what measured parts leave open is not in these"))
     tails = [partial(_rare_loads, view, name) for name in view.leading]
     by_load = dict(zip(view.leading, mapped(tails, min(asked.processes, 2)), strict=True))

@@ -13,7 +13,7 @@ from tolstat.analysis.sample import CONFIDENCE, Sample, total_interval
 from tolstat.common.loads import ANY_LIMIT, SHOWN_LOADS, load_of, unit_text
 from tolstat.display import text
 from tolstat.display.table import Row, Rows
-from tolstat.store import error_budget, known_parts
+from tolstat.store import error_budget
 from tolstat.store.view import View
 
 SHARES = (0.5, 0.9, 0.95, 0.99)
@@ -78,7 +78,7 @@ def _above_limit(view: View, load: Sample) -> dict[str, Any]:
     row |= {"confidence": CONFIDENCE, "numerical_error": error_budget.relative(view, load.name)}
     row |= dict(zip(ERROR_BUDGET, budget, strict=True))
     row["unsearched_upper"] = max(end.upper_if_missed(level, CONFIDENCE) for end in (loads[0], loads[-1]))
-    if (parts := known_parts.of(view)) is not None:
+    if (parts := error_budget.known_parts(view)) is not None:
         known = parts.share(load.name, CONFIDENCE)
         row |= {"both_lower": known.lower, "both_upper": known.upper}
         row |= {name: getattr(known, name) for name in KNOWN}

@@ -28,7 +28,7 @@ import typer
 
 from tolstat.cli._library import points, stores, studies, units
 from tolstat.cli._shared import deliver, fail, progress, say, session, work
-from tolstat.common.errors import Fault, InputError, TolstatError, gather
+from tolstat.common.errors import Fault, InputError, TolstatError, gather, raise_all
 from tolstat.common.files import check_target, reason
 from tolstat.display import options
 from tolstat.display.options import Opt
@@ -162,8 +162,7 @@ def _values(parameters: Mapping[str, Parameter], given: dict[str, Any]) -> dict[
                 check_target(Path(value), *paths)
             elif opt.unit is not None:
                 given[name] = parameter.default if value is None else quantity(value, opt, flag_of(parameter))
-    if faults:
-        raise InputError(faults)
+    raise_all(faults)
     return given
 
 

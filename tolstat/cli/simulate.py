@@ -14,7 +14,7 @@ import typer
 from tolstat.cli import _library as library
 from tolstat.cli._library import np
 from tolstat.cli._shared import print_json, print_warnings, progress, say, warn, work, write
-from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.errors import Fault, gather, raise_all
 from tolstat.common.files import atomic_write, check_target, finite
 from tolstat.display.options import AsJson, Opt, Point, ResultPath, SimulatedPath, Trace, Workers
 
@@ -228,8 +228,7 @@ def read_table(path: Path, names: Mapping[str, str]) -> NDArray[np.float64]:
     if len(faults) > MAX_FAULTS:
         rest = Fault(str(path), f"and {len(faults) - MAX_FAULTS} more faults", "mend these first")
         faults = [*faults[:MAX_FAULTS], rest]
-    if faults:
-        raise InputError(faults)
+    raise_all(faults)
     return values * list(factors.values())
 
 
@@ -272,8 +271,7 @@ def show(
         faults.append(Fault(f"--out {target}", "is not a picture", f"end its name in {', '.join(FORMATS)}"))
     with gather(faults):
         check_target(target)
-    if faults:
-        raise InputError(faults)
+    raise_all(faults)
     joint, own_alpha, title, own_errors = library.drawings.read(source, row, alpha)
     if errors:
         figure, rows = library.drawings.draw_errors(joint), library.drawings.meanings()

@@ -30,6 +30,10 @@ TITLE = 0.34
 LETTER, KEY = 0.071, 0.5
 """Width of a letter of a legend, and of the rest of an entry, inches."""
 GREY = "#B8B8B8"
+ACCEPTED: dict[str, Any] = {"color": style.COLOURS[2], "lw": 1.4, "ls": (0.0, (6.0, 2.0))}
+"""Look of the line of an accepted share."""
+WORDS: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 8.0, "backgroundcolor": "white"}
+"""Look of words on a vertical line."""
 
 
 @contextmanager
@@ -202,9 +206,45 @@ def empty(ax: Axes, why: str) -> None:
     ax.set(xticks=[], yticks=[])
 
 
+def share_bar(
+    ax: Axes, y: float, share: Sequence[float], drawn: float, floor: float, colour: str, height: float, off: float = 0.0
+) -> None:
+    """Draw how far a change moves a share: a bar from the share as drawn, and the interval of the new one.
+
+    Parameters
+    ----------
+    ax : Axes
+        Panel of horizontal rows with an axis of shares.
+    y : float
+        Row.
+    share : sequence of float
+        Share, lower and upper end of its interval.
+    drawn : float
+        Share as drawn.
+    floor : float
+        Left end of the axis; an arrow there stands for an end that is smaller.
+    colour, height
+        Of the bar.
+    off : float
+        Distance of the interval above the middle of the row.
+    """
+    moved, low, high = (max(end, floor) for end in share)
+    ax.barh(y, moved - drawn, height, left=drawn, color=colour, zorder=2)
+    ax.plot([low, high], [y - off, y - off], color=style.INK, lw=1.2, zorder=3)
+    if share[1] < floor:
+        ax.plot(floor, y - off, marker=style.markers.CARETLEFT, color=style.INK, ms=5.0, zorder=4, clip_on=False)
+
+
+def accepted(ax: Axes, share: float, y: float) -> None:
+    """Draw the accepted share into a panel of horizontal rows, with words at the height y; nothing if there is none."""
+    if share > 0.0:
+        ax.axvline(share, **ACCEPTED)
+        ax.text(share, y, f"accepted {text.percent(share)}", **WORDS)
+
+
 def rows_left(labels: Sequence[str]) -> float:
     """Room for the labels of a panel of horizontal rows, inches."""
-    return max(1.2, 0.064 * max(map(len, labels), default=0) + 0.12)
+    return max(1.2, 0.064 * max((len(line) for label in labels for line in label.split("\n")), default=0) + 0.12)
 
 
 def rows_height(count: int) -> float:

@@ -18,7 +18,7 @@ from tolstat.analysis.prediction import DELIVERY
 from tolstat.analysis.reweight import Ratios
 from tolstat.analysis.sample import CONFIDENCE, Sample
 from tolstat.common.columns import holds
-from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.errors import Fault, InputError, gather, raise_all
 from tolstat.common.loads import ANY_LIMIT, FloatArray, split, unit_text
 from tolstat.common.tables import Status
 from tolstat.common.units import DISPLAY_UNITS
@@ -311,8 +311,7 @@ def _read_request(view: View, targets: Sequence[str], costs: Path | None, keep: 
     each: list[Cost] = []
     with gather(faults):
         each = prices.of(every, costs)
-    if faults:
-        raise InputError(faults)
+    raise_all(faults)
     pairs = zip(every, each, strict=True)
     free = [(t, cost) for t, cost in pairs if cost.reach[0] < cost.reach[1] and not kept_names & set(t.names)]
     if not free:

@@ -9,8 +9,8 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from tolstat.analysis import binomial, extreme
 from tolstat.analysis import capability as indices
+from tolstat.analysis import extreme
 from tolstat.analysis.prediction import DELIVERY
 from tolstat.common.cores import mapped
 from tolstat.common.errors import Fault, InputError, NotApplicable
@@ -174,7 +174,7 @@ def limit_rows(view: View, confidence: float = 0.95, delivery: int = DELIVERY) -
         row = dict(shares.good(view, load.name, confidence, delivery))
         index = indices.of_sample(load, row["limit"], confidence)
         both = shares.with_ends("cpk", index.cpk) | shares.with_ends("cpk_normal", index.cpk_normal)
-        if binomial.unresolved_matter(row["count"], row["n"], row["n_failed"] + row["n_unsettled"]):
+        if shares.unresolved_matter(row):
             both = dict.fromkeys(both, np.nan)
         rows.append(row | both | {"normal_p": index.normal_p, "needed": index.needed})
     return rows

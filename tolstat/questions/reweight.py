@@ -19,7 +19,7 @@ from tolstat.analysis.prediction import DELIVERY
 from tolstat.analysis.reweight import Ratios
 from tolstat.analysis.sample import CONFIDENCE, Sample
 from tolstat.analysis.weighted import Weighted
-from tolstat.common.errors import Fault, InputError
+from tolstat.common.errors import Fault, raise_all
 from tolstat.common.loads import ANY_LIMIT, FloatArray
 from tolstat.common.tables import Status
 from tolstat.display import text
@@ -131,8 +131,7 @@ def reweight(
     new = {name: law for name, law in changed(view.study, settings).items() if law.describe() != old[name].describe()}
     remedy = "run a study with these tolerances"
     beyond = {name: _beyond(old[name], law) for name, law in new.items()}
-    if faults := [Fault(f"tolerances.{name}", words, remedy) for name, words in beyond.items() if words]:
-        raise InputError(faults)
+    raise_all(Fault(f"tolerances.{name}", words, remedy) for name, words in beyond.items() if words)
     done = np.flatnonzero(view.status != Status.PENDING)
     ratios = _ratios(view, new, done)
     if not ratios.values.any():

@@ -20,8 +20,9 @@ from tolstat.questions.assumptions.variations import Standing
 from tolstat.questions.bearing_life import answer as bearing_life
 from tolstat.questions.causes import lines
 from tolstat.questions.exceedance import rows as exceedance
-from tolstat.questions.exceedance.rows import ends, share_of, unresolved_matter, verdict
+from tolstat.questions.exceedance.rows import ends, share_of, verdict
 from tolstat.questions.fatigue import answer as fatigue
+from tolstat.questions.shares import unresolved_matter
 from tolstat.store import error_budget
 from tolstat.store.view import View
 

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.analysis import binomial
 from tolstat.analysis.estimates import CURVE
 from tolstat.analysis.sample import CONFIDENCE, Sample, total_interval
 from tolstat.common.loads import ANY_LIMIT, SHOWN_LOADS, load_of, unit_text
 from tolstat.display import text
 from tolstat.display.table import Row, Rows
+from tolstat.questions.shares import unresolved_matter
 from tolstat.store import error_budget
 from tolstat.store.view import View
 
@@ -239,8 +239,3 @@ def share_of(row: Row) -> str:
         return text.percent(row["estimate"])
     low, high = ends(row)
     return text.span(low, high) if not np.isnan(low) else text.span(row["bound_lower"], row["bound_upper"])
-
-
-def unresolved_matter(row: Row) -> bool:
-    """Whether joints without a valid load make the share above a limit as uncertain as sampling does."""
-    return binomial.unresolved_matter(row["count"], row["n"], row["n_failed"] + row["n_unsettled"])

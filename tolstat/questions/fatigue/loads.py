@@ -14,7 +14,7 @@ from tolstat.analysis.cycles import Cycles
 from tolstat.analysis.sample import Sample
 from tolstat.common import load_kinds, loads, strict
 from tolstat.common.channels import BUSHING_LOADS, CHANNELS, LoadHistory, channels_of, histories_of
-from tolstat.common.errors import Fault, InputError, StoreError
+from tolstat.common.errors import Fault, StoreError, raise_all
 from tolstat.common.late import pandas as pd
 from tolstat.common.tables import SIMULATED, Status
 from tolstat.display.table import Row, Rows
@@ -42,13 +42,11 @@ def channels(patterns: Sequence[str]) -> tuple[str, ...]:
         With every pattern that selects nothing.
     """
     selected = {pattern: select(pattern, CHANNELS) for pattern in patterns}
-    faults = [
+    raise_all(
         Fault(f"channel {pattern!r}", "selects nothing", strict.did_you_mean(pattern, list(CHANNELS)[:8]))
         for pattern, names in selected.items()
         if not names
-    ]
-    if faults:
-        raise InputError(faults)
+    )
     return tuple(name for name in CHANNELS if any(name in names for names in selected.values()))
 
 

@@ -53,9 +53,8 @@ _EXACT: dict[str, Any] = {"ls": "", "mfc": "white", "mec": style.INK, "ms": 5.5}
 
 def _cost(head: str, name: str, rank: int = 0) -> Column:
     """Column of what a change costs more than the drawing."""
-    return Column(
-        head, lambda row: text.formed(row.get(name, np.nan) + 0.0, "+.4g"), shown=has(name), rank=rank
-    )  # no -0
+    # + 0.0: no -0
+    return Column(head, lambda row: text.formed(row.get(name, np.nan) + 0.0, "+.4g"), shown=has(name), rank=rank)
 
 
 LINE = Column("line", word("line"), words=True)

@@ -9,7 +9,7 @@ only correlates errors of the joint that share it, as `correlated` does.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
 from typing import Annotated, NamedTuple
@@ -26,7 +26,6 @@ from tolstat.common.units import Number
 from tolstat.study.axes import is_zone
 from tolstat.study.selection import Reading, select
 from tolstat.study.tolerances.distributions import Distribution, Normal
-from tolstat.study.tolerances.entry import Toleranced
 
 Array = NDArray[np.float64]
 NODES = 64
@@ -160,18 +159,6 @@ class Lot(NamedTuple):
 
     share: float
     score: str
-
-
-def of_entries(entries: Iterable[Toleranced]) -> dict[str, Lot]:
-    """Lots of the errors, by name, in the order of the entries."""
-    lots: dict[str, Lot] = {}
-    for entry in entries:
-        names = [site.name for site, _ in entry.models]
-        for site, model in entry.models:
-            lot = getattr(model, "lot", None)
-            if lot is not None:
-                lots[site.name] = Lot(lot.share, names[0] if lot.shared else site.name)
-    return lots
 
 
 def correlated(copula: Copula, lots: Mapping[str, Lot], place: str) -> Copula:

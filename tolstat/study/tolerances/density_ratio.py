@@ -105,9 +105,8 @@ def of_error(new: Distribution, old: Distribution) -> Exact:
     if isinstance(new, Normal) and isinstance(old, Normal):
         square, largest = _of_normals(new.sigma / old.sigma, (new.mean - old.mean) / old.sigma)
     elif isinstance(new, Rayleigh) and isinstance(old, Rayleigh) and new.upper is None and old.upper is None:
-        square, largest = (
-            2.0 * of_coordinate for of_coordinate in _of_normals(new.sigma / old.sigma)
-        )  # both coordinates are normal
+        # both coordinates are normal
+        square, largest = (2.0 * of_coordinate for of_coordinate in _of_normals(new.sigma / old.sigma))
     else:
         square, largest = _integrated(new, old)
         if not unbounded(new):

@@ -20,7 +20,7 @@ from tolstat.common.tables import FACTORS
 from tolstat.study.axes import ORIENTATIONS, REJECT, Axis, Bonus, columns_of
 from tolstat.study.selection import TOLERANCED, Entry, Reading
 from tolstat.study.tolerances import distributions as tolerance
-from tolstat.study.tolerances.correlation import Lot, of_entries
+from tolstat.study.tolerances.correlation import Lot
 from tolstat.study.tolerances.distributions import Distribution
 from tolstat.study.tolerances.entry import (
     Banded,
@@ -309,8 +309,14 @@ class Tolerances(NamedTuple):
 
     @property
     def lots(self) -> dict[str, Lot]:
-        """Lot of each error that has one."""
-        return of_entries(self.entries)
+        """Lot of each error that has one, in the order of the entries."""
+        lots: dict[str, Lot] = {}
+        for entry in self.entries:
+            first = entry.models[0][0].name
+            for site, model in entry.models:
+                if (lot := getattr(model, "lot", None)) is not None:
+                    lots[site.name] = Lot(lot.share, first if lot.shared else site.name)
+        return lots
 
     @property
     def accepted(self) -> set[str]:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Sequence
 from html import escape
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any, Literal
@@ -34,22 +33,16 @@ ACCEPTED: dict[str, Any] = {"color": style.COLOURS[2], "lw": 1.4, "ls": (0.0, (6
 """Look of the line of an accepted share."""
 WORDS: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 8.0, "backgroundcolor": "white"}
 """Look of words on a vertical line."""
-
-
-@contextmanager
-def settings() -> Iterator[None]:
-    """Apply the common style with font and line sizes for a single panel."""
-    given: Any = {
-        "font.size": 8.8,
-        "lines.linewidth": 1.6,
-        "legend.frameon": True,
-        "legend.framealpha": 0.95,
-        "legend.facecolor": "white",
-        "legend.edgecolor": "none",
-        "svg.fonttype": "none",  # keep text as text: small, sharp, searchable, readable aloud
-    }
-    with style.settings(given):
-        yield
+_SETTINGS = {
+    "font.size": 8.8,
+    "lines.linewidth": 1.6,
+    "legend.frameon": True,
+    "legend.framealpha": 0.95,
+    "legend.facecolor": "white",
+    "legend.edgecolor": "none",
+    "svg.fonttype": "none",  # keep text as text: small, sharp, searchable, readable aloud
+}
+"""Font and line sizes of a single panel, beside the common style."""
 
 
 def _place(panel: Panel) -> tuple[float, float, float, float]:
@@ -70,7 +63,7 @@ def svg(panel: Panel) -> tuple[str, tuple[float, ...]]:
     tuple of float
         Left, right, upper, lower edge of the axes, points from the left and the top; loads at both ends of the x axis.
     """
-    with settings():
+    with style.settings(_SETTINGS):
         figure = style.new_figure(figsize=panel.size, dpi=72)
         ax = figure.add_axes(_place(panel))
         panel.draw(ax)
@@ -86,7 +79,7 @@ def sheet(panels: Sequence[Panel], title: str = "", notes: Sequence[str] = (), c
     heights = [panel.size[1] + TITLE for panel in panels[::columns]]
     head, foot = wrap(title, 44 * columns), [line for note in notes for line in wrap(note, 62 * columns)]
     size = (columns * panels[0].size[0], sum(heights) + 0.35 * len(head) + 0.2 * len(foot))
-    with settings():
+    with style.settings(_SETTINGS):
         figure = style.new_figure(figsize=size, layout="constrained")
         axes = figure.subplots(len(heights), columns, squeeze=False, height_ratios=heights)
         for panel, ax in zip(panels, axes.flat, strict=True):

@@ -46,7 +46,7 @@ SHORT = {"pin": {"l": "15 mm"}}
 def drawn(panel):
     """Names of what is drawn, with its points: corners of parts, tail and tip of arrows, middles of bushings."""
     figure = Figure(figsize=panel.size)
-    with drawing.settings():
+    with drawing.style.settings():
         panel.draw(figure.add_axes((0, 0, 1, 1)))
         FigureCanvasAgg(figure).draw()
     found = {}

@@ -45,7 +45,8 @@ from tolstat.store import ResultFile, Writer, what_if
 from tolstat.study import widths
 from tolstat.study.starter import joint_text
 from tolstat.study.tolerances import fits, iso
-from tolstat.study.widths import COARSER, EXACT, FINER, HALF, Line
+from tolstat.study.tolerances.correlation import Group
+from tolstat.study.widths import COARSER, EXACT, FINER, HALF
 
 TEXT = (
     synthetic.HEAD
@@ -567,7 +568,7 @@ def test_faults_of_groups_are_listed_together(tmp_path):
     with pytest.raises(InputError) as caught:
         widths.named(plan, ["tilts", "a = pin*.tilt_x", "b = pin1.tilt_t"])
     assert len(caught.value.faults) == 2
-    assert widths.named(plan, ["b = pin1.tilt_t"]) == [Line("b", ("pin1.tilt_t",))]
+    assert widths.named(plan, ["b = pin1.tilt_t"]) == [Group("b", ("pin1.tilt_t",))]
 
 
 def test_zones_that_lean_on_others_are_left_out(tmp_path):

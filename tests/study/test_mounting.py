@@ -90,6 +90,12 @@ def test_an_axial_force_on_rigid_shafts_is_refused(tmp_path: Path) -> None:
     assert not load(tmp_path, text=points + DRAWN).at("b").has_axial_force
 
 
+def test_settings_without_effect_are_refused_with_the_other_faults(tmp_path: Path) -> None:
+    told = faults(tmp_path, RIGID, ('plus_minus = "0.1 mm"', 'plus_minus = "0.1"'))
+    assert f"study.toml:8: operation.axial_force: {NO_EFFECT}" in told
+    assert "tolerances.pin1.offset_t" in told
+
+
 def test_a_case_has_the_same_rules(tmp_path: Path) -> None:
     path = tmp_path / "case.toml"
     path.write_text(HEAD, encoding="utf-8")

@@ -63,17 +63,8 @@ def most_likely(excesses: ArrayLike) -> tuple[FloatArray, FloatArray]:
     """Estimate k and sigma of many samples by maximum likelihood, k not below `LEAST_SHAPE`.
 
     The likelihood is that of b = -k / sigma alone, with k = mean(log(1 - b x)) (Grimshaw 1993), on the grid of
-    `zhang_stephens`, then on finer ones about its maximum.
-
-    Parameters
-    ----------
-    excesses : array_like, shape (..., n)
-        Positive excesses, n of each sample, at least 2.
-
-    Returns
-    -------
-    k, sigma : ndarray, shape (...)
-        Shape, and scale in the unit of the excesses.
+    `zhang_stephens`, then on finer ones about its maximum. Parameters and what is returned are those of
+    `zhang_stephens`.
     """
     part = np.linspace(0.0, 1.0, 12)
     x, b = _grid(excesses, np.linspace(1e-3, 0.999, 20)[::-1])

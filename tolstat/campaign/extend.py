@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from tolstat.common.columns import drawn_columns
 from tolstat.common.counts import Counts
-from tolstat.common.errors import Fault, InputError
+from tolstat.common.errors import Fault, InputError, raise_all
 from tolstat.common.tables import Status
 from tolstat.sampling import draw_blocks, origin_blocks
 from tolstat.store import Reader, Writer, layout, what_if
@@ -191,8 +191,7 @@ def _check_extendable(store: Reader, n: int) -> None:
     if other := differing_code(store.versions):
         remedy = f"extend it with {code_of(store)}, or run its study into another file: tolstat run STUDY --n {n} --out"
         faults.append(Fault(place, "\n    ".join([OTHER_CODE, *other]), f"{remedy} OTHER.h5"))
-    if faults:
-        raise InputError(faults)
+    raise_all(faults)
 
 
 def code_of(store: Reader) -> str:
@@ -219,8 +218,7 @@ def _check_one_campaign(stores: Sequence[Reader]) -> None:
         listed = ", ".join(f"{part.start}:{part.stop}" for part in missing)
         remedy = f"simulate them: tolstat run STUDY --rows {missing[0].start}:{missing[0].stop} --out FILE"
         faults.append(Fault("merge", f"no slice holds rows {listed} of {first.campaign_rows}", remedy))
-    if faults:
-        raise InputError(faults)
+    raise_all(faults)
 
 
 def _ends(stores: Sequence[Reader]) -> list[int]:

@@ -17,7 +17,7 @@ from tolstat.campaign.block import Block, Timed, results_of, simulate_block
 from tolstat.campaign.blocks import MAX_BLOCK, MIN_BLOCKS_PER_WORKER, SOME, compile_missing, work_beside
 from tolstat.campaign.run import choose_fidelity
 from tolstat.common.cores import available_cores
-from tolstat.common.errors import Fault, InputError
+from tolstat.common.errors import Fault, InputError, raise_all
 from tolstat.common.loads import LOADS, SHOWN_LOADS, UNIT_OF_LOAD
 from tolstat.common.tables import VALID, Options
 from tolstat.joint import nominal_errors, perturb
@@ -276,8 +276,7 @@ def function(
         chosen.update(dict.fromkeys(names))
         if not names:
             faults.append(Fault("loads", f"{pattern!r} is no load", suggestion(pattern, list(UNIT_OF_LOAD))))
-    if faults:
-        raise InputError(faults)
+    raise_all(faults)
     return Function(study, list(chosen), point, workers)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.common import strict, tables
-from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.errors import Fault, InputError, gather, raise_all
 from tolstat.common.tables import FAILED, UNSETTLED, HistorySpec, Options, Status
 from tolstat.joint.ideal import NO_CLOSED_FORM
 from tolstat.solver import fidelity
@@ -210,8 +210,7 @@ def parse_retry(statuses: str, settings: Sequence[str], study: Study) -> Retry:
         solver = strict.validate(type(solver), solver.model_dump(exclude_unset=True) | new, "--set", prefix=("solver",))
     if study.has_axial_force and solver.fidelity == "ideal":
         faults.append(Fault("--set: solver.fidelity", *NO_CLOSED_FORM))
-    if faults:
-        raise InputError(faults)
+    raise_all(faults)
     chosen = tuple(labels[name] for name in dict.fromkeys(names))
     return Retry(chosen, changed, solver.options(), auto=solver.fidelity == "auto")
 

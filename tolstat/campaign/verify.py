@@ -22,7 +22,7 @@ from tolstat.campaign.what_if import check_code
 from tolstat.common import tables
 from tolstat.common.columns import blank_others, holds
 from tolstat.common.counts import Counts
-from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.errors import Fault, InputError, gather, raise_all
 from tolstat.common.loads import Limit, load_of, split
 from tolstat.common.tables import Fidelity, Method, Options, Simulation, Start, Status
 from tolstat.sampling import draw
@@ -226,8 +226,7 @@ def check(
     if path.suffix == ".toml":
         with gather(faults):
             study = load(path)
-    if faults:
-        raise InputError(faults)
+    raise_all(faults)
     make = partial(run_checks, workers=workers, progress=progress)
     return check_study(study, number, seed, make) if path.suffix == ".toml" else check_file(path, number, seed, make)
 

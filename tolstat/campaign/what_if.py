@@ -27,7 +27,7 @@ from tolstat.store.what_if import Altered
 from tolstat.study import Study, axes, widths
 from tolstat.study.assumptions import with_value
 from tolstat.study.points import at
-from tolstat.study.widths import Line
+from tolstat.study.tolerances.correlation import Group
 
 WIDTH, FIT, EXCHANGE, JOINT, AS_DRAWN = "width", "fit", "exchange", "joint", "as drawn"
 """Kinds of sets: a line with another width, with another fit, with the errors of another joint; other keys; nothing."""
@@ -60,7 +60,7 @@ class Change(NamedTuple):
     numbers: range
 
 
-def stepped(study: Study, line: Line, step: str, numbers: range) -> Change:
+def stepped(study: Study, line: Group, step: str, numbers: range) -> Change:
     """A line after a step (`widths.steps`); joint i is sample i of the campaign but for this line."""
     changed = widths.after(study, line, step)
     about = {
@@ -76,7 +76,7 @@ def stepped(study: Study, line: Line, step: str, numbers: range) -> Change:
     return Change(about, changed, partial(_draw, changed), numbers)
 
 
-def exchanged(study: Study, line: Line, numbers: range) -> Change:
+def exchanged(study: Study, line: Group, numbers: range) -> Change:
     """Joint i is sample 2i of the campaign with the line's errors of sample 2i + 1."""
     about = {"kind": EXCHANGE, "label": line.label, "seed": study.sampling.seed, "names": list(line.names)}
     unchanged = widths.applied(study, {})
@@ -263,7 +263,7 @@ def _draw(study: Study, numbers: range) -> NDArray[np.void]:
     return sampling.draw(study, range(numbers.start + first, numbers.stop + first))
 
 
-def _exchange(study: Study, line: Line, numbers: range) -> NDArray[np.void]:
+def _exchange(study: Study, line: Group, numbers: range) -> NDArray[np.void]:
     scores = sampling.scores(study, range(2 * numbers.start, 2 * numbers.stop))
     exchanged = {stream for name in line.names for stream in axes.streams_of(name)}
     moved = np.array([stream in exchanged for stream in sampling.streams(study)])

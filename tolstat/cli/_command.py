@@ -28,7 +28,7 @@ import typer
 
 from tolstat.cli._library import points, stores, studies, units
 from tolstat.cli._shared import deliver, fail, progress, say, session, work
-from tolstat.common.errors import Fault, InputError, TolstatError, gather
+from tolstat.common.errors import Fault, InputError, TolstatError, gather, raise_all
 from tolstat.common.files import check_target, reason
 from tolstat.display import options
 from tolstat.display.options import Opt
@@ -162,8 +162,7 @@ def _values(parameters: Mapping[str, Parameter], given: dict[str, Any]) -> dict[
                 check_target(Path(value), *paths)
             elif opt.unit is not None:
                 given[name] = parameter.default if value is None else quantity(value, opt, flag_of(parameter))
-    if faults:
-        raise InputError(faults)
+    raise_all(faults)
     return given
 
 
@@ -226,18 +225,13 @@ READS: dict[str, dict[str, Any]] = {
 def function_of(question: Question) -> Callable[..., None]:
     """Make the function of a command that answers a question."""
     answer_of, simulate = question.functions()
-    views, options_of_answer, simulated, only_simulated = (
-        list[Parameter](),
-        list[Parameter](),
-        list[Parameter](),
-        list[Parameter](),
-    )
-    for parameter in _parameters(answer_of).values():
-        (views if parameter.annotation is stores.View else options_of_answer).append(parameter)
+    of_answer, simulated, only_simulated = _parameters(answer_of), list[Parameter](), list[Parameter]()
+    views = [p for p in of_answer.values() if p.annotation is stores.View]
+    options_of_answer = [p for p in of_answer.values() if p not in views]
     several, takes_study, into_file = views[0].kind is Parameter.VAR_POSITIONAL, False, False
     if simulate is not None:
         source, _, *simulated = _parameters(simulate).values()
-        only_simulated = [p for p in simulated if p.name not in _parameters(answer_of)]
+        only_simulated = [p for p in simulated if p.name not in of_answer]
         takes_study, into_file = source.annotation is not Path, source.annotation is not studies.Study
     reads = "pair" if len(views) == 2 else "views" if several else "view"
     if takes_study:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from tolstat.questions.drawings import answer as drawings
     from tolstat.questions.drawings import views
     from tolstat.questions.exceedance import rows as exceedance
-    from tolstat.questions.fatigue import pylife
+    from tolstat.questions.fatigue import loads as fatigue
     from tolstat.report import answer as reports
     from tolstat.report import page
     from tolstat.solver import compilation
@@ -46,8 +46,8 @@ else:
     columns, load_units, strict, tables, units, sections = (Late(f"tolstat.{name}") for name in names)
     answers, style, table, text = (Late(f"tolstat.display.{name}") for name in ("answer", "style", "table", "text"))
     names = ("accuracy", "joints", "causes.errors", "drawings.answer", "drawings.views")
-    names += ("exceedance.rows", "fatigue.pylife")
-    accuracy, joints, causes, drawings, views, exceedance, pylife = (
+    names += ("exceedance.rows", "fatigue.loads")
+    accuracy, joints, causes, drawings, views, exceedance, fatigue = (
         Late(f"tolstat.questions.{name}") for name in names
     )
     names = ("report.answer", "report.page", "solver.compilation")

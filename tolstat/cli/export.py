@@ -1,4 +1,4 @@
-"""``tolstat export``: joints, load cycles or statistics as a file."""
+"""``tolstat export`` and ``report``: joints, load cycles or statistics as files; tables, figures, one HTML page."""
 
 from __future__ import annotations
 
@@ -12,16 +12,18 @@ from typing import TYPE_CHECKING, Annotated, TextIO
 
 import typer
 
-from tolstat.cli._library import causes, exceedance, load_units, pylife, reports, result_file, stores, text
-from tolstat.cli._shared import json_of, progress, say, write
+from tolstat.cli import _library as library
+from tolstat.cli._shared import deliver, json_of, progress, say, write
+from tolstat.common.cores import available_cores
 from tolstat.common.errors import Fault, InputError
-from tolstat.common.files import atomic_write
+from tolstat.common.files import atomic_write, check_target
 from tolstat.common.late import pandas as pd
-from tolstat.display.options import Accepted, Opt, Point, ResultPath
+from tolstat.display.options import Accepted, AsJson, Opt, Point, ResultPath, Wide
 
 if TYPE_CHECKING:
     from tolstat.store import Reader, View
 
+PAGES = (".html", ".htm")
 Target = Annotated[str | None, Opt("OUT", writes=True)]
 MAX_ROWS = 1_048_575
 """Number of joints that a sheet of Excel can hold below its heading."""
@@ -98,7 +100,7 @@ def export(
         if target is not None and find_spec(package) is None:
             remedy = f"install it with: pip install {package}, or use --csv OUT"
             raise InputError([Fault(option, f"{package} is not installed", remedy)])
-    with progress("export"), stores.ResultFile.open(file) as opened:
+    with progress("export"), library.stores.ResultFile.open(file) as opened:
         view = opened.view().at(point or "")
         store = view.store
         number = f"{store.n - (0 if nominal else store.first_sample)} joints"
@@ -106,22 +108,22 @@ def export(
             too_many = f"{store.path} has {store.n} joints, a sheet of Excel has {MAX_ROWS} rows"
             raise InputError([Fault("--xlsx", too_many, "use --parquet OUT or --csv OUT")])
         if cycles is not None:
-            table = pylife.table(view, nominal=nominal)
+            table = library.fatigue.pylife_table(view, nominal=nominal)
             write(cycles, lambda out: table.to_csv(out, index=False, lineterminator="\n"))
             _tell(cycles, f"cycles of {table['joint'].nunique()} joints")
         if statistics is not None:
-            values = reports.statistics(view, accepted=accepted)
-            values["causes"] = {load: causes.causes(view, load).values() for load in by or ()}
+            values = library.reports.statistics(view, accepted=accepted)
+            values["causes"] = {load: library.causes.causes(view, load).values() for load in by or ()}
             write(statistics, lambda out: out.write(json_of(values) + "\n"))
             _tell(statistics, "all statistics")
         if joints is not None:
             if joints == "-":
-                list(result_file.in_blocks(store, nominal))  # damage is found before anything is printed
+                list(library.result_file.in_blocks(store, nominal))  # damage is found before anything is printed
             write(joints, partial(_write_csv, store, nominal))
             _tell(joints, number)
         if parquet is None and xlsx is None:
             return
-        frame = result_file.to_pandas(store, nominal)
+        (frame,) = library.result_file.in_blocks(store, nominal, store.n)
         writers = {xlsx: partial(_write_workbook, view, frame), parquet: partial(frame.to_parquet, engine="pyarrow")}
         for name, write_file in writers.items():
             if name is not None:
@@ -138,10 +140,10 @@ def _tell(target: str, content: str) -> None:
 def _write_csv(store: Reader, nominal: bool, stream: TextIO) -> None:
     """Write errors and results block by block."""
     out = csv.writer(stream, lineterminator="\n")
-    for k, frame in enumerate(result_file.in_blocks(store, nominal)):
+    for k, frame in enumerate(library.result_file.in_blocks(store, nominal)):
         if k == 0:
             out.writerows([["row", *frame.columns], ["1", *frame.attrs["units"].values()]])
-        out.writerows(text.csv_rows([frame.index.tolist(), *(frame[name].tolist() for name in frame)]))
+        out.writerows(library.text.csv_rows([frame.index.tolist(), *(frame[name].tolist() for name in frame)]))
 
 
 def _write_workbook(view: View, frame: pd.DataFrame, path: Path) -> None:
@@ -152,13 +154,14 @@ def _write_workbook(view: View, frame: pd.DataFrame, path: Path) -> None:
     """
     from openpyxl import Workbook
 
-    limits = [(name, limit, load_units.load_of(name).unit) for name, limit in view.limits.items()]
+    limits = [(name, limit, library.load_units.load_of(name).unit) for name, limit in view.limits.items()]
     if view.sampled:  # joints of a sweep or a list are no sample, whose shares would mean something
         rows = (
-            {**row, "valid": row["n"] - row["n_failed"] - row["n_unsettled"]} for row in exceedance.limit_rows(view)
+            {**row, "valid": row["n"] - row["n_failed"] - row["n_unsettled"]}
+            for row in library.exceedance.limit_rows(view)
         )
         limits = [tuple(row[key] for key in LIMITS.values()) for row in rows]
-    meanings = {name: column.description for name, column in result_file.described(view.store).items()}
+    meanings = {name: column.description for name, column in library.result_file.described(view.store).items()}
     units = [(name, unit, meanings.get(name, "")) for name, unit in frame.attrs["units"].items()]
     sheets = {
         "joints": (("row", *frame.columns), frame.itertuples(name=None)),
@@ -171,7 +174,77 @@ def _write_workbook(view: View, frame: pd.DataFrame, path: Path) -> None:
         sheet.freeze_panes = "B2"
         sheet.append(list(heads))
         for row in cells:
-            sheet.append([text.cell(text.plain(value)) for value in row])
+            sheet.append([library.text.cell(library.text.plain(value)) for value in row])
     whole = BytesIO()  # openpyxl does not recover from a full disk
     book.save(whole)
     path.write_bytes(whole.getvalue())
+
+
+def report(
+    file: ResultPath,
+    *,
+    out: Annotated[Path | None, Opt("DIR|PAGE.html")] = None,
+    accepted: Accepted = math.nan,
+    again: Annotated[int | None, Opt("N", least=0, name="replay")] = None,
+    full: bool = False,
+    brief: bool = False,
+    point: Point = None,
+    wide: Wide = False,
+    as_json: AsJson = False,
+) -> None:
+    """Report the share of joints above each load.
+
+    Prints the verdict and the share of joints above each limit; without limits, the quantiles of each bushing load; for
+    a sweep, the loads against the swept value. Writes the curves as PNG, SVG and CSV.
+
+    With --out PAGE.html, writes a single page instead, with verdict, exceedance, capability, causes, worst joints,
+    fatigue, contact modes, numerical error, failed joints and provenance. The campaign may be unfinished.
+
+    Example: tolstat report iso2768_f.h5 --out page.html --accept "1 %"
+
+    Parameters
+    ----------
+    out : Path, optional
+        Folder for the files, created if missing (default: folder of FILE), or an HTML page to write.
+    again : int, optional
+        With an HTML page: number of joints evaluated over the input angle, simulated again if FILE has no load
+        histories; default: 1000, but none is simulated again if FILE has pending joints.
+    full : bool
+        With an HTML page: open all its sections.
+    brief : bool
+        With an HTML page: verdict and line to change only, on one printed sheet.
+    """
+    if out is not None and out.suffix.lower() in PAGES:
+        _page(file, out, accepted, again, point or "", full, brief)
+        return
+    with library.stores.viewed(file) as view:
+        if out is not None:
+            check_target(out / file.stem)
+        with progress("report"):
+            answer = library.reports.report(view.at(point or ""), accepted)
+        deliver(answer, wide, as_json)
+        if as_json:
+            return
+        if note := library.recorded.note_on_mounting(view.store):
+            say(f"note: {note}")
+        with progress("files") as shown:
+            files = library.reports.write(answer, view.path, out, point or "", shown.stage)
+    for path in files:
+        say(f"wrote {path}")
+
+
+def _page(file: Path, out: Path, accepted: float, again: int | None, point: str, full: bool, brief: bool) -> None:
+    check_target(out, file)
+    with library.stores.viewed(file) as view:
+        has_histories = bool(library.revolutions.held(view.store))
+        if again is None:
+            with progress("reading the file"):
+                done = view.counts.done == view.counts.total
+            again = library.page.REPLAYED if has_histories or done else 0
+            if not again:
+                say(f"{file} has pending joints: the page shows the others, and none over the input angle (--replay)")
+        if again and view.method in library.columns.DRAWN and not has_histories:
+            library.compilation.announce()
+        with progress("page") as shown:
+            library.page.write_page(view, out, accepted, again, shown.stage, point, available_cores(), full, brief)
+    say(f"wrote {out}")

@@ -13,7 +13,7 @@ import typer
 
 from tolstat.cli import _library as library
 from tolstat.cli._shared import deliver, print_json, print_study_notes, progress, say, work, wrapped
-from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.errors import Fault, InputError, gather, raise_all
 from tolstat.common.files import check_target
 from tolstat.display.options import AsJson, Joints, Opt, OtherStudy, Report, ResultPath, StudyPath, Wide, Workers
 
@@ -129,8 +129,7 @@ def run(
         text = library.rewriting.with_settings(library.strict.read_text(study_file), changes) if changes else None
         plan = library.studies.load(study_file, n=n, text=text)
         again = None if retry is None else library.remedy.parse_retry(retry, retried, plan)
-    if faults:
-        raise InputError(faults)
+    raise_all(faults)
     print_study_notes(study_file, plan)
     if exact := library.assumptions.unselected(plan):
         say(f"no tolerance, taken as exact: {', '.join(exact)}")

@@ -1,4 +1,4 @@
-"""``tolstat simulate``, ``replay`` and ``evaluate``: joints of a case, of a campaign, and of another program."""
+"""``tolstat simulate``, ``replay``, ``evaluate``, ``show``: joints of a case, a campaign, another program; drawings."""
 
 from __future__ import annotations
 
@@ -11,23 +11,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tolstat.cli._library import (
-    compilation,
-    function,
-    load_units,
-    np,
-    replays,
-    sections,
-    stores,
-    strict,
-    studies,
-    tables,
-    text,
-    units,
-)
+from tolstat.cli import _library as library
+from tolstat.cli._library import np
 from tolstat.cli._shared import print_json, print_warnings, progress, say, warn, work, write
-from tolstat.common.errors import Fault, InputError
-from tolstat.common.files import atomic_write, check_target
+from tolstat.common.errors import Fault, gather, raise_all
+from tolstat.common.files import atomic_write, check_target, finite
 from tolstat.display.options import AsJson, Opt, Point, ResultPath, SimulatedPath, Trace, Workers
 
 if TYPE_CHECKING:
@@ -35,6 +23,7 @@ if TYPE_CHECKING:
 
     from tolstat.campaign.replay import CaseResult, Replay
 
+FORMATS = (".svg", ".png", ".pdf")
 MAX_FAULTS = 20
 """Most faults of a table that a message lists."""
 
@@ -53,12 +42,12 @@ def simulate(case: Annotated[Path, Opt("CASE")], *, out: Trace = None, as_json: 
     case : Path
         Case file (TOML): one joint with its errors.
     """
-    loaded = studies.load_case(case)
+    loaded = library.studies.load_case(case)
     print_warnings(case, [loaded.joint])
-    say(f"{loaded.name}: {sections.mounting_and_law([loaded.joint.shaft.axial], [loaded.joint.contact.law])}")
-    compilation.announce()
+    say(f"{loaded.name}: {library.sections.mounting_and_law([loaded.joint.shaft.axial], [loaded.joint.contact.law])}")
+    library.compilation.announce()
     with progress("simulation"):
-        result = replays.simulate_case(loaded)
+        result = library.replays.simulate_case(loaded)
     _deliver(result, {}, out, as_json)
 
 
@@ -85,9 +74,9 @@ def replay(
     point : str, optional
         Operating point, such as cruise; needed if FILE has several.
     """
-    compilation.announce()
-    with progress("simulation"), stores.ResultFile.open(file) as store:
-        again = replays.replay(store.at(point) if point else store, row)
+    library.compilation.announce()
+    with progress("simulation"), library.stores.ResultFile.open(file) as store:
+        again = library.replays.replay(store.at(point) if point else store, row)
     facts = {"row": row, "equal": not again.differences, "differing": [d.name for d in again.differences]}
     _deliver(again.result, facts, out, as_json)
     say(_verdict(again))
@@ -102,10 +91,10 @@ def _deliver(result: CaseResult, facts: dict[str, Any], out: Path | None, as_jso
         print_json(summary)
     else:
         lines = [f"{name}: {value}" for name, value in summary.items() if name != "max"]
-        typer.echo("\n".join([*lines, text.align(_largest(summary["max"]))]))
-    state = tables.Status[str(summary["status"]).upper()]
-    if state != tables.Status.OK:
-        warn(f"warning: {state.label}: {tables.STATUS_TEXT[state]}\n  hint: {result.remedy()}")
+        typer.echo("\n".join([*lines, library.text.align(_largest(summary["max"]))]))
+    state = library.tables.Status[str(summary["status"]).upper()]
+    if state != library.tables.Status.OK:
+        warn(f"warning: {state.label}: {library.tables.STATUS_TEXT[state]}\n  hint: {result.remedy()}")
     if out is not None:
         with atomic_write(out) as temporary:
             result.to_pandas().to_csv(temporary, index=False, lineterminator="\n")
@@ -119,7 +108,7 @@ def _largest(largest: dict[str, dict[str, Any]]) -> list[list[str]]:
         values = ("-" if value is None else f"{value:.5g}" for value in (load["joint"], load.get("without_errors")))
         change = load.get("change")
         change = "-" if change is None else "0.0 %" if abs(change) < 5e-4 else f"{100 * change:+.1f} %"
-        rows.append([name, load_units.unit_text(load["unit"]), *values, change])
+        rows.append([name, library.load_units.unit_text(load["unit"]), *values, change])
     known = any(load.get("without_errors") is not None for load in largest.values())
     return rows if known else [row[:3] for row in rows]
 
@@ -172,16 +161,16 @@ def evaluate(
     """
     if out != "-":
         check_target(Path(out), errors)
-    f = function.function(studies.load(study), loads, point=point, workers=workers)
-    si = {field.name: "1" if uniform else field.unit for field in tables.ERROR_FIELDS}
+    f = library.function.function(library.studies.load(study), loads, point=point, workers=workers)
+    si = {field.name: "1" if uniform else field.unit for field in library.tables.ERROR_FIELDS}
     given = read_table(errors, {name: si.get(name, "1") for name in (f.cube_names if uniform else f.names)})
     with work(workers=workers) as shown:
         shown.display.stage("simulation")
         y = f(f.uniform(given) if uniform else given)
-    head = [["status", *f.loads], ["", *(load_units.UNIT_OF_LOAD[name] for name in f.loads)]]
-    rows = text.csv_rows([[tables.Status(number).label for number in f.status], *y.T.tolist()])
+    head = [["status", *f.loads], ["", *(library.load_units.UNIT_OF_LOAD[name] for name in f.loads)]]
+    rows = library.text.csv_rows([[library.tables.Status(number).label for number in f.status], *y.T.tolist()])
     write(out, lambda stream: csv.writer(stream, lineterminator="\n").writerows([*head, *rows]))
-    without = int((~np.isin(f.status, tables.VALID)).sum())
+    without = int((~np.isin(f.status, library.tables.VALID)).sum())
     say(f"{'' if out == '-' else f'wrote {out}: '}{len(y)} joints, {without} of them without a valid load")
 
 
@@ -205,7 +194,7 @@ def read_table(path: Path, names: Mapping[str, str]) -> NDArray[np.float64]:
     InputError
         With the faults of the file: columns that it lacks or has twice, units, cells that are no finite numbers.
     """
-    lines = csv.reader(StringIO(strict.read_text(path), newline=""))
+    lines = csv.reader(StringIO(library.strict.read_text(path), newline=""))
     rows = [(lines.line_num, [cell.strip() for cell in row]) for row in lines if any(cell.strip() for cell in row)]
     head = rows.pop(0)[1] if rows else []
     faults = [
@@ -220,18 +209,18 @@ def read_table(path: Path, names: Mapping[str, str]) -> NDArray[np.float64]:
             faults.append(Fault(f"{path}:{line}", length, "give a cell for each column"))
     rows = [(line, cells) for line, cells in rows if len(cells) == len(head)]
     factors = dict.fromkeys(columns, 1.0)
-    if rows and any(math.isnan(_number(rows[0][1][column])) for column in columns.values()):
+    if rows and any(math.isnan(finite(rows[0][1][column])) for column in columns.values()):
         line, cells = rows.pop(0)
         for name, column in columns.items():
             unit = cells[column]
             try:
-                factors[name] = units.to_si(f"1 {unit}" if unit not in ("", "1") else 1.0, names[name])
+                factors[name] = library.units.to_si(f"1 {unit}" if unit not in ("", "1") else 1.0, names[name])
             except ValueError:
                 remedy = f"write {names[name]}, or another such unit"
                 faults.append(Fault(f"{path}:{line}: {name}", f"{unit!r} is no unit of it", remedy))
     if not rows and not faults:
         faults.append(Fault(str(path), "has no joints", "give a row of numbers for each"))
-    values = np.array([[_number(cells[column]) for column in columns.values()] for _, cells in rows])
+    values = np.array([[finite(cells[column]) for column in columns.values()] for _, cells in rows])
     for i, j in np.argwhere(np.isnan(values)):
         (line, cells), name = rows[i], list(columns)[j]
         problem = f"{cells[columns[name]]!r} is no finite number"
@@ -239,15 +228,60 @@ def read_table(path: Path, names: Mapping[str, str]) -> NDArray[np.float64]:
     if len(faults) > MAX_FAULTS:
         rest = Fault(str(path), f"and {len(faults) - MAX_FAULTS} more faults", "mend these first")
         faults = [*faults[:MAX_FAULTS], rest]
-    if faults:
-        raise InputError(faults)
+    raise_all(faults)
     return values * list(factors.values())
 
 
-def _number(cell: str) -> float:
-    """Finite number of a cell; NaN if it holds none."""
-    try:
-        value = float(cell)
-    except ValueError:
-        return math.nan
-    return value if math.isfinite(value) else math.nan
+def show(
+    source: Annotated[str, Opt("SOURCE")],
+    *,
+    errors: bool = False,
+    row: Annotated[int | None, Opt("I", least=0)] = None,
+    alpha: Annotated[str | None, Opt("ANGLE")] = None,
+    columns: Annotated[int, Opt("N", least=1, most=2)] = 2,
+    out: Annotated[Path | None, Opt("PICTURE")] = None,
+) -> None:
+    """Draw a joint, its errors, or one joint of a campaign.
+
+    Draws cross, forks, bushings, pins in their holes and the axes e, t, z from the joint's own dimensions. Prints the
+    dimensions; with --errors the kinds of errors (to errors.svg), with --row the errors of that joint (to rowI.svg).
+
+    Example: tolstat show studies/iso2768_f.toml --out joint.svg
+
+    Parameters
+    ----------
+    source : str
+        Joint file, study or case (TOML), result file (HDF5), or name of a joint: cirelli2021.
+    errors : bool
+        Draw what a positive error of each kind means instead of the joint.
+    row : int, optional
+        Draw the errors of this row of a result file, enlarged.
+    alpha : str, optional
+        Misalignment in place of the source's; "15 deg".
+    columns : int
+        Drawings of the joint side by side: 1 or 2.
+    out : Path, optional
+        File to write: .svg, .png or .pdf; default: joint.svg.
+    """
+    target = out or Path("errors.svg" if errors else "joint.svg" if row is None else f"row{row}.svg")
+    faults = []
+    if errors and row is not None:
+        faults.append(Fault("--errors", "cannot be used together with --row", "give one of them"))
+    if target.suffix.lower() not in FORMATS:
+        faults.append(Fault(f"--out {target}", "is not a picture", f"end its name in {', '.join(FORMATS)}"))
+    with gather(faults):
+        check_target(target)
+    raise_all(faults)
+    joint, own_alpha, title, own_errors = library.drawings.read(source, row, alpha)
+    if errors:
+        figure, rows = library.drawings.draw_errors(joint), library.drawings.meanings()
+    elif own_errors is not None:
+        figure, rows = library.drawings.draw_row(joint, own_errors, title), library.views.numbers(joint, own_errors)
+    else:
+        figure, rows = (
+            library.drawings.draw_joint(joint, own_alpha, title, columns),
+            library.drawings.lengths(joint, own_alpha),
+        )
+    (path,) = library.style.save(figure, target.with_suffix(""), (target.suffix.lower(),))
+    typer.echo(library.table.fitted(library.table.plain(rows), rows)[0])
+    say(f"wrote {path}")

@@ -1,17 +1,22 @@
-"""``tolstat status``: number of joints by status."""
+"""``tolstat status`` and ``verify``: number of joints by status, numerical error of a campaign."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tolstat.cli._library import np, remedy, stores, table, tables, text, verification, what_if
-from tolstat.cli._shared import print_json, print_table, progress, wrapped
+from tolstat.cli import _library as library
+from tolstat.cli._library import np
+from tolstat.cli._shared import deliver, print_json, print_table, progress, say, wrapped
+from tolstat.common.cores import available_cores
 from tolstat.common.errors import Fault, StoreError
-from tolstat.display.options import AsJson, ResultPath, Wide
+from tolstat.common.files import atomic_write
+from tolstat.common.late import pandas as pd
+from tolstat.display.options import AsJson, Opt, ResultPath, Wide, Workers
 from tolstat.display.progress import clock
 
 if TYPE_CHECKING:
@@ -38,24 +43,24 @@ def status(file: ResultPath, *, check: bool = False, wide: Wide = False, as_json
     check : bool
         Compare all that is in the file with its checksums; exit code 2 if damaged.
     """
-    with progress("reading the file"), stores.ResultFile.open(file) as store:
+    with progress("reading the file"), library.stores.ResultFile.open(file) as store:
         states = {at.point or "": at.status() for at in store.each()}
         facts, shares = _facts(store, states), _shares(store.view())
         if check:
             facts["checked"] = _checked(store)
-        reasons = remedy.reasons(store, states)
+        reasons = library.remedy.reasons(store, states)
     if as_json:
         causes = {f"{r.status.label} at {r.point}" if r.point else r.status.label: r for r in reasons}
         hints = {name: {"row": reason.row, "remedy": reason.remedy} for name, reason in causes.items()}
-        print_json(text.plain(facts | {"exceedance": shares, "causes": hints}))
+        print_json(library.text.plain(facts | {"exceedance": shares, "causes": hints}))
         return
     typer.echo("\n".join([*_lines(facts), *(wrapped(reason.text) for reason in reasons)]))
     if shares:
         columns = (
-            table.Column("load > limit", lambda row: text.limit({**row, "level": row["limit"]})),
-            table.Column("above", lambda row: f"{row['above']} of {row['of']}"),
-            table.Column("share", lambda row: text.percent(row["estimate"])),
-            table.Column("95 % interval", lambda row: text.span(row["lower"], row["upper"])),
+            library.table.Column("load > limit", lambda row: library.text.limit({**row, "level": row["limit"]})),
+            library.table.Column("above", lambda row: f"{row['above']} of {row['of']}"),
+            library.table.Column("share", lambda row: library.text.percent(row["estimate"])),
+            library.table.Column("95 % interval", lambda row: library.text.span(row["lower"], row["upper"])),
         )
         typer.echo()
         print_table(columns, shares, wide)
@@ -64,11 +69,11 @@ def status(file: ResultPath, *, check: bool = False, wide: Wide = False, as_json
 def _facts(store: ResultFile, states: dict[str, NDArray[np.uint8]]) -> dict[str, Any]:
     """Study, counts by status, in all and by point, and the pace of the run under way; `states` by point."""
     facts: dict[str, Any] = {"study": store.study_name, "joints": store.n}
-    facts |= _counts(tables.worst_status(list(states.values())))
+    facts |= _counts(library.tables.worst_status(list(states.values())))
     counts = {point: _counts(status) for point, status in states.items()}
     if len(counts) > 1:
         facts["points"] = {point: {k: n for k, n in numbers.items() if n} for point, numbers in counts.items()}
-    points, waiting = store.each(), tables.Status.PENDING.label
+    points, waiting = store.each(), library.tables.Status.PENDING.label
     pending = sum(numbers[waiting] for numbers in counts.values())
     stored = sum(_counts(at.column("results", "status", slice(None)))[waiting] for at in points)
     again = sum(int(np.count_nonzero(at.attempt())) for at in points)
@@ -83,7 +88,7 @@ def _facts(store: ResultFile, states: dict[str, NDArray[np.uint8]]) -> dict[str,
 
 
 def _counts(states: NDArray[np.uint8]) -> dict[str, int]:
-    return {state.label: int(np.count_nonzero(states == state)) for state in tables.Status}
+    return {state.label: int(np.count_nonzero(states == state)) for state in library.tables.Status}
 
 
 def _shares(view: View) -> list[dict[str, Any]]:
@@ -122,13 +127,71 @@ def _checked(store: ResultFile) -> bool:
     StoreError
         With everything that does not match its checksum.
     """
-    integrity, altered = store.check(), what_if.damaged(store)
+    integrity, altered = store.check(), library.what_if.damaged(store)
     faults = [f"{path} of rows {', '.join(rows)}" for path, rows in integrity.damaged.items()]
     faults += [f"what_if: {altered} {'change' if altered == 1 else 'changes'}"] * bool(altered)
     if faults:
         remedy = "simulate joints with damaged results again: tolstat run STUDY; for damaged errors restore a copy"
         raise StoreError(str(Fault(str(store.path), "\n    ".join(["is damaged:", *faults]), remedy)))
     for at in store.each():
-        for name in (verification.VERIFY, verification.NEAR):
-            verification.read(at, name)
+        for name in (library.verification.VERIFY, library.verification.NEAR):
+            library.verification.read(at, name)
     return integrity.checked
+
+
+def verify(
+    what: Annotated[Path, Opt("STUDY|FILE")],
+    *,
+    joints: Annotated[str | None, Opt("N|all")] = None,
+    near: Annotated[str | None, Opt("LIMIT")] = None,
+    seed: Annotated[int | None, Opt("S", least=0)] = None,
+    out: Annotated[Path | None, Opt("CSV", writes=True)] = None,
+    workers: Workers = None,
+    wide: Wide = False,
+    as_json: AsJson = False,
+) -> None:
+    """Estimate the numerical error on some joints.
+
+    Simulates joints again with half the step, with a smaller Newton tolerance, from another initial state, with another
+    integration method, and with a tight reference solution (scipy's Radau). Prints the distribution of the errors of
+    the largest loads, relative to the largest load of the kind in the joint.
+
+    Of a result file, checks settled joints and stores the checks in the file for the report. With --near, checks the
+    joints nearest to a limit, 50 for each load of it, without another method and reference: how far their loads change,
+    and to which side, tells how far the share above the limit moves. Intervals of all commands use it from then on.
+
+    Example: tolstat verify iso2768_f.h5 --joints 2 --out errors.csv
+
+    Parameters
+    ----------
+    what : Path
+        Study file (TOML) or result file (HDF5).
+    joints : str, optional
+        Number of joints to check, or all; default: 24, near a limit 50.
+    near : str, optional
+        Check the joints nearest to a limit: "cross1.F > 700 N", "cross*.F > 700 N" or "any limit".
+    seed : int, optional
+        Seed of the choice of joints; default: that of the study.
+    out : Path, optional
+        Write the errors of each joint, check and load as CSV.
+    """
+    with progress("checks, then tight references") as shown:
+        count = workers or available_cores()
+        if near is None:
+            verification = library.checks.check(what, joints or 24, seed, count, progress=shown)
+        else:
+            verification = library.checks.check_near(what, near, joints or library.numerical.LEAST_NEAR, count, shown)
+    units = dict.fromkeys(("median", "usual", "worst"), "1")
+    rows, by_load = library.accuracy.error_rows(verification), library.accuracy.error_rows(verification, by_kind=False)
+    parts: list[library.answers.Part] = [
+        library.answers.Table("kinds", "By kind of load", library.accuracy.ERRORS, rows, units),
+        library.answers.Table("loads", "By load", (), by_load, units),
+        library.answers.Sentence(library.accuracy.note(verification)),
+    ]
+    facts = {"rows": verification.rows, "seed": verification.seed}
+    facts |= {"checks": {name: check.description for name, check in verification.checks.items()}}
+    deliver(library.answers.Answer("verify", "Numerical error", parts, facts), wide, as_json)
+    if out is not None:
+        with atomic_write(out) as temporary:
+            pd.DataFrame(library.accuracy.joint_rows(verification)).to_csv(temporary, index=False, lineterminator="\n")
+        say(f"wrote {out}")

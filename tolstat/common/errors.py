@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
@@ -68,8 +68,13 @@ def collected() -> Iterator[list[Fault]]:
     """
     faults: list[Fault] = []
     yield faults
-    if faults:
-        raise InputError(faults)
+    raise_all(faults)
+
+
+def raise_all(faults: Iterable[Fault]) -> None:
+    """Raise an `InputError` with all faults, if there are any."""
+    if every := tuple(faults):
+        raise InputError(every)
 
 
 @contextmanager

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Sequence
 from html import escape
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any, Literal
@@ -30,22 +29,20 @@ TITLE = 0.34
 LETTER, KEY = 0.071, 0.5
 """Width of a letter of a legend, and of the rest of an entry, inches."""
 GREY = "#B8B8B8"
-
-
-@contextmanager
-def settings() -> Iterator[None]:
-    """Apply the common style with font and line sizes for a single panel."""
-    given: Any = {
-        "font.size": 8.8,
-        "lines.linewidth": 1.6,
-        "legend.frameon": True,
-        "legend.framealpha": 0.95,
-        "legend.facecolor": "white",
-        "legend.edgecolor": "none",
-        "svg.fonttype": "none",  # keep text as text: small, sharp, searchable, readable aloud
-    }
-    with style.settings(given):
-        yield
+ACCEPTED: dict[str, Any] = {"color": style.COLOURS[2], "lw": 1.4, "ls": (0.0, (6.0, 2.0))}
+"""Look of the line of an accepted share."""
+WORDS: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 8.0, "backgroundcolor": "white"}
+"""Look of words on a vertical line."""
+_SETTINGS = {
+    "font.size": 8.8,
+    "lines.linewidth": 1.6,
+    "legend.frameon": True,
+    "legend.framealpha": 0.95,
+    "legend.facecolor": "white",
+    "legend.edgecolor": "none",
+    "svg.fonttype": "none",  # keep text as text: small, sharp, searchable, readable aloud
+}
+"""Font and line sizes of a single panel, beside the common style."""
 
 
 def _place(panel: Panel) -> tuple[float, float, float, float]:
@@ -66,7 +63,7 @@ def svg(panel: Panel) -> tuple[str, tuple[float, ...]]:
     tuple of float
         Left, right, upper, lower edge of the axes, points from the left and the top; loads at both ends of the x axis.
     """
-    with settings():
+    with style.settings(_SETTINGS):
         figure = style.new_figure(figsize=panel.size, dpi=72)
         ax = figure.add_axes(_place(panel))
         panel.draw(ax)
@@ -82,7 +79,7 @@ def sheet(panels: Sequence[Panel], title: str = "", notes: Sequence[str] = (), c
     heights = [panel.size[1] + TITLE for panel in panels[::columns]]
     head, foot = wrap(title, 44 * columns), [line for note in notes for line in wrap(note, 62 * columns)]
     size = (columns * panels[0].size[0], sum(heights) + 0.35 * len(head) + 0.2 * len(foot))
-    with settings():
+    with style.settings(_SETTINGS):
         figure = style.new_figure(figsize=size, layout="constrained")
         axes = figure.subplots(len(heights), columns, squeeze=False, height_ratios=heights)
         for panel, ax in zip(panels, axes.flat, strict=True):
@@ -202,9 +199,45 @@ def empty(ax: Axes, why: str) -> None:
     ax.set(xticks=[], yticks=[])
 
 
+def share_bar(
+    ax: Axes, y: float, share: Sequence[float], drawn: float, floor: float, colour: str, height: float, off: float = 0.0
+) -> None:
+    """Draw how far a change moves a share: a bar from the share as drawn, and the interval of the new one.
+
+    Parameters
+    ----------
+    ax : Axes
+        Panel of horizontal rows with an axis of shares.
+    y : float
+        Row.
+    share : sequence of float
+        Share, lower and upper end of its interval.
+    drawn : float
+        Share as drawn.
+    floor : float
+        Left end of the axis; an arrow there stands for an end that is smaller.
+    colour, height
+        Of the bar.
+    off : float
+        Distance of the interval above the middle of the row.
+    """
+    moved, low, high = (max(end, floor) for end in share)
+    ax.barh(y, moved - drawn, height, left=drawn, color=colour, zorder=2)
+    ax.plot([low, high], [y - off, y - off], color=style.INK, lw=1.2, zorder=3)
+    if share[1] < floor:
+        ax.plot(floor, y - off, marker=style.markers.CARETLEFT, color=style.INK, ms=5.0, zorder=4, clip_on=False)
+
+
+def accepted(ax: Axes, share: float, y: float) -> None:
+    """Draw the accepted share into a panel of horizontal rows, with words at the height y; nothing if there is none."""
+    if share > 0.0:
+        ax.axvline(share, **ACCEPTED)
+        ax.text(share, y, f"accepted {text.percent(share)}", **WORDS)
+
+
 def rows_left(labels: Sequence[str]) -> float:
     """Room for the labels of a panel of horizontal rows, inches."""
-    return max(1.2, 0.064 * max(map(len, labels), default=0) + 0.12)
+    return max(1.2, 0.064 * max((len(line) for label in labels for line in label.split("\n")), default=0) + 0.12)
 
 
 def rows_height(count: int) -> float:

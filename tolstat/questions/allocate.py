@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from shlex import quote
 from typing import Annotated, Any, NamedTuple
@@ -18,7 +18,7 @@ from tolstat.analysis.prediction import DELIVERY
 from tolstat.analysis.reweight import Ratios
 from tolstat.analysis.sample import CONFIDENCE, Sample
 from tolstat.common.columns import holds
-from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.errors import Fault, InputError, gather, raise_all
 from tolstat.common.loads import ANY_LIMIT, FloatArray, split, unit_text
 from tolstat.common.tables import Status
 from tolstat.common.units import DISPLAY_UNITS
@@ -33,7 +33,7 @@ from tolstat.study import costs as prices
 from tolstat.study.costs import Cost
 from tolstat.study.rule import Statement
 from tolstat.study.scaling import Tolerance
-from tolstat.study.tolerances.density_ratio import Exact, of_error
+from tolstat.study.tolerances.density_ratio import Exact, exact, log_ratios, of_error
 from tolstat.study.tolerances.distributions import Distribution, Normal
 from tolstat.study.tolerances.zone_laws import Rayleigh
 
@@ -72,7 +72,7 @@ LIMITS = (
     Column("95 % interval", shares.shares("lower", "upper")),
     Column("ppm", lambda row: text.ppm(row["estimate"]), rank=2),
     Column("above in delivery", text.delivery, rank=3),
-    Column("counts as joints", lambda row: text.formed(row["ess"], ".0f"), rank=1),
+    Column("counts as joints", lambda row: f"{row['ess']:.0f}" if row["usable"] else "-", rank=1),
 )
 """Columns of the table ``limits``."""
 
@@ -179,11 +179,17 @@ def allocate(
         for t, f in zip(request.tolerances, choice.factors, strict=True)
         if abs(f - 1) > MIN_CHANGE
     }
-    blocks = [
-        DensityRatios(view.study, request.tolerances, errors).of_entries(entries)
+    study, changed = (
+        view.study,
+        [(t, t.distribution(entries[t.pattern])) for t in request.tolerances if t.pattern in entries],
+    )
+    new = {name: law for t, law in changed for name in t.names}
+    logs = [
+        log_ratios(new, study.tolerances, study.copula, partial(sampling.values, study, errors), len(errors))
         for errors in view.error_blocks(request.columns)
     ]
-    ratios = _ratios(np.concatenate([logs for logs, _ in blocks])[done[checked]], blocks[-1][1])
+    exact_ratio = exact((law, study.tolerances[name]) for name, law in new.items())
+    ratios = _ratios(np.concatenate(logs)[done[checked]], exact_ratio)
     judged: list[_Judged] = [(s.text, s.bound, event) for s, event in zip(request.statements, events, strict=True)]
     if len(events) > 1:  # with both ends of the numerical error where it is known of all
         judged.append((ANY_LIMIT, np.nan, [np.any(ends, axis=0) for ends in zip(*events, strict=False)]))
@@ -224,17 +230,8 @@ class DensityRatios:
         return np.asarray(sum(self._log_ratio(i, float(f)) for i, f in enumerate(factors)))
 
     def exact(self, factors: FloatArray) -> Exact:
-        """Exact numbers of the ratio for tolerances scaled by factors."""
-        return self._sum(self._exact(i, float(f)) for i, f in enumerate(factors))
-
-    def of_entries(self, entries: Entries) -> tuple[FloatArray, Exact]:
-        """Logarithms of the ratios for changed entries, (n,), and their exact numbers."""
-        new = [t.distribution(entries.get(t.pattern, t.entry)) for t in self._tolerances]
-        logs = np.asarray(sum(self._log_density(i, law) for i, law in enumerate(new)) - sum(self._old_density))
-        return logs, self._sum(of_error(*pair) for pair in zip(new, self._old, strict=True))
-
-    def _sum(self, each: Iterable[Exact]) -> Exact:
-        """Sum over errors, of which a tolerance may have several."""
+        """Exact numbers of the ratio for tolerances scaled by factors; a tolerance may have several errors."""
+        each = [self._exact(i, float(f)) for i, f in enumerate(factors)]
         terms = [len(t.names) * np.array(exact) for t, exact in zip(self._tolerances, each, strict=True)]
         return Exact(*np.sum(terms, axis=0).tolist())
 
@@ -314,8 +311,7 @@ def _read_request(view: View, targets: Sequence[str], costs: Path | None, keep: 
     each: list[Cost] = []
     with gather(faults):
         each = prices.of(every, costs)
-    if faults:
-        raise InputError(faults)
+    raise_all(faults)
     pairs = zip(every, each, strict=True)
     free = [(t, cost) for t, cost in pairs if cost.reach[0] < cost.reach[1] and not kept_names & set(t.names)]
     if not free:

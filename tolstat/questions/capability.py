@@ -9,8 +9,8 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from tolstat.analysis import binomial, extreme
 from tolstat.analysis import capability as indices
+from tolstat.analysis import extreme
 from tolstat.analysis.prediction import DELIVERY
 from tolstat.common.cores import mapped
 from tolstat.common.errors import Fault, InputError, NotApplicable
@@ -20,7 +20,7 @@ from tolstat.display import text
 from tolstat.display.answer import Answer, Asked, Column, Part, Rows, Sentence, Table
 from tolstat.display.options import Delivery, Opt
 from tolstat.questions import shares
-from tolstat.store import error_budget, known_parts
+from tolstat.store import error_budget
 from tolstat.store.view import View
 
 NOT_NORMAL = 0.01
@@ -124,7 +124,7 @@ def capability_on_page(view: View, asked: Asked) -> Answer:
     if not (view.sampled and view.count(*VALID)) or view.design.refuses("index"):
         raise NotApplicable
     parts = list(capability(view).parts) if view.limits else []
-    if known_parts.of(view) is not None:
+    if error_budget.known_parts(view) is not None:
         parts.append(Sentence("for the tolerances as stated: what measured parts leave open is not in these"))
     tails = [partial(_rare_loads, view, name) for name in view.leading]
     by_load = dict(zip(view.leading, mapped(tails, min(asked.processes, 2)), strict=True))
@@ -174,7 +174,7 @@ def limit_rows(view: View, confidence: float = 0.95, delivery: int = DELIVERY) -
         row = dict(shares.good(view, load.name, confidence, delivery))
         index = indices.of_sample(load, row["limit"], confidence)
         both = shares.with_ends("cpk", index.cpk) | shares.with_ends("cpk_normal", index.cpk_normal)
-        if binomial.unresolved_matter(row["count"], row["n"], row["n_failed"] + row["n_unsettled"]):
+        if shares.unresolved_matter(row):
             both = dict.fromkeys(both, np.nan)
         rows.append(row | both | {"normal_p": index.normal_p, "needed": index.needed})
     return rows

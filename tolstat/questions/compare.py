@@ -17,7 +17,7 @@ from tolstat.analysis.design import Claim
 from tolstat.analysis.sample import Sample
 from tolstat.common.columns import DRAWN
 from tolstat.common.counts import Counts
-from tolstat.common.errors import Fault, InputError, StoreError
+from tolstat.common.errors import Fault, StoreError, raise_all
 from tolstat.common.loads import ANY_LIMIT, unit_text
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import Status
@@ -216,13 +216,11 @@ def _names(a: View, b: View, by: Sequence[str], limited: Sequence[str]) -> list[
     """Loads whose quantiles and means are compared; checks that both files keep them and the loads with limits."""
     kept = [name for name in a.kept_loads if name in b.kept_loads]
     asked = dict.fromkeys(by, "--by") | {name: f"limits.{name}" for name in limited}
-    faults = [
+    raise_all(
         Fault(option, f"{name!r} is not a load that both files keep", did_you_mean(name, kept))
         for name, option in asked.items()
         if name not in kept
-    ]
-    if faults:
-        raise InputError(faults)
+    )
     return list(by) or list(dict.fromkeys(limited)) or [name for name in a.shown_loads if name in kept]
 
 

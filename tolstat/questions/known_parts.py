@@ -10,7 +10,7 @@ from tolstat.display import drawing, style, text
 from tolstat.display.answer import Answer, Axes, Column, Panel, Panels, Part, Row, Rows, Sentence, Table
 from tolstat.display.style import lines
 from tolstat.questions import shares
-from tolstat.store import known_parts as known
+from tolstat.store import error_budget
 from tolstat.store.view import View
 
 DRAWN = 6
@@ -62,7 +62,7 @@ def known_parts(view: View) -> Answer:
     NotApplicable
         When the study takes its tolerances as exact or has no limits, or no joint is simulated.
     """
-    process = known.of(view)
+    process = error_budget.known_parts(view)
     if process is None or not view.counts.done:
         remedy = "give an entry of [tolerances] known_from, and the study [limits]"
         raise shares.inapplicable(view, "has no share that measured parts leave open", remedy)
@@ -79,7 +79,7 @@ def known_parts(view: View) -> Answer:
     return Answer("known_parts", "Tolerances known from measured parts", parts)
 
 
-def _row(view: View, process: known.KnownParts, name: str) -> Row:
+def _row(view: View, process: error_budget.KnownParts, name: str) -> Row:
     load = view.load(name)
     assert load.limit is not None
     above = load.above(load.limit)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 from shlex import quote
 from typing import Annotated, Any
 
@@ -18,7 +19,7 @@ from tolstat.analysis.prediction import DELIVERY
 from tolstat.analysis.reweight import Ratios
 from tolstat.analysis.sample import CONFIDENCE, Sample
 from tolstat.analysis.weighted import Weighted
-from tolstat.common.errors import Fault, InputError
+from tolstat.common.errors import Fault, raise_all
 from tolstat.common.loads import ANY_LIMIT, FloatArray
 from tolstat.common.tables import Status
 from tolstat.display import text
@@ -31,7 +32,7 @@ from tolstat.study import Study
 from tolstat.study.axes import columns_of
 from tolstat.study.scaling import changed, rewritten_with
 from tolstat.study.tolerances import density_ratio
-from tolstat.study.tolerances.distributions import Distribution, score
+from tolstat.study.tolerances.distributions import Distribution
 
 SHARES = (0.5, 0.9, 0.99)
 """Quantiles of a study without limits."""
@@ -49,7 +50,7 @@ def _any_unresolved(rows: Rows) -> bool:
     return any(row["bound_upper"] > row["bound_lower"] for row in rows)
 
 
-COUNTS = Column("counts as joints", lambda row: text.formed(row["ess"], ".0f"), rank=1)
+COUNTS = Column("counts as joints", lambda row: f"{row['ess']:.0f}" if row["usable"] else "-", rank=1)
 LIMITS = (
     Column("load > limit", text.limit),
     Column("before", shares.share("before")),
@@ -127,14 +128,12 @@ def reweight(
     view.check_drawn()
     view.check("share")
     old = view.study.tolerances
-    new = changed(view.study, settings)
-    names = [name for name in new if new[name].describe() != old[name].describe()]
+    new = {name: law for name, law in changed(view.study, settings).items() if law.describe() != old[name].describe()}
     remedy = "run a study with these tolerances"
-    beyond = {name: _beyond(old[name], new[name]) for name in names}
-    if faults := [Fault(f"tolerances.{name}", words, remedy) for name, words in beyond.items() if words]:
-        raise InputError(faults)
+    beyond = {name: _beyond(old[name], law) for name, law in new.items()}
+    raise_all(Fault(f"tolerances.{name}", words, remedy) for name, words in beyond.items() if words)
     done = np.flatnonzero(view.status != Status.PENDING)
-    ratios = _ratios(view, new, names, done)
+    ratios = _ratios(view, new, done)
     if not ratios.values.any():
         raise shares.unusable(view, "the new tolerances make none of the joints", remedy)
     rows = _rows(view, done, ratios, delivery)
@@ -147,10 +146,10 @@ def reweight(
         command = f"tolstat reweight {quote(str(view.path))} {changes} --out changed"
         study = quote(f"changed/{view.path.stem}_reweight.toml")
         again = f"fresh joints, same seeds: {command} && tolstat run {study}"
-    words = (f"{len(names)} errors changed; {verdict}", error_budget.unknown(view), again)
+    words = (f"{len(new)} errors changed; {verdict}", error_budget.unknown(view), again)
     notes, other = [Sentence(note) for note in words if note], Document(".toml", rewritten_with(view.study, settings))
     table = Table("loads", f"{title}, reweighted", columns, rows)
-    return Answer("reweight", "Other tolerances", [table, *notes, other], facts | {"changed": names})
+    return Answer("reweight", "Other tolerances", [table, *notes, other], facts | {"changed": list(new)})
 
 
 def _rows(view: View, done: NDArray[np.intp], ratios: Ratios, delivery: int) -> list[Row]:
@@ -180,22 +179,22 @@ def _verdict(ratios: Ratios, rows: Rows) -> str:
     return figures + (f"; {missing} of {len(rows)} rows need new runs: {least}" if missing else "")
 
 
-def _ratios(view: View, new: Mapping[str, Distribution], names: Sequence[str], done: NDArray[np.intp]) -> Ratios:
+def _ratios(view: View, new: Mapping[str, Distribution], done: NDArray[np.intp]) -> Ratios:
     """Density ratios of the joints `done`, with their exact mean square."""
     study = view.study
-    columns = [column for name in dict.fromkeys((*names, *study.copula.names)) for column in columns_of(name)]
+    columns = [column for name in dict.fromkeys((*new, *study.copula.names)) for column in columns_of(name)]
     blocks = view.error_blocks(columns)  # the errors of a million joints would be half a gigabyte
-    logs = np.concatenate([_block_log_ratios(study, new, names, errors) for errors in blocks])
+    logs = np.concatenate([_log_ratios(study, new, errors) for errors in blocks])
     values = np.exp((logs + np.log(view.design.counts_as(view.n)))[done])
-    correlated = [name for name in names if name in study.copula.names]
+    correlated = {name: law for name, law in new.items() if name in study.copula.names}
     square, open_square, largest = density_ratio.exact(
-        (new[name], study.tolerances[name]) for name in names if name not in correlated
+        (law, study.tolerances[name]) for name, law in new.items() if name not in correlated
     )
     if correlated:
         # mean ratio over errors drawn from the new tolerances: its mean square over the old ones
         scores = np.random.default_rng(2024).standard_normal((DRAWS, len(sampling.streams(study))))
-        errors = sampling.from_scores(replace(study, tolerances=dict(new)), scores)
-        added = float(np.log(np.mean(np.exp(_block_log_ratios(study, new, correlated, errors)))))
+        errors = sampling.from_scores(replace(study, tolerances=study.tolerances | dict(new)), scores)
+        added = float(np.log(np.mean(np.exp(_log_ratios(study, correlated, errors)))))
         square, open_square, largest = square + added, open_square + added, np.inf
     # the tolerances have at least the share 1 / heaviest of the mixture drawn from
     heaviest = np.log(view.design.heaviest) if isinstance(view.design, Weighted) else 0.0
@@ -216,22 +215,9 @@ def _beyond(old: Distribution, new: Distribution) -> str:
     return f"{outside:.2g} of the new errors lie where the study draws none" if outside > MAX_OUTSIDE else ""
 
 
-def _block_log_ratios(
-    study: Study, new: Mapping[str, Distribution], names: Sequence[str], errors: NDArray[np.void]
-) -> FloatArray:
-    """Logarithm of new over old density of the errors of some joints, (m,)."""
-    logs = np.zeros(len(errors))
-    for name in names:
-        values = sampling.values(study, errors, name)
-        logs += new[name].logpdf(values) - study.tolerances[name].logpdf(values)
-    correlated = study.copula.names
-    if set(correlated) & set(names):
-        # density of the Gaussian copula: correlated over independent normal density
-        form = np.linalg.inv(study.copula.matrix) - np.eye(len(correlated))
-        for sign, tolerances in ((-0.5, new), (0.5, study.tolerances)):
-            z = np.column_stack([score(tolerances[n], sampling.values(study, errors, n)) for n in correlated])
-            logs += sign * np.einsum("ni,ij,nj->n", z, form, z)
-    return logs
+def _log_ratios(study: Study, new: Mapping[str, Distribution], errors: NDArray[np.void]) -> FloatArray:
+    values = partial(sampling.values, study, errors)
+    return density_ratio.log_ratios(new, study.tolerances, study.copula, values, len(errors))
 
 
 def _share_above(view: View, load: Sample, done: NDArray[np.intp], ratios: Ratios, delivery: int) -> dict[str, Any]:

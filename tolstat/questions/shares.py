@@ -238,7 +238,7 @@ def together(row: Row, limits: int) -> Yield:
         low, high = ((valid - above) / n, 1.0 - above / n) if n else (0.0, 1.0)
     span, counted = text.span(low, high), f"{valid - above} of {valid}{' with a valid load' if unresolved else ''}"
     figure = text.percent(row["good"])
-    if binomial.unresolved_matter(above, n, unresolved):
+    if unresolved_matter(row):
         figure, interval = span, kind
     else:
         interval = "no interval" if kind == "bounds" else f"{kind} {span}"
@@ -246,10 +246,9 @@ def together(row: Row, limits: int) -> Yield:
     return Yield(figure, f"of the joints {keep} ({counted}; {interval})", high - low < WIDEST)
 
 
-def delivered(row: Row, limits: int) -> str:
-    """What `good` predicts of the next `DELIVERY` joints; empty without an interval."""
-    exceeded = "at least one limit" if limits > 1 else "the limit"
-    return "" if math.isnan(row["next_lower"]) else f"of the next {DELIVERY} joints exceed {exceeded}"
+def unresolved_matter(row: Row) -> bool:
+    """Whether joints without a valid load make the share above a limit as uncertain as sampling does."""
+    return binomial.unresolved_matter(row["count"], row["n"], row["n_failed"] + row["n_unsettled"])
 
 
 class ChangedJoints:

@@ -15,7 +15,7 @@ from tolstat.analysis import binomial, cycles
 from tolstat.analysis.design import Design
 from tolstat.analysis.sample import CONFIDENCE, Sample
 from tolstat.common import channels, strict
-from tolstat.common.errors import Fault, InputError, gather
+from tolstat.common.errors import Fault, InputError, gather, raise_all
 from tolstat.common.loads import FloatArray
 from tolstat.common.tables import Status
 from tolstat.display import drawing, text
@@ -137,8 +137,7 @@ def _levels(view: View, by: Sequence[str], levels: Sequence[str]) -> dict[str, F
         if not values and not faults:
             faults.append(Fault("--level", f"{name} has neither a level nor a limit", 'give one: --level "700 N"'))
         levels_of[name] = np.array(values, dtype=float)
-    if faults:
-        raise InputError(faults)
+    raise_all(faults)
     return levels_of
 
 

@@ -20,9 +20,10 @@ from tolstat.questions.assumptions.variations import Standing
 from tolstat.questions.bearing_life import answer as bearing_life
 from tolstat.questions.causes import lines
 from tolstat.questions.exceedance import rows as exceedance
-from tolstat.questions.exceedance.rows import ends, share_of, unresolved_matter, verdict
+from tolstat.questions.exceedance.rows import ends, share_of, verdict
 from tolstat.questions.fatigue import answer as fatigue
-from tolstat.store import known_parts
+from tolstat.questions.shares import unresolved_matter
+from tolstat.store import error_budget
 from tolstat.store.view import View
 
 
@@ -104,21 +105,18 @@ def _sentence(view: View, row: table.Row, accepted: float, answer: str, standing
     exceed = "" if row["load"] == ANY_LIMIT else f" exceed {limit}"
     interval = "total interval" if unresolved_matter(row) else text.span(*ends(row))
     value, words = WORDS[answer], f"{share}{exceed} ({interval}); {most} is accepted"
-    behind = ""
-    if standing is not None and (turned := sentences.turned(standing)) != ("", ""):
+    behind = sentences.of_variations(standing, answer)
+    if standing is not None and any(turned := sentences.turned(standing)):
         value, words = turned
-    elif answer == "no":
-        behind = sentences.least(standing) if standing else ""
     elif answer == "searched":
         words = f"at most {most} exceed {limit} if the proposals reach every way to it ({text.span(*ends(row))}); "
         words += f"whatever they miss, at most {text.percent(row['unsearched_upper'])}"
     elif answer == "yes":
-        words = f"at most {most} exceed {limit} ({share}, {interval}){sentences.also(standing) if standing else ''}"
+        words = f"at most {most} exceed {limit} ({share}, {interval}){behind}"
     else:
-        if view.design.has_interval("index") and "both_lower" not in row:
+        if answer == "open" and view.design.has_interval("index") and "both_lower" not in row:
             words += f"; {_deciding(row, accepted)}"
-        behind = sentences.decided(standing) if standing else ""
-    words += f". {behind}" if behind else ""
+        words += f". {behind}" if behind else ""
     return value, words + _not_varied(view, standing)
 
 
@@ -140,7 +138,7 @@ def _without_errors(view: View) -> str:
 
 def tells_yield(view: View) -> bool:
     """Whether the share of the joints that keep all limits can be told: of joints that count equally, with a load."""
-    return view.design.refuses("index") is None and known_parts.of(view) is None and bool(view.count(*VALID))
+    return view.design.refuses("index") is None and error_budget.known_parts(view) is None and bool(view.count(*VALID))
 
 
 def _decisive(view: View, records: Sequence[table.Row]) -> table.Row:
@@ -176,7 +174,7 @@ def _yield(view: View, records: Sequence[table.Row], standing: Standing | None) 
     """Without an accepted share: share of the joints that keep all limits; of weighted joints, that exceed any."""
     without = view.design.without_interval("share")
     notes: tuple[str, ...] = (without,) if without else ()
-    if view.design.refuses("index") or known_parts.of(view) is not None:
+    if view.design.refuses("index") or error_budget.known_parts(view) is not None:
         row, worst = _decisive(view, records), exceedance.most_exceeded(view, records)
         if np.isnan(row["estimate"]):
             known = [record for record in records if not np.isnan(record["estimate"])]
@@ -197,7 +195,7 @@ def _yield(view: View, records: Sequence[table.Row], standing: Standing | None) 
     kept = shares.together(shares.good(view), len(view.limits))
     if not kept.decides:
         return Verdict("none", WORDS["none"], _reason(view, [_decisive(view, records)]), notes)
-    behind = [sentences.reach(standing) if standing else "", text.capital(_without_errors(view))]
+    behind = [sentences.of_variations(standing, ""), text.capital(_without_errors(view))]
     words = ". ".join([kept.words + _not_varied(view, standing), *filter(None, behind)])
     return Verdict("", kept.value, words, notes, exceedance.most_exceeded(view, records)["load"])
 
@@ -213,7 +211,7 @@ def _reason(view: View, records: Sequence[table.Row]) -> str:
     poor = [row for row in records if row["n"] > lost and np.isnan(row["estimate"])]
     if poor:
         return f"above {text.limit(poor[0])}, {view.load(poor[0]['load']).doubt(poor[0]['level'])}"
-    known = known_parts.of(view)
+    known = error_budget.known_parts(view)
     if known is not None and np.isnan(ends(records[0])[0]):
         unsupported = text.percent(records[0]["unsupported"])
         reason = f"the joints do not support {unsupported} of the processes that the measured parts leave open"

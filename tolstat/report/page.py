@@ -313,8 +313,9 @@ def _cards(view: View, verdict: Verdict | None) -> list[Card]:
         if verdict.answer:
             together = shares.together(row, len(view.limits))
             cards.append(Card(together.value, together.words, "Yield"))
-        if predicted := shares.delivered(row, len(view.limits)):
-            interval = text.ends(row["next_lower"], row["next_upper"], ".0f")
+        if (interval := text.ends(row["next_lower"], row["next_upper"], ".0f")) != "-":
+            exceeded = "at least one limit" if len(view.limits) > 1 else "the limit"
+            predicted = f"of the next {row['delivery']} joints exceed {exceeded}"
             cards.append(Card(interval, predicted, "95 % prediction interval"))
     if verdict is not None and verdict.load and verdict.load not in verdict.words:
         most = next(row for row in exceedance.limit_rows(view) if row["load"] == verdict.load)

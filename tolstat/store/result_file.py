@@ -92,7 +92,8 @@ class ResultFile(Reader):
             joints; how each joint was drawn, where that is recorded; errors; kept results, ``status`` as
             text. ``attrs["units"]`` has the SI unit of each column.
         """
-        return to_pandas(self, nominal)
+        (frame,) = in_blocks(self, nominal, max(self.n, 1))
+        return frame
 
     def to_xarray(self, nominal: bool = False) -> xarray.Dataset:
         """Export errors and results along ``row``, with units and descriptions.
@@ -169,21 +170,16 @@ class NamedLoads(Mapping[str, "pd.Series[float]"]):
 
 
 def described(store: Reader) -> dict[str, Column]:
-    """Columns with unit and description that an export has, by name; see `to_pandas` for the others."""
+    """Columns with unit and description that an export has, by name; see `ResultFile.to_pandas` for the others."""
     errors = [c._replace(description=OPERATING.get(c.name, c.description)) for c in ERROR_COLUMNS]
     return {c.name: c for c in (*drawn_columns(store.sampling), *errors, *store.columns)}
 
 
-def to_pandas(store: Reader, nominal: bool) -> pd.DataFrame:
-    """Export a campaign to one DataFrame, see `ResultFile.to_pandas`."""
-    return _frame(store, slice(0 if nominal else store.first_sample, store.n), nominal, _listed(store))
-
-
-def in_blocks(store: Reader, nominal: bool) -> Iterator[pd.DataFrame]:
-    """Yield the rows of `to_pandas` in blocks of at most `AT_ONCE`, one at least."""
+def in_blocks(store: Reader, nominal: bool, at_once: int = AT_ONCE) -> Iterator[pd.DataFrame]:
+    """Yield the rows of `ResultFile.to_pandas` in blocks of at most `at_once`, one at least."""
     first, listed = 0 if nominal else store.first_sample, _listed(store)
-    for begin in range(first, max(store.n, first + 1), AT_ONCE):
-        yield _frame(store, slice(begin, min(begin + AT_ONCE, store.n)), nominal, listed)
+    for begin in range(first, max(store.n, first + 1), at_once):
+        yield _frame(store, slice(begin, min(begin + at_once, store.n)), nominal, listed)
 
 
 def _frame(store: Reader, rows: slice, nominal: bool, listed: Mapping[str, NDArray[Any]]) -> pd.DataFrame:

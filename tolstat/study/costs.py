@@ -17,7 +17,7 @@ from typing import Annotated, Any, NamedTuple
 from pydantic import Field, model_validator
 
 from tolstat.common import strict, units
-from tolstat.common.errors import Fault, InputError, gather, input_error
+from tolstat.common.errors import Fault, InputError, gather, input_error, raise_all
 from tolstat.common.files import finite, read_input
 from tolstat.common.strict import Strict, refuse
 from tolstat.study import selection
@@ -134,12 +134,11 @@ def of(tolerances: Sequence[Tolerance], path: Path | None = None) -> list[Cost]:
         raise InputError(strict.with_lines(faults, str(path), read_input(path)) if toml else faults)
     kept = CostEntry(cost=0.0, keep=True)
     read = [Cost(t.width, tuple(costs.get(name, kept) for name in t.names)) for t in tolerances]
-    if faults := [
+    raise_all(
         Fault(f"{path}: {tolerance.pattern}", "costs more than a number can hold", "give a smaller cost, at or power")
         for tolerance, cost in zip(tolerances, read, strict=True)
         if not cost.is_finite
-    ]:
-        raise InputError(faults)
+    )
     return read
 
 
@@ -150,12 +149,11 @@ def _read_csv(path: Path) -> dict[str, dict[str, Any]]:
         raise input_error(path, f"cannot be read: {error}", "give a TOML or CSV file") from error
     if not rows or "tolerance" not in rows[0]:
         raise input_error(path, "has no column tolerance", "write the header line: tolerance,cost,fixed,at,power")
-    if faults := [
+    raise_all(
         Fault(f"{path}: row {number}", "has more cells than the header line", "write decimals with a point: 0.5")
         for number, row in enumerate(rows, start=2)
         if None in row
-    ]:
-        raise InputError(faults)
+    )
     return {row.pop("tolerance"): {key: _value(cell) for key, cell in row.items() if cell} for row in rows}
 
 

@@ -188,8 +188,12 @@ class Settings(Strict):
     def _take_revolutions(cls, starts: float, info: ValidationInfo) -> float:
         revolutions = info.data.get("revolutions")
         if revolutions is not None and starts > revolutions:
-            raise refuse(f"{starts:g} starts in {revolutions:g} revolutions", "give at most one for each")
+            raise refuse(*_too_many(starts, revolutions))
         return starts
+
+
+def _too_many(starts: float, revolutions: float) -> tuple[str, str]:
+    return f"{starts:g} starts in {revolutions:g} revolutions", "give at most one for each, or more revolutions"
 
 
 class LineEntry(Strict):
@@ -265,8 +269,7 @@ class Fatigue:
         if not (self.required or math.isnan(hours)):
             within = replace(self, revolutions=hours * hourly, required=True, hours=hours)
         if within.starts > within.revolutions:
-            found = f"{within.starts:g} starts in {within.revolutions:g} revolutions"
-            raise input_error(f"{place}: fatigue.starts", found, "give at most one for each, or more revolutions")
+            raise input_error(f"{place}: fatigue.starts", *_too_many(within.starts, within.revolutions))
         return within
 
     @property

@@ -22,7 +22,6 @@ from tolstat.joint.derived import BEARING
 from tolstat.joint.model import Assumed, leaves, merged
 from tolstat.joint.reading import faults_of_assumed
 from tolstat.study import fatigue, listing, points, proposal, rewriting, selection, selective
-from tolstat.study.axes import is_zone, zone_of
 from tolstat.study.design import Design
 from tolstat.study.model import MAX_ROWS, Output, Sampling, Solver, Subset
 from tolstat.study.selection import TOLERANCED, Assignments, Reading
@@ -100,21 +99,13 @@ def _sampling(file: Reading) -> Sampling | None:
 def _scatter(file: Reading) -> Tolerances:
     """``[tolerances]``: how errors scatter."""
     written = []
-    units = dict[str, str]()
     for entry in fits.entries(file.table("tolerances"), file.fit):
         with gather(file.faults):
             selected = selection.resolve(entry, TOLERANCED, file.place)
             with gather(file.faults):
                 file.claims.claim(entry, selected)
-            units |= {name: TOLERANCED[name] for name in selected}
             written.append((entry, selected))
-    read = kinds.read(written, file)
-    drawn: dict[str, list[str]] = {}
-    for quantity in read.distributions:
-        drawn.setdefault(zone_of(quantity) if is_zone(quantity) else quantity, []).append(quantity)
-    # those with faults stand for what they would draw, so that others do not seem to lack them
-    file.parts["drawn"] = {quantity: unit for name, unit in units.items() for quantity in drawn.get(name, [name])}
-    return read
+    return kinds.read(written, file)
 
 
 def _limits(file: Reading) -> dict[str, float]:
@@ -305,12 +296,16 @@ def load(
         file.parts["joint"] = joint
     _read(file, READERS)
     _check(file)
+    # of joints that the file lists or sweeps, nothing is known where it has faults
+    whole = file.sampling is not None and (file.sampling.method not in ("sweep", "cases") or not file.faults)
+    if whole and None not in (file.joint, file.operation, file.solver, file.output):
+        read: Tolerances = file.scatter
+        parts = {name: part for name, part in file.parts.items() if name != "scatter"}
+        parts |= {"tolerances": read.distributions, "entries": read.entries, "axes": read.axes, "lots": read.lots}
+        study = Study(file.path, file.text, **parts)
+        with gather(file.faults):
+            study.check_mounting()
     file.finish("sampling.n" if n is not None else "")
-    read: Tolerances = file.scatter
-    parts = {name: part for name, part in file.parts.items() if name not in ("scatter", "drawn")}
-    parts |= {"tolerances": read.distributions, "entries": read.entries, "axes": read.axes, "lots": read.lots}
-    study = Study(file.path, file.text, **parts)
-    study.check_mounting()
     return study
 
 
@@ -340,9 +335,12 @@ def load_case(path: str | Path) -> Case:
     if file.solver is not None and file.solver.fidelity == "auto":
         remedy = 'write "dynamic", "quasistatic" or "ideal"'
         file.fault("solver.fidelity", "'auto' needs the joints of a campaign, a case has one joint", remedy)
-    file.finish()
+    if None in (file.joint, file.operation, file.solver, file.errors):
+        file.finish()
     case = Case(file.path, file.text, file.joint, file.operation, file.solver, file.errors)
-    case.check_mounting()
+    with gather(file.faults):
+        case.check_mounting()
+    file.finish()
     return case
 
 

@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 
 from tolstat import joint
 from tolstat.common import strict, units
-from tolstat.common.errors import Fault, InputError, collected, gather, input_error
+from tolstat.common.errors import Fault, collected, gather, input_error, raise_all
 from tolstat.common.notation import DIAMETER
 from tolstat.common.strict import Strict, refuse
 from tolstat.common.tables import DESIGN, Variant
@@ -303,8 +303,7 @@ def _members(
             faults.append(Fault(where, found, "write one variant for each value"))
         elif low[key] == high[key]:
             faults.append(Fault(where, "from and to are equal", "write a constant value in joint"))
-    if faults:
-        raise InputError(faults)
+    raise_all(faults)
     text = dict(flat(start.model_dump(mode="json")))
     members = []
     for shares in cube(entry.design, entry.points, len(ranges), entry.seed):

@@ -151,7 +151,7 @@ def read(file: Reading) -> tuple[Proposal, ...]:
 
 def _resolved(entry: ProposalEntry, file: Reading, number: int) -> Proposal:
     """Expand the patterns of an entry; of a zone it applies to the scores of the radii."""
-    toleranced, whole = list(file.drawn), f"{file.place}: proposal[{number}]"
+    toleranced, whole = file.scatter.drawn, f"{file.place}: proposal[{number}]"
     means = dict.fromkeys(toleranced, 0.0)
     widths = dict.fromkeys(toleranced, 1.0)
     widen = entry.widen if isinstance(entry.widen, dict) else {}

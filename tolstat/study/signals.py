@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pydantic_core import PydanticCustomError
 
 from tolstat.common import units
-from tolstat.common.errors import Fault, InputError, gather, input_error
+from tolstat.common.errors import Fault, gather, input_error, raise_all
 from tolstat.common.files import finite
 from tolstat.common.late import interpolate
 from tolstat.common.loads import FloatArray
@@ -112,8 +112,7 @@ def read(path: Path, needed: Sequence[str] = ()) -> dict[str, FloatArray]:
     if len(faults) > SHOWN:
         others = Fault(str(path), f"has {len(faults) - SHOWN} more faults", "mend all lines in the same way")
         faults = [*faults[:SHOWN], others]
-    if faults:
-        raise InputError(faults)
+    raise_all(faults)
     return signal
 
 

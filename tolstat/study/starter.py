@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from tolstat.common import strict
-from tolstat.common.errors import Fault, InputError, input_error
+from tolstat.common.errors import Fault, input_error, raise_all
 from tolstat.common.files import atomic_write, data_dir
 from tolstat.study import rewriting
 from tolstat.study.schema import KINDS, schema
@@ -49,11 +49,9 @@ def write(path: Path, joint: str) -> list[Path]:
     if joint not in (*names, OWN):
         raise input_error("--joint", f"no joint is named {joint!r}", strict.did_you_mean(joint, [*names, OWN]))
     files = dict(_files(path, joint))
-    faults = [
+    raise_all(
         Fault(str(file), "exists", "give the study another name") for file in files if file.exists() and not _made(file)
-    ]
-    if faults:
-        raise InputError(faults)
+    )
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         for file, text in files.items():

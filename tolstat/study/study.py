@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.common.columns import holds
-from tolstat.common.errors import Fault, InputError
+from tolstat.common.errors import Fault, raise_all
 from tolstat.common.loads import UNIT_OF_LOAD, limits_in_words, split
 from tolstat.common.strict import dotted, with_lines
 from tolstat.common.tables import DESIGN, Variant
@@ -79,9 +79,7 @@ class Case:
         InputError
             With every such setting.
         """
-        faults = [self.fault(dotted(path), *texts) for path, *texts in points.refusals(self._settings, self._varied)]
-        if faults:
-            raise InputError(faults)
+        raise_all([self.fault(dotted(path), *texts) for path, *texts in points.refusals(self._settings, self._varied)])
 
     @property
     def _settings(self) -> list[Setting]:

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -25,6 +25,7 @@ from tolstat.study.axes import is_zone
 from tolstat.study.file import load
 from tolstat.study.study import Study
 from tolstat.study.tolerances import fits, iso
+from tolstat.study.tolerances.correlation import Group
 from tolstat.study.tolerances.distributions import Array, Distribution
 from tolstat.study.tolerances.entry import SingleEntry, Site, Toleranced, ToleranceEntry
 
@@ -83,47 +84,32 @@ class Rescaled(Distribution):
         return {"distribution": "rescaled", "every": self.every.describe(), **parameters}
 
 
-class Line(NamedTuple):
-    """What is changed together.
-
-    Attributes
-    ----------
-    label : str
-        Pattern of the entry, name of a group, feature or error.
-    names : tuple of str
-        Quantities that the study draws.
-    """
-
-    label: str
-    names: tuple[str, ...]
-
-
-def lines(study: Study) -> list[Line]:
+def lines(study: Study) -> list[Group]:
     """Entries of ``[tolerances]`` that can be changed, in their order; the diameters of a fit are one of them."""
     names_of: dict[str, tuple[str, ...]] = {}
     for entry in study.entries:
         if _free(study, entry):
             label = _fit_label(study) if _is_of_fit(study, entry) else entry.pattern
             names_of[label] = (*names_of.get(label, ()), *entry.names)
-    return [Line(label, names) for label, names in names_of.items()]
+    return [Group(label, names) for label, names in names_of.items()]
 
 
-def features(study: Study) -> list[Line]:
+def features(study: Study) -> list[Group]:
     """Each pin with its hole: all that is drawn of the two."""
     pairs = [(pin, hole, f"{pin} and {hole}") for pin, hole in HOLE_OF_PIN.items()]
     return [
-        Line(label, names)
+        Group(label, names)
         for pin, hole, label in pairs
         if (names := tuple(n for n in _drawn(study) if n.partition(".")[0] in (pin, hole)))
     ]
 
 
-def errors(study: Study) -> list[Line]:
+def errors(study: Study) -> list[Group]:
     """Each quantity that the study draws, by itself."""
-    return [Line(name, (name,)) for name in _drawn(study)]
+    return [Group(name, (name,)) for name in _drawn(study)]
 
 
-def named(study: Study, texts: Sequence[str]) -> list[Line]:
+def named(study: Study, texts: Sequence[str]) -> list[Group]:
     """Groups that a user names.
 
     Parameters
@@ -153,7 +139,7 @@ def named(study: Study, texts: Sequence[str]) -> list[Line]:
                         remedy = did_you_mean(pattern, [*(line.label for line in lines(study)), *known])
                         raise input_error(f"--group {text!r}", f"{pattern!r} selects no line", remedy)
                     names |= dict.fromkeys(selected)
-                groups.append(Line(label, tuple(names)))
+                groups.append(Group(label, tuple(names)))
     return groups
 
 
@@ -162,7 +148,7 @@ def left_out(study: Study) -> list[str]:
     return [entry.pattern for entry in study.entries if not _free(study, entry)]
 
 
-def steps(study: Study, line: Line) -> tuple[str, ...]:
+def steps(study: Study, line: Group) -> tuple[str, ...]:
     """Changes of a line: `STEPS`; of a fit the codes of `other_fits`."""
     return STEPS if study.fit is None or line.label != _fit_label(study) else tuple(other_fits(study.fit))
 
@@ -190,7 +176,7 @@ def other_fits(fit: fits.Fit) -> dict[str, iso.Zones]:
     return fits_beside
 
 
-def after(study: Study, line: Line, step: str) -> Study:
+def after(study: Study, line: Group, step: str) -> Study:
     """Study with a line after one of its `steps`, with joints as `applied` draws them."""
     if step in STEPS:
         return applied(study, changed(study, line, step))
@@ -202,14 +188,14 @@ def after(study: Study, line: Line, step: str) -> Study:
     return applied(load(study.path, study.sampling.n, text, varied(study.joint, diameters)), {})
 
 
-def changed(study: Study, line: Line, step: str) -> dict[str, Distribution]:
+def changed(study: Study, line: Group, step: str) -> dict[str, Distribution]:
     """Distributions of a line with another width, by name of the quantity.
 
     Parameters
     ----------
     study : Study
         The study.
-    line : Line
+    line : Group
         What is changed.
     step : str
         One of `STEPS`.
@@ -224,7 +210,7 @@ def changed(study: Study, line: Line, step: str) -> dict[str, Distribution]:
     return distributions
 
 
-def factors(study: Study, line: Line, step: str) -> dict[str, float]:
+def factors(study: Study, line: Group, step: str) -> dict[str, float]:
     """How many times as wide each quantity of a line is after one of its `steps`."""
     if step in STEPS:
         drawn = _drawn(study)
@@ -246,7 +232,7 @@ def applied(study: Study, distributions: Mapping[str, Distribution]) -> Study:
     return replace(study, sampling=sampling, tolerances=tolerances, proposals=(), groups=())
 
 
-def words(study: Study, line: Line, step: str) -> str:
+def words(study: Study, line: Group, step: str) -> str:
     """What a step does to a line: ``"half"``, ``"class m"``, ``"mean radial clearance +15 µm"``; several in a row."""
     if step not in STEPS:
         assert study.fit is not None
@@ -257,7 +243,7 @@ def words(study: Study, line: Line, step: str) -> str:
     return ", ".join(dict.fromkeys(_width(*drawn[name][:2], step)[1] for name in line.names))
 
 
-def size(study: Study, line: Line) -> str:
+def size(study: Study, line: Group) -> str:
     """Tolerance of a line, ``"±0.5 deg"``, or code of its fit; empty if its quantities have several."""
     if study.fit is not None and line.label == _fit_label(study):
         return study.fit.entry.code

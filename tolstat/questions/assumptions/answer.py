@@ -17,7 +17,7 @@ from tolstat.campaign import what_if as sets
 from tolstat.campaign.pool import kept_workers
 from tolstat.campaign.what_if import Change
 from tolstat.campaign.work import Work
-from tolstat.common.errors import Fault, InputError, NotApplicable, gather
+from tolstat.common.errors import Fault, NotApplicable, gather, raise_all
 from tolstat.display import drawing, style, text
 from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Sentence, Table
 from tolstat.display.options import Accepted, Opt
@@ -144,21 +144,15 @@ def bars(standing: variations.Standing) -> Panel:
             ax.plot([max(lower, floor), max(upper, floor)], [0, 0], color=style.INK, lw=1.6)
         ax.plot(drawn, 0, "o" if share >= floor else style.markers.CARETLEFT, color=style.INK, ms=6.0, clip_on=False)
         for y, row in enumerate(rows, 1):
-            moved, low, top = (max(row[f"share{end}"], floor) for end in ("", "_lower", "_upper"))
-            ax.barh(y, moved - drawn, 0.62, left=drawn, color=style.COLOURS[row["change"] > 0.0], zorder=2)
-            ax.plot([low, top], [y, y], color=style.INK, lw=1.2, zorder=3)
-            if row["share_lower"] < floor:
-                ax.plot(floor, y, marker=style.markers.CARETLEFT, color=style.INK, ms=5.0, zorder=4, clip_on=False)
-        if accepted > 0.0:
-            ax.axvline(accepted, color=style.COLOURS[2], lw=1.4, ls=(0.0, (6.0, 2.0)))
-            words: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 8.0, "backgroundcolor": "white"}
-            ax.text(accepted, -0.9, f"accepted {text.percent(accepted)}", **words)
+            moved = [row[f"share{end}"] for end in ("", "_lower", "_upper")]
+            drawing.share_bar(ax, y, moved, drawn, floor, style.COLOURS[row["change"] > 0.0], 0.62)
+        drawing.accepted(ax, accepted, -0.9)
         ax.set_xlabel("share of the joints that exceed a limit")
 
     moving = "; ".join(f"{row['label']} {text.percent(row['share'])}" for row in rows)
     description = f"As drawn {text.percent(share)}. {moving or 'Nothing that is assumed moves it'}"
     size = drawing.WIDTH, 0.27 * (len(labels) + 1) + drawing.BOTTOM + 0.3
-    left = drawing.rows_left([part for label in labels for part in label.split("\n")])
+    left = drawing.rows_left(labels)
     title = "Share of the joints above a limit, with other values of what is assumed"
     return Panel("assumptions", title, description, draw, size, left)
 
@@ -227,8 +221,7 @@ def simulate(
             for variation in wanted:
                 with gather(faults):
                     changes.append(sets.with_joint(study, variation.keys, range(number)))
-            if faults:
-                raise InputError(faults)
+            raise_all(faults)
             labels.update(variation.label for variation in wanted)
             if (first := own_joints(view)) < number:
                 changes.insert(0, sets.as_drawn(study, range(first, number)))

@@ -55,48 +55,42 @@ def more(standing: Standing, file: str) -> str:
     return f"{head}; if its share stays, this decides {row['label']}:\ntolstat assumptions {file} --run --joints {n}"
 
 
-def also(standing: Standing) -> str:
-    """End of the sentence of a verdict *kept*: in how many variations the limits are kept, too."""
-    n = len(standing.rows)
-    if not n:
+def of_variations(standing: Standing | None, answer: str) -> str:
+    """Sentence on the variations behind a verdict; empty where there are none.
+
+    Parameters
+    ----------
+    standing : Standing, optional
+        What the verdict stands on.
+    answer : str
+        ``yes``: in how many variations the limits are kept, too, to follow the words of the verdict. ``no``: the one
+        with the smallest share, which shows how far a better value helps. ``open``: on which side the variations lie,
+        with the farthest one of each side. Empty, where no share is accepted: the smallest and the largest share.
+    """
+    if standing is None or not standing.rows:
         return ""
-    kept = sum(row["side"] == "yes" for row in standing.rows)
-    if kept == n:
-        return f", also in {'the one variation' if n == 1 else f'all {n} variations'} of what is assumed"
-    others = sorted((row for row in standing.rows if row["side"] != "yes"), key=lambda row: -row["share"])
-    return f", also in {kept} of {n} variations of what is assumed; {_most('open', others)}"
-
-
-def least(standing: Standing) -> str:
-    """Sentence behind a verdict *not kept*: the variation with the smallest share."""
-    if not standing.rows:
-        return ""
-    n, row = len(standing.rows), min(standing.rows, key=lambda row: float(row["share"]))
-    head = f"Least of {n} variations" if n > 1 else "In the one variation"
-    smallest = f"{head}: {text.percent(row['share'])}, {row['label']}{' (open)' if row['side'] == 'open' else ''}"
-    others = [other for other in standing.rows if other["side"] == "open" and other is not row]
-    return f"{smallest}; {_most('open', others)}" if others else smallest
-
-
-def decided(standing: Standing) -> str:
-    """Sentence behind an open verdict: on which side the variations lie, with the farthest one of each side."""
-    if not standing.rows:
-        return ""
+    rows, shares = standing.rows, [float(row["share"]) for row in standing.rows]
+    n = len(rows)
+    if answer == "yes":
+        others = sorted((row for row in rows if row["side"] != "yes"), key=lambda row: -row["share"])
+        if not others:
+            return f", also in {'the one variation' if n == 1 else f'all {n} variations'} of what is assumed"
+        return f", also in {n - len(others)} of {n} variations of what is assumed; {_most('open', others)}"
+    if answer == "no":
+        row = min(rows, key=lambda row: float(row["share"]))
+        head = f"Least of {n} variations" if n > 1 else "In the one variation"
+        smallest = f"{head}: {text.percent(row['share'])}, {row['label']}{' (open)' if row['side'] == 'open' else ''}"
+        others = [other for other in rows if other["side"] == "open" and other is not row]
+        return f"{smallest}; {_most('open', others)}" if others else smallest
+    if not answer:
+        return f"In {n} variations of what is assumed: {text.span(1.0 - max(shares), 1.0 - min(shares))}"
     sides = []
     for side, word in KEPT.items():
-        rows = [row for row in standing.rows if row["side"] == side]
-        if alone := [row for row in rows if row["name"] != ALL] or rows:
+        decided = [row for row in rows if row["side"] == side]
+        if alone := [row for row in decided if row["name"] != ALL] or decided:
             far = max(alone, key=lambda row: abs(row["change"]))
-            sides.append(f"{word} in {len(rows)} ({text.percent(far['share'])} {_condition(far['label'])})")
-    return f"Of {len(standing.rows)} variations of what is assumed: {', '.join(sides) or 'open in all'}"
-
-
-def reach(standing: Standing) -> str:
-    """Sentence where no share is accepted: the smallest and the largest share of the variations."""
-    if not standing.rows:
-        return ""
-    shares = [float(row["share"]) for row in standing.rows]
-    return f"In {len(shares)} variations of what is assumed: {text.span(1.0 - max(shares), 1.0 - min(shares))}"
+            sides.append(f"{word} in {len(decided)} ({text.percent(far['share'])} {_condition(far['label'])})")
+    return f"Of {n} variations of what is assumed: {', '.join(sides) or 'open in all'}"
 
 
 def not_varied(standing: Standing, file: str) -> str:

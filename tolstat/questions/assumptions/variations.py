@@ -15,7 +15,7 @@ from tolstat.common.errors import InputError, TolstatError
 from tolstat.common.loads import FloatArray
 from tolstat.display.table import Row, Rows
 from tolstat.questions.shares import ChangedJoints, Estimate, check_sample, own_joints, unusable, with_ends
-from tolstat.store import error_budget, known_parts
+from tolstat.store import error_budget
 from tolstat.store import what_if as kept
 from tolstat.store.view import View
 from tolstat.study.assumptions import Assumption, assumptions, given, together
@@ -166,7 +166,7 @@ def _evaluate(view: View, accepted: float) -> Standing:
         missing = (ALL,) if len(together_in_file) < len(every) else ()
     looks = 2 if len({len(loads) for _, loads in simulated}) > 1 else 1
     confidence = 1.0 - 0.05 / max(looks * len(simulated), 1)
-    load, parts = joints.load, known_parts.of(view)
+    load, parts = joints.load, error_budget.known_parts(view)
     interval = total_interval(error_budget.with_error(view, load), joints.level, 0.95)
     if parts is not None:
         known = parts.share(load.name, 0.95)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from tolstat.analysis.binomial import needed, unresolved_matter
+from tolstat.analysis.binomial import needed
 from tolstat.analysis.rating_life import A1, FRETTING
 from tolstat.common.errors import NotApplicable
 from tolstat.common.tables import VALID
@@ -43,8 +43,7 @@ def _span(row: Row) -> str:
 
 def _undecided(row: Row) -> bool:
     """Whether joints without a life make a share as uncertain as sampling does, or no joint has one."""
-    without = row["n_failed"] + row["n_unsettled"]
-    return bool(without == row["n"] or unresolved_matter(row["count"], row["n"], without))
+    return bool(row["n_failed"] + row["n_unsettled"] == row["n"] or shares.unresolved_matter(row))
 
 
 BEARING = Column("bearing", lambda row: PLACE_NAMES.get(row["place"], str(row["place"])))

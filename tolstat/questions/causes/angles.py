@@ -270,10 +270,8 @@ def _parts(each: Sequence[AgainstAngle], shown: Container[str]) -> list[Part]:
     ]
     seen = [row for row in rows if row["error"] in shown]
     table = Table("revolution", OVER_REVOLUTION, COLUMNS, rows, {"theta": "rad"}, seen)
-    first, alone = (
-        each[0],
-        (f"{100 * indices.additive:.0f} % of the variance of {indices.quantity}" for indices in each),
-    )
+    first = each[0]
+    alone = (f"{100 * indices.additive:.0f} % of the variance of {indices.quantity}" for indices in each)
     note = (
         f"All errors alone explain {', '.join(alone)}. Over the input angle: the first {first.joints} settled joints, "
         f"{ORIGIN[first.origin]}; bands are the 95 % intervals at each angle. Shares are corrected for chance: an "

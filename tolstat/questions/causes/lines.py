@@ -41,8 +41,6 @@ _SHARES = ("factor", *(f"{name}{end}" for name in ("share", "change") for end in
 
 CURVES = 4
 """Number of lines whose curve has a colour; the others are grey."""
-_ACCEPTED: dict[str, Any] = {"color": style.COLOURS[2], "lw": 1.4, "ls": (0.0, (6.0, 2.0))}
-"""Style of the accepted share."""
 _BARS = {
     COARSER: ("one step coarser", style.COLOURS[1], 0.3, -0.1),
     HALF: ("half as wide", style.COLOURS[0], 0.56, 0.1),
@@ -55,9 +53,8 @@ _EXACT: dict[str, Any] = {"ls": "", "mfc": "white", "mec": style.INK, "ms": 5.5}
 
 def _cost(head: str, name: str, rank: int = 0) -> Column:
     """Column of what a change costs more than the drawing."""
-    return Column(
-        head, lambda row: text.formed(row.get(name, np.nan) + 0.0, "+.4g"), shown=has(name), rank=rank
-    )  # no -0
+    # + 0.0: no -0
+    return Column(head, lambda row: text.formed(row.get(name, np.nan) + 0.0, "+.4g"), shown=has(name), rank=rank)
 
 
 LINE = Column("line", word("line"), words=True)
@@ -249,15 +246,10 @@ def _tornado(changed: Lines, accepted: float) -> Panel:
     labels += [f"{row['step']}\nin place of {row['size']}" for row in fits]
     bars = [*([HALF, COARSER] if halves else []), *(["share"] if others else [])]
     keys = [*(_BARS[name][0] for name in bars), *(["exact"] if halves else [])]
-    left = drawing.rows_left([part for label in labels for part in label.split("\n")])
+    left = drawing.rows_left(labels)
     top = drawing.legend_room(keys, left)
     drawn, lower, upper = (changed.facts[name] for name in ("share", "lower", "upper"))
     floor = _floor(changed, accepted)
-
-    def whisker(ax: Axes, y: float, low: float, high: float) -> None:
-        ax.plot([max(low, floor), max(high, floor)], [y, y], color=style.INK, lw=1.2, zorder=3)
-        if low < floor:  # an arrow at the left edge stands for an end that is smaller than what the axis shows
-            ax.plot(floor, y, marker=markers.CARETLEFT, color=style.INK, ms=5.0, zorder=4, clip_on=False)
 
     def draw(ax: Axes) -> None:
         drawing.rows(ax, labels)
@@ -270,16 +262,13 @@ def _tornado(changed: Lines, accepted: float) -> Panel:
         for y, row in enumerate([*by_line, *fits]):
             for name, (_, colour, height, above) in _BARS.items():
                 if name in row:
-                    ax.barh(y, max(row[name], floor) - drawn, height, left=drawn, color=colour, zorder=2)
-                    whisker(ax, y - above, row[f"{name}_lower"], row[f"{name}_upper"])
+                    share = [row[f"{name}{end}"] for end in shares.ENDS]
+                    drawing.share_bar(ax, y, share, drawn, floor, colour, height, above)
             if EXACT in row:
                 marker = "o" if row[EXACT] >= floor else markers.CARETLEFT
                 ax.plot(max(row[EXACT], floor), y, marker=marker, zorder=4, clip_on=False, **_EXACT)
-        words: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 8.0, "backgroundcolor": "white"}
-        ax.text(drawn, -0.9, f"as drawn {text.percent(drawn)}", **words)
-        if accepted > 0.0:
-            ax.axvline(accepted, **_ACCEPTED)
-            ax.text(accepted, len(labels) + 0.1, f"accepted {text.percent(accepted)}", **words)
+        ax.text(drawn, -0.9, f"as drawn {text.percent(drawn)}", **drawing.WORDS)
+        drawing.accepted(ax, accepted, len(labels) + 0.1)
         handles: list[Artist] = [patches.Patch(color=_BARS[name][1]) for name in bars]
         handles += ax.plot([], [], marker="o", **_EXACT) if halves else []
         drawing.legend_above(ax, handles, keys)
@@ -323,7 +312,7 @@ def _curves(changed: Lines, accepted: float) -> Iterator[Panel]:
         ax.plot(1.0, facts["share"], "D", color=style.INK, ms=6.0, zorder=5)
         ax.set_ylim(floor, min(1.0, 2.0 * top))
         if accepted > 0.0:
-            handles.append(ax.axhline(accepted, **_ACCEPTED))
+            handles.append(ax.axhline(accepted, **drawing.ACCEPTED))
         ax.set(xlabel="width of the line, relative to the drawing", ylabel=f"share above {changed.limit}")
         drawing.legend_above(ax, handles, labels)
 

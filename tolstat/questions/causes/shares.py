@@ -20,7 +20,8 @@ from tolstat.store.view import View
 from tolstat.study import Study, scaling, widths
 from tolstat.study.costs import Cost
 from tolstat.study.costs import of as prices_of
-from tolstat.study.widths import COARSER, EXACT, FINER, HALF, STEPS, Line
+from tolstat.study.tolerances.correlation import Group
+from tolstat.study.widths import COARSER, EXACT, FINER, HALF, STEPS
 
 NEGLIGIBLE = 0.1
 """Difference of two lines that does not matter for their order, relative to the share of the joints as drawn."""
@@ -145,13 +146,13 @@ def evaluate(view: View, by: str, costs: Path | None = None) -> Lines | None:
 class Joints(ChangedJoints):
     """Load of the joints that the lines are compared on, as drawn and with each change."""
 
-    def settled(self, lines: Sequence[Line], confidence: float = 0.95) -> bool:
+    def settled(self, lines: Sequence[Group], confidence: float = 0.95) -> bool:
         """Whether the file has all these lines half as wide, or with other fits, and their order `is_settled`."""
         loads = [self.decisive(line) for line in lines]
         known = [values for _, values in loads if values is not None]
         return len(known) == len(loads) and is_settled(known, self.base, self.level, confidence)
 
-    def decisive(self, line: Line) -> tuple[str, FloatArray | None]:
+    def decisive(self, line: Group) -> tuple[str, FloatArray | None]:
         """Step that a line has its place in the order by, and the load of the joints with it; None without these.
 
         Of a fit it is the other fit that lowers the share most.
@@ -184,11 +185,11 @@ class Joints(ChangedJoints):
 
     def rows(self) -> list[dict[str, Any]]:
         """Rows of `Lines.rows`: lines by their decisive share, then by that if exact, those without these behind."""
-        by_line: dict[Line, dict[str, Any]] = {}
+        by_line: dict[Group, dict[str, Any]] = {}
         for about, loads in self.changes(sets.WIDTH, sets.FIT):
             values = loads[: len(self.base)]
             if np.isfinite(values + self.base[: len(values)]).any():
-                by_line.setdefault(Line(about["label"], tuple(about["tolerances"])), {})[about["step"]] = about, values
+                by_line.setdefault(Group(about["label"], tuple(about["tolerances"])), {})[about["step"]] = about, values
         rows, ranks = [], dict[str, tuple[int, float]]()
         for line, steps in by_line.items():
             head = {"line": line.label, "names": line.names, "size": widths.size(self._study, line)}
@@ -239,7 +240,7 @@ def _with_costs(study: Study, rows: list[dict[str, Any]], table: Path) -> list[d
         if not entry.keep
     }
     for row in rows:
-        factors = widths.factors(study, Line(row["line"], row["names"]), row["step"])
+        factors = widths.factors(study, Group(row["line"], row["names"]), row["step"])
         is_known = all(name in prices and factor > 0.0 for name, factor in factors.items())
         cost = sum(prices[name].at(factor) for name, factor in factors.items()) if is_known else np.nan
         row |= {"cost": cost, "extra_cost": cost - (sum(prices[name].at(1.0) for name in factors) if is_known else 0.0)}

@@ -28,7 +28,8 @@ from tolstat.store.hdf5 import store_error
 from tolstat.store.view import View
 from tolstat.study import Study, widths
 from tolstat.study.rewriting import with_keys
-from tolstat.study.widths import STEPS, Line
+from tolstat.study.tolerances.correlation import Group
+from tolstat.study.widths import STEPS
 
 FIRST, LEAST, MOST = 1024, 128, 16_384
 """Number of joints of each change at the first look, the smallest if time is short, and by default the largest."""
@@ -132,7 +133,7 @@ class _Looks:
     """Looks at the order of the lines, each with more joints of the changes than the one before."""
 
     def __init__(
-        self, simulation: Simulation, view: View, lines: Sequence[Line], load: str, budget: float, most: int
+        self, simulation: Simulation, view: View, lines: Sequence[Group], load: str, budget: float, most: int
     ) -> None:
         self._simulation, self._budget, self._end, self._most = simulation, budget, time.monotonic() + budget, most
         self._view, self._lines, self._load, self._own = view, lines, load, own_joints(view)

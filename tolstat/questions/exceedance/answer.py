@@ -18,7 +18,7 @@ from tolstat.questions import shares
 from tolstat.questions.exceedance import rows as of
 from tolstat.questions.exceedance.curves import forest_panel, leading_panel, reader
 from tolstat.questions.exceedance.rows import verdict
-from tolstat.store import known_parts
+from tolstat.store import error_budget
 from tolstat.store.recorded import joint_of
 from tolstat.store.view import View
 
@@ -257,7 +257,7 @@ def _how(view: View, accepted: float) -> Iterator[str]:
         "for each limit by itself. Grey: the total interval. Failed and unsettled joints are counted below the limit "
         "at its lower end and above it at its upper end; it covers the numerical error, too, where it is known."
     )
-    if known_parts.of(view) is not None:
+    if error_budget.known_parts(view) is not None:
         yield "Grey covers what the measured parts leave open of the process, too."
     if len(view.points) > 1:
         yield "A limit that names no operating point is about the largest load over all of them."

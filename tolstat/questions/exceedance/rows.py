@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.analysis import binomial
 from tolstat.analysis.estimates import CURVE
 from tolstat.analysis.sample import CONFIDENCE, Sample, total_interval
 from tolstat.common.loads import ANY_LIMIT, SHOWN_LOADS, load_of, unit_text
 from tolstat.display import text
 from tolstat.display.table import Row, Rows
-from tolstat.store import error_budget, known_parts
+from tolstat.questions.shares import unresolved_matter
+from tolstat.store import error_budget
 from tolstat.store.view import View
 
 SHARES = (0.5, 0.9, 0.95, 0.99)
@@ -78,7 +78,7 @@ def _above_limit(view: View, load: Sample) -> dict[str, Any]:
     row |= {"confidence": CONFIDENCE, "numerical_error": error_budget.relative(view, load.name)}
     row |= dict(zip(ERROR_BUDGET, budget, strict=True))
     row["unsearched_upper"] = max(end.upper_if_missed(level, CONFIDENCE) for end in (loads[0], loads[-1]))
-    if (parts := known_parts.of(view)) is not None:
+    if (parts := error_budget.known_parts(view)) is not None:
         known = parts.share(load.name, CONFIDENCE)
         row |= {"both_lower": known.lower, "both_upper": known.upper}
         row |= {name: getattr(known, name) for name in KNOWN}
@@ -239,8 +239,3 @@ def share_of(row: Row) -> str:
         return text.percent(row["estimate"])
     low, high = ends(row)
     return text.span(low, high) if not np.isnan(low) else text.span(row["bound_lower"], row["bound_upper"])
-
-
-def unresolved_matter(row: Row) -> bool:
-    """Whether joints without a valid load make the share above a limit as uncertain as sampling does."""
-    return binomial.unresolved_matter(row["count"], row["n"], row["n_failed"] + row["n_unsettled"])

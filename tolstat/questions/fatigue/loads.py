@@ -1,4 +1,4 @@
-"""Fatigue by loads: rainflow cycles of the joints, damage-equivalent loads, damage sums and load spectra."""
+"""Fatigue by loads: rainflow cycles of the joints, also for pyLife, damage-equivalent loads, damage sums, spectra."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ from tolstat.analysis.cycles import Cycles
 from tolstat.analysis.sample import Sample
 from tolstat.common import load_kinds, loads, strict
 from tolstat.common.channels import BUSHING_LOADS, CHANNELS, LoadHistory, channels_of, histories_of
-from tolstat.common.errors import Fault, InputError, StoreError
+from tolstat.common.errors import Fault, StoreError, raise_all
+from tolstat.common.late import pandas as pd
 from tolstat.common.tables import SIMULATED, Status
 from tolstat.display.table import Row, Rows
 from tolstat.questions.fatigue import duty
@@ -41,13 +42,11 @@ def channels(patterns: Sequence[str]) -> tuple[str, ...]:
         With every pattern that selects nothing.
     """
     selected = {pattern: select(pattern, CHANNELS) for pattern in patterns}
-    faults = [
+    raise_all(
         Fault(f"channel {pattern!r}", "selects nothing", strict.did_you_mean(pattern, list(CHANNELS)[:8]))
         for pattern, names in selected.items()
         if not names
-    ]
-    if faults:
-        raise InputError(faults)
+    )
     return tuple(name for name in CHANNELS if any(name in names for names in selected.values()))
 
 
@@ -310,3 +309,83 @@ def leading(rows: Rows) -> list[str]:
         here = [row for row in here if load_kinds.PLACES[CHANNELS[row["channel"]].place].group == group]
         chosen += [max(here, key=lambda row: float(row["estimate"]))["channel"]] if here else []
     return chosen
+
+
+INTERVALS = ("range", "mean")
+
+
+def pylife_series(
+    view: View,
+    channels: Sequence[str] | None = None,
+    bins: int = 100,
+    revolutions: float = 1.0,
+    nominal: bool = False,
+) -> pd.Series[float]:
+    """Rainflow cycles of every joint of a file as a pyLife load collective.
+
+    Parameters
+    ----------
+    view : View
+        A campaign that keeps cycles or load histories.
+    channels : sequence of str, optional
+        Channels to keep, keys of `channels.CHANNELS`; by default those of bushings.
+    bins : int
+        Number of classes of the range (from 0 to the largest) and of the mean (between its extremes); one set of
+        classes for all forces, one for all torques.
+    revolutions : float
+        Number of revolutions that the numbers of cycles refer to.
+    nominal : bool
+        Include the nominal joint, row 0 of the campaign.
+
+    Returns
+    -------
+    pandas.Series
+        Name ``cycles``; index levels ``range`` and ``mean`` (intervals closed on the left, N or N m), ``joint`` (row
+        of the campaign) and ``channel``. Classes without cycles, and joints without results, are left out.
+
+    Raises
+    ------
+    StoreError
+        When the file holds no histories.
+    ValueError
+        When `bins` is less than 1.
+    """
+    table = pylife_table(view, channels, bins, revolutions, nominal)
+    levels = [
+        pd.IntervalIndex.from_arrays(table[f"{name}_left"], table[f"{name}_right"], closed="left") for name in INTERVALS
+    ]
+    names = [*INTERVALS, "joint", "channel"]
+    index = pd.MultiIndex.from_arrays([*levels, table["joint"], table["channel"]], names=names)
+    return pd.Series(table["cycles"].to_numpy(float), index, name="cycles")
+
+
+def pylife_table(
+    view: View,
+    channels: Sequence[str] | None = None,
+    bins: int = 100,
+    revolutions: float = 1.0,
+    nominal: bool = False,
+) -> pd.DataFrame:
+    """Flat table of `pylife_series`: ``joint``, ``channel``, ``unit``, ends of range and mean, ``cycles``."""
+    if bins < 1:
+        raise ValueError(f"{bins} classes: at least 1 expected")
+    first = 0 if nominal else view.store.first_sample
+    cycles = cycles_of(view.store, np.arange(first, view.store.n), channels)
+    joint, channel, cycle = np.nonzero(cycles.ranges > 0)  # leaves out NaN
+    units = np.array([CHANNELS[name].unit for name in cycles.channels], dtype=object)[channel]
+    columns: dict[str, Any] = {"joint": np.array(view.store.rows[first:])[joint], "channel": channel, "unit": units}
+    for name, values in (("range", cycles.ranges), ("mean", cycles.means)):
+        ends = np.zeros((2, len(joint)))
+        for kind in (units != "N", units == "N"):
+            sizes = values[joint, channel, cycle][kind].astype(float)
+            low, high = 0.0 if name == "range" else sizes.min(initial=np.inf), sizes.max(initial=-np.inf)
+            if low <= high:  # the last edge is above the largest value
+                edges = np.linspace(low, high + 1e-6 * max(high - low, abs(high), 1e-300), bins + 1)
+                here = np.searchsorted(edges, sizes, side="right") - 1
+                ends[:, kind] = edges[here], edges[here + 1]
+        columns |= dict(zip((f"{name}_left", f"{name}_right"), ends, strict=True))
+    keys = ["joint", "channel", *(f"{name}_{side}" for name in INTERVALS for side in ("left", "right"))]
+    frame = pd.DataFrame(columns | {"cycles": cycles.repeats[joint, channel, cycle] * revolutions})
+    classes = frame.groupby([*keys[:2], "unit", *keys[2:]])[["cycles"]].sum().reset_index()
+    classes["channel"] = np.array(cycles.channels, dtype=object)[classes["channel"]]
+    return classes

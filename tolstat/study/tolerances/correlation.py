@@ -9,7 +9,7 @@ only correlates errors of the joint that share it, as `correlated` does.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
 from typing import Annotated, NamedTuple
@@ -26,7 +26,6 @@ from tolstat.common.units import Number
 from tolstat.study.axes import is_zone
 from tolstat.study.selection import Reading, select
 from tolstat.study.tolerances.distributions import Distribution, Normal
-from tolstat.study.tolerances.entry import Toleranced
 
 Array = NDArray[np.float64]
 NODES = 64
@@ -98,7 +97,7 @@ def read(file: Reading) -> Copula:
         names: dict[str, None] = {}
         for pattern in entry.between:
             with gather(file.faults):
-                names.update(dict.fromkeys(_named(pattern, file.drawn, f"{file.place}: {where}")))
+                names.update(dict.fromkeys(_named(pattern, file.scatter.drawn, f"{file.place}: {where}")))
         members = list(names)
         if len(members) < 2 and len(file.faults) == before:
             file.fault(where, f"names only one error, {members[0]}", "name at least two")
@@ -119,7 +118,7 @@ def read(file: Reading) -> Copula:
     return Copula()
 
 
-def _named(pattern: str, toleranced: dict[str, str], where: str) -> list[str]:
+def _named(pattern: str, toleranced: Sequence[str], where: str) -> list[str]:
     """Errors of one name or pattern in `between`."""
     names = select(pattern, toleranced)
     if any(is_zone(name) for name in names or [pattern]):
@@ -162,18 +161,6 @@ class Lot(NamedTuple):
     score: str
 
 
-def of_entries(entries: Iterable[Toleranced]) -> dict[str, Lot]:
-    """Lots of the errors, by name, in the order of the entries."""
-    lots: dict[str, Lot] = {}
-    for entry in entries:
-        names = [site.name for site, _ in entry.models]
-        for site, model in entry.models:
-            lot = getattr(model, "lot", None)
-            if lot is not None:
-                lots[site.name] = Lot(lot.share, names[0] if lot.shared else site.name)
-    return lots
-
-
 def correlated(copula: Copula, lots: Mapping[str, Lot], place: str) -> Copula:
     """Correlation of the errors of a joint, with that of errors that share the score of their lot.
 
@@ -207,15 +194,15 @@ def correlated(copula: Copula, lots: Mapping[str, Lot], place: str) -> Copula:
 
 
 class Group(NamedTuple):
-    """Errors that are taken together from another joint; groups are independent of each other.
+    """Errors that are taken from another joint, or changed, together: a line of the drawing, or errors that correlate.
 
     Attributes
     ----------
     label : str
-        Name of the error, or pattern of the entry of ``[tolerances]``; a group without a pattern is labelled by its
-        first error and the number of others.
+        Pattern of the entry of ``[tolerances]``, name of a group, feature or error; correlated errors without a pattern
+        are labelled by the first and the number of others.
     names : tuple of str
-        The errors.
+        The errors, or zones.
     """
 
     label: str

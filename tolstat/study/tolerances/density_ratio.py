@@ -1,15 +1,19 @@
-"""Mean square and largest value of the ratio of two densities: how many joints remain effective after reweighting."""
+"""Ratio of two densities: of some joints, and its mean square and largest value, which say how many joints remain.
+
+Joints of a sample count as so many after reweighting to the new density.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from typing import NamedTuple
 
 import numpy as np
 
 from tolstat.common.late import integrate
-from tolstat.study.tolerances.distributions import Distribution, Normal
+from tolstat.study.tolerances.correlation import Copula
+from tolstat.study.tolerances.distributions import Array, Distribution, Normal, score
 from tolstat.study.tolerances.zone_laws import Rayleigh
 
 MIDPOINTS = 1000
@@ -18,6 +22,45 @@ NODES, END = 1001, 1e-10
 """Number of nodes in each half of a distribution, and probability of the outermost node."""
 GROWTH = 0.01
 """Growth of the logarithm of a ratio over the outermost decade of probability from which on it has no bound."""
+
+
+def log_ratios(
+    new: Mapping[str, Distribution],
+    old: Mapping[str, Distribution],
+    copula: Copula,
+    values: Callable[[str], Array],
+    n: int,
+) -> Array:
+    """Logarithm of new over old density of the errors of some joints.
+
+    Parameters
+    ----------
+    new : dict of str to Distribution
+        What quantities that change are drawn from.
+    old : dict of str to Distribution
+        What all quantities were drawn from.
+    copula : Copula
+        Their correlation, which stays.
+    values : callable
+        Name of a quantity -> its values, (n,).
+    n : int
+        Number of joints.
+
+    Returns
+    -------
+    ndarray, (n,)
+        Zero where nothing changes.
+    """
+    logs = np.zeros(n)
+    for name, law in new.items():
+        logs += law.logpdf(values(name)) - old[name].logpdf(values(name))
+    if set(copula.names) & set(new):
+        # density of the Gaussian copula: correlated over independent normal density
+        form = np.linalg.inv(copula.matrix) - np.eye(len(copula.names))
+        for sign, laws in ((-0.5, {**old, **new}), (0.5, old)):
+            z = np.column_stack([score(laws[name], values(name)) for name in copula.names])
+            logs += sign * np.einsum("ni,ij,nj->n", z, form, z)
+    return logs
 
 
 class Exact(NamedTuple):
@@ -62,9 +105,8 @@ def of_error(new: Distribution, old: Distribution) -> Exact:
     if isinstance(new, Normal) and isinstance(old, Normal):
         square, largest = _of_normals(new.sigma / old.sigma, (new.mean - old.mean) / old.sigma)
     elif isinstance(new, Rayleigh) and isinstance(old, Rayleigh) and new.upper is None and old.upper is None:
-        square, largest = (
-            2.0 * of_coordinate for of_coordinate in _of_normals(new.sigma / old.sigma)
-        )  # both coordinates are normal
+        # both coordinates are normal
+        square, largest = (2.0 * of_coordinate for of_coordinate in _of_normals(new.sigma / old.sigma))
     else:
         square, largest = _integrated(new, old)
         if not unbounded(new):

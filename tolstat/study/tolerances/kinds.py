@@ -20,7 +20,7 @@ from tolstat.common.tables import FACTORS
 from tolstat.study.axes import ORIENTATIONS, REJECT, Axis, Bonus, columns_of
 from tolstat.study.selection import TOLERANCED, Entry, Reading
 from tolstat.study.tolerances import distributions as tolerance
-from tolstat.study.tolerances.correlation import Lot, of_entries
+from tolstat.study.tolerances.correlation import Lot
 from tolstat.study.tolerances.distributions import Distribution
 from tolstat.study.tolerances.entry import (
     Banded,
@@ -293,10 +293,13 @@ class Tolerances(NamedTuple):
         In the order of the file.
     axes : dict of str to Axis
         Features and pairs that have zones.
+    drawn : sequence of str
+        Quantities that are drawn, those of entries with faults included.
     """
 
     entries: tuple[Toleranced, ...] = ()
     axes: Mapping[str, Axis] = {}
+    drawn: Sequence[str] = ()
 
     @property
     def distributions(self) -> dict[str, Distribution]:
@@ -306,8 +309,14 @@ class Tolerances(NamedTuple):
 
     @property
     def lots(self) -> dict[str, Lot]:
-        """Lot of each error that has one."""
-        return of_entries(self.entries)
+        """Lot of each error that has one, in the order of the entries."""
+        lots: dict[str, Lot] = {}
+        for entry in self.entries:
+            first = entry.models[0][0].name
+            for site, model in entry.models:
+                if (lot := getattr(model, "lot", None)) is not None:
+                    lots[site.name] = Lot(lot.share, first if lot.shared else site.name)
+        return lots
 
     @property
     def accepted(self) -> set[str]:
@@ -364,7 +373,9 @@ def read(table: Sequence[tuple[Entry, list[str]]], file: Reading) -> Tolerances:
     if file.joint is not None:
         with gather(file.faults):
             axes = axes_of(entries, reach, file.place)
-    return Tolerances(entries, axes)
+    # those with faults stand for what they would draw, so that others do not seem to lack them
+    drawn = [quantity for i, (_, names) in enumerate(table) for quantity in (read[i].names if i in read else names)]
+    return Tolerances(entries, axes, list(dict.fromkeys(drawn)))
 
 
 def _is_position(names: list[str]) -> bool:

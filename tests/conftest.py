@@ -125,9 +125,9 @@ def random_errors() -> Callable[[int], dict[str, float]]:
 
 @pytest.fixture(scope="session", autouse=True)
 def _small_campaigns_in_this_process() -> Iterator[None]:
-    """Simulate campaigns of one worker here: starting it takes longer than the joints of most tests.
+    """One core, and campaigns of one worker simulate here: starting workers takes longer than few joints do.
 
-    Tests of what joints do to their process ask for the fixture `in_workers`.
+    Tests of several workers say how many; those of what joints do to their process ask for the fixture `in_workers`.
     """
 
     def quick(
@@ -142,6 +142,7 @@ def _small_campaigns_in_this_process() -> Iterator[None]:
             yield block, work.function(block)
 
     with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(os, "sched_getaffinity", lambda _: {0})
         patch.setattr(pool, "map_blocks", quick)
         yield
 
@@ -150,12 +151,6 @@ def _small_campaigns_in_this_process() -> Iterator[None]:
 def in_workers(monkeypatch: pytest.MonkeyPatch) -> None:
     """Simulate all campaigns in worker processes, as users do."""
     monkeypatch.setattr(pool, "map_blocks", IN_WORKERS)
-
-
-@pytest.fixture
-def one_core(monkeypatch: pytest.MonkeyPatch) -> None:
-    """One core, so that commands simulate in this process: starting workers takes longer than few joints do."""
-    monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0})
 
 
 @pytest.fixture(scope="session")

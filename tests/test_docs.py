@@ -190,7 +190,6 @@ def folder(example_files: Path, tmp_path_factory: pytest.TempPathFactory) -> Pat
     return made
 
 
-@pytest.mark.usefixtures("one_core")
 @pytest.mark.slow
 @pytest.mark.parametrize("path", [DOCS / "python.md", *sorted((DOCS / "questions").glob("*.md"))], ids=name)
 def test_examples_run(path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

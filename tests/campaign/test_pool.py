@@ -19,81 +19,27 @@ from typing import Any
 import pytest
 
 from tests.conftest import IN_WORKERS as map_blocks
+from tests.support.blocks import (
+    bad_luck,
+    die,
+    die_in_the_end,
+    halves,
+    large,
+    mark,
+    marked,
+    raise_often,
+    slow_square,
+    square,
+    squares,
+    surroundings,
+    very_slow_first,
+)
 from tests.support.environment import environment
+from tolstat.campaign import pool
 from tolstat.campaign.pool import Lost, Work, WorkerDied, kept_workers
 from tolstat.common.cores import THREAD_VARIABLES, available_cores
 
 SQUARES = {i: i * i for i in range(20)}
-
-
-def square(x: int) -> int:
-    return x * x
-
-
-def slow_square(x: int) -> int:
-    time.sleep(0.05)
-    return x * x
-
-
-def very_slow_first(x: int) -> int:
-    time.sleep(60 if x == 0 else 0)
-    return x
-
-
-def squares(xs: list[int]) -> list[int]:
-    """Squares; 11 kills the process, 13 is a bug."""
-    for x in xs:
-        if x == 11:
-            os.kill(os.getpid(), signal.SIGKILL)
-        if x == 13:
-            raise ZeroDivisionError("a bug")
-    return [x * x for x in xs]
-
-
-def halves(xs: list[int]) -> list[list[int]]:
-    return [part for part in (xs[: (len(xs) + 1) // 2], xs[(len(xs) + 1) // 2 :]) if part]
-
-
-def die(x: int) -> int:
-    os.kill(os.getpid(), signal.SIGKILL)
-    return x
-
-
-def bad_luck(job: tuple[str, int]) -> int:
-    """Square; the first process that comes to a multiple of three dies of it, the next does not."""
-    folder, x = job
-    if x % 3 == 0 and not Path(folder, str(x)).exists():
-        Path(folder, str(x)).touch()
-        die(x)
-    return x * x
-
-
-def die_in_the_end(job: tuple[str, int]) -> int:
-    """Every process dies after five blocks, whatever it works at, as when another program takes all memory."""
-    folder, x = job
-    if len(list(Path(folder).iterdir())) >= 5:
-        die(x)
-    Path(folder, str(x)).touch()
-    return x
-
-
-def surroundings(x: int) -> tuple[int, dict[str, str | None], set[Any]]:
-    handlers = {signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
-    return os.getpid(), {name: os.environ.get(name) for name in THREAD_VARIABLES}, handlers
-
-
-def mark() -> None:
-    """Leave a mark in this process."""
-    os.environ["MARKED"] = "yes"
-
-
-def marked(x: int) -> bool:
-    return "MARKED" in os.environ
-
-
-def large(x: int) -> bytes:
-    """More than a pipe holds: who is killed meanwhile is killed while it sends."""
-    return bytes([x % 256]) * 10_000_000
 
 
 def test_every_block_once() -> None:
@@ -174,12 +120,13 @@ def test_the_only_joint_is_given_up_too() -> None:
     assert list(map_blocks(Work(die), [1], 1)) == [(1, Lost("killed by SIGKILL"))]
 
 
-def test_workers_that_begin_to_die_end_the_map(tmp_path: Path) -> None:
+def test_workers_that_begin_to_die_end_the_map(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pool, "MAX_FAILURES", 4)
     seen: dict[Any, Any] = {}
-    with pytest.raises(WorkerDied, match="10 times in a row a worker process failed, the last time: killed by SIGKILL"):
+    with pytest.raises(WorkerDied, match="4 times in a row a worker process failed, the last time: killed by SIGKILL"):
         seen.update(map_blocks(Work(die_in_the_end), ((str(tmp_path), x) for x in range(100)), 1))
     assert [found for found in seen.values() if not isinstance(found, Lost)] == list(range(5))
-    assert len(seen) < 16
+    assert len(seen) < 10
 
 
 def test_an_exception_in_every_block_comes_through() -> None:
@@ -243,7 +190,11 @@ def test_workers_that_are_killed_while_they_send_change_nothing() -> None:
 @pytest.mark.slow
 def test_a_script_without_a_main_guard_is_told(tmp_path: Path) -> None:
     script = tmp_path / "script.py"
-    script.write_text("from tests.campaign.test_pool import *\nprint(dict(map_blocks(Work(square), range(4), 2)))\n")
+    script.write_text(
+        "from tests.support.blocks import square\n"
+        "from tolstat.campaign.pool import Work, map_blocks\n"
+        "print(dict(map_blocks(Work(square), range(4), 2)))\n"
+    )
     python = [sys.executable, str(script)]
     ended = subprocess.run(python, env=environment(), capture_output=True, text=True, check=False)
     assert ended.returncode == 1
@@ -257,8 +208,9 @@ def test_workers_end_with_their_parent(tmp_path: Path, rest: str) -> None:
     """Also where no thread of Python runs, as while compiled code does: here a lock is never released."""
     script = tmp_path / "script.py"
     script.write_text(
-        "import ctypes\n"
-        "from tests.campaign.test_pool import *\n"
+        "import ctypes, os, time\n"
+        "from pathlib import Path\n"
+        "from tolstat.campaign.pool import Work, map_blocks\n"
         "def work(x):\n"
         f"    Path({str(tmp_path)!r}, str(os.getpid())).touch()\n"
         f"    {rest}\n"
@@ -289,15 +241,11 @@ def running(pid: int) -> bool:
     return not status.exists() or status.read_text().rsplit(")", 1)[1].split()[0] != "Z"
 
 
-def test_available_cores_is_what_this_process_may_use() -> None:
-    assert 1 <= available_cores() <= (os.cpu_count() or 1)
-
-
-def raise_often(xs: list[int]) -> list[int]:
-    """Squares; one in seventeen is a bug."""
-    if any(x % 17 == 5 for x in xs):
-        raise ZeroDivisionError("a bug")
-    return [x * x for x in xs]
+def test_available_cores_is_what_this_process_may_use(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, "sched_getaffinity", lambda process: {0, 1, 5} if process == 0 else {0})
+    assert available_cores() == 3
+    monkeypatch.delattr(os, "sched_getaffinity")
+    assert available_cores() == (os.cpu_count() or 1)
 
 
 def test_many_joints_that_fail_are_given_up_alone() -> None:

@@ -18,6 +18,7 @@ import pytest
 
 from tests.campaign.test_campaign import datasets, start
 from tests.support import fakes
+from tolstat.campaign import pool
 from tolstat.campaign import run as campaign
 from tolstat.campaign.block import without_simulation
 from tolstat.campaign.blocks import MAX_BLOCK, Pace
@@ -52,7 +53,7 @@ def assert_same_but(path: Path, expected: dict[str, bytes], rows: list[int]) -> 
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("in_workers")
-@pytest.mark.parametrize(("workers", "block"), [(2, 4), (1, 40)])
+@pytest.mark.parametrize(("workers", "block"), [(2, 4), (1, 10)])
 def test_joints_that_kill_or_raise_are_marked_and_cost_only_themselves(
     tmp_path: Path, expected: dict[str, bytes], workers: int, block: int
 ) -> None:
@@ -76,12 +77,13 @@ def test_joints_that_kill_or_raise_are_marked_and_cost_only_themselves(
 @pytest.mark.slow
 @pytest.mark.usefixtures("in_workers")
 def test_a_machine_on_which_workers_die_ends_the_run_and_keeps_what_is_done(
-    tmp_path: Path, expected: dict[str, bytes]
+    tmp_path: Path, expected: dict[str, bytes], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(pool, "MAX_FAILURES", 3)
     path = tmp_path / "a.h5"
     dying = partial(simulate_until, folder=str(tmp_path / "done"))
     (tmp_path / "done").mkdir()
-    with pytest.raises(WorkerDied, match=r"(?s)10 times in a row .*holds the results of \d+ of 40 joints; to resume"):
+    with pytest.raises(WorkerDied, match=r"(?s)3 times in a row .*holds the results of \d+ of 40 joints; to resume"):
         fakes.run(fakes.Study(), path, 1, 4, simulate_rows=dying)
     with ResultFile.open(path) as store:
         assert 16 <= store.counts().done < 30

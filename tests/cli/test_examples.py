@@ -60,7 +60,6 @@ def test_help_has_plain_words_for_arguments(command: str) -> None:
     assert not re.search(r"<\w|\[Path|list\[", arguments)
 
 
-@pytest.mark.usefixtures("one_core")
 @pytest.mark.slow
 @pytest.mark.parametrize("command", COMMANDS)
 def test_the_example_runs(command: str, made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

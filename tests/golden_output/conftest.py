@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -41,10 +40,8 @@ def check(
     made: Callable[[Campaign], tuple[Path, str]],
     tmp_path: Path,
     request: pytest.FixtureRequest,
-    monkeypatch: pytest.MonkeyPatch,
 ) -> Check:
     """Run the commands of a campaign that have one golden file: gives how their output differs, or writes the file."""
-    monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0})
     updating = bool(request.config.getoption("--update-golden"))
 
     def run(campaign: Campaign, name: str) -> str:

@@ -187,7 +187,6 @@ def test_a_variation_has_the_results_of_a_study_with_that_key(tmp_path, varied):
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("one_core")
 def test_the_solver_gives_a_variation_and_a_study_with_that_key_the_same_bytes(tmp_path):
     text = TEXT.replace("n = 600", "n = 24").replace("[sampling]", f"{synthetic.SOLVER}[sampling]")
     own = text.replace("[operation]", 'shaft.axial = "free"\n[operation]')

@@ -33,7 +33,7 @@ def simulate(params, options, histories="none", n_harmonics=16):
 
 
 @pytest.fixture(autouse=True)
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, one_core: None) -> None:
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Work in an empty folder on one core, with a solver that invents its results."""
     monkeypatch.chdir(tmp_path)
     fakes.replace_functions(monkeypatch, **fakes.SOLVER | {"simulate_rows": simulate})

@@ -118,7 +118,7 @@ class Found(NamedTuple):
 def search(
     path: Path, folder: Path, numbers: range, commands: Sequence[Sequence[str]] = READING
 ) -> tuple[list[Found], dict[str, int]]:
-    """Change one bit of a file, for each number another one, and pass it to commands.
+    """Change one bit of a file, for each number one in another part of the file, and pass it to commands.
 
     Returns
     -------
@@ -133,9 +133,9 @@ def search(
     usual = [read(words, copied) for words in commands]
     assert not [ended for ended in usual if ended.code], usual
     found, kinds = [], {"same": 0, "refused": 0, "told": 0, "fault": 0}
-    for number in numbers:
+    for part, number in enumerate(numbers):
         rng = np.random.default_rng(number)
-        at, bit = int(rng.integers(len(content))), int(rng.integers(8))
+        at, bit = int((part + rng.random()) / len(numbers) * len(content)), int(rng.integers(8))
         for words, before in zip(commands, usual, strict=True):
             copied.write_bytes(content)
             flip(copied, at, bit)

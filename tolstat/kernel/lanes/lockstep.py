@@ -221,14 +221,8 @@ def lockstep(options, patience, batch, queue, tally):
     batch, queue, tally = without_refcount(batch), without_refcount(queue), without_refcount(tally)
     par, work, tangent = as_lanes(batch.par), as_lanes(batch.work), as_lanes(batch.tangent)
     motion, control = as_lanes(batch.motion), as_lanes(batch.control)
-    lanes, motions, controls, rows, results = (
-        (par, work, motion),
-        batch.motion,
-        batch.control,
-        queue.rows,
-        queue.results,
-    )
-    pasts = batch.pasts
+    lanes, motions, controls = (par, work, motion), batch.motion, batch.control
+    rows, results, pasts = queue.rows, queue.results, batch.pasts
     queued, waited, controlled = 0, 0, follows_error(options)
     for lane in range(controls.joint.size):
         put_joint(lane, queue.words[0], batch)

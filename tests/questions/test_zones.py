@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -11,10 +13,10 @@ from tolstat import sampling, study
 from tolstat.common.errors import InputError
 from tolstat.common.tables import Simulation
 from tolstat.questions.causes.errors import causes
-from tolstat.questions.reweight import _block_log_ratios
 from tolstat.store import View, Writer
 from tolstat.study import scaling
 from tolstat.study.scaling import changed
+from tolstat.study.tolerances.density_ratio import log_ratios
 
 ENTRIES = (
     HEAD
@@ -47,7 +49,8 @@ def test_reweighted_joints_have_the_moments_of_narrower_zones(tmp_path):
     assert sum(new[name] != plan.tolerances[name] for name in new) == 11
     assert sum(name.startswith("hole") and new[name] == plan.tolerances[name] for name in new) == 2
     errors = sampling.draw(plan)[1:]
-    ratios = np.exp(_block_log_ratios(plan, new, list(new), errors))
+    values = partial(sampling.values, plan, errors)
+    ratios = np.exp(log_ratios(new, plan.tolerances, plan.copula, values, len(errors)))
     assert ratios.mean() == pytest.approx(1.0, abs=0.08)
     text = ENTRIES
     for old, narrow in (("0.05 mm", "0.04 mm"), ("0.02 mm", "0.018 mm"), ('"0.04 mm"', '"0.036 mm"')):

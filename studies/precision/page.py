@@ -157,8 +157,8 @@ Exudyn takes part where it is installed: its generalised α with equal steps, re
 iteration fails; the loads are those at its own steps.
 They call the same compiled accelerations, without Numba's check of the argument types, and use a Jacobian from finite
 differences or the compiled one ("our Jacobian"). Times are CPU times of processes with one thread, without compilation:
-of tolstat the median of repeated calls, of the others one call. "Uniform steps alone" is tolstat without the closer
-look at peaks and without refinement: they help the joints whose contacts ring.
+of tolstat the median of repeated calls, of the others one call. "Uniform" is tolstat with uniform steps alone, without
+the closer look at peaks and without refinement: they help the joints whose contacts ring.
 
 The truth is a reference solution by scipy's Radau, which starts in the settled state and integrates until the largest
 loads repeat within 1e-5 (`tolstat.solver.reference`). With the next looser tolerance its largest loads differ by

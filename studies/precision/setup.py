@@ -131,7 +131,7 @@ def jobs(setup: Setup, base: Study, say: Callable[[str], None]) -> Iterator[Job]
         yield from (OwnJob(name, levels, row, i, setup.repeats, 1) for i, row in rows)
     name, levels = next(iter(own.items()))
     alone = tuple(level._replace(peak_substeps=1, max_refinements=0) for level in levels)
-    for block, settings in ((name, levels), (f"{name}, uniform steps alone", alone)):
+    for block, settings in ((name, levels), (f"{name} uniform", alone)):
         yield OwnJob(f"{block}, {len(params)} joints at once", settings, params, 0, setup.repeats, count)
 
 

@@ -93,7 +93,7 @@ def test_jobs_cover_every_contender_joint_and_setting(there, monkeypatch):
     for name in {"Exudyn", "Exudyn, our Jacobian"} & set(by_name):
         assert by_name[name].settings == asked.tolstat.steps_per_rev
     assert by_name["LSODA"].settings == asked.others.rtol
-    together = ["BDF2, 64 joints at once", "BDF2, uniform steps alone, 64 joints at once"]
+    together = ["BDF2, 64 joints at once", "BDF2 uniform, 64 joints at once"]
     assert list(by_name)[-6:] == ["BDF2", "TR-BDF2", "quasistatic", "ideal joint", *together]
     assert len(by_name["quasistatic"].options) == len(asked.tolstat.steps_per_rev)
     assert {o.fidelity for o in by_name["quasistatic"].options} == {1}

@@ -35,8 +35,8 @@ LONGEST = 4 * math.pi
 """Longest part that the trapezoidal rule takes, in units of sqrt(m/k) of a pin on its bushing: two periods. In longer
 ones ringing dies away, but the trapezoidal rule would go on with it."""
 LAST_ITERATION_FACTOR = 1000.0
-"""Residual, in units of `newton_tol`, up to which one more iteration with the same tangent is the last: parts are so
-short that it takes off all but a hundredth."""
+"""Residual, in units of `newton_tol`, up to which one more iteration with the same tangent is the last, in parts that
+the trapezoidal rule takes: they are so short that it takes off all but a hundredth."""
 
 
 @njit
@@ -104,5 +104,7 @@ def recall(s, lane, par, options, samples, motion):
         motion.q1[i, lane], motion.v1[i, lane] = before.q[i], before.v[i]
         motion.a0[i, lane] = (3 * here.v[i] - 4 * before.v[i] + first.v[i]) / (2 * h)
     resolved = h / options.peak_substeps <= LONGEST * math.sqrt(par.pin_mass / stiffness(PIN, par)[0])
-    motion.memory[H_OLD, lane], motion.memory[TRAPEZOIDAL, lane] = h, 1.0 if resolved else 0.0
-    motion.memory[LAST_ITERATION_BELOW, lane] = LAST_ITERATION_FACTOR * options.newton_tol
+    motion.memory[H_OLD, lane] = h
+    if resolved:
+        motion.memory[TRAPEZOIDAL, lane] = 1.0
+        motion.memory[LAST_ITERATION_BELOW, lane] = LAST_ITERATION_FACTOR * options.newton_tol

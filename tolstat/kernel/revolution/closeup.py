@@ -2,9 +2,9 @@
 
 When a contact opens or closes, the bodies ring at kilohertz. The steps of the output grid do not resolve the ringing,
 and need not: it decays within a few degrees. On top of a load's peak, however, it decides the largest load. There the
-steps from the switch on are integrated again in smaller parts, from the recorded motion, as long as it rings near the
-peak; in place of BDF2, which damps the ringing, by the trapezoidal rule, if the parts resolve it. The parts count among
-the largest and smallest loads; the recorded samples stay as they are.
+steps from the switch on are integrated again in smaller parts, from the recorded motion, as long as a load rings near
+its largest value. The trapezoidal rule takes them in place of BDF2, which damps the ringing, if the parts resolve it.
+They count among the largest and smallest loads; the recorded samples stay as they are.
 """
 
 import math

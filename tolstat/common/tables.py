@@ -159,7 +159,7 @@ class Options(NamedTuple):
     steps_per_rev: int = 180
     max_revs: int = 20
     settle_tol: float = 1e-4
-    newton_tol: float = 1e-6
+    newton_tol: float = 3e-6
     newton_max_iter: int = 12
     max_halvings: int = 16
     rtol: float = 0.0

@@ -7,6 +7,7 @@ import numpy as np
 from tolstat.common.tables import PARAM, Options
 from tolstat.kernel.integrators.memory import MEMORY
 from tolstat.kernel.lanes.lane_memory import aligned_zeros, lane_dtype
+from tolstat.kernel.mechanics.loads import N_INSTANT
 from tolstat.kernel.mechanics.scale import set_weight, typical_force
 from tolstat.kernel.mechanics.topology import N_DOF
 from tolstat.kernel.mechanics.work import WORK
@@ -74,7 +75,7 @@ class Batch(NamedTuple):
     control: np.record
     peaks: np.record
     samples: np.recarray  # (width, steps_per_rev) SAMPLE
-    fine: np.recarray  # (width, 3) SAMPLE: last parts of a closer look, or of a cell
+    fine: np.ndarray  # (width, 3, N_INSTANT) loads of the last parts of a closer look, or of a cell, part j at j % 3
     notes: np.recarray  # (width,) NOTES
     pasts: Pasts
     scratch: np.record  # WORK: scratch of an evaluation of one joint
@@ -99,7 +100,7 @@ def make_batch(options: Options, width: int = WIDTH) -> Batch:
     layouts = [lane_dtype(dtype, width) for dtype in (WORK, WORK, MOTION, control, PEAKS)]
     work, tangent, motion, state, peaks = (aligned_zeros(1, layout).view(np.recarray)[0] for layout in layouts)
     words = pars.view(np.float64).view(np.ndarray)
-    samples, fine = make_samples(width, options.steps_per_rev), make_samples(width, 3)
+    samples, fine = make_samples(width, options.steps_per_rev), np.zeros((width, 3, N_INSTANT))
     notes, pasts = make_notes(width), make_pasts(width, options)
     scratch = np.zeros(1, WORK).view(np.recarray)[0]
     return Batch(
@@ -119,9 +120,9 @@ def _word_index(width):
 
 
 @njit
-def samples_of(lane, batch, queue):
-    """Samples of the lane's joint: those of the queue if the caller keeps them, else those of the batch."""
-    return queue.samples[batch.control.joint[lane]] if len(queue.samples) > 0 else batch.samples[lane]
+def samples_of(lane, joint, of_lanes, of_joints):
+    """Samples of the lane's joint: `of_joints`, those of the queue, if the caller keeps them, else `of_lanes`."""
+    return of_joints[joint] if len(of_joints) > 0 else of_lanes[lane]
 
 
 @njit

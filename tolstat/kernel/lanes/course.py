@@ -33,7 +33,14 @@ from tolstat.kernel.revolution.resolve import (
     follows_error,
     merge_extremes,
 )
-from tolstat.kernel.revolution.settle import ALL_LOADS, closure_error, grid_step, predict_increment, record
+from tolstat.kernel.revolution.settle import (
+    ALL_LOADS,
+    closure_error,
+    grid_step,
+    predict_increment,
+    record,
+    record_loads,
+)
 from tolstat.kernel.simd.jit import njit
 
 OUT_OF_REVOLUTIONS = -1
@@ -161,7 +168,7 @@ def step(lane, par, lanes, options, control, motion, samples, notes, out):
 def finish_closeup_part(lane, par, lanes, options, control, motion, fine, out):
     """Record a part of a closer look and set up the next one; return `OK` after the last part of the step."""
     j, part = control.looked[lane], control.grid[lane]
-    record(j, lane, lanes[0], lanes[1], lanes[2].v, fine)
+    record_loads(lane, lanes[0], lanes[1], lanes[2].v, fine[j % 3])
     count_in(j, fine, out)
     control.looked[lane] += 1
     control.part[lane] += 1
@@ -301,7 +308,7 @@ def part(lane, par, lanes, options, control, motion, samples, fine, past, out):
     if not control.error[lane] <= 1:
         status = reject_cell(lane, options, control, motion, past)
         return status, status == NOT_SETTLED
-    record(control.part[lane], lane, lanes[0], lanes[1], lanes[2].v, fine)
+    record_loads(lane, lanes[0], lanes[1], lanes[2].v, fine[control.part[lane] % 3])
     count_in(control.part[lane], fine, past.extremes[0])
     control.steps[lane] += 1
     control.done[lane] += whole >> control.level[lane]

@@ -84,7 +84,7 @@ def load_explicit_joint(lane, joint, steps, options, batch, queue, past):
     control.joint[lane] = joint
     control.iterations[lane], control.factorisations[lane] = out.newton_iterations, out.factorisations
     clear_results(out)
-    clear_samples(samples_of(lane, batch, queue), batch.notes[lane])
+    clear_samples(samples_of(lane, joint, batch.samples, queue.samples), batch.notes[lane])
     begin_explicit(steps[joint], par, options, batch.scratch, past)
     begin_revolution((start[0], start[1], start[2]), steps[joint], par, batch.scratch, past)
     start_revolution(lane, par, options, batch)
@@ -175,7 +175,8 @@ def explicit(steps, options, batch, queue):
             past = Past(trail, pasts.turns[lane], pasts.extremes[lane], pasts.begun[lane], pasts.mesh[lane])
             if (arrived >> lane) & 1:
                 joint = at.joint[lane]
-                samples, out = samples_of(lane, batch, queue), queue.results[joint]
+                out = queue.results[joint]
+                samples = samples_of(lane, joint, batch.samples, queue.samples)
                 left = queue.left[joint]
                 status, goes_on = arrive(lane, queue.rows[joint], lanes, left, options, batch, samples, past, out)
                 if not goes_on:

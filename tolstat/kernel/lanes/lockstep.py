@@ -57,7 +57,7 @@ from tolstat.kernel.simd.borrow import without_refcount
 from tolstat.kernel.simd.jit import njit
 from tolstat.kernel.simd.lane import WIDTH, any_of, bits_of, count_of, where
 
-PATIENCE = 1 + WIDTH // 4
+PATIENCE = WIDTH // 2
 """Number of lanes in need of a new tangent at which it is computed: it costs as much for one lane as for all, and lanes
 that wait stand still."""
 STANDSTILL = 2 * WIDTH
@@ -89,7 +89,8 @@ def finish_joint(lane, status, options, batch, queue):
     A joint that has not settled gets no closer look. A failed step of a closer look ends that look. `status` is that of
     the joint or step.
     """
-    control, joint, samples = batch.control, batch.control.joint[lane], samples_of(lane, batch, queue)
+    control, joint = batch.control, batch.control.joint[lane]
+    samples = samples_of(lane, joint, batch.samples, queue.samples)
     par, out, k, failed, looking = queue.rows[joint], queue.results[joint], 0, -1, False
     if control.phase[lane] == LOOK:
         looking, status, k = status != NEWTON_FAILED, OK, control.k[lane] + 1
@@ -169,7 +170,7 @@ def load_joint(lane, joint, options, batch, queue):
     if not inside_model(par):
         end_joint(lane, OUTSIDE_MODEL, -1, options.steps_per_rev, options, batch, queue)
         return
-    clear_samples(samples_of(lane, batch, queue), batch.notes[lane])
+    clear_samples(samples_of(lane, joint, batch.samples, queue.samples), batch.notes[lane])
     control.origin[lane], control.grid[lane] = 0.0, grid_step(par, options)
     control.t[lane] = 0.0 if options.fidelity == DYNAMIC else angle_time(0, options.steps_per_rev, par)
     if options.fidelity == DYNAMIC and options.start == RAMP:
@@ -244,7 +245,7 @@ def lockstep(options, patience, batch, queue, tally):
             tally[2] += 1
             control.before = where(stale, now, control.before)
             failed, moving = failed | (stale & ~good), moving | (stale & good)
-        failed = failed | correct(moving, tangent, motion, control)
+        failed = failed | correct(moving, solved, tangent, motion, control)
         solved = solved | last
         if controlled and any_of(solved & (control.stage > 0)):
             control.error = load_error(control.h, par, motion)
@@ -258,7 +259,7 @@ def lockstep(options, patience, batch, queue, tally):
                 finish_spent_joint(lane, options, batch, queue)
                 queued = fill(lane, queued, options, batch, queue)
                 continue
-            here, goes_on = samples_of(lane, batch, queue), True
+            here, goes_on = samples_of(lane, joint, batch.samples, queue.samples), True
             trail = Trail(pasts.loads[lane], pasts.revolution[lane], pasts.notes[lane])
             past = Past(trail, pasts.turns[lane], pasts.extremes[lane], pasts.begun[lane], pasts.mesh[lane])
             if (arrived >> lane) & 1 == 0:

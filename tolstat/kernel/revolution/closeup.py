@@ -34,7 +34,7 @@ STEPS = 2
 LONGEST = 4 * math.pi
 """Longest part that the trapezoidal rule takes, in units of sqrt(m/k) of a pin on its bushing: two periods. In longer
 ones ringing dies away, but the trapezoidal rule would go on with it."""
-LAST_ITERATION_FACTOR = 1000.0
+LAST_ITERATION_FACTOR = 300.0
 """Residual, in units of `newton_tol`, up to which one more iteration with the same tangent is the last, in parts that
 the trapezoidal rule takes: they are so short that it takes off all but a hundredth."""
 
@@ -83,9 +83,9 @@ def count_in(j, fine, out):
     """Update the extremes in `out` with sample `j` of the finer integration and the peak at sample `j - 1`, if any."""
     here, before, first = fine[j % 3], fine[(j - 1) % 3], fine[(j - 2) % 3]
     for i in range(N_INSTANT):
-        load = here.loads[i]
+        load = here[i]
         if j > 1 and INTERPOLATED[i]:
-            load = max(load, height(first.loads[i], before.loads[i], load))
+            load = max(load, height(first[i], before[i], load))
         if i < N_AVERAGED:
             out.largest[i], out.range[i] = extend(load, out.largest[i], out.range[i])
         else:

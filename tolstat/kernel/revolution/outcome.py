@@ -99,8 +99,10 @@ def check_settled(k, iterations, par, options, samples, notes, out):
         out.closure = with_slow_decay(closure, out.revolutions, par, notes)
         small = with_slow_decay(closure_of_bushings, out.revolutions, par, notes) <= EARLY_CLOSURE * bound
         small = small and out.closure <= EARLY_SUMS * bound
-        if small and step_error(par, samples) <= EARLY_STEP_ERROR:
-            return OK
+        if small:
+            out.step_error = step_error(par, samples)
+            if out.step_error <= EARLY_STEP_ERROR:
+                return OK
     if k >= 2 * n and (k * CHECKS_PER_REV) % n < CHECKS_PER_REV:
         closure = closure_error(0, n, ALL_LOADS, samples)
         note_closure(out.revolutions, closure, notes)
@@ -140,7 +142,7 @@ def write_diagnostics(status, par, options, notes, samples, out):
 
     The closure trend of a joint that has not settled is fitted over the second half of ``max_revs``.
     """
-    if options.fidelity == DYNAMIC:
+    if options.fidelity == DYNAMIC and not out.step_error <= EARLY_STEP_ERROR:  # else known from the early check
         out.step_error = step_error(par, samples)
     since = 0.0 if status == OK else 0.5 * options.max_revs
     out.closure_trend, _ = closure_trend(since, notes)

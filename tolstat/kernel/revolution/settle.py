@@ -135,6 +135,15 @@ def record(k, lane, par, work, v, samples):
 
 
 @njit
+def record_loads(lane, par, work, v, loads):
+    """Write all loads at one instant, shape (N_INSTANT,); other arguments as of `record`."""
+    _, psi = output_speed(lane, work, v)
+    write_loads(lane, psi, par, work)
+    for i in range(N_INSTANT):
+        loads[i] = load_at(i, lane, work)
+
+
+@njit
 def write_shaft(shaft, lane, par, work, out):
     """Write force and moment on `shaft` to `out`, (6,): of the input (0) in G, of the output shaft (1) in Ry(alpha)."""
     cosine, sine = pick(work.turned[shaft, 0], lane), pick(work.turned[shaft, 1], lane)
@@ -169,13 +178,14 @@ def predict_increment(k, q, v, ahead, samples):
     n = samples.size
     here, following = samples[k % n], samples[(k + 1) % n]
     before = samples[(k - 1) % n], samples[(k - 2) % n], samples[(k - 3) % n], samples[(k - 4) % n]
-    known = k > n
-    for i in range(N_DOF):
-        if known:
+    if k > n:
+        for i in range(N_DOF):
             ahead[i] = following.q[i] - here.q[i]
+    for i in range(N_DOF):
         here.q[i], here.v[i] = q[i], v[i]
-        if not known:
-            ahead[i] = 4 * q[i] - 10 * before[0].q[i] + 10 * before[1].q[i] - 5 * before[2].q[i] + before[3].q[i]
+    if k <= n:
+        for i in range(N_DOF):
+            ahead[i] = 4 * here.q[i] - 10 * before[0].q[i] + 10 * before[1].q[i] - 5 * before[2].q[i] + before[3].q[i]
     return 1.0 if k >= 5 else 0.0
 
 
@@ -242,7 +252,7 @@ def step_error(par, samples):
     total = 0.0
     for s in range(samples.size):
         q0, q1, q2, q3 = samples[s - 3].q, samples[s - 2].q, samples[s - 1].q, samples[s].q
-        worst = 0.0
+        by_shift = by_turn = 0.0
         for body in range(N_LUMPS):
             k, k_turn = stiffness(body, par)
             shift = turn = 0.0
@@ -250,8 +260,8 @@ def step_error(par, samples):
                 j = i + 3
                 shift = max(shift, abs(q3[i] - q0[i] - 3 * (q2[i] - q1[i])))
                 turn = max(turn, abs(q3[j] - q0[j] - 3 * (q2[j] - q1[j])))
-            worst = max(worst, max(k / force * shift, k_turn / torque * turn))
-        total += worst
+            by_shift, by_turn = max(by_shift, k * shift), max(by_turn, k_turn * turn)
+        total += max(by_shift / force, by_turn / torque)
     return 2 / 9 * total / samples.size
 
 

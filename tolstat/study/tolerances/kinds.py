@@ -15,7 +15,7 @@ from pydantic import Field
 from tolstat.analysis.process import LEAST_PARTS, MOST_PARTS
 from tolstat.common import strict
 from tolstat.common.errors import gather, input_error
-from tolstat.common.strict import described, refuse
+from tolstat.common.strict import refuse
 from tolstat.common.tables import FACTORS
 from tolstat.study.axes import ORIENTATIONS, REJECT, Axis, Bonus, columns_of
 from tolstat.study.selection import TOLERANCED, Entry, Reading
@@ -42,7 +42,7 @@ from tolstat.study.tolerances.zone_laws import Accepted, Rayleigh
 from tolstat.study.tolerances.zones import CoaxialityEntry, OrientationEntry, PositionEntry, axes_of
 
 CPK = "capability index Cpk of the process: sigma is the distance from the mean to the nearer limit over 3 Cpk"
-Cpk = Annotated[PositiveNumber | None, described(f"{CPK}; 1 unless given", 1.33)]
+Cpk = Annotated[PositiveNumber | None, Field(description=f"{CPK}; 1 unless given", examples=[1.33])]
 
 
 class NormalEntry(Banded):

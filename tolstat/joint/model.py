@@ -249,10 +249,13 @@ def merged(data: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def leaves(table: Mapping[str, Any], before: str = "") -> dict[str, Any]:
-    """Values of a joint by dotted key."""
+    """Values of nested tables by dotted key; tuples become lists, as in JSON."""
     values: dict[str, Any] = {}
     for key, value in table.items():
-        values |= leaves(value, f"{before}{key}.") if isinstance(value, Mapping) else {f"{before}{key}": value}
+        if isinstance(value, Mapping):
+            values |= leaves(value, f"{before}{key}.")
+        else:
+            values[f"{before}{key}"] = list(value) if isinstance(value, tuple) else value
     return values
 
 

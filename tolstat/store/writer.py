@@ -211,7 +211,7 @@ class Writer(Reader):
         self.replace(both)
         self._describe(document)
 
-    def begin_retry(self, rows: Mapping[str, NDArray[np.intp]], entry: Mapping[str, Any]) -> None:
+    def mark_pending(self, rows: Mapping[str, NDArray[np.intp]], entry: Mapping[str, Any]) -> None:
         """Mark joints as pending that are to be simulated again, with the settings of `entry`.
 
         Parameters

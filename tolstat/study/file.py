@@ -17,7 +17,7 @@ from tolstat.common.errors import Fault, collected, gather, input_error
 from tolstat.common.loads import LOADS, UNIT_OF_LOAD, load_of, split
 from tolstat.common.strict import dotted, validate
 from tolstat.common.tables import FINEST_STEPS
-from tolstat.joint import Joint
+from tolstat.joint import Joint, reading
 from tolstat.joint.derived import BEARING
 from tolstat.joint.model import Assumed, leaves, merged
 from tolstat.joint.reading import faults_of_assumed
@@ -59,7 +59,7 @@ def _joint(file: Reading) -> Joint | None:
         return None
     if file.fit is not None and isinstance(keys["base"], str):
         keys = _with_diameters(file, keys)
-    return listing.joint_of(file, keys, ("joint",))
+    return reading.load(keys["base"], keys, file.place, file.folder)
 
 
 def _with_diameters(file: Reading, keys: Mapping[str, Any]) -> dict[str, Any]:

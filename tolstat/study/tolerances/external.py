@@ -99,6 +99,13 @@ class ScipyLaw(Distribution):
         band = {key: end for key, end in (("lower", self.lower), ("upper", self.upper)) if end is not None}
         return {"distribution": f"{PREFIX}{self.name}", **dict(self.parameters), "unit": self.unit, **band}
 
+    def openturns(self, ot: Any) -> Any:
+        """See `Distribution.openturns`."""
+        ends = [self.ends[0]], [self.ends[1]], [self.lower is not None], [self.upper is not None]
+        whole = ot.Distribution(ot.SciPyDistribution(self.whole))
+        inside = ot.TruncatedDistribution(whole, ot.Interval(*ends))
+        return ot.CompositeDistribution(ot.SymbolicFunction("x", f"{self.unit!r} * x"), inside)
+
 
 class ScipyEntry(SingleEntry):
     """Continuous law of scipy.stats with literal numbers, such as `"scipy:weibull_min(c=1.8, scale=0.012)"`.
@@ -106,6 +113,7 @@ class ScipyEntry(SingleEntry):
     `loc` and `scale` have the unit `unit`. Parts outside `lower` and `upper` are sorted out.
     """
 
+    scales = False
     distribution: str = Field(pattern=f"^{PREFIX}", examples=["scipy:weibull_min(c=1.8, scale=0.012)"])
     """name and parameters of the law"""
     unit: str | None = Field(default=None, examples=["mm"])
@@ -181,6 +189,7 @@ class MeasuredEntry(SingleEntry):
     With `law` mean and deviation of the sample are those of the parts, and the study knows that they are estimates.
     """
 
+    scales = False
     distribution: Literal["measured"]
     file: str | None = Field(default=None, examples=["rattle.csv"])
     """path of the CSV file, from the study's folder"""

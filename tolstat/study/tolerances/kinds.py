@@ -125,6 +125,7 @@ class TriangularEntry(Banded):
 class LogNormalEntry(Banded):
     """The logarithm of the value above `threshold` is normal: by band and Cpk of the logarithm, or by mean and std."""
 
+    scales = False
     distribution: Literal["lognormal"]
     threshold: Value = Field(default=0.0, examples=["-0.01 mm"])
     """least possible value; 0 unless given"""

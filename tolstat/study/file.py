@@ -112,15 +112,15 @@ def _limits(file: Reading) -> dict[str, float]:
     """``[limits]``: limit of each load that has one (SI), ``cross1.F`` at all points, ``cross1.F at cruise``."""
     limits: dict[str, float] = {}
     claims = Assignments(file.place)
-    every = [point.name for point in file.points]
+    names_of_points = [point.name for point in file.points]
     for entry in file.entries("limits"):
         with gather(file.faults):
             pattern, where = split(entry.pattern)
             names = selection.resolve(entry._replace(pattern=pattern), UNIT_OF_LOAD, file.place)
             value = selection.quantity(entry, UNIT_OF_LOAD[names[0]], file.place)
-            if every:  # if not, the points have faults of their own
-                chosen = points.names_of(where, every, f"{file.place}: {dotted(entry.path)}")
-                names = [points.at(name, chosen, every) for name in names]
+            if names_of_points:  # if not, the points have faults of their own
+                chosen = points.names_of(where, names_of_points, f"{file.place}: {dotted(entry.path)}")
+                names = [points.at(name, chosen, names_of_points) for name in names]
             claims.claim(entry, names)
             if value <= 0:
                 file.fault(entry.path, f"{entry.value!r} is not positive", "give a limit above zero")

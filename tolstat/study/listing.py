@@ -240,10 +240,10 @@ def _note_clashes(file: Reading, axes: list[Axis]) -> None:
 
 def _variants(file: Reading, nominal: Nominal, cases: list[str]) -> list[Listed]:
     """Variants without faults in the order of the file, families expanded."""
-    every = list(range(len(cases)))
+    all_cases = list(range(len(cases)))
     entries = file.tables("variant")
     if not entries:
-        return [(Variant("joint", {}), *nominal, every)]
+        return [(Variant("joint", {}), *nominal, all_cases)]
     variants = []
     for number, item in enumerate(entries):
         with gather(file.faults):
@@ -251,7 +251,7 @@ def _variants(file: Reading, nominal: Nominal, cases: list[str]) -> list[Listed]
             unknown = [name for name in entry.cases or () if name not in cases]
             for name in unknown:
                 file.fault(f"variant[{number}].cases", f"no case {name!r}", strict.did_you_mean(name, cases))
-            run = every if entry.cases is None else sorted({0, *map(cases.index, set(entry.cases) - set(unknown))})
+            run = all_cases if entry.cases is None else sorted({0, *map(cases.index, set(entry.cases) - set(unknown))})
             variants += _expanded(file, entry, run, nominal, ("variant", number))
     return variants
 

@@ -325,8 +325,8 @@ def meanings(entries: Sequence[Toleranced]) -> pd.DataFrame:
                 rows.setdefault(key, {}).update(dict.fromkeys(name.partition(".")[2] for name in meaning.errors))
     columns = ["entry", "number", "unit", "sigma", "outside", "errors"]
     cells = [(*key[:4], float(key[4]), _pattern(list(keys))) for key, keys in rows.items()]
-    made = pd.DataFrame(cells, columns=columns)
-    return made[["entry", "number", "errors", "unit", "sigma", "outside"]]
+    table = pd.DataFrame(cells, columns=columns)
+    return table[["entry", "number", "errors", "unit", "sigma", "outside"]]
 
 
 def _pattern(keys: Sequence[str]) -> str:

@@ -305,8 +305,10 @@ class Tolerances(NamedTuple):
     @property
     def distributions(self) -> dict[str, Distribution]:
         """Distribution of each quantity that is drawn: of the diameters of pins and holes that are accepted."""
-        made = {name: law for entry in self.entries for name, law in entry.quantities.items()}
-        return made | {bonus.diameter: Accepted(made[bonus.diameter], bonus) for bonus in self.rejecting}
+        of_quantities = {name: law for entry in self.entries for name, law in entry.quantities.items()}
+        return of_quantities | {
+            bonus.diameter: Accepted(of_quantities[bonus.diameter], bonus) for bonus in self.rejecting
+        }
 
     @property
     def lots(self) -> dict[str, Lot]:

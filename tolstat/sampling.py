@@ -247,8 +247,8 @@ def _fill_listed(samples: Table, design: Design, numbers: range) -> None:
     here = slice(numbers.start, numbers.stop)
     variant, case, point = design.table["variant"][here], design.table["case"][here], design.point()[here]
     for values, index in ((design.points, point), (tuple(design.cases.values()), case)):
-        for number, fixed in enumerate(values):
-            for name, value in fixed.items():
+        for number, errors in enumerate(values):
+            for name, value in errors.items():
                 samples[name][index == number] = value
     for name in {name for values in design.points for name in values}:
         samples[name] -= np.array([_nominal(operation, name) for operation in design.operations])[variant]

@@ -238,7 +238,7 @@ def test_a_campaign_with_damaged_joints_grows_without_them(
 def test_joints_that_are_to_be_simulated_again_stay_so_when_the_campaign_grows(tmp_path: Path, make: Make) -> None:
     grown = run(make(40), tmp_path / "grown.h5")
     with Writer.open(grown) as store:
-        store.begin_retry({"": np.array([3, 9])}, {"status": ["ok"], "settings": {}, "options": store.options})
+        store.mark_pending({"": np.array([3, 9])}, {"status": ["ok"], "settings": {}, "options": store.options})
     extend.extend(grown, 60)
     with ResultFile.open(grown) as store:
         assert store.pending().tolist() == [3, 9, *range(41, 61)]

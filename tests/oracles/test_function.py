@@ -8,7 +8,6 @@ from tests.campaign.test_function import MAIN, TEXT, study_of
 from tests.study.test_tolerance import build
 from tests.support.environment import ROOT
 from tests.test_docs import blocks
-from tolstat.campaign.function import _marginal
 from tolstat.study import load
 
 ot = pytest.importorskip("openturns", reason="pip install .[oracles]")
@@ -33,7 +32,7 @@ ENTRIES = [
 def test_marginals_are_ours(entry, monkeypatch):
     monkeypatch.chdir(MAIN.parent)
     own = build(entry)
-    theirs, x = _marginal(ot, own), own.ppf(np.linspace(0.001, 0.999, 41))
+    theirs, x = own.openturns(ot), own.ppf(np.linspace(0.001, 0.999, 41))
     np.testing.assert_allclose(np.array(theirs.computeCDF(ot.Sample(x[:, None])))[:, 0], own.cdf(x), atol=1e-7)
 
 

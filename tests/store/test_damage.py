@@ -226,7 +226,7 @@ def test_a_damaged_attempt_simulates_nothing_with_the_settings_of_another(
     with new_store(path, plan) as store:
         store.write(np.arange(12), simulation(plan, np.arange(12)))
         entry = {"status": ["ok"], "settings": {}, "options": store.options}
-        store.begin_retry({"": np.array([3, 9])}, entry)
+        store.mark_pending({"": np.array([3, 9])}, entry)
         store.write(np.array([3, 9]), simulation(plan, np.array([3, 9])))
     damage.flip_in(path, "ledger/attempt", 3, 0)
     damage.flip_in(path, "results/psi_max", 9)
@@ -245,7 +245,7 @@ def test_a_retry_that_is_killed_or_stopped_before_its_first_joint_is_no_damage(
     with new_store(path, plan) as store:
         store.write(np.arange(12), simulation(plan, np.arange(12)))
     with Writer.open(path) as store:
-        store.begin_retry({"": np.array([3, 9])}, {"status": ["ok"], "settings": {}, "options": store.options})
+        store.mark_pending({"": np.array([3, 9])}, {"status": ["ok"], "settings": {}, "options": store.options})
         killed.write_bytes(path.read_bytes())
     for file, checked in ((path, True), (killed, False)):
         with ResultFile.open(file) as store:

@@ -64,7 +64,7 @@ def test_a_slice_without_the_nominal_joint(tmp_path):
 
 def test_what_is_opened_for_reading_cannot_write(store):
     assert type(store) is ResultFile
-    assert {"create", "write", "finish", "change", "begin_retry"} <= WRITING
+    assert {"create", "write", "finish", "change", "mark_pending"} <= WRITING
     assert not WRITING & set(dir(store))
     view = store.view()
     load = view.load("cross1.F")

@@ -37,9 +37,9 @@ from tolstat.common.tables import (
     Status,
 )
 from tolstat.joint import Operation
+from tolstat.joint.model import leaves
 from tolstat.solver import stationary
 from tolstat.store import Reader, recorded
-from tolstat.study.design import flat
 from tolstat.study.model import Sampling
 from tolstat.study.points import Point
 
@@ -171,7 +171,7 @@ class Study:
         """Return what decides the numbers."""
         operations = {point.name: point.operation.model_dump() for point in self.points}
         parts = {"joint": self.joint, "operation": operations.get("", operations)}
-        settings = {"solver.steps_per_rev": self.solver.steps_per_rev} | dict(flat(parts))
+        settings = {"solver.steps_per_rev": self.solver.steps_per_rev} | leaves(parts)
         return settings | {"sampling.n": self.n, "sampling.seed": self.seed} | self.output.identity()
 
 

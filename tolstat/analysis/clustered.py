@@ -224,8 +224,8 @@ def delivery(above: ArrayLike, joints: ArrayLike, number: int, lots: int = 1) ->
     error = np.sqrt((1.0 + (n.mean() - 1.0) * spread) / (n.sum() * p * (1.0 - p)))
     means = special.logit(p) + np.linspace(-REACH, REACH, GRID) * min(float(error), 1.0)
     a, b, (weight,) = _posterior(k[:, None], n[:, None], means, SPREADS)
-    kept = weight > NEGLIGIBLE
-    a, b, weight = a[kept], b[kept], weight[kept] / weight[kept].sum()
+    likely = weight > NEGLIGIBLE
+    a, b, weight = a[likely], b[likely], weight[likely] / weight[likely].sum()
     small, more = divmod(number, lots)
     spectrum = np.ones((weight.size, (number + 1) // 2 + 1), dtype=complex)
     for size, count in ((small, lots - more), (small + 1, more)):

@@ -132,10 +132,14 @@ def tallies(
         )
         block = np.exp(logs - logs.max(axis=0))  # weights, up to a factor of each process
         largest = np.stack([block[mask].max(axis=0, initial=0.0) for mask in sides])
-        every = np.broadcast_to(np.maximum(block.max(axis=0), heaviest * np.exp(-logs.max(axis=0))), largest.shape)
-        tables.append([members @ block, members @ np.square(block), largest, every])
-    *tallied, every = (np.concatenate(parts, axis=1) for parts in zip(*tables, strict=True))
-    return [Split.of([tally[k : k + 2] for tally in tallied], every[k : k + 2]) for k in range(0, len(sides), 2)]
+        heaviest_of_any = np.broadcast_to(
+            np.maximum(block.max(axis=0), heaviest * np.exp(-logs.max(axis=0))), largest.shape
+        )
+        tables.append([members @ block, members @ np.square(block), largest, heaviest_of_any])
+    *tallied, heaviest_of_any = (np.concatenate(parts, axis=1) for parts in zip(*tables, strict=True))
+    return [
+        Split.of([tally[k : k + 2] for tally in tallied], heaviest_of_any[k : k + 2]) for k in range(0, len(sides), 2)
+    ]
 
 
 def intervals(

@@ -220,9 +220,9 @@ class Walk:
         step = FIRST_STEP if math.isnan(acceptance) else self._step * math.exp(acceptance - ACCEPTANCE)
         self._step, self._threshold = min(1.0, step), threshold
         self._simulated = self._accepted = 0
-        kept = states.part(beyond)
-        chains = np.arange(kept.loads.size)[:, None]
-        self._start = kept._replace(families=np.hstack([chains, kept.families[:, :LAG]]))
+        seeds = states.part(beyond)
+        chains = np.arange(seeds.loads.size)[:, None]
+        self._start = seeds._replace(families=np.hstack([chains, seeds.families[:, :LAG]]))
         self._parts = [self._start]
 
     def _add_variance(self, beyond: NDArray[np.bool_], share: float, families: NDArray[np.intp]) -> None:

@@ -57,8 +57,8 @@ class Split(NamedTuple):
         for w, number in ((weights[::-1], weights.size - first), (weights, first)):
             sums = w.cumsum(), (w**2).cumsum(), np.maximum.accumulate(w)
             sides.append([np.insert(total, 0, 0.0)[number] for total in sums])
-        every = heaviest if np.isfinite(heaviest) else weights.max(initial=0.0)
-        return cls.of(np.swapaxes(sides, 0, 1), every)
+        heaviest_of_any = heaviest if np.isfinite(heaviest) else weights.max(initial=0.0)
+        return cls.of(np.swapaxes(sides, 0, 1), heaviest_of_any)
 
     @classmethod
     def by(cls, is_above: NDArray[np.bool_], weights: FloatArray) -> Split:

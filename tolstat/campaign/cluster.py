@@ -110,8 +110,8 @@ def map_on_cluster(
             except Exception as error:  # it cost too many workers, or raised this
                 failed.append(block)
                 failures += 1
-                last = str(error) if isinstance(error, KilledWorker) else error
-                if ending := pool.too_many_failures(failures, max(1, threads), last, succeeded):
+                failure = str(error) if isinstance(error, KilledWorker) else error
+                if ending := pool.too_many_failures(failures, max(1, threads), failure, succeeded):
                     raise ending from error
             else:
                 failures, succeeded = 0, True

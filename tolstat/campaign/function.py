@@ -25,8 +25,6 @@ from tolstat.solver.simulation import simulate_rows
 from tolstat.store.recorded import settings
 from tolstat.study import Study, axes
 from tolstat.study.selection import select, suggestion
-from tolstat.study.tolerances import distributions as law
-from tolstat.study.tolerances.external import ScipyLaw
 
 if TYPE_CHECKING:
     import openturns
@@ -174,7 +172,7 @@ class Function:
             parts, steps = [ot.Uniform(0.0, 1.0)] * len(names), [STEP / math.sqrt(12.0)] * len(names)
         else:
             laws = list((self.distributions or {}).values())
-            parts, steps = [_marginal(ot, own) for own in laws], [STEP * own.moments.deviation for own in laws]
+            parts, steps = [law.openturns(ot) for law in laws], [STEP * law.moments.deviation for law in laws]
             if self.copula.names:
                 correlation, at = np.eye(len(names)), [names.index(name) for name in self.copula.names]
                 correlation[np.ix_(at, at)] = self.copula.matrix
@@ -303,36 +301,3 @@ def _dependence(study: Study) -> tuple[str, str]:
     if study.sampling.joints_per_lot > 1:
         return "sampling.joints_per_lot", "joints of one lot depend on each other"
     return "", ""
-
-
-def _marginal(ot: Any, own: law.Distribution) -> Any:
-    """Distribution of OpenTURNS that equals one of a tolerance."""
-    match own:
-        case law.Normal():
-            return ot.Normal(own.mean, own.sigma)
-        case law.TruncatedNormal():
-            return ot.TruncatedNormal(own.mean, own.sigma, own.lower, own.upper)
-        case law.Uniform():
-            return ot.Uniform(own.lower, own.upper)
-        case law.Triangular():
-            return ot.Triangular(own.lower, own.peak, own.upper)
-        case law.Beta():
-            return ot.Beta(own.a, own.b, own.lower, own.upper)
-        case law.LogNormal(log=log):
-            whole = ot.LogNormal(log.mean, log.sigma, own.threshold)
-            if isinstance(log, law.Normal):
-                return whole
-            return ot.TruncatedDistribution(
-                whole, *(own.threshold + float(np.exp(end)) for end in (log.lower, log.upper))
-            )
-        case law.Measured():
-            return ot.UserDefined(own.values[:, None].tolist())
-        case ScipyLaw():
-            whole = ot.Distribution(ot.SciPyDistribution(own.whole))
-            inside = ot.TruncatedDistribution(
-                whole, ot.Interval([own.ends[0]], [own.ends[1]], [own.lower is not None], [own.upper is not None])
-            )
-            return ot.CompositeDistribution(ot.SymbolicFunction("x", f"{own.unit!r} * x"), inside)
-    raise InputError(
-        [Fault(type(own).__name__, "has no equal in OpenTURNS", "take the unit cube: openturns(cube=True)")]
-    )

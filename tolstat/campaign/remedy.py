@@ -250,4 +250,4 @@ def begin_retry(store: Writer, retry: Retry, specs: Mapping[str, HistorySpec], t
     again = sum(slots.size for slots in rows.values())
     tell(f"{again} joints are simulated again")
     if again:
-        store.begin_retry(rows, entry)
+        store.mark_pending(rows, entry)

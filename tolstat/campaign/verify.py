@@ -199,13 +199,13 @@ def check_few(store: Writer) -> None:
 
     Does nothing if the file is a slice, and leaves checks that it has as they are.
     """
-    seed, made = int(store.sampling["seed"]), []
+    seed, verifications = int(store.sampling["seed"]), []
     for at_point in store.each() if store.whole else ():
         if at_point.complete and verification.read(at_point) is None:
             verified = check_campaign(at_point, few(at_point.n), seed, partial(run_checks, names=QUICK_CHECKS))
-            made += [(at_point, verified)] if verified else []
-    if made:
-        verification.write(made)
+            verifications += [(at_point, verified)] if verified else []
+    if verifications:
+        verification.write(verifications)
 
 
 def check(
@@ -335,8 +335,10 @@ def check_near(
             new = slots if before is None else slots[~np.isin(at_point.row(slots), before.rows)]
             if new.size:
                 make = partial(run_checks, names=QUICK_CHECKS, workers=workers, progress=progress)
-                made = check_slots(at_point, new, 0, make)
-                verification.write([(at_point, made if before is None else _merged(before, made))], verification.NEAR)
+                new_checks = check_slots(at_point, new, 0, make)
+                verification.write(
+                    [(at_point, new_checks if before is None else _merged(before, new_checks))], verification.NEAR
+                )
         return _stored(store, verification.NEAR)
 
 

@@ -186,8 +186,8 @@ def simulate(
     names = asked.names(study)
     todo = [change._replace(numbers=lacking) for change in wanted if (lacking := missing(in_file, change, names))]
     table = _Table(todo, asked, names)
-    every = _blocks(study, options_of(study, store), todo, asked.points)
-    done = pool.map_blocks(work_beside(Options()), every, workers, stop)
+    blocks = _blocks(study, options_of(study, store), todo, asked.points)
+    done = pool.map_blocks(work_beside(Options()), blocks, workers, stop)
     counts, saved = Counts(table.status.size, 0, 0, 0), time.monotonic()
     progress(counts)
     try:

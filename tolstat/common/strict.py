@@ -18,7 +18,7 @@ from types import NoneType
 from typing import Any, TypeVar, get_args, get_origin
 
 import annotated_types
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, GetJsonSchemaHandler, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, GetJsonSchemaHandler, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import CoreSchema, PydanticCustomError
 
@@ -277,16 +277,6 @@ def _example(model: type[BaseModel], location: Sequence[int | str], known: Mappi
     if example is None or isinstance(example, (Mapping, list)):
         return ""
     return f", for example {location[-1]} = {json.dumps(example, ensure_ascii=False)}"
-
-
-def described(meaning: str, *examples: Any, **others: Any) -> Any:
-    """Field of a key: its meaning, examples, and bounds, defaults and the like as `pydantic.Field` has them."""
-    return Field(description=meaning, examples=list(examples) or None, **others)
-
-
-def whole(least: int, most: int, meaning: str, example: int) -> Any:
-    """Field of a key whose value is a whole number from `least` to `most`."""
-    return described(meaning, example, strict=True, ge=least, le=most)
 
 
 def refuse(found: str, remedy: str, *keys: str) -> PydanticCustomError:

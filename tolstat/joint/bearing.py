@@ -11,12 +11,12 @@ from functools import cache
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
-from pydantic import AfterValidator, ValidationInfo, field_validator
+from pydantic import AfterValidator, Field, ValidationInfo, field_validator
 
 from tolstat.analysis.rating_life import A1, critical_amplitude
 from tolstat.common import units
 from tolstat.common.bisection import first
-from tolstat.common.strict import Strict, described, refuse
+from tolstat.common.strict import Strict, refuse
 from tolstat.joint.material import Array
 from tolstat.joint.sections import Force, Length, Number
 
@@ -39,25 +39,22 @@ class Bearing(Strict):
     With the contact law `needles` its `needles` and `needle_length` say how stiff it is; the other keys affect no load.
     """
 
-    needles: Annotated[int, described("needles of one bearing", 32, strict=True, ge=3, le=1000)]
-    needle_length: Annotated[Length, described("length of a needle, needed with law `needles`", "22 mm")] = LEFT_OUT
-    C: Annotated[
-        Force, described("basic dynamic load rating of one bearing (ISO 281), needed for the life", "30 kN")
-    ] = LEFT_OUT
-    needle_diameter: Annotated[Length, described("diameter of a needle, needed for the life", "4 mm")] = LEFT_OUT
-    pitch_diameter: Annotated[
-        Length, described("diameter of the circle of the needles' axes, needed for the life", "42 mm")
-    ] = LEFT_OUT
-    required_life: Annotated[
-        units.Time | None, described("life that all four bearings of a joint must reach", "5000 h")
-    ] = None
-    reliability: Annotated[
-        Annotated[units.Number, AfterValidator(_tabulated)],
-        described("share of equal joints that reach their rating life", "95 %"),
-    ] = 0.9
-    a_iso: Annotated[
-        Number | None, described("life modification factor for lubrication and contamination (ISO 281)", 0.8)
-    ] = None
+    needles: int = Field(strict=True, ge=3, le=1000, examples=[32])
+    """needles of one bearing"""
+    needle_length: Length = Field(default=LEFT_OUT, examples=["22 mm"])
+    """length of a needle, needed with law `needles`"""
+    C: Force = Field(default=LEFT_OUT, examples=["30 kN"])
+    """basic dynamic load rating of one bearing (ISO 281), needed for the life"""
+    needle_diameter: Length = Field(default=LEFT_OUT, examples=["4 mm"])
+    """diameter of a needle, needed for the life"""
+    pitch_diameter: Length = Field(default=LEFT_OUT, examples=["42 mm"])
+    """diameter of the circle of the needles' axes, needed for the life"""
+    required_life: units.Time | None = Field(default=None, examples=["5000 h"])
+    """life that all four bearings of a joint must reach"""
+    reliability: Annotated[units.Number, AfterValidator(_tabulated)] = Field(default=0.9, examples=["95 %"])
+    """share of equal joints that reach their rating life"""
+    a_iso: Number | None = Field(default=None, examples=[0.8])
+    """life modification factor for lubrication and contamination (ISO 281)"""
 
     @field_validator("pitch_diameter")
     @classmethod

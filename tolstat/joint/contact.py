@@ -15,11 +15,11 @@ from pydantic import AfterValidator, Field, ValidationInfo, field_validator
 
 from tolstat.common import units
 from tolstat.common.fields import MAX_STATIONS
-from tolstat.common.strict import Strict, described, refuse
+from tolstat.common.strict import Strict, refuse
 from tolstat.common.units import NOT_NEGATIVE, Damping, Diameter, QuadraticStiffness
 from tolstat.joint.bearing import Bearing, fit_needles
 from tolstat.joint.material import Array
-from tolstat.joint.sections import FOLLOWS, Force, Length, Number, Ratio, Stiffness, follows
+from tolstat.joint.sections import Force, Length, Number, Ratio, Stiffness, follows
 
 
 class Stations(NamedTuple):
@@ -56,13 +56,14 @@ def _check_position(ratio: float) -> float:
 class Station(Strict):
     """A contact station of one's own, for law `stations`."""
 
-    s_over_z: Annotated[
-        Annotated[units.Number, AfterValidator(_check_position)],
-        described("place along the contact, from -0.5 (inner end) to 0.5 (outer end)", 0.5),
-    ]
-    k1: Annotated[QuadraticStiffness, described("quadratic coefficient of the force", "1.6e6 N/mm^2")]
-    k2: Annotated[Annotated[units.Stiffness, NOT_NEGATIVE], described("linear coefficient of the force", "1.8e5 N/mm")]
-    weight: Annotated[Ratio, described("weight of damping `c_d` and film `c_t`", 1.0)]
+    s_over_z: Annotated[units.Number, AfterValidator(_check_position)] = Field(examples=[0.5])
+    """place along the contact, from -0.5 (inner end) to 0.5 (outer end)"""
+    k1: QuadraticStiffness = Field(examples=["1.6e6 N/mm^2"])
+    """quadratic coefficient of the force"""
+    k2: Annotated[units.Stiffness, NOT_NEGATIVE] = Field(examples=["1.8e5 N/mm"])
+    """linear coefficient of the force"""
+    weight: Ratio = Field(examples=[1.0])
+    """weight of damping `c_d` and film `c_t`"""
 
 
 def _check_stations(stations: tuple[Station, ...] | None) -> tuple[Station, ...] | None:
@@ -188,40 +189,40 @@ class Contact(Strict):
     Of `D_H`, `D_P` and `clearance` two define the third.
     """
 
-    law: Annotated[LawName, described("set of contact stations, see the contact laws of the joint model")]
-    n_stations: Annotated[int, Field(strict=True, ge=1, le=MAX_STATIONS)] | None = described(
-        "stations of a pin, for laws `sliced` and `needles`", default=None, validate_default=True
+    law: LawName
+    """set of contact stations, see the contact laws of the joint model"""
+    n_stations: Annotated[int, Field(strict=True, ge=1, le=MAX_STATIONS)] | None = Field(
+        default=None, validate_default=True
     )
-    stations: Annotated[tuple[Station, ...] | None, AfterValidator(_check_stations)] = described(
-        "stations of one's own, for law `stations`",
-        [{"s_over_z": 0.5, "k1": "1.6e6 N/mm^2", "k2": "1.8e5 N/mm", "weight": 1.0}],
+    """stations of a pin, for laws `sliced` and `needles`"""
+    stations: Annotated[tuple[Station, ...] | None, AfterValidator(_check_stations)] = Field(
         default=None,
         validate_default=True,
+        examples=[[{"s_over_z": 0.5, "k1": "1.6e6 N/mm^2", "k2": "1.8e5 N/mm", "weight": 1.0}]],
     )
-    D_H: Annotated[Diameter, follows("contact.D_H", "diameter of the hole")] = FOLLOWS
-    D_P: Annotated[Diameter, follows("contact.D_P", "diameter of the pin in the hole, not above `D_H`")] = FOLLOWS
-    clearance: Annotated[
-        units.Length, NOT_NEGATIVE, follows("contact.clearance", "radial clearance of the pin in its hole", "0.1 mm")
-    ] = FOLLOWS
-    z: Annotated[Length, described("length of the contact")]
-    k1u: Annotated[QuadraticStiffness, follows("contact.k1u", "quadratic coefficient of uniform contact")] = FOLLOWS
-    k2u: Annotated[Stiffness, follows("contact.k2u", "linear coefficient of uniform contact")] = FOLLOWS
-    k1p: Annotated[QuadraticStiffness, follows("contact.k1p", "quadratic coefficient of point contact")] = FOLLOWS
-    k2p: Annotated[Stiffness, follows("contact.k2p", "linear coefficient of point contact")] = FOLLOWS
-    H: Number | None = described(
-        "displacement in point contact over that in uniform contact at the same force",
-        default=None,
-        validate_default=True,
+    """stations of one's own, for law `stations`"""
+    D_H: Diameter = follows("contact.D_H", "diameter of the hole")
+    D_P: Diameter = follows("contact.D_P", "diameter of the pin in the hole, not above `D_H`")
+    clearance: Annotated[units.Length, NOT_NEGATIVE] = follows(
+        "contact.clearance", "radial clearance of the pin in its hole", "0.1 mm"
     )
-    fit_load: Force | None = described(
-        "largest load of the fit of k1u and k2u, or of that to needles", default=None, validate_default=True
-    )
-    c_d: Annotated[Damping, follows("contact.c_d", "damping of a station")] = FOLLOWS
-    xi: Ratio | None = described("damping ratio of the contact, from which c_d follows", default=None)
-    c_t: Annotated[
-        Damping, described("damping by the lubricant across the clearance; without it a pin whirls for ever")
-    ]
-    delta_d: Annotated[Length, described("penetration over which contact damping rises to its full value")]
+    z: Length
+    """length of the contact"""
+    k1u: QuadraticStiffness = follows("contact.k1u", "quadratic coefficient of uniform contact")
+    k2u: Stiffness = follows("contact.k2u", "linear coefficient of uniform contact")
+    k1p: QuadraticStiffness = follows("contact.k1p", "quadratic coefficient of point contact")
+    k2p: Stiffness = follows("contact.k2p", "linear coefficient of point contact")
+    H: Number | None = Field(default=None, validate_default=True)
+    """displacement in point contact over that in uniform contact at the same force"""
+    fit_load: Force | None = Field(default=None, validate_default=True)
+    """largest load of the fit of k1u and k2u, or of that to needles"""
+    c_d: Damping = follows("contact.c_d", "damping of a station")
+    xi: Ratio | None = None
+    """damping ratio of the contact, from which c_d follows"""
+    c_t: Damping
+    """damping by the lubricant across the clearance; without it a pin whirls for ever"""
+    delta_d: Length
+    """penetration over which contact damping rises to its full value"""
 
     @field_validator("D_P")
     @classmethod

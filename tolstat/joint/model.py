@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import BaseModel, Field, ValidationInfo, field_validator
 
 from tolstat.common.errors import Fault
-from tolstat.common.strict import Strict, described, refuse
+from tolstat.common.strict import Strict, refuse
 from tolstat.joint import derived
 from tolstat.joint.bearing import Bearing
 from tolstat.joint.contact import COEFFICIENTS, LAWS, Contact, keys_valid_for
@@ -39,17 +39,16 @@ def affecting_results(given: Mapping[str, Any]) -> dict[str, Any]:
 class Assumed(Strict):
     """Keys of the joint whose values are assumed, and other values that they may have; affects no result."""
 
-    name: Annotated[str, described("what is assumed, as a noun", "contact law", min_length=1)]
-    values: Annotated[
-        tuple[Annotated[dict[str, Any], Field(min_length=1, json_schema_extra={"x-table": "keys"})], ...],
-        described(
-            "other values, each some keys of the joint, with those that follow from them and are to stay",
-            [{"contact": {"law": "sliced"}}, {"contact": {"law": "uniform"}}],
-            min_length=1,
-        ),
-    ]
-    because: Annotated[str, described("why the value is not known", "no drawing gives it", min_length=1)]
-    varied: Annotated[bool, described("whether it is varied unless it is asked for by name", False, strict=True)] = True
+    name: str = Field(min_length=1, examples=["contact law"])
+    """what is assumed, as a noun"""
+    values: tuple[Annotated[dict[str, Any], Field(min_length=1, json_schema_extra={"x-table": "keys"})], ...] = Field(
+        min_length=1, examples=[[{"contact": {"law": "sliced"}}, {"contact": {"law": "uniform"}}]]
+    )
+    """other values, each some keys of the joint, with those that follow from them and are to stay"""
+    because: str = Field(min_length=1, examples=["no drawing gives it"])
+    """why the value is not known"""
+    varied: bool = Field(default=True, strict=True, examples=[False])
+    """whether it is varied unless it is asked for by name"""
 
 
 class Joint(Strict):
@@ -58,9 +57,8 @@ class Joint(Strict):
     Arrays of three or six values that the properties return refer to the local axes (e, t, z) of a pin or arm.
     """
 
-    description: Annotated[
-        str, described("text about the joint, copied to result files", "gearbox A, drawing 4711")
-    ] = ""
+    description: str = Field(default="", examples=["gearbox A, drawing 4711"])
+    """text about the joint, copied to result files"""
     material: Material
     pin: Pin
     arm: Arm
@@ -69,21 +67,13 @@ class Joint(Strict):
     shaft: Shaft
     bushing: Bushing
     contact: Contact
-    bearing: Annotated[
-        Bearing | None,
-        described(
-            'Needle bearing of each pin: with `law = "needles"` and `n_stations` of the contact, `needles` '
-            "and `needle_length` say how stiff it is; other keys are for its rating life and affect no load",
-            validate_default=True,
-        ),
-    ] = None
-    assumed: Annotated[
-        tuple[Assumed, ...],
-        described(
-            "values of the joint that nobody measured, a table `[[assumed]]` each",
-            [{"name": "H", "values": [{"contact": {"H": 3.0}}], "because": "no drawing gives it"}],
-        ),
-    ] = ()
+    bearing: Bearing | None = Field(default=None, validate_default=True)
+    """Needle bearing of each pin: with `law = "needles"` and `n_stations` of the contact, `needles` and `needle_length`
+    say how stiff it is; other keys are for its rating life and affect no load"""
+    assumed: tuple[Assumed, ...] = Field(
+        default=(), examples=[[{"name": "H", "values": [{"contact": {"H": 3.0}}], "because": "no drawing gives it"}]]
+    )
+    """values of the joint that nobody measured, a table `[[assumed]]` each"""
     _inherited: tuple[Fault, ...] = ()
     _replaced: Mapping[str, str] = {}
 
@@ -259,10 +249,13 @@ def merged(data: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def leaves(table: Mapping[str, Any], before: str = "") -> dict[str, Any]:
-    """Values of a joint by dotted key."""
+    """Values of nested tables by dotted key; tuples become lists, as in JSON."""
     values: dict[str, Any] = {}
     for key, value in table.items():
-        values |= leaves(value, f"{before}{key}.") if isinstance(value, Mapping) else {f"{before}{key}": value}
+        if isinstance(value, Mapping):
+            values |= leaves(value, f"{before}{key}.")
+        else:
+            values[f"{before}{key}"] = list(value) if isinstance(value, tuple) else value
     return values
 
 

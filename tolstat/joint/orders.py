@@ -19,12 +19,12 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, BeforeValidator, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from tolstat.common import units
 from tolstat.common.fields import MAX_ORDERS
-from tolstat.common.strict import Strict, described, refuse
+from tolstat.common.strict import Strict, refuse
 from tolstat.joint import ideal
 from tolstat.joint.material import Array
 
@@ -48,26 +48,24 @@ def _check_whole(n: object) -> object:
 class Order(Strict):
     """One order: its number, and the phase of its wave."""
 
-    n: Annotated[
-        int, BeforeValidator(_check_whole), described("waves in a revolution of the input shaft", 2, strict=True, ge=1)
-    ]
-    phase: Annotated[units.Angle, described("phase of the wave where the mean input angle is zero", "30 deg")] = 0.0
+    n: Annotated[int, BeforeValidator(_check_whole)] = Field(strict=True, ge=1, examples=[2])
+    """waves in a revolution of the input shaft"""
+    phase: units.Angle = Field(default=0.0, examples=["30 deg"])
+    """phase of the wave where the mean input angle is zero"""
 
 
 class TorqueOrder(Order):
     """Order of the resisting torque, amplitude cos(n phase + q)."""
 
-    amplitude: Annotated[units.Torque, units.POSITIVE, described("amplitude of the resisting torque", "40 N*m")]
+    amplitude: Annotated[units.Torque, units.POSITIVE] = Field(examples=["40 N*m"])
+    """amplitude of the resisting torque"""
 
 
 class SpeedOrder(Order):
     """Order of the input angle, amplitude sin(n phase + p), rad."""
 
-    amplitude: Annotated[
-        units.Angle,
-        units.POSITIVE,
-        described('amplitude of the input angle, or of the speed as a share of it: "2 %"', "1 deg"),
-    ]
+    amplitude: Annotated[units.Angle, units.POSITIVE] = Field(examples=["1 deg"])
+    """amplitude of the input angle, or of the speed as a share of it: "2 %" """
 
     @model_validator(mode="before")
     @classmethod
@@ -103,12 +101,12 @@ SpeedOrders = Annotated[
     tuple[SpeedOrder, ...],
     AfterValidator(_check_numbers),
     AfterValidator(_check_turning),
-    described("orders of the speed, { n, amplitude, phase } each", max_length=MAX_GIVEN),
+    Field(max_length=MAX_GIVEN),
 ]
 TorqueOrders = Annotated[
     tuple[TorqueOrder, ...],
     AfterValidator(_check_numbers),
-    described("orders of the resisting torque, { n, amplitude, phase } each", max_length=MAX_GIVEN),
+    Field(max_length=MAX_GIVEN),
 ]
 
 
@@ -197,31 +195,17 @@ def check_misalignment(alpha: float) -> float:
 class Partner(Strict):
     """The other joint of the drive shaft, on the same intermediate shaft."""
 
-    position: Annotated[
-        Literal["before", "after"],
-        described("where the partner is: before this joint, towards the input, or after it", "after"),
-    ]
-    alpha: Annotated[
-        units.Angle,
-        AfterValidator(check_misalignment),
-        described("misalignment of the partner, below 90 deg", "12 deg"),
-    ]
-    offset: Annotated[
-        units.Angle,
-        described(
-            "angle by which the fork of the intermediate shaft at its output end is turned ahead of the "
-            "fork at its input end, less the angle between the planes of the two joints",
-            "90 deg",
-        ),
-    ] = 0.0
-    inertia: Annotated[
-        units.Inertia,
-        described("moment of inertia behind the second joint of the shaft", "0.02 kg*m^2"),
-    ]
-    stiffness: Annotated[
-        units.RotaryStiffness | None,
-        described("torsional stiffness of the intermediate shaft", "2e4 N*m/rad"),
-    ] = None
+    position: Literal["before", "after"] = Field(examples=["after"])
+    """where the partner is: before this joint, towards the input, or after it"""
+    alpha: Annotated[units.Angle, AfterValidator(check_misalignment)] = Field(examples=["12 deg"])
+    """misalignment of the partner, below 90 deg"""
+    offset: units.Angle = Field(default=0.0, examples=["90 deg"])
+    """angle by which the fork of the intermediate shaft at its output end is turned ahead of the fork at its input end,
+    less the angle between the planes of the two joints"""
+    inertia: units.Inertia = Field(examples=["0.02 kg*m^2"])
+    """moment of inertia behind the second joint of the shaft"""
+    stiffness: units.RotaryStiffness | None = Field(default=None, examples=["2e4 N*m/rad"])
+    """torsional stiffness of the intermediate shaft"""
 
     @property
     def in_words(self) -> str:

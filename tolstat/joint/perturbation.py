@@ -14,7 +14,7 @@ from tolstat.common import units
 from tolstat.common.fields import MAX_STATIONS
 from tolstat.common.load_kinds import PINS
 from tolstat.common.loads import split
-from tolstat.common.strict import Strict, described
+from tolstat.common.strict import Strict
 from tolstat.common.tables import ERROR, FACTORS, HOLES, PARAM
 from tolstat.joint import material, orders
 from tolstat.joint.contact import Contact
@@ -40,42 +40,23 @@ ARM_TRIADS: Array = TRIAD[ARM : ARM + 4]
 class Operation(Strict):
     """Operating point of the joint."""
 
-    alpha: Annotated[
-        units.Angle, AfterValidator(check_misalignment), described("misalignment of the shafts, below 90 deg", "15 deg")
-    ]
-    speed: Annotated[
-        units.Speed,
-        AfterValidator(units.not_zero),
-        described(
-            "speed of the input shaft, with orders { mean, orders }, or measured { file }; negative: turns "
-            "the other way",
-            "500 rpm",
-        ),
-    ]
-    torque: Annotated[
-        units.Torque,
-        described(
-            "resisting torque on the output shaft, with orders { mean, orders }, or measured { file }; "
-            "negative: drives the output shaft",
-            "100 N*m",
-        ),
-    ]
-    axial_force: Annotated[
-        units.Force,
-        described(
-            "axial force on an output shaft that is not rigid along its axis; above zero: pulls it away from the joint",
-            "500 N",
-        ),
-    ] = 0.0
+    alpha: Annotated[units.Angle, AfterValidator(check_misalignment)] = Field(examples=["15 deg"])
+    """misalignment of the shafts, below 90 deg"""
+    speed: Annotated[units.Speed, AfterValidator(units.not_zero)] = Field(examples=["500 rpm"])
+    """speed of the input shaft, with orders { mean, orders }, or measured { file }; negative: turns the other way"""
+    torque: units.Torque = Field(examples=["100 N*m"])
+    """resisting torque on the output shaft, with orders { mean, orders }, or measured { file }; negative: drives the
+    output shaft"""
+    axial_force: units.Force = Field(default=0.0, examples=["500 N"])
+    """axial force on an output shaft that is not rigid along its axis; above zero: pulls it away from the joint"""
     speed_orders: Annotated[orders.SpeedOrders, Field(alias="speed.orders")] = ()
+    """orders of the speed, { n, amplitude, phase } each"""
     torque_orders: Annotated[orders.TorqueOrders, Field(alias="torque.orders")] = ()
-    partner: Annotated[
-        Partner | None,
-        described(
-            "the other joint of a drive shaft; speed and torque are then those of the shaft's ends",
-            {"position": "after", "alpha": "12 deg", "inertia": "0.02 kg*m^2"},
-        ),
-    ] = None
+    """orders of the resisting torque, { n, amplitude, phase } each"""
+    partner: Partner | None = Field(
+        default=None, examples=[{"position": "after", "alpha": "12 deg", "inertia": "0.02 kg*m^2"}]
+    )
+    """the other joint of a drive shaft; speed and torque are then those of the shaft's ends"""
 
     _split = model_validator(mode="before")(orders.split)
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from tolstat.common import strict, units
-from tolstat.common.errors import Fault, InputError
+from tolstat.common.errors import Fault, InputError, input_error
 from tolstat.common.files import data_dir
 from tolstat.common.notation import DIAMETER
 from tolstat.common.strict import validate
@@ -22,16 +22,17 @@ DEFAULT_JOINT = "cirelli2021"
 
 
 def load(
-    base: str | Path, overrides: Mapping[str, Any], place: str, relative_to: Path | None = None, section: str = "joint"
+    base: object, overrides: Mapping[str, Any], place: str, relative_to: Path | None = None, section: str = "joint"
 ) -> Joint:
     """Read a joint file and merge a case's own keys over it.
 
     Parameters
     ----------
     base : str or Path
-        Name of a file in ``data/joints`` without ``.toml``, or a path (it ends in ``.toml`` or has a folder).
+        Name of a file in ``data/joints`` without ``.toml``, or a path (it ends in ``.toml`` or has a folder); anything
+        else is a fault.
     overrides : mapping
-        Keys of the case's ``[joint]`` table other than `base`, nested as TOML nests them.
+        Keys of the case's ``[joint]`` table, nested as TOML nests them; its `base` is left out.
     place : str
         Name of the case file, under which faults of `base` and `overrides` are reported.
     relative_to : Path, optional
@@ -49,12 +50,13 @@ def load(
     InputError
         With every fault: those of the joint file under its name, those of `overrides` under `place`.
     """
-    path = _find(base, f"{place}: {section}", relative_to)
+    overrides = {key: value for key, value in overrides.items() if key != "base"}
+    path = _find(base, f"{place}: {section}.base", relative_to)
     text = strict.read_text(path)
     data = strict.read_toml(path, text)
     if "material" not in data and data.keys() & {"joint", "operation", "sampling"}:
         remedy = "give a joint file; tolstat new STUDY.toml --joint own writes one"
-        raise InputError([Fault(str(path), "is a study or case, not a joint file", remedy)])
+        raise input_error(path, "is a study or case, not a joint file", remedy)
     with strict.lines_of(path):
         faults = list(_faults_of_file(path, text))
         if "assumed" in overrides:
@@ -154,7 +156,9 @@ def examples() -> dict[str, Any]:
     return leaves(strict.read_toml(data_dir() / "joints" / f"{DEFAULT_JOINT}.toml"))
 
 
-def _find(base: str | Path, place: str, relative_to: Path | None) -> Path:
+def _find(base: object, place: str, relative_to: Path | None) -> Path:
+    if not isinstance(base, str | Path):
+        raise input_error(place, f"{base!r} is not a text", "give a name in data/joints or a path")
     path = Path(base)
     if path.suffix == ".toml" or len(path.parts) > 1:
         return (relative_to or Path()) / path
@@ -164,7 +168,7 @@ def _find(base: str | Path, place: str, relative_to: Path | None) -> Path:
         return folder / f"{base}.toml"
     close = difflib.get_close_matches(str(base), names, n=1)
     known = f"did you mean {close[0]!r}?" if close else f"write one of {', '.join(names)}, or a path to a .toml file"
-    raise InputError([Fault(f"{place}.base", f"no joint is named {str(base)!r}", known)])
+    raise input_error(place, f"no joint is named {str(base)!r}", known)
 
 
 def _attributed(

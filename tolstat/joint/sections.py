@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Annotated, Any, get_args, get_origin
 
-from pydantic import AfterValidator, BaseModel, ValidationInfo, field_validator
+from pydantic import AfterValidator, BaseModel, Field, ValidationInfo, field_validator
 
 from tolstat.common import units
-from tolstat.common.strict import Strict, described, refuse
+from tolstat.common.strict import Strict, refuse
 from tolstat.common.units import NOT_NEGATIVE, POSITIVE
 from tolstat.joint.derived import DERIVED, PIN_CHI
 
@@ -52,13 +52,12 @@ Triple = Annotated[tuple[units.Inertia, units.Inertia, units.Inertia], AfterVali
 PIN_INERTIA = ["5.78e-5 kg*m^2", "6.42e-5 kg*m^2", "6.42e-5 kg*m^2"]
 ARM_INERTIA = ["1.40e-4 kg*m^2", "5.31e-5 kg*m^2", "1.11e-4 kg*m^2"]
 """Examples: those of the joint of Cirelli et al. (2021)."""
-FOLLOWS: Any = None
-"""Default of a key that follows from others where it is left out."""
 
 
 def follows(key: str, meaning: str, *examples: Any) -> Any:
-    """Field of a key of `DERIVED`: its meaning, and the formula that it follows by."""
-    return described(f"{meaning}; when left out: {DERIVED[key].formula}", *examples)
+    """Field of a key of `DERIVED`, which may be left out: its meaning, and the formula that it follows by."""
+    meaning = f"{meaning}; when left out: {DERIVED[key].formula}"
+    return Field(default=None, description=meaning, examples=list(examples) or None)
 
 
 def quantities(model: type[BaseModel], before: str = "") -> dict[str, str]:
@@ -80,29 +79,30 @@ def quantities(model: type[BaseModel], before: str = "") -> dict[str, str]:
 class Material(Strict):
     """Material of all parts."""
 
-    E: Annotated[Annotated[Stress, AfterValidator(_modulus)], described("Young's modulus")]
-    nu: Annotated[Annotated[units.Number, AfterValidator(_poisson)], described("Poisson's ratio, from 0 to below 0.5")]
-    G: Annotated[Stress, follows("material.G", "shear modulus")] = FOLLOWS
-    rho: Annotated[units.Density, described("density")]
+    E: Annotated[Stress, AfterValidator(_modulus)]
+    """Young's modulus"""
+    nu: Annotated[units.Number, AfterValidator(_poisson)]
+    """Poisson's ratio, from 0 to below 0.5"""
+    G: Stress = follows("material.G", "shear modulus")
+    rho: units.Density
+    """density"""
 
 
 class Pin(Strict):
     """Each of the four pins: a round beam along its axis e, clamped at the hub, its mass lumped at its end."""
 
-    l: Annotated[  # noqa: E741
-        Length,
-        described(
-            "length of the beam, from the hub to the middle of the contact; know it to 1 mm: the torque "
-            "of the bushing is the force times l, or up to l + z/2"
-        ),
-    ]
-    d: Annotated[units.Diameter, described("diameter of the beam")]
-    chi: Annotated[Number, described("shear factor of the section")] = PIN_CHI
-    A: Annotated[units.Area, follows("pin.A", "area of the section")] = FOLLOWS
-    J: Annotated[units.AreaMoment, follows("pin.J", "area moment of the section")] = FOLLOWS
-    Jp: Annotated[units.AreaMoment, follows("pin.Jp", "polar moment of the section")] = FOLLOWS
-    mass: Annotated[units.Mass, follows("pin.mass", "mass")] = FOLLOWS
-    inertia: Annotated[Triple, follows("pin.inertia", "moments of inertia about e, t, z", PIN_INERTIA)] = FOLLOWS
+    l: Length  # noqa: E741
+    """length of the beam, from the hub to the middle of the contact; know it to 1 mm: the torque of the bushing is the
+    force times l, or up to l + z/2"""
+    d: units.Diameter
+    """diameter of the beam"""
+    chi: Number = PIN_CHI
+    """shear factor of the section"""
+    A: units.Area = follows("pin.A", "area of the section")
+    J: units.AreaMoment = follows("pin.J", "area moment of the section")
+    Jp: units.AreaMoment = follows("pin.Jp", "polar moment of the section")
+    mass: units.Mass = follows("pin.mass", "mass")
+    inertia: Triple = follows("pin.inertia", "moments of inertia about e, t, z", PIN_INERTIA)
 
 
 class Arm(Strict):
@@ -111,17 +111,21 @@ class Arm(Strict):
     A rectangular section needs only its `width` and `depth`, a round one `d`; for another give `A`, `Jx` and `Jy`.
     """
 
-    l_f: Annotated[Length, described("length of the beam, from its fork to the hole's centre")]
-    width: Annotated[Length | None, described("side of a rectangular section along t", "58 mm")] = None
-    depth: Annotated[Length | None, described("side of a rectangular section along e, the hole's axis", "21 mm")] = None
-    d: Annotated[units.Diameter | None, described("diameter of a round section", "40 mm")] = None
-    chi: Annotated[Number, follows("arm.chi", "shear factor of the section")] = FOLLOWS
-    A: Annotated[units.Area, follows("arm.A", "area of the section")] = FOLLOWS
-    Jx: Annotated[units.AreaMoment, follows("arm.Jx", "area moment about x, the local t")] = FOLLOWS
-    Jy: Annotated[units.AreaMoment, follows("arm.Jy", "area moment about y, the local e")] = FOLLOWS
-    Jp: Annotated[units.AreaMoment, follows("arm.Jp", "polar moment of the section")] = FOLLOWS
-    mass: Annotated[units.Mass, follows("arm.mass", "mass", "0.3516 kg")] = FOLLOWS
-    inertia: Annotated[Triple, follows("arm.inertia", "moments of inertia about e, t, z", ARM_INERTIA)] = FOLLOWS
+    l_f: Length
+    """length of the beam, from its fork to the hole's centre"""
+    width: Length | None = Field(default=None, examples=["58 mm"])
+    """side of a rectangular section along t"""
+    depth: Length | None = Field(default=None, examples=["21 mm"])
+    """side of a rectangular section along e, the hole's axis"""
+    d: units.Diameter | None = Field(default=None, examples=["40 mm"])
+    """diameter of a round section"""
+    chi: Number = follows("arm.chi", "shear factor of the section")
+    A: units.Area = follows("arm.A", "area of the section")
+    Jx: units.AreaMoment = follows("arm.Jx", "area moment about x, the local t")
+    Jy: units.AreaMoment = follows("arm.Jy", "area moment about y, the local e")
+    Jp: units.AreaMoment = follows("arm.Jp", "polar moment of the section")
+    mass: units.Mass = follows("arm.mass", "mass", "0.3516 kg")
+    inertia: Triple = follows("arm.inertia", "moments of inertia about e, t, z", ARM_INERTIA)
 
     @field_validator("d")
     @classmethod
@@ -136,8 +140,8 @@ class Arm(Strict):
 class Hub(Strict):
     """Middle of the cross, to which the four pins are attached."""
 
-    mass: Annotated[units.Mass, follows("hub.mass", "mass")] = FOLLOWS
-    inertia: Annotated[Triple, follows("hub.inertia", "moments of inertia about x, y, z of the cross")] = FOLLOWS
+    mass: units.Mass = follows("hub.mass", "mass")
+    inertia: Triple = follows("hub.inertia", "moments of inertia about x, y, z of the cross")
 
 
 RIGID, FREE = "rigid", "free"
@@ -150,24 +154,17 @@ class Shaft(Strict):
     A shaft that is not rigid along its axis needs the mass that moves and the damping of its motion.
     """
 
-    Js: Annotated[units.Inertia, described("inertia of the output shaft about its axis")]
-    mass: Annotated[units.Mass | None, described("mass that moves along the axis; needed unless `axial` is rigid")] = (
-        None
+    Js: units.Inertia
+    """inertia of the output shaft about its axis"""
+    mass: units.Mass | None = None
+    """mass that moves along the axis; needed unless `axial` is rigid"""
+    axial_damping: units.Damping | None = None
+    """damping of the motion along the axis, as by grease; needed unless `axial` is rigid"""
+    axial: Annotated[float | str, units.Quantity("N/m", words=(RIGID, FREE)), POSITIVE] = Field(
+        default=RIGID, examples=[FREE]
     )
-    axial_damping: Annotated[
-        units.Damping | None,
-        described("damping of the motion along the axis, as by grease; needed unless `axial` is rigid"),
-    ] = None
-    axial: Annotated[
-        float | str,
-        units.Quantity("N/m", words=(RIGID, FREE)),
-        POSITIVE,
-        described(
-            "what holds the shaft along its axis: `rigid`, nothing gives way; `free`, a spline or a loose "
-            "bearing; or the stiffness of the bearings of both shafts in series",
-            FREE,
-        ),
-    ] = RIGID
+    """what holds the shaft along its axis: `rigid`, nothing gives way; `free`, a spline or a loose bearing; or the
+    stiffness of the bearings of both shafts in series"""
 
     @field_validator("axial")
     @classmethod
@@ -193,40 +190,42 @@ class Shaft(Strict):
 class Cross(Strict):
     """Main dimensions of the cross."""
 
-    R: Annotated[Length, described("distance from the centre of the joint to the middle of pin and hole")]
-    r_b: Annotated[
-        Length, follows("cross.r_b", "distance from the centre of the joint to the marker of a cross bushing")
-    ] = FOLLOWS
+    R: Length
+    """distance from the centre of the joint to the middle of pin and hole"""
+    r_b: Length = follows("cross.r_b", "distance from the centre of the joint to the marker of a cross bushing")
 
 
 class PinBushing(Strict):
     """Stiffness of a pin in beam axes: z along the beam (local e), x the local t, y the local z."""
 
-    k_x: Annotated[Stiffness, follows("bushing.cross.k_x", "shear along x")] = FOLLOWS
-    k_y: Annotated[Stiffness, follows("bushing.cross.k_y", "shear along y")] = FOLLOWS
-    k_z: Annotated[Stiffness, follows("bushing.cross.k_z", "tension")] = FOLLOWS
-    k_bx: Annotated[units.RotaryStiffness, follows("bushing.cross.k_bx", "bending about x")] = FOLLOWS
-    k_by: Annotated[units.RotaryStiffness, follows("bushing.cross.k_by", "bending about y")] = FOLLOWS
-    k_tz: Annotated[units.RotaryStiffness, follows("bushing.cross.k_tz", "torsion")] = FOLLOWS
+    k_x: Stiffness = follows("bushing.cross.k_x", "shear along x")
+    k_y: Stiffness = follows("bushing.cross.k_y", "shear along y")
+    k_z: Stiffness = follows("bushing.cross.k_z", "tension")
+    k_bx: units.RotaryStiffness = follows("bushing.cross.k_bx", "bending about x")
+    k_by: units.RotaryStiffness = follows("bushing.cross.k_by", "bending about y")
+    k_tz: units.RotaryStiffness = follows("bushing.cross.k_tz", "torsion")
 
 
 class ArmBushing(Strict):
     """Stiffness of an arm in beam axes: z along the shaft, x the local t, y the local e."""
 
-    k_x: Annotated[Stiffness, follows("bushing.fork.k_x", "shear along x")] = FOLLOWS
-    k_y: Annotated[Stiffness, follows("bushing.fork.k_y", "shear along y")] = FOLLOWS
-    k_z: Annotated[Stiffness, follows("bushing.fork.k_z", "tension")] = FOLLOWS
-    k_bx: Annotated[units.RotaryStiffness, follows("bushing.fork.k_bx", "bending about x")] = FOLLOWS
-    k_by: Annotated[units.RotaryStiffness, follows("bushing.fork.k_by", "bending about y")] = FOLLOWS
-    k_tz: Annotated[units.RotaryStiffness, follows("bushing.fork.k_tz", "torsion")] = FOLLOWS
+    k_x: Stiffness = follows("bushing.fork.k_x", "shear along x")
+    k_y: Stiffness = follows("bushing.fork.k_y", "shear along y")
+    k_z: Stiffness = follows("bushing.fork.k_z", "tension")
+    k_bx: units.RotaryStiffness = follows("bushing.fork.k_bx", "bending about x")
+    k_by: units.RotaryStiffness = follows("bushing.fork.k_by", "bending about y")
+    k_tz: units.RotaryStiffness = follows("bushing.fork.k_tz", "torsion")
 
 
 class Bushing(Strict):
     """Bushings, the elasticity of pins and arms: three springs and three torsion springs each, eq. (8)."""
 
-    xi: Annotated[Ratio, described("damping ratio: damping is 2 xi sqrt(k m), of rotations 2 xi sqrt(k J)")]
-    cross: Annotated[PinBushing, described("Stiffness of a pin's bushing")] = PinBushing()
-    fork: Annotated[ArmBushing, described("Stiffness of an arm's bushing")] = ArmBushing()
+    xi: Ratio
+    """damping ratio: damping is 2 xi sqrt(k m), of rotations 2 xi sqrt(k J)"""
+    cross: PinBushing = PinBushing()
+    """Stiffness of a pin's bushing"""
+    fork: ArmBushing = ArmBushing()
+    """Stiffness of an arm's bushing"""
 
 
 RIGID_SHAFTS = "shafts rigid along their axes"

@@ -275,8 +275,8 @@ AXES: dict[str, tuple[tuple[str, ...], str]] = {
 def attach_scales(dataset: h5py.Dataset, spec: HistorySpec) -> None:
     """Attach dimension scales to a history: those named in `spec` to all axes but the first."""
     name = dataset.name.rpartition("/")[2]
-    given = spec.axes or tuple(f"{name}_axis{k}" for k in range(1, dataset.ndim))
-    for k, (axis, size) in enumerate(zip(given, spec.shape, strict=True), 1):
+    axes = spec.axes or tuple(f"{name}_axis{k}" for k in range(1, dataset.ndim))
+    for k, (axis, size) in enumerate(zip(axes, spec.shape, strict=True), 1):
         if axis not in dataset.parent:
             put_scale(dataset.parent, axis, *scale_of(axis, size))
         dataset.dims[k].attach_scale(dataset.parent[axis])

@@ -160,11 +160,11 @@ class Writer(Reader):
         shapes = {name: values.shape for name, values in histories.items()}
         if len(results) != len(rows) or shapes != expected or np.any(results["status"] == Status.PENDING):
             raise ValueError("each row of a block needs a result that is not pending, and the histories of the file")
-        kept = {c.name: c.of(results) for c in self.columns}
-        status = {"status": kept.pop("status")}
+        columns = {c.name: c.of(results) for c in self.columns}
+        status = {"status": columns.pop("status")}
         with self._told("cannot be written", "free disk space, " + KEPT):
             self._begin_writing(rows)
-            put(self._place("results"), rows, kept)
+            put(self._place("results"), rows, columns)
             if histories:
                 put(self._place("histories"), rows, histories)
             self._sync()
@@ -211,7 +211,7 @@ class Writer(Reader):
         self.replace(both)
         self._describe(document)
 
-    def begin_retry(self, rows: Mapping[str, NDArray[np.intp]], entry: Mapping[str, Any]) -> None:
+    def mark_pending(self, rows: Mapping[str, NDArray[np.intp]], entry: Mapping[str, Any]) -> None:
         """Mark joints as pending that are to be simulated again, with the settings of `entry`.
 
         Parameters

@@ -132,8 +132,8 @@ def of(tolerances: Sequence[Tolerance], path: Path | None = None) -> list[Cost]:
     if faults:
         toml = path.suffix != ".csv"
         raise InputError(strict.with_lines(faults, str(path), read_input(path)) if toml else faults)
-    kept = CostEntry(cost=0.0, keep=True)
-    read = [Cost(t.width, tuple(costs.get(name, kept) for name in t.names)) for t in tolerances]
+    unchanged = CostEntry(cost=0.0, keep=True)
+    read = [Cost(t.width, tuple(costs.get(name, unchanged) for name in t.names)) for t in tolerances]
     raise_all(
         Fault(f"{path}: {tolerance.pattern}", "costs more than a number can hold", "give a smaller cost, at or power")
         for tolerance, cost in zip(tolerances, read, strict=True)

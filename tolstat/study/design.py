@@ -5,7 +5,7 @@ Listed is every variant of the joint, at every point of a grid, with the errors 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from typing import Any
@@ -90,15 +90,6 @@ def cube(design: str, n: int, dimensions: int, seed: int) -> list[list[float]]:
     if design == "sobol":
         return [[float(share) for share in point] for point in sobol(n, dimensions, seed)]
     return [[number / (n - 1)] * dimensions for number in range(n)]
-
-
-def flat(value: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Leaves of nested tables by dotted key; tuples become lists, as in JSON."""
-    for key, inner in value.items():
-        if isinstance(inner, Mapping):
-            yield from flat(inner, f"{prefix}{key}.")
-        else:
-            yield f"{prefix}{key}", list(inner) if isinstance(inner, tuple) else inner
 
 
 KEYS = {key: unit for key, unit in quantities(Joint).items() if affects_results(key)}

@@ -17,7 +17,7 @@ from tolstat.common.errors import Fault, collected, gather, input_error
 from tolstat.common.loads import LOADS, UNIT_OF_LOAD, load_of, split
 from tolstat.common.strict import dotted, validate
 from tolstat.common.tables import FINEST_STEPS
-from tolstat.joint import Joint
+from tolstat.joint import Joint, reading
 from tolstat.joint.derived import BEARING
 from tolstat.joint.model import Assumed, leaves, merged
 from tolstat.joint.reading import faults_of_assumed
@@ -59,7 +59,7 @@ def _joint(file: Reading) -> Joint | None:
         return None
     if file.fit is not None and isinstance(keys["base"], str):
         keys = _with_diameters(file, keys)
-    return listing.joint_of(file, keys, ("joint",))
+    return reading.load(keys["base"], keys, file.place, file.folder)
 
 
 def _with_diameters(file: Reading, keys: Mapping[str, Any]) -> dict[str, Any]:
@@ -112,15 +112,15 @@ def _limits(file: Reading) -> dict[str, float]:
     """``[limits]``: limit of each load that has one (SI), ``cross1.F`` at all points, ``cross1.F at cruise``."""
     limits: dict[str, float] = {}
     claims = Assignments(file.place)
-    every = [point.name for point in file.points]
+    names_of_points = [point.name for point in file.points]
     for entry in file.entries("limits"):
         with gather(file.faults):
             pattern, where = split(entry.pattern)
             names = selection.resolve(entry._replace(pattern=pattern), UNIT_OF_LOAD, file.place)
             value = selection.quantity(entry, UNIT_OF_LOAD[names[0]], file.place)
-            if every:  # if not, the points have faults of their own
-                chosen = points.names_of(where, every, f"{file.place}: {dotted(entry.path)}")
-                names = [points.at(name, chosen, every) for name in names]
+            if names_of_points:  # if not, the points have faults of their own
+                chosen = points.names_of(where, names_of_points, f"{file.place}: {dotted(entry.path)}")
+                names = [points.at(name, chosen, names_of_points) for name in names]
             claims.claim(entry, names)
             if value <= 0:
                 file.fault(entry.path, f"{entry.value!r} is not positive", "give a limit above zero")

@@ -11,14 +11,14 @@ from pydantic import Field, model_validator
 
 from tolstat import joint
 from tolstat.common import strict, units
-from tolstat.common.errors import Fault, collected, gather, input_error, raise_all
+from tolstat.common.errors import Fault, collected, gather, raise_all
 from tolstat.common.notation import DIAMETER
 from tolstat.common.strict import Strict, refuse
 from tolstat.common.tables import DESIGN, Variant
 from tolstat.joint import Joint, Operation
-from tolstat.joint.model import TOLD, laid_over, nested
+from tolstat.joint.model import TOLD, laid_over, leaves, nested
 from tolstat.study import selection
-from tolstat.study.design import IDEAL, KEYS, MAX_JOINTS, Design, cube, flat
+from tolstat.study.design import IDEAL, KEYS, MAX_JOINTS, Design, cube
 from tolstat.study.model import MAX_ROWS, Solver, SweepAxis, SweepEntry
 from tolstat.study.selection import UNITS, Assignments, Entry, Reading
 from tolstat.study.tolerances.entry import Site
@@ -178,7 +178,7 @@ def swept(file: Reading) -> Design | None:
     for values in product(*(np.linspace(axes[k].start, axes[k].stop, axes[k].points).tolist() for k in dimensions)):
         point = {name: value for k, value in zip(dimensions, values, strict=True) for name in axes[k].names}
         keys = nested({key: units.Quantity(KEYS[key]).written(value) for key, value in point.items()})
-        joints.append(joint_of(file, laid_over(file.data["joint"], keys), ("sweep",)))
+        joints.append(_joint(file, laid_over(file.data["joint"], keys), ("sweep",)))
         variants.append(Variant("sweep", _values(nominal[0], joints[-1], list(point))))
     all_points, first = [axis.points for axis in axes], file.sampling.first_sample
     index = np.unravel_index(np.arange(np.prod(all_points)), all_points)
@@ -240,10 +240,10 @@ def _note_clashes(file: Reading, axes: list[Axis]) -> None:
 
 def _variants(file: Reading, nominal: Nominal, cases: list[str]) -> list[Listed]:
     """Variants without faults in the order of the file, families expanded."""
-    every = list(range(len(cases)))
+    all_cases = list(range(len(cases)))
     entries = file.tables("variant")
     if not entries:
-        return [(Variant("joint", {}), *nominal, every)]
+        return [(Variant("joint", {}), *nominal, all_cases)]
     variants = []
     for number, item in enumerate(entries):
         with gather(file.faults):
@@ -251,22 +251,22 @@ def _variants(file: Reading, nominal: Nominal, cases: list[str]) -> list[Listed]
             unknown = [name for name in entry.cases or () if name not in cases]
             for name in unknown:
                 file.fault(f"variant[{number}].cases", f"no case {name!r}", strict.did_you_mean(name, cases))
-            run = every if entry.cases is None else sorted({0, *map(cases.index, set(entry.cases) - set(unknown))})
+            run = all_cases if entry.cases is None else sorted({0, *map(cases.index, set(entry.cases) - set(unknown))})
             variants += _expanded(file, entry, run, nominal, ("variant", number))
     return variants
 
 
 def _expanded(file: Reading, entry: VariantEntry, run: list[int], nominal: Nominal, at: Section) -> list[Listed]:
     keys = laid_over(file.data["joint"], entry.joint)
-    joints = [joint_of(file, keys, (*at, "joint"))]
+    joints = [_joint(file, keys, (*at, "joint"))]
     ranges = dict(_ranges(entry.vary, (*at, "vary"), file.place))
     if ranges:
         members = _members(file, entry, keys, ranges, (*at, "vary"))
-        joints = [joint_of(file, laid_over(keys, member), (*at, "vary")) for member in members]
+        joints = [_joint(file, laid_over(keys, member), (*at, "vary")) for member in members]
     operation, solver = _settings(file, entry, nominal, at)
     values = {f"operation.{key}": getattr(operation, key) for key in entry.operation}
     values |= {f"solver.{key}": getattr(solver, key) for key in entry.solver}
-    written = [key for key, _ in flat(entry.joint)] + list(ranges)
+    written = [*leaves(entry.joint), *ranges]
     variants = [Variant(entry.name, _values(nominal[0], made, written) | values, entry.note) for made in joints]
     return [(*pair, operation, solver, run) for pair in zip(variants, joints, strict=True)]
 
@@ -292,8 +292,8 @@ def _members(
     """Keys of each joint of a family, as a joint file writes them."""
     assert entry.points is not None
     ends = [{key: getattr(r, end) for key, r in ranges.items()} for end in ("start", "stop")]
-    start, stop = (joint_of(file, laid_over(keys, nested(end)), at) for end in ends)
-    low, high = dict(flat(start.model_dump())), dict(flat(stop.model_dump()))
+    start, stop = (_joint(file, laid_over(keys, nested(end)), at) for end in ends)
+    low, high = leaves(start.model_dump()), leaves(stop.model_dump())
     faults = []
     for key in ranges:
         where = f"{file.place}: {strict.dotted((*at, key))}"
@@ -304,7 +304,7 @@ def _members(
         elif low[key] == high[key]:
             faults.append(Fault(where, "from and to are equal", "write a constant value in joint"))
     raise_all(faults)
-    text = dict(flat(start.model_dump(mode="json")))
+    text = leaves(start.model_dump(mode="json"))
     members = []
     for shares in cube(entry.design, entry.points, len(ranges), entry.seed):
         values = {key: low[key] + s * (high[key] - low[key]) for key, s in zip(ranges, shares, strict=True)}
@@ -312,24 +312,13 @@ def _members(
     return members
 
 
-def joint_of(file: Reading, keys: Mapping[str, Any], at: Section) -> Joint:
-    """Joint of a table ``base`` and keys that replace some of its own.
-
-    Raises
-    ------
-    InputError
-        With its faults.
-    """
-    if not isinstance(keys["base"], str):
-        where = f"{file.place}: {strict.dotted(at)}.base"
-        raise input_error(where, f"{keys['base']!r} is not a text", "give a name in data/joints or a path")
-    overrides = {key: value for key, value in keys.items() if key != "base"}
-    return joint.load(keys["base"], overrides, file.place, file.folder, strict.dotted(at))
+def _joint(file: Reading, keys: Mapping[str, Any], at: Section) -> Joint:
+    return joint.load(keys["base"], keys, file.place, file.folder, strict.dotted(at))
 
 
 def _values(nominal: Joint, made: Joint, written: list[str]) -> dict[str, Any]:
     """Return the keys `written` and all others in which a joint differs from the study's, see `Variant.values`."""
-    before, values = (dict(flat(joint.given())) for joint in (nominal, made))
+    before, values = (leaves(joint.given()) for joint in (nominal, made))
     keys = [key for key in before | values if key not in TOLD]
     return {key: values.get(key) for key in keys if key in written or before.get(key) != values.get(key)}
 

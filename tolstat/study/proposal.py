@@ -142,9 +142,9 @@ def read(file: Reading) -> tuple[Proposal, ...]:
     for number, entry in enumerate(file.models("proposal", ProposalEntry)):
         with gather(file.faults):
             proposals.append(_resolved(entry, file, number))
-    left = 1.0 - math.fsum(p.share for p in proposals)
-    if left < MIN_NOMINAL_SHARE - 1e-12:
-        found = f"shares leave {left:.3g} of the joints to the tolerances"
+    nominal_share = 1.0 - math.fsum(p.share for p in proposals)
+    if nominal_share < MIN_NOMINAL_SHARE - 1e-12:
+        found = f"shares leave {nominal_share:.3g} of the joints to the tolerances"
         file.fault("proposal.share", found, f"give shares with a sum of at most {1.0 - MIN_NOMINAL_SHARE:g}")
     return tuple(proposals)
 

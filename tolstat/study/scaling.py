@@ -19,8 +19,6 @@ from tolstat.study.tolerances.distributions import Distribution
 from tolstat.study.tolerances.entry import Site, Toleranced, ToleranceEntry
 from tolstat.study.tolerances.zones import ZoneEntry
 
-SCALED = ("normal", "uniform", "triangular", "beta", "rayleigh")
-"""Distributions that can be scaled; those of measured parts and lognormal ones cannot."""
 _WIDTHS = ("plus_minus", "std", "sigma", "zone")
 _PLACES = {"lower", "upper", "peak", "mean"}
 
@@ -121,12 +119,7 @@ def tolerances(study: Study) -> list[Tolerance]:
         of_parts = not site.name.startswith(("operation.", "material."))
         refined = any(place.shared and place.name.endswith(".position") for place, _ in entry.models)
         refined |= any(study.has_bonus(place.name) for place, _ in entry.models)
-        if (
-            of_parts
-            and not refined
-            and entry.keys["distribution"] in SCALED
-            and not set(entry.names) & set(study.copula.names)
-        ):
+        if of_parts and not refined and model.scales and not set(entry.names) & set(study.copula.names):
             scalable.append(
                 Tolerance(entry.pattern, entry.names, dict(entry.keys), site, width(entry.keys, site), mark(model))
             )

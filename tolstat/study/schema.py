@@ -60,8 +60,8 @@ def _changed(part: Any, change: Callable[[Schema], Schema]) -> Any:
 @cache
 def of_model(model: type[BaseModel]) -> Schema:
     """JSON schema of a model, with the models inside it in place of references; only the first part of docstrings."""
-    made = model.model_json_schema(by_alias=True)
-    definitions = made.pop("$defs", {})
+    generated = model.model_json_schema(by_alias=True)
+    definitions = generated.pop("$defs", {})
 
     def inlined(part: Schema) -> Schema:
         if "$ref" in part:
@@ -70,7 +70,7 @@ def of_model(model: type[BaseModel]) -> Schema:
             part["description"] = " ".join(part["description"].partition("\n\n")[0].split())
         return part
 
-    schema: Schema = _changed(made, inlined)
+    schema: Schema = _changed(generated, inlined)
     return schema
 
 
@@ -201,8 +201,8 @@ def sections() -> dict[str, Schema]:
 
 
 def _listed(model: type[BaseModel]) -> Schema:
-    made = of_model(model)
-    return {"type": "array", "items": made, "description": made["description"]}
+    item = of_model(model)
+    return {"type": "array", "items": item, "description": item["description"]}
 
 
 def _definitions() -> dict[str, Schema]:
@@ -274,21 +274,21 @@ def schema(kind: str) -> Schema:
     -------
     dict
     """
-    made: Schema = _changed(KINDS[kind](), _finished)
+    document: Schema = _changed(KINDS[kind](), _finished)
     definitions = {name: _changed(part, _finished) for name, part in _definitions().items()}
     used: dict[str, Schema] = {}
-    referring: list[Schema] = [made]
+    referring: list[Schema] = [document]
     while referring:
         names = dict.fromkeys(re.findall(r'"#/definitions/([^"]+)"', json.dumps(referring)))
         referring = [used.setdefault(name, definitions[name]) for name in names if name not in used]
-    return {"$schema": DRAFT} | made | ({"definitions": used} if used else {})
+    return {"$schema": DRAFT} | document | ({"definitions": used} if used else {})
 
 
 def _finished(part: Schema) -> Schema:
     """Schema for editors, of draft 7: without keywords of this package; see `_changed`."""
     if isinstance(part.get("x-table"), str):
-        kept = {key: part[key] for key in ("description", "default", "examples") if key in part}
-        return {"allOf": [{"$ref": f"#/definitions/{part['x-table']}"}]} | kept
+        annotations = {key: part[key] for key in ("description", "default", "examples") if key in part}
+        return {"allOf": [{"$ref": f"#/definitions/{part['x-table']}"}]} | annotations
     part.pop("x-unit", None)
     if isinstance(part.get("prefixItems"), list):
         part["items"] = part.pop("prefixItems")[0]

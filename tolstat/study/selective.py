@@ -197,8 +197,8 @@ def _in_class(u: list[Array], near: Range, within: Range) -> list[Array]:
     either = Range(near.distribution, near.gauge, min(near.low, within.low), max(near.high, within.high))
     drawn, decided = [], np.zeros(len(u[0]), dtype=bool)
     for k, probabilities in enumerate(u):
-        left = len(u) - k
-        q = inside * (low + inside) ** (left - 1) / ((low + inside) ** left - low**left)
+        remaining = len(u) - k
+        q = inside * (low + inside) ** (remaining - 1) / ((low + inside) ** remaining - low**remaining)
         hit = ~decided & (probabilities >= 1.0 - q)
         z = np.empty(len(probabilities))
         for of, here, v in (

@@ -200,14 +200,14 @@ def orders(angle: FloatArray, time: FloatArray, values: FloatArray | None = None
     phases = np.angle(waves[numbers]) - numbers * (angle[0] + ahead)
     whole, repeated = float(signal.var()), float(signal.mean(axis=0).var())
     constant = whole <= (ROUNDING * float(np.abs(signal).max())) ** 2
-    kept = 0.5 * float((size[numbers] ** 2).sum())
+    variance_kept = 0.5 * float((size[numbers] ** 2).sum())
     return Orders(
         mean,
         numbers,
         size[numbers],
         np.arctan2(np.sin(phases), np.cos(phases)),
         math.nan if constant or turns == 1 else max(0.0, 1.0 - repeated / whole),
-        math.nan if constant else max(0.0, repeated - kept) / whole,
+        math.nan if constant else max(0.0, repeated - variance_kept) / whole,
         turns,
     )
 

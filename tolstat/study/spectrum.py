@@ -116,14 +116,14 @@ def duty_cycle(time: FloatArray, torque: FloatArray, speed: FloatArray, alpha: F
     torques = np.sign(sums(revolutions * torque)) * size
     all_visits = _visits(at, revolutions)
     visits = _fewer(all_visits, torques)
-    kept = float(np.sum(_cycles(torques[visits])[1] ** m) / change.sum()) if len(visits) else 0.0
+    damage_of_visits = float(np.sum(_cycles(torques[visits])[1] ** m) / change.sum()) if len(visits) else 0.0
     return DutyCycle(
         sums(revolutions * alpha) / turns,
         np.sign(sums(revolutions * speed)) * 2.0 * np.pi * turns / seconds,
         torques,
         seconds / weight[turning].sum(),
         sums(damage) / damage.sum(),
-        kept,
+        damage_of_visits,
         float(weight[~turning].sum() / weight.sum()),
         visits,
         len(all_visits) - len(visits),
@@ -166,17 +166,17 @@ def _visits(at: NDArray[np.intp], revolutions: FloatArray) -> NDArray[np.intp]:
 def _fewer(visits: NDArray[np.intp], torques: FloatArray) -> NDArray[np.intp]:
     """Leave out visits until `VISITS` are left: turning points of the torque with changes above a rising threshold."""
     for change in np.append(-1.0, np.unique(np.abs(torques[:, None] - torques))):
-        kept, up = list(visits[:1]), 0.0
+        chosen, up = list(visits[:1]), 0.0
         for point in visits[1:]:
-            step = torques[point] - torques[kept[-1]]
+            step = torques[point] - torques[chosen[-1]]
             if change < 0 or (abs(step) > change and step * up <= 0):
-                kept.append(point)
+                chosen.append(point)
                 up = step
             elif step * up > 0:
-                kept[-1] = point
-        if len(kept) <= VISITS:
+                chosen[-1] = point
+        if len(chosen) <= VISITS:
             break
-    return np.array(kept[:VISITS], np.intp)
+    return np.array(chosen[:VISITS], np.intp)
 
 
 def read(path: Path, m: float) -> DutyCycle:
@@ -218,9 +218,9 @@ def text(cycle: DutyCycle, source: Path, path: Path, base: Path | None = None) -
     InputError
         When the base cannot be changed.
     """
-    given = starter.study_text(path, JOINT) if base is None else read_text(base)
+    study = starter.study_text(path, JOINT) if base is None else read_text(base)
     try:
-        document = tomlkit.parse(given)
+        document = tomlkit.parse(study)
     except tomlkit.exceptions.TOMLKitError as error:
         raise input_error(base, f"is not TOML: {error}", "give a study that tolstat plan reads") from error
     document.pop("operation", None)

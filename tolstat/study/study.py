@@ -18,11 +18,11 @@ from tolstat.common.loads import UNIT_OF_LOAD, limits_in_words, split
 from tolstat.common.strict import dotted, with_lines
 from tolstat.common.tables import DESIGN, Variant
 from tolstat.joint import Joint, Operation, affecting_results
-from tolstat.joint.model import Assumed
+from tolstat.joint.model import Assumed, leaves
 from tolstat.joint.sections import mounting_and_law
 from tolstat.study import points
 from tolstat.study.axes import Axis
-from tolstat.study.design import Design, flat
+from tolstat.study.design import Design
 from tolstat.study.fatigue import Fatigue
 from tolstat.study.model import Output, Sampling, Solver, SweepAxis
 from tolstat.study.points import Point, Setting, limits_at, only_one
@@ -339,4 +339,4 @@ class Study(Case):
             "swept": [variant.values for variant in self.swept.variants] if self.swept else [],
         }
         parts |= {name: part for name, part in optional.items() if part}
-        return dict(flat(parts | (self.listed.identity() if self.listed else {})))
+        return leaves(parts | (self.listed.identity() if self.listed else {}))

@@ -249,7 +249,7 @@ def size(study: Study, line: Group) -> str:
         return study.fit.entry.code
     sizes, drawn = set(), _drawn(study)
     for entry, site, model in map(drawn.__getitem__, line.names):
-        if entry.keys["distribution"] not in scaling.SCALED:
+        if not model.scales:
             return ""
         size = units.shown(scaling.width(entry.keys, site), site.unit)
         sizes.add(scaling.marked(scaling.mark(model), size))

@@ -182,8 +182,8 @@ def correlated(copula: Copula, lots: Mapping[str, Lot], place: str) -> Copula:
     if both:
         remedy = "remove one of the two; errors of one entry are correlated by lot = { share = ..., shared = true }"
         raise input_error(f"{place}: {dotted(('correlation',))}", f"{both[0]} has a lot already", remedy)
-    every = [lot.score for lot in lots.values()]
-    names = [name for name, lot in lots.items() if every.count(lot.score) > 1]
+    scores_of_lots = [lot.score for lot in lots.values()]
+    names = [name for name, lot in lots.items() if scores_of_lots.count(lot.score) > 1]
     scores, shares = (np.array([lots[name][i] for name in names]) for i in (1, 0))
     shared = np.where(scores[:, None] == scores, shares[:, None], 0.0)
     np.fill_diagonal(shared, 1.0)

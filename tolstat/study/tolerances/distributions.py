@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tolstat.common.errors import input_error
 from tolstat.common.late import special
 
 Array = NDArray[np.float64]
@@ -87,6 +88,10 @@ class Distribution(ABC):
     def describe(self) -> dict[str, Any]:
         """Kind and parameters, as JSON values: everything that determines the values drawn."""
 
+    def openturns(self, ot: Any) -> Any:
+        """Return the same distribution of OpenTURNS, of its module `ot`; raises an InputError where there is none."""
+        raise input_error(type(self).__name__, "has no equal in OpenTURNS", "take the unit cube: openturns(cube=True)")
+
 
 @dataclass(frozen=True)
 class Described(Distribution):
@@ -131,6 +136,10 @@ class Normal(Described):
         """See `Distribution.moments`."""
         return Moments(self.mean, self.sigma)
 
+    def openturns(self, ot: Any) -> Any:
+        """See `Distribution.openturns`."""
+        return ot.Normal(self.mean, self.sigma)
+
 
 @dataclass(frozen=True)
 class TruncatedNormal(Described):
@@ -165,6 +174,10 @@ class TruncatedNormal(Described):
         """See `Distribution.logpdf`."""
         return _within(self.lower, self.upper, x, Normal(self.mean, self.sigma).logpdf(x) - math.log(self._span[2]))
 
+    def openturns(self, ot: Any) -> Any:
+        """See `Distribution.openturns`."""
+        return ot.TruncatedNormal(self.mean, self.sigma, self.lower, self.upper)
+
 
 @dataclass(frozen=True)
 class Uniform(Described):
@@ -184,6 +197,10 @@ class Uniform(Described):
     def logpdf(self, x: Array) -> Array:
         """See `Distribution.logpdf`."""
         return _within(self.lower, self.upper, x, np.full_like(x, -math.log(self.upper - self.lower)))
+
+    def openturns(self, ot: Any) -> Any:
+        """See `Distribution.openturns`."""
+        return ot.Uniform(self.lower, self.upper)
 
 
 @dataclass(frozen=True)
@@ -216,6 +233,10 @@ class Triangular(Described):
             height = np.log(np.where(x < self.peak, rising, np.where(x > self.peak, falling, 1.0)))
         return _within(self.lower, self.upper, x, height + math.log(2.0 / (self.upper - self.lower)))
 
+    def openturns(self, ot: Any) -> Any:
+        """See `Distribution.openturns`."""
+        return ot.Triangular(self.lower, self.peak, self.upper)
+
 
 @dataclass(frozen=True)
 class LogNormal(Described):
@@ -238,6 +259,14 @@ class LogNormal(Described):
         above = x > self.threshold
         y = np.log(np.where(above, x - self.threshold, 1.0))
         return np.where(above, self.log.logpdf(y) - y, -np.inf)
+
+    def openturns(self, ot: Any) -> Any:
+        """See `Distribution.openturns`."""
+        whole = ot.LogNormal(self.log.mean, self.log.sigma, self.threshold)
+        if isinstance(self.log, Normal):
+            return whole
+        ends = (self.threshold + float(np.exp(end)) for end in (self.log.lower, self.log.upper))
+        return ot.TruncatedDistribution(whole, *ends)
 
 
 @dataclass(frozen=True)
@@ -264,6 +293,10 @@ class Beta(Described):
         t = np.clip((x - self.lower) / width, 0.0, 1.0)
         power = special.xlogy(self.a - 1, t) + special.xlog1py(self.b - 1, -t)
         return _within(self.lower, self.upper, x, np.asarray(power - special.betaln(self.a, self.b) - math.log(width)))
+
+    def openturns(self, ot: Any) -> Any:
+        """See `Distribution.openturns`."""
+        return ot.Beta(self.a, self.b, self.lower, self.upper)
 
 
 @dataclass(frozen=True)
@@ -317,6 +350,10 @@ class Measured(Distribution):
     def describe(self) -> dict[str, Any]:
         """See `Distribution.describe`."""
         return {"distribution": "measured", "count": self.values.size, "digest": self.digest}
+
+    def openturns(self, ot: Any) -> Any:
+        """See `Distribution.openturns`."""
+        return ot.UserDefined(self.values[:, None].tolist())
 
 
 def probability(distribution: Distribution, values: Array) -> Array:

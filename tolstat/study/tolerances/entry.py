@@ -10,7 +10,7 @@ import math
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple, Self
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, WithJsonSchema, model_validator
@@ -121,6 +121,9 @@ PositiveLength = Annotated[units.Length, AfterValidator(units.positive)]
 
 class ToleranceEntry(strict.Strict):
     """Base of the entries: what an entry draws, and what it means."""
+
+    scales: ClassVar[bool] = True
+    """Whether a factor on its widths gives an entry of the same shape."""
 
     @abstractmethod
     def quantities(self, site: Site) -> dict[str, Distribution]:
@@ -322,8 +325,8 @@ def meanings(entries: Sequence[Toleranced]) -> pd.DataFrame:
                 rows.setdefault(key, {}).update(dict.fromkeys(name.partition(".")[2] for name in meaning.errors))
     columns = ["entry", "number", "unit", "sigma", "outside", "errors"]
     cells = [(*key[:4], float(key[4]), _pattern(list(keys))) for key, keys in rows.items()]
-    made = pd.DataFrame(cells, columns=columns)
-    return made[["entry", "number", "errors", "unit", "sigma", "outside"]]
+    table = pd.DataFrame(cells, columns=columns)
+    return table[["entry", "number", "errors", "unit", "sigma", "outside"]]
 
 
 def _pattern(keys: Sequence[str]) -> str:

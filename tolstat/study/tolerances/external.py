@@ -99,6 +99,13 @@ class ScipyLaw(Distribution):
         band = {key: end for key, end in (("lower", self.lower), ("upper", self.upper)) if end is not None}
         return {"distribution": f"{PREFIX}{self.name}", **dict(self.parameters), "unit": self.unit, **band}
 
+    def openturns(self, ot: Any) -> Any:
+        """See `Distribution.openturns`."""
+        ends = [self.ends[0]], [self.ends[1]], [self.lower is not None], [self.upper is not None]
+        whole = ot.Distribution(ot.SciPyDistribution(self.whole))
+        inside = ot.TruncatedDistribution(whole, ot.Interval(*ends))
+        return ot.CompositeDistribution(ot.SymbolicFunction("x", f"{self.unit!r} * x"), inside)
+
 
 class ScipyEntry(SingleEntry):
     """Continuous law of scipy.stats with literal numbers, such as `"scipy:weibull_min(c=1.8, scale=0.012)"`.
@@ -106,6 +113,7 @@ class ScipyEntry(SingleEntry):
     `loc` and `scale` have the unit `unit`. Parts outside `lower` and `upper` are sorted out.
     """
 
+    scales = False
     distribution: str = Field(pattern=f"^{PREFIX}", examples=["scipy:weibull_min(c=1.8, scale=0.012)"])
     """name and parameters of the law"""
     unit: str | None = Field(default=None, examples=["mm"])
@@ -150,10 +158,10 @@ def _parsed(text: str) -> tuple[str, tuple[tuple[str, float], ...]]:
         call = ast.parse(text.strip() if len(text) <= MAX_LENGTH else "", mode="eval").body
         if not (isinstance(call, ast.Call) and isinstance(call.func, ast.Name)):
             raise ValueError("no call of a name")
-        given = [(str(keyword.arg), ast.literal_eval(keyword.value)) for keyword in call.keywords]
-        placed = [ast.literal_eval(value) for value in call.args]
+        by_name = [(str(keyword.arg), ast.literal_eval(keyword.value)) for keyword in call.keywords]
+        by_position = [ast.literal_eval(value) for value in call.args]
         name = call.func.id
-        if any(type(value) not in (int, float) for value in (*placed, *(value for _, value in given))):
+        if any(type(value) not in (int, float) for value in (*by_position, *(value for _, value in by_name))):
             raise ValueError("not only numbers")
     except (SyntaxError, ValueError, TypeError, MemoryError, RecursionError) as error:
         raise refuse(f"{text[:MAX_LENGTH]!r} is no law with numbers", EXAMPLE) from error
@@ -162,9 +170,9 @@ def _parsed(text: str) -> tuple[str, tuple[tuple[str, float], ...]]:
         raise refuse(f"scipy.stats has no continuous law {name!r}", did_you_mean(name, sorted(laws)))
     shapes = laws[name].shapes.split(", ") if laws[name].shapes else []
     allowed = [*shapes, "loc", "scale"]
-    pairs = [*zip(allowed, placed, strict=False), *given]
+    pairs = [*zip(allowed, by_position, strict=False), *by_name]
     names = [key for key, _ in pairs]
-    if len(placed) > len(allowed) or len(set(names)) < len(names) or not set(shapes) <= set(names) <= set(allowed):
+    if len(by_position) > len(allowed) or len(set(names)) < len(names) or not set(shapes) <= set(names) <= set(allowed):
         raise refuse(f"{text!r} does not give each parameter once", f"{name} has {', '.join(allowed)}")
     return name, tuple(
         (str(key), float(value)) for key, value in sorted(pairs, key=lambda pair: allowed.index(pair[0]))
@@ -181,6 +189,7 @@ class MeasuredEntry(SingleEntry):
     With `law` mean and deviation of the sample are those of the parts, and the study knows that they are estimates.
     """
 
+    scales = False
     distribution: Literal["measured"]
     file: str | None = Field(default=None, examples=["rattle.csv"])
     """path of the CSV file, from the study's folder"""

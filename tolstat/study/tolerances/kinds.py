@@ -15,7 +15,7 @@ from pydantic import Field
 from tolstat.analysis.process import LEAST_PARTS, MOST_PARTS
 from tolstat.common import strict
 from tolstat.common.errors import gather, input_error
-from tolstat.common.strict import described, refuse
+from tolstat.common.strict import refuse
 from tolstat.common.tables import FACTORS
 from tolstat.study.axes import ORIENTATIONS, REJECT, Axis, Bonus, columns_of
 from tolstat.study.selection import TOLERANCED, Entry, Reading
@@ -42,7 +42,7 @@ from tolstat.study.tolerances.zone_laws import Accepted, Rayleigh
 from tolstat.study.tolerances.zones import CoaxialityEntry, OrientationEntry, PositionEntry, axes_of
 
 CPK = "capability index Cpk of the process: sigma is the distance from the mean to the nearer limit over 3 Cpk"
-Cpk = Annotated[PositiveNumber | None, described(f"{CPK}; 1 unless given", 1.33)]
+Cpk = Annotated[PositiveNumber | None, Field(description=f"{CPK}; 1 unless given", examples=[1.33])]
 
 
 class NormalEntry(Banded):
@@ -125,6 +125,7 @@ class TriangularEntry(Banded):
 class LogNormalEntry(Banded):
     """The logarithm of the value above `threshold` is normal: by band and Cpk of the logarithm, or by mean and std."""
 
+    scales = False
     distribution: Literal["lognormal"]
     threshold: Value = Field(default=0.0, examples=["-0.01 mm"])
     """least possible value; 0 unless given"""
@@ -304,8 +305,10 @@ class Tolerances(NamedTuple):
     @property
     def distributions(self) -> dict[str, Distribution]:
         """Distribution of each quantity that is drawn: of the diameters of pins and holes that are accepted."""
-        made = {name: law for entry in self.entries for name, law in entry.quantities.items()}
-        return made | {bonus.diameter: Accepted(made[bonus.diameter], bonus) for bonus in self.rejecting}
+        of_quantities = {name: law for entry in self.entries for name, law in entry.quantities.items()}
+        return of_quantities | {
+            bonus.diameter: Accepted(of_quantities[bonus.diameter], bonus) for bonus in self.rejecting
+        }
 
     @property
     def lots(self) -> dict[str, Lot]:

@@ -278,7 +278,7 @@ def axes_of(entries: Sequence[Toleranced], reach: float, place: str) -> dict[str
                 zones.setdefault(feature, {})[key] = (model, dotted(("tolerances", entry.pattern)))
                 if isinstance(model, PositionEntry):
                     bonus[feature] = model.bonus(site)
-    made, faults = {}, []
+    axis_of, faults = {}, []
     for name, of_axis in zones.items():
         position = of_axis.get("position", (None, ""))[0]
         room, over = math.inf, math.nan
@@ -289,10 +289,10 @@ def axes_of(entries: Sequence[Toleranced], reach: float, place: str) -> dict[str
                     model, where = of_axis[key]
                     room = position.band if position.bounded else math.inf
                     faults += _contradictions(model, position, f"{place}: {where}")
-        made[name] = Axis(name, over, room, reach if name in PAIRS else math.nan, bonus.get(name))
+        axis_of[name] = Axis(name, over, room, reach if name in PAIRS else math.nan, bonus.get(name))
     if faults:
         raise InputError(list(dict.fromkeys(faults)))
-    return made
+    return axis_of
 
 
 def short_axes(entries: Sequence[Toleranced], length: float) -> Iterator[tuple[str, str, str]]:

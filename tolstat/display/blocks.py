@@ -96,9 +96,13 @@ class Panel:
     size : tuple of float
         Width and height in inches at its natural scale.
     left : float
-        Room for the labels of the y axis, inches.
+        Least room for the labels of the y axis, inches.
     top : float
-        Room above the axes, inches.
+        Least room above the axes, inches.
+    rows : sequence of str
+        Labels of the horizontal rows of the picture, the first on top; none for a picture with a y axis.
+    has_legend : bool
+        Whether artists that have labels are named in a legend above the axes.
     reads : tuple of str
         Loads whose exceedance the picture shows, for the cursor.
     bare : bool
@@ -115,6 +119,8 @@ class Panel:
     size: tuple[float, float] = (5.0, 3.5)
     left: float = 0.72
     top: float = 0.26
+    rows: Sequence[str] = ()
+    has_legend: bool = True
     reads: tuple[str, ...] = ()
     bare: bool = False
     switches: Sequence[tuple[str, str]] = ()

@@ -174,7 +174,9 @@ def _load_panel(load: Sample) -> Panel:
     scale = "logarithmic" if load.long_tailed else "linear"
     title = f"{load.name}: distribution of the joints"
     words = f"Half of the joints are below {median}, 95 % below {most}; scale of loads {scale}"
-    return Panel(f"histogram-{load.name}", title, words, partial(_draw_load, load=load), (drawing.WIDTH, 2.7))
+    return Panel(
+        f"histogram-{load.name}", title, words, partial(_draw_load, load=load), (drawing.WIDTH, 2.7), has_legend=False
+    )
 
 
 def _draw_load(ax: Axes, load: Sample) -> None:
@@ -187,7 +189,7 @@ def _draw_load(ax: Axes, load: Sample) -> None:
         words, at = f"limit {text.value(load.limit, load.unit)}", (load.limit, 1.015)
         ax.annotate(words, at, xycoords=ax.get_xaxis_transform(), ha="center", va="bottom")
     if load.long_tailed:
-        unit = drawing.log_loads(ax, 0.95 * low, 1.05 * high, load.limit or high, load.unit)
+        unit = drawing.log_loads(ax.xaxis, 0.95 * low, 1.05 * high, load.limit or high, load.unit)
     else:
         margin = 0.03 * (high - low)
         ax.set_xlim(low - margin, high + margin)

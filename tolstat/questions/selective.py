@@ -135,16 +135,15 @@ def selective(*views: View) -> Answer:
     def draw(ax: Axes) -> None:
         """Draw yield with its interval, unmatched share, and share of all crosses in a good joint, over the classes."""
         x = [row["classes"] for row in rows]
-        for key, colour, dash in zip(LINES, style.COLOURS, style.DASHES, strict=False):
-            ax.plot(x, [100.0 * row[key] for row in rows], marker="o", ms=4.5, color=colour, ls=dash)
+        for (key, label), colour, dash in zip(LINES.items(), style.COLOURS, style.DASHES, strict=False):
+            y = [100.0 * row[key] for row in rows]
+            ax.plot(x, y, marker="o", ms=4.5, color=colour, ls=dash, label=label)
         low, high = ([100.0 * row[end] for row in rows] for end in ("good_lower", "good_upper"))
-        drawing.legend_above(ax, ax.lines, list(LINES.values()))
         ax.vlines(x, low, high, color=style.COLOURS[0], lw=1.2)
         ax.set(xlabel="classes", ylabel="share [%]", ylim=(-2.0, 102.0), xticks=x)
 
-    top = drawing.legend_room(list(LINES.values()))
     description = "; ".join(f"{row['classes']} classes: yield {text.percent(row['good'])}" for row in rows)
-    panel = Panel("classes", TITLE, description, draw, (drawing.WIDTH, 3.4), top=top)
+    panel = Panel("classes", TITLE, description, draw, (drawing.WIDTH, 3.4))
     table = Table("classes", "Yield and unmatched parts, by number of classes", COLUMNS, rows, {"clearance": "m"})
     return Answer("selective", TITLE, [Panels([panel]), table, *NOTES])
 

@@ -174,11 +174,9 @@ def _row(view: View, load: Sample, stage: str, kept: FloatArray | None, rejected
 
 def _panel(rows: Rows) -> Panel:
     """Picture of the share above the limits at each stage."""
-    labels = [row["stage"] for row in rows]
 
     def draw(ax: Axes) -> None:
         """Draw the share above the limits at each stage, with its interval, and beside it what a good joint costs."""
-        drawing.rows(ax, labels)
         high = 1.25 * max(float(row["upper"]) for row in rows)
         ax.set(xlim=(0.0, 100.0 * high), xlabel="share of the joints above a limit, per cent")
         for i, row in enumerate(rows):
@@ -190,4 +188,5 @@ def _panel(rows: Rows) -> Panel:
 
     size = (drawing.WIDTH, 0.55 * len(rows) + drawing.BOTTOM + 0.1)
     description = "; ".join(f"{row['stage']}: {text.percent(row['estimate'])}" for row in rows)
-    return Panel("stages", "Joints above a limit, before and after", description, draw, size, drawing.rows_left(labels))
+    labels = [row["stage"] for row in rows]
+    return Panel("stages", "Joints above a limit, before and after", description, draw, size, rows=labels)

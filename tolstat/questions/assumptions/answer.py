@@ -135,7 +135,6 @@ def bars(standing: variations.Standing) -> Panel:
         shown = np.array([share, accepted, *ends])
         known = shown[shown >= 0.5 / max(standing.n, 1)]
         floor, high = 0.6 * float(known.min(initial=0.1)), min(1.2 * float(known.max(initial=0.1)), 1.0)
-        drawing.rows(ax, labels)
         ax.set_ylim(len(labels) - 0.4, -1.3)  # a row above, for the accepted share in words
         style.share_axis(ax, floor, "x", high)
         drawn = max(share, floor)
@@ -152,9 +151,8 @@ def bars(standing: variations.Standing) -> Panel:
     moving = "; ".join(f"{row['label']} {text.percent(row['share'])}" for row in rows)
     description = f"As drawn {text.percent(share)}. {moving or 'Nothing that is assumed moves it'}"
     size = drawing.WIDTH, 0.27 * (len(labels) + 1) + drawing.BOTTOM + 0.3
-    left = drawing.rows_left(labels)
     title = "Share of the joints above a limit, with other values of what is assumed"
-    return Panel("assumptions", title, description, draw, size, left)
+    return Panel("assumptions", title, description, draw, size, rows=labels)
 
 
 FURTHER = 4

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Container, Iterator, Sequence
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,8 +34,6 @@ SPREAD = (0.05, 0.5, 0.95)
 TITLE = "Causes over the input angle"
 LINES = 4
 """Number of errors whose share is drawn."""
-LOADS = ("5 to 95 % of the joints", "median", "without errors")
-"""Labels of the lines of a load."""
 OVER_REVOLUTION = "Share of the variance over the whole revolution, every angle weighted by its variance"
 
 
@@ -290,32 +288,30 @@ def _panels(indices: AgainstAngle) -> Iterator[Panel]:
 
     def draw_loads(ax: Axes) -> None:
         theta = theta_axis(ax, indices.angles)
-        ax.fill_between(theta, closed(low), closed(high), color=style.COLOURS[0], alpha=0.2, lw=0, label=LOADS[0])
-        ax.plot(theta, closed(middle), color=style.COLOURS[0], label=LOADS[1])
+        band = "5 to 95 % of the joints"
+        ax.fill_between(theta, closed(low), closed(high), color=style.COLOURS[0], alpha=0.2, lw=0, label=band)
+        ax.plot(theta, closed(middle), color=style.COLOURS[0], label="median")
         if np.isfinite(indices.nominal).all():
-            ax.plot(theta, closed(indices.nominal), color=style.INK, lw=1.0, ls=(0.0, (4.0, 2.0)), label=LOADS[2])
+            nominal: Any = {"color": style.INK, "lw": 1.0, "ls": (0.0, (4.0, 2.0)), "label": "without errors"}
+            ax.plot(theta, closed(indices.nominal), **nominal)
         ax.set_ylabel(f"|{key}| [{unit}]")
         ax.set_ylim(0.0, 1.05 * max(high.max(), np.nan_to_num(indices.nominal).max()))
-        drawing.legend_above(ax, *ax.get_legend_handles_labels())
 
     def draw_shares(ax: Axes) -> None:
-        theta, ceiling = theta_axis(ax, indices.angles), 0.0
-        for i, name in enumerate(leading):
-            share, lower, upper = (100.0 * closed(end[i]) for end in indices.first[:3])
-            if np.isfinite(lower).all():
-                ax.fill_between(theta, lower, upper, color=style.COLOURS[i], alpha=0.15, lw=0)
-            ax.plot(theta, share, color=style.COLOURS[i], ls=style.DASHES[i], label=name)
-            ceiling = max(ceiling, float(np.nanmax(np.where(np.isfinite(upper), upper, share), initial=0.0)))
-        ax.set(ylim=(0.0, 1.05 * max(ceiling, 1.0)), ylabel="share of the variance [%]")
-        drawing.legend_above(ax, *ax.get_legend_handles_labels())
+        estimate, lower, upper = (100.0 * closed(end[: len(leading)]) for end in indices.first[:3])
+        has_bands = np.isfinite(lower).all()
+        curves = dict(zip(leading, zip(estimate, lower, upper, strict=True), strict=True))
+        drawing.curves(ax, theta_axis(ax, indices.angles), curves, bands=LINES if has_bands else 0)
+        ceiling = float(np.nanmax(upper if has_bands else estimate, initial=1.0))
+        ax.set(ylim=(0.0, 1.05 * ceiling), ylabel="share of the variance [%]")
 
     description = (
         f"Median of the joints between {middle.min():.4g} and {middle.max():.4g} {unit} over the input angle; "
         f"95 % of the joints stay below {high.max():.4g} {unit} everywhere"
     )
-    size, room = (4.9, 3.1), drawing.legend_room
-    yield Panel(f"angle-{key}", f"{key} over the revolution", description, draw_loads, size, top=room(LOADS))
+    size = (drawing.WIDTH, 3.1)
+    yield Panel(f"angle-{key}", f"{key} over the revolution", description, draw_loads, size)
     estimates = zip(leading, indices.overall.estimate, strict=False)
     description = f"Over the whole revolution: {', '.join(f'{name} {100 * x:.1f} %' for name, x in estimates)}"
     title = f"{indices.quantity}: share of the variance over the input angle"
-    yield Panel(f"angle-shares-{key}", title, description, draw_shares, size, top=room(leading))
+    yield Panel(f"angle-shares-{key}", title, description, draw_shares, size)

@@ -170,8 +170,8 @@ def leading_panel(view: View, name: str) -> Panel:
         ax.set_ylabel("share of joints above x")
 
     title, description = f"{name}: share of the joints above x", f"{name}: {description}"
-    looks: Any = {"size": (4.9, 3.7), "reads": (name, *others), "switches": switches}
-    return Panel(f"leading-{name}", title, description, draw, **looks)
+    looks: Any = {"reads": (name, *others), "switches": switches, "has_legend": False}
+    return Panel(f"leading-{name}", title, description, draw, (drawing.WIDTH, 3.7), **looks)
 
 
 def reader(view: View) -> Reader:
@@ -196,7 +196,6 @@ def forest_panel(rows: Rows, accepted: float) -> Panel:
 
     def draw(ax: Axes) -> None:
         """Estimate, interval and total interval of each limit, on an axis from the least to the largest of them."""
-        drawing.rows(ax, labels)
         style.share_axis(ax, min(0.7 * shown.min(initial=high), 0.3 * high), "x", high)
         low, blue = ax.get_xlim()[0], style.COLOURS[0]
         for i, (row, span) in enumerate(zip(rows, spans, strict=True)):
@@ -211,5 +210,5 @@ def forest_panel(rows: Rows, accepted: float) -> Panel:
             ax.text(accepted, -0.75, f"accepted: {text.percent(accepted)}", ha="center", va="bottom")
         ax.set_xlabel("share of the joints above the limit")
 
-    size, left = (4.9, drawing.rows_height(len(rows))), max(1.4, drawing.rows_left(labels))
-    return Panel("forest", "Share of the joints above each limit", description, draw, size, left)
+    size = (drawing.WIDTH, drawing.rows_height(len(rows)))
+    return Panel("forest", "Share of the joints above each limit", description, draw, size, 1.4, rows=labels)

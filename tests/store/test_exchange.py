@@ -51,15 +51,9 @@ def test_statistics_are_of_a_sample(tmp_path):
     assert "--by is used with --statistics only" in done.stderr
 
 
-def test_what_is_not_installed_is_said_before_anything_is_written(tmp_path, monkeypatch):
-    monkeypatch.setattr("tolstat.cli.export.find_spec", lambda name: None)
+def test_what_is_not_installed_is_said(tmp_path, monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "xarray", None)
-    path, out = synthetic.store(tmp_path), tmp_path / "x.csv"
-    done = export(path, "--parquet", tmp_path / "x.parquet", "--csv", out)
-    assert done.exit_code == 2
-    assert "pip install pyarrow" in done.stderr
-    assert not out.exists()
-    with ResultFile.open(path) as store, pytest.raises(InputError, match="pip install xarray"):
+    with ResultFile.open(synthetic.store(tmp_path)) as store, pytest.raises(InputError, match="pip install xarray"):
         store.to_xarray()
 
 
@@ -92,46 +86,11 @@ def test_damage_is_found_before_anything_goes_to_standard_output(tmp_path, monke
 def test_parquet_has_columns_units_and_rows(tmp_path):
     pytest.importorskip("pyarrow")
     path, out = synthetic.store(tmp_path, failed=2), tmp_path / "x.parquet"
-    assert export(path, "--parquet", out).exit_code == 0
-    frame = pd.read_parquet(out)
     with ResultFile.open(path) as store:
+        store.to_pandas().to_parquet(out)
+        frame = pd.read_parquet(out)
         pd.testing.assert_frame_equal(frame, store.to_pandas(), check_like=False, check_index_type=False)
     assert frame.attrs["units"]["cross1.T_max"] == "N*m"
-
-
-@pytest.mark.slow
-def test_excel_has_sheets_for_joints_limits_and_units(tmp_path):
-    openpyxl = pytest.importorskip("openpyxl")
-    path, out = synthetic.store(tmp_path, failed=2, unsettled=3), tmp_path / "x.xlsx"
-    assert export(path, "--xlsx", out).exit_code == 0
-    book = openpyxl.load_workbook(out)
-    assert book.sheetnames == ["joints", "limits", "units"]
-    joints = pd.read_excel(out, sheet_name="joints", index_col="row")
-    with ResultFile.open(path) as store:
-        view, frame = store.view(), store.to_pandas()
-        share = view.load("cross1.F").above(700.0)
-        nominal = store.nominal["cross1.F"]
-    pd.testing.assert_frame_equal(joints, frame, check_dtype=False, check_index_type=False, check_exact=False)
-    limits = pd.read_excel(out, sheet_name="limits", index_col="load").loc["cross1.F"]
-    assert limits[["limit", "unit", "above", "joints"]].tolist() == [700.0, "N", share.count, 55]
-    assert limits[["share", "lower", "upper", "nominal"]].tolist() == pytest.approx(
-        [share.estimate, share.lower, share.upper, nominal]
-    )
-    units = pd.read_excel(out, sheet_name="units", index_col="column")
-    assert units["unit"].astype(str).to_dict() == frame.attrs["units"]
-    assert units.loc["pin1.offset_e", "meaning"] == ERROR_COLUMNS[0].description
-    assert export(path, "--xlsx", out, "--nominal").exit_code == 0
-    marked = pd.read_excel(out, sheet_name="joints", index_col="row")
-    assert marked["nominal"].tolist() == [True] + [False] * 60
-
-
-def test_excel_of_a_sweep_has_limits_without_shares(tmp_path):
-    pytest.importorskip("openpyxl")
-    path, out = synthetic.store(tmp_path, f'{synthetic.SWEEP}[limits]\n"psi" = 0.01\n', "sweep"), tmp_path / "x.xlsx"
-    assert export(path, "--xlsx", out).exit_code == 0
-    limits = pd.read_excel(out, sheet_name="limits")
-    assert limits.iloc[0, :3].tolist() == ["psi", 0.01, 1]
-    assert limits.iloc[0, 3:].isna().all()
 
 
 def test_the_nominal_joint_is_exported_if_asked_for(tmp_path):

@@ -88,7 +88,7 @@ def write_report(
     list of Path
         The files written: for ``FILE.h5`` ``FILE_exceedance.png``, ``.svg`` and ``.csv``, ``FILE_quantiles.csv`` and,
         with limits, ``FILE_limits.csv``; for a sweep ``FILE_sweep.png``, ``.svg`` and ``.csv``; for listed joints
-        ``FILE_cases.csv`` and, where variants have notes, ``FILE_cases.md``.
+        ``FILE_cases.csv``.
 
     Raises
     ------

@@ -83,7 +83,7 @@ MISLEADING = {
 @pytest.fixture(autouse=True)
 def _without_pictures(monkeypatch):
     monkeypatch.setattr("tolstat.display.style.save", lambda figure, stem: [])
-    monkeypatch.setattr("tolstat.questions.exceedance.curves.sheet", lambda view, subtitle: None)
+    monkeypatch.setattr("tolstat.questions.exceedance.curves.sheet", lambda view, notes: None)
     monkeypatch.setattr("tolstat.report.page.sections_of", lambda view, asked: [])
 
 

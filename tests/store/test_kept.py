@@ -224,7 +224,7 @@ def test_reports_show_what_there_is() -> None:
     held = ["cross1.F", "cross2.F", "cross3.F", "cross4.F", "fork2.T"]
     assert list(dict.fromkeys(row["load"] for row in rows.quantile_rows(made))) == held
     assert list(dict.fromkeys(row["load"] for row in rows.curve_rows(made))) == held
-    assert texts(curves.sheet(made, "")).count("not kept by the study") == 2
+    assert texts(curves.sheet(made, [])).count("not kept by the study") == 2
     assert "cross1.T, cross2.T" in rows.not_kept(made)
     assert all(0 <= row["estimate"] <= 1 for row in rows.limit_rows(made))
 

@@ -92,7 +92,7 @@ class Panel:
     description : str
         Text alternative for readers who cannot see the picture.
     draw : callable
-        Function that draws the picture into given axes.
+        Function that draws the picture into given axes; artists with labels are named in a legend above these.
     size : tuple of float
         Width and height in inches at its natural scale.
     left : float
@@ -101,8 +101,6 @@ class Panel:
         Least room above the axes, inches.
     rows : sequence of str
         Labels of the horizontal rows of the picture, the first on top; none for a picture with a y axis.
-    has_legend : bool
-        Whether artists that have labels are named in a legend above the axes.
     reads : tuple of str
         Loads whose exceedance the picture shows, for the cursor.
     bare : bool
@@ -120,7 +118,6 @@ class Panel:
     left: float = 0.72
     top: float = 0.26
     rows: Sequence[str] = ()
-    has_legend: bool = True
     reads: tuple[str, ...] = ()
     bare: bool = False
     switches: Sequence[tuple[str, str]] = ()

@@ -49,11 +49,14 @@ def _place(panel: Panel, top: float) -> tuple[float, float, float, float]:
     """Position of the axes as fractions of the panel's size: left, bottom, width, height; `top` inches are above."""
     if panel.bare:
         return (0.0, 0.0, 1.0, 1.0)
-    # rows: 0.064 inches a letter of the longest line of a label
+    (width, height), left = panel.size, _left(panel)
+    return (left / width, BOTTOM / height, 1.0 - (left + RIGHT) / width, 1.0 - (BOTTOM + top) / height)
+
+
+def _left(panel: Panel) -> float:
+    """Room for the labels of the y axis, inches: for those of rows 0.064 a letter of the longest line."""
     letters = [len(line) for label in panel.rows for line in label.split("\n")]
-    left = max(panel.left, 1.2, 0.064 * max(letters) + 0.12) if letters else panel.left
-    (width, height), across, along = panel.size, left + RIGHT, BOTTOM + top
-    return (left / width, BOTTOM / height, 1.0 - across / width, 1.0 - along / height)
+    return max(panel.left, 1.2, 0.064 * max(letters) + 0.12) if letters else panel.left
 
 
 def _draw(ax: Axes, panel: Panel) -> float:
@@ -62,11 +65,11 @@ def _draw(ax: Axes, panel: Panel) -> float:
         rows(ax, panel.rows)
     panel.draw(ax)
     entries = {label: handle for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)}
-    if not (entries and panel.has_legend):
+    if not entries:
         return panel.top
     labels = list(entries)
     # as many columns, filled one after the other, as fit the width of the axes
-    width = ax.get_window_extent().width / ax.figure.dpi
+    width = panel.size[0] - _left(panel) - RIGHT
     for columns in range(len(labels), 0, -1):
         lines = -(-len(labels) // columns)
         letters = sum(max(map(len, labels[i : i + lines])) for i in range(0, len(labels), lines))

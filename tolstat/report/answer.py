@@ -122,7 +122,7 @@ def write(
 def _tables(view: View, accepted: float) -> Iterator[Part]:
     """Tables for people, limits or else quantiles; the other ones and the curves as numbers, and their picture."""
     if view.bushing_loads:
-        yield Sheet("exceedance", lambda: curves.sheet(view, f"{view.head()}\n{exceedance.note(view)}"))
+        yield Sheet("exceedance", lambda: curves.sheet(view, [view.head(), exceedance.note(view)]))
     if not view.shown_loads:
         yield Sentence("no largest load is kept; the results that are: tolstat export", "lead")
     for table in exceedance.quantile_tables(view):

@@ -208,7 +208,9 @@ def _panel(facts: Mapping[str, Any], use: FloatArray, values: FloatArray) -> Pan
     def draw(ax: Axes) -> None:
         above, unit = values > limit, unit_text(facts["unit"])  # nowhere without a limit
         for here, colour, label in ((~above, style.COLOURS[0], "within the limit"), (above, style.COLOURS[1], "above")):
-            ax.plot(use[here], values[here], "o", color=colour, ms=3.4, alpha=0.6, mew=0, label=label)
+            ax.plot(
+                use[here], values[here], "o", color=colour, ms=3.4, alpha=0.6, mew=0, label=label if has_limit else None
+            )
         if values.min() > 0.0 and values.max() > 3.0 * np.median(values):
             low, high = 0.9 * values.min(), 1.1 * values.max()
             unit = drawing.log_loads(ax.yaxis, low, high, high, facts["unit"])
@@ -219,4 +221,4 @@ def _panel(facts: Mapping[str, Any], use: FloatArray, values: FloatArray) -> Pan
 
     description = f"{facts['name']}: rank correlation {facts['correlation']:.2f} over {use.size} joints"
     title, size = f"{load} against the share of the clearance used", (drawing.WIDTH, 3.6)
-    return Panel(f"pairs-{load}", title, description, draw, size, has_legend=has_limit)
+    return Panel(f"pairs-{load}", title, description, draw, size)

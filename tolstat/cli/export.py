@@ -28,7 +28,6 @@ def export(
     joints: Annotated[str | None, Opt("OUT", name="csv", writes=True)] = None,
     cycles: Annotated[str | None, Opt("OUT", name="pylife", writes=True)] = None,
     statistics: Annotated[str | None, Opt("OUT", writes=True)] = None,
-    by: Annotated[list[str] | None, Opt("LOAD")] = None,
     accepted: Accepted = math.nan,
     nominal: bool = False,
     point: Point = None,
@@ -45,7 +44,7 @@ def export(
     If the study has several operating points, --statistics is of the worst of them, and the other files need --point.
 
     --statistics writes the verdict, the share above each limit, quantiles, capability, the numerical error and the
-    versions.
+    versions; causes of a load: tolstat causes FILE --by LOAD --json.
 
     --pylife writes the cycles per revolution, one row per joint, channel and class of range and mean, if the study
     keeps cycles or load histories. To read it as a pandas Series: tolstat docs fatigue
@@ -60,8 +59,6 @@ def export(
         Write load cycles as CSV for pyLife; - for standard output.
     statistics : str, optional
         Write all statistics as JSON; - for standard output.
-    by : list of str, optional
-        With --statistics: load whose causes are included, such as cross1.F; repeatable.
     nominal : bool
         Include the joint without errors, marked by a column.
     """
@@ -69,7 +66,6 @@ def export(
     repeated = not targets or len(set(targets)) < len(targets)
     wrong = {
         "give one or more of --csv, --statistics and --pylife, each with its own file OUT": repeated,
-        "--by is used with --statistics only: add --statistics OUT": by and statistics is None,
         "--accept is used with --statistics only: add --statistics OUT": accepted == accepted and statistics is None,
         "--nominal is used with --csv and --pylife: add one of them": nominal and targets == [statistics],
     }
@@ -85,7 +81,6 @@ def export(
             _tell(cycles, f"cycles of {table['joint'].nunique()} joints")
         if statistics is not None:
             values = library.reports.statistics(view, accepted=accepted)
-            values["causes"] = {load: library.causes.causes(view, load).values() for load in by or ()}
             write(statistics, lambda out: out.write(json_of(values) + "\n"))
             _tell(statistics, "all statistics")
         if joints is not None:
@@ -147,8 +142,8 @@ def report(
         _page(file, out, accepted, again, point or "", full, brief)
         return
     with library.stores.viewed(file) as view:
-        if out is not None:
-            check_target(out / file.stem)
+        stem = (out or file.parent) / (f"{file.stem}_{point}" if point else file.stem)
+        check_target(stem)
         with progress("report"):
             answer = library.reports.report(view.at(point or ""), accepted)
         deliver(answer, wide, as_json)
@@ -156,8 +151,8 @@ def report(
             return
         if note := library.recorded.note_on_mounting(view.store):
             say(f"note: {note}")
-        with progress("files") as shown:
-            files = library.reports.write(answer, view.path, out, point or "", shown.stage)
+        with progress("files"):
+            files = answer.write(stem)
     for path in files:
         say(f"wrote {path}")
 

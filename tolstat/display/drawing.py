@@ -62,7 +62,11 @@ def _left(panel: Panel) -> float:
 def _draw(ax: Axes, panel: Panel) -> float:
     """Draw a panel with its rows and its legend, and return the room above the axes, inches."""
     if panel.rows:
-        rows(ax, panel.rows)
+        ax.set_yticks(range(len(panel.rows)), panel.rows)
+        ax.set_ylim(len(panel.rows) - 0.4, -0.6)
+        ax.tick_params(axis="y", length=0)
+        ax.grid(axis="y", visible=False)
+        ax.spines["left"].set_visible(False)
     panel.draw(ax)
     entries = {label: handle for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)}
     if not entries:
@@ -145,15 +149,6 @@ def _inline(drawn: str, panel: Panel) -> str:
     title, description = (escape(unseen.visible(words)) for words in (panel.title, panel.description))
     texts = f'<title id="{panel.key}-title">{title}</title><desc id="{panel.key}-desc">{description}</desc>'
     return head + texts + body[body.index(">") + 1 :].strip()
-
-
-def rows(ax: Axes, labels: Sequence[str]) -> None:
-    """Label the horizontal rows of a panel, the first row on top."""
-    ax.set_yticks(range(len(labels)), labels)
-    ax.set_ylim(len(labels) - 0.4, -0.6)
-    ax.tick_params(axis="y", length=0)
-    ax.grid(axis="y", visible=False)
-    ax.spines["left"].set_visible(False)
 
 
 def curves(

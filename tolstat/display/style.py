@@ -141,11 +141,6 @@ def mark(ax: Axes, x: float, y: float, colour: str) -> None:
     ax.plot(x, y, "v", color=colour, label="nominal joint", **look)
 
 
-def note(ax: Axes, text: str, y: float) -> None:
-    """Write a note on a horizontal line, at its right end."""
-    ax.annotate(text, (1.0, y), (-2, 3), ax.get_yaxis_transform(), "offset points", ha="right", fontsize=9)
-
-
 def save(figure: Figure, stem: Path, suffixes: tuple[str, ...] = (".png", ".svg")) -> list[Path]:
     """Write a figure in each format; the same figure gives the same bytes.
 

@@ -213,14 +213,14 @@ def sides(a: View, b: View) -> Sides:
 
 def _names(a: View, b: View, by: Sequence[str], limited: Sequence[str]) -> list[str]:
     """Loads whose quantiles and means are compared; checks that both files keep them and the loads with limits."""
-    kept = [name for name in a.kept_loads if name in b.kept_loads]
+    common = [name for name in a.kept_loads if name in b.kept_loads]
     asked = dict.fromkeys(by, "--by") | {name: f"limits.{name}" for name in limited}
     raise_all(
-        Fault(option, f"{name!r} is not a load that both files keep", did_you_mean(name, kept))
+        Fault(option, f"{name!r} is not a load that both files keep", did_you_mean(name, common))
         for name, option in asked.items()
-        if name not in kept
+        if name not in common
     )
-    return list(by) or list(dict.fromkeys(limited)) or [name for name in a.shown_loads if name in kept]
+    return list(by) or list(dict.fromkeys(limited)) or [name for name in a.shown_loads if name in common]
 
 
 def _share(both: Sides, name: str, level: float) -> Row:
@@ -240,8 +240,8 @@ def _statistics(both: Sides, name: str) -> Rows:
 def _switched(both: Sides, name: str, level: float) -> Iterator[Row]:
     loads = both.load(name)
     a, b = (load.values for load in loads)
-    here = np.isfinite(a) & np.isfinite(b) & ((a > level) != (b > level))
-    for row, of_a, of_b in zip(both.rows[here].tolist(), a[here].tolist(), b[here].tolist(), strict=True):
+    differs = np.isfinite(a) & np.isfinite(b) & ((a > level) != (b > level))
+    for row, of_a, of_b in zip(both.rows[differs].tolist(), a[differs].tolist(), b[differs].tolist(), strict=True):
         yield {"row": row, "load": name, "unit": loads[0].unit, "level": level, "a": of_a, "b": of_b}
 
 

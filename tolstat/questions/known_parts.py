@@ -68,12 +68,12 @@ def known_parts(view: View) -> Answer:
         raise shares.inapplicable(view, "has no share that measured parts leave open", remedy)
     rows = [_row(view, process, name) for name in (*view.limits, *([ANY_LIMIT] if len(view.limits) > 1 else []))]
     rows.sort(key=lambda row: (row["load"] != ANY_LIMIT, -row["estimate"]))
-    given = [row for row in rows if not math.isnan(row["both_upper"])][:DRAWN]
+    drawn = [row for row in rows if not math.isnan(row["both_upper"])][:DRAWN]
     entries = ", ".join(f"{entry.pattern} from {entry.parts}" for entry in process.entries)
     words = (f"Mean and deviation are estimated from measured parts: {entries}.", EXPLANATION)
-    parts: list[Part] = [Panels([_panel(given)], beside=list(map(Sentence, words)))] if given else []
+    parts: list[Part] = [Panels([_panel(drawn)], beside=list(map(Sentence, words)))] if drawn else []
     parts.append(Table("intervals", "Shares above the limits, with what leaves them open", COLUMNS, rows))
-    if len(given) < min(len(rows), DRAWN):
+    if len(drawn) < min(len(rows), DRAWN):
         most = text.percent(max(row["unsupported"] for row in rows))
         parts.append(Sentence(f"The joints do not support {most} of the likely processes. {process.remedy}.", "lead"))
     return Answer("known_parts", "Tolerances known from measured parts", parts)

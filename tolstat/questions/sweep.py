@@ -148,8 +148,8 @@ def _draw(ax: Axes, view: View, axes: list[Axis], group: str, kind: Kind) -> Non
     bottom, top = ax.get_ylim()
     for limit in sorted({view.limits[name] for name in loads if name in view.limits}):
         if limit < top + 0.5 * (top - bottom):
-            ax.axhline(limit, color=style.INK, lw=1.3, ls=(0.0, (8.0, 3.0)))
-            style.note(ax, f"limit {text.value(limit, kind.unit)}", limit)
+            label = f"limit {text.value(limit, kind.unit)}"
+            ax.axhline(limit, color=style.INK, lw=1.3, ls=(0.0, (8.0, 3.0)), label=label)
 
 
 def _line(ax: Axes, view: View, axis: Axis, values: FloatArray, joints: NDArray[np.intp], **look: Any) -> None:

@@ -246,5 +246,5 @@ def _further(view: View, accepted: float, n: int) -> tuple[list[variations.Varia
     second = (1.0 + standing.confidence) / 2.0
     needed = {row["label"]: MARGIN * binomial.needed(row["share"], accepted, second) for row in standing.undecided}
     numbers = {label: number for label, number in needed.items() if number <= FURTHER * n}
-    every = {each.label: each for each in (*variations.singles(view.study), *variations.all_together(view))}
-    return [every[label] for label in numbers], math.ceil(max(numbers.values(), default=n))
+    by_label = {each.label: each for each in (*variations.singles(view.study), *variations.all_together(view))}
+    return [by_label[label] for label in numbers], math.ceil(max(numbers.values(), default=n))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Container, Iterator, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -94,15 +94,14 @@ def angles(
     (indices,) = against_angle(view, [load], joints, (load,) if logarithm else ())
     std = np.sqrt(indices.first.variance).tolist()
     rows = [
-        {"theta": theta, "load": load, "unit": indices.unit, "std": std[k], "error": name}
+        {"theta": theta, "load": load, "unit": indices.facts["unit"], "std": std[k], "error": name}
         | with_ends("share", (end[i, k] for end in indices.first[:3]))
         for k, theta in enumerate(indices.angles.tolist())
         for i, name in enumerate(indices.names)
     ]
     parts = _parts([indices], indices.names[:top])
     parts.insert(2, Table("angles", "Shares at each input angle", (), rows, {"theta": "rad"}))
-    keys = ("load", "unit", "logarithm", "joints", "origin", "apart", "additive")
-    return Answer("angles", TITLE, parts, {key: getattr(indices, key) for key in keys})
+    return Answer("angles", TITLE, parts, indices.facts)
 
 
 def angles_on_page(view: View, asked: Asked) -> Answer:
@@ -123,18 +122,11 @@ class AgainstAngle(NamedTuple):
 
     Attributes
     ----------
-    load : str
-        ``cross1.F``: the load at an angle, not its largest over the revolution.
-    unit : str
-        SI unit of the load.
-    logarithm : bool
-        Whether the variance of the logarithm is decomposed.
-    quantity : str
-        Name of the decomposed quantity: the load, or its logarithm.
-    joints : int
-        Number of joints evaluated.
-    origin, apart
-        As in `revolutions.Revolutions`.
+    facts : mapping
+        ``load`` (the load at an angle, not its largest over the revolution), its SI ``unit``; ``logarithm``, whether
+        the variance of the logarithm is decomposed; ``joints`` evaluated; ``origin`` and ``apart``, as in
+        `revolutions.Revolutions`; ``additive``, share of the variance over the revolution that all errors explain
+        alone.
     angles : ndarray, shape (k,)
         Input angles, rad.
     nominal : ndarray, shape (k,)
@@ -147,24 +139,20 @@ class AgainstAngle(NamedTuple):
         Shares of the variance at each angle, (d, k); variance (k,).
     overall : FirstOrder
         Shares over the whole revolution, (d,).
-    additive : float
-        Share of the variance over the revolution that all errors explain alone.
     """
 
-    load: str
-    unit: str
-    logarithm: bool
-    quantity: str
-    joints: int
-    origin: str
-    apart: float
+    facts: Mapping[str, Any]
     angles: FloatArray
     nominal: FloatArray
     spread: FloatArray
     names: tuple[str, ...]
     first: FirstOrder
     overall: FirstOrder
-    additive: float
+
+    @property
+    def quantity(self) -> str:
+        """Name of the decomposed quantity: the load, or its logarithm."""
+        return f"log {self.facts['load']}" if self.facts["logarithm"] else str(self.facts["load"])
 
 
 def against_angle(
@@ -211,10 +199,11 @@ def against_angle(
         of_angles = sensitivity.over_revolution(x, np.log(y) if is_log else y, iid=iid)
         order = np.argsort(-of_angles[1].estimate, kind="stable")
         first, overall = (FirstOrder._make((*(end[order] for end in i[:3]), i.variance)) for i in of_angles)
-        head = name, CHANNELS[name].unit, is_log, f"log {name}" if is_log else name, len(y)
-        revolution = histories.origin, histories.apart, histories.angles, drawn, _quantiles(y)
-        indices = tuple(names[i] for i in order), first, overall, float(np.nansum(overall.estimate))
-        each.append(AgainstAngle(*head, *revolution, *indices))
+        facts = {"load": name, "unit": CHANNELS[name].unit, "logarithm": is_log, "joints": len(y)}
+        facts |= {"origin": histories.origin, "apart": histories.apart}
+        facts["additive"] = float(np.nansum(overall.estimate))
+        ordered = tuple(names[i] for i in order)
+        each.append(AgainstAngle(facts, histories.angles, drawn, _quantiles(y), ordered, first, overall))
     return each
 
 
@@ -261,29 +250,29 @@ def theta_axis(ax: Axes, theta: FloatArray) -> FloatArray:
 def _parts(each: Sequence[AgainstAngle], shown: Container[str]) -> list[Part]:
     """Pictures; shares over the revolution, of which people see those of the errors `shown`; a note."""
     rows = [
-        {"load": indices.load, "error": name, **with_ends("share", (end[i] for end in indices.overall[:3]))}
+        {"load": indices.facts["load"], "error": name, **with_ends("share", (end[i] for end in indices.overall[:3]))}
         | {"largest": float(indices.first.estimate[i, k]), "theta": float(indices.angles[k])}
         for indices in each
         for i, (name, k) in enumerate(zip(indices.names, indices.first.estimate.argmax(axis=1), strict=True))
     ]
     seen = [row for row in rows if row["error"] in shown]
     table = Table("revolution", OVER_REVOLUTION, COLUMNS, rows, {"theta": "rad"}, seen)
-    first = each[0]
-    alone = (f"{100 * indices.additive:.0f} % of the variance of {indices.quantity}" for indices in each)
+    first = each[0].facts
+    alone = (f"{100 * indices.facts['additive']:.0f} % of the variance of {indices.quantity}" for indices in each)
     note = (
-        f"All errors alone explain {', '.join(alone)}. Over the input angle: the first {first.joints} settled joints, "
-        f"{ORIGIN[first.origin]}; bands are the 95 % intervals at each angle. Shares are corrected for chance: an "
-        "error without effect has the mean share 0, and its estimate may be negative."
+        f"All errors alone explain {', '.join(alone)}. Over the input angle: the first {first['joints']} settled "
+        f"joints, {ORIGIN[first['origin']]}; bands are the 95 % intervals at each angle. Shares are corrected for "
+        "chance: an error without effect has the mean share 0, and its estimate may be negative."
     )
-    if first.apart:
-        apart = f"The largest loads differ by up to {first.apart:.1e} (relative) from the stored ones"
+    if first["apart"]:
+        apart = f"The largest loads differ by up to {first['apart']:.1e} (relative) from the stored ones"
         note += f" {apart}, which another machine or version computed."
     return [Panels([panel for indices in each for panel in _panels(indices)]), table, Sentence(note)]
 
 
 def _panels(indices: AgainstAngle) -> Iterator[Panel]:
     """Load over the revolution, and shares of its variance."""
-    key, unit, leading = indices.load, unit_text(indices.unit), indices.names[:LINES]
+    key, unit, leading = indices.facts["load"], unit_text(indices.facts["unit"]), indices.names[:LINES]
     low, middle, high = indices.spread
 
     def draw_loads(ax: Axes) -> None:

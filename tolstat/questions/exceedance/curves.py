@@ -46,12 +46,12 @@ def sheet(view: View, notes: Sequence[str]) -> Figure:
 
 def _group_panel(view: View, group: str, kind: Kind) -> Panel:
     """Curves of one kind of loads at the cross or fork bushings."""
-    kept = {i: view.load(x) for i, x in enumerate(names_of(group, kind)) if x in view.bushing_loads}
-    loads = {i: load for i, load in kept.items() if load.valid.size}
+    samples = {i: view.load(x) for i, x in enumerate(names_of(group, kind)) if x in view.bushing_loads}
+    loads = {i: load for i, load in samples.items() if load.valid.size}
 
     def draw(ax: Axes) -> None:
         if not loads:
-            drawing.empty(ax, "no joint with a valid result" if kept else "not kept by the study")
+            drawing.empty(ax, "no joint with a valid result" if samples else "not kept by the study")
             return
         high, _ = _draw(ax, loads)
         unit = drawing.loads_axis(ax.xaxis, max((x.limit for x in loads.values() if x.limit), default=high), kind.unit)

@@ -38,16 +38,12 @@ def test_cells_of_text_are_no_formulas() -> None:
 
 
 def test_exports_hold_no_formulas(tmp_path: Path) -> None:
-    openpyxl = pytest.importorskip("openpyxl")
     path = synthetic.store(tmp_path, CASES)
-    book = tmp_path / "a.xlsx"
-    ended = corruption.call(["export", path, "--csv", "-", "--xlsx", book], tmp_path)
+    ended = corruption.call(["export", path, "--csv", "-"], tmp_path)
     assert ended.code == 0, ended.err
     rows = list(csv.reader(StringIO(ended.out)))
     cases = [row[rows[0].index("case")] for row in rows[2:]]
     assert cases[1:] == ["'" + FORMULAS[0]]
-    sheet = openpyxl.load_workbook(book)["joints"]
-    assert not [cell for row in sheet.iter_rows() for cell in row if cell.data_type == "f"]
 
 
 def test_standard_error_moves_no_cursor(capsys: pytest.CaptureFixture[str]) -> None:

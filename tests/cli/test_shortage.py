@@ -110,7 +110,6 @@ def test_a_page_that_does_not_fit_the_disk_leaves_the_old_one(tmp_path: Path, mo
     "words",
     [
         ("export", "--csv", "new.csv"),
-        ("export", "--xlsx", "new.xlsx"),
         ("merge", "--out", "new.h5"),
         ("report", "--out", "new.html"),
     ],
@@ -119,8 +118,6 @@ def test_a_page_that_does_not_fit_the_disk_leaves_the_old_one(tmp_path: Path, mo
 def test_a_full_disk_ends_in_one_message_and_leaves_no_half_file(words: tuple[str, str, str], tmp_path: Path) -> None:
     """No file may become longer than 20 kB: the system refuses what lies beyond, as on a full disk."""
     command, option, new = words
-    if option == "--xlsx":
-        pytest.importorskip("openpyxl")
     path = synthetic.store(tmp_path)
     names, content = sorted(tmp_path.iterdir()), path.read_bytes()
     _, hard = resource.getrlimit(resource.RLIMIT_FSIZE)

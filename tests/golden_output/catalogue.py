@@ -108,7 +108,6 @@ MAIN = Campaign(
             "export iso2768_f.h5 --csv joints.csv --statistics - --accept '10 %'",
             "export iso2768_f.h5 --pylife cycles.csv",
             "export iso2768_f.h5",
-            "export iso2768_f.h5 --statistics - --by cross1.F",
         ],
         "refused": [
             "causes iso2768_f.h5",

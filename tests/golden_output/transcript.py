@@ -24,8 +24,8 @@ PROCESS = "process: "
 ROUGH, SHAPE = "rough: ", "shape: "
 """Before a command whose numbers depend on the processor, by linear algebra in it: the first are compared roughly, of
 the second words and tables alone."""
-SHOWN_FILES = {".csv", ".json", ".toml", ".html", ".md"}
-RESULT_FILES = {".h5", ".png", ".svg", ".parquet", ".xlsx"}
+SHOWN_FILES = {".csv", ".json", ".toml", ".html"}
+RESULT_FILES = {".h5", ".png", ".svg"}
 ENVIRONMENT = {"COLUMNS": "80", "LINES": "40", "TERM": "dumb", "NO_COLOR": "1"}
 
 

@@ -177,7 +177,7 @@ def figure(rows: Sequence[Row], about: str) -> Figure:
         through = [last.wall * x / last.joints for x in ends]
         time.plot(ends, through, color=style.FAINT, lw=0.9, zorder=1, label="in proportion to the number of joints")
         time.set(xlim=ends, ylim=heights)
-        style.legend(page, *time.get_legend_handles_labels())
+        page.legend(*time.get_legend_handles_labels(), loc="lower center", ncols=5, fontsize=9.5)
     return page
 
 

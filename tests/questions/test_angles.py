@@ -93,7 +93,7 @@ def known(tmp_path, monkeypatch):
 def test_each_error_has_its_share_where_it_acts(known):
     with ResultFile.open(known) as store:
         found = against_angle(store.view(), ["cross2.F"], 800)[0]
-    assert (found.joints, found.names[:2]) == (800, ("pin1.offset_t", "pin3.offset_z"))
+    assert (found.facts["joints"], found.names[:2]) == (800, ("pin1.offset_t", "pin3.offset_z"))
     assert found.nominal == pytest.approx(np.full(12, 600.0))
     square = np.stack([400.0 * np.cos(found.angles) ** 2, 100.0 * np.sin(found.angles) ** 2])
     assert found.first.estimate[:2] == pytest.approx(square / square.sum(axis=0), abs=0.1)
@@ -156,7 +156,7 @@ def test_shares_that_are_no_more_than_chance_have_no_minus_before_zero():
 def test_components_and_loads_of_shafts_have_shares_in_their_unit(known):
     with ResultFile.open(known) as store:
         found = against_angle(store.view(), ["fork1.T_e", "output.moment", "output.f_x"], 400)
-    assert [angle.unit for angle in found] == ["N*m", "N*m", "N"]
+    assert [angle.facts["unit"] for angle in found] == ["N*m", "N*m", "N"]
     assert all(angle.names[0] == "pin1.offset_t" for angle in found)
 
 

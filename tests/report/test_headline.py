@@ -83,7 +83,7 @@ MISLEADING = {
 @pytest.fixture(autouse=True)
 def _without_pictures(monkeypatch):
     monkeypatch.setattr("tolstat.display.style.save", lambda figure, stem: [])
-    monkeypatch.setattr("tolstat.questions.exceedance.curves.sheet", lambda view, subtitle: None)
+    monkeypatch.setattr("tolstat.questions.exceedance.curves.sheet", lambda view, notes: None)
     monkeypatch.setattr("tolstat.report.page.sections_of", lambda view, asked: [])
 
 
@@ -102,10 +102,10 @@ def everywhere(path, accepted):
         first = page.compose(made, Asked(path, accepted)).sections[0]
     decision = next(block for block in first.blocks if isinstance(block, Decision))
     card, place = decision.verdicts[0], decision.picture.title.partition(":")[0]
-    assert place == "The joint" if card.value == "no verdict" else f" on {place}." in card.label or "keep" in card.label
-    separator = ":" if card.verdict else ""
+    assert place == "The joint" if card.value == "no verdict" else f" on {place}." in card.words or "keep" in card.words
+    separator = ":" if card.shade else ""
     assert text.table.splitlines()[0].lower() == f"{json_['sentence']}.".lower()
-    assert f"{card.value}{separator} {card.label}" == json_["sentence"]
+    assert f"{card.value}{separator} {card.words}" == json_["sentence"]
     assert all(note in text.notes for note in json_["notes"])
     return json_, card
 
@@ -116,7 +116,7 @@ def test_no_verdict_says_more_than_the_file(tmp_path, name):
     said, card = everywhere(make(tmp_path), 0.01)
     assert said["answer"] == WORDS[answer]
     assert words in said["sentence"]
-    assert card.verdict == "open"
+    assert card.shade == "open"
     assert "100 % of the joints keep" not in said["sentence"]
 
 
@@ -144,7 +144,7 @@ def test_joints_without_a_result_have_a_cause_and_a_remedy(tmp_path):
     said, card = everywhere(interfering(tmp_path), 0.01)
     assert said["notes"][0].startswith("36 outside_model: ")
     assert "Row 1: negative clearance" in said["notes"][0]
-    assert said["notes"][0] in card.note
+    assert card.notes == tuple(said["notes"])
 
 
 def test_pending_joints_are_told(tmp_path):
@@ -168,7 +168,7 @@ def test_a_limit_that_is_not_kept_leads_with_its_share(tmp_path):
     interval = f"{100 * low:.3g} .. {100 * high:.3g} %"
     assert said["sentence"] == (f"not kept: 33.3 % ({interval}); 5 % is accepted. Most often 700 N on cross1.F: 33.3 %")
     assert said["notes"] == ["of 7 limits, each by itself: 1 not kept, 6 open"]
-    assert card.verdict == "no"
+    assert card.shade == "no"
 
 
 def test_the_page_predicts_the_next_delivery(tmp_path):
@@ -176,9 +176,9 @@ def test_the_page_predicts_the_next_delivery(tmp_path):
     with ResultFile.open(path) as store:
         cards = page.compose(store.view(), Asked(path, 0.05)).sections[0].blocks[0].cards
     low, high = prediction.of_counts(20, 20, 60, 1000)
-    (found,) = (card for card in cards if card.label.startswith("of the next"))
+    (found,) = (card for card in cards if card.words.startswith("of the next"))
     assert found.value == f"{low:.0f} .. {high:.0f}"
-    assert found.label == "of the next 1000 joints exceed at least one limit"
+    assert found.words == "of the next 1000 joints exceed at least one limit"
 
 
 def apart(each):

@@ -35,7 +35,7 @@ def test_report_json_and_page_give_the_same_verdict(tmp_path, study, place):
     assert json.loads(call("report", path, "--accept", "10 %", "--json").stdout)["facts"]["lives"] == [found.values()]
     (head,) = (block for block in section.blocks if isinstance(block, Decision))
     card = head.verdicts[place]
-    assert (f"{card.value}: {card.label}", card.verdict) == (found.sentence, found.answer)
+    assert (f"{card.value}: {card.words}", card.shade) == (found.sentence, found.answer)
 
 
 def test_an_interval_up_to_the_accepted_share_is_kept_and_one_from_it_on_is_open():

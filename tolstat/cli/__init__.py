@@ -40,7 +40,7 @@ PLAIN = {
     "Decide": {},
     "Share": {
         "export": "Export joints, load cycles or statistics to files.",
-        "docs": "Print a page of the documents, or open their site.",
+        "docs": "Print a page of the documents, or the names of all.",
         "cache": "Show where compiled kernels are kept, or remove them.",
     },
 }

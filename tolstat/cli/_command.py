@@ -60,18 +60,18 @@ def command_of(function: Callable[..., None]) -> Callable[..., None]:
     """Make the function of a command: with the options of `_shared.session`, and values with a unit as text."""
     parameters_of_function, common = _parameters(function), _parameters(session)
 
-    def run(**given: Any) -> None:
+    def run(**arguments: Any) -> None:
         gc.enable()  # see `cli.main`
-        shared = {name: given.pop(name) for name in common}
+        shared = {name: arguments.pop(name) for name in common}
         with exit_codes(), session(**shared), exit_codes():  # those inside are written to the log, too
-            function(**_values(parameters_of_function, given))
+            function(**_values(parameters_of_function, arguments))
 
-    made: Any = run
-    made.__name__, made.__doc__ = function.__name__, prose(inspect.getdoc(function) or "")
+    command: Any = run
+    command.__name__, command.__doc__ = function.__name__, prose(inspect.getdoc(function) or "")
     texts = entries(inspect.getdoc(session) or "") | entries(inspect.getdoc(function) or "")
     parameters = [*parameters_of_function.values(), *common.values()]
-    made.__signature__ = Signature([_typed(p, texts.get(p.name)) for p in parameters])
-    made.__annotations__ = {p.name: p.annotation for p in made.__signature__.parameters.values()}
+    command.__signature__ = Signature([_typed(p, texts.get(p.name)) for p in parameters])
+    command.__annotations__ = {p.name: p.annotation for p in command.__signature__.parameters.values()}
     return run
 
 
@@ -138,13 +138,13 @@ def _typed(parameter: Parameter, text: str | None) -> Parameter:
     else:
         base, default = str | None, None
     if parameter.kind is not Parameter.KEYWORD_ONLY:
-        made: Any = typer.Argument(**shown)
+        info: Any = typer.Argument(**shown)
     else:
-        made = typer.Option(*(() if default is True else (flag_of(parameter),)), **shown)
-    return parameter.replace(kind=Parameter.KEYWORD_ONLY, annotation=Annotated[base, made], default=default)
+        info = typer.Option(*(() if default is True else (flag_of(parameter),)), **shown)
+    return parameter.replace(kind=Parameter.KEYWORD_ONLY, annotation=Annotated[base, info], default=default)
 
 
-def _values(parameters: Mapping[str, Parameter], given: dict[str, Any]) -> dict[str, Any]:
+def _values(parameters: Mapping[str, Parameter], arguments: dict[str, Any]) -> dict[str, Any]:
     """Arguments of the function: in SI where they have a unit.
 
     Raises
@@ -153,17 +153,17 @@ def _values(parameters: Mapping[str, Parameter], given: dict[str, Any]) -> dict[
         With each value that cannot be used, and each file that cannot be written.
     """
     faults: list[Fault] = []
-    inputs = [given[name] for name, p in parameters.items() if p.kind is not Parameter.KEYWORD_ONLY]
+    inputs = [arguments[name] for name, p in parameters.items() if p.kind is not Parameter.KEYWORD_ONLY]
     paths = [Path(value) for value in inputs if isinstance(value, str | Path)]
     for name, parameter in parameters.items():
-        opt, value = opt_of(parameter)[1], given[name]
+        opt, value = opt_of(parameter)[1], arguments[name]
         with gather(faults):
             if opt.writes and value not in (None, "-"):
                 check_target(Path(value), *paths)
             elif opt.unit is not None:
-                given[name] = parameter.default if value is None else quantity(value, opt, flag_of(parameter))
+                arguments[name] = parameter.default if value is None else quantity(value, opt, flag_of(parameter))
     raise_all(faults)
-    return given
+    return arguments
 
 
 DISK = {
@@ -237,23 +237,28 @@ def function_of(question: Question) -> Callable[..., None]:
     if takes_study:
         reads = "study" if several and not into_file else "either"
 
-    def run(**given: Any) -> None:
-        named = [given[name] for name in READS[reads]]
+    def run(**arguments: Any) -> None:
+        named = [arguments[name] for name in READS[reads]]
         sources: list[Path] = named[0] if reads == "views" else named
         stem = f"{'_'.join(path.stem for path in sources[:2])}_{question.name}"
-        point, study_file, out = given.get("point") or "", given.get("study_file"), given["out"]
+        point, study_file, out = arguments.get("point") or "", arguments.get("study_file"), arguments["out"]
         if out is not None:
             check_target(out / stem)
         is_study = simulate is not None and sources[0].suffix == ".toml"
-        if simulate is not None and (is_study or given.get("run")):
+        if simulate is not None and (is_study or arguments.get("run")):
             what: Any = sources[0]
             if is_study:
                 what = studies.load(sources[0])
                 points.names_of(point, [at.name for at in what.points], str(sources[0]))
-            settings = {"workers": given["workers"], "folder": out or Path(), "study_file": study_file, "point": point}
+            settings = {
+                "workers": arguments["workers"],
+                "folder": out or Path(),
+                "study_file": study_file,
+                "point": point,
+            }
             with work(**settings) as running:
-                sources = simulate(what, running, **{p.name: given[p.name] for p in simulated})
-        elif used := [flag_of(p) for p in only_simulated if given[p.name] not in (None, p.default)]:
+                sources = simulate(what, running, **{p.name: arguments[p.name] for p in simulated})
+        elif used := [flag_of(p) for p in only_simulated if arguments[p.name] not in (None, p.default)]:
             ways = {"add --run": into_file, "give a study (TOML)": takes_study}
             remedy = ", or ".join(way for way, is_open in ways.items() if is_open)
             holds = f"about a simulation, and {sources[0]} holds its joints already"
@@ -263,8 +268,8 @@ def function_of(question: Question) -> Callable[..., None]:
             point = "" if is_study and len(opened[0].points) == 1 else point  # the one that was simulated
             seen = [store.view(study_file).at(point) for store in opened]
             with progress(question.name):
-                answer = answer_of(*seen, **{p.name: given[p.name] for p in options_of_answer})
-            deliver(answer, given["wide"], given["as_json"])
+                answer = answer_of(*seen, **{p.name: arguments[p.name] for p in options_of_answer})
+            deliver(answer, arguments["wide"], arguments["as_json"])
             if out is not None:
                 with progress("files"):
                     files = answer.write(out / stem)
@@ -272,8 +277,8 @@ def function_of(question: Question) -> Callable[..., None]:
                     say(f"wrote {path}")
 
     texts = entries(inspect.getdoc(simulate) or "") | entries(inspect.getdoc(answer_of) or "")
-    made: Any = run
-    made.__name__, made.__doc__ = question.name, prose(inspect.getdoc(answer_of) or "")
+    command: Any = run
+    command.__name__, command.__doc__ = question.name, prose(inspect.getdoc(answer_of) or "")
     parameters = [_parameter(name, kind, Parameter.empty) for name, kind in READS[reads].items()]
     for p in (*options_of_answer, *only_simulated):
         base, opt = opt_of(p)
@@ -289,7 +294,7 @@ def function_of(question: Question) -> Callable[..., None]:
     }.items():
         if applies:
             parameters.append(_parameter(name, annotation, default))
-    made.__signature__ = Signature(parameters)
+    command.__signature__ = Signature(parameters)
     return run
 
 

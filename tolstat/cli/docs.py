@@ -1,11 +1,10 @@
-"""``tolstat docs`` and ``cache``: documents in the terminal or a browser, and compiled kernels."""
+"""``tolstat docs`` and ``cache``: documents in the terminal, and compiled kernels."""
 
 from __future__ import annotations
 
 import re
 import sys
 import textwrap
-import webbrowser
 from pathlib import Path
 from typing import Annotated
 
@@ -18,59 +17,33 @@ from tolstat.common.strict import did_you_mean
 from tolstat.display.options import Opt
 from tolstat.kernel.simd import cache_folder
 
-BUILT = Path("build", "docs", "docs", "index.html")
-"""First page of the built site, from the root of a clone."""
 PAGE_WIDTH = 100
 """Maximum width of a page in the terminal, characters."""
-BUILD = (
-    'python3 -m venv .venv && .venv/bin/pip install --quiet -e ".[docs,fatigue]"',
-    ".venv/bin/sphinx-build -q -c docs . build/docs",
-)
 
 
 def docs(page: Annotated[str | None, Opt("PAGE")] = None) -> None:
-    """Print a page of the documents, or open their site.
+    """Print a page of the documents, or the names of all.
 
     With PAGE, prints this page: study (all keys of study and joint files), tolerances, tutorial, model, report, or the
     name of a command, such as causes.
-
-    Without PAGE, opens the site that was built in a clone of the repository: the clone that tolstat was installed from
-    with -e, or that around the current folder. Prints its path, or else the two commands that build it. Without a
-    clone, prints the names of the pages.
 
     Example: tolstat docs study
 
     Parameters
     ----------
     page : str, optional
-        Page to read in the terminal, such as study; without it: the browser.
+        Page to read, such as study; without it: the names of all pages, with their titles.
     """
     if page is not None:
         _print_page(page)
         return
-    folders = [Path(__file__).parents[2], Path.cwd(), *Path.cwd().parents]
-    marks = (Path("docs", "conf.py"), Path("tolstat", "cli", "docs.py"))
-    clone = next((folder for folder in folders if all((folder / mark).is_file() for mark in marks)), None)
-    if clone is None:
-        say("pages of the installed package; the site with all pages and pictures is built from a clone")
-        width = max(map(len, pages()))
-        for name, file in pages().items():
-            lines = _plain(file.read_text(encoding="utf-8")).splitlines()
-            title = next(line for line in lines if line.startswith("# "))[2:]
-            indent = " " * (width + 2)
-            typer.echo(textwrap.fill(title, WIDTH, initial_indent=f"{name:{width}}  ", subsequent_indent=indent))
-        say("next: tolstat docs study")
-        return
-    built = clone / BUILT
-    if built.exists():
-        typer.echo(built)
-        if not webbrowser.open(built.as_uri()):
-            say("no browser was found: open this file in one")
-        return
-    say(f"the pages are not built yet; they can be read as text from {clone / 'docs' / 'index.md'}")
-    say(f"next, in {clone}: these two commands (some minutes), then tolstat docs")
-    for command in BUILD:
-        typer.echo(command)
+    width = max(map(len, pages()))
+    for name, file in pages().items():
+        lines = _plain(file.read_text(encoding="utf-8")).splitlines()
+        title = next(line for line in lines if line.startswith("# "))[2:]
+        indent = " " * (width + 2)
+        typer.echo(textwrap.fill(title, WIDTH, initial_indent=f"{name:{width}}  ", subsequent_indent=indent))
+    say("next: tolstat docs study")
 
 
 def pages() -> dict[str, Path]:

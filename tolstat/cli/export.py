@@ -5,8 +5,6 @@ from __future__ import annotations
 import csv
 import math
 from functools import partial
-from importlib.util import find_spec
-from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, TextIO
 
@@ -15,21 +13,13 @@ import typer
 from tolstat.cli import _library as library
 from tolstat.cli._shared import deliver, json_of, progress, say, write
 from tolstat.common.cores import available_cores
-from tolstat.common.errors import Fault, InputError
-from tolstat.common.files import atomic_write, check_target
-from tolstat.common.late import pandas as pd
+from tolstat.common.files import check_target
 from tolstat.display.options import Accepted, AsJson, Opt, Point, ResultPath, Wide
 
 if TYPE_CHECKING:
-    from tolstat.store import Reader, View
+    from tolstat.store import Reader
 
 PAGES = (".html", ".htm")
-Target = Annotated[str | None, Opt("OUT", writes=True)]
-MAX_ROWS = 1_048_575
-"""Number of joints that a sheet of Excel can hold below its heading."""
-LIMITS = {"load": "load", "limit": "level", "unit": "unit", "above": "count", "joints": "valid"}
-LIMITS |= {"share": "estimate"} | {name: name for name in ("lower", "upper", "confidence", "nominal")}
-"""Columns of the sheet ``limits``, and the keys of `exceedance.limit_rows`."""
 
 
 def export(
@@ -37,10 +27,7 @@ def export(
     *,
     joints: Annotated[str | None, Opt("OUT", name="csv", writes=True)] = None,
     cycles: Annotated[str | None, Opt("OUT", name="pylife", writes=True)] = None,
-    parquet: Target = None,
-    xlsx: Target = None,
-    statistics: Target = None,
-    by: Annotated[list[str] | None, Opt("LOAD")] = None,
+    statistics: Annotated[str | None, Opt("OUT", writes=True)] = None,
     accepted: Accepted = math.nan,
     nominal: bool = False,
     point: Point = None,
@@ -52,14 +39,12 @@ def export(
     of the columns, the second their units: read it with pandas.read_csv(OUT, header=[0, 1], index_col=0). The joint
     without errors is left out unless --nominal is given.
 
-    --parquet writes the same columns; pandas has their units in frame.attrs["units"].
-
-    --xlsx writes three sheets: the same columns, the share above each limit, the unit and meaning of each column.
+    For Parquet or Excel: tolstat.open(FILE).to_pandas() has the same columns.
 
     If the study has several operating points, --statistics is of the worst of them, and the other files need --point.
 
     --statistics writes the verdict, the share above each limit, quantiles, capability, the numerical error and the
-    versions.
+    versions; causes of a load: tolstat causes FILE --by LOAD --json.
 
     --pylife writes the cycles per revolution, one row per joint, channel and class of range and mean, if the study
     keeps cycles or load histories. To read it as a pandas Series: tolstat docs fatigue
@@ -72,64 +57,37 @@ def export(
         Write errors and results as CSV; - for standard output.
     cycles : str, optional
         Write load cycles as CSV for pyLife; - for standard output.
-    parquet : str, optional
-        Write errors and results as Parquet (needs pyarrow).
-    xlsx : str, optional
-        Write joints, limits and units as Excel file (needs openpyxl).
     statistics : str, optional
         Write all statistics as JSON; - for standard output.
-    by : list of str, optional
-        With --statistics: load whose causes are included, such as cross1.F; repeatable.
     nominal : bool
         Include the joint without errors, marked by a column.
     """
-    given = {"--csv": joints, "--pylife": cycles, "--parquet": parquet, "--xlsx": xlsx, "--statistics": statistics}
-    targets = {option: target for option, target in given.items() if target is not None}
-    every = "--csv, --parquet, --xlsx, --statistics and --pylife, each with its own file OUT"
+    targets = [target for target in (joints, cycles, statistics) if target is not None]
+    repeated = not targets or len(set(targets)) < len(targets)
     wrong = {
-        f"give one or more of {every}": not targets or len(set(targets.values())) < len(targets),
-        "--by is used with --statistics only: add --statistics OUT": by and statistics is None,
+        "give one or more of --csv, --statistics and --pylife, each with its own file OUT": repeated,
         "--accept is used with --statistics only: add --statistics OUT": accepted == accepted and statistics is None,
-        "--nominal is used with --csv, --parquet, --xlsx and --pylife: add one of them": nominal
-        and targets.keys() == {"--statistics"},
+        "--nominal is used with --csv and --pylife: add one of them": nominal and targets == [statistics],
     }
     for message, applies in wrong.items():
         if applies:
             raise typer.BadParameter(message)
-    for option, target, package in (("--parquet", parquet, "pyarrow"), ("--xlsx", xlsx, "openpyxl")):
-        if target is not None and find_spec(package) is None:
-            remedy = f"install it with: pip install {package}, or use --csv OUT"
-            raise InputError([Fault(option, f"{package} is not installed", remedy)])
     with progress("export"), library.stores.ResultFile.open(file) as opened:
         view = opened.view().at(point or "")
         store = view.store
-        number = f"{store.n - (0 if nominal else store.first_sample)} joints"
-        if xlsx is not None and store.n > MAX_ROWS:
-            too_many = f"{store.path} has {store.n} joints, a sheet of Excel has {MAX_ROWS} rows"
-            raise InputError([Fault("--xlsx", too_many, "use --parquet OUT or --csv OUT")])
         if cycles is not None:
             table = library.fatigue.pylife_table(view, nominal=nominal)
             write(cycles, lambda out: table.to_csv(out, index=False, lineterminator="\n"))
             _tell(cycles, f"cycles of {table['joint'].nunique()} joints")
         if statistics is not None:
             values = library.reports.statistics(view, accepted=accepted)
-            values["causes"] = {load: library.causes.causes(view, load).values() for load in by or ()}
             write(statistics, lambda out: out.write(json_of(values) + "\n"))
             _tell(statistics, "all statistics")
         if joints is not None:
             if joints == "-":
                 list(library.result_file.in_blocks(store, nominal))  # damage is found before anything is printed
             write(joints, partial(_write_csv, store, nominal))
-            _tell(joints, number)
-        if parquet is None and xlsx is None:
-            return
-        (frame,) = library.result_file.in_blocks(store, nominal, store.n)
-        writers = {xlsx: partial(_write_workbook, view, frame), parquet: partial(frame.to_parquet, engine="pyarrow")}
-        for name, write_file in writers.items():
-            if name is not None:
-                with atomic_write(Path(name)) as temporary:
-                    write_file(temporary)
-                _tell(name, number)
+            _tell(joints, f"{store.n - (0 if nominal else store.first_sample)} joints")
 
 
 def _tell(target: str, content: str) -> None:
@@ -144,40 +102,6 @@ def _write_csv(store: Reader, nominal: bool, stream: TextIO) -> None:
         if k == 0:
             out.writerows([["row", *frame.columns], ["1", *frame.attrs["units"].values()]])
         out.writerows(library.text.csv_rows([frame.index.tolist(), *(frame[name].tolist() for name in frame)]))
-
-
-def _write_workbook(view: View, frame: pd.DataFrame, path: Path) -> None:
-    """Write an Excel workbook, a row at a time: joints in SI units, limits, and unit and meaning of each column.
-
-    Sheet ``limits`` has the share of the joints with a valid load above each limit, and its interval (empty unless
-    joints are independent samples).
-    """
-    from openpyxl import Workbook
-
-    limits = [(name, limit, library.load_units.load_of(name).unit) for name, limit in view.limits.items()]
-    if view.sampled:  # joints of a sweep or a list are no sample, whose shares would mean something
-        rows = (
-            {**row, "valid": row["n"] - row["n_failed"] - row["n_unsettled"]}
-            for row in library.exceedance.limit_rows(view)
-        )
-        limits = [tuple(row[key] for key in LIMITS.values()) for row in rows]
-    meanings = {name: column.description for name, column in library.result_file.described(view.store).items()}
-    units = [(name, unit, meanings.get(name, "")) for name, unit in frame.attrs["units"].items()]
-    sheets = {
-        "joints": (("row", *frame.columns), frame.itertuples(name=None)),
-        "limits": (LIMITS, limits),
-        "units": (("column", "unit", "meaning"), units),
-    }
-    book = Workbook(write_only=True)
-    for name, (heads, cells) in sheets.items():
-        sheet = book.create_sheet(name)
-        sheet.freeze_panes = "B2"
-        sheet.append(list(heads))
-        for row in cells:
-            sheet.append([library.text.cell(library.text.plain(value)) for value in row])
-    whole = BytesIO()  # openpyxl does not recover from a full disk
-    book.save(whole)
-    path.write_bytes(whole.getvalue())
 
 
 def report(
@@ -218,8 +142,8 @@ def report(
         _page(file, out, accepted, again, point or "", full, brief)
         return
     with library.stores.viewed(file) as view:
-        if out is not None:
-            check_target(out / file.stem)
+        stem = (out or file.parent) / (f"{file.stem}_{point}" if point else file.stem)
+        check_target(stem)
         with progress("report"):
             answer = library.reports.report(view.at(point or ""), accepted)
         deliver(answer, wide, as_json)
@@ -227,8 +151,8 @@ def report(
             return
         if note := library.recorded.note_on_mounting(view.store):
             say(f"note: {note}")
-        with progress("files") as shown:
-            files = library.reports.write(answer, view.path, out, point or "", shown.stage)
+        with progress("files"):
+            files = answer.write(stem)
     for path in files:
         say(f"wrote {path}")
 

@@ -47,12 +47,12 @@ def plan(
     print_study_notes(study_file, loaded)
     library.compilation.announce()
     with progress() as shown:
-        made = library.plan.plan(loaded, workers, pilot or library.plan.PILOT, shown.stage)
+        prediction = library.plan.plan(loaded, workers, pilot or library.plan.PILOT, shown.stage)
     if as_json:
-        print_json(asdict(made) | {"seconds": made.seconds})
+        print_json(asdict(prediction) | {"seconds": prediction.seconds})
     else:
-        typer.echo(wrapped("\n".join(_lines(made))))
-        meanings = {library.joints.ENTRIES: made.tolerances, library.joints.CORRELATED: made.correlations}
+        typer.echo(wrapped("\n".join(_lines(prediction))))
+        meanings = {library.joints.ENTRIES: prediction.tolerances, library.joints.CORRELATED: prediction.correlations}
         for columns, rows in meanings.items():
             if rows:
                 typer.echo(f"\n{library.table.fitted(columns, rows)[0]}")
@@ -249,7 +249,7 @@ def conclude(path: Path, report: bool, wide: bool, study_file: str = "STUDY") ->
             with progress("report") as shown:
                 answer = library.reports.report(store.view())
                 shown.stage("files")
-                files = library.reports.write(answer, path)
+                files = answer.write(path.with_suffix(""))
             deliver(answer, wide)
             for file in files:
                 say(f"wrote {file}")
@@ -263,38 +263,38 @@ def conclude(path: Path, report: bool, wide: bool, study_file: str = "STUDY") ->
         say(f"next: tolstat {following if store.whole else f'merge {source} OTHER_SLICES --out WHOLE.h5'}")
 
 
-def _lines(made: library.plan.Plan) -> Iterator[str]:
-    yield f"joints: {made.rows}" + (f", each at {', '.join(made.points)}" if all(made.points) else "")
-    yield f"random numbers a joint: {made.dimensions}"
-    yield f"pilot: {made.pilot} joints, {made.failed} failed, {made.unsettled} not settled"
-    if made.fidelity:
-        yield made.fidelity
-    if rattle := made.reversals.joints:
+def _lines(prediction: library.plan.Plan) -> Iterator[str]:
+    yield f"joints: {prediction.rows}" + (f", each at {', '.join(prediction.points)}" if all(prediction.points) else "")
+    yield f"random numbers a joint: {prediction.dimensions}"
+    yield f"pilot: {prediction.pilot} joints, {prediction.failed} failed, {prediction.unsettled} not settled"
+    if prediction.fidelity:
+        yield prediction.fidelity
+    if rattle := prediction.reversals.joints:
         yield (
-            f"warning: the torque reverses in {rattle} of {made.pilot} joints: inertia torque up to "
-            f"{made.reversals.torque:.3g} N m; these joints rattle and cost {made.reversals.cost:.2g} times as much as "
-            "others"
+            f"warning: the torque reverses in {rattle} of {prediction.pilot} joints: inertia torque up to "
+            f"{prediction.reversals.torque:.3g} N m; these joints rattle and cost {prediction.reversals.cost:.2g} "
+            "times as much as others"
         )
-    if misfits := made.assembly.misfits:
-        ends = [f"{100 * end:.2g}" for end in made.assembly.interval or ()]
+    if misfits := prediction.assembly.misfits:
+        ends = [f"{100 * end:.2g}" for end in prediction.assembly.interval or ()]
         interval = f"; 95 % interval of their share {' to '.join(ends)} %" if ends else ""
-        joints = f"{misfits} of {made.assembly.of} joints"
+        joints = f"{misfits} of {prediction.assembly.of} joints"
         yield f"warning: {joints} have a pin larger than its hole and cannot be simulated{interval}"
-    yield f"time a joint: {1e3 * made.seconds_per_joint:.3g} ms"
-    yield f"time: about {_duration(made.seconds)} on {made.workers} cores, of which"
-    for stage, seconds in made.stages.items():
+    yield f"time a joint: {1e3 * prediction.seconds_per_joint:.3g} ms"
+    yield f"time: about {_duration(prediction.seconds)} on {prediction.workers} cores, of which"
+    for stage, seconds in prediction.stages.items():
         yield f"  {stage}: {_duration(seconds)}"
-    yield f"memory: {made.process_bytes / 1e6:.0f} MB a process, {made.workers + 1} processes"
-    yield f"file: {_size(made.file_bytes)}"
-    yield from (*made.fit, *made.sweep)
-    if made.exact:
-        yield f"no tolerance, taken as exact: {', '.join(made.exact)}"
-    for share, width in made.widths.items():
+    yield f"memory: {prediction.process_bytes / 1e6:.0f} MB a process, {prediction.workers + 1} processes"
+    yield f"file: {_size(prediction.file_bytes)}"
+    yield from (*prediction.fit, *prediction.sweep)
+    if prediction.exact:
+        yield f"no tolerance, taken as exact: {', '.join(prediction.exact)}"
+    for share, width in prediction.widths.items():
         yield f"95 % interval of a share of {100 * share:g} %: {100 * width:.2g} points wide"
-    for limit in made.limits:
+    for limit in prediction.limits:
         interval = f"interval at most {100 * limit.width:.2g} points wide"
         yield f"limit {limit.load}: {limit.above} of {limit.of} above in the pilot; {interval}"
-    for q, n in made.wilks.items():
+    for q, n in prediction.wilks.items():
         yield f"joints for a load that {100 * q:g} % stay below, with 95 % confidence: {n}"
 
 

@@ -163,10 +163,10 @@ def evaluate(
         check_target(Path(out), errors)
     f = library.function.function(library.studies.load(study), loads, point=point, workers=workers)
     si = {field.name: "1" if uniform else field.unit for field in library.tables.ERROR_FIELDS}
-    given = read_table(errors, {name: si.get(name, "1") for name in (f.cube_names if uniform else f.names)})
+    columns = read_table(errors, {name: si.get(name, "1") for name in (f.cube_names if uniform else f.names)})
     with work(workers=workers) as shown:
         shown.display.stage("simulation")
-        y = f(f.uniform(given) if uniform else given)
+        y = f(f.uniform(columns) if uniform else columns)
     head = [["status", *f.loads], ["", *(library.load_units.UNIT_OF_LOAD[name] for name in f.loads)]]
     rows = library.text.csv_rows([[library.tables.Status(number).label for number in f.status], *y.T.tolist()])
     write(out, lambda stream: csv.writer(stream, lineterminator="\n").writerows([*head, *rows]))

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
 from tolstat.display.table import Table
+from tolstat.display.verdict import Verdict
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist as Artist
@@ -34,24 +35,6 @@ class Sentence:
 
 
 @dataclass(frozen=True)
-class Card:
-    """One number of the first section.
-
-    Attributes
-    ----------
-    value, label, note : str
-        The number, its meaning, and a note, such as its interval.
-    verdict : str
-        ``yes``, ``no``, ``open``, or empty if there is no verdict.
-    """
-
-    value: str
-    label: str
-    note: str
-    verdict: str = ""
-
-
-@dataclass(frozen=True)
 class Decision:
     """The head of the page: what was asked, the verdicts, what they stand on, and a drawing beside them.
 
@@ -59,10 +42,10 @@ class Decision:
     ----------
     question : str
         The question; empty if the study has none.
-    verdicts : sequence of Card
-        The verdicts in one sentence each: its first words, the rest, causes and remedies.
-    cards : sequence of Card
-        Other numbers.
+    verdicts : sequence of Verdict
+        The verdicts.
+    cards : sequence of Verdict
+        Other numbers in the form of verdicts: the number, what it means, and a note, such as its interval.
     picture : Panel, optional
         The drawing.
     chart : Panel, optional
@@ -72,8 +55,8 @@ class Decision:
     """
 
     question: str
-    verdicts: Sequence[Card]
-    cards: Sequence[Card]
+    verdicts: Sequence[Verdict]
+    cards: Sequence[Verdict]
     picture: Panel | None = None
     chart: Panel | None = None
     below: Sequence[str] = ()
@@ -92,13 +75,15 @@ class Panel:
     description : str
         Text alternative for readers who cannot see the picture.
     draw : callable
-        Function that draws the picture into given axes.
+        Function that draws the picture into given axes; artists with labels are named in a legend above these.
     size : tuple of float
         Width and height in inches at its natural scale.
     left : float
-        Room for the labels of the y axis, inches.
+        Least room for the labels of the y axis, inches.
     top : float
-        Room above the axes, inches.
+        Least room above the axes, inches.
+    rows : sequence of str
+        Labels of the horizontal rows of the picture, the first on top; none for a picture with a y axis.
     reads : tuple of str
         Loads whose exceedance the picture shows, for the cursor.
     bare : bool
@@ -115,6 +100,7 @@ class Panel:
     size: tuple[float, float] = (5.0, 3.5)
     left: float = 0.72
     top: float = 0.26
+    rows: Sequence[str] = ()
     reads: tuple[str, ...] = ()
     bare: bool = False
     switches: Sequence[tuple[str, str]] = ()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any, Literal
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 BOTTOM, RIGHT = 0.5, 0.12
-"""Margins below and beside the axes, inches; `Panel.left` and `Panel.top` are the others."""
+"""Margins below and beside the axes, inches."""
 WIDTH = 4.9
 """Usual width of a panel, inches."""
 TITLE = 0.34
@@ -45,12 +45,43 @@ _SETTINGS = {
 """Font and line sizes of a single panel, beside the common style."""
 
 
-def _place(panel: Panel) -> tuple[float, float, float, float]:
-    """Position of the axes as fractions of the panel's size: left, bottom, width, height."""
+def _place(panel: Panel, top: float) -> tuple[float, float, float, float]:
+    """Position of the axes as fractions of the panel's size: left, bottom, width, height; `top` inches are above."""
     if panel.bare:
         return (0.0, 0.0, 1.0, 1.0)
-    (width, height), across, along = panel.size, panel.left + RIGHT, BOTTOM + panel.top
-    return (panel.left / width, BOTTOM / height, 1.0 - across / width, 1.0 - along / height)
+    (width, height), left = panel.size, _left(panel)
+    return (left / width, BOTTOM / height, 1.0 - (left + RIGHT) / width, 1.0 - (BOTTOM + top) / height)
+
+
+def _left(panel: Panel) -> float:
+    """Room for the labels of the y axis, inches: for those of rows 0.064 a letter of the longest line."""
+    letters = [len(line) for label in panel.rows for line in label.split("\n")]
+    return max(panel.left, 1.2, 0.064 * max(letters) + 0.12) if letters else panel.left
+
+
+def _draw(ax: Axes, panel: Panel) -> float:
+    """Draw a panel with its rows and its legend, and return the room above the axes, inches."""
+    if panel.rows:
+        ax.set_yticks(range(len(panel.rows)), panel.rows)
+        ax.set_ylim(len(panel.rows) - 0.4, -0.6)
+        ax.tick_params(axis="y", length=0)
+        ax.grid(axis="y", visible=False)
+        ax.spines["left"].set_visible(False)
+    panel.draw(ax)
+    entries = {label: handle for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)}
+    if not entries:
+        return panel.top
+    labels = list(entries)
+    # as many columns, filled one after the other, as fit the width of the axes
+    width = panel.size[0] - _left(panel) - RIGHT
+    for columns in range(len(labels), 0, -1):
+        lines = -(-len(labels) // columns)
+        letters = sum(max(map(len, labels[i : i + lines])) for i in range(0, len(labels), lines))
+        if LETTER * letters + KEY * columns <= width or columns == 1:
+            break
+    where: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "borderaxespad": 0.0}
+    ax.legend(list(entries.values()), labels, ncols=columns, handlelength=2.2, columnspacing=1.2, **where)
+    return max(panel.top, 0.08 + 0.2 * lines)
 
 
 def svg(panel: Panel) -> tuple[str, tuple[float, ...]]:
@@ -65,8 +96,8 @@ def svg(panel: Panel) -> tuple[str, tuple[float, ...]]:
     """
     with style.settings(_SETTINGS):
         figure = style.new_figure(figsize=panel.size, dpi=72)
-        ax = figure.add_axes(_place(panel))
-        panel.draw(ax)
+        ax = figure.add_axes(_place(panel, panel.top))
+        ax.set_position(_place(panel, _draw(ax, panel)))
         buffer = io.StringIO()
         figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None}, transparent=True)
     box, height = ax.get_window_extent(), figure.bbox.height
@@ -83,8 +114,8 @@ def sheet(panels: Sequence[Panel], title: str = "", notes: Sequence[str] = (), c
         figure = style.new_figure(figsize=size, layout="constrained")
         axes = figure.subplots(len(heights), columns, squeeze=False, height_ratios=heights)
         for panel, ax in zip(panels, axes.flat, strict=True):
-            panel.draw(ax)
-            pad = 6.0 if panel.bare else 72.0 * panel.top
+            top = _draw(ax, panel)
+            pad = 6.0 if panel.bare else 72.0 * top
             ax.set_title("\n".join(wrap(panel.title, 62)), fontsize=10, fontweight="normal", pad=pad)
             ax.set_anchor("N")
         left = {"x": 0.1 / size[0], "ha": "left"}
@@ -120,58 +151,27 @@ def _inline(drawn: str, panel: Panel) -> str:
     return head + texts + body[body.index(">") + 1 :].strip()
 
 
-def rows(ax: Axes, labels: list[str]) -> None:
-    """Label the horizontal rows of a panel, the first row on top."""
-    ax.set_yticks(range(len(labels)), labels)
-    ax.set_ylim(len(labels) - 0.4, -0.6)
-    ax.tick_params(axis="y", length=0)
-    ax.grid(axis="y", visible=False)
-    ax.spines["left"].set_visible(False)
-
-
-def legend_above(ax: Axes, handles: Sequence[Artist], labels: Sequence[str]) -> None:
-    """Put a legend above the axes, where it covers nothing; `legend_room` is the room that it takes."""
-    where: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "borderaxespad": 0.0}
-    columns = _legend_columns(labels, ax.get_window_extent().width / ax.figure.dpi)
-    ax.legend(handles, labels, ncols=columns, handlelength=2.2, columnspacing=1.2, **where)
-
-
-def legend_room(labels: Sequence[str], left: float = Panel.left) -> float:
-    """Room that a legend takes above the axes of a panel of usual width, inches; `left` as in `Panel`."""
-    return 0.08 + 0.2 * -(-len(labels) // _legend_columns(labels, WIDTH - left - RIGHT))
-
-
-def _legend_columns(labels: Sequence[str], width: float) -> int:
-    """Largest number of columns, filled one after the other, that fit a width, inches."""
-    for columns in range(len(labels), 1, -1):
-        rows = -(-len(labels) // columns)
-        letters = sum(max(map(len, labels[i : i + rows])) for i in range(0, len(labels), rows))
-        if LETTER * letters + KEY * columns <= width:
-            return columns
-    return 1
-
-
 def curves(
     ax: Axes,
     x: ArrayLike,
-    lines: Iterable[Iterable[ArrayLike]],
-    marks: Iterable[float],
-    bands: int,
+    lines: Mapping[str, Sequence[ArrayLike]],
+    marks: Iterable[float] = (),
+    bands: int = 0,
     colours: Sequence[str] = style.COLOURS,
-    step: Literal["post"] | None = None,
-) -> list[Artist]:
-    """Draw lines, each with the ends of its interval, over `x`, the first of them with `bands`; return the lines.
+    step: Literal["pre", "post"] | None = None,
+) -> None:
+    """Draw lines by their labels, each with the ends of its interval, over `x`; bands show the first `bands` intervals.
 
-    Vertical lines mark some values of `x`; steps go on to the right of each value.
+    Vertical lines mark some values of `x`; steps go on to the left or to the right of each value.
     """
-    handles: list[Artist] = []
-    for (middle, low, high), colour, dash in zip(lines, colours, style.DASHES, strict=False):
-        handles += ax.plot(x, middle, color=colour, ls=dash, drawstyle="steps-post" if step else "default")
-        if len(handles) <= bands:
-            ax.fill_between(x, low, high, step=step, color=colour, alpha=0.2, lw=0)
+    way = f"steps-{step}" if step else "default"
+    for (label, (middle, *_)), colour, dash in zip(lines.items(), colours, style.DASHES, strict=False):
+        ax.plot(x, middle, color=colour, ls=dash, drawstyle=way, label=label)
+    for i, ((_, low, high), colour) in enumerate(zip(list(lines.values())[:bands], colours, strict=False)):
+        name = None if i else "95 % band"
+        ax.fill_between(x, low, high, step=step, color=colour, alpha=0.2, lw=0, label=name)
     for mark in marks:
         ax.axvline(float(mark), color=style.FAINT, lw=1.0, ls=style.DASHES[2])
-    return handles
 
 
 def loads_axis(axis: Axis, typical: float, unit: str) -> str:
@@ -182,14 +182,14 @@ def loads_axis(axis: Axis, typical: float, unit: str) -> str:
     return name
 
 
-def log_loads(ax: Axes, low: float, high: float, typical: float, unit: str) -> str:
-    """Make the x axis logarithmic, over loads from `low` to `high`, SI; otherwise as `loads_axis`."""
+def log_loads(axis: Axis, low: float, high: float, typical: float, unit: str) -> str:
+    """Make an axis logarithmic, over loads from `low` to `high`, SI; otherwise as `loads_axis`."""
     size, name = text.multiple(typical, unit)
-    ax.set_xscale("log")
-    ax.set_xlim(low, high)
-    ax.xaxis.set_major_locator(style.ticker.LogLocator(subs=(1.0, 2.0, 5.0) if high < 200.0 * low else (1.0,)))
-    ax.xaxis.set_major_formatter(style.ticker.FuncFormatter(lambda x, _: f"{x / size:g}"))
-    ax.xaxis.set_minor_formatter(style.ticker.NullFormatter())
+    which = "x" if axis is axis.axes.xaxis else "y"
+    axis.axes.set(**{f"{which}scale": "log", f"{which}lim": (low, high)})
+    axis.set_major_locator(style.ticker.LogLocator(subs=(1.0, 2.0, 5.0) if high < 200.0 * low else (1.0,)))
+    axis.set_major_formatter(style.ticker.FuncFormatter(lambda x, _: f"{x / size:g}"))
+    axis.set_minor_formatter(style.ticker.NullFormatter())
     return name
 
 
@@ -200,7 +200,15 @@ def empty(ax: Axes, why: str) -> None:
 
 
 def share_bar(
-    ax: Axes, y: float, share: Sequence[float], drawn: float, floor: float, colour: str, height: float, off: float = 0.0
+    ax: Axes,
+    y: float,
+    share: Sequence[float],
+    drawn: float,
+    floor: float,
+    colour: str,
+    height: float,
+    off: float = 0.0,
+    label: str = "",
 ) -> None:
     """Draw how far a change moves a share: a bar from the share as drawn, and the interval of the new one.
 
@@ -220,9 +228,11 @@ def share_bar(
         Of the bar.
     off : float
         Distance of the interval above the middle of the row.
+    label : str
+        Name of the change in the legend.
     """
     moved, low, high = (max(end, floor) for end in share)
-    ax.barh(y, moved - drawn, height, left=drawn, color=colour, zorder=2)
+    ax.barh(y, moved - drawn, height, left=drawn, color=colour, zorder=2, label=label)
     ax.plot([low, high], [y - off, y - off], color=style.INK, lw=1.2, zorder=3)
     if share[1] < floor:
         ax.plot(floor, y - off, marker=style.markers.CARETLEFT, color=style.INK, ms=5.0, zorder=4, clip_on=False)
@@ -233,11 +243,6 @@ def accepted(ax: Axes, share: float, y: float) -> None:
     if share > 0.0:
         ax.axvline(share, **ACCEPTED)
         ax.text(share, y, f"accepted {text.percent(share)}", **WORDS)
-
-
-def rows_left(labels: Sequence[str]) -> float:
-    """Room for the labels of a panel of horizontal rows, inches."""
-    return max(1.2, 0.064 * max((len(line) for label in labels for line in label.split("\n")), default=0) + 0.12)
 
 
 def rows_height(count: int) -> float:

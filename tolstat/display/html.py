@@ -36,25 +36,25 @@ def environment(figure: Callable[[Panel], dict[str, Any]]) -> jinja2.Environment
         Picture of a panel, as `figures` gives it.
     """
     files = jinja2.FileSystemLoader(TEMPLATES)
-    made = jinja2.Environment(loader=files, autoescape=True, trim_blocks=True, lstrip_blocks=True, finalize=_shown)
-    made.globals |= {"figure": figure, "schemes": Markup(style.style_sheet())}
-    made.filters |= {"data": _data, "grouped": grouped, "bound": bound, "sentence": sentence}
-    made.filters["kind"] = lambda block: type(block).__name__
-    return made
+    templates = jinja2.Environment(loader=files, autoescape=True, trim_blocks=True, lstrip_blocks=True, finalize=_shown)
+    templates.globals |= {"figure": figure, "schemes": Markup(style.style_sheet())}
+    templates.filters |= {"data": _data, "grouped": grouped, "bound": bound, "sentence": sentence}
+    templates.filters["kind"] = lambda block: type(block).__name__
+    return templates
 
 
 def fragment(title: str, blocks: Sequence[Block]) -> str:
     """Blocks as an element for notebooks, with their style."""
-    made = environment(figures(blocks, 1))
-    return made.get_template("fragment.html.j2").render(title=title, blocks=blocks)
+    templates = environment(figures(blocks, 1))
+    return templates.get_template("fragment.html.j2").render(title=title, blocks=blocks)
 
 
 def figures(blocks: Sequence[Block], processes: int) -> Callable[[Panel], dict[str, Any]]:
     """Draw the pictures of some blocks; the function returned gives a panel's ``svg`` and the ``frame`` of its axes."""
     panels = [panel for block in blocks for panel in _panels(block)]
     drawn = zip(panels, mapped([partial(drawing.svg, panel) for panel in panels], processes), strict=True)
-    made = {p.key: {"svg": Markup(svg), "frame": " ".join(f"{x:.7g}" for x in frame)} for p, (svg, frame) in drawn}
-    return lambda panel: made[panel.key]
+    pictures = {p.key: {"svg": Markup(svg), "frame": " ".join(f"{x:.7g}" for x in frame)} for p, (svg, frame) in drawn}
+    return lambda panel: pictures[panel.key]
 
 
 def grouped(words: str) -> str:

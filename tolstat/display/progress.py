@@ -52,8 +52,8 @@ def text(counts: Counts, begun: int, seconds: float, budget: float = math.inf) -
     words = [f"{counts.done} of {counts.total} joints"]
     if counts.done > begun and seconds > 0:
         rate = (counts.done - begun) / seconds
-        left = min((counts.total - counts.done) / rate, max(budget, 0.0))
-        words += [f"{rate:.3g} joints/s", f"{clock(left)} left"]
+        remaining = min((counts.total - counts.done) / rate, max(budget, 0.0))
+        words += [f"{rate:.3g} joints/s", f"{clock(remaining)} left"]
     return ", ".join([*words, counts.shortfall])
 
 

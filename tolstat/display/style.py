@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tolstat.common import load_kinds, loads
 from tolstat.common.files import atomic_write
 from tolstat.common.late import Late
 
@@ -119,31 +118,6 @@ def new_figure(**look: Any) -> Figure:
     return matplotlib.figure.Figure(**look)
 
 
-def panels(title: str, subtitle: str) -> tuple[Figure, list[tuple[str, load_kinds.Kind, Axes]]]:
-    """Make a page of four panels: force and bending moment of the cross bushings above those of the fork bushings.
-
-    Parameters
-    ----------
-    title, subtitle : str
-        Headline, and the line or lines of small print below it.
-
-    Returns
-    -------
-    figure : Figure
-        The page; the strip at its foot is reserved for `legend`.
-    panels : list of (group, kind, Axes)
-        One for each of `loads.PANELS`.
-    """
-    figure = new_figure(figsize=(11.0, 8.5))
-    axes = figure.subplots(2, 2).ravel()
-    figure.subplots_adjust(left=0.085, right=0.975, top=0.82, bottom=0.125, hspace=0.42, wspace=0.16)
-    figure.text(0.02, 0.972, title, fontsize=15, fontweight="bold", va="top")
-    figure.text(0.02, 0.932, subtitle, fontsize=9.5, color="#444444", va="top", linespacing=1.45)
-    for (group, kind), ax in zip(loads.PANELS, axes, strict=True):
-        ax.set_title(f"{group.capitalize()} bushings, {loads.QUANTITY[kind.unit]}", pad=21)
-    return figure, [(group, kind, ax) for (group, kind), ax in zip(loads.PANELS, axes, strict=True)]
-
-
 def share_axis(ax: Axes, low: float, which: str = "y", high: float = 1.0) -> None:
     """Make an axis logarithmic, in per cent, from `low` to slightly above `high` so that a curve there is visible.
 
@@ -165,18 +139,6 @@ def mark(ax: Axes, x: float, y: float, colour: str) -> None:
     """Mark the nominal joint by a small triangle."""
     look: Any = {"ms": 7.5, "mec": "white", "mew": 0.7, "ls": "", "clip_on": False, "zorder": 5}
     ax.plot(x, y, "v", color=colour, label="nominal joint", **look)
-
-
-def note(ax: Axes, text: str, y: float) -> None:
-    """Write a note on a horizontal line, at its right end."""
-    ax.annotate(text, (1.0, y), (-2, 3), ax.get_yaxis_transform(), "offset points", ha="right", fontsize=9)
-
-
-def legend(figure: Figure, handles: Sequence[Any], labels: Sequence[str]) -> None:
-    """Put one legend for all panels at the foot of the page, in one or two rows."""
-    columns = len(labels) if sum(len(label) + 7 for label in labels) < 140 else -(-len(labels) // 2)
-    look: Any = {"handlelength": 2.4, "columnspacing": 1.3, "fontsize": 9.5}
-    figure.legend(handles, labels, loc="lower center", ncols=columns, bbox_to_anchor=(0.5, 0.0), **look)
 
 
 def save(figure: Figure, stem: Path, suffixes: tuple[str, ...] = (".png", ".svg")) -> list[Path]:

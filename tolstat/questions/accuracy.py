@@ -148,5 +148,5 @@ def in_percent(error: float) -> str:
 
 def _kept(verification: Verification) -> NDArray[np.bool_]:
     """Which of `OBSERVABLES` the campaign keeps, (loads,); all if no joint has a value."""
-    kept = ~np.isnan(comparison.loads(verification.base)).all(axis=0)
-    return np.asarray(kept | ~kept.any())
+    has_values = ~np.isnan(comparison.loads(verification.base)).all(axis=0)
+    return np.asarray(has_values | ~has_values.any())

@@ -13,12 +13,11 @@ from tolstat.campaign.remedy import remedy
 from tolstat.common.columns import holds
 from tolstat.common.load_kinds import BUSHINGS
 from tolstat.common.tables import Status
-from tolstat.display.answer import Answer, Document, Part, Row, Rows, Sentence, Table, plain
+from tolstat.display.answer import Answer, Part, Row, Rows, Sentence, Table, plain
 from tolstat.questions.shares import inapplicable, rows_of
 from tolstat.solver import refinement
 from tolstat.store import Reader, recorded, verification
 from tolstat.store.view import View
-from tolstat.study.design import IDEAL
 
 RANKED = ("status", "alpha [deg]", "period")
 """Columns that a narrow terminal leaves out, the last first."""
@@ -57,8 +56,6 @@ def cases(view: View) -> Answer:
     parts: list[Part] = [Table("cases", title, plain(seen, RANKED), rows, seen=seen)]
     parts.append(Sentence(f"{counts.done} of {counts.total} joints, {counts.shortfall}"))
     parts += [Sentence(f"{row['variant']}, {row['case']}: {row['remedy']}") for row in rows if row["remedy"]]
-    if any(row["note"] for row in rows):
-        parts.append(Document("_cases.md", _markdown(rows)))
     return Answer("cases", "Listed joints", parts)
 
 
@@ -133,39 +130,6 @@ def _worst(row: Row) -> dict[str, Any]:
     """Row for people: Gamma of the largest modulus among the bushings kept, signed, for force and for torque."""
     short = {key: row[key] for key in ("variant", "alpha [deg]", "case", "status", "period")}
     for head in ("Gamma_F [%]", "Gamma_T [%]"):
-        if gamma := _of_bushings(row, head):
+        if gamma := [row[name] for bushing in BUSHINGS if (name := f"{bushing}.{head}") in row]:
             short[head] = max(gamma, key=lambda x: -1.0 if np.isnan(x) else abs(x))
     return short
-
-
-def _of_bushings(row: Row, what: str) -> list[float]:
-    return [row[name] for bushing in BUSHINGS if (name := f"{bushing}.{what}") in row]
-
-
-def _markdown(rows: Rows) -> str:
-    """Markdown table: why each joint is difficult, and its results.
-
-    One line per joint: status, largest force and torque, their errors if known, and its cost relative to the first
-    joint.
-    """
-    heads = ["joint", "what makes it hard", "status", "period", "revolutions", "max F (N)", "max T (N m)", "cost"]
-    checked = "reference" in rows[0]
-    heads += ["error of F", "error of T"] if checked else []
-    lines = [f"| {' | '.join(heads)} |", f"|{'---|' * len(heads)}"]
-    for row in rows:
-        joint = [row["variant"], row["note"]] if row["case"] == IDEAL else [f"{row['variant']}, {row['case']}", ""]
-        largest = (float(np.fmax.reduce(_of_bushings(row, load), initial=np.nan)) for load in ("F [N]", "T [N*m]"))
-        numbers = (f"{x:.3g}" for x in (row["revolutions"], *largest, row["cost"]))
-        cells = [*joint, row["status"], str(row["period"] or "–"), *numbers, *(_errors(row) if checked else [])]
-        lines.append(f"| {' | '.join(cells)} |".replace("nan", "–"))
-    return "\n".join(lines) + "\n"
-
-
-def _errors(row: Row) -> list[str]:
-    """Cells with the errors of F and T, or the reason why they are missing."""
-    if not row["reference"]:
-        return ["nothing to compare" if row["status"] != Status.OK.label else "not compared", "nan"]
-    if row["reference"] == Status.NEWTON_FAILED.label:
-        return ["reference gave up", "nan"]
-    wanders = f" ± {row['reference_change']:.0e}" if row["reference"] == Status.NOT_SETTLED.label else ""
-    return [f"{row[key]:.0e}{wanders}" for key in ("error_F", "error_T")]

@@ -24,7 +24,6 @@ from tolstat.common.tables import Status
 from tolstat.display import drawing, style, text
 from tolstat.display.answer import Answer, Axes, Column, Panel, Panels, Part, Row, Rows, Sentence, Table
 from tolstat.display.options import Loads
-from tolstat.display.style import patches
 from tolstat.questions.shares import NO_INTERVALS, inapplicable, share, word
 from tolstat.store.view import View
 
@@ -214,14 +213,14 @@ def sides(a: View, b: View) -> Sides:
 
 def _names(a: View, b: View, by: Sequence[str], limited: Sequence[str]) -> list[str]:
     """Loads whose quantiles and means are compared; checks that both files keep them and the loads with limits."""
-    kept = [name for name in a.kept_loads if name in b.kept_loads]
+    common = [name for name in a.kept_loads if name in b.kept_loads]
     asked = dict.fromkeys(by, "--by") | {name: f"limits.{name}" for name in limited}
     raise_all(
-        Fault(option, f"{name!r} is not a load that both files keep", did_you_mean(name, kept))
+        Fault(option, f"{name!r} is not a load that both files keep", did_you_mean(name, common))
         for name, option in asked.items()
-        if name not in kept
+        if name not in common
     )
-    return list(by) or list(dict.fromkeys(limited)) or [name for name in a.shown_loads if name in kept]
+    return list(by) or list(dict.fromkeys(limited)) or [name for name in a.shown_loads if name in common]
 
 
 def _share(both: Sides, name: str, level: float) -> Row:
@@ -241,8 +240,8 @@ def _statistics(both: Sides, name: str) -> Rows:
 def _switched(both: Sides, name: str, level: float) -> Iterator[Row]:
     loads = both.load(name)
     a, b = (load.values for load in loads)
-    here = np.isfinite(a) & np.isfinite(b) & ((a > level) != (b > level))
-    for row, of_a, of_b in zip(both.rows[here].tolist(), a[here].tolist(), b[here].tolist(), strict=True):
+    differs = np.isfinite(a) & np.isfinite(b) & ((a > level) != (b > level))
+    for row, of_a, of_b in zip(both.rows[differs].tolist(), a[differs].tolist(), b[differs].tolist(), strict=True):
         yield {"row": row, "load": name, "unit": loads[0].unit, "level": level, "a": of_a, "b": of_b}
 
 
@@ -279,21 +278,17 @@ def _in_words(value: object) -> str:
 def _panels(both: Sides, name: str, rows: Rows, loads: Rows) -> Iterator[Panel]:
     """Pictures of a load: exceedance of both campaigns, and their difference, with pointwise 95 % intervals."""
     limits = [row["level"] for row in rows if row["load"] == name]
-    band = ["95 % band"] if both.has_intervals else []
-    labels = [*(f"{side}: {view.path.stem}" for side, view in zip("AB", both.views, strict=True)), *band]
     draw = partial(_draw, both=both, name=name, limits=limits)
     median = next(row for row in loads if row["load"] == name and row["statistic"] == "50 %")
     words = f"Medians of A and B: {' and '.join(text.value(median[side], median['unit']) for side in 'ab')}"
-    curves, top = partial(draw, labels=labels, change=False), drawing.legend_room(labels)
-    yield Panel(name, f"{name}: joints above a load", words, curves, SIZE, top=top)
+    yield Panel(name, f"{name}: joints above a load", words, partial(draw, change=False), SIZE)
     title, key = f"{name}: B less A{', pairs' if both.paired else ''}", f"{name}-difference"
     words = "Difference of the shares of the joints above a load"
-    change, top = partial(draw, labels=band, change=True), drawing.legend_room(band) if band else Panel.top
-    yield Panel(key, title, words, change, SIZE, top=top)
+    yield Panel(key, title, words, partial(draw, change=True), SIZE)
 
 
-def _draw(ax: Axes, both: Sides, name: str, limits: Sequence[float], labels: Sequence[str], change: bool) -> None:
-    """Draw the exceedance of both campaigns, or the share of B less that of A; the last of `labels` is of the bands."""
+def _draw(ax: Axes, both: Sides, name: str, limits: Sequence[float], change: bool) -> None:
+    """Draw the exceedance of both campaigns, or the share of B less that of A."""
     a, b = both.load(name)
     # levels of the curves: quantiles of both campaigns pooled, denser in the tail
     pooled = np.concatenate([a.valid, b.valid])
@@ -303,17 +298,15 @@ def _draw(ax: Axes, both: Sides, name: str, limits: Sequence[float], labels: Seq
     if change:
         ax.axhline(0.0, color=style.FAINT, lw=1.0)
         shares = difference.shares(a, b, levels, both.paired)
-        curves = [100.0 * np.array([shares.estimate, shares.lower, shares.upper])]
+        curves = {"": [100.0 * end for end in (shares.estimate, shares.lower, shares.upper)]}
     else:
-        tables = (load.curve(levels) for load in (a, b))
-        curves = [
-            np.array([curve[end] for end in ("estimate", "lower", "upper")]).clip(0.1 * floor) for curve in tables
-        ]
+        curves = {}
+        for side, view, load in zip("AB", both.views, (a, b), strict=True):
+            table = load.curve(levels)
+            ends = [table[end].clip(0.1 * floor) for end in ("estimate", "lower", "upper")]
+            curves[f"{side}: {view.path.stem}"] = ends
     look: Any = {"step": "post", "colours": (style.INK,) if change else style.COLOURS}
-    handles = drawing.curves(ax, levels, curves, limits, bands=len(curves) if both.has_intervals else 0, **look)
-    if labels:
-        band = [patches.Patch(color=style.FAINT, alpha=0.3, lw=0)] if both.has_intervals else []
-        drawing.legend_above(ax, [*([] if change else handles), *band], labels)
+    drawing.curves(ax, levels, curves, limits, bands=len(curves) if both.has_intervals else 0, **look)
     ax.set_xlabel(f"x [{unit_text(a.unit)}]" if a.unit != "1" else "x")
     ax.set_ylabel("B less A, % of the joints" if change else "share of the joints above x")
     if not change:

@@ -183,11 +183,10 @@ def _draw_load(ax: Axes, load: Sample) -> None:
     low, high = float(edges[0]), float(edges[-1])
     if load.limit is not None and 0.5 * low <= load.limit <= 2.0 * high:
         low, high = min(low, load.limit), max(high, load.limit)
-        ax.axvline(load.limit, color=style.INK, lw=1.4, ls=(0.0, (8.0, 3.0)))
-        words, at = f"limit {text.value(load.limit, load.unit)}", (load.limit, 1.015)
-        ax.annotate(words, at, xycoords=ax.get_xaxis_transform(), ha="center", va="bottom")
+        limit = f"limit {text.value(load.limit, load.unit)}"
+        ax.axvline(load.limit, color=style.INK, lw=1.4, ls=(0.0, (8.0, 3.0)), label=limit)
     if load.long_tailed:
-        unit = drawing.log_loads(ax, 0.95 * low, 1.05 * high, load.limit or high, load.unit)
+        unit = drawing.log_loads(ax.xaxis, 0.95 * low, 1.05 * high, load.limit or high, load.unit)
     else:
         margin = 0.03 * (high - low)
         ax.set_xlim(low - margin, high + margin)
@@ -195,7 +194,7 @@ def _draw_load(ax: Axes, load: Sample) -> None:
         unit = drawing.loads_axis(ax.xaxis, load.limit or high, load.unit)
     left, right = ax.get_xlim()
     if left <= load.nominal <= right:
-        style.mark(ax, load.nominal, ax.get_ylim()[1], style.COLOURS[0])
+        style.mark(ax, load.nominal, 0.96 * ax.get_ylim()[1], style.COLOURS[0])
     ax.set(xlabel=f"{load.name} [{unit or '1'}], largest over the revolution", ylabel="share of the joints [%]")
 
 

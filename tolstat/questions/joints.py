@@ -80,7 +80,7 @@ def modes(view: View) -> Answer:
     rows = rows_of({"pin": load_kinds.PINS} | dict(zip(MODE_WORDS, view.mode_share.T.tolist(), strict=True)))
     lines = [f"{row['pin']}: " + ", ".join(f"{column.head} {column.cell(row)}" for column in MODES[1:]) for row in rows]
     draw, size = partial(_draw_modes, rows=rows), (drawing.WIDTH, 2.0)
-    panel = Panel("modes", "Contact modes", "; ".join(lines), draw, size, 0.6, 0.28)
+    panel = Panel("modes", "Contact modes", "; ".join(lines), draw, size, rows=load_kinds.PINS)
     note = "Share of the revolution that each pin spends in each mode, mean of the settled joints. None: the pin "
     note += "touches nothing; one point: one end; two point: both ends, on opposite sides; uniform: along the hole."
     table = Table("modes", "Mean share of the revolution", MODES, rows, dict.fromkeys(MODE_WORDS, "1"))
@@ -204,14 +204,12 @@ def their_errors(view: View) -> Rows:
 
 
 def _draw_modes(ax: Axes, rows: Rows) -> None:
-    drawing.rows(ax, list(load_kinds.PINS))
     left = np.zeros(4)
     for (key, words), colour in zip(MODE_WORDS.items(), COLOURS, strict=True):
         share = 100.0 * np.array([row[key] for row in rows])
         ax.barh(range(4), share, left=left, height=0.62, color=colour, edgecolor="white", label=words)
         left += share
     ax.set(xlim=(0.0, 100.0), xlabel="share of the revolution [%]")
-    drawing.legend_above(ax, *ax.get_legend_handles_labels())
 
 
 def _errors_panel(rows: Rows) -> Panel:
@@ -219,13 +217,12 @@ def _errors_panel(rows: Rows) -> Panel:
     for number, row in enumerate(rows[:4]):
         words += f"{';' if number else ''} {row['error']}: larger {row['direction']:.2f}, "
         words += f"farther from the middle {row['size']:.2f}"
-    left, title = drawing.rows_left([row["error"] for row in rows]), "Failures in the space of errors"
-    size, room = (drawing.WIDTH, drawing.rows_height(len(rows)) + 0.2), drawing.legend_room([*COMPARED.values()], left)
-    return Panel("errors-without-load", title, words, partial(_draw_errors, rows=rows), size, left, room)
+    draw, size = partial(_draw_errors, rows=rows), (drawing.WIDTH, drawing.rows_height(len(rows)) + 0.2)
+    labels = [row["error"] for row in rows]
+    return Panel("errors-without-load", "Failures in the space of errors", words, draw, size, rows=labels)
 
 
 def _draw_errors(ax: Axes, rows: Rows) -> None:
-    drawing.rows(ax, [row["error"] for row in rows])
     for (key, label), marker, off, colour in zip(COMPARED.items(), "oD", (-0.16, 0.16), style.COLOURS, strict=False):
         y = np.arange(len(rows)) + off
         estimate, lower, upper = (np.array([row[f"{key}{end}"] for row in rows]) for end in ("", "_lower", "_upper"))
@@ -234,4 +231,3 @@ def _draw_errors(ax: Axes, rows: Rows) -> None:
         ax.plot(estimate, y, marker, ms=4.5, color=colour, ls="", label=label)
     ax.axvline(0.5, color=style.INK, lw=0.9)
     ax.set(xlim=(0.0, 1.0), xlabel="probability that the joint without a valid load has the error that is …")
-    drawing.legend_above(ax, *ax.get_legend_handles_labels())

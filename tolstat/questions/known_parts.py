@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from tolstat.analysis.sample import CONFIDENCE
 from tolstat.common.loads import ANY_LIMIT
 from tolstat.display import drawing, style, text
 from tolstat.display.answer import Answer, Axes, Column, Panel, Panels, Part, Row, Rows, Sentence, Table
-from tolstat.display.style import lines
 from tolstat.questions import shares
 from tolstat.store import error_budget
 from tolstat.store.view import View
@@ -68,12 +68,12 @@ def known_parts(view: View) -> Answer:
         raise shares.inapplicable(view, "has no share that measured parts leave open", remedy)
     rows = [_row(view, process, name) for name in (*view.limits, *([ANY_LIMIT] if len(view.limits) > 1 else []))]
     rows.sort(key=lambda row: (row["load"] != ANY_LIMIT, -row["estimate"]))
-    given = [row for row in rows if not math.isnan(row["both_upper"])][:DRAWN]
+    drawn = [row for row in rows if not math.isnan(row["both_upper"])][:DRAWN]
     entries = ", ".join(f"{entry.pattern} from {entry.parts}" for entry in process.entries)
     words = (f"Mean and deviation are estimated from measured parts: {entries}.", EXPLANATION)
-    parts: list[Part] = [Panels([_panel(given)], beside=list(map(Sentence, words)))] if given else []
+    parts: list[Part] = [Panels([_panel(drawn)], beside=list(map(Sentence, words)))] if drawn else []
     parts.append(Table("intervals", "Shares above the limits, with what leaves them open", COLUMNS, rows))
-    if len(given) < min(len(rows), DRAWN):
+    if len(drawn) < min(len(rows), DRAWN):
         most = text.percent(max(row["unsupported"] for row in rows))
         parts.append(Sentence(f"The joints do not support {most} of the likely processes. {process.remedy}.", "lead"))
     return Answer("known_parts", "Tolerances known from measured parts", parts)
@@ -90,26 +90,21 @@ def _row(view: View, process: error_budget.KnownParts, name: str) -> Row:
 
 def _panel(rows: Rows) -> Panel:
     """Picture of the three intervals of some shares."""
-    labels = [text.limit(row) for row in rows]
 
     def draw(ax: Axes) -> None:
         """Draw the three intervals of each share, below each other; shares on a logarithmic axis."""
-        drawing.rows(ax, labels)
         ends = [row[end] for row in rows for low, high, _ in INTERVALS.values() for end in (low, high)]
         low = max(0.7 * min(end for end in ends if end > LEAST), LEAST)
         style.share_axis(ax, low, "x", min(1.3 * max(ends), 1.0))
         for i, row in enumerate(rows):
-            for k, (lower, upper, colour) in enumerate(INTERVALS.values()):
-                y = i + 0.24 * (k - 1)
-                ax.plot([max(row[lower], 0.1 * low), row[upper]], [y, y], color=colour, lw=3.0, solid_capstyle="butt")
+            for k, (label, (lower, upper, colour)) in enumerate(INTERVALS.items()):
+                look: Any = {"color": colour, "lw": 3.0, "solid_capstyle": "butt", "label": label}
+                ax.plot([max(row[lower], 0.1 * low), row[upper]], [i + 0.24 * (k - 1)] * 2, **look)
             if row["estimate"] > low:
                 ax.plot([row["estimate"]] * 2, [i - 0.36, i + 0.36], color=style.FAINT, lw=1.2)
-        handles = [lines.Line2D([], [], color=colour, lw=3.0) for *_, colour in INTERVALS.values()]
-        drawing.legend_above(ax, handles, list(INTERVALS))
         ax.set_xlabel("share of the joints above the limit, 95 % intervals")
 
-    left = drawing.rows_left(labels)
-    top = drawing.legend_room(list(INTERVALS), left)
-    size = (drawing.WIDTH, 0.47 * len(rows) + drawing.BOTTOM + top + 0.1)
+    labels, size = [text.limit(row) for row in rows], (drawing.WIDTH, 0.47 * len(rows) + drawing.BOTTOM + 0.38)
     spans = "; ".join(f"{row['load']}: {text.span(row['both_lower'], row['both_upper'])}" for row in rows)
-    return Panel("intervals", "What joints and parts leave open", f"Intervals of both: {spans}", draw, size, left, top)
+    words = f"Intervals of both: {spans}"
+    return Panel("intervals", "What joints and parts leave open", words, draw, size, rows=labels)

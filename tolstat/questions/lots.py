@@ -34,8 +34,8 @@ from tolstat.study.rewriting import with_keys
 Integers = NDArray[np.intp]
 LOTS, JOINTS = 50, 20
 """Number of lots, and of joints of each, that are simulated unless told otherwise."""
-LINES = ("lots simulated", "expected of a new lot", "if joints did not depend on their lot")
-
+EXPECTED = ("if joints did not depend on their lot", "expected of a new lot")
+"""Labels of the curves that are not simulated."""
 DELIVERY = 500
 """Joints of the next delivery, unless another number is given."""
 COLUMNS = (
@@ -236,11 +236,12 @@ def _panel(row: Row, above: Integers, n: Integers, size: int) -> Panel:
         at, x = np.arange(top + 1), np.arange(top + 2) / size
         expected = np.cumsum(clustered.delivery(above, n, size).probability)[at]
         alone = special.bdtr(at, size, above.sum() / n.sum())
-        for cdf, colour, dash in ((alone, style.FAINT, style.DASHES[2]), (expected, style.COLOURS[1], style.DASHES[1])):
-            ax.step(x, 100.0 * np.append(cdf, cdf[-1]), where="post", color=colour, ls=dash)
+        looks = (style.FAINT, style.DASHES[2]), (style.COLOURS[1], style.DASHES[1])
+        for label, cdf, (colour, dash) in zip(EXPECTED, (alone, expected), looks, strict=True):
+            ax.step(x, 100.0 * np.append(cdf, cdf[-1]), where="post", color=colour, ls=dash, label=label)
         steps = 100.0 * np.arange(1, share.size + 1) / share.size
-        ax.step(np.append(share, x[-1]), np.append(steps, 100.0), where="post", color=style.COLOURS[0])
-        drawing.legend_above(ax, ax.lines[::-1], LINES)
+        look: Any = {"color": style.COLOURS[0], "label": "lots simulated"}
+        ax.step(np.append(share, x[-1]), np.append(steps, 100.0), where="post", **look)
         ax.set(xlim=(0.0, x[-1]), ylim=(0.0, 104.0), ylabel="lots with at most this share [%]")
         ax.xaxis.set_major_formatter(lambda value, _: f"{100.0 * value:g} %")
         ax.set_xlabel("share of the joints of a lot that exceed at least one limit")
@@ -248,4 +249,4 @@ def _panel(row: Row, above: Integers, n: Integers, size: int) -> Panel:
     title = f"{row['lots']} lots: which share of their joints is bad"
     half, worst = text.percent(row["median"]), text.percent(row["worst"])
     description = f"Half of the lots have at most {half}, the worst has {worst}"
-    return Panel("lots", title, description, draw, (drawing.WIDTH, 3.2), top=drawing.legend_room(LINES))
+    return Panel("lots", title, description, draw, (drawing.WIDTH, 3.2))

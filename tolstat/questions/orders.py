@@ -16,7 +16,7 @@ from tolstat.common.loads import LOADS, FloatArray, load_of
 from tolstat.common.tables import VALID
 from tolstat.display import drawing, style, text
 from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Part, Row, Rows, Sentence, Table, has
-from tolstat.display.style import lines, patches, ticker
+from tolstat.display.style import ticker
 from tolstat.questions.shares import ORIGIN, unusable, value, values, with_ends, word
 from tolstat.store import revolutions
 from tolstat.store.view import View
@@ -30,8 +30,6 @@ INTRODUCTION = (
     "are taken in axes that do not turn; there the vector of one order moves on an ellipse, whose semi-major axis is "
     "the amplitude. An orbit also holds the mean force; its dot is the input angle 0, its arrow points on."
 )
-AMPLITUDES = ("nominal joint", "median", "5 to 95 %")
-"""Labels of the picture of amplitudes."""
 SMALL = 0.05
 """Orbits below this part of the largest one are too small for an arrow."""
 LOOKS: dict[str, tuple[str, str, style.Dash]] = {
@@ -221,8 +219,7 @@ def _amplitude_panels(rows: Rows) -> Iterator[Panel]:
         most, shaft = max(amplitudes, key=lambda row: float(row["qmedian"])), name.rpartition(".")[0]
         title = f"{text.capital(most['noun'])}{f', {shaft} shaft' if shaft else ''}".replace("Psi", "Ψ")
         words = f"The median of the joints is largest at order {most['order']}, {value('qmedian')(most)}."
-        draw, room = partial(_bars, rows=amplitudes), drawing.legend_room(AMPLITUDES)
-        yield Panel(f"amplitude-{name}", title, words, draw, (drawing.WIDTH, 2.7), top=room)
+        yield Panel(f"amplitude-{name}", title, words, partial(_bars, rows=amplitudes), (drawing.WIDTH, 2.7))
 
 
 def _orbit_panel(orbits: Sequence[Orbit]) -> Panel:
@@ -231,8 +228,7 @@ def _orbit_panel(orbits: Sequence[Orbit]) -> Panel:
     title = f"Lateral force on the {shaft} shaft over one revolution{f', at {point}' if point else ''}"
     words = "Orbit of the force in axes that do not turn, of the nominal joint and of two others. "
     words += " ".join(f"{orbit.label}: up to {text.value(orbit.largest, 'N')}." for orbit in orbits)
-    draw, room = partial(_draw_orbits, orbits=orbits), drawing.legend_room([orbit.label for orbit in orbits])
-    return Panel(f"orbit-{shaft}", title, words, draw, (drawing.WIDTH, 4.6), top=room)
+    return Panel(f"orbit-{shaft}", title, words, partial(_draw_orbits, orbits=orbits), (drawing.WIDTH, 4.6))
 
 
 def _bars(ax: Axes, rows: Rows) -> None:
@@ -240,9 +236,10 @@ def _bars(ax: Axes, rows: Rows) -> None:
     keys = ("order", "nominal", "q5", "qmedian", "q95")
     order, nominal, low, middle, high = (np.nan_to_num([row[key] for row in rows]) for key in keys)
     ends = np.clip([middle - low, high - middle], 0.0, None)
-    ax.bar(order - 0.18, nominal, 0.32, color=drawing.GREY)
-    ax.bar(order + 0.18, middle, 0.32, color=style.COLOURS[0])
-    ax.errorbar(order + 0.18, middle, ends, fmt="none", ecolor=style.INK, elinewidth=1.3, capsize=4.0)
+    ax.bar(order - 0.18, nominal, 0.32, color=drawing.GREY, label="nominal joint")
+    ax.bar(order + 0.18, middle, 0.32, color=style.COLOURS[0], label="median")
+    look: Any = {"fmt": "none", "ecolor": style.INK, "elinewidth": 1.3, "capsize": 4.0, "label": "5 to 95 %"}
+    ax.errorbar(order + 0.18, middle, ends, **look)
     top = float(max(high.max(), nominal.max()))
     ax.set(xticks=list(ORDERS), xticklabels=[f"{n}×" for n in ORDERS], xlabel="order, multiple of the input speed")
     ax.set(xlim=(ORDERS[0] - 0.6, ORDERS[-1] + 0.6), ylim=(0.0, 1.08 * top or 1.0))
@@ -251,13 +248,11 @@ def _bars(ax: Axes, rows: Rows) -> None:
     if not unit:
         ax.yaxis.set_major_formatter(ticker.FuncFormatter(lambda x, _: f"{x:.3g}"))
     ax.set_ylabel(f"amplitude [{unit or '1'}]")
-    bars = [patches.Patch(color=colour) for colour in (drawing.GREY, style.COLOURS[0])]
-    drawing.legend_above(ax, [*bars, lines.Line2D([], [], color=style.INK, lw=1.3, marker="|", ms=8.0)], AMPLITUDES)
 
 
 def _draw_orbits(ax: Axes, orbits: Sequence[Orbit]) -> None:
     """Draw the orbits about zero force; a dot is the input angle 0, an arrow head points on."""
-    handles, largest = [], max(orbit.largest for orbit in orbits)
+    largest = max(orbit.largest for orbit in orbits)
     for line in (ax.axhline, ax.axvline):
         line(0.0, color=style.FAINT, lw=0.8)
     for orbit in orbits:
@@ -265,7 +260,7 @@ def _draw_orbits(ax: Axes, orbits: Sequence[Orbit]) -> None:
         x, y = np.vstack([orbit.force, orbit.force[:1]]).T
         small = orbit.near == "nominal"  # mostly a point at the centre, where other orbits pass
         size, order = (4.0, 4) if small else (6.0, 3)
-        handles += ax.plot(x, y, "o", markevery=[0], ms=size, zorder=order, color=colour, ls=dash)
+        ax.plot(x, y, "o", markevery=[0], ms=size, zorder=order, color=colour, ls=dash, label=orbit.label)
         k = max(1, len(orbit.force) // 12)
         if orbit.largest > SMALL * largest:
             head = {"arrowstyle": "-|>", "color": colour, "mutation_scale": 16.0}
@@ -275,4 +270,3 @@ def _draw_orbits(ax: Axes, orbits: Sequence[Orbit]) -> None:
     unit = drawing.loads_axis(ax.xaxis, largest, "N")
     drawing.loads_axis(ax.yaxis, largest, "N")
     ax.set(xlabel=f"f_x, in the plane of both shafts [{unit}]", ylabel=f"f_y, normal to that plane [{unit}]")
-    drawing.legend_above(ax, handles, [orbit.label for orbit in orbits])

@@ -135,16 +135,15 @@ def selective(*views: View) -> Answer:
     def draw(ax: Axes) -> None:
         """Draw yield with its interval, unmatched share, and share of all crosses in a good joint, over the classes."""
         x = [row["classes"] for row in rows]
-        for key, colour, dash in zip(LINES, style.COLOURS, style.DASHES, strict=False):
-            ax.plot(x, [100.0 * row[key] for row in rows], marker="o", ms=4.5, color=colour, ls=dash)
+        for (key, label), colour, dash in zip(LINES.items(), style.COLOURS, style.DASHES, strict=False):
+            y = [100.0 * row[key] for row in rows]
+            ax.plot(x, y, marker="o", ms=4.5, color=colour, ls=dash, label=label)
         low, high = ([100.0 * row[end] for row in rows] for end in ("good_lower", "good_upper"))
-        drawing.legend_above(ax, ax.lines, list(LINES.values()))
         ax.vlines(x, low, high, color=style.COLOURS[0], lw=1.2)
         ax.set(xlabel="classes", ylabel="share [%]", ylim=(-2.0, 102.0), xticks=x)
 
-    top = drawing.legend_room(list(LINES.values()))
     description = "; ".join(f"{row['classes']} classes: yield {text.percent(row['good'])}" for row in rows)
-    panel = Panel("classes", TITLE, description, draw, (drawing.WIDTH, 3.4), top=top)
+    panel = Panel("classes", TITLE, description, draw, (drawing.WIDTH, 3.4))
     table = Table("classes", "Yield and unmatched parts, by number of classes", COLUMNS, rows, {"clearance": "m"})
     return Answer("selective", TITLE, [Panels([panel]), table, *NOTES])
 
@@ -156,9 +155,9 @@ def selective_on_page(view: View, asked: Asked) -> Answer:
         raise NotApplicable
     words = f"{text.percent(classes.unmatched)} of the crosses and forks have no partner of their class."
     if view.limits:
-        kept = shares.good(view)
-        ends = text.span(kept["good_lower"], kept["good_upper"])
-        words += f" {text.percent(kept['good'])} of the assembled joints keep all limits (total interval {ends})."
+        good = shares.good(view)
+        ends = text.span(good["good_lower"], good["good_upper"])
+        words += f" {text.percent(good['good'])} of the assembled joints keep all limits (total interval {ends})."
     columns = {"class": range(1, classes.matched.size + 1), "pins": classes.edges[0, 1:], "holes": classes.edges[1, 1:]}
     columns |= dict(zip((kind.name for kind in KINDS), classes.shares, strict=True)) | {"matched": classes.matched}
     title = "Classes by measured diameter, deviation from nominal"
@@ -179,12 +178,12 @@ def _row(view: View) -> Row:
     if not view.limits:
         remedy = "add [limits] to the study, and run the same command again"
         raise shares.inapplicable(view, "is of a study without [limits]", remedy)
-    classes, kept = classes_of(view), shares.good(view)
+    classes, good = classes_of(view), shares.good(view)
     number, unmatched = (1, 0.0) if classes is None else (classes.matched.size, classes.unmatched)
     errors = view.errors(np.arange(min(view.n, BLOCK)))  # of a large campaign the first joints
     clearances = (0.5 * (errors[f"{hole}.diameter"] - errors[f"{pin}.diameter"]) for pin, hole in HOLE_OF_PIN.items())
     deviation = float(np.sqrt(np.mean([clearance.var() for clearance in clearances])))
     row = {"classes": number, "unmatched": unmatched, "clearance": deviation}
     ends = ("good", "good_lower", "good_upper")
-    row |= {key: kept[key] for key in ("n", "count", "n_failed", "n_unsettled", *ends)}
-    return row | {key.replace("good", "of_all"): (1.0 - unmatched) * kept[key] for key in ends}
+    row |= {key: good[key] for key in ("n", "count", "n_failed", "n_unsettled", *ends)}
+    return row | {key.replace("good", "of_all"): (1.0 - unmatched) * good[key] for key in ends}

@@ -184,9 +184,9 @@ def _causes(pair: Shafts) -> Rows:
         errors = {name: column for name, column in errors.items() if np.ptp(column) > 0}
         index = first_order(np.column_stack(list(errors.values())), above[place].astype(float), iid=independent)
         for entry in study.entries:
-            here = [name in entry.quantities or name[:-2] in entry.quantities for name in errors]
-            caused = weight * np.nan_to_num(index.estimate[here])
-            half = weight * (index.upper - index.estimate)[here] if weight else np.zeros(1)
+            of_entry = [name in entry.quantities or name[:-2] in entry.quantities for name in errors]
+            caused = weight * np.nan_to_num(index.estimate[of_entry])
+            half = weight * (index.upper - index.estimate)[of_entry] if weight else np.zeros(1)
             parts[entry.pattern] = (*parts.get(entry.pattern, ()), float(caused.sum()))
             wide[entry.pattern] = wide.get(entry.pattern, 0.0) + float((half**2).sum())
     rows = []

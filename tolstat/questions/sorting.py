@@ -118,20 +118,20 @@ def _parts(view: View, costs: Costs) -> tuple[Panel, Table, Table]:
         raise shares.inapplicable(view, "is of a study that sorts nothing, or has no limits", remedy)
     if not view.design.has_interval("reweighting"):
         raise shares.unusable(view, "holds joints that are not independent", 'write sampling.method = "random"')
-    kept, base = np.ones(view.n), view.design.counts_as(view.n)
+    probability, base = np.ones(view.n), view.design.counts_as(view.n)
     parts: list[dict[str, Any]] = []
     for part, price in _prices(scaling.tolerances(study), costs).items():
         used = _accepted(view, [gauge for gauge in scrap if gauge.part == part])
-        share, kept = float(np.average(used, weights=base)), kept * used
+        share, probability = float(np.average(used, weights=base)), probability * used
         parts.append({"part": part, "scrapped": 1.0 - share, "cost": price, "cost_used": price / share})
-    made, cost = (sum(row[key] for row in parts) for key in ("cost", "cost_used"))
-    stages: list[tuple[str, FloatArray | None, float, float]] = [(MADE, None, 0.0, made)]
+    cost_made, cost = (sum(row[key] for row in parts) for key in ("cost", "cost_used"))
+    stages: list[tuple[str, FloatArray | None, float, float]] = [(MADE, None, 0.0, cost_made)]
     if scrap:
-        stages.append((SCRAPPED, kept, 0.0, cost))
+        stages.append((SCRAPPED, probability, 0.0, cost))
     if study.rejects:
         passed = _accepted(view, study.rejects)
-        share = float(np.average(passed, weights=base * kept))
-        stages.append((INSPECTED, kept * passed, 1.0 - share, cost / share))
+        share = float(np.average(passed, weights=base * probability))
+        stages.append((INSPECTED, probability * passed, 1.0 - share, cost / share))
     loads = view.loads([*([ANY_LIMIT] if len(view.limits) > 1 else []), *view.limits])
     rows = [_row(view, load, *stage) for load in loads for stage in stages]
     title = "Shares above the limits, and what a joint costs"
@@ -174,11 +174,9 @@ def _row(view: View, load: Sample, stage: str, kept: FloatArray | None, rejected
 
 def _panel(rows: Rows) -> Panel:
     """Picture of the share above the limits at each stage."""
-    labels = [row["stage"] for row in rows]
 
     def draw(ax: Axes) -> None:
         """Draw the share above the limits at each stage, with its interval, and beside it what a good joint costs."""
-        drawing.rows(ax, labels)
         high = 1.25 * max(float(row["upper"]) for row in rows)
         ax.set(xlim=(0.0, 100.0 * high), xlabel="share of the joints above a limit, per cent")
         for i, row in enumerate(rows):
@@ -190,4 +188,5 @@ def _panel(rows: Rows) -> Panel:
 
     size = (drawing.WIDTH, 0.55 * len(rows) + drawing.BOTTOM + 0.1)
     description = "; ".join(f"{row['stage']}: {text.percent(row['estimate'])}" for row in rows)
-    return Panel("stages", "Joints above a limit, before and after", description, draw, size, drawing.rows_left(labels))
+    labels = [row["stage"] for row in rows]
+    return Panel("stages", "Joints above a limit, before and after", description, draw, size, rows=labels)

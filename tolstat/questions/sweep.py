@@ -16,8 +16,8 @@ from tolstat.common.strict import read_section
 from tolstat.common.tables import ERROR_FIELDS, FAILED, SIMULATED, UNSETTLED, Status
 from tolstat.common.units import DISPLAY_UNITS
 from tolstat.display import drawing, style, text
-from tolstat.display.answer import Answer, Artist, Axes, Figure, Panel, Panels, Part, Row, Sheet, Table, plain
-from tolstat.display.style import lines, ticker
+from tolstat.display.answer import Answer, Axes, Figure, Panel, Panels, Part, Row, Sheet, Table, plain
+from tolstat.display.style import ticker
 from tolstat.questions.shares import inapplicable, rows_of
 from tolstat.store import recorded
 from tolstat.store.view import View
@@ -27,10 +27,6 @@ from tolstat.study.selection import UNITS
 MAX_LEGEND = 6
 """Maximum number of values of the second swept quantity in the legend."""
 Look = dict[str, Any]
-JOINTS: Look = {"marker": "o", "ms": 3.2}
-NOMINAL: Look = {"color": style.FAINT, "lw": 1.1, "ls": (0.0, (1.0, 2.0))}
-UNSETTLED_JOINTS: Look = {"ls": "", "marker": "o", "ms": 6.5, "mfc": "white"}
-FAILED_JOINTS: Look = {"ls": "", "marker": "x", "color": style.INK}
 
 
 def sweep(view: View) -> Answer:
@@ -91,15 +87,10 @@ def _short(row: Row) -> Row:
 
 def _panel(view: View, group: str, kind: Kind) -> Panel:
     axes = swept_axes(view)
-    room, quantity = drawing.legend_room(_legend(view, axes)[1]), QUANTITY[kind.unit]
-
-    def draw(ax: Axes) -> None:
-        _draw(ax, view, axes, group, kind)
-        drawing.legend_above(ax, *_legend(view, axes))
-
+    quantity, draw = QUANTITY[kind.unit], partial(_draw, view=view, axes=axes, group=group, kind=kind)
     title, words = f"{group.capitalize()} bushings, {quantity}", f"Largest {quantity}s of the {group} bushings"
-    size = (drawing.WIDTH, 3.3 + room)
-    return Panel(f"sweep-{group}-{kind.symbol}", title, f"{words} against the swept value", draw, size, top=room)
+    words += " against the swept value"
+    return Panel(f"sweep-{group}-{kind.symbol}", title, words, draw, (drawing.WIDTH, 3.8))
 
 
 def sheet(view: View) -> Figure:
@@ -137,21 +128,28 @@ def _draw(ax: Axes, view: View, axes: list[Axis], group: str, kind: Kind) -> Non
         drawing.empty(ax, "not kept by the study")
         return
     if len(axes) < 2:
-        for name, colour, dash in zip(names_of(group, kind), style.COLOURS, style.DASHES, strict=True):
+        looks = zip(names_of(group, kind), style.COLOURS, style.DASHES, strict=True)
+        for i, (name, colour, dash) in enumerate(looks, 1):
             if name in loads:
-                _line(ax, view, first, loads[name], np.arange(view.n), color=colour, ls=dash)
+                _line(ax, view, first, loads[name], np.arange(view.n), color=colour, ls=dash, label=f"bushing {i}")
     else:
         largest, others = np.max(list(loads.values()), axis=0), np.column_stack([axis.values for axis in axes[1:]])
-        shades = _shades(axes[1])
+        values, shades = np.unique(axes[1].values), style.shades()
+        numbers = np.linspace(0, len(shades) - 1, values.size).round().astype(int)
+        named = values[np.linspace(0, values.size - 1, MAX_LEGEND).round().astype(int)]
         for point in np.unique(others, axis=0):
-            _line(ax, view, first, largest, np.flatnonzero((others == point).all(axis=1)), color=shades[point[0]])
+            label = f"{point[0]:.4g} {axes[1].unit}".strip() if point[0] in named else None
+            shade = shades[numbers[np.searchsorted(values, point[0])]]
+            _line(ax, view, first, largest, np.flatnonzero((others == point).all(axis=1)), color=shade, label=label)
     if len(view.nominal):
-        ax.axhline(max(load.nominal for load in view.loads(list(loads))), zorder=1.5, **NOMINAL)
+        nominal = max(load.nominal for load in view.loads(list(loads)))
+        look: Look = {"color": style.FAINT, "lw": 1.1, "ls": (0.0, (1.0, 2.0)), "zorder": 1.5}
+        ax.axhline(nominal, label="nominal joint, largest", **look)
     bottom, top = ax.get_ylim()
     for limit in sorted({view.limits[name] for name in loads if name in view.limits}):
         if limit < top + 0.5 * (top - bottom):
-            ax.axhline(limit, color=style.INK, lw=1.3, ls=(0.0, (8.0, 3.0)))
-            style.note(ax, f"limit {text.value(limit, kind.unit)}", limit)
+            label = f"limit {text.value(limit, kind.unit)}"
+            ax.axhline(limit, color=style.INK, lw=1.3, ls=(0.0, (8.0, 3.0)), label=label)
 
 
 def _line(ax: Axes, view: View, axis: Axis, values: FloatArray, joints: NDArray[np.intp], **look: Any) -> None:
@@ -159,35 +157,14 @@ def _line(ax: Axes, view: View, axis: Axis, values: FloatArray, joints: NDArray[
     joints = joints[np.argsort(axis.values[joints], kind="stable")]
     x, status = axis.values[joints], view.status[joints]
     shown = np.where(np.isin(status, SIMULATED), values[joints], np.nan)
-    ax.plot(x, shown, zorder=3, **JOINTS, **look)
+    ax.plot(x, shown, zorder=3, marker="o", ms=3.2, **look)
     loose, gone = np.isin(status, UNSETTLED), np.isin(status, FAILED)
-    ax.plot(x[loose], shown[loose], mec=look["color"], zorder=4, **UNSETTLED_JOINTS)
-    foot = np.full(int(gone.sum()), 0.02)
-    ax.plot(x[gone], foot, transform=ax.get_xaxis_transform(), zorder=4, **FAILED_JOINTS)
-
-
-def _shades(axis: Axis) -> dict[float, str]:
-    """Colour of `style.shades` of each value of a swept quantity, ascending."""
-    values, shades = np.unique(axis.values), style.shades()
-    numbers = np.linspace(0, len(shades) - 1, values.size).round().astype(int)
-    return {value: shades[i] for value, i in zip(values, numbers, strict=True)}
-
-
-def _legend(view: View, axes: list[Axis]) -> tuple[list[Artist], list[str]]:
-    """Handles and labels of a panel's legend."""
-    entries: list[tuple[str, Look]]
-    if len(axes) < 2:
-        looks = zip(style.COLOURS, style.DASHES, strict=True)
-        entries = [(f"bushing {i}", {"color": c, "ls": d} | JOINTS) for i, (c, d) in enumerate(looks, 1)]
-    else:
-        shades = list(_shades(axes[1]).items())
-        named = np.unique(np.linspace(0, len(shades) - 1, MAX_LEGEND).round().astype(int))
-        unit = axes[1].unit
-        entries = [(f"{shades[i][0]:.4g} {unit}".strip(), {"color": shades[i][1]} | JOINTS) for i in named]
-    entries += [("nominal joint, largest", NOMINAL)] if len(view.nominal) else []
-    entries += [("not settled", UNSETTLED_JOINTS | {"mec": style.INK})] if view.count(*UNSETTLED) else []
-    entries += [("no result", FAILED_JOINTS)] if view.count(*FAILED) else []
-    return [lines.Line2D([], [], **look) for _, look in entries], [label for label, _ in entries]
+    if loose.any():
+        hollow: Look = {"ms": 6.5, "mfc": "white", "mec": look["color"], "label": "not settled"}
+        ax.plot(x[loose], shown[loose], "o", zorder=4, **hollow)
+    if gone.any():
+        foot: Look = {"transform": ax.get_xaxis_transform(), "color": style.INK, "label": "no result"}
+        ax.plot(x[gone], np.full(int(gone.sum()), 0.02), "x", zorder=4, **foot)
 
 
 class Axis(NamedTuple):

@@ -192,17 +192,15 @@ def _panels(name: str, rows: Rows, levels: FloatArray) -> Iterator[Panel]:
         ("time", "time above a level", LINES),
     ):
         draw = partial(_curves, columns=columns, labels=labels, levels=levels)
-        room = drawing.legend_room(list(labels.values())) if len(labels) > 1 else Panel.top
-        yield Panel(f"{key}-{name}", f"{name}: {title}", words, draw, (drawing.WIDTH, 3.4), top=room)
+        yield Panel(f"{key}-{name}", f"{name}: {title}", words, draw, (drawing.WIDTH, 3.4))
 
 
 def _curves(ax: Axes, columns: Mapping[str, Any], labels: Mapping[str, str], levels: FloatArray) -> None:
-    """Draw curves over the level, the first with its interval; with a legend if there are several."""
+    """Draw curves over the level, the first with its interval."""
     x, ends = np.array(columns["level"]), ("", "_lower", "_upper")
-    curves = [[100.0 * np.array(columns[f"{name}{end}"]) for end in ends] for name in labels]
-    handles = drawing.curves(ax, x, curves, levels, bands=int(np.isfinite(curves[0][1]).all()))
+    curves = {label: [100.0 * np.array(columns[f"{key}{end}"]) for end in ends] for key, label in labels.items()}
+    has_band = all(np.isfinite(low).all() for _, low, _ in curves.values())
+    drawing.curves(ax, x, curves, levels, bands=int(has_band))
     unit = drawing.loads_axis(ax.xaxis, float(np.abs(x).max()), columns["unit"][0])
     ax.set(xlabel=f"level [{unit}]", ylim=(0.0, None))
     ax.set_ylabel("time above, % of a revolution" if len(labels) > 1 else "joints that exceed the level, %")
-    if len(labels) > 1:
-        drawing.legend_above(ax, handles, list(labels.values()))

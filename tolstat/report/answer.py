@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from tolstat import questions
 from tolstat.campaign.stop_rule import BIASED
-from tolstat.common.errors import Fault, InputError, StoreError
+from tolstat.common.errors import Fault, StoreError
+from tolstat.common.files import check_target
 from tolstat.common.tables import Status
-from tolstat.display import progress, text
+from tolstat.display import text
 from tolstat.display.answer import Answer, Part, Sentence, Sheet, Table
 from tolstat.joint.sections import mounting_and_law
 from tolstat.questions import accuracy, shares
@@ -56,8 +57,8 @@ def report(view: View, accepted: float = math.nan) -> Answer:
     parts: list[Part] = [Sentence(text.sentence(each.sentence), "lead") for each in verdicts]
     parts += [*stands_on, *_tables(view, accepted)]
     if verdict and verdict.answer and tells_yield(view):
-        kept = shares.together(shares.good(view), len(view.limits))
-        parts.append(Sentence(f"Yield: {kept.value} {kept.words}.", "lead"))
+        in_words = shares.together(shares.good(view), len(view.limits))
+        parts.append(Sentence(f"Yield: {in_words.value} {in_words.words}.", "lead"))
     causes = [Sentence(note) for note in verdict.notes] if verdict else []
     causes += [Sentence(text.sentence(note)) for life in lives for note in life.notes]
     return Answer("report", view.name, [*parts, *causes, *_notes(view), *_run(view)], facts)
@@ -88,7 +89,7 @@ def write_report(
     list of Path
         The files written: for ``FILE.h5`` ``FILE_exceedance.png``, ``.svg`` and ``.csv``, ``FILE_quantiles.csv`` and,
         with limits, ``FILE_limits.csv``; for a sweep ``FILE_sweep.png``, ``.svg`` and ``.csv``; for listed joints
-        ``FILE_cases.csv`` and, where variants have notes, ``FILE_cases.md``.
+        ``FILE_cases.csv``.
 
     Raises
     ------
@@ -98,31 +99,16 @@ def write_report(
         When the folder cannot be written to.
     """
     with viewed(source) as view:
-        return write(report(view.at(point), accepted), view.path, out_dir, point)
-
-
-def write(
-    made: Answer,
-    path: Path,
-    out_dir: str | Path | None = None,
-    point: str = "",
-    stage: Callable[[str], None] = progress.silent,
-) -> list[Path]:
-    """Write the files of a report beside the result file `path`, or to a folder; see `write_report`."""
-    folder = path.parent if out_dir is None else Path(out_dir)
-    stage("files")
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        return made.write(folder / (f"{path.stem}_{point}" if point else path.stem))
-    except OSError as error:
-        problem = f"cannot be written to: {error.strerror or error}"
-        raise InputError([Fault(str(folder), problem, "give another folder with --out")]) from error
+        folder = view.path.parent if out_dir is None else Path(out_dir)
+        stem = folder / (f"{view.path.stem}_{point}" if point else view.path.stem)
+        check_target(stem)
+        return report(view.at(point), accepted).write(stem)
 
 
 def _tables(view: View, accepted: float) -> Iterator[Part]:
     """Tables for people, limits or else quantiles; the other ones and the curves as numbers, and their picture."""
     if view.bushing_loads:
-        yield Sheet("exceedance", lambda: curves.sheet(view, f"{view.head()}\n{exceedance.note(view)}"))
+        yield Sheet("exceedance", lambda: curves.sheet(view, [view.head(), exceedance.note(view)]))
     if not view.shown_loads:
         yield Sentence("no largest load is kept; the results that are: tolstat export", "lead")
     for table in exceedance.quantile_tables(view):

@@ -192,12 +192,12 @@ def _yield(view: View, records: Sequence[table.Row], standing: Standing | None) 
         if row["load"] == ANY_LIMIT and worst["count"] and not np.isnan(worst["estimate"]):
             words += _most_often(view, records, worst)
         return Verdict("", share_of(row), words, notes, worst["load"])
-    kept = shares.together(shares.good(view), len(view.limits))
-    if not kept.decides:
+    in_words = shares.together(shares.good(view), len(view.limits))
+    if not in_words.decides:
         return Verdict("none", WORDS["none"], _reason(view, [_decisive(view, records)]), notes)
     behind = [sentences.of_variations(standing, ""), text.capital(_without_errors(view))]
-    words = ". ".join([kept.words + _not_varied(view, standing), *filter(None, behind)])
-    return Verdict("", kept.value, words, notes, exceedance.most_exceeded(view, records)["load"])
+    words = ". ".join([in_words.words + _not_varied(view, standing), *filter(None, behind)])
+    return Verdict("", in_words.value, words, notes, exceedance.most_exceeded(view, records)["load"])
 
 
 def _undecided(records: Sequence[table.Row]) -> bool:

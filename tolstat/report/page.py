@@ -17,7 +17,7 @@ from tolstat.common.errors import Fault, NotApplicable, StoreError, TolstatError
 from tolstat.common.tables import SCHEMA_VERSION, VALID
 from tolstat.display import html, progress, table, text
 from tolstat.display.answer import Asked
-from tolstat.display.blocks import Block, Card, Decision, Facts, Listing, Page, Panels, Section, Sentence
+from tolstat.display.blocks import Block, Decision, Facts, Listing, Page, Panels, Section, Sentence
 from tolstat.display.verdict import WORDS, Verdict
 from tolstat.joint import Joint, derived, load, model
 from tolstat.joint.model import leaves
@@ -94,9 +94,9 @@ def write_page(
             remedy = "leave the ending .html out: tolstat report FILE writes their table"
             raise StoreError(str(Fault(str(view.path), "lists its joints one by one", remedy)))
         asked = Asked(view.path, accepted, replay, stage=stage, processes=processes)
-        made = compose(view.at(point), asked, full, brief)
+        page = compose(view.at(point), asked, full, brief)
         stage("page: pictures")  # drawn from the view
-        html.write(made, Path(out), processes)
+        html.write(page, Path(out), processes)
     return Path(out)
 
 
@@ -217,12 +217,12 @@ def joint_values(store: Reader) -> Listing:
         When this version cannot read the joint in the file.
     """
     joint = strict.validate(Joint, store.joint, f"{store.path}: joint")
-    given, values = leaves(joint.given()), _values(joint)
+    given_keys, values = leaves(joint.given()), _values(joint)
     default = _values(load(DEFAULT_JOINT, {}, DEFAULT_JOINT))
     rows = [
-        (key, value, default.get(key, "-"), "given" if key in given else derived.DERIVED[key].formula)
+        (key, value, default.get(key, "-"), "given" if key in given_keys else derived.DERIVED[key].formula)
         for key, value in values.items()
-        if value != default.get(key) and (key in given or key in derived.DERIVED)
+        if value != default.get(key) and (key in given_keys or key in derived.DERIVED)
     ]
     title = f"The joint: values that differ from {DEFAULT_JOINT}"
     if not rows:
@@ -252,12 +252,12 @@ def decision(view: View, asked: Asked) -> Section:
     """Decide on the limits: question, verdicts, what they stand on, drawing with the worst bushing marked, numbers."""
     verdict = headline(view, asked.accepted)
     leading = verdict.load if verdict else next(iter(view.leading), "")
-    lives = [_card(life) for life in life_verdicts(view, asked.accepted, asked.replay)]
+    lives = life_verdicts(view, asked.accepted, asked.replay)
     standing = variations.applicable(view, asked.accepted)
     below = [sentences.still(standing), sentences.shop(view)] if standing and standing.rows else []
     head = Decision(
         question_of(view.store.study_text),
-        lives if verdict is None and lives else [_card(verdict) if verdict else _without_verdict(view), *lives],
+        lives if verdict is None and lives else [verdict or _without_verdict(view), *lives],
         _cards(view, verdict),
         place_of(view, leading, asked),
         answer.bars(standing) if standing and standing.rows else None,
@@ -296,47 +296,43 @@ def question_of(study: str) -> str:
     return " ".join(question[1].split()) if question else ""
 
 
-def _card(verdict: Verdict) -> Card:
-    return Card(verdict.value, verdict.words, " ".join(map(text.sentence, verdict.notes)), verdict.shade)
-
-
-def _without_verdict(view: View) -> Card:
+def _without_verdict(view: View) -> Verdict:
     why = "The study sets no limits" if view.sampled else f"Joints of a {METHODS[view.method]} are no sample"
-    return Card("", f"{why}, so there is no verdict.", "")
+    return Verdict("", "", f"{why}, so there is no verdict.")
 
 
-def _cards(view: View, verdict: Verdict | None) -> list[Card]:
+def _cards(view: View, verdict: Verdict | None) -> list[Verdict]:
     """Unless the verdict says it, the yield and the limit exceeded most; next delivery, number of joints, errors."""
     cards = []
     if verdict is not None and tells_yield(view):
         row = shares.good(view)
         if verdict.answer:
             together = shares.together(row, len(view.limits))
-            cards.append(Card(together.value, together.words, "Yield"))
+            cards.append(Verdict("", together.value, together.words, ("Yield",)))
         if (interval := text.ends(row["next_lower"], row["next_upper"], ".0f")) != "-":
             exceeded = "at least one limit" if len(view.limits) > 1 else "the limit"
             predicted = f"of the next {row['delivery']} joints exceed {exceeded}"
-            cards.append(Card(interval, predicted, "95 % prediction interval"))
+            cards.append(Verdict("", interval, predicted, ("95 % prediction interval",)))
     if verdict is not None and verdict.load and verdict.load not in verdict.words:
         most = next(row for row in exceedance.limit_rows(view) if row["load"] == verdict.load)
         label = f"exceed {text.value(most['level'], most['unit'])} on {most['load']}, the limit exceeded most"
         low, high = exceedance.ends(most)
         interval = "no interval" if np.isnan(low) else f"total interval {text.span(low, high)}"
         note = f"{shares.above(most)} joints with a valid load; {interval}"
-        cards.append(Card(exceedance.share_of(most), label, note))
+        cards.append(Verdict("", exceedance.share_of(most), label, (note,)))
     return [*cards, *_basis(view)]
 
 
-def _basis(view: View) -> list[Card]:
+def _basis(view: View) -> list[Verdict]:
     counts = view.counts
     pending = counts.total - counts.done
     note = counts.shortfall + (f", {pending} still pending" if pending else "")
     whole = view.count(*VALID) == counts.total
-    cards = [Card(str(counts.done), "joints simulated", note, "" if whole else "open")]
+    cards = [Verdict("" if whole else "open", str(counts.done), "joints simulated", (note,))]
     kinds = {loads.load_of(name).kind.key for name in view.leading}
     usual = {k: error for k, error in view.numerical_error.items() if k in kinds and not np.isnan(error)}
     if usual and view.verification:
         kind = max(usual, key=lambda name: usual[name])
         label = f"numerical error of the largest loads ({kind})"
-        cards.append(Card(accuracy.in_percent(usual[kind]), label, accuracy.basis(view.verification)))
+        cards.append(Verdict("", accuracy.in_percent(usual[kind]), label, (accuracy.basis(view.verification),)))
     return cards

@@ -135,7 +135,6 @@ def bars(standing: variations.Standing) -> Panel:
         shown = np.array([share, accepted, *ends])
         known = shown[shown >= 0.5 / max(standing.n, 1)]
         floor, high = 0.6 * float(known.min(initial=0.1)), min(1.2 * float(known.max(initial=0.1)), 1.0)
-        drawing.rows(ax, labels)
         ax.set_ylim(len(labels) - 0.4, -1.3)  # a row above, for the accepted share in words
         style.share_axis(ax, floor, "x", high)
         drawn = max(share, floor)
@@ -152,9 +151,8 @@ def bars(standing: variations.Standing) -> Panel:
     moving = "; ".join(f"{row['label']} {text.percent(row['share'])}" for row in rows)
     description = f"As drawn {text.percent(share)}. {moving or 'Nothing that is assumed moves it'}"
     size = drawing.WIDTH, 0.27 * (len(labels) + 1) + drawing.BOTTOM + 0.3
-    left = drawing.rows_left(labels)
     title = "Share of the joints above a limit, with other values of what is assumed"
-    return Panel("assumptions", title, description, draw, size, left)
+    return Panel("assumptions", title, description, draw, size, rows=labels)
 
 
 FURTHER = 4
@@ -248,5 +246,5 @@ def _further(view: View, accepted: float, n: int) -> tuple[list[variations.Varia
     second = (1.0 + standing.confidence) / 2.0
     needed = {row["label"]: MARGIN * binomial.needed(row["share"], accepted, second) for row in standing.undecided}
     numbers = {label: number for label, number in needed.items() if number <= FURTHER * n}
-    every = {each.label: each for each in (*variations.singles(view.study), *variations.all_together(view))}
-    return [every[label] for label in numbers], math.ceil(max(numbers.values(), default=n))
+    by_label = {each.label: each for each in (*variations.singles(view.study), *variations.all_together(view))}
+    return [by_label[label] for label in numbers], math.ceil(max(numbers.values(), default=n))

@@ -160,10 +160,10 @@ def _evaluate(view: View, accepted: float) -> Standing:
     in_file = [variation.keys for variation, _ in simulated]
     missing = tuple(dict.fromkeys(each.name for each in singles(study) if each.keys not in in_file))
     if not missing:
-        every = all_together(view)
-        together_in_file = joints.simulated(every)
+        combined = all_together(view)
+        together_in_file = joints.simulated(combined)
         simulated += together_in_file
-        missing = (ALL,) if len(together_in_file) < len(every) else ()
+        missing = (ALL,) if len(together_in_file) < len(combined) else ()
     looks = 2 if len({len(loads) for _, loads in simulated}) > 1 else 1
     confidence = 1.0 - 0.05 / max(looks * len(simulated), 1)
     load, parts = joints.load, error_budget.known_parts(view)

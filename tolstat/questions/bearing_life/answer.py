@@ -13,7 +13,7 @@ from tolstat.analysis.binomial import needed
 from tolstat.analysis.rating_life import A1, FRETTING
 from tolstat.common.errors import NotApplicable
 from tolstat.common.tables import VALID
-from tolstat.display import style, text
+from tolstat.display import drawing, style, text
 from tolstat.display.answer import Answer, Asked, Axes, Panel, Panels, Part, Sentence, Table
 from tolstat.display.table import Column, Row, Rows, by_share, has, has_unresolved, of_shares
 from tolstat.display.verdict import Verdict, on_share
@@ -270,21 +270,14 @@ def _draw(ax: Axes, lives: Lives) -> None:
     rate = lives.rate(JOINT)
     table = rate.curve(np.unique(rate.valid))[::-1]
     x, floor = 1.0 / table["level"], 0.5 / float(table["n"][0])
-    drawn = {name: table[name].clip(floor, 1.0) for name in ("outer_lower", "estimate", "outer_upper")}
-    if lives.view.design.has_interval("quantile"):
-        band = drawn["outer_lower"], drawn["outer_upper"]
-        ax.fill_between(x, *band, step="pre", color=style.COLOURS[0], alpha=0.2, lw=0, label="95 % band")
-    ax.step(x, drawn["estimate"], where="pre", color=style.COLOURS[0])
-    ax.set_xscale("log")
+    curve = [table[name].clip(floor, 1.0) for name in ("estimate", "outer_lower", "outer_upper")]
+    drawing.curves(ax, x, {"": curve}, bands=int(lives.view.design.has_interval("quantile")), step="pre")
     style.share_axis(ax, floor)
-    ax.xaxis.set_major_locator(style.ticker.LogLocator(subs=(1.0, 2.0, 5.0)))
-    ax.xaxis.set_major_formatter(style.ticker.FuncFormatter(lambda value, _: text.number(value)))
-    ax.xaxis.set_minor_formatter(style.ticker.NullFormatter())
-    ax.set(xlabel=f"life {lives.bearing.symbol} of the joint [h]", ylabel="share of joints with a shorter life")
     nominal = float(lives.nominal_hours[-1])
+    ends = [life for life in (x.min(), x.max(), nominal, lives.required) if math.isfinite(life)]
+    drawing.log_loads(ax.xaxis, 0.8 * min(ends), 1.25 * max(ends), max(ends), "h")
+    ax.set(xlabel=f"life {lives.bearing.symbol} of the joint [h]", ylabel="share of joints with a shorter life")
     if math.isfinite(nominal):
-        marker: Any = {"ms": 7.5, "mec": "white", "color": style.INK, "ls": "", "clip_on": False}
-        ax.plot(nominal, 1.0, "v", label="nominal joint", **marker)
+        style.mark(ax, nominal, 1.0, style.INK)
     if math.isfinite(lives.required):
         ax.axvline(lives.required, color=style.INK, lw=1.4, ls="--", label="required life")
-    ax.legend(loc="lower right")

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Container, Iterator, Sequence
-from typing import Annotated, NamedTuple
+from collections.abc import Container, Iterator, Mapping, Sequence
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,8 +34,6 @@ SPREAD = (0.05, 0.5, 0.95)
 TITLE = "Causes over the input angle"
 LINES = 4
 """Number of errors whose share is drawn."""
-LOADS = ("5 to 95 % of the joints", "median", "without errors")
-"""Labels of the lines of a load."""
 OVER_REVOLUTION = "Share of the variance over the whole revolution, every angle weighted by its variance"
 
 
@@ -96,15 +94,14 @@ def angles(
     (indices,) = against_angle(view, [load], joints, (load,) if logarithm else ())
     std = np.sqrt(indices.first.variance).tolist()
     rows = [
-        {"theta": theta, "load": load, "unit": indices.unit, "std": std[k], "error": name}
+        {"theta": theta, "load": load, "unit": indices.facts["unit"], "std": std[k], "error": name}
         | with_ends("share", (end[i, k] for end in indices.first[:3]))
         for k, theta in enumerate(indices.angles.tolist())
         for i, name in enumerate(indices.names)
     ]
     parts = _parts([indices], indices.names[:top])
     parts.insert(2, Table("angles", "Shares at each input angle", (), rows, {"theta": "rad"}))
-    keys = ("load", "unit", "logarithm", "joints", "origin", "apart", "additive")
-    return Answer("angles", TITLE, parts, {key: getattr(indices, key) for key in keys})
+    return Answer("angles", TITLE, parts, indices.facts)
 
 
 def angles_on_page(view: View, asked: Asked) -> Answer:
@@ -125,18 +122,11 @@ class AgainstAngle(NamedTuple):
 
     Attributes
     ----------
-    load : str
-        ``cross1.F``: the load at an angle, not its largest over the revolution.
-    unit : str
-        SI unit of the load.
-    logarithm : bool
-        Whether the variance of the logarithm is decomposed.
-    quantity : str
-        Name of the decomposed quantity: the load, or its logarithm.
-    joints : int
-        Number of joints evaluated.
-    origin, apart
-        As in `revolutions.Revolutions`.
+    facts : mapping
+        ``load`` (the load at an angle, not its largest over the revolution), its SI ``unit``; ``logarithm``, whether
+        the variance of the logarithm is decomposed; ``joints`` evaluated; ``origin`` and ``apart``, as in
+        `revolutions.Revolutions`; ``additive``, share of the variance over the revolution that all errors explain
+        alone.
     angles : ndarray, shape (k,)
         Input angles, rad.
     nominal : ndarray, shape (k,)
@@ -149,24 +139,20 @@ class AgainstAngle(NamedTuple):
         Shares of the variance at each angle, (d, k); variance (k,).
     overall : FirstOrder
         Shares over the whole revolution, (d,).
-    additive : float
-        Share of the variance over the revolution that all errors explain alone.
     """
 
-    load: str
-    unit: str
-    logarithm: bool
-    quantity: str
-    joints: int
-    origin: str
-    apart: float
+    facts: Mapping[str, Any]
     angles: FloatArray
     nominal: FloatArray
     spread: FloatArray
     names: tuple[str, ...]
     first: FirstOrder
     overall: FirstOrder
-    additive: float
+
+    @property
+    def quantity(self) -> str:
+        """Name of the decomposed quantity: the load, or its logarithm."""
+        return f"log {self.facts['load']}" if self.facts["logarithm"] else str(self.facts["load"])
 
 
 def against_angle(
@@ -213,10 +199,11 @@ def against_angle(
         of_angles = sensitivity.over_revolution(x, np.log(y) if is_log else y, iid=iid)
         order = np.argsort(-of_angles[1].estimate, kind="stable")
         first, overall = (FirstOrder._make((*(end[order] for end in i[:3]), i.variance)) for i in of_angles)
-        head = name, CHANNELS[name].unit, is_log, f"log {name}" if is_log else name, len(y)
-        revolution = histories.origin, histories.apart, histories.angles, drawn, _quantiles(y)
-        indices = tuple(names[i] for i in order), first, overall, float(np.nansum(overall.estimate))
-        each.append(AgainstAngle(*head, *revolution, *indices))
+        facts = {"load": name, "unit": CHANNELS[name].unit, "logarithm": is_log, "joints": len(y)}
+        facts |= {"origin": histories.origin, "apart": histories.apart}
+        facts["additive"] = float(np.nansum(overall.estimate))
+        ordered = tuple(names[i] for i in order)
+        each.append(AgainstAngle(facts, histories.angles, drawn, _quantiles(y), ordered, first, overall))
     return each
 
 
@@ -263,59 +250,57 @@ def theta_axis(ax: Axes, theta: FloatArray) -> FloatArray:
 def _parts(each: Sequence[AgainstAngle], shown: Container[str]) -> list[Part]:
     """Pictures; shares over the revolution, of which people see those of the errors `shown`; a note."""
     rows = [
-        {"load": indices.load, "error": name, **with_ends("share", (end[i] for end in indices.overall[:3]))}
+        {"load": indices.facts["load"], "error": name, **with_ends("share", (end[i] for end in indices.overall[:3]))}
         | {"largest": float(indices.first.estimate[i, k]), "theta": float(indices.angles[k])}
         for indices in each
         for i, (name, k) in enumerate(zip(indices.names, indices.first.estimate.argmax(axis=1), strict=True))
     ]
     seen = [row for row in rows if row["error"] in shown]
     table = Table("revolution", OVER_REVOLUTION, COLUMNS, rows, {"theta": "rad"}, seen)
-    first = each[0]
-    alone = (f"{100 * indices.additive:.0f} % of the variance of {indices.quantity}" for indices in each)
+    first = each[0].facts
+    alone = (f"{100 * indices.facts['additive']:.0f} % of the variance of {indices.quantity}" for indices in each)
     note = (
-        f"All errors alone explain {', '.join(alone)}. Over the input angle: the first {first.joints} settled joints, "
-        f"{ORIGIN[first.origin]}; bands are the 95 % intervals at each angle. Shares are corrected for chance: an "
-        "error without effect has the mean share 0, and its estimate may be negative."
+        f"All errors alone explain {', '.join(alone)}. Over the input angle: the first {first['joints']} settled "
+        f"joints, {ORIGIN[first['origin']]}; bands are the 95 % intervals at each angle. Shares are corrected for "
+        "chance: an error without effect has the mean share 0, and its estimate may be negative."
     )
-    if first.apart:
-        apart = f"The largest loads differ by up to {first.apart:.1e} (relative) from the stored ones"
+    if first["apart"]:
+        apart = f"The largest loads differ by up to {first['apart']:.1e} (relative) from the stored ones"
         note += f" {apart}, which another machine or version computed."
     return [Panels([panel for indices in each for panel in _panels(indices)]), table, Sentence(note)]
 
 
 def _panels(indices: AgainstAngle) -> Iterator[Panel]:
     """Load over the revolution, and shares of its variance."""
-    key, unit, leading = indices.load, unit_text(indices.unit), indices.names[:LINES]
+    key, unit, leading = indices.facts["load"], unit_text(indices.facts["unit"]), indices.names[:LINES]
     low, middle, high = indices.spread
 
     def draw_loads(ax: Axes) -> None:
         theta = theta_axis(ax, indices.angles)
-        ax.fill_between(theta, closed(low), closed(high), color=style.COLOURS[0], alpha=0.2, lw=0, label=LOADS[0])
-        ax.plot(theta, closed(middle), color=style.COLOURS[0], label=LOADS[1])
+        band = "5 to 95 % of the joints"
+        ax.fill_between(theta, closed(low), closed(high), color=style.COLOURS[0], alpha=0.2, lw=0, label=band)
+        ax.plot(theta, closed(middle), color=style.COLOURS[0], label="median")
         if np.isfinite(indices.nominal).all():
-            ax.plot(theta, closed(indices.nominal), color=style.INK, lw=1.0, ls=(0.0, (4.0, 2.0)), label=LOADS[2])
+            nominal: Any = {"color": style.INK, "lw": 1.0, "ls": (0.0, (4.0, 2.0)), "label": "without errors"}
+            ax.plot(theta, closed(indices.nominal), **nominal)
         ax.set_ylabel(f"|{key}| [{unit}]")
         ax.set_ylim(0.0, 1.05 * max(high.max(), np.nan_to_num(indices.nominal).max()))
-        drawing.legend_above(ax, *ax.get_legend_handles_labels())
 
     def draw_shares(ax: Axes) -> None:
-        theta, ceiling = theta_axis(ax, indices.angles), 0.0
-        for i, name in enumerate(leading):
-            share, lower, upper = (100.0 * closed(end[i]) for end in indices.first[:3])
-            if np.isfinite(lower).all():
-                ax.fill_between(theta, lower, upper, color=style.COLOURS[i], alpha=0.15, lw=0)
-            ax.plot(theta, share, color=style.COLOURS[i], ls=style.DASHES[i], label=name)
-            ceiling = max(ceiling, float(np.nanmax(np.where(np.isfinite(upper), upper, share), initial=0.0)))
-        ax.set(ylim=(0.0, 1.05 * max(ceiling, 1.0)), ylabel="share of the variance [%]")
-        drawing.legend_above(ax, *ax.get_legend_handles_labels())
+        estimate, lower, upper = (100.0 * closed(end[: len(leading)]) for end in indices.first[:3])
+        has_bands = np.isfinite(lower).all()
+        curves = dict(zip(leading, zip(estimate, lower, upper, strict=True), strict=True))
+        drawing.curves(ax, theta_axis(ax, indices.angles), curves, bands=LINES if has_bands else 0)
+        ceiling = float(np.nanmax(upper if has_bands else estimate, initial=1.0))
+        ax.set(ylim=(0.0, 1.05 * ceiling), ylabel="share of the variance [%]")
 
     description = (
         f"Median of the joints between {middle.min():.4g} and {middle.max():.4g} {unit} over the input angle; "
         f"95 % of the joints stay below {high.max():.4g} {unit} everywhere"
     )
-    size, room = (4.9, 3.1), drawing.legend_room
-    yield Panel(f"angle-{key}", f"{key} over the revolution", description, draw_loads, size, top=room(LOADS))
+    size = (drawing.WIDTH, 3.1)
+    yield Panel(f"angle-{key}", f"{key} over the revolution", description, draw_loads, size)
     estimates = zip(leading, indices.overall.estimate, strict=False)
     description = f"Over the whole revolution: {', '.join(f'{name} {100 * x:.1f} %' for name, x in estimates)}"
     title = f"{indices.quantity}: share of the variance over the input angle"
-    yield Panel(f"angle-shares-{key}", title, description, draw_shares, size, top=room(leading))
+    yield Panel(f"angle-shares-{key}", title, description, draw_shares, size)

@@ -21,7 +21,6 @@ from tolstat.common.tables import VALID
 from tolstat.display import drawing, style
 from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Part, Row, Rows, Sentence, Table, has
 from tolstat.display.options import Costs, Load, Top
-from tolstat.display.style import patches
 from tolstat.questions import shares
 from tolstat.questions.causes import lines
 from tolstat.questions.causes.simulation import simulate as simulate
@@ -45,7 +44,6 @@ Parts = Mapping[str, NamedTuple]
 """Estimates of all errors with their ends, by name of `KINDS`."""
 
 
-ALONE, IN_ALL = "alone (first order), 95 %", "in all (bounds of the total index)"
 BARS = (
     "Bars: share of a load's variance that vanishes when the error is removed (first-order index). "
     "The rest up to 100 % comes from errors that act together."
@@ -255,8 +253,6 @@ def _notes(of_errors: Indices, command: str) -> list[str]:
 
 def _tornado(of_errors: Indices) -> Panel:
     facts, rows = of_errors.facts, of_errors.rows[:SHOWN]
-    names, is_narrow = [str(row["error"]) for row in rows], _has_narrow_bounds(rows)
-    labels = [ALONE, *([IN_ALL] if is_narrow else [])]
 
     def draw(ax: Axes) -> None:
         y = np.arange(len(rows))
@@ -264,24 +260,22 @@ def _tornado(of_errors: Indices) -> Panel:
             100.0 * np.array([row[key] for row in rows])
             for key in ("first", "first_lower", "first_upper", "total_lower", "total_upper")
         )
-        drawing.rows(ax, names)
-        ax.barh(y, first.clip(min=0.0), height=0.5, color=style.COLOURS[0], zorder=2)
-        handles = [patches.Patch(color=style.COLOURS[0])]
-        if is_narrow:
-            grey: dict[str, Any] = {"color": drawing.GREY, "alpha": 0.45}
-            ax.barh(y, total_high - total_low, left=total_low, height=0.74, zorder=1, **grey)
-            handles.append(patches.Patch(**grey))
+        bar: Any = {"height": 0.5, "color": style.COLOURS[0], "zorder": 2, "label": "alone (first order), 95 %"}
+        ax.barh(y, first.clip(min=0.0), **bar)
+        if _has_narrow_bounds(rows):
+            bar = {"height": 0.74, "color": drawing.GREY, "alpha": 0.45, "zorder": 1}
+            label = "in all (bounds of the total index)"
+            ax.barh(y, total_high - total_low, left=total_low, label=label, **bar)
         if np.isfinite(low).any():
             ax.hlines(y, low, high, color=style.INK, lw=1.2, zorder=3)
         ax.set_xlim(0.0, None)
-        drawing.legend_above(ax, handles, labels)
         ax.set_xlabel(f"share of the variance of {of_errors.quantity} [%]")
 
     largest = ", ".join(f"{row['error']} {100 * row['first']:.1f} %" for row in rows[:5])
     description = f"Largest first-order indices: {largest}; all errors alone {100 * facts['additive']:.0f} %"
-    title, size = f"{of_errors.quantity}: share of the variance by error", (4.9, drawing.rows_height(len(rows)) + 0.25)
-    left, key = drawing.rows_left(names), f"tornado-{facts['load']}"
-    return Panel(key, title, description, draw, size, left, drawing.legend_room(labels, left))
+    title, height = f"{of_errors.quantity}: share of the variance by error", drawing.rows_height(len(rows)) + 0.25
+    key, names = f"tornado-{facts['load']}", [str(row["error"]) for row in rows]
+    return Panel(key, title, description, draw, (drawing.WIDTH, height), rows=names)
 
 
 def indices(

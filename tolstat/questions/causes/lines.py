@@ -13,9 +13,9 @@ from tolstat.common.errors import NotApplicable
 from tolstat.common.loads import ANY_LIMIT
 from tolstat.common.tables import VALID
 from tolstat.display import drawing, style, text
-from tolstat.display.answer import Answer, Artist, Asked, Axes, Column, Panel, Panels, Part, Row, Sentence, Table, has
+from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Part, Row, Sentence, Table, has
 from tolstat.display.options import Accepted, Costs, Load
-from tolstat.display.style import markers, patches
+from tolstat.display.style import markers
 from tolstat.questions.causes import shares
 from tolstat.questions.causes.shares import INDICES, Lines
 from tolstat.questions.shares import estimated, inapplicable, word
@@ -47,8 +47,6 @@ _BARS = {
     "share": ("another fit", style.COLOURS[3], 0.4, 0.0),
 }
 """Bars of the tornado: label, colour, height, and how far above the middle of the bar its whisker is."""
-_EXACT: dict[str, Any] = {"ls": "", "mfc": "white", "mec": style.INK, "ms": 5.5}
-"""Style of the mark of an exact line."""
 
 
 def _cost(head: str, name: str, rank: int = 0) -> Column:
@@ -244,15 +242,10 @@ def _tornado(changed: Lines, accepted: float) -> Panel:
     description = ". ".join(filter(None, (f"Half as wide: {halves}" * bool(halves), others)))
     labels = [f"{row['line']}\n{row['size']}" if row["size"] else str(row["line"]) for row in by_line]
     labels += [f"{row['step']}\nin place of {row['size']}" for row in fits]
-    bars = [*([HALF, COARSER] if halves else []), *(["share"] if others else [])]
-    keys = [*(_BARS[name][0] for name in bars), *(["exact"] if halves else [])]
-    left = drawing.rows_left(labels)
-    top = drawing.legend_room(keys, left)
     drawn, lower, upper = (changed.facts[name] for name in ("share", "lower", "upper"))
     floor = _floor(changed, accepted)
 
     def draw(ax: Axes) -> None:
-        drawing.rows(ax, labels)
         ax.set_ylim(len(labels) + 0.6, -1.2)  # a row above and one below, for what the vertical lines are
         ax.tick_params(axis="y", labelsize=7.6)
         style.share_axis(ax, floor, "x")
@@ -260,24 +253,22 @@ def _tornado(changed: Lines, accepted: float) -> Panel:
         ax.axvspan(max(lower, floor), upper, color=drawing.GREY, alpha=0.3, lw=0)
         ax.axvline(drawn, color=style.INK, lw=1.2)
         for y, row in enumerate([*by_line, *fits]):
-            for name, (_, colour, height, above) in _BARS.items():
+            for name, (label, colour, height, above) in _BARS.items():
                 if name in row:
                     share = [row[f"{name}{end}"] for end in shares.ENDS]
-                    drawing.share_bar(ax, y, share, drawn, floor, colour, height, above)
+                    drawing.share_bar(ax, y, share, drawn, floor, colour, height, above, label)
             if EXACT in row:
-                marker = "o" if row[EXACT] >= floor else markers.CARETLEFT
-                ax.plot(max(row[EXACT], floor), y, marker=marker, zorder=4, clip_on=False, **_EXACT)
+                look: Any = {"ls": "", "mfc": "white", "mec": style.INK, "ms": 5.5, "zorder": 4, "clip_on": False}
+                look |= {"marker": "o", "label": "exact"} if row[EXACT] >= floor else {"marker": markers.CARETLEFT}
+                ax.plot(max(row[EXACT], floor), y, **look)
         ax.text(drawn, -0.9, f"as drawn {text.percent(drawn)}", **drawing.WORDS)
         drawing.accepted(ax, accepted, len(labels) + 0.1)
-        handles: list[Artist] = [patches.Patch(color=_BARS[name][1]) for name in bars]
-        handles += ax.plot([], [], marker="o", **_EXACT) if halves else []
-        drawing.legend_above(ax, handles, keys)
         ax.set_xlabel(f"share of the joints above {changed.limit}")
 
     title = f"Share of the joints with {changed.event}, if one line is changed"
     description = f"As drawn {text.percent(drawn)}. {description}"
-    size = drawing.WIDTH, 0.34 * (len(labels) + 2.2) + drawing.BOTTOM + top
-    return Panel(f"lines-{changed.facts['load']}", title, description, draw, size, left, top)
+    size = drawing.WIDTH, 0.34 * (len(labels) + 2.2) + drawing.BOTTOM + 0.48
+    return Panel(f"lines-{changed.facts['load']}", title, description, draw, size, rows=labels)
 
 
 def _curves(changed: Lines, accepted: float) -> Iterator[Panel]:
@@ -288,40 +279,34 @@ def _curves(changed: Lines, accepted: float) -> Iterator[Panel]:
             by_line.setdefault(row["line"], []).append(row)
     if not by_line:
         return
-    labels = [*list(by_line)[:CURVES], *(["the other lines"] if len(by_line) > CURVES else [])]
-    labels += [f"accepted {text.percent(accepted)}"] if accepted > 0.0 else []
     floor, facts = _floor(changed, accepted), changed.facts
     drawn = {"factor": 1.0, "share": facts["share"], "share_lower": facts["lower"], "share_upper": facts["upper"]}
 
     def draw(ax: Axes) -> None:
         style.share_axis(ax, floor)
         top = floor
-        handles: list[Artist] = []
-        for i, rows in enumerate(by_line.values()):
+        for i, (line, rows) in enumerate(by_line.items()):
             ordered = sorted([*rows, drawn], key=lambda row: row["factor"])
             x, y, low, high = (np.array([row[name] for row in ordered]) for name in drawn)
             top, grey = max(top, float(y.max())), i >= CURVES
             colour, dash = (drawing.GREY, "-") if grey else (style.COLOURS[i], style.DASHES[i])
-            look: dict[str, Any] = {"color": colour, "ls": dash, "lw": 1.0 if grey else 1.6}
-            (curve,) = ax.plot(x, np.maximum(y, floor), marker="o", ms=3.0, **look)
+            look: dict[str, Any] = {"color": colour, "ls": dash, "lw": 1.0 if grey else 1.6, "marker": "o", "ms": 3.0}
+            ax.plot(x, np.maximum(y, floor), label="the other lines" if grey else line, **look)
             at_edge = np.full(int((y < floor).sum()), floor)
             ax.plot(x[y < floor], at_edge, marker=markers.CARETDOWN, ls="", color=colour, ms=5.0, clip_on=False)
-            handles += [curve] if i <= CURVES else []
             if i == 0:
                 ax.fill_between(x, np.maximum(low, floor), np.maximum(high, floor), color=colour, alpha=0.18, lw=0)
         ax.plot(1.0, facts["share"], "D", color=style.INK, ms=6.0, zorder=5)
         ax.set_ylim(floor, min(1.0, 2.0 * top))
         if accepted > 0.0:
-            handles.append(ax.axhline(accepted, **drawing.ACCEPTED))
+            ax.axhline(accepted, label=f"accepted {text.percent(accepted)}", **drawing.ACCEPTED)
         ax.set(xlabel="width of the line, relative to the drawing", ylabel=f"share above {changed.limit}")
-        drawing.legend_above(ax, handles, labels)
 
     title, words = "The share against the width of each line", []
     for line, rows in by_line.items():
         points = (f"{row['factor']:.3g} {text.percent(row['share'])}" for row in rows)
         words.append(f"{line}: {', '.join(points)}")
-    size = drawing.WIDTH, 3.4 + (room := drawing.legend_room(labels))
-    yield Panel(f"widths-{facts['load']}", title, "; ".join(words), draw, size, top=room)
+    yield Panel(f"widths-{facts['load']}", title, "; ".join(words), draw, (drawing.WIDTH, 4.0))
 
 
 def _floor(changed: Lines, accepted: float) -> float:

@@ -19,7 +19,7 @@ from tolstat.analysis.ranks import ranks
 from tolstat.common.errors import NotApplicable
 from tolstat.common.load_kinds import PINS
 from tolstat.common.loads import FloatArray, unit_text
-from tolstat.display import style, text
+from tolstat.display import drawing, style, text
 from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Part, Sentence, Table
 from tolstat.display.options import Load
 from tolstat.joint import HOLE_OF_PIN, perturb
@@ -203,25 +203,22 @@ def _finding(facts: Mapping[str, Any], use: FloatArray, values: FloatArray) -> s
 
 
 def _panel(facts: Mapping[str, Any], use: FloatArray, values: FloatArray) -> Panel:
-    load, limit = facts["load"], facts["limit"]
+    load, limit, has_limit = facts["load"], facts["limit"], not math.isnan(facts["limit"])
 
     def draw(ax: Axes) -> None:
-        above = values > limit  # nowhere without a limit
+        above, unit = values > limit, unit_text(facts["unit"])  # nowhere without a limit
         for here, colour, label in ((~above, style.COLOURS[0], "within the limit"), (above, style.COLOURS[1], "above")):
-            ax.plot(use[here], values[here], "o", color=colour, ms=3.4, alpha=0.6, mew=0, label=label)
+            ax.plot(
+                use[here], values[here], "o", color=colour, ms=3.4, alpha=0.6, mew=0, label=label if has_limit else None
+            )
         if values.min() > 0.0 and values.max() > 3.0 * np.median(values):
-            ax.set_yscale("log")
-            low, high = 0.9 * values.min(), 1.9 * values.max()
-            ticks = [level * 10.0**power for power in range(-6, 9) for level in (1, 2, 5)]
-            ax.set_yticks([tick for tick in ticks if low <= tick <= high], minor=False)
-            ax.set_yticks([], minor=True)
-            ax.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
-            ax.set_ylim(low, high)
+            low, high = 0.9 * values.min(), 1.1 * values.max()
+            unit = drawing.log_loads(ax.yaxis, low, high, high, facts["unit"])
         ax.set_xlim(0.0, None)
-        ax.set(xlabel=f"clearance used by {facts['name']}", ylabel=f"{load} [{unit_text(facts['unit'])}]")
-        if not math.isnan(limit):
+        ax.set(xlabel=f"clearance used by {facts['name']}", ylabel=f"{load} [{unit}]")
+        if has_limit:
             ax.axhline(limit, color=style.INK, lw=1.2, ls=(0.0, (8.0, 3.0)), label="limit")
-            ax.legend(loc="upper left", ncols=3, columnspacing=1.2, handlelength=1.8)
 
     description = f"{facts['name']}: rank correlation {facts['correlation']:.2f} over {use.size} joints"
-    return Panel(f"pairs-{load}", f"{load} against the share of the clearance used", description, draw, (4.9, 3.6))
+    title, size = f"{load} against the share of the clearance used", (drawing.WIDTH, 3.6)
+    return Panel(f"pairs-{load}", title, description, draw, size)

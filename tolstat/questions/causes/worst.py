@@ -30,8 +30,6 @@ DRAWN = 3
 """Number of the worst joints drawn for each load."""
 ANGLES = 180
 """Number of input angles drawn, if the histories have as many samples."""
-SPREAD = "5 to 95 %"
-"""Label of the loads of all joints."""
 ERRORS = ("largest error in σ", "second", "third", "fourth", "fifth")
 """Heads of the columns of the largest errors of a joint."""
 ERRORS_ON_PAGE = 4
@@ -231,12 +229,11 @@ def _panel(view: View, rows: Rows, spread: tuple[FloatArray, FloatArray] | None)
         if spread is not None:
             low, _, high = angles.closed(spread[1])
             around = angles.theta_axis(ax, spread[0])
-            ax.fill_between(around, low, high, color=style.FAINT, alpha=0.25, lw=0, label=SPREAD)
+            ax.fill_between(around, low, high, color=style.FAINT, alpha=0.25, lw=0, label="5 to 95 %")
         if limit is not None:
             ax.axhline(limit, color=style.INK, lw=1.2, ls=(0.0, (8.0, 3.0)), label="limit")
         top = 1.05 * np.nanmax([*(line.max() for line in lines.values()), limit or 0.0])
         ax.set(ylabel=f"|{load}| [{unit_text(rows[0]['unit'])}]", ylim=(0.0, top))
-        drawing.legend_above(ax, *ax.get_legend_handles_labels())
 
-    title, room = f"{load} of the worst joints over the revolution", drawing.legend_room([*lines, SPREAD, "limit"])
-    return Panel(f"worst-{load}", title, f"Histories of the worst joints: {highest}", draw, (4.9, 3.3), top=room)
+    title, words = f"{load} of the worst joints over the revolution", f"Histories of the worst joints: {highest}"
+    return Panel(f"worst-{load}", title, words, draw, (drawing.WIDTH, 3.3))

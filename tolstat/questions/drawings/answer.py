@@ -147,7 +147,9 @@ def read(
         When there is no such joint, row or misalignment, or a file cannot be read.
     """
     path, errors, point = Path(source), None, ""
-    given = validate(Operation, {"alpha": alpha or "15 deg", "speed": "1 rpm", "torque": "1 N*m"}, "--alpha").alpha
+    asked_alpha = validate(
+        Operation, {"alpha": alpha or "15 deg", "speed": "1 rpm", "torque": "1 N*m"}, "--alpha"
+    ).alpha
     if path.is_file() and path.suffix != ".toml":
         with ResultFile.open(path) as store:
             if row is not None and row not in store.rows:
@@ -167,9 +169,9 @@ def read(
         joint, own_alpha, title = case.joint, case.operation.alpha, path.stem
         point = case.points[0].name if isinstance(case, study.Study) else ""
     else:
-        joint, own_alpha = joints.load(source, {}, str(source)), given
+        joint, own_alpha = joints.load(source, {}, str(source)), asked_alpha
         title = joint.description or path.stem
-    return joint, given if alpha else own_alpha, f"{title}, at {point}" if point else title, errors
+    return joint, asked_alpha if alpha else own_alpha, f"{title}, at {point}" if point else title, errors
 
 
 def draw_joint(joint: Joint, alpha: float, title: str = "", columns: int = 2) -> Figure:

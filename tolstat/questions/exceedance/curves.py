@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from tolstat.analysis.binomial import simultaneous
 from tolstat.analysis.sample import Sample
-from tolstat.common.loads import LOADS, PANELS, load_of, names_of
+from tolstat.common.load_kinds import Kind
+from tolstat.common.loads import LOADS, PANELS, QUANTITY, load_of, names_of
 from tolstat.display import drawing, style, text
 from tolstat.display.answer import Axes, Figure, Panel, Reader, Rows
 from tolstat.display.style import lines, ticker
@@ -24,43 +25,44 @@ THIN_LEVELS = 80
 LIMIT_DASH = (0.0, (8.0, 3.0))
 
 
-def sheet(view: View, subtitle: str) -> Figure:
+def sheet(view: View, notes: Sequence[str]) -> Figure:
     """Draw the exceedance curves of all bushing loads that the study keeps.
 
     Parameters
     ----------
     view : View
         The campaign; without a valid joint, the panels say so.
-    subtitle : str
-        Lines of small print.
+    notes : sequence of str
+        Small print.
 
     Returns
     -------
     Figure
         Four panels, empty where no load is kept; share of the joints on a logarithmic axis down to half a joint.
     """
-    with style.settings():
-        page, panels = style.panels(f"{view.name}: share of joints whose largest load exceeds x", subtitle)
-        for group, kind, ax in panels:
-            kept = {i: view.load(x) for i, x in enumerate(names_of(group, kind)) if x in view.bushing_loads}
-            loads = {i: load for i, load in kept.items() if load.valid.size}
-            if not loads:
-                drawing.empty(ax, "no joint with a valid result" if kept else "not kept by the study")
-                continue
-            high, _ = _draw(ax, loads)
-            unit = drawing.loads_axis(
-                ax.xaxis, max((x.limit for x in loads.values() if x.limit), default=high), kind.unit
-            )
-            ax.set_xlabel(f"x: largest |{kind.symbol}| over the revolution [{unit}]")
-            ax.set_ylabel("share of joints above x" if kind == PANELS[0][1] else "")
-            if view.design.has_interval("share"):
-                end = max(curve(load, DRAWN_LEVELS)["outer_upper"][-1] for load in loads.values())
-                look: Any = {"color": style.FAINT, "lw": 1.1, "ls": (0.0, (1.0, 2.0)), "zorder": 1.5}
-                ax.axhline(end, **look, label="upper end where none exceeds x")
-        legends = [ax.get_legend_handles_labels() for _, _, ax in panels]
-        entries = {label: handle for legend in legends for handle, label in zip(*legend, strict=True)}
-        style.legend(page, list(entries.values()), list(entries))
-    return page
+    title = f"{view.name}: share of joints whose largest load exceeds x"
+    return drawing.sheet([_group_panel(view, *panel) for panel in PANELS], title, notes, columns=2)
+
+
+def _group_panel(view: View, group: str, kind: Kind) -> Panel:
+    """Curves of one kind of loads at the cross or fork bushings."""
+    samples = {i: view.load(x) for i, x in enumerate(names_of(group, kind)) if x in view.bushing_loads}
+    loads = {i: load for i, load in samples.items() if load.valid.size}
+
+    def draw(ax: Axes) -> None:
+        if not loads:
+            drawing.empty(ax, "no joint with a valid result" if samples else "not kept by the study")
+            return
+        high, _ = _draw(ax, loads)
+        unit = drawing.loads_axis(ax.xaxis, max((x.limit for x in loads.values() if x.limit), default=high), kind.unit)
+        ax.set(xlabel=f"x: largest |{kind.symbol}| over the revolution [{unit}]", ylabel="share of joints above x")
+        if view.design.has_interval("share"):
+            end = max(curve(load, DRAWN_LEVELS)["outer_upper"][-1] for load in loads.values())
+            look: Any = {"color": style.FAINT, "lw": 1.1, "ls": (0.0, (1.0, 2.0)), "zorder": 1.5}
+            ax.axhline(end, **look, label="upper end where none exceeds x")
+
+    title = f"{group.capitalize()} bushings, {QUANTITY[kind.unit]}"
+    return Panel(f"exceedance-{group}-{kind.symbol}", title, title, draw, (drawing.WIDTH, 3.9))
 
 
 def _draw(ax: Axes, loads: Mapping[int, Sample], others: Sequence[Sample] = ()) -> tuple[float, float]:
@@ -87,7 +89,7 @@ def _draw(ax: Axes, loads: Mapping[int, Sample], others: Sequence[Sample] = ()) 
     style.share_axis(ax, floor)
     for i, table in tables.items():
         _bands(ax, table, floor, style.COLOURS[i])
-        look: Any = {"color": style.COLOURS[i], "ls": style.DASHES[i], "zorder": 3, "label": f"bushing {i + 1}"}
+        look: Any = {"color": style.COLOURS[i], "ls": style.DASHES[i], "zorder": 3, "label": loads[i].name}
         _step(ax, table, table["estimate"], floor, **look)
     for i in tables:
         if low <= loads[i].nominal <= high:
@@ -96,7 +98,15 @@ def _draw(ax: Axes, loads: Mapping[int, Sample], others: Sequence[Sample] = ()) 
         dash = "-" if load_of(name).place.group == "cross" else (0.0, (4.0, 1.5))
         line = _step(ax, table, table["estimate"], floor, color=style.FAINT, lw=0.7, ls=dash)
         drawing.switched(line, "others")
-    _limits(ax, dict(sorted(limits.items())), next(iter(loads.values())).unit, len(loads))
+    for level, which in sorted(limits.items()):
+        of = "" if len(which) == len(loads) else f" ({', '.join(str(i + 1) for i in which)})"
+        beyond = " →" if level > high else " ←" if level < low else ""
+        look = {"color": style.COLOURS[which[0]] if len(which) == 1 < len(loads) else style.INK, "lw": 1.4, "zorder": 2}
+        look |= {"ls": LIMIT_DASH, "label": f"limit {text.value(level, loads[which[0]].unit)}{of}{beyond}"}
+        if beyond:
+            ax.plot([], [], **look)
+        else:
+            ax.axvline(level, **look)
     return high, floor
 
 
@@ -119,25 +129,6 @@ def _bands(ax: Axes, table: NDArray[np.void], floor: float, colour: str) -> None
         low, high = (table[end].clip(1e-3 * floor, 1.0) for end in (lower, upper))
         label = "95 % band" if lower == "lower" else None
         ax.fill_between(_steps(ax, table), low, high, step="post", color=colour, alpha=alpha, lw=0, label=label)
-
-
-def _limits(ax: Axes, limits: Mapping[float, Sequence[int]], unit: str, count: int) -> None:
-    """Mark limits by vertical lines, with one label above the panel; an arrow stands for one out of range. SI `unit`.
-
-    `limits` have the indices of the loads that they are of, out of `count`.
-    """
-    low, high = ax.get_xlim()
-    words = []
-    for level, which in limits.items():
-        numbers = "" if len(which) == count else f" ({', '.join(str(i + 1) for i in which)})"
-        words.append(f"{text.value(level, unit)}{numbers}{' →' if level > high else ' ←' if level < low else ''}")
-        if low <= level <= high:
-            colour = style.COLOURS[which[0]] if len(which) == 1 < count else style.INK
-            ax.axvline(level, color=colour, lw=1.4, ls=LIMIT_DASH, zorder=2)
-    if words:
-        middle = float(np.mean(np.clip((np.array([*limits]) - low) / (high - low), 0.0, 1.0)))
-        side = "left" if middle < 0.3 else "right" if middle > 0.7 else "center"
-        ax.annotate(f"limit {', '.join(words)}", (middle, 1.0), (0, 3), "axes fraction", "offset points", ha=side)
 
 
 def leading_panel(view: View, name: str) -> Panel:
@@ -170,8 +161,8 @@ def leading_panel(view: View, name: str) -> Panel:
         ax.set_ylabel("share of joints above x")
 
     title, description = f"{name}: share of the joints above x", f"{name}: {description}"
-    looks: Any = {"size": (4.9, 3.7), "reads": (name, *others), "switches": switches}
-    return Panel(f"leading-{name}", title, description, draw, **looks)
+    looks: Any = {"reads": (name, *others), "switches": switches}
+    return Panel(f"leading-{name}", title, description, draw, (drawing.WIDTH, 3.7), **looks)
 
 
 def reader(view: View) -> Reader:
@@ -196,7 +187,6 @@ def forest_panel(rows: Rows, accepted: float) -> Panel:
 
     def draw(ax: Axes) -> None:
         """Estimate, interval and total interval of each limit, on an axis from the least to the largest of them."""
-        drawing.rows(ax, labels)
         style.share_axis(ax, min(0.7 * shown.min(initial=high), 0.3 * high), "x", high)
         low, blue = ax.get_xlim()[0], style.COLOURS[0]
         for i, (row, span) in enumerate(zip(rows, spans, strict=True)):
@@ -211,5 +201,5 @@ def forest_panel(rows: Rows, accepted: float) -> Panel:
             ax.text(accepted, -0.75, f"accepted: {text.percent(accepted)}", ha="center", va="bottom")
         ax.set_xlabel("share of the joints above the limit")
 
-    size, left = (4.9, drawing.rows_height(len(rows))), max(1.4, drawing.rows_left(labels))
-    return Panel("forest", "Share of the joints above each limit", description, draw, size, left)
+    size = (drawing.WIDTH, drawing.rows_height(len(rows)))
+    return Panel("forest", "Share of the joints above each limit", description, draw, size, 1.4, rows=labels)

@@ -38,8 +38,6 @@ POINTS = 25
 """Number of lives of the curve of failures."""
 DECADES = 2.0
 """Decades drawn around the service life."""
-LABELS = [*(f"{100 * share:g} % of the joints stay below" for share in SHARES), "nominal joint"]
-"""Legend of a load spectrum."""
 
 
 def _life(*lives: float) -> str:
@@ -252,8 +250,7 @@ def _of_loads(loading: Loading, rows: Rows, seen: Rows, delivery: int) -> list[P
             f"{channel}: load spectrum",
             f"Ranges of {channel} that so many cycles a revolution reach, for half, 90 and 99 % of the joints",
             partial(_draw_spectrum, loading=loading, channel=channel),
-            (4.9, 3.5),
-            top=drawing.legend_room(LABELS),
+            (drawing.WIDTH, 3.5),
         )
         for channel in loads.leading(rows)
     ]
@@ -317,10 +314,8 @@ def _draw_failures(ax: Axes, stressed: parts.Stressed, life: float) -> None:
     first, last = sorted([service, life if math.isfinite(life) and life > 0 else service])
     numbers = np.geomspace(first / 10**DECADES, last * 10**DECADES, POINTS)
     curve, has_band = parts.failures_over_life(stressed, numbers.tolist()), stressed.design.has_interval("mean")
-    lower, share, upper = np.array([(at.outer_lower, at.estimate, at.outer_upper) for at in curve]).T
-    if has_band:
-        ax.fill_between(numbers, lower, upper, color=style.COLOURS[0], alpha=0.2, lw=0)
-    ax.plot(numbers, share, color=style.COLOURS[0])
+    share, lower, upper = np.array([(at.estimate, at.outer_lower, at.outer_upper) for at in curve]).T
+    drawing.curves(ax, numbers, {"": (share, lower, upper)}, bands=int(has_band))
     ax.axvline(service, color=style.INK, lw=1, ls="--")
     at = ("data", "axes fraction")
     ax.annotate("service life", (service, 1.0), (4, -2), xycoords=at, textcoords="offset points", va="top")
@@ -338,18 +333,18 @@ def _draw_spectrum(ax: Axes, loading: Loading, channel: str) -> None:
     floor = MIN_RANGE * ceiling if ceiling > 0 else 1.0
     numbers = np.array([row["cycles"] for row in rows if row["share"] == SHARES[0]]) / loading.settings.revolutions
     x = np.concatenate([[0.7 * numbers[0]], numbers])
-    handles = []
-    for share, colour, dash in zip(SHARES, style.COLOURS, style.DASHES, strict=False):
+    curves = {}
+    for share in SHARES:
         curve = [row for row in rows if row["share"] == share]
         lower, estimate, upper, nominal = (  # the first value twice, so that the curve begins at the left edge
             np.array([row[key] for row in (curve[0], *curve)]) for key in ("lower", "estimate", "upper", "nominal")
         )
-        if np.isfinite(lower).any():
-            top = np.where(np.isfinite(upper), upper, estimate)  # too few joints: the upper end is infinite
-            low, high = (np.maximum(y, 0.1 * floor) for y in (lower, top))
-            ax.fill_between(x, low, high, step="pre", color=colour, alpha=0.2, lw=0)
-        handles += ax.step(x, estimate, where="pre", color=colour, ls=dash, zorder=3)
-    handles += ax.step(x, nominal, where="pre", color=style.INK, lw=1, zorder=2)
+        top = np.where(np.isfinite(upper), upper, estimate)  # too few joints: the upper end is infinite
+        low, high = (np.maximum(y, 0.1 * floor) for y in (lower, top))
+        curves[f"{100 * share:g} % of the joints stay below"] = estimate, low, high
+    ax.step(x, nominal, where="pre", color=style.INK, lw=1, label="nominal joint")
+    has_bands = loading.design.has_interval("quantile")
+    drawing.curves(ax, x, curves, bands=len(curves) if has_bands else 0, step="pre")
     shown = max([row["cycles"] for row in rows if row["estimate"] > floor], default=0.0) / loading.settings.revolutions
     ax.set(xscale="log", yscale="log", ylim=(floor, 2.0 * max(ceiling, floor)))
     ax.set_xlim(x[0], 1.05 * max(shown if shown > x[0] else x[-1], 2.0 * x[0]))
@@ -359,4 +354,3 @@ def _draw_spectrum(ax: Axes, loading: Loading, channel: str) -> None:
     ax.set_xticks([t for t in (0.01, 0.03, 0.1, 0.3, 1, 2, 3, 4, 6, 8, 12, 16) if x[0] <= t <= ax.get_xlim()[1]])
     unit = unit_text(CHANNELS[channel].unit)
     ax.set(xlabel="cycles a revolution with at least this range", ylabel=f"range of {channel} [{unit}]")
-    drawing.legend_above(ax, handles, LABELS)

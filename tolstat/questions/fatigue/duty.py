@@ -124,8 +124,8 @@ def members(views: Sequence[View], shares: Sequence[float] | None) -> tuple[Sequ
         views, shares = views[0].parts, views[0].shares_of_revolutions.tolist()
     shares = [1.0] if shares is None else shares
     if len(shares) != len(views) or min(shares, default=0.0) <= 0 or abs(sum(shares) - 1) > 1e-6:
-        given = f"{list(shares)} for {len(views)} files"
-        raise InputError([Fault("shares", given, "give a positive share for each file; their sum is 1")])
+        problem = f"{list(shares)} for {len(views)} files"
+        raise InputError([Fault("shares", problem, "give a positive share for each file; their sum is 1")])
     names, first = [column.name for column in ERROR_FIELDS], views[0]
     for view in views:
         view.check("mean")

@@ -305,9 +305,9 @@ def leading(rows: Rows) -> list[str]:
     names, chosen = most_loaded(rows), []
     candidates = [row for row in rows if row["share"] == SHARES[-1] and row["channel"] in names]
     for group, kind in loads.PANELS:
-        here = [row for row in candidates if CHANNELS[row["channel"]].kind == kind]
-        here = [row for row in here if load_kinds.PLACES[CHANNELS[row["channel"]].place].group == group]
-        chosen += [max(here, key=lambda row: float(row["estimate"]))["channel"]] if here else []
+        of_group = [row for row in candidates if CHANNELS[row["channel"]].kind == kind]
+        of_group = [row for row in of_group if load_kinds.PLACES[CHANNELS[row["channel"]].place].group == group]
+        chosen += [max(of_group, key=lambda row: float(row["estimate"]))["channel"]] if of_group else []
     return chosen
 
 
@@ -381,8 +381,8 @@ def pylife_table(
             low, high = 0.0 if name == "range" else sizes.min(initial=np.inf), sizes.max(initial=-np.inf)
             if low <= high:  # the last edge is above the largest value
                 edges = np.linspace(low, high + 1e-6 * max(high - low, abs(high), 1e-300), bins + 1)
-                here = np.searchsorted(edges, sizes, side="right") - 1
-                ends[:, kind] = edges[here], edges[here + 1]
+                edge = np.searchsorted(edges, sizes, side="right") - 1
+                ends[:, kind] = edges[edge], edges[edge + 1]
         columns |= dict(zip((f"{name}_left", f"{name}_right"), ends, strict=True))
     keys = ["joint", "channel", *(f"{name}_{side}" for name in INTERVALS for side in ("left", "right"))]
     frame = pd.DataFrame(columns | {"cycles": cycles.repeats[joint, channel, cycle] * revolutions})

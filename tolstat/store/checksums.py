@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.store import layout
-from tolstat.store.hdf5 import put_attributes, put_scale, told_as_damage
+from tolstat.store.hdf5 import put_attributes, put_scale, read_rows, told_as_damage
 from tolstat.store.layout import Stored
 from tolstat.store.metadata import Metadata
 
@@ -93,8 +93,8 @@ class CheckedFile:
         Either all of them change in a run (results, ledger, histories), or none does. Without checksums no block counts
         as damaged.
         """
-        blocks, number = np.arange(begin // ROWS, blocks_of(max(begin, end))), self.number
-        changes = layout.is_at_point(paths[0])
+        blocks, changes = np.arange(begin // ROWS, blocks_of(max(begin, end))), layout.is_at_point(paths[0])
+        number = self.number if changes else self._number
         if changes and number % 2:
             return blocks[:0]
         if number != self._number:
@@ -160,18 +160,19 @@ def computed(file: h5py.File, stored: Sequence[Stored], blocks: NDArray[np.intp]
     runs = np.split(np.arange(len(blocks)), np.flatnonzero(np.diff(blocks) != 1) + 1) if len(blocks) else []
     for k, dataset in enumerate(stored):
         for run in runs:
-            checksums[k, run] = _of_run(file[dataset.path], dataset, int(blocks[run[0]]), int(blocks[run[-1]]) + 1)
+            checksums[k, run] = _of_run(file, dataset, int(blocks[run[0]]), int(blocks[run[-1]]) + 1)
     return checksums
 
 
-def _of_run(dataset: h5py.Dataset, stored: Stored, first: int, last: int) -> list[int]:
+def _of_run(file: h5py.File, stored: Stored, first: int, last: int) -> list[int]:
     """Checksums of consecutive blocks; several are read together, or one in pieces if it is large."""
     n, stop = stored.shape[0], min(last * ROWS, stored.shape[0])
     # a power of two, as ROWS: one divides the other
     step = 1 << ((READ_BYTES // stored.row_bytes) or 1).bit_length() - 1
     checksums, crc = [], 0
     for begin in range(first * ROWS, stop, step):
-        values = dataset[begin : min(begin + step, stop)]
+        values = np.empty((min(step, stop - begin), *stored.shape[1:]), stored.dtype)
+        read_rows(file, stored.path, begin, values)
         for start in range(begin, begin + len(values), ROWS):
             if start % ROWS == 0:
                 shape = (min(start + ROWS, n) - start, *stored.shape[1:])

@@ -206,8 +206,9 @@ def create_table(
         Dimension scale of the rows; ``row`` of the file without it, which the group then has with ``nominal``.
     """
     group = _linked(holder, name, LINKED if scale is None else (scale.name,))
+    row = scale or holder.file["row"]
     for c in columns:
-        _create(group, c.name, (n,), c, scale or holder.file["row"], codes or MEANINGS, blocks is None)
+        _create(group, c.name, (n,), c, row, codes or MEANINGS, blocks is None)
     first = 0
     for block in blocks or ():
         put(group, np.arange(first, first + len(block)), {c.name: c.of(block) for c in columns})

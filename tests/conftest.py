@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from tolstat.campaign import pool
 from tolstat.cli import app
 from tolstat.common.tables import PARAM
 from tolstat.joint import orders
+from tolstat.store import metadata
 
 REFERENCE = Path(__file__).parent / "reference"
 REFERENCE_CASES = sorted(path.stem for path in REFERENCE.glob("*.toml"))
@@ -144,6 +146,8 @@ def _small_campaigns_in_this_process() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(os, "sched_getaffinity", lambda _: {0})
         patch.setattr(pool, "map_blocks", quick)
+        for name in ("git_commit", "source_hash"):  # neither changes meanwhile
+            patch.setattr(metadata, name, cache(getattr(metadata, name)))
         yield
 
 

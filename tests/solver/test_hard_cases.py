@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from functools import partial
 from pathlib import Path
 
@@ -79,11 +80,9 @@ def test_all_hard_cases_end_in_a_result_or_a_status(hard: Path) -> None:
     rings = case == "tilt of 5 deg"  # for ever, by a few thousandths of the loads
     assert (results["status"][rings] == Status.STATIONARY).all()
     assert (results["closure"][rings] < 1e-2).all()
-    stiff = case == "E x 1e3"  # finer steps take more iterations than are allowed
-    assert (results["status"][stiff] == Status.NOT_RESOLVED).all()
-    results, family = results[~rings & ~stiff], family[~rings & ~stiff]
+    results, family = results[~rings], family[~rings]
     ended = {name: {Status(s).label for s in results["status"][family == name]} for name in family}
-    assert ended.pop("85 deg") == {"newton_failed"}
+    assert ended.pop("85 deg") == {"newton_failed", "not_resolved"}
     for name in (
         "20000 rpm",
         "20000 rpm, 60 revolutions",
@@ -96,7 +95,7 @@ def test_the_setting_that_the_message_names_solves_the_case(hard: Path) -> None:
     with ResultFile.open(hard) as store:
         results, design = store.results(), store.design()
         family = [store.variants[i].family for i in design["variant"]]
-    dear = results[family.index("85 deg")]
+    (dear,) = results[(np.array(family) == "85 deg") & (results["status"] == Status.NEWTON_FAILED)]
     assert "solver.steps_per_rev = 720" in remedy(dear, Options()._asdict())
     assert 0 <= dear["failed_theta"] < 2 * np.pi
 
@@ -107,7 +106,7 @@ def test_the_report_has_a_row_for_each_joint(hard: Path) -> None:
     assert len(rows) == 42
     assert rows["note"][0].startswith("what the others are compared with")
     assert rows["cost"][0] == 1.0
-    assert "85 deg, ideal: 40 iterations a step were spent at" in report.notes
+    assert re.search("^85 deg, .*: 40 iterations a step were spent at", report.notes, flags=re.MULTILINE)
 
 
 def test_a_fuzz_of_joints_far_outside_tolerance(tmp_path: Path) -> None:

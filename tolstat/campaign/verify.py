@@ -66,10 +66,7 @@ def _dynamic(options: Options) -> dict[str, Any]:
 CHECKS: dict[str, tuple[str, Callable[[Options], dict[str, Any]]]] = {
     "half_step": ("twice as many steps a revolution", lambda options: {"steps_per_rev": 2 * options.steps_per_rev}),
     "newton": ("a hundredth of solver.newton_tol", lambda options: {"newton_tol": 0.01 * options.newton_tol}),
-    "settling": (
-        "the other solver.start, a hundredth of solver.settle_tol, a tenth of solver.newton_tol",
-        _other_start,
-    ),
+    "settling": ("the other solver.start, 1/100 of solver.settle_tol, 1/10 of solver.newton_tol", _other_start),
     "method": ("another solver.method", _other_method),
     "fidelity": ("dynamic fidelity instead of a lower one", _dynamic),
     "reference": ("scipy's Radau, rtol 1e-7, largest loads at 2880 angles and all steps", lambda options: {}),

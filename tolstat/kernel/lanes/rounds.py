@@ -158,8 +158,8 @@ def refactorise(mask, control, par, work, tangent):
 def correct(moving, solved, tangent, motion, control):
     """Apply Newton's correction in the lanes of `moving`; return in which of them an equilibrium has diverged.
 
-    The lanes of `solved` that have a tangent are corrected once more, at no cost: their loads stay those of the last
-    evaluation, but less of the residual goes into the prediction of the next steps, which amplifies it 15 times.
+    The lanes of `solved` that have a tangent are corrected, too, without being evaluated again: the prediction of the
+    next steps multiplies what is left of the residual by up to 15. Their loads stay those of the last evaluation.
     """
     mask = moving | (solved & (control.factorised == control.cv) & (control.phase >= STEP))
     for i in range(N_DOF):

@@ -157,6 +157,14 @@ def in_workers(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(pool, "map_blocks", IN_WORKERS)
 
 
+@pytest.fixture
+def without_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Write reports without pictures, and pages without sections below the verdict: they take most of the time."""
+    monkeypatch.setattr("tolstat.display.style.save", lambda figure, stem: [])
+    monkeypatch.setattr("tolstat.questions.exceedance.curves.sheet", lambda view, notes: None)
+    monkeypatch.setattr("tolstat.report.page.sections_of", lambda view, asked: [])
+
+
 @pytest.fixture(scope="session")
 def example_files(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Folder with the studies and files that examples name, of few joints at a cheap fidelity; tests copy it."""

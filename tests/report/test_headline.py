@@ -78,13 +78,7 @@ MISLEADING = {
     "not begun": (lambda d: synthetic.store(d, study(), simulated=0), "none", "no joint has been simulated"),
     "three joints": (lambda d: synthetic.store(d, study(3)), "open", "(0 .. 70.8 %); 1 % is accepted; 368 joints"),
 }  # fmt: skip
-
-
-@pytest.fixture(autouse=True)
-def _without_pictures(monkeypatch):
-    monkeypatch.setattr("tolstat.display.style.save", lambda figure, stem: [])
-    monkeypatch.setattr("tolstat.questions.exceedance.curves.sheet", lambda view, notes: None)
-    monkeypatch.setattr("tolstat.report.page.sections_of", lambda view, asked: [])
+pytestmark = pytest.mark.usefixtures("without_pictures")
 
 
 @pytest.fixture(autouse=True)

@@ -22,6 +22,7 @@ from tolstat.store import ResultFile
 LIMITED = STUDY.replace("[sampling]", '[limits]\n"cross1.F" = "700 N"\n[sampling]')
 
 
+@pytest.mark.usefixtures("without_pictures")
 @pytest.mark.parametrize(("study", "place"), [(STUDY, 0), (LIMITED, 1)])
 def test_report_json_and_page_give_the_same_verdict(tmp_path, study, place):
     path = synthetic.store(tmp_path, study)

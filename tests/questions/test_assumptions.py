@@ -60,6 +60,9 @@ TEXT = (
 n = 600
 seed = 3
 
+[output]
+results = ["cross1.F_max"]
+
 [limits]
 "cross1.F" = "700 N"
 """

@@ -130,7 +130,7 @@ def test_rows_are_a_b_and_a_with_one_group_of_b(tmp_path):
 
 
 def test_correlated_errors_move_together_and_each_error_by_itself(tmp_path):
-    text = TEXT.replace("[limits]", 'groups = "error"\n\n[limits]')
+    text = TEXT.replace("seed = 2021", 'seed = 2021\ngroups = "error"')
     linked = '\n[[correlation]]\nbetween = ["pin1.offset_t", "pin3.offset_t"]\nrho = 0.5\n'
     assert [len(group.names) for group in load(tmp_path, text).groups] == [1] * 5
     found = load(tmp_path, text + linked, "linked").groups

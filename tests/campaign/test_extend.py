@@ -28,7 +28,7 @@ from tolstat.common.tables import Options, Simulation, Status
 from tolstat.store import ResultFile, Writer, metadata
 from tolstat.study import Study
 
-BODY = synthetic.STUDY.replace("[limits]", '[output]\nhistories = "KIND"\n[limits]')
+BODY = synthetic.STUDY.replace("[output]", '[output]\nhistories = "KIND"')
 Make = Callable[..., Study]
 
 

@@ -185,7 +185,7 @@ def test_wilks(share: float, n: int) -> None:
 @pytest.fixture
 def small(tmp_path: Path) -> study.Study:
     path = tmp_path / "small.toml"
-    text = synthetic.STUDY.replace("[limits]", '[solver]\nsteps_per_rev = 45\n[output]\nhistories = "full"\n[limits]')
+    text = synthetic.WHOLE.replace("[limits]", '[solver]\nsteps_per_rev = 45\n[output]\nhistories = "full"\n[limits]')
     path.write_text(text, encoding="utf-8")
     return study.load(path)
 

@@ -191,7 +191,7 @@ def test_a_run_can_do_without(tmp_path):
 
 
 def test_a_slice_keeps_the_rows_of_the_campaign(tmp_path, monkeypatch):
-    (tmp_path / "plan.toml").write_text(synthetic.STUDY, encoding="utf-8")
+    (tmp_path / "plan.toml").write_text(synthetic.WHOLE, encoding="utf-8")
     plan, rows, results = study.load(tmp_path / "plan.toml"), range(20, 30), synthetic.results(61)[20:30]
     with Writer.create(tmp_path / "b.h5", plan, [sampling.draw(plan, rows)], rows=rows) as store:
         store.write(np.arange(10), Simulation(results, {}))

@@ -180,7 +180,7 @@ def test_status_of_a_file_in_any_state(tmp_path, simulated, pending):
 
 
 def test_export_has_a_row_for_every_joint_and_units_in_the_second_line(tmp_path):
-    path, out = synthetic.store(tmp_path, simulated=50, failed=3), tmp_path / "all.csv"
+    path, out = synthetic.store(tmp_path, synthetic.WHOLE, simulated=50, failed=3), tmp_path / "all.csv"
     done = call("export", path, "--csv", out)
     assert (done.exit_code, done.stdout) == (0, "")
     table = pd.read_csv(out, header=[0, 1], index_col=0)

@@ -33,7 +33,7 @@ def stores(tmp_path_factory):
     found = {}
     for kind in ("full", "harmonics", "none"):
         source = folder / f"{kind}.toml"
-        text = synthetic.STUDY.replace("n = 60", "n = 4") + f'\n[output]\nhistories = "{kind}"\nharmonics = 60\n'
+        text = synthetic.WHOLE.replace("n = 60", "n = 4") + f'\n[output]\nhistories = "{kind}"\nharmonics = 60\n'
         source.write_text(text, encoding="utf-8")
         campaign.run(study.load(source), folder / f"{kind}.h5", workers=1)
         found[kind] = folder / f"{kind}.h5"

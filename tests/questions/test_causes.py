@@ -122,7 +122,9 @@ def refuses(view, load, costs):
 
 
 def test_correlated_errors_have_no_total_and_dependent_samples_no_interval(tmp_path):
-    text = TEXT.replace('"random"', '"lhs"').replace("[limits]", 'method = "lhs"\n\n[limits]').replace("3000", "400")
+    text = (
+        TEXT.replace('"random"', '"lhs"').replace("seed = 2021", 'seed = 2021\nmethod = "lhs"').replace("3000", "400")
+    )
     text += '\n[[correlation]]\nbetween = ["pin1.offset_t", "pin3.offset_t"]\nrho = 0.5\n'
     done = run("causes", made(tmp_path, text))
     assert done.exit_code == 0

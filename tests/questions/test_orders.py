@@ -25,7 +25,7 @@ from tolstat.report import page
 from tolstat.solver.histories import history_specs
 from tolstat.store import ResultFile, Writer
 
-ASKED = synthetic.STUDY.replace("[limits]", '[limits]\n"output.lateral_1x" = "200 N"')
+ASKED = synthetic.WHOLE.replace("[limits]", '[limits]\n"output.lateral_1x" = "200 N"')
 OTHERS = "'*.[FT]_max', 'pin1.contact_*', 'psi_max'"
 """Columns that the limits of the invented campaigns need."""
 SAMPLES = 180
@@ -238,7 +238,7 @@ def test_joints_of_a_sweep_are_simulated_again_each_at_its_own_operating_point(t
     ],
 )
 def test_the_page_shows_orders_where_the_study_asks_for_loads_of_the_shafts(tmp_path, change, asked):
-    path = synthetic.store(tmp_path, synthetic.STUDY.replace(*change))
+    path = synthetic.store(tmp_path, synthetic.WHOLE.replace(*change))
     with ResultFile.open(path) as store:
         assert module.are_asked(store.view()) == asked
         remarks = Asked(path)
@@ -287,6 +287,6 @@ def test_command_prints_a_table_writes_files_and_refuses_files_without_amplitude
     found = json.loads(run(slow[1], "--json").stdout)
     table = pd.read_csv(tmp_path / "out" / "full_orders_amplitudes.csv")
     assert [row["q95"] for row in found["tables"]["amplitudes"]["rows"]] == table["q95"].tolist()
-    few = synthetic.store(tmp_path, synthetic.STUDY.replace("[limits]", f"[output]\nresults = [{OTHERS}]\n[limits]"))
+    few = synthetic.store(tmp_path, synthetic.WHOLE.replace("[limits]", f"[output]\nresults = [{OTHERS}]\n[limits]"))
     with ResultFile.open(few) as store, pytest.raises(StoreError, match="no amplitudes of orders"):
         orders(store.view())

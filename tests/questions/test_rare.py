@@ -29,7 +29,7 @@ from tolstat.store.recorded import recall
 
 SEEDS = 500
 RHO = 0.6
-PLAN = synthetic.STUDY.replace("[limits]", "[output]\nresults = ['cross*.F_max']\n[limits]").replace(
+PLAN = synthetic.WHOLE.replace("[limits]", "[output]\nresults = ['cross*.F_max']\n[limits]").replace(
     '"fork*.T" = "40 N*m"\n"pin1.contact" = "800 N"\n"psi" = 0.01\n', ""
 ) + (f'\n[[correlation]]\nbetween = ["pin1.offset_t", "pin2.offset_t"]\nrho = {RHO}\n')
 FAILING = -2.0

@@ -23,7 +23,7 @@ from tolstat.store import ResultFile, Writer
 
 SEEDS = 500
 SAMPLES = 720
-TEXT = synthetic.STUDY.replace("n = 60", "n = 200").replace("[limits]", '[output]\nhistories = "full"\n\n[limits]')
+TEXT = synthetic.STUDY.replace("n = 60", "n = 200").replace("[output]", '[output]\nhistories = "full"')
 
 
 def wave(tops):

@@ -32,7 +32,7 @@ from tolstat.store.recorded import recall
 from tolstat.store.worst import MAX_LISTED
 
 HEAD = '# Question: how often is too much\n#   too much?\n# Run time: none.\n# <script>alert("no")</script>\n'
-TEXT = HEAD + synthetic.STUDY.replace("n = 60", "n = 400").replace("40 N*m", "18 N*m").replace(
+TEXT = HEAD + synthetic.WHOLE.replace("n = 60", "n = 400").replace("40 N*m", "18 N*m").replace(
     "offset_t", "offset_[tz]"
 )
 VOID = {"meta", "link", "input", "br"}
@@ -436,7 +436,7 @@ def test_wrong_options_write_nothing(path, tmp_path, monkeypatch, arguments, sai
 @pytest.mark.slow
 def test_joints_of_different_weight_are_counted_by_it_and_told_so(tmp_path):
     proposal = '\n[[proposal]]\nshare = 0.5\nwiden = { "pin[12].offset_t" = 1.7 }\n'
-    text = synthetic.STUDY.replace("n = 60", 'method = "importance"\nn = 300') + proposal
+    text = synthetic.WHOLE.replace("n = 60", 'method = "importance"\nn = 300') + proposal
     path = synthetic.store(tmp_path, text, failed=3)
     page.write_page(path, tmp_path / "page.html", accepted=0.05, replay=0)
     html = (tmp_path / "page.html").read_text(encoding="utf-8")

@@ -29,7 +29,7 @@ SEEDS = 500
 BETA = 4.75
 
 PLAN = (
-    synthetic.STUDY.replace("[sampling]\nn = 60", '[sampling]\nmethod = "importance"\nn = 4000')
+    synthetic.WHOLE.replace("[sampling]\nn = 60", '[sampling]\nmethod = "importance"\nn = 4000')
     + """
 [[proposal]]
 share = 0.5

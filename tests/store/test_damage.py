@@ -26,8 +26,9 @@ from tolstat.store import ResultFile, Writer, metadata, verification, what_if
 from tolstat.store.checksums import Integrity
 
 ROWS = 8
+KEPT = synthetic.KEPT.replace("[", '["*.lateral_?x_max", ', 1)
 TEXT = synthetic.REAL.replace("n = 60", "n = 40").replace(
-    "[limits]", '[output]\nhistories = "harmonics+cycles"\nharmonics = 4\n\n[limits]'
+    synthetic.KEPT, f'{KEPT}\nhistories = "harmonics+cycles"\nharmonics = 4'
 )
 CHANGE = {"kind": "width", "label": "pin*.offset_t", "step": "half", "words": "half", "seed": 1, "tolerances": {}}
 SET = f"what_if/{what_if.key(CHANGE)}"

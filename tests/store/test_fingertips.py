@@ -22,7 +22,7 @@ WRITING = {name for name in set(dir(Writer)) - set(dir(ResultFile)) if not name.
 
 @pytest.fixture(scope="module")
 def path(tmp_path_factory):
-    return synthetic.store(tmp_path_factory.mktemp("store"), failed=2, unsettled=3)
+    return synthetic.store(tmp_path_factory.mktemp("store"), synthetic.WHOLE, failed=2, unsettled=3)
 
 
 @pytest.fixture
@@ -51,7 +51,7 @@ def test_loads_have_names_and_rows_of_the_campaign(store):
 
 def test_a_slice_without_the_nominal_joint(tmp_path):
     source = tmp_path / "a.toml"
-    source.write_text(synthetic.STUDY, encoding="utf-8")
+    source.write_text(synthetic.WHOLE, encoding="utf-8")
     study = tolstat.load(source)
     Writer.create(tmp_path / "a.h5", study, [tolstat.draw(study, range(20, 30))], rows=range(20, 30)).close()
     with tolstat.open(tmp_path / "a.h5") as opened:

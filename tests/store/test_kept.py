@@ -31,7 +31,7 @@ from tolstat.store import ResultFile, layout, metadata, verification
 
 CROSS_F = [f"cross{i}.F_max" for i in (1, 2, 3, 4)]
 COURSE = [c.name for c in RESULT_COLUMNS if c.field not in OPTIONAL_FIELDS]
-PLAIN = synthetic.STUDY.partition("[limits]")[0]
+PLAIN = synthetic.WHOLE.partition("[limits]")[0]
 
 
 def text(*patterns: str, body: str = PLAIN, more: str = "") -> str:
@@ -78,7 +78,7 @@ def test_the_same_columns_are_the_same_campaign(tmp_path: Path) -> None:
 
 
 def test_faults_are_told_together(tmp_path: Path) -> None:
-    body = synthetic.STUDY  # its limits ask for more
+    body = synthetic.WHOLE  # its limits ask for more
     with pytest.raises(InputError) as caught:
         loaded(tmp_path, text("kross*.F_max", "cross1.F_mx", "F_max", "cross1.F", body=PLAIN))
     said = str(caught.value)
@@ -162,9 +162,7 @@ def test_lost_and_unknown_columns_are_damage(tmp_path: Path) -> None:
 def test_slices_and_extensions_are_one_run(tmp_path: Path) -> None:
     def selected(n: int) -> study.Study:
         made = small(tmp_path, n)
-        source = made.text.replace(
-            'histories = "none"', 'results = ["*.F_max", "fork*.T_*", "pin*.contact*", "psi_max"]'
-        )
+        source = made.text.replace(synthetic.KEPT, '["*.F_max", "fork*.T_*", "pin*.contact*", "psi_max"]')
         made.path.write_text(source.replace("[limits]", "[limits]\n#"), encoding="utf-8")
         return study.load(made.path)
 

@@ -23,7 +23,7 @@ from tolstat.common.errors import StoreError
 from tolstat.common.tables import Status
 from tolstat.store import ResultFile, checksums
 
-TEXT = synthetic.REAL.replace("n = 60", "n = 11").replace("[limits]", '[output]\nhistories = "full"\n\n[limits]')
+TEXT = synthetic.REAL.replace("n = 60", "n = 11").replace("[output]", '[output]\nhistories = "full"')
 
 
 def load(folder: Path, seed: int) -> study.Study:

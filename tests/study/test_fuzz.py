@@ -212,7 +212,7 @@ def refused(tmp_path: Path, text: str) -> str:
 
 @pytest.mark.parametrize("value", ["[" * 10_000 + "]" * 10_000, "{a=" * 10_000 + "1" + "}" * 10_000])
 def test_deep_files_are_refused(tmp_path: Path, value: str) -> None:
-    text = f"{synthetic.STUDY}\n[output]\nresults = {value}"
+    text = f"{synthetic.WHOLE}\n[output]\nresults = {value}"
     assert "too many tables and lists inside each other" in refused(tmp_path, text)
 
 

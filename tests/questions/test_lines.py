@@ -59,6 +59,9 @@ TEXT = (
 n = 400
 seed = 3
 
+[output]
+results = ["*.F_max"]
+
 [limits]
 "cross1.F" = "700 N"
 """

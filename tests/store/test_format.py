@@ -21,6 +21,7 @@ from tests import make_golden
 from tests.campaign.test_campaign import datasets
 from tests.store.test_store import new_store, simulation
 from tests.support import fakes
+from tests.support.reading import read_all
 from tolstat.common import tables
 from tolstat.common.columns import ERROR_COLUMNS, RESULT_COLUMNS
 from tolstat.common.errors import StoreError
@@ -29,19 +30,6 @@ from tolstat.store import ResultFile, Writer, layout, metadata, verification, wh
 from tolstat.store.hdf5 import text
 
 GOLDEN, BEFORE = make_golden.FOLDER / make_golden.PRESENT, make_golden.FOLDER / make_golden.BEFORE
-
-
-def read_all(path: Path) -> int:
-    """Read everything that a result file holds; number of its joints."""
-    with ResultFile.open(path) as store:
-        store.counts()
-        store.errors()
-        store.results()
-        for name in store.history_specs:
-            store.histories(name)
-        if store.case_names:
-            store.design()
-        return store.n
 
 
 def test_a_released_file_is_read() -> None:
@@ -68,15 +56,22 @@ def test_the_layout_is_that_of_its_schema(tmp_path: Path) -> None:
         assert [*json.loads(new["metadata"][()])] == [*json.loads(old["metadata"][()])]
 
 
-@pytest.fixture
-def whole(tmp_path: Path) -> Path:
-    """Make the file of a complete campaign with histories."""
-    path, study = tmp_path / "a.h5", fakes.Study(n=6, output=fakes.Output("full"))
+@pytest.fixture(scope="module")
+def content(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    """Bytes of the file of a complete campaign with histories."""
+    path, study = tmp_path_factory.mktemp("whole") / "a.h5", fakes.Study(n=6, output=fakes.Output("full"))
     with new_store(path, study) as store:
         store.write(np.arange(6), simulation(study, np.arange(6)))
         store.finish()
     assert read_all(path) == 6
-    return path
+    return path.read_bytes()
+
+
+@pytest.fixture
+def whole(tmp_path: Path, content: bytes) -> Path:
+    """Copy the file of a complete campaign with histories."""
+    (tmp_path / "a.h5").write_bytes(content)
+    return tmp_path / "a.h5"
 
 
 def groups(path: Path) -> list[str]:
@@ -254,7 +249,7 @@ def test_files_that_are_not_as_their_metadata_say_are_refused(whole: Path, name:
 READ_ALL = """
 import pathlib, resource, sys
 resource.setrlimit(resource.RLIMIT_AS, (1 << 32, 1 << 32))
-from tests.store.test_format import read_all
+from tests.support.reading import read_all
 from tolstat.common.errors import StoreError
 from tolstat.common.tables import SCHEMA_VERSION
 for line in sys.stdin:

@@ -9,7 +9,6 @@ import sys
 
 import pytest
 
-from tests.conftest import CHEAP
 from tests.measure import commands, usage
 from tests.measure.commands import Row
 from tests.report.test_report import overlapping, texts
@@ -118,7 +117,7 @@ def test_the_figure_has_units_a_line_for_each_command_and_one_in_proportion():
 
 @pytest.mark.slow
 def test_commands_run_one_after_the_other_and_leave_no_file(study, tmp_path):
-    study.write_text(synthetic.WHOLE.replace("[sampling]", f"[output]\n{CHEAP}"), encoding="utf-8")
+    study.write_text(f'{synthetic.REAL.partition("[limits]")[0]}[limits]\n"cross1.F" = "700 N"\n', encoding="utf-8")
     script = [sys.executable, "-m", "tests.measure.commands", str(study), "--joints", "200,400", "--workers", "1"]
     (tmp_path / "made").mkdir()
     run = [*script, "--folder", str(tmp_path / "made")]

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 import shutil
-import signal
 from functools import partial
 
 import h5py
@@ -20,6 +18,7 @@ from typer.testing import CliRunner
 
 import tolstat
 from tests.support import fakes, synthetic
+from tests.support.two_errors import killing, stand_in
 from tolstat import sampling, study
 from tolstat.campaign import blocks
 from tolstat.campaign import what_if as sets
@@ -29,7 +28,7 @@ from tolstat.campaign.work import Work
 from tolstat.cli import app
 from tolstat.common.errors import InputError, NotApplicable, StoreError
 from tolstat.common.loads import LOADS
-from tolstat.common.tables import RESULT, Simulation, Status
+from tolstat.common.tables import Status
 from tolstat.display import text
 from tolstat.display.answer import Asked, Panels, Sentence, Table
 from tolstat.display.progress import Display
@@ -74,18 +73,6 @@ def loaded(folder, text=TEXT):
     source = folder / "made.toml"
     source.write_text(text, encoding="utf-8")
     return study.load(source)
-
-
-def stand_in(params, options, histories="none", n_harmonics=0):
-    """Loads at 100 N m from one tilt and one offset: 640 N, 40 N a sigma of the tilt, 15 N a sigma of the offset."""
-    results = np.zeros(len(params), RESULT)
-    tilt = -params["pin_axis"][:, 0, 2] / 0.0029  # about t of pin 1: its axis leaves along z
-    offset = params["pin_point"][:, 1, 2] / 5e-5
-    factor = params["torque"] / 100.0
-    results["F_max"][:] = (factor * (640.0 + 40.0 * np.abs(tilt) + 15.0 * np.abs(offset)))[:, None]
-    results["status"], results["settled"] = Status.OK, 1
-    stationary.fill_intervals(results)
-    return Simulation(results, {})
 
 
 def stand_in_with(patch):
@@ -471,13 +458,6 @@ def test_interrupted_it_goes_on_and_ends_with_the_same_sets(path, once, monkeypa
             expected[name].loads.tobytes(),
             expected[name].status.tobytes(),
         )
-
-
-def killing(params, options, tilt, **given):
-    """Stand in for the solver; a joint with this tilt kills its process."""
-    if tilt in params["pin_axis"][:, 0, 2]:
-        os.kill(os.getpid(), signal.SIGKILL)
-    return stand_in(params, options)
 
 
 @pytest.mark.slow

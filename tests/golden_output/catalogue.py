@@ -54,10 +54,15 @@ def forms(*commands: str) -> list[str]:
     return [command + form for command in commands for form in FORMS]
 
 
+def plain(*commands: str) -> list[str]:
+    """Each command as text and as JSON: of those that always show all columns."""
+    return [command + form for command in commands for form in ("", " --json")]
+
+
 def usual(file: str, kind: str = "") -> dict[str, list[str]]:
     """Commands that are asked of every campaign; `kind` stands before those that show many digits of small numbers."""
     return {
-        "status": forms(f"status {file}"),
+        "status": plain(f"status {file}"),
         "report": [f"report {file} --wide --accept '5 %' --out wide"],
         "page": [f"report {file} --out page.html --accept '10 %' --replay 20"],
         "capability": forms(f"capability {file}"),
@@ -74,7 +79,7 @@ MAIN = Campaign(
     | {
         "pictures": ["orders iso2768_f.h5 --orbits --out orders", "report iso2768_f.h5 --out report --accept '50 %'"],
         "again": ["run iso2768_f.toml --n 64 --out iso2768_f.h5", "process: run iso2768_f.toml --n 64"],
-        "capability_rare": forms("capability iso2768_f.h5 --one-in 100 --delivery 50"),
+        "capability_rare": plain("capability iso2768_f.h5 --one-in 100 --delivery 50"),
         "compare": [*forms("compare iso2768_f.h5 rigid_shafts.h5"), "compare iso2768_f.h5 rigid_shafts.h5 --by psi"],
         "worst_by": ["worst iso2768_f.h5 --by psi --top 3", "worst iso2768_f.h5 --by revolutions --top 3"],
         "show": ["show iso2768_f.h5 --row 3", "show iso2768_f.h5 --out joint.png", "show iso2768_f.h5 --errors"],
@@ -86,7 +91,7 @@ MAIN = Campaign(
         ],
         "verify_near": [
             "verify iso2768_f.h5 --near 'any limit' --joints 4",
-            *forms("verify iso2768_f.h5 --near 'cross1.F > 700 N' --joints 3"),
+            *plain("verify iso2768_f.h5 --near 'cross1.F > 700 N' --joints 3"),
             "report iso2768_f.h5 --wide",
             "capability iso2768_f.h5 --json",
         ],
@@ -95,7 +100,7 @@ MAIN = Campaign(
             "run iso2768_f.toml --n 64",
             'sed \'|[limits]|[limits]\\npsi = 0.0001\\n"input.lateral" = "20 N"|\' iso2768_f.toml',
             "run iso2768_f.toml --n 64 --no-report",
-            *forms("status iso2768_f.h5"),
+            *plain("status iso2768_f.h5"),
             "capability iso2768_f.h5",
         ],
         "extend": [

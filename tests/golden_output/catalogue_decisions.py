@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tests.golden_output.catalogue import Campaign, forms, usual
+from tests.golden_output.catalogue import Campaign, forms, plain, usual
 from tests.golden_output.catalogue_studies import HISTORIES, cheap
 
 PROPOSAL = '|[limits]|[[proposal]]\\nshare = 0.4\\nwiden = 1.3\\nshift = { "pin1.tilt_z" = 1.0 }\\n\\n[limits]|'
@@ -78,7 +78,7 @@ FITTED = Campaign(
     [cheap("selective"), "selective selective.toml --classes 1 --classes 3 --n 64"],
     usual("selective_k3.h5")
     | {
-        "selective": forms("selective selective.toml --classes 1 --classes 3 --n 64"),
+        "selective": plain("selective selective.toml --classes 1 --classes 3 --n 64"),
         "one": ["report selective_k1.h5"],
     },
 )
@@ -88,7 +88,7 @@ SORTING = Campaign(
     usual("sorting.h5")
     | {
         "sorting": forms("sorting sorting.h5"),
-        "capability_rare": forms("capability sorting.h5 --one-in 1000 --delivery 50"),
+        "capability_rare": plain("capability sorting.h5 --one-in 1000 --delivery 50"),
         "causes": [
             *forms("causes sorting.h5 --by cross1.T --top 5"),
             "causes sorting.h5 --logarithm",

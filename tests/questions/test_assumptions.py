@@ -245,39 +245,35 @@ def test_joints_without_a_load_count_on_both_sides(tmp_path, quick, monkeypatch)
     assert row["change_lower"] < 0.0 < row["change_upper"]
 
 
-def test_a_run_that_is_stopped_goes_on(tmp_path, quick, monkeypatch):
-    path, taken = made(tmp_path), []
-    (tmp_path / "whole.h5").write_bytes(path.read_bytes())
-    simulated(tmp_path / "whole.h5")
+def test_a_run_that_is_stopped_goes_on(tmp_path, varied, quick, monkeypatch):
+    path, taken, solver = made(tmp_path), [], partial(stand_in, slides=-60.0)
 
     def failing(*arguments, **options):
         taken.append(1)
         if len(taken) == 9:
             raise KeyboardInterrupt
-        return stand_in(*arguments, **options)
+        return solver(*arguments, **options)
 
     monkeypatch.setattr(blocks, "simulate_rows", failing)
     with pytest.raises(KeyboardInterrupt):
         simulated(path)
     assert standing(path).missing
     assert "not varied: tolstat assumptions made.h5 --run" in verdict(path, 0.5).sentence
-    monkeypatch.setattr(blocks, "simulate_rows", stand_in)
+    monkeypatch.setattr(blocks, "simulate_rows", solver)
     simulated(path)
-    with ResultFile.open(path) as store, ResultFile.open(tmp_path / "whole.h5") as whole:
+    with ResultFile.open(path) as store, ResultFile.open(varied(slides=-60.0)) as whole:
         found, expected = what_if.read(store), what_if.read(whole)
     assert {name: one.loads.tobytes() for name, one in found.items()} == {
         name: one.loads.tobytes() for name, one in expected.items()
     }
 
 
-def test_sentences_of_each_case(tmp_path, quick):
-    quick(slides=-60.0, arm=1.0)
-    path = made(tmp_path)
-    before = verdict(path, 0.5)
+def test_sentences_of_each_case(tmp_path, varied):
+    path = varied(slides=-60.0, arm=4.0)
+    before = verdict(made(tmp_path), 0.5)
     assert before.answer == "yes"
     assert before.sentence.endswith("; mounting and arm length not varied: tolstat assumptions made.h5 --run")
     assert before.stands_on["answer"] is None
-    simulated(path)
     share = of(standing(path), "shaft slides")["share"]
     shown = tolstat.display.text.percent
 
@@ -335,11 +331,11 @@ def test_a_share_near_the_accepted_one_takes_more_joints(varied):
     assert " --run --joints " in said
 
 
-def test_more_joints_decide_what_the_first_ones_leave_open(tmp_path, quick):
+def test_more_joints_decide_what_the_first_ones_leave_open(tmp_path, varied, quick):
     """Only of this variation; all intervals are then those of two looks at each variation, and the same call ends."""
     quick(slides=-60.0)
-    path = made(tmp_path)
-    simulated(path)
+    path = tmp_path / "made.h5"
+    path.write_bytes(varied(slides=-60.0).read_bytes())
     first = standing(path)
     accepted = of(first, "shaft slides")["share_upper"] - 0.002
     assert standing(path, accepted).side == "no"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 
@@ -347,8 +346,6 @@ def test_other_laws_share_the_statics(params, law):
 PROBE = """
 import numpy as np
 from tolstat import joint
-from tolstat.kernel.mechanics import dynamics
-from tolstat.kernel.mechanics.work import make_work
 from tolstat.solver import simulation
 from tolstat.common.tables import RESULT, Options
 operation = joint.Operation.model_construct(alpha=0.3, speed=50.0, torque=100.0)
@@ -357,29 +354,15 @@ par = par.view(np.recarray)
 """
 
 
-def python(code, **environment):
+def python(code):
     done = subprocess.run(
         [sys.executable, "-c", PROBE + code],
         capture_output=True,
         text=True,
-        env=os.environ | environment,
         check=False,
     )
     assert done.returncode == 0, done.stderr
     return done.stdout
-
-
-ACCELERATION = """
-q, out = np.linspace(-1e-4, 2e-4, 56), np.empty(56)
-dynamics.acceleration(0.01, q, q, par[0], Options(), make_work(), out)
-print(out.tolist())
-"""
-
-
-@pytest.mark.slow
-def test_the_kernel_is_the_same_without_compilation():
-    plain = eval(python(ACCELERATION, NUMBA_DISABLE_JIT="1"))
-    np.testing.assert_allclose(eval(python(ACCELERATION)), plain, rtol=1e-9, atol=1e-9 * np.abs(plain).max())
 
 
 @pytest.mark.slow

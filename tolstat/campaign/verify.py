@@ -18,6 +18,7 @@ from tolstat.analysis.accuracy import LEAST_NEAR
 from tolstat.campaign import pool
 from tolstat.campaign.blocks import simulate_beside
 from tolstat.campaign.pool import Lost, Work, kept_workers
+from tolstat.campaign.stop_rule import limit_of
 from tolstat.campaign.what_if import check_code
 from tolstat.common import tables
 from tolstat.common.columns import blank_others, holds
@@ -32,7 +33,7 @@ from tolstat.store import Reader, View, Writer, verification
 from tolstat.store.hdf5 import pick, store_error
 from tolstat.store.recorded import options_of, parameters, perturbed, variants
 from tolstat.store.verification import Check, Verification
-from tolstat.study import Study, load, rule
+from tolstat.study import Study, load
 
 QUICK_CHECKS = ("half_step", "newton", "settling")
 """Checks at the end of every run; they need no code beyond that of the run."""
@@ -319,7 +320,7 @@ def check_near(
         found = f"{joints} joints do not tell the numerical error near a limit"
         raise InputError([Fault("--joints", found, f"give {LEAST_NEAR} or more")])
     with Writer.open(path) as store:
-        limit = rule.limit_of(text, store.limits, "--near", EXAMPLE)
+        limit = limit_of(text, store.limits, "--near", EXAMPLE)
         lacking = [name for name in limit.loads if not holds(store.columns, load_of(name).name)]
         if lacking:
             remedy = "give loads that it keeps, see tolstat status"

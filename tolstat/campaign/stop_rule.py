@@ -207,10 +207,10 @@ def run_until(study: Study, out: Path, rule: Statement, run: Callable[[int], obj
     """
     if study.sampling.method != "random":
         found = f"sampling.method is {study.sampling.method!r}: its interval needs independent samples of equal weight"
-        raise InputError([Fault("--until", found, 'write sampling.method = "random" in the study')])
+        raise input_error("--until", found, 'write sampling.method = "random" in the study')
     if study.sampling.joints_per_lot > 1:
         found = "joints share lots: the interval of a stop needs independent samples"
-        raise InputError([Fault("--until", found, "remove sampling.joints_per_lot, or --until")])
+        raise input_error("--until", found, "remove sampling.joints_per_lot, or --until")
     for load in map(load_of, rule.limit.loads):
         if not holds(study.output.columns, load.name):
             remedy = f"add {', '.join(load.columns)}"

@@ -346,8 +346,8 @@ def test_workers_and_block_must_be_positive(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("n", "workers"), [(1, 1), (1, 2), (513, 2), (100_000, 64), (9, 3)])
-def test_default_block(n: int, workers: int) -> None:
-    size = execution.default_block(n, workers)
+def test_first_block(n: int, workers: int) -> None:
+    size = execution.Pace(n, workers, None).size
     assert 1 <= size <= execution.MAX_BLOCK
     assert size == 1 or n // size >= execution.MIN_BLOCKS_PER_WORKER * workers
 

@@ -62,7 +62,7 @@ class Pace:
         self._left = n_pending
         self._workers = workers
         self._fixed = fixed
-        self.size = fixed or default_block(n_pending, workers)
+        self.size = fixed or max(1, min(MAX_FIRST_BLOCK, n_pending // (MIN_BLOCKS_PER_WORKER * workers)))
 
     def take(self, available: int) -> int:
         """Return the size of the next block, and count its joints as handed out."""
@@ -141,11 +141,6 @@ def simulate_beside(params: NDArray[np.void], options: Options) -> Simulation:
 def work_beside(options: Options) -> BlockWork:
     """Return how a worker simulates blocks without histories."""
     return _work([options], "none", 0, {})
-
-
-def default_block(n_pending: int, workers: int) -> int:
-    """Return the number of joints in the first blocks: at most `MAX_FIRST_BLOCK`, and several blocks per worker."""
-    return max(1, min(MAX_FIRST_BLOCK, n_pending // (MIN_BLOCKS_PER_WORKER * workers)))
 
 
 def settings_in_use(study: Study, store: Reader) -> list[Options]:

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 from tolstat.campaign import pool
 from tolstat.campaign.pool import BlockT, Lost, ResultT, Work, WorkerDied
 from tolstat.common.cores import one_thread_each
-from tolstat.common.errors import Fault, InputError
+from tolstat.common.errors import InputError, input_error
 from tolstat.store.metadata import differing, versions
 
 if TYPE_CHECKING:
@@ -148,7 +148,7 @@ def check(expected: Mapping[str, str], actual: Mapping[str, str], where: str) ->
     """
     if lines := differing(actual, expected, "on the worker", "here"):
         text = "\n    ".join([f"{where} has other software versions", *lines])
-        raise InputError([Fault("--executor dask", text, "install the same versions there, and restart the workers")])
+        raise input_error("--executor dask", text, "install the same versions there, and restart the workers")
 
 
 def _checked(client: Client) -> dict[str, str]:
@@ -161,7 +161,7 @@ def _checked(client: Client) -> dict[str, str]:
     for address, actual in client.run(versions, on_error="return").items():
         if isinstance(actual, BaseException):
             remedy = "install tolstat there, and restart the workers"
-            raise InputError([Fault("--executor dask", f"the worker {address} cannot run tolstat: {actual!r}", remedy)])
+            raise input_error("--executor dask", f"the worker {address} cannot run tolstat: {actual!r}", remedy)
         check(expected, actual, f"the worker {address}")
     return expected
 
@@ -171,8 +171,8 @@ def _client(scheduler: str | None, workers: int) -> Iterator[Client]:
     try:
         from distributed import Client, LocalCluster
     except ImportError as error:
-        remedy = "install it with: pip install 'tolstat[dask]'"
-        raise InputError([Fault("--executor dask", "Dask's distributed is not installed", remedy)]) from error
+        found = "Dask's distributed is not installed"
+        raise input_error("--executor dask", found, "install it with: pip install 'tolstat[dask]'") from error
     if scheduler is None:
         with one_thread_each(), pool.signals_blocked():
             cluster = LocalCluster(workers, threads_per_worker=1, dashboard_address=None, host=LOOPBACK)
@@ -186,6 +186,6 @@ def _client(scheduler: str | None, workers: int) -> Iterator[Client]:
         remedy = "give the address that dask scheduler prints: --scheduler tcp://HOST:PORT"
         if scheduler.startswith("tls:"):
             remedy = "check the certificates: docs/cluster.md names the variables that Dask reads them from"
-        raise InputError([Fault("--scheduler", found, remedy)]) from error
+        raise input_error("--scheduler", found, remedy) from error
     with client:
         yield client

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from tolstat.common.columns import drawn_columns
 from tolstat.common.counts import Counts
-from tolstat.common.errors import Fault, InputError, raise_all
+from tolstat.common.errors import Fault, input_error, raise_all
 from tolstat.common.tables import Status
 from tolstat.sampling import draw_blocks, origin_blocks
 from tolstat.store import Reader, Writer, layout, what_if
@@ -247,7 +247,7 @@ def _copy_results(file: h5py.File, sources: Sequence[Reader]) -> None:
                 holding = [str(store.path) for store in sources if row in store.rows]
                 found = f"hold different results of row {row}: {column} differs"
                 remedy = f"find the file that is wrong, and leave it out: tolstat replay {holding[0]} --row {row}"
-                raise InputError([Fault(" and ".join(holding), found, remedy)])
+                raise input_error(" and ".join(holding), found, remedy)
 
 
 def _copy(file: h5py.File, source: Reader) -> Iterator[tuple[int, str]]:

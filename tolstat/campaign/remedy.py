@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.common import strict, tables
-from tolstat.common.errors import Fault, InputError, gather, raise_all
+from tolstat.common.errors import Fault, gather, input_error, raise_all
 from tolstat.common.tables import FAILED, UNSETTLED, HistorySpec, Options, Status
 from tolstat.joint.ideal import NO_CLOSED_FORM
 from tolstat.solver import fidelity
@@ -201,8 +201,8 @@ def parse_retry(statuses: str, settings: Sequence[str], study: Study) -> Retry:
         with gather(faults):
             key, equals, value = text.partition("=")
             if not (equals and key.startswith("solver.")):
-                remedy = "write --set solver.steps_per_rev=360"
-                raise InputError([Fault("--set", f"{text!r} is not a solver setting", remedy)])
+                example = "write --set solver.steps_per_rev=360"
+                raise input_error("--set", f"{text!r} is not a solver setting", example)
             changed[key.strip()] = given(value)
     solver = study.solver
     with gather(faults):
@@ -245,7 +245,7 @@ def begin_retry(store: Writer, retry: Retry, specs: Mapping[str, HistorySpec], t
     if dict(specs) != store.history_specs:
         found = "these settings give load histories another number of samples than those in the file"
         remedy = "remove solver.steps_per_rev, or run another campaign: tolstat run STUDY --out OTHER.h5"
-        raise InputError([Fault("--set", found, remedy)])
+        raise input_error("--set", found, remedy)
     rows = {at_point.point or "": np.flatnonzero(np.isin(at_point.status(), retry.status)) for at_point in each}
     again = sum(slots.size for slots in rows.values())
     tell(f"{again} joints are simulated again")

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tolstat.campaign.remedy import remedy
 from tolstat.common import loads
 from tolstat.common.channels import BUSHING_LOADS, SHAFT_LOADS, LoadHistory
-from tolstat.common.errors import Fault, InputError
+from tolstat.common.errors import Fault, InputError, input_error
 from tolstat.common.late import pandas as pd
 from tolstat.common.load_kinds import CONTACTS, PINS
 from tolstat.common.tables import Options, Simulation, Status
@@ -226,7 +226,7 @@ def replay(store: Reader, row: int) -> Replay:
     here = slice(store.slot(row), store.slot(row) + 1)
     stored = store.results(here)
     if stored["status"][0] == Status.PENDING:
-        raise InputError([Fault(place, f"row {row} is pending", f"simulate it first: tolstat run STUDY --out {place}")])
+        raise input_error(place, f"row {row} is pending", f"simulate it first: tolstat run STUDY --out {place}")
     params = parameters(store, np.array([here.start]))
     options = options_of(store, here.start)
     warm_up()

@@ -20,7 +20,7 @@ from tolstat.campaign.extend import NOT_EXTENDABLE, OTHER_CODE, code_of
 from tolstat.campaign.pool import SIGNALS, WorkerDied, kept_workers
 from tolstat.campaign.remedy import Retry, begin_retry
 from tolstat.common.counts import Counts
-from tolstat.common.errors import Fault, InputError, StoreError
+from tolstat.common.errors import Fault, InputError, StoreError, input_error
 from tolstat.common.tables import Simulation, Status
 from tolstat.display.progress import JOINTS, Reporter, Tell, display, note, silent
 from tolstat.sampling import dimensions, draw_blocks, origin_blocks
@@ -246,7 +246,7 @@ def _create_or_resume(study: Study, path: Path, rows: range | None, tell: Tell) 
     rows = range(study.rows) if rows is None else rows
     if not (0 <= rows.start < rows.stop <= study.rows and rows.step == 1):
         found = f"{rows.start}:{rows.stop} is no part of the rows 0:{study.rows} of the study"
-        raise InputError([Fault("rows", found, f"write --rows A:B with 0 <= A < B <= {study.rows}")])
+        raise input_error("rows", found, f"write --rows A:B with 0 <= A < B <= {study.rows}")
     if not path.exists():
         choice = choose_fidelity(study) if study.solver.fidelity == "auto" else {}
         if choice:

@@ -1,4 +1,6 @@
-"""Stop rule: end a campaign when the interval of an exceedance is narrow enough.
+"""Limits and statements on a probability as the command line has them, and the stop rule, which is one of them.
+
+A stop rule ends a campaign when the interval of an exceedance is narrow enough.
 
 When to look, and with which confidence, is in `analysis.binomial`. The looks depend only on the number of joints of
 the campaign, not on workers or time: each evaluates the first joints of the sequence, all of them done. Looks of a
@@ -7,6 +9,7 @@ campaign that is extended afterwards stay looks.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -16,16 +19,38 @@ import numpy as np
 from tolstat.analysis import binomial
 from tolstat.campaign.pool import kept_workers
 from tolstat.common.columns import holds
-from tolstat.common.errors import Fault, InputError
-from tolstat.common.loads import Limit, load_of
+from tolstat.common.errors import Fault, InputError, collected, gather, input_error
+from tolstat.common.files import finite
+from tolstat.common.loads import ANY_LIMIT, AT, UNIT_OF_LOAD, Limit, load_of
+from tolstat.common.strict import did_you_mean
 from tolstat.store import Reader, View, Writer
 from tolstat.study import Study
-from tolstat.study import rule as rules
+from tolstat.study.selection import Entry, quantity, resolve
 
 CONFIDENCE = 0.95
 BIASED = f"biased high if few joints are above ({100 * binomial.BIAS:.0f} % of itself with {binomial.LEAST_BESIDE})"
 """Sentence on the share at a stop."""
 EXAMPLE = 'write --until "P(cross1.F > 700 N) width < 0.01"'
+_STATEMENT = re.compile(r"\s*P\s*\((?P<limit>[^)]*)\)\s*(?P<what>\w*)\s*<\s*(?P<bound>\S+)\s*")
+_LIMIT = re.compile(r"\s*(?P<load>[^\s>]+)\s*>\s*(?P<level>.+?)\s*")
+
+
+class Statement(NamedTuple):
+    """Statement that the probability of a load above a limit, or the width of its interval, is below a bound.
+
+    Attributes
+    ----------
+    text : str
+        The statement as written.
+    limit : Limit
+        The limit.
+    bound : float
+        Upper bound, between 0 and 1.
+    """
+
+    text: str
+    limit: Limit
+    bound: float
 
 
 class Look(NamedTuple):
@@ -71,25 +96,93 @@ class Outcome(NamedTuple):
     look: Look
     looks: list[int]
 
-    def record(self, rule: rules.Statement) -> dict[str, Any]:
+    def record(self, rule: Statement) -> dict[str, Any]:
         """Return the attribute ``stop`` of the result file."""
         taken = [joints for joints in self.looks if joints <= self.look.joints]
         how = {"confidence": CONFIDENCE, "confidence_of_a_look": binomial.LOOK_CONFIDENCE, "looks": taken}
         return {"rule": rule.text, "reached": self.reached} | self.look._asdict() | how
 
 
-def parse(text: str, limits: Mapping[str, float]) -> rules.Statement:
-    """Read a rule, ``"P(cross1.F > 700 N) width < 0.002"``; `limits` are those of the study.
+def limit_of(text: str, limits: Mapping[str, float], option: str, example: str) -> Limit:
+    """Read a limit.
+
+    Parameters
+    ----------
+    text : str
+        ``"cross1.F > 700 N"``; ``"cross*.F > 700 N"``, any of the loads that the pattern selects; or `ANY_LIMIT`, any
+        limit of the study.
+    limits : mapping
+        Limits of the study, SI.
+    option : str
+        Option of the command line, shown in faults.
+    example : str
+        Remedy shown for a text that is not a limit.
 
     Raises
     ------
     InputError
         With every fault of it.
     """
-    return rules.parse(text, "width", "--until", EXAMPLE, limits)
+    if text.split() == ANY_LIMIT.split():
+        if not limits:
+            raise input_error(option, "the study has no limits", f"add [limits] to it, or {example}")
+        return Limit(ANY_LIMIT, tuple(limits), tuple(limits.values()))
+    if text.split() == ["all", "limits"]:
+        remedy = f'write "{ANY_LIMIT}": a joint counts if it is above at least one'
+        raise input_error(option, f"{text.strip()!r} is not a limit", remedy)
+    match = _LIMIT.fullmatch(text)
+    if match is None and AT in text:
+        remedy = "name the load alone: at several operating points the largest counts, with --point that at one of them"
+        raise input_error(option, f"{text.strip()!r} names an operating point", remedy)
+    if match is None:
+        raise input_error(option, f"{text.strip()!r} is not a limit", example)
+    entry = Entry(match["load"], (match["load"],), match["level"])
+    if not set(entry.pattern) & set("*?[") and entry.pattern not in UNIT_OF_LOAD:
+        raise input_error(option, f"{entry.pattern!r} is not a load", did_you_mean(entry.pattern, list(UNIT_OF_LOAD)))
+    loads = resolve(entry, UNIT_OF_LOAD, option)
+    level = quantity(entry, UNIT_OF_LOAD[loads[0]], option)
+    return Limit(entry.pattern, tuple(loads), (level,) * len(loads))
 
 
-def run_until(study: Study, out: Path, rule: rules.Statement, run: Callable[[int], object]) -> Outcome:
+def parse(
+    text: str, limits: Mapping[str, float], what: str = "width", option: str = "--until", example: str = EXAMPLE
+) -> Statement:
+    """Read a stop rule, or another statement.
+
+    Parameters
+    ----------
+    text : str
+        ``"P(LIMIT) width < 0.002"``, with a LIMIT as in `limit_of`.
+    limits : mapping
+        Limits of the study, SI.
+    what : str
+        Word before the ``<``; empty for the probability itself.
+    option, example
+        As in `limit_of`.
+
+    Returns
+    -------
+    Statement
+        The parsed statement.
+
+    Raises
+    ------
+    InputError
+        With every fault of the statement.
+    """
+    match = _STATEMENT.fullmatch(text)
+    if match is None or match["what"] != what:
+        raise input_error(option, f"{text!r} is not a rule", example)
+    bound = finite(match["bound"])
+    with collected() as faults:
+        with gather(faults):
+            limit = limit_of(match["limit"], limits, option, example)
+        if not 0.0 < bound < 1.0:
+            faults.append(Fault(option, f"{what} {match['bound']} is not between 0 and 1".strip(), example))
+    return Statement(text.strip(), limit, bound)
+
+
+def run_until(study: Study, out: Path, rule: Statement, run: Callable[[int], object]) -> Outcome:
     """Run a campaign until a stop rule is satisfied or all joints are simulated.
 
     Parameters
@@ -114,10 +207,10 @@ def run_until(study: Study, out: Path, rule: rules.Statement, run: Callable[[int
     """
     if study.sampling.method != "random":
         found = f"sampling.method is {study.sampling.method!r}: its interval needs independent samples of equal weight"
-        raise InputError([Fault("--until", found, 'write sampling.method = "random" in the study')])
+        raise input_error("--until", found, 'write sampling.method = "random" in the study')
     if study.sampling.joints_per_lot > 1:
         found = "joints share lots: the interval of a stop needs independent samples"
-        raise InputError([Fault("--until", found, "remove sampling.joints_per_lot, or --until")])
+        raise input_error("--until", found, "remove sampling.joints_per_lot, or --until")
     for load in map(load_of, rule.limit.loads):
         if not holds(study.output.columns, load.name):
             remedy = f"add {', '.join(load.columns)}"

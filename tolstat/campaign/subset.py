@@ -22,9 +22,9 @@ from tolstat.campaign import run as campaign
 from tolstat.campaign.extend import grow
 from tolstat.campaign.work import Work
 from tolstat.common.columns import SUBSET
-from tolstat.common.errors import Fault, StoreError
 from tolstat.common.loads import FloatArray
 from tolstat.store import ResultFile, Writer
+from tolstat.store.hdf5 import store_error
 from tolstat.store.reader import Reader
 from tolstat.store.recorded import differing_keys
 from tolstat.study import Study
@@ -90,7 +90,7 @@ class Subsets:
         results = store.results(slots)
         if (store.origin(slots) != self.origin).any():
             reason = f"rows {stage.start}:{stage.stop} do not follow from the loads before them"
-            raise StoreError(str(Fault(str(store.path), reason, "run the study again into another folder (--out DIR)")))
+            raise store_error(store.path, reason, "run the study again into another folder (--out DIR)")
         loads = self.settings.limit.of(results).copy()
         valid = is_valid(loads, results["status"])
         loads[~valid] = math.inf if self.settings.unresolved == "above" else -math.inf

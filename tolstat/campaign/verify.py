@@ -18,11 +18,12 @@ from tolstat.analysis.accuracy import LEAST_NEAR
 from tolstat.campaign import pool
 from tolstat.campaign.blocks import simulate_beside
 from tolstat.campaign.pool import Lost, Work, kept_workers
+from tolstat.campaign.stop_rule import limit_of
 from tolstat.campaign.what_if import check_code
 from tolstat.common import tables
 from tolstat.common.columns import blank_others, holds
 from tolstat.common.counts import Counts
-from tolstat.common.errors import Fault, InputError, gather, raise_all
+from tolstat.common.errors import Fault, InputError, gather, input_error, raise_all
 from tolstat.common.loads import Limit, load_of, split
 from tolstat.common.tables import Fidelity, Method, Options, Simulation, Start, Status
 from tolstat.sampling import draw
@@ -32,7 +33,7 @@ from tolstat.store import Reader, View, Writer, verification
 from tolstat.store.hdf5 import pick, store_error
 from tolstat.store.recorded import options_of, parameters, perturbed, variants
 from tolstat.store.verification import Check, Verification
-from tolstat.study import Study, load, rule
+from tolstat.study import Study, load
 
 QUICK_CHECKS = ("half_step", "newton", "settling")
 """Checks at the end of every run; they need no code beyond that of the run."""
@@ -317,13 +318,13 @@ def check_near(
     number = _parse_joints(joints)
     if number is None or number < LEAST_NEAR:
         found = f"{joints} joints do not tell the numerical error near a limit"
-        raise InputError([Fault("--joints", found, f"give {LEAST_NEAR} or more")])
+        raise input_error("--joints", found, f"give {LEAST_NEAR} or more")
     with Writer.open(path) as store:
-        limit = rule.limit_of(text, store.limits, "--near", EXAMPLE)
+        limit = limit_of(text, store.limits, "--near", EXAMPLE)
         lacking = [name for name in limit.loads if not holds(store.columns, load_of(name).name)]
         if lacking:
-            remedy = "give loads that it keeps, see tolstat status"
-            raise InputError([Fault("--near", f"the file does not keep {', '.join(lacking)}", remedy)])
+            found = f"the file does not keep {', '.join(lacking)}"
+            raise input_error("--near", found, "give loads that it keeps, see tolstat status")
         check_code(store)
         chosen = [(at_point, nearest(at_point, limit, number)) for at_point in store.each()]
         fewest = min((slots.size for _, slots in chosen if slots.size), default=0)
@@ -336,10 +337,9 @@ def check_near(
             new = slots if before is None else slots[~np.isin(at_point.row(slots), before.rows)]
             if new.size:
                 make = partial(run_checks, names=QUICK_CHECKS, workers=workers, progress=progress)
-                new_checks = check_slots(at_point, new, 0, make)
-                verification.write(
-                    [(at_point, new_checks if before is None else _merged(before, new_checks))], verification.NEAR
-                )
+                checked = check_slots(at_point, new, 0, make)
+                merged = checked if before is None else _merged(before, checked)
+                verification.write([(at_point, merged)], verification.NEAR)
         return _stored(store, verification.NEAR)
 
 
@@ -395,5 +395,5 @@ def _parse_joints(joints: int | str) -> int | None:
         return None
     if not (str(joints).isdecimal() and int(joints)):
         found = f"{joints} is not a whole number of at least one"
-        raise InputError([Fault("joints", found, "write --joints 24, or --joints all")])
+        raise input_error("joints", found, "write --joints 24, or --joints all")
     return int(joints)

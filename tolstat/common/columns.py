@@ -139,8 +139,3 @@ def drawn_columns(sampling: Mapping[str, Any]) -> tuple[Column, ...]:
         The attribute ``sampling`` of a result file.
     """
     return flat(DRAWN_FIELDS.get(sampling["method"], ()))
-
-
-def drawn_dtype(sampling: Mapping[str, Any]) -> np.dtype[np.void]:
-    """Structured type of a row of the table."""
-    return dtype_of(DRAWN_FIELDS[sampling["method"]])

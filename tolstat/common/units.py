@@ -150,26 +150,6 @@ def _without_unit(value: object, unit: str) -> PydanticCustomError:
     return _fault(f"{value!r} has no unit", unit, f"write {remedy}")
 
 
-def is_diameter(value: object) -> bool:
-    """Whether a quantity as written in a file has the sign of a diameter: ``"⌀0.1 mm"``, ``"dia 0.1 mm"``."""
-    read = notation.read(value) if isinstance(value, str) else None
-    return read is not None and read.mark == DIAMETER
-
-
-def diameter(value: object) -> float:
-    """Diameter of a round zone, m: a length that must have the sign of a diameter.
-
-    Raises
-    ------
-    pydantic_core.PydanticCustomError
-        For a value without the sign, and as `to_si`.
-    """
-    si = to_si(value, "m", DIAMETER)
-    if not is_diameter(value):
-        raise _fault(f"{value!r} is not marked as a diameter", "m", f'write "{DIAMETER}{value}" or "dia {value}"')
-    return si
-
-
 def _marked(read: Written, value: str, unit: str, mark: str) -> PydanticCustomError:
     """Fault of a value with a sign that means another quantity."""
     plain = f"{_short(read.number)} {read.unit}".strip()

@@ -17,6 +17,8 @@ from tolstat.analysis import allocation, reweight
 from tolstat.analysis.prediction import DELIVERY
 from tolstat.analysis.reweight import Ratios
 from tolstat.analysis.sample import CONFIDENCE, Sample
+from tolstat.campaign import stop_rule
+from tolstat.campaign.stop_rule import Statement
 from tolstat.common.columns import holds
 from tolstat.common.errors import Fault, InputError, gather, raise_all
 from tolstat.common.loads import ANY_LIMIT, FloatArray, split, unit_text
@@ -28,10 +30,9 @@ from tolstat.display.options import Costs, Delivery, Opt
 from tolstat.questions import shares
 from tolstat.store import error_budget
 from tolstat.store.view import View
-from tolstat.study import Study, axes, rule, scaling, selection
+from tolstat.study import Study, axes, scaling, selection
 from tolstat.study import costs as prices
 from tolstat.study.costs import Cost
-from tolstat.study.rule import Statement
 from tolstat.study.scaling import Tolerance
 from tolstat.study.tolerances.density_ratio import Exact, exact, log_ratios, of_error
 from tolstat.study.tolerances.distributions import Distribution, Normal
@@ -295,7 +296,7 @@ def _read_request(view: View, targets: Sequence[str], costs: Path | None, keep: 
     statements: list[Statement] = []
     for target in targets:
         with gather(faults):
-            statements.append(rule.parse(target, "", "--target", EXAMPLE, view.limits))
+            statements.append(stop_rule.parse(target, view.limits, "", "--target", EXAMPLE))
             loads = statements[-1].limit.loads
             lacking = [name for name in loads if not holds(view.columns, split(name)[0])]
             if lacking:

@@ -18,6 +18,7 @@ from tolstat.analysis.sample import CONFIDENCE
 from tolstat.analysis.subset import Estimate
 from tolstat.campaign import subset
 from tolstat.campaign.pool import kept_workers
+from tolstat.campaign.stop_rule import limit_of
 from tolstat.campaign.subset import Subsets
 from tolstat.campaign.work import Work
 from tolstat.common.errors import Fault, InputError
@@ -31,7 +32,7 @@ from tolstat.questions import shares
 from tolstat.store import ResultFile, error_budget, verification
 from tolstat.store.reader import Reader
 from tolstat.store.view import View
-from tolstat.study import Study, rule, subset_of
+from tolstat.study import Study, subset_of
 
 EXAMPLE = 'write --limit "cross1.F > 900 N"'
 LEVELS = (
@@ -102,7 +103,7 @@ def simulate(
         raise InputError([Fault("--limit", "is missing", 'add --limit "cross1.F > 900 N"')])
     else:
         study = source.at(work.point).at("")
-        wanted = rule.limit_of(limit, study.limits, "--limit", EXAMPLE)
+        wanted = limit_of(limit, study.limits, "--limit", EXAMPLE)
         levels = dict(zip(wanted.loads, wanted.levels, strict=True))
         fields = {"load": wanted.name, "levels": levels, "per_level": n, "p0": p0, "unresolved": unresolved}
         plan = subset_of(study, fields | ({} if seed is None else {"seed": seed}))

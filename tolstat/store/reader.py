@@ -20,15 +20,16 @@ from numpy.typing import NDArray
 from tolstat.common import tables
 from tolstat.common.columns import (
     DESIGN_COLUMNS,
+    DRAWN_FIELDS,
     ERROR_COLUMNS,
     OPTIONAL_FIELDS,
     Column,
     drawn_columns,
-    drawn_dtype,
     kept_columns,
 )
 from tolstat.common.counts import Counts, Session
 from tolstat.common.errors import Fault, StoreError
+from tolstat.common.fields import dtype_of
 from tolstat.common.tables import Status
 from tolstat.joint import Operation
 from tolstat.store import layout, metadata
@@ -303,7 +304,7 @@ class Reader:
         if not columns:
             remedy = 'give a result file with sampling.method = "importance", or of tolstat rare'
             raise store_error(self.path, "has no record of how its joints were drawn", remedy)
-        dtype = drawn_dtype(self.sampling)
+        dtype = dtype_of(DRAWN_FIELDS[self.sampling["method"]])
         return self._table("origin", columns, dtype, slots, dtype.names or ())
 
     def histories(self, name: str, slots: NDArray[np.intp] | None = None) -> NDArray[Any]:

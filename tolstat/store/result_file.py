@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.common.columns import ERROR_COLUMNS, Column, drawn_columns
-from tolstat.common.errors import Fault, InputError
+from tolstat.common.errors import input_error
 from tolstat.common.late import pandas as pd
 from tolstat.common.loads import LOADS
 from tolstat.common.tables import Status
@@ -112,7 +112,7 @@ class ResultFile(Reader):
             import xarray
         except ImportError as error:
             remedy = "install it with: pip install xarray, or use to_pandas()"
-            raise InputError([Fault(str(self.path), "xarray is not installed", remedy)]) from error
+            raise input_error(self.path, "xarray is not installed", remedy) from error
         frame, columns = self.to_pandas(nominal), described(self)
         attrs = {name: {"units": c.unit, "description": c.description} for name, c in columns.items()}
         data = {name: ("row", frame[name].to_numpy(), attrs.get(str(name), {})) for name in frame}

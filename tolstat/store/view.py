@@ -17,7 +17,7 @@ from tolstat.analysis.estimates import frozen
 from tolstat.analysis.sample import Sample, largest_of
 from tolstat.common.columns import METHODS, holds
 from tolstat.common.counts import Counts
-from tolstat.common.errors import Fault, InputError
+from tolstat.common.errors import input_error
 from tolstat.common.loads import ANY_LIMIT, LOADS, SHOWN_LOADS, FloatArray, Limit, split
 from tolstat.common.strict import did_you_mean
 from tolstat.common.tables import Status
@@ -197,10 +197,10 @@ class View:
                 self._loads[name] = replace(at_points, name=name, limit=self.limits.get(name, at_points.limit))
                 return self._loads[name]
             if name not in LOADS:
-                raise InputError([Fault(name, "is not a load", did_you_mean(name, list(LOADS)))])
+                raise input_error(name, "is not a load", did_you_mean(name, list(LOADS)))
             if not holds(self.columns, name):
                 found = f"is not kept in {self.path}, see [output] results of its study"
-                raise InputError([Fault(name, found, f"give one of: {', '.join(self.kept_loads)}")])
+                raise input_error(name, found, f"give one of: {', '.join(self.kept_loads)}")
             load, limit = LOADS[name], self.limits.get(name)
             nominal = float(load.of(self.nominal)[0]) if len(self.nominal) else np.nan
             values, _, inexact = worst.load_of([part.results for part in self.parts], load)
@@ -290,7 +290,7 @@ class View:
         if np.isnan(shares).any():
             remedy = "write share = ... in each [[operation]] and run the study again, which simulates nothing anew"
             remedy += f"; or look at one point: --point {self.points[0]}"
-            raise InputError([Fault(str(self.path), "has operating points without a share of the time", remedy)])
+            raise input_error(self.path, "has operating points without a share of the time", remedy)
         return np.asarray(shares / shares.sum())
 
     @property

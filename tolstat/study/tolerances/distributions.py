@@ -35,6 +35,7 @@ class Moments(NamedTuple):
         return self.mean**2 + self.deviation**2
 
 
+@dataclass(frozen=True)
 class Distribution(ABC):
     """Distribution of one error, in SI units."""
 
@@ -84,22 +85,13 @@ class Distribution(ABC):
         """Whether the distribution is discrete, so that `logpdf` gives logarithms of probabilities."""
         return False
 
-    @abstractmethod
     def describe(self) -> dict[str, Any]:
-        """Kind and parameters, as JSON values: everything that determines the values drawn."""
+        """Kind and parameters, as JSON values: everything that determines the values drawn; by default all fields."""
+        return {"distribution": type(self).__name__.lower(), **asdict(self)}
 
     def openturns(self, ot: Any) -> Any:
         """Return the same distribution of OpenTURNS, of its module `ot`; raises an InputError where there is none."""
         raise input_error(type(self).__name__, "has no equal in OpenTURNS", "take the unit cube: openturns(cube=True)")
-
-
-@dataclass(frozen=True)
-class Described(Distribution):
-    """Distribution that its dataclass fields describe completely."""
-
-    def describe(self) -> dict[str, Any]:
-        """See `Distribution.describe`."""
-        return {"distribution": type(self).__name__.lower(), **asdict(self)}
 
 
 def share_between(a: float | Array, b: float | Array) -> Array:
@@ -113,7 +105,7 @@ def _within(lower: float, upper: float, x: Array, density: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class Normal(Described):
+class Normal(Distribution):
     """Normal distribution with `mean` and standard deviation `sigma`."""
 
     mean: float
@@ -142,7 +134,7 @@ class Normal(Described):
 
 
 @dataclass(frozen=True)
-class TruncatedNormal(Described):
+class TruncatedNormal(Distribution):
     """Normal distribution, with `mean` and `sigma` before parts outside the band are rejected."""
 
     mean: float
@@ -180,7 +172,7 @@ class TruncatedNormal(Described):
 
 
 @dataclass(frozen=True)
-class Uniform(Described):
+class Uniform(Distribution):
     """Uniform distribution on the band."""
 
     lower: float
@@ -204,7 +196,7 @@ class Uniform(Described):
 
 
 @dataclass(frozen=True)
-class Triangular(Described):
+class Triangular(Distribution):
     """Triangular distribution on the band, most likely at `peak`."""
 
     lower: float
@@ -239,7 +231,7 @@ class Triangular(Described):
 
 
 @dataclass(frozen=True)
-class LogNormal(Described):
+class LogNormal(Distribution):
     """Lognormal distribution: ``threshold + exp(y)``, where y is (truncated) normal."""
 
     threshold: float
@@ -270,7 +262,7 @@ class LogNormal(Described):
 
 
 @dataclass(frozen=True)
-class Beta(Described):
+class Beta(Distribution):
     """Beta distribution with shapes `a` and `b`, stretched over the band."""
 
     a: float

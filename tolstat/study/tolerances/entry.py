@@ -19,6 +19,7 @@ from tolstat.common import strict, units
 from tolstat.common.late import pandas as pd
 from tolstat.common.notation import PLUS_MINUS, schema_of_quantity
 from tolstat.common.strict import refuse
+from tolstat.study.axes import columns_of
 from tolstat.study.tolerances import iso
 from tolstat.study.tolerances.distributions import Distribution
 
@@ -191,7 +192,10 @@ class SingleEntry(ToleranceEntry):
         distribution = self.build(site)
         band = self.band(site)
         share = math.nan if band is None else distribution.outside(*band)
-        return [Meaning(self.number(site), (site.name,), site.unit, distribution.moments.deviation, share)]
+        columns, moments = columns_of(site.name), distribution.moments
+        # of a radius, standard deviation of each of its two coordinates
+        sigma = moments.deviation if len(columns) == 1 else math.sqrt(0.5 * moments.mean_square)
+        return [Meaning(self.number(site), columns, site.unit, sigma, share)]
 
 
 class Toleranced(NamedTuple):

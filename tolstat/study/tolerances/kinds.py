@@ -17,7 +17,7 @@ from tolstat.common import strict
 from tolstat.common.errors import gather, input_error
 from tolstat.common.strict import refuse
 from tolstat.common.tables import FACTORS
-from tolstat.study.axes import ORIENTATIONS, REJECT, Axis, Bonus, columns_of
+from tolstat.study.axes import ORIENTATIONS, REJECT, Axis, Bonus
 from tolstat.study.selection import TOLERANCED, Entry, Reading
 from tolstat.study.tolerances import distributions as tolerance
 from tolstat.study.tolerances.correlation import Lot
@@ -26,7 +26,6 @@ from tolstat.study.tolerances.entry import (
     Banded,
     Diameter,
     HalfBand,
-    Meaning,
     NotNegative,
     Positive,
     PositiveNumber,
@@ -211,13 +210,6 @@ class RayleighEntry(HalfBand):
         """See `SingleEntry.band`."""
         radius = self.half_width(site)
         return None if radius is None else (-1.0, radius)
-
-    def meaning(self, site: Site) -> list[Meaning]:
-        """See `ToleranceEntry.meaning`."""
-        distribution, band = self.build(site), self.band(site)
-        share = math.nan if band is None else distribution.outside(*band)
-        sigma = math.sqrt(0.5 * distribution.moments.mean_square)
-        return [Meaning(self.number(site), columns_of(site.name), site.unit, sigma, share)]
 
 
 KINDS: dict[str, type[ToleranceEntry]] = {

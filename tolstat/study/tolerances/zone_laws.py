@@ -12,14 +12,14 @@ import numpy as np
 
 from tolstat.common.late import special
 from tolstat.study.axes import Bonus
-from tolstat.study.tolerances.distributions import Array, Described, Distribution, score
+from tolstat.study.tolerances.distributions import Array, Distribution, score
 
 ROUNDING = 1.0 + 1e-9
 """A radius computed back from errors may exceed the zone's by rounding."""
 
 
 @dataclass(frozen=True)
-class Rayleigh(Described):
+class Rayleigh(Distribution):
     """Radius of a point whose two coordinates are normal with standard deviation `sigma` each.
 
     With `upper`, parts beyond that radius are rejected.
@@ -52,7 +52,7 @@ class Rayleigh(Described):
 
 
 @dataclass(frozen=True)
-class Disc(Described):
+class Disc(Distribution):
     """Radius of a point that is uniform by area in a circle of radius `upper`."""
 
     upper: float

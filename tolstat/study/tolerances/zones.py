@@ -47,15 +47,15 @@ MARKS = ("Ⓜ", "(M)")
 
 
 def _read(value: object, info: ValidationInfo) -> Zone:
+    grown = next((mark for mark in MARKS if isinstance(value, str) and value.rstrip().endswith(mark)), None)
+    if grown is not None:
+        value = str(value).rstrip().removesuffix(grown)
     written = notation.read(value) if isinstance(value, str) else None
-    if written is not None and written.mark == notation.PLUS_MINUS:
+    mark = "" if written is None else written.mark
+    if written is not None and mark == notation.PLUS_MINUS:
         raise _band(written, (info.context or {})["site"].name)
-    mark = next((mark for mark in MARKS if isinstance(value, str) and value.rstrip().endswith(mark)), None)
-    if mark is not None:
-        value = str(value).rstrip().removesuffix(mark)
-    round_ = units.is_diameter(value)
-    size = units.diameter(value) if round_ else units.to_si(value, "m")
-    return Zone(units.positive(size), round_, mark is not None)
+    size = units.to_si(value, "m", notation.DIAMETER)
+    return Zone(units.positive(size), mark == notation.DIAMETER, grown is not None)
 
 
 def _band(written: notation.Written, name: str) -> PydanticCustomError:

@@ -43,15 +43,12 @@ from tolstat.kernel.simd.lane import any_of, fma, where
 
 @njit
 def clear(work):
-    """Set all blocks of the tangent to zero."""
-    for b in range(work.block.shape[0]):
+    """Set to zero what parts add to: blocks of lumps, of pins and their arms, and the corner."""
+    for b in range(PIN_HUB):
         for i in range(6):
-            for j in range(6):
+            for j in range(i if b < N_LUMPS else 0, 6):
                 work.block[b, i, j] = 0.0
     for unknown in (OF_PSI, OF_S):
-        for arm in range(ARM + 2, ARM + 4):
-            for i in range(6):
-                work.edge[unknown, arm, i] = 0.0
         work.corner[unknown, OF_PSI] = work.corner[unknown, OF_S] = 0.0
 
 
@@ -125,12 +122,12 @@ def put_symmetric(blocks, b, i, a):
 
 
 @njit
-def take(blocks, b, i, j, a):
-    """Subtract what `put` adds: columns `a`, block `b` of `blocks`, from row `i` and column `j` on."""
+def set_negative(blocks, b, i, j, a):
+    """Write minus the 3 x 3 matrix with columns `a` to block `b` of `blocks`, from row `i` and column `j` on."""
     for k in range(3):
-        blocks[b, i + k, j] -= a[0][k]
-        blocks[b, i + k, j + 1] -= a[1][k]
-        blocks[b, i + k, j + 2] -= a[2][k]
+        blocks[b, i + k, j] = -a[0][k]
+        blocks[b, i + k, j + 1] = -a[1][k]
+        blocks[b, i + k, j + 2] = -a[2][k]
 
 
 @njit
@@ -167,10 +164,10 @@ def bushing_tangent(i, cv, par, work):
         put(block, HUB, 0, 3, by_base)
         put_symmetric(block, HUB, 3, plus(b, crossed(base_lever, by_base)))
         pin_hub = PIN_HUB + lump - PIN
-        take(block, pin_hub, 0, 0, a)
-        take(block, pin_hub, 0, 3, by_base)
-        take(block, pin_hub, 3, 0, transposed(by_lump))
-        take(block, pin_hub, 3, 3, between)
+        set_negative(block, pin_hub, 0, 0, a)
+        set_negative(block, pin_hub, 0, 3, by_base)
+        set_negative(block, pin_hub, 3, 0, transposed(by_lump))
+        set_negative(block, pin_hub, 3, 3, between)
     elif base == OUTPUT_SHAFT:  # its unknowns are rotation about z and, where it slides, displacement along z
         slides = par.slides
         connect_shaft(OF_PSI, lump, by_base[2], between[2], work.edge)
@@ -182,10 +179,10 @@ def bushing_tangent(i, cv, par, work):
 
 @njit
 def connect_shaft(unknown, arm, f, torque, edge):
-    """Subtract `f` and `torque` from the column of the shaft's `unknown` in `edge`, rows of `arm`."""
+    """Write minus `f` and `torque` to the column of the shaft's `unknown` in `edge`, rows of `arm`."""
     for n in range(3):
-        edge[unknown, arm, n] -= f[n]
-        edge[unknown, arm, 3 + n] -= torque[n]
+        edge[unknown, arm, n] = -f[n]
+        edge[unknown, arm, 3 + n] = -torque[n]
 
 
 @njit

@@ -10,7 +10,7 @@ from tolstat.kernel.codes import RAMP
 from tolstat.kernel.mechanics.bushing import bushing_load
 from tolstat.kernel.mechanics.contact import contact_load, smooth_step
 from tolstat.kernel.mechanics.motion import ideal_motion
-from tolstat.kernel.mechanics.rotation import exponential, spin, spin_bias, spin_rate, unspin
+from tolstat.kernel.mechanics.rotation import about_z, exponential, spin, spin_bias, spin_rate, unspin
 from tolstat.kernel.mechanics.topology import (
     ARM,
     FRAME,
@@ -71,7 +71,7 @@ def place_shaft(body, turned, shifted, work):
     zero = turned[0] - turned[0]  # of the type of the angle: tuples of one type go through one compiled version
     put(work.pos, body, (zero, zero, shifted[0]))
     put(work.vel, body, (zero, zero, shifted[1]))
-    exponential((zero, zero, turned[0]), work.rot, body)
+    about_z(turned[0], work.rot, body)
     put(work.spin, body, (zero, zero, turned[1]))
 
 
@@ -104,19 +104,34 @@ def axial_force(q, v, par, work):
 
 
 @njit
+def in_turning_frame(body, x, dx, w, a, work):
+    """Absolute acceleration, angular velocity and angular acceleration of a lump, in axes of its ideal frame.
+
+    `x`, `dx`: position and velocity; `w`: angular velocity; `a`: as in `body_inertia`; relative to that frame.
+    """
+    ddx, dw = a
+    if body < ARM:
+        omega, domega = row(work.frame_w, FRAME[body]), row(work.frame_dw, FRAME[body])
+        centripetal = cross(omega, axpy(2.0, dx, cross(omega, x)))
+        acceleration = add(add(ddx, centripetal), cross(domega, x))
+        return acceleration, add(omega, w), add(add(domega, dw), cross(omega, w))
+    turning, change = work.frame_w[FRAME[body], 2], work.frame_dw[FRAME[body], 2]  # about z, as the fork's shaft
+    along, across = 2 * dx[0] - turning * x[1], 2 * dx[1] + turning * x[0]
+    acceleration = (ddx[0] - turning * across - change * x[1], ddx[1] + turning * along + change * x[0], ddx[2])
+    angular = (dw[0] - turning * w[1], dw[1] + turning * w[0], dw[2] + change)
+    return acceleration, (w[0], w[1], w[2] + turning), angular
+
+
+@njit
 def body_inertia(body, a, par, work):
     """Mass times absolute acceleration of a lump (N), and the rate of its angular momentum (N m).
 
     `a`: acceleration and angular acceleration relative to the ideal frame, (u'', w'), m/s^2 and rad/s^2.
     """
     mass, inertia = mass_of(body, par)
-    omega, domega = row(work.frame_w, FRAME[body]), row(work.frame_dw, FRAME[body])
     x, dx, w = row(work.pos, body), row(work.vel, body), row(work.spin, body)
-    ddx, dw = a
-    centripetal = cross(omega, axpy(2.0, dx, cross(omega, x)))
-    acceleration = add(add(ddx, centripetal), cross(domega, x))
-    total = to_triad(body, turn_back(work.rot, body, add(omega, w)))
-    angular = add(add(domega, dw), cross(omega, w))
+    acceleration, total, angular = in_turning_frame(body, x, dx, w, a, work)
+    total = to_triad(body, turn_back(work.rot, body, total))
     angular = to_triad(body, turn_back(work.rot, body, angular))
     momentum = (inertia[0] * total[0], inertia[1] * total[1], inertia[2] * total[2])
     rate = (inertia[0] * angular[0], inertia[1] * angular[1], inertia[2] * angular[2])

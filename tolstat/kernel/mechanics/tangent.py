@@ -9,6 +9,7 @@ beside it: rotation of the loads with the bodies, gyroscopic terms (2 Omega / cv
 from tolstat.kernel.mechanics.bushing import markers
 from tolstat.kernel.mechanics.contact import smooth_step, smooth_step_slope
 from tolstat.kernel.mechanics.dynamics import mass_of
+from tolstat.kernel.mechanics.motion import to_cross
 from tolstat.kernel.mechanics.topology import (
     ARM,
     ARM_OF_PIN,
@@ -21,7 +22,7 @@ from tolstat.kernel.mechanics.topology import (
     PIN,
     QUARTERS,
 )
-from tolstat.kernel.mechanics.vector import add, axpy, cross, of_column, row, scale, sub, turn, turn_back
+from tolstat.kernel.mechanics.vector import add, axpy, cross, of_column, row, scale, sub, turn
 from tolstat.kernel.mechanics.work import (
     ARM_PIN,
     DELTA,
@@ -192,11 +193,11 @@ def _directions(pin, j, work):
     frame = FRAME[arm]
     station = work.station[pin, j]
     point = (station[POINT], station[POINT + 1], station[POINT + 2])
-    lever = sub(turn_back(work.relative, frame, point), row(work.pos, body))
+    lever = sub(to_cross(frame, point, work), row(work.pos, body))
     arm_lever = sub(point, row(work.pos, arm))
     for k, first in ((0, NORMAL), (1, TANGENT)):
         u = (station[first], station[first + 1], station[first + 2])
-        u_pin = turn_back(work.relative, frame, u)
+        u_pin = to_cross(frame, u, work)
         about_pin, about_arm = cross(lever, u_pin), cross(arm_lever, u)
         for i in range(3):
             work.vectors[k, i], work.vectors[k, 3 + i] = u_pin[i], about_pin[i]

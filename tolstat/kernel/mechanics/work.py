@@ -24,8 +24,7 @@ OF_PSI, OF_S = 0, 1
 FIELDS = {
     "frame_w": (3, 3),  # angular velocity of I, C, F in their own axes
     "frame_dw": (3, 3),  # its derivative
-    "relative": (3, 3, 3),  # components in C to components in I, -, F
-    "relative_w": (3, 3),  # angular velocity of C relative to I, -, F
+    "relative": (3, 3),  # of C relative to I (about x), -, F (about y): cosine and sine of the angle, its rate
     "drive": (2,),  # angular velocity of the input shaft; resisting torque, without the ramp at the start
     "shaft": (2,),  # ideal speed and acceleration of the output shaft
     "turned": (2, 2),  # cosine and sine of the angle theta of the input, and theta_o of the output shaft

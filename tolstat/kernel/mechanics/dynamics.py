@@ -10,7 +10,7 @@ from tolstat.kernel.codes import RAMP
 from tolstat.kernel.mechanics.bushing import bushing_load
 from tolstat.kernel.mechanics.contact import contact_load, smooth_step
 from tolstat.kernel.mechanics.motion import ideal_motion
-from tolstat.kernel.mechanics.rotation import about_z, exponential, spin, spin_bias, spin_rate, unspin
+from tolstat.kernel.mechanics.rotation import about_z, coefficients, exponential, spin, spin_bias, spin_rate, unspin
 from tolstat.kernel.mechanics.topology import (
     ARM,
     FRAME,
@@ -24,7 +24,7 @@ from tolstat.kernel.mechanics.topology import (
     S,
 )
 from tolstat.kernel.mechanics.triad import from_triad, to_triad
-from tolstat.kernel.mechanics.vector import add, axpy, cross, put, row, scale, sub, turn, turn_back
+from tolstat.kernel.mechanics.vector import add, axpy, cross, dot, put, row, scale, sub, turn, turn_back
 from tolstat.kernel.simd.jit import njit
 from tolstat.kernel.simd.lane import where
 
@@ -48,8 +48,10 @@ def set_bodies(q, v, par, work):
         phi = (q[i + 3], q[i + 4], q[i + 5])
         put(work.pos, body, axpy(distance, row(TRIAD[body], 0), (q[i], q[i + 1], q[i + 2])))
         put(work.vel, body, (v[i], v[i + 1], v[i + 2]))
-        exponential(phi, work.rot, body)
-        put(work.spin, body, spin(phi, (v[i + 3], v[i + 4], v[i + 5])))
+        s = coefficients(dot(phi, phi))
+        put(work.series, body, s)
+        exponential(phi, s, work.rot, body)
+        put(work.spin, body, spin(phi, s, (v[i + 3], v[i + 4], v[i + 5])))
     still = 0.0 * q[PSI]
     place_shaft(INPUT_SHAFT, (still, still), (still, still), work)
     place_shaft(OUTPUT_SHAFT, (q[PSI], v[PSI]), (par.slides * q[S], par.slides * v[S]), work)
@@ -162,7 +164,7 @@ def residual(t, q, v, a, par, options, work, out):
     for body in range(N_LUMPS):
         i = 6 * body
         phi, rate = (q[i + 3], q[i + 4], q[i + 5]), (v[i + 3], v[i + 4], v[i + 5])
-        dw = spin_rate(phi, rate, (a[i + 3], a[i + 4], a[i + 5]))
+        dw = spin_rate(phi, row(work.series, body), rate, (a[i + 3], a[i + 4], a[i + 5]))
         f, torque = body_inertia(body, ((a[i], a[i + 1], a[i + 2]), dw), par, work)
         for k in range(3):
             out[i + k] = f[k] - work.force[body, k]
@@ -180,7 +182,7 @@ def acceleration(t, q, v, par, options, work, out):
     for body in range(N_LUMPS):
         i = 6 * body
         phi, rate = (q[i + 3], q[i + 4], q[i + 5]), (v[i + 3], v[i + 4], v[i + 5])
-        f, torque = body_inertia(body, (zero, spin_bias(phi, rate)), par, work)
+        f, torque = body_inertia(body, (zero, spin_bias(phi, row(work.series, body), rate)), par, work)
         mass, inertia = mass_of(body, par)
         torque = sub((work.force[body, 3], work.force[body, 4], work.force[body, 5]), torque)
         torque = to_triad(body, turn_back(work.rot, body, torque))

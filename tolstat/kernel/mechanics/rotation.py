@@ -47,9 +47,9 @@ def inverse_coefficient(x):
 
 
 @njit
-def exponential(phi, out, i):
-    """Write R = exp(phi x) to matrix `i` of `out`, shape (n, 3, 3)."""
-    s1, s2, _ = coefficients(dot(phi, phi))
+def exponential(phi, s, out, i):
+    """Write R = exp(phi x) to matrix `i` of `out`, shape (n, 3, 3); `s`: `coefficients` at |phi|^2, here and below."""
+    s1, s2, _ = s
     a, b, c = phi
     out[i, 0, 0] = 1 - s2 * (b * b + c * c)
     out[i, 1, 1] = 1 - s2 * (a * a + c * c)
@@ -63,9 +63,9 @@ def exponential(phi, out, i):
 
 
 @njit
-def spin(phi, rate):
+def spin(phi, s, rate):
     """Angular velocity w = T(phi) rate, in the axes of phi."""
-    _, s2, s3 = coefficients(dot(phi, phi))
+    _, s2, s3 = s
     turned = cross(phi, rate)
     return add(rate, axpy(s3, cross(phi, turned), scale(s2, turned)))
 
@@ -78,26 +78,9 @@ def unspin(phi, w):
 
 
 @njit
-def spin_bias(phi, rate):
+def spin_bias(phi, s, rate):
     """Velocity-dependent part of the angular acceleration: dT/dt rate, so that w' = T phi'' + bias."""
-    x = dot(phi, phi)
-    return _bias(x, coefficients(x), phi, rate)
-
-
-@njit
-def spin_rate(phi, rate, change):
-    """Angular acceleration w' = T(phi) change + dT/dt rate, `change` being the second derivative of phi."""
-    x = dot(phi, phi)
-    s = coefficients(x)
-    turned = cross(phi, change)
-    w = add(change, axpy(s[2], cross(phi, turned), scale(s[1], turned)))
-    return add(w, _bias(x, s, phi, rate))
-
-
-@njit
-def _bias(x, s, phi, rate):
-    """`spin_bias` at `phi` (rad) and `rate` (rad/s), with `x` = |phi|^2 and coefficients `s` = (s1, s2, s3) at x."""
-    s1, s2, s3 = s
+    x, (s1, s2, s3) = dot(phi, phi), s
     small = x < SERIES_BELOW
     ds2 = -1 / 24 + x * (1 / 360 - x * (1 / 13440 - x * (1 / 907200)))
     ds3 = -1 / 120 + x * (1 / 2520 - x * (1 / 120960 - x * (1 / 9979200)))
@@ -109,6 +92,14 @@ def _bias(x, s, phi, rate):
     twice = cross(phi, turned)
     back = cross(rate, turned)
     return add(scale(ds2 * along, turned), axpy(ds3 * along, twice, scale(s3, back)))
+
+
+@njit
+def spin_rate(phi, s, rate, change):
+    """Angular acceleration w' = T(phi) change + dT/dt rate, `change` being the second derivative of phi."""
+    turned = cross(phi, change)
+    w = add(change, axpy(s[2], cross(phi, turned), scale(s[1], turned)))
+    return add(w, spin_bias(phi, s, rate))
 
 
 @njit

@@ -31,6 +31,7 @@ FIELDS = {
     "pos": (N_BODIES, 3),  # X + u
     "vel": (N_BODIES, 3),  # u'
     "rot": (N_BODIES, 3, 3),  # exp(phi x)
+    "series": (N_LUMPS, 3),  # `rotation.coefficients` of its rotation vector
     "spin": (N_BODIES, 3),  # angular velocity relative to the ideal frame
     "force": (N_BODIES, 6),  # force, torque about the reference point
     "load": (8, 6),  # bushing loads on the lump, in the base marker's (e, t, z)

@@ -12,7 +12,7 @@ from tolstat.common.load_kinds import INNER, OUTER, RESULTANT
 from tolstat.common.tables import Mode, Options
 from tolstat.joint.contact import PREDEFINED
 from tolstat.kernel.mechanics import dynamics, linsolve, tangent
-from tolstat.kernel.mechanics.motion import ideal_motion
+from tolstat.kernel.mechanics.motion import ideal_motion, to_arm, to_cross, velocity_in
 from tolstat.kernel.mechanics.topology import N_DOF, PSI, S
 from tolstat.kernel.mechanics.work import make_work
 
@@ -61,11 +61,12 @@ def test_frames_are_those_of_the_output_shaft(params, phase, alpha, orders):
         speed[s] = work.frame_w.copy()
     ideal_motion(phase, par, work)
     np.testing.assert_allclose(work.frame_dw, (speed[1] - speed[-1]) / (2 * h), atol=2e-6 * (1 + np.tan(alpha) ** 4))
-    np.testing.assert_allclose(work.relative[0], here[0].T @ here[1], atol=1e-15)
-    np.testing.assert_allclose(work.relative[2], here[2].T @ here[1], atol=1e-14)
     for k in (0, 2):
-        against = here[k].T @ here[1] @ work.frame_w[1] - work.frame_w[k]
-        np.testing.assert_allclose(work.relative_w[k], against, atol=1e-13 * (1 + np.tan(alpha) ** 2))
+        relative, x, dx = here[k].T @ here[1], np.array([0.3, -0.5, 0.8]), np.array([0.2, 0.7, -0.4])
+        np.testing.assert_allclose(to_arm(k, x, work), relative @ x, atol=1e-14)
+        np.testing.assert_allclose(to_cross(k, x, work), relative.T @ x, atol=1e-14)
+        swept = np.cross(relative @ work.frame_w[1] - work.frame_w[k], x)
+        np.testing.assert_allclose(velocity_in(k, dx, x, work), dx + swept, atol=1e-13 * (1 + np.tan(alpha) ** 2))
 
 
 @SHAFTS

@@ -11,8 +11,8 @@ from tolstat.kernel.mechanics.topology import TRIAD
 from tolstat.kernel.mechanics.triad import from_triad, to_triad
 from tolstat.kernel.mechanics.trigonometry import sine_cosine
 
-SIZES = [0.0, 1e-9, 1e-3, 0.3, 0.31622, 0.31624, 1.0, 2.5]
-"""Angles on both sides of the change from series to closed form at 0.3162 rad."""
+SIZES = [0.0, 1e-9, 1e-3, 0.04999, 0.05001, 0.3, 1.0, 2.5]
+"""Angles on both sides of the change from series to closed form at 0.05 rad."""
 
 
 def vectors(size):
@@ -22,9 +22,17 @@ def vectors(size):
         yield size * direction / np.linalg.norm(direction), rng.normal(size=3)
 
 
+def coefficients(phi):
+    return rotation.coefficients(phi @ phi)
+
+
+def spin(phi, rate):
+    return rotation.spin(tuple(phi), coefficients(phi), tuple(rate))
+
+
 def matrix(phi):
     out = np.full((1, 3, 3), np.nan)
-    rotation.exponential(tuple(phi), out, 0)
+    rotation.exponential(tuple(phi), coefficients(phi), out, 0)
     return out[0]
 
 
@@ -40,13 +48,13 @@ def test_spin_is_the_angular_velocity(size):
     for phi, rate in vectors(size):
         step = matrix(phi + h * rate) @ matrix(phi - h * rate).T
         expected = Rotation.from_matrix(step).as_rotvec() / (2 * h)
-        np.testing.assert_allclose(rotation.spin(tuple(phi), tuple(rate)), expected, atol=2e-9)
+        np.testing.assert_allclose(spin(phi, rate), expected, atol=2e-9)
 
 
 @pytest.mark.parametrize("size", SIZES)
 def test_unspin_inverts_spin(size):
     for phi, rate in vectors(size):
-        there = rotation.spin(tuple(phi), tuple(rate))
+        there = spin(phi, rate)
         np.testing.assert_allclose(rotation.unspin(tuple(phi), there), rate, atol=1e-14)
 
 
@@ -54,9 +62,9 @@ def test_unspin_inverts_spin(size):
 def test_bias_is_the_change_of_spin_at_constant_rate(size):
     h = 1e-5
     for phi, rate in vectors(size):
-        ahead = np.array(rotation.spin(tuple(phi + h * rate), tuple(rate)))
-        behind = np.array(rotation.spin(tuple(phi - h * rate), tuple(rate)))
-        bias = rotation.spin_bias(tuple(phi), tuple(rate))
+        ahead = np.array(spin(phi + h * rate, rate))
+        behind = np.array(spin(phi - h * rate, rate))
+        bias = rotation.spin_bias(tuple(phi), coefficients(phi), tuple(rate))
         np.testing.assert_allclose(bias, (ahead - behind) / (2 * h), atol=1e-9)
 
 
@@ -66,6 +74,17 @@ def test_relative_vector_is_scipys(size):
         first = Rotation.from_rotvec(other)
         pair = np.stack([first.as_matrix(), (first * Rotation.from_rotvec(phi)).as_matrix()])
         np.testing.assert_allclose(rotation.relative_vector(pair, 0, 1), phi, atol=3e-15)
+
+
+@pytest.mark.parametrize("size", [*SIZES, 3.0])
+def test_rotation_against_a_turned_shaft_is_scipys(size):
+    for phi, other in vectors(size):
+        pair = np.full((2, 3, 3), np.nan)
+        rotation.about_z(size * np.sign(other[2]), pair, 0)
+        shaft = Rotation.from_rotvec([0.0, 0.0, size * np.sign(other[2])])
+        np.testing.assert_allclose(pair[0], shaft.as_matrix(), atol=1e-15)
+        pair[1] = (shaft * Rotation.from_rotvec(phi)).as_matrix()
+        np.testing.assert_allclose(rotation.relative_to_turned(pair, 0, 1), phi, atol=3e-15)
 
 
 @pytest.mark.parametrize("size", [0.8, 7.0, 200.0, 1e6])

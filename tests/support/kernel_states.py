@@ -112,21 +112,18 @@ def tally(these: Sample) -> NDArray[np.int64]:
 
 def dense(work: np.record) -> NDArray[np.float64]:
     """Tangent as one matrix, (56, 56): the blocks of `work` after assembly and before elimination."""
-    from tolstat.kernel.mechanics.topology import ARM, ARM_OF_PIN, N_DOF, PIN, PSI, S
-    from tolstat.kernel.mechanics.work import ARM_PIN, ARM_SHAFT, HUB_PIN, OF_PSI, OF_S, PIN_ARM, PIN_HUB, SHAFT_ARM
+    from tolstat.kernel.mechanics.topology import ARM, ARM_OF_PIN, N_DOF, N_LUMPS, PIN, PSI, S
+    from tolstat.kernel.mechanics.work import ARM_PIN, OF_PSI, OF_S, PIN_HUB
 
     s = np.zeros((N_DOF, N_DOF))
     m, e = work.block, work.edge
-    s[:6, :6] = m[0]
+    for body in range(N_LUMPS):
+        s[6 * body : 6 * body + 6, 6 * body : 6 * body + 6] = m[body]
     for p in range(4):
         pin, arm = 6 * (PIN + p), 6 * (ARM + ARM_OF_PIN[p])
-        i, j = slice(pin, pin + 6), slice(arm, arm + 6)
-        s[i, i], s[j, j] = m[PIN + p], m[ARM + ARM_OF_PIN[p]]
-        s[:6, i], s[i, :6] = m[HUB_PIN + p], m[PIN_HUB + p]
-        s[i, j], s[j, i] = m[PIN_ARM + p], m[ARM_PIN + p]
-    for a in range(4):
-        rows = slice(6 * (ARM + a), 6 * (ARM + a) + 6)
-        for unknown, of in ((PSI, OF_PSI), (S, OF_S)):
-            s[rows, unknown], s[unknown, rows] = e[of, ARM_SHAFT + a], e[of, SHAFT_ARM + a]
+        s[:6, pin : pin + 6] = m[PIN_HUB + p].T
+        s[pin : pin + 6, arm : arm + 6] = m[ARM_PIN + p].T
+    for body in (ARM + 2, ARM + 3):  # output fork
+        s[6 * body : 6 * body + 6, PSI], s[6 * body : 6 * body + 6, S] = e[OF_PSI, body], e[OF_S, body]
     s[PSI : S + 1, PSI : S + 1] = work.corner
-    return s
+    return np.triu(s) + np.triu(s, 1).T

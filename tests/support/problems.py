@@ -34,7 +34,7 @@ def pendulum_angle(t, amplitude):
 
 
 INERTIA = (1.0, 2.0, 3.5)
-to_spin, to_rate, bias = rotation.spin, rotation.unspin, rotation.spin_bias
+series, to_spin, to_rate, bias = rotation.coefficients, rotation.spin, rotation.unspin, rotation.spin_bias
 
 
 @numba.njit
@@ -42,8 +42,9 @@ def free_body(t, q, v, out):
     """Euler's equations in rotation vectors: w' = J^-1 (-w x J w) in body axes, w turned to the axes of phi."""
     rate = (v[0], v[1], v[2])
     back = (-q[0], -q[1], -q[2])
-    w = to_spin(back, rate)  # T(-phi) phi': angular velocity in body axes
-    push = bias(back, (-rate[0], -rate[1], -rate[2]))
+    s = series(q[0] * q[0] + q[1] * q[1] + q[2] * q[2])
+    w = to_spin(back, s, rate)  # T(-phi) phi': angular velocity in body axes
+    push = bias(back, s, (-rate[0], -rate[1], -rate[2]))
     j = INERTIA
     torque = (
         (j[1] - j[2]) * w[1] * w[2],

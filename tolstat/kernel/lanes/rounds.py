@@ -11,7 +11,7 @@ from tolstat.kernel.lanes.batch import CHECK, STEP
 from tolstat.kernel.lanes.equilibrium import CA_REGULAR, CV_REGULAR, CV_STATIC, ENOUGH, FAR
 from tolstat.kernel.mechanics.linsolve import factorise, solve
 from tolstat.kernel.mechanics.tangent import assemble
-from tolstat.kernel.mechanics.topology import N_DOF
+from tolstat.kernel.mechanics.topology import N_DOF, N_LUMPS
 from tolstat.kernel.revolution.quasistatic import extrapolate, keep
 from tolstat.kernel.simd.jit import njit
 from tolstat.kernel.simd.lane import retain, where
@@ -123,20 +123,18 @@ def classify_lanes(options, motion, control):
 
 
 @njit
-def keep_blocks(mask, new, old):
-    """Copy matrices, shape (n, m, m), in the lanes of the mask."""
-    for b in range(new.shape[0]):
-        for i in range(new.shape[1]):
-            for j in range(new.shape[2]):
-                old[b, i, j] = retain(mask, new[b, i, j], old[b, i, j])
-
-
-@njit
-def keep_rows(mask, new, old):
-    """Copy vectors, shape (n, m), in the lanes of the mask."""
-    for b in range(new.shape[0]):
-        for i in range(new.shape[1]):
-            old[b, i] = retain(mask, new[b, i], old[b, i])
+def keep_tangent(mask, new, old):
+    """Copy a factorised tangent in the lanes of the mask; `new`, `old`: records of WORK."""
+    for b in range(new.block.shape[0]):
+        for i in range(6):
+            for j in range(i if b < N_LUMPS else 0, 6):
+                old.block[b, i, j] = retain(mask, new.block[b, i, j], old.block[b, i, j])
+    for unknown in range(2):
+        for lump in range(N_LUMPS):
+            for i in range(6):
+                old.edge[unknown, lump, i] = retain(mask, new.edge[unknown, lump, i], old.edge[unknown, lump, i])
+        for other in range(unknown, 2):
+            old.corner[unknown, other] = retain(mask, new.corner[unknown, other], old.corner[unknown, other])
 
 
 @njit
@@ -146,9 +144,7 @@ def refactorise(mask, control, par, work, tangent):
     cv, ca = where(static, CV_REGULAR, control.cv), where(static, CA_REGULAR, control.ca)
     assemble(cv, ca, where(static, 0.0, control.cv), par, work)
     good = factorise(work)
-    keep_blocks(mask, work.block, tangent.block)
-    keep_blocks(mask, work.edge, tangent.edge)
-    keep_rows(mask, work.corner, tangent.corner)
+    keep_tangent(mask, work, tangent)
     control.factorised = where(mask, control.cv, control.factorised)
     control.factorisations = where(mask, control.factorisations + 1, control.factorisations)
     return good

@@ -10,9 +10,10 @@ import math
 from tolstat.common.load_kinds import INNER, OUTER, RESULTANT
 from tolstat.common.tables import Mode as ContactMode
 from tolstat.kernel.mechanics.bushing import accumulate
+from tolstat.kernel.mechanics.motion import to_arm, to_cross, velocity_in
 from tolstat.kernel.mechanics.spring import elastic, has_needles
 from tolstat.kernel.mechanics.topology import ARM, ARM_OF_PIN, FRAME, PIN
-from tolstat.kernel.mechanics.vector import add, axpy, choose, cross, dot, row, scale, sub, turn, turn_back
+from tolstat.kernel.mechanics.vector import add, axpy, choose, cross, dot, row, scale, sub, turn
 from tolstat.kernel.mechanics.work import DELTA, FORCE, NORMAL, POINT, RHO, SLOPE, TANGENT, V_NORMAL, V_TANGENT
 from tolstat.kernel.simd.jit import njit
 from tolstat.kernel.simd.lane import all_of, any_of, where
@@ -46,9 +47,9 @@ def locate(pin, par, work):
     for j in range(par.n_stations):
         lever = axpy(par.station_s[j], direction, origin)
         # the station and its velocity relative to the arm's ideal frame, in axes of that frame
-        point = turn(work.relative, frame, add(row(work.pos, body), lever))
-        velocity = turn(work.relative, frame, add(row(work.vel, body), cross(row(work.spin, body), lever)))
-        velocity = add(velocity, cross(row(work.relative_w, frame), point))
+        point = to_arm(frame, add(row(work.pos, body), lever), work)
+        velocity = to_arm(frame, add(row(work.vel, body), cross(row(work.spin, body), lever)), work)
+        velocity = velocity_in(frame, velocity, point, work)
         arm_lever = sub(point, row(work.pos, arm))
         velocity = sub(velocity, add(row(work.vel, arm), cross(row(work.spin, arm), arm_lever)))
 
@@ -122,8 +123,8 @@ def contact_load(pin, par, work):
         f_arm = axpy(station[FORCE], n, scale(drag, m))
         total = add(total, f_arm)
         accumulate(work.force, arm, f_arm, cross(sub(point, row(work.pos, arm)), f_arm))
-        f_pin = scale(-1.0, turn_back(work.relative, FRAME[arm], f_arm))
-        lever = sub(turn_back(work.relative, FRAME[arm], point), row(work.pos, body))
+        f_pin = scale(-1.0, to_cross(FRAME[arm], f_arm, work))
+        lever = sub(to_cross(FRAME[arm], point, work), row(work.pos, body))
         accumulate(work.force, body, f_pin, cross(lever, f_pin))
     work.contact[pin, OUTER] = work.station[pin, 0, FORCE]
     work.contact[pin, INNER] = work.station[pin, par.n_stations - 1, FORCE]

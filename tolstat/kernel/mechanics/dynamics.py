@@ -10,7 +10,7 @@ from tolstat.kernel.codes import RAMP
 from tolstat.kernel.mechanics.bushing import bushing_load
 from tolstat.kernel.mechanics.contact import contact_load, smooth_step
 from tolstat.kernel.mechanics.motion import ideal_motion
-from tolstat.kernel.mechanics.rotation import exponential, spin, spin_bias, spin_rate, unspin
+from tolstat.kernel.mechanics.rotation import about_z, coefficients, exponential, spin, spin_bias, spin_rate, unspin
 from tolstat.kernel.mechanics.topology import (
     ARM,
     FRAME,
@@ -24,7 +24,7 @@ from tolstat.kernel.mechanics.topology import (
     S,
 )
 from tolstat.kernel.mechanics.triad import from_triad, to_triad
-from tolstat.kernel.mechanics.vector import add, axpy, cross, put, row, scale, sub, turn, turn_back
+from tolstat.kernel.mechanics.vector import add, axpy, cross, dot, put, row, scale, sub, turn, turn_back
 from tolstat.kernel.simd.jit import njit
 from tolstat.kernel.simd.lane import where
 
@@ -48,8 +48,10 @@ def set_bodies(q, v, par, work):
         phi = (q[i + 3], q[i + 4], q[i + 5])
         put(work.pos, body, axpy(distance, row(TRIAD[body], 0), (q[i], q[i + 1], q[i + 2])))
         put(work.vel, body, (v[i], v[i + 1], v[i + 2]))
-        exponential(phi, work.rot, body)
-        put(work.spin, body, spin(phi, (v[i + 3], v[i + 4], v[i + 5])))
+        s = coefficients(dot(phi, phi))
+        put(work.series, body, s)
+        exponential(phi, s, work.rot, body)
+        put(work.spin, body, spin(phi, s, (v[i + 3], v[i + 4], v[i + 5])))
     still = 0.0 * q[PSI]
     place_shaft(INPUT_SHAFT, (still, still), (still, still), work)
     place_shaft(OUTPUT_SHAFT, (q[PSI], v[PSI]), (par.slides * q[S], par.slides * v[S]), work)
@@ -71,7 +73,7 @@ def place_shaft(body, turned, shifted, work):
     zero = turned[0] - turned[0]  # of the type of the angle: tuples of one type go through one compiled version
     put(work.pos, body, (zero, zero, shifted[0]))
     put(work.vel, body, (zero, zero, shifted[1]))
-    exponential((zero, zero, turned[0]), work.rot, body)
+    about_z(turned[0], work.rot, body)
     put(work.spin, body, (zero, zero, turned[1]))
 
 
@@ -104,19 +106,34 @@ def axial_force(q, v, par, work):
 
 
 @njit
+def in_turning_frame(body, x, dx, w, a, work):
+    """Absolute acceleration, angular velocity and angular acceleration of a lump, in axes of its ideal frame.
+
+    `x`, `dx`: position and velocity; `w`: angular velocity; `a`: as in `body_inertia`; relative to that frame.
+    """
+    ddx, dw = a
+    if body < ARM:
+        omega, domega = row(work.frame_w, FRAME[body]), row(work.frame_dw, FRAME[body])
+        centripetal = cross(omega, axpy(2.0, dx, cross(omega, x)))
+        acceleration = add(add(ddx, centripetal), cross(domega, x))
+        return acceleration, add(omega, w), add(add(domega, dw), cross(omega, w))
+    turning, change = work.frame_w[FRAME[body], 2], work.frame_dw[FRAME[body], 2]  # about z, as the fork's shaft
+    along, across = 2 * dx[0] - turning * x[1], 2 * dx[1] + turning * x[0]
+    acceleration = (ddx[0] - turning * across - change * x[1], ddx[1] + turning * along + change * x[0], ddx[2])
+    angular = (dw[0] - turning * w[1], dw[1] + turning * w[0], dw[2] + change)
+    return acceleration, (w[0], w[1], w[2] + turning), angular
+
+
+@njit
 def body_inertia(body, a, par, work):
     """Mass times absolute acceleration of a lump (N), and the rate of its angular momentum (N m).
 
     `a`: acceleration and angular acceleration relative to the ideal frame, (u'', w'), m/s^2 and rad/s^2.
     """
     mass, inertia = mass_of(body, par)
-    omega, domega = row(work.frame_w, FRAME[body]), row(work.frame_dw, FRAME[body])
     x, dx, w = row(work.pos, body), row(work.vel, body), row(work.spin, body)
-    ddx, dw = a
-    centripetal = cross(omega, axpy(2.0, dx, cross(omega, x)))
-    acceleration = add(add(ddx, centripetal), cross(domega, x))
-    total = to_triad(body, turn_back(work.rot, body, add(omega, w)))
-    angular = add(add(domega, dw), cross(omega, w))
+    acceleration, total, angular = in_turning_frame(body, x, dx, w, a, work)
+    total = to_triad(body, turn_back(work.rot, body, total))
     angular = to_triad(body, turn_back(work.rot, body, angular))
     momentum = (inertia[0] * total[0], inertia[1] * total[1], inertia[2] * total[2])
     rate = (inertia[0] * angular[0], inertia[1] * angular[1], inertia[2] * angular[2])
@@ -147,7 +164,7 @@ def residual(t, q, v, a, par, options, work, out):
     for body in range(N_LUMPS):
         i = 6 * body
         phi, rate = (q[i + 3], q[i + 4], q[i + 5]), (v[i + 3], v[i + 4], v[i + 5])
-        dw = spin_rate(phi, rate, (a[i + 3], a[i + 4], a[i + 5]))
+        dw = spin_rate(phi, row(work.series, body), rate, (a[i + 3], a[i + 4], a[i + 5]))
         f, torque = body_inertia(body, ((a[i], a[i + 1], a[i + 2]), dw), par, work)
         for k in range(3):
             out[i + k] = f[k] - work.force[body, k]
@@ -165,7 +182,7 @@ def acceleration(t, q, v, par, options, work, out):
     for body in range(N_LUMPS):
         i = 6 * body
         phi, rate = (q[i + 3], q[i + 4], q[i + 5]), (v[i + 3], v[i + 4], v[i + 5])
-        f, torque = body_inertia(body, (zero, spin_bias(phi, rate)), par, work)
+        f, torque = body_inertia(body, (zero, spin_bias(phi, row(work.series, body), rate)), par, work)
         mass, inertia = mass_of(body, par)
         torque = sub((work.force[body, 3], work.force[body, 4], work.force[body, 5]), torque)
         torque = to_triad(body, turn_back(work.rot, body, torque))

@@ -11,11 +11,11 @@ import math
 
 from tolstat.kernel.mechanics.contact import locate
 from tolstat.kernel.mechanics.dynamics import set_bodies
-from tolstat.kernel.mechanics.motion import ideal_motion
+from tolstat.kernel.mechanics.motion import ideal_motion, to_cross
 from tolstat.kernel.mechanics.scale import centring_stiffness, mean_clearance
 from tolstat.kernel.mechanics.spring import penetration
 from tolstat.kernel.mechanics.topology import ARM, ARM_OF_PIN, FRAME, FRAME_F, HUB, PIN, PSI, TRIAD, S
-from tolstat.kernel.mechanics.vector import add, axpy, cross, dot, row, scale, turn_back
+from tolstat.kernel.mechanics.vector import add, axpy, cross, dot, row, scale
 from tolstat.kernel.mechanics.work import NORMAL, RHO
 from tolstat.kernel.simd.jit import njit
 
@@ -29,7 +29,7 @@ def offset(pin, j, work):
     """Displacement (m) of station `j` in its hole, from `locate`, along the pin's t and along z of the cross."""
     station = work.station[pin, j]
     n = (station[NORMAL], station[NORMAL + 1], station[NORMAL + 2])
-    d = scale(station[RHO], turn_back(work.relative, FRAME[ARM + ARM_OF_PIN[pin]], n))
+    d = scale(station[RHO], to_cross(FRAME[ARM + ARM_OF_PIN[pin]], n, work))
     return dot(d, row(TRIAD[PIN + pin], 1)), d[2]
 
 
@@ -89,7 +89,7 @@ def rigid_guess(t, at_rest, par, work, q):
     want1, r1 = travel_to_contact(1, forward, across, par, work)
     turn_out = (want0 + want1) / (r0 + r1)
     shift = (r0 * turn_out - want0, want2 - r2 * turn_in, up)
-    psi = (turn_in - turn_out) / work.relative[FRAME_F, 2, 2]
+    psi = (turn_in - turn_out) / work.relative[FRAME_F, 0]
     turned = (about_x, about_y, turn_in)
     for body in range(HUB, ARM):
         distance = 0.0 if body == HUB else par.R
@@ -114,7 +114,7 @@ def shift_along_axis(par, work):
     The stations of all pins are as `locate` wrote them at s = 0.
     """
     apart = middle(0, par, work) + middle(1, par, work) - middle(2, par, work) - middle(3, par, work)
-    centred = 0.5 * apart / work.relative[FRAME_F, 2, 2]
+    centred = 0.5 * apart / work.relative[FRAME_F, 0]
     stiffness = centring_stiffness(0, par) + par.k_a
     if stiffness == 0:
         return centred

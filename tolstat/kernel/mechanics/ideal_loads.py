@@ -18,7 +18,7 @@ from tolstat.common.load_kinds import INNER, OUTER, RESULTANT
 from tolstat.common.tables import Mode
 from tolstat.kernel.mechanics.bushing import accumulate, markers
 from tolstat.kernel.mechanics.dynamics import body_inertia, set_bodies
-from tolstat.kernel.mechanics.motion import ideal_motion
+from tolstat.kernel.mechanics.motion import ideal_motion, to_arm
 from tolstat.kernel.mechanics.topology import (
     ARM,
     ARM_OF_PIN,
@@ -32,7 +32,7 @@ from tolstat.kernel.mechanics.topology import (
     TRIAD,
 )
 from tolstat.kernel.mechanics.triad import to_triad
-from tolstat.kernel.mechanics.vector import add, cross, row, scale, sub, turn
+from tolstat.kernel.mechanics.vector import add, cross, row, scale, sub
 from tolstat.kernel.simd.jit import njit
 
 NONE, ONE_POINT = int(Mode.NONE), int(Mode.ONE_POINT)
@@ -86,7 +86,7 @@ def ideal_loads(phase, at_rest, par, work):
     set_bodies(at_rest, at_rest, par, work)
     radius = contact_radius(par)
     moment, torque = moving_moments(par, work)
-    sin_gamma, cos_gamma = work.relative[FRAME_F, 2, 0], work.relative[FRAME_F, 2, 2]
+    cos_gamma, sin_gamma = work.relative[FRAME_F, 0], -work.relative[FRAME_F, 1]
     output = (work.drive[1] + torque + moment[0] * sin_gamma) / cos_gamma
     for pin in range(4):
         e, t = row(TRIAD[PIN + pin], 0), row(TRIAD[PIN + pin], 1)
@@ -120,7 +120,7 @@ def touch(pin, radius, force, par, work):
     work.contact[pin, OUTER] = work.contact[pin, RESULTANT] = size
     work.contact[pin, INNER] = 0.0
     work.mode[pin] = ONE_POINT if size > 0 else NONE
-    on_arm = turn(work.relative, FRAME[arm], force)
+    on_arm = to_arm(FRAME[arm], force, work)
     for body, off in ((PIN + pin, scale(-1.0, force)), (arm, on_arm)):
         lever = scale(radius - par.R, row(TRIAD[body], 0))
         accumulate(work.force, body, off, cross(lever, off))

@@ -1,28 +1,17 @@
 """Direct solution of the tangent system by block elimination along the joint's structure.
 
 Four chains pin - arm are connected to the hub; the arms of the output fork also to psi and s of the output shaft. Arms
-are eliminated into pins and shaft, pins into hub and shaft; of hub and shaft, the hub first, then psi, then s. Each 6 x
-6 block on the diagonal is inverted: a product with the inverse is six independent sums, while substitutions are one
+are eliminated into pins and shaft, pins into hub and shaft; of hub and shaft, the hub first, then psi, then s. The
+matrix is symmetric: blocks below the diagonal, and entries below the diagonal of a block on it, are not stored. Each
+6 x 6 block on the diagonal is inverted: a product with the inverse is six independent sums, while substitutions are one
 long chain of dependent operations. Every diagonal has bushing stiffness, so the blocks are inverted without pivoting; a
-zero or NaN pivot is reported. A shaft that is held has 1 on the diagonal of s and zeros beside it.
+zero or NaN determinant is reported. A shaft that is held has 1 on the diagonal of s and zeros beside it.
 """
 
+from tolstat.kernel.mechanics import vector
 from tolstat.kernel.mechanics.rotation import unspin
 from tolstat.kernel.mechanics.topology import ARM, ARM_OF_PIN, HUB, N_LUMPS, PIN, PSI, S
-from tolstat.kernel.mechanics.work import (
-    ARM_PIN,
-    ARM_SHAFT,
-    HUB_PIN,
-    HUB_SHAFT,
-    OF_PSI,
-    OF_S,
-    PIN_ARM,
-    PIN_HUB,
-    PIN_SHAFT,
-    SHAFT_ARM,
-    SHAFT_HUB,
-    SHAFT_PIN,
-)
+from tolstat.kernel.mechanics.work import ARM_PIN, OF_PSI, OF_S, PIN_HUB
 from tolstat.kernel.simd.jit import njit
 from tolstat.kernel.simd.lane import fma
 
@@ -40,32 +29,20 @@ def put_six(x, i, a):
 
 
 @njit
-def edge(e, of, i):
-    """Vector `i` of the unknown `of` of the output shaft; `e`: shape (2, n, 6)."""
-    return (e[of, i, 0], e[of, i, 1], e[of, i, 2], e[of, i, 3], e[of, i, 4], e[of, i, 5])
+def edge(e, of, body):
+    """Column of the unknown `of` of the output shaft, rows of a lump; `e`: shape (2, 9, 6)."""
+    return (e[of, body, 0], e[of, body, 1], e[of, body, 2], e[of, body, 3], e[of, body, 4], e[of, body, 5])
 
 
 @njit
-def put_edge(e, of, i, a):
-    """Write `a` to vector `i` of the unknown `of` of the output shaft in `e`."""
-    e[of, i, 0], e[of, i, 1], e[of, i, 2], e[of, i, 3], e[of, i, 4], e[of, i, 5] = a
-
-
-@njit
-def row(m, b, i):
-    """Row `i` of matrix `b` of `m`, shape (n, 6, 6)."""
-    return (m[b, i, 0], m[b, i, 1], m[b, i, 2], m[b, i, 3], m[b, i, 4], m[b, i, 5])
-
-
-@njit
-def put_row(m, b, i, a):
-    """Write `a` to row `i` of matrix `b` of `m`."""
-    m[b, i, 0], m[b, i, 1], m[b, i, 2], m[b, i, 3], m[b, i, 4], m[b, i, 5] = a
+def put_edge(e, of, body, a):
+    """Write `a` to the column of the unknown `of` in `e`, rows of a lump."""
+    e[of, body, 0], e[of, body, 1], e[of, body, 2], e[of, body, 3], e[of, body, 4], e[of, body, 5] = a
 
 
 @njit
 def column(m, b, j):
-    """Column `j` of matrix `b` of `m`."""
+    """Column `j` of matrix `b` of `m`, shape (n, 6, 6)."""
     return (m[b, 0, j], m[b, 1, j], m[b, 2, j], m[b, 3, j], m[b, 4, j], m[b, 5, j])
 
 
@@ -90,14 +67,9 @@ def of_row(m, b, i, a, c):
 
 
 @njit
-def product(m, b, a):
-    """Matrix `b` of `m` times `a`."""
-    return plus_product((0.0, 0.0, 0.0, 0.0, 0.0, 0.0), m, b, a)
-
-
-@njit
-def plus_product(c, m, b, a):
-    """Return `c` plus matrix `b` of `m` times `a`."""
+def minus_product(c, m, b, a):
+    """Return `c` minus matrix `b` of `m` times `a`."""
+    a = minus(a)
     return (
         of_row(m, b, 0, a, c[0]),
         of_row(m, b, 1, a, c[1]),
@@ -109,9 +81,29 @@ def plus_product(c, m, b, a):
 
 
 @njit
-def times(s, a):
-    """Return s a."""
-    return (s * a[0], s * a[1], s * a[2], s * a[3], s * a[4], s * a[5])
+def minus_transposed_product(c, m, b, a):
+    """Return `c` minus the transpose of matrix `b` of `m` times `a`."""
+    return (
+        c[0] - dot(column(m, b, 0), a),
+        c[1] - dot(column(m, b, 1), a),
+        c[2] - dot(column(m, b, 2), a),
+        c[3] - dot(column(m, b, 3), a),
+        c[4] - dot(column(m, b, 4), a),
+        c[5] - dot(column(m, b, 5), a),
+    )
+
+
+@njit
+def symmetric_product(m, b, a):
+    """Symmetric matrix `b` of `m` times `a`."""
+    return (
+        dot((m[b, 0, 0], m[b, 0, 1], m[b, 0, 2], m[b, 0, 3], m[b, 0, 4], m[b, 0, 5]), a),
+        dot((m[b, 0, 1], m[b, 1, 1], m[b, 1, 2], m[b, 1, 3], m[b, 1, 4], m[b, 1, 5]), a),
+        dot((m[b, 0, 2], m[b, 1, 2], m[b, 2, 2], m[b, 2, 3], m[b, 2, 4], m[b, 2, 5]), a),
+        dot((m[b, 0, 3], m[b, 1, 3], m[b, 2, 3], m[b, 3, 3], m[b, 3, 4], m[b, 3, 5]), a),
+        dot((m[b, 0, 4], m[b, 1, 4], m[b, 2, 4], m[b, 3, 4], m[b, 4, 4], m[b, 4, 5]), a),
+        dot(column(m, b, 5), a),
+    )
 
 
 @njit
@@ -135,121 +127,127 @@ def less(a, s, b):
 
 
 @njit
-def invert(m, b):
-    """Replace the 6 x 6 matrix `b` of `m` by its inverse (Gauss-Jordan).
+def invert_three(s):
+    """Inverse of a symmetric 3 x 3 matrix, and whether its determinant is finite and not zero.
 
-    Returns
-    -------
-    bool
-        False when a pivot is zero or not finite.
+    Matrices are given by their entries 00, 01, 02, 11, 12, 22.
     """
-    good = True
-    for k in range(6):
-        pivot = 1 / m[b, k, k]
-        good = good & (abs(pivot) < 1e300)
-        m[b, k, k] = 1.0
-        pivots = times(pivot, row(m, b, k))
-        put_row(m, b, k, pivots)
-        for i in range(6):
-            if i != k:
-                factor = m[b, i, k]
-                m[b, i, k] = 0.0
-                put_row(m, b, i, less(row(m, b, i), factor, pivots))
-    return good
+    of_x = fma(s[3], s[5], -s[4] * s[4]), fma(s[2], s[4], -s[1] * s[5]), fma(s[1], s[4], -s[2] * s[3])
+    det = vector.dot((s[0], s[1], s[2]), of_x)
+    of_y = fma(s[0], s[5], -s[2] * s[2]), fma(s[1], s[2], -s[0] * s[4])
+    of_z = fma(s[0], s[3], -s[1] * s[1])
+    r = 1 / det
+    return (r * of_x[0], r * of_x[1], r * of_x[2], r * of_y[0], r * of_y[1], r * of_z), abs(r) < 1e300
 
 
 @njit
-def multiply_columns(m, b, c):
-    """Replace matrix `c` of `m`, shape (n, 6, 6), by matrix `b` times it."""
-    for j in range(6):
-        put_column(m, c, j, product(m, b, column(m, c, j)))
+def times_three(s, a):
+    """Symmetric 3 x 3 matrix, given as in `invert_three`, times `a`."""
+    return (
+        vector.dot((s[0], s[1], s[2]), a),
+        vector.dot((s[1], s[3], s[4]), a),
+        vector.dot((s[2], s[4], s[5]), a),
+    )
 
 
 @njit
-def subtract_product(m, o, a, b):
-    """Subtract matrix `a` of `m`, shape (n, 6, 6), times matrix `b` from matrix `o`."""
-    for j in range(6):
-        put_column(m, o, j, plus_product(column(m, o, j), m, a, minus(column(m, b, j))))
+def rows_of(columns):
+    """Rows of a 3 x 3 matrix given by its columns."""
+    x, y, z = columns
+    return (x[0], y[0], z[0]), (x[1], y[1], z[1]), (x[2], y[2], z[2])
+
+
+@njit
+def invert(m, b):
+    """Replace the symmetric 6 x 6 matrix `b` of `m` by its inverse; return whether it is regular and finite.
+
+    With the 3 x 3 blocks x, y, y^T, z: w = x^-1 y, t = (z - y^T w)^-1, and the inverse is x^-1 + w t w^T, -w t, t.
+    """
+    x = (m[b, 0, 0], m[b, 0, 1], m[b, 0, 2], m[b, 1, 1], m[b, 1, 2], m[b, 2, 2])
+    y0, y1, y2 = (
+        (m[b, 0, 3], m[b, 1, 3], m[b, 2, 3]),
+        (m[b, 0, 4], m[b, 1, 4], m[b, 2, 4]),
+        (m[b, 0, 5], m[b, 1, 5], m[b, 2, 5]),
+    )
+    x, regular = invert_three(x)
+    w0, w1, w2 = times_three(x, y0), times_three(x, y1), times_three(x, y2)
+    t, also = invert_three(
+        (
+            m[b, 3, 3] - vector.dot(y0, w0),
+            m[b, 3, 4] - vector.dot(y0, w1),
+            m[b, 3, 5] - vector.dot(y0, w2),
+            m[b, 4, 4] - vector.dot(y1, w1),
+            m[b, 4, 5] - vector.dot(y1, w2),
+            m[b, 5, 5] - vector.dot(y2, w2),
+        )
+    )
+    m[b, 3, 3], m[b, 3, 4], m[b, 3, 5], m[b, 4, 4], m[b, 4, 5], m[b, 5, 5] = t
+    w = rows_of((w0, w1, w2))
+    v = times_three(t, w[0]), times_three(t, w[1]), times_three(t, w[2])  # rows of w t
+    m[b, 0, 3], m[b, 0, 4], m[b, 0, 5] = -v[0][0], -v[0][1], -v[0][2]
+    m[b, 1, 3], m[b, 1, 4], m[b, 1, 5] = -v[1][0], -v[1][1], -v[1][2]
+    m[b, 2, 3], m[b, 2, 4], m[b, 2, 5] = -v[2][0], -v[2][1], -v[2][2]
+    m[b, 0, 0], m[b, 0, 1] = x[0] + vector.dot(w[0], v[0]), x[1] + vector.dot(w[0], v[1])
+    m[b, 0, 2], m[b, 1, 1] = x[2] + vector.dot(w[0], v[2]), x[3] + vector.dot(w[1], v[1])
+    m[b, 1, 2], m[b, 2, 2] = x[4] + vector.dot(w[1], v[2]), x[5] + vector.dot(w[2], v[2])
+    return regular & also
+
+
+@njit
+def eliminate(lump, following, between, m):
+    """Eliminate a lump: invert its block, multiply matrix `between` by the inverse, and reduce the block `following`.
+
+    `between` has rows of the lump and columns of the one that follows. Returns whether the block is regular and finite.
+    """
+    regular = invert(m, lump)
+    for j in range(5, -1, -1):  # columns up to j are still those before the product
+        solved = symmetric_product(m, lump, column(m, between, j))
+        for i in range(j + 1):
+            m[following, i, j] -= dot(column(m, between, i), solved)
+        put_column(m, between, j, solved)
+    return regular
+
+
+@njit
+def reduce_corner(lump, work):
+    """Multiply the columns psi and s of a lump by the inverse of its block, and reduce the corner."""
+    m, e, corner = work.block, work.edge, work.corner
+    of_psi, of_s = edge(e, OF_PSI, lump), edge(e, OF_S, lump)
+    by_psi, by_s = symmetric_product(m, lump, of_psi), symmetric_product(m, lump, of_s)
+    corner[OF_PSI, OF_PSI] -= dot(of_psi, by_psi)
+    corner[OF_PSI, OF_S] -= dot(of_psi, by_s)
+    corner[OF_S, OF_S] -= dot(of_s, by_s)
+    put_edge(e, OF_PSI, lump, by_psi)
+    put_edge(e, OF_S, lump, by_s)
 
 
 @njit
 def factorise(work):
-    """Factorise the tangent in place: eliminate arms and pins, invert the diagonal blocks.
-
-    Returns
-    -------
-    bool
-        False when a block is singular or not finite.
-    """
-    m = work.block
-    good = True
-    for unknown in (OF_PSI, OF_S):
-        for i in range(6):
-            work.edge[unknown, HUB_SHAFT, i] = work.edge[unknown, SHAFT_HUB, i] = 0.0
-    for p in range(4):
-        pin, a = PIN + p, ARM_OF_PIN[p]
-        arm = ARM + a
-        good = good & invert(m, arm)
-        multiply_columns(m, arm, ARM_PIN + p)
-        subtract_product(m, pin, PIN_ARM + p, ARM_PIN + p)
-        good = good & invert(m, pin)
-        multiply_columns(m, pin, PIN_HUB + p)
-        subtract_product(m, HUB, HUB_PIN + p, PIN_HUB + p)
-        if a >= 2:  # output fork
-            eliminate_into_shaft(p, work)
-    good = good & invert(m, HUB)
-    return good & factorise_corner(work)
-
-
-@njit
-def eliminate_into_shaft(p, work):
-    """Eliminate pin `p` and its arm from the columns and rows of the output shaft; their blocks are inverted."""
+    """Factorise the tangent in place: eliminate arms, pins, hub, and psi; return where it is regular and finite."""
     m, e, corner = work.block, work.edge, work.corner
-    pin, a = PIN + p, ARM_OF_PIN[p]
-    for unknown in (OF_PSI, OF_S):
-        by_arm = product(m, ARM + a, edge(e, unknown, ARM_SHAFT + a))
-        put_edge(e, unknown, ARM_SHAFT + a, by_arm)
-        by_pin = product(m, pin, product(m, PIN_ARM + p, minus(by_arm)))
-        put_edge(e, unknown, PIN_SHAFT + p, by_pin)
-        of_arm = edge(e, unknown, SHAFT_ARM + a)
-        for i in range(6):
-            e[unknown, SHAFT_PIN + p, i] = -dot(of_arm, column(m, ARM_PIN + p, i))
-        put_edge(e, unknown, HUB_SHAFT, plus_product(edge(e, unknown, HUB_SHAFT), m, HUB_PIN + p, minus(by_pin)))
-        of_pin = edge(e, unknown, SHAFT_PIN + p)
-        put_edge(e, unknown, SHAFT_HUB, minus_row_product(edge(e, unknown, SHAFT_HUB), of_pin, m, PIN_HUB + p))
-    for i in (OF_PSI, OF_S):
-        of_arm, of_pin = edge(e, i, SHAFT_ARM + a), edge(e, i, SHAFT_PIN + p)
-        for j in (OF_PSI, OF_S):
-            corner[i, j] -= dot(of_arm, edge(e, j, ARM_SHAFT + a)) + dot(of_pin, edge(e, j, PIN_SHAFT + p))
-
-
-@njit
-def factorise_corner(work):
-    """Eliminate the hub from psi and s, and psi from s; return False when a pivot is zero or not finite."""
-    e, corner = work.edge, work.corner
-    for unknown in (OF_PSI, OF_S):
-        put_edge(e, unknown, HUB_SHAFT, product(work.block, HUB, edge(e, unknown, HUB_SHAFT)))
-    for i in (OF_PSI, OF_S):
-        for j in (OF_PSI, OF_S):
-            corner[i, j] -= dot(edge(e, i, SHAFT_HUB), edge(e, j, HUB_SHAFT))
+    regular = True
+    none = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    put_edge(e, OF_PSI, HUB, none)
+    put_edge(e, OF_S, HUB, none)
+    for p in range(4):
+        pin, arm = PIN + p, ARM + ARM_OF_PIN[p]
+        regular = regular & eliminate(arm, pin, ARM_PIN + p, m) & eliminate(pin, HUB, PIN_HUB + p, m)
+        if ARM_OF_PIN[p] < 2:  # input fork
+            continue
+        for unknown in (OF_PSI, OF_S):
+            of_pin = minus_transposed_product(none, m, ARM_PIN + p, edge(e, unknown, arm))
+            of_hub = minus_transposed_product(edge(e, unknown, HUB), m, PIN_HUB + p, of_pin)
+            put_edge(e, unknown, pin, of_pin)
+            put_edge(e, unknown, HUB, of_hub)
+        reduce_corner(arm, work)
+        reduce_corner(pin, work)
+    regular = regular & invert(m, HUB)
+    reduce_corner(HUB, work)
     pivot = 1 / corner[OF_PSI, OF_PSI]
-    factor = corner[OF_S, OF_PSI] * pivot
+    factor = corner[OF_PSI, OF_S] * pivot
     last = 1 / (corner[OF_S, OF_S] - factor * corner[OF_PSI, OF_S])
-    corner[OF_PSI, OF_PSI], corner[OF_S, OF_PSI], corner[OF_S, OF_S] = pivot, factor, last
-    return (abs(pivot) < 1e300) & (abs(last) < 1e300)
-
-
-@njit
-def minus_row_product(c, a, m, b):
-    """Return `c` minus the row `a` times matrix `b` of `m`."""
-    return (
-        c[0] - dot(a, column(m, b, 0)),
-        c[1] - dot(a, column(m, b, 1)),
-        c[2] - dot(a, column(m, b, 2)),
-        c[3] - dot(a, column(m, b, 3)),
-        c[4] - dot(a, column(m, b, 4)),
-        c[5] - dot(a, column(m, b, 5)),
-    )
+    corner[OF_PSI, OF_PSI], corner[OF_PSI, OF_S], corner[OF_S, OF_S] = pivot, factor, last
+    return regular & (abs(pivot) < 1e300) & (abs(last) < 1e300)
 
 
 @njit
@@ -258,38 +256,34 @@ def solve(q, work):
 
     Increments of attitude are converted to increments of the rotation vectors in `q`, shape (56,).
     """
-    x, m, e = work.solution, work.block, work.edge
+    x, m, e, corner = work.solution, work.block, work.edge, work.corner
     hub, of_psi, of_s = six(x, 0), x[PSI], x[S]
     for p in range(4):
-        pin, a = 6 * (PIN + p), ARM_OF_PIN[p]
-        arm = 6 * (ARM + a)
-        of_arm = product(m, ARM + a, six(x, arm))
-        of_pin = product(m, PIN + p, plus_product(six(x, pin), m, PIN_ARM + p, minus(of_arm)))
-        hub = plus_product(hub, m, HUB_PIN + p, minus(of_pin))
-        if a >= 2:
-            of_psi -= dot(edge(e, OF_PSI, SHAFT_ARM + a), of_arm) + dot(edge(e, OF_PSI, SHAFT_PIN + p), of_pin)
-            of_s -= dot(edge(e, OF_S, SHAFT_ARM + a), of_arm) + dot(edge(e, OF_S, SHAFT_PIN + p), of_pin)
-        put_six(x, arm, of_arm)
-        put_six(x, pin, of_pin)
-    hub = product(m, HUB, hub)
-    of_psi -= dot(edge(e, OF_PSI, SHAFT_HUB), hub)
-    of_s -= dot(edge(e, OF_S, SHAFT_HUB), hub)
-    s = work.corner[OF_S, OF_S] * (of_s - work.corner[OF_S, OF_PSI] * of_psi)
-    psi = work.corner[OF_PSI, OF_PSI] * (of_psi - work.corner[OF_PSI, OF_S] * s)
+        pin, arm = PIN + p, ARM + ARM_OF_PIN[p]
+        of_arm = six(x, 6 * arm)
+        of_pin = minus_transposed_product(six(x, 6 * pin), m, ARM_PIN + p, of_arm)
+        hub = minus_transposed_product(hub, m, PIN_HUB + p, of_pin)
+        put_six(x, 6 * pin, of_pin)
+        if ARM_OF_PIN[p] >= 2:
+            of_psi -= dot(edge(e, OF_PSI, arm), of_arm) + dot(edge(e, OF_PSI, pin), of_pin)
+            of_s -= dot(edge(e, OF_S, arm), of_arm) + dot(edge(e, OF_S, pin), of_pin)
+    of_psi -= dot(edge(e, OF_PSI, HUB), hub)
+    of_s -= dot(edge(e, OF_S, HUB), hub)
+    s = corner[OF_S, OF_S] * (of_s - corner[OF_PSI, OF_S] * of_psi)
+    psi = corner[OF_PSI, OF_PSI] * of_psi - corner[OF_PSI, OF_S] * s
     x[PSI], x[S] = psi, s
-    hub = less(less(hub, psi, edge(e, OF_PSI, HUB_SHAFT)), s, edge(e, OF_S, HUB_SHAFT))
+    hub = less(less(symmetric_product(m, HUB, hub), psi, edge(e, OF_PSI, HUB)), s, edge(e, OF_S, HUB))
     put_six(x, 0, hub)
     for p in range(4):
-        pin, a = 6 * (PIN + p), ARM_OF_PIN[p]
-        arm = 6 * (ARM + a)
-        of_pin = plus_product(six(x, pin), m, PIN_HUB + p, minus(hub))
-        if a >= 2:
-            of_pin = less(less(of_pin, psi, edge(e, OF_PSI, PIN_SHAFT + p)), s, edge(e, OF_S, PIN_SHAFT + p))
-        of_arm = plus_product(six(x, arm), m, ARM_PIN + p, minus(of_pin))
-        if a >= 2:
-            of_arm = less(less(of_arm, psi, edge(e, OF_PSI, ARM_SHAFT + a)), s, edge(e, OF_S, ARM_SHAFT + a))
-        put_six(x, pin, of_pin)
-        put_six(x, arm, of_arm)
+        pin, arm = PIN + p, ARM + ARM_OF_PIN[p]
+        of_pin = minus_product(symmetric_product(m, pin, six(x, 6 * pin)), m, PIN_HUB + p, hub)
+        of_arm = symmetric_product(m, arm, six(x, 6 * arm))
+        if ARM_OF_PIN[p] >= 2:
+            of_pin = less(less(of_pin, psi, edge(e, OF_PSI, pin)), s, edge(e, OF_S, pin))
+            of_arm = less(less(of_arm, psi, edge(e, OF_PSI, arm)), s, edge(e, OF_S, arm))
+        of_arm = minus_product(of_arm, m, ARM_PIN + p, of_pin)
+        put_six(x, 6 * pin, of_pin)
+        put_six(x, 6 * arm, of_arm)
     for body in range(N_LUMPS):
         i = 6 * body + 3
         x[i], x[i + 1], x[i + 2] = unspin((q[i], q[i + 1], q[i + 2]), (x[i], x[i + 1], x[i + 2]))

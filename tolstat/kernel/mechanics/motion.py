@@ -56,7 +56,7 @@ def ideal_motion(phase, par, work):
     par : record of PARAM
         The joint.
     work : record of WORK
-        Its ``frame_w``, ``frame_dw``, ``relative``, ``relative_w``, ``shaft``, ``turned`` and ``drive`` are
+        Its ``frame_w``, ``frame_dw``, ``relative``, ``shaft``, ``turned`` and ``drive`` are
         written.
     """
     theta, slope, bend, torque = drive_and_load(phase, par)
@@ -90,17 +90,35 @@ def ideal_motion(phase, par, work):
     w[FRAME_F, 0], w[FRAME_F, 1], w[FRAME_F, 2] = 0.0, 0.0, dto
     dw[FRAME_F, 0], dw[FRAME_F, 1], dw[FRAME_F, 2] = 0.0, 0.0, ddto
 
-    # components in C to components in the arm's frame: Rx(beta) to I, Ry(gamma)^T to F
-    rel, rel_w = work.relative, work.relative_w
-    rel[FRAME_I, 0, 0], rel[FRAME_I, 0, 1], rel[FRAME_I, 0, 2] = 1.0, 0.0, 0.0
-    rel[FRAME_I, 1, 0], rel[FRAME_I, 1, 1], rel[FRAME_I, 1, 2] = 0.0, cb, -sb
-    rel[FRAME_I, 2, 0], rel[FRAME_I, 2, 1], rel[FRAME_I, 2, 2] = 0.0, sb, cb
-    rel[FRAME_F, 0, 0], rel[FRAME_F, 0, 1], rel[FRAME_F, 0, 2] = cg, 0.0, -sg
-    rel[FRAME_F, 1, 0], rel[FRAME_F, 1, 1], rel[FRAME_F, 1, 2] = 0.0, 1.0, 0.0
-    rel[FRAME_F, 2, 0], rel[FRAME_F, 2, 1], rel[FRAME_F, 2, 2] = sg, 0.0, cg
-    # angular velocity of C relative to the arm's frame, in axes of the arm's frame
-    rel_w[FRAME_I, 0], rel_w[FRAME_I, 1], rel_w[FRAME_I, 2] = db, 0.0, 0.0
-    rel_w[FRAME_F, 0], rel_w[FRAME_F, 1], rel_w[FRAME_F, 2] = 0.0, -dg, 0.0
+    work.relative[FRAME_I, 0], work.relative[FRAME_I, 1], work.relative[FRAME_I, 2] = cb, sb, db
+    work.relative[FRAME_F, 0], work.relative[FRAME_F, 1], work.relative[FRAME_F, 2] = cg, -sg, -dg
     work.shaft[0], work.shaft[1] = dto, ddto
     work.turned[0, 0], work.turned[0, 1] = ct, st
     work.turned[1, 0], work.turned[1, 1] = ca * ct / cg, st / cg
+
+
+@njit
+def to_arm(frame, a, work):
+    """Components in axes of a fork's frame, I or F, of a vector in axes of C."""
+    c, s = work.relative[frame, 0], work.relative[frame, 1]
+    if frame == FRAME_I:
+        return (a[0], c * a[1] - s * a[2], s * a[1] + c * a[2])
+    return (c * a[0] + s * a[2], a[1], c * a[2] - s * a[0])
+
+
+@njit
+def to_cross(frame, a, work):
+    """Components in axes of C of a vector in axes of a fork's frame, I or F."""
+    c, s = work.relative[frame, 0], work.relative[frame, 1]
+    if frame == FRAME_I:
+        return (a[0], c * a[1] + s * a[2], c * a[2] - s * a[1])
+    return (c * a[0] - s * a[2], a[1], s * a[0] + c * a[2])
+
+
+@njit
+def velocity_in(frame, velocity, point, work):
+    """Velocity relative to a fork's frame, I or F, of what moves with `velocity` in C at `point`; all in its axes."""
+    w = work.relative[frame, 2]
+    if frame == FRAME_I:
+        return (velocity[0], velocity[1] - w * point[2], velocity[2] + w * point[1])
+    return (velocity[0] + w * point[2], velocity[1], velocity[2] - w * point[0])

@@ -9,6 +9,7 @@ beside it: rotation of the loads with the bodies, gyroscopic terms (2 Omega / cv
 from tolstat.kernel.mechanics.bushing import markers
 from tolstat.kernel.mechanics.contact import smooth_step, smooth_step_slope
 from tolstat.kernel.mechanics.dynamics import mass_of
+from tolstat.kernel.mechanics.motion import to_cross
 from tolstat.kernel.mechanics.topology import (
     ARM,
     ARM_OF_PIN,
@@ -21,21 +22,17 @@ from tolstat.kernel.mechanics.topology import (
     PIN,
     QUARTERS,
 )
-from tolstat.kernel.mechanics.vector import add, axpy, cross, of_column, row, scale, sub, turn, turn_back
+from tolstat.kernel.mechanics.vector import add, axpy, cross, of_column, row, scale, sub, turn
 from tolstat.kernel.mechanics.work import (
     ARM_PIN,
-    ARM_SHAFT,
     DELTA,
     FORCE,
-    HUB_PIN,
     NORMAL,
     OF_PSI,
     OF_S,
-    PIN_ARM,
     PIN_HUB,
     POINT,
     RHO,
-    SHAFT_ARM,
     SLOPE,
     TANGENT,
     V_NORMAL,
@@ -47,15 +44,12 @@ from tolstat.kernel.simd.lane import any_of, fma, where
 
 @njit
 def clear(work):
-    """Set all blocks of the tangent to zero."""
-    for b in range(work.block.shape[0]):
+    """Set to zero what parts add to: blocks of lumps, of pins and their arms, and the corner."""
+    for b in range(PIN_HUB):
         for i in range(6):
-            for j in range(6):
+            for j in range(i if b < N_LUMPS else 0, 6):
                 work.block[b, i, j] = 0.0
     for unknown in (OF_PSI, OF_S):
-        for a in range(4):
-            for i in range(6):
-                work.edge[unknown, ARM_SHAFT + a, i] = work.edge[unknown, SHAFT_ARM + a, i] = 0.0
         work.corner[unknown, OF_PSI] = work.corner[unknown, OF_S] = 0.0
 
 
@@ -119,12 +113,22 @@ def put(blocks, b, i, j, a):
 
 
 @njit
-def take(blocks, b, i, j, a):
-    """Subtract what `put` adds: columns `a`, block `b` of `blocks`, from row `i` and column `j` on."""
+def put_symmetric(blocks, b, i, a):
+    """Add the symmetric 3 x 3 matrix with columns `a` to block `b` on its diagonal, from row and column `i` on."""
     for k in range(3):
-        blocks[b, i + k, j] -= a[0][k]
-        blocks[b, i + k, j + 1] -= a[1][k]
-        blocks[b, i + k, j + 2] -= a[2][k]
+        blocks[b, i, i + k] += a[k][0]
+    for k in range(1, 3):
+        blocks[b, i + 1, i + k] += a[k][1]
+    blocks[b, i + 2, i + 2] += a[2][2]
+
+
+@njit
+def set_negative(blocks, b, i, j, a):
+    """Write minus the 3 x 3 matrix with columns `a` to block `b` of `blocks`, from row `i` and column `j` on."""
+    for k in range(3):
+        blocks[b, i + k, j] = -a[0][k]
+        blocks[b, i + k, j + 1] = -a[1][k]
+        blocks[b, i + k, j + 2] = -a[2][k]
 
 
 @njit
@@ -133,7 +137,7 @@ def inertia_tangent(body, ca, par, work):
     mass, inertia = mass_of(body, par)
     for j in range(3):
         work.block[body, j, j] += ca * mass
-    put(work.block, body, 3, 3, spread(work.rot, body, body, scale(ca, inertia)))
+    put_symmetric(work.block, body, 3, spread(work.rot, body, body, scale(ca, inertia)))
 
 
 @njit
@@ -152,43 +156,34 @@ def bushing_tangent(i, cv, par, work):
     b = spread(work.rot, base, lump, (fma(cv, c[3], k[3]), fma(cv, c[4], k[4]), fma(cv, c[5], k[5])))
     by_lump, by_base = turning(a, lever), turning(a, base_lever)
     block = work.block
-    put(block, lump, 0, 0, a)
+    put_symmetric(block, lump, 0, a)
     put(block, lump, 0, 3, by_lump)
-    put(block, lump, 3, 0, transposed(by_lump))
-    put(block, lump, 3, 3, plus(b, crossed(lever, by_lump)))
+    put_symmetric(block, lump, 3, plus(b, crossed(lever, by_lump)))
     between = plus(b, crossed(lever, by_base))
     if base == HUB:
-        pin = lump - PIN
-        put(block, HUB, 0, 0, a)
+        put_symmetric(block, HUB, 0, a)
         put(block, HUB, 0, 3, by_base)
-        put(block, HUB, 3, 0, transposed(by_base))
-        put(block, HUB, 3, 3, plus(b, crossed(base_lever, by_base)))
-        take(block, PIN_HUB + pin, 0, 0, a)
-        take(block, PIN_HUB + pin, 0, 3, by_base)
-        take(block, PIN_HUB + pin, 3, 0, transposed(by_lump))
-        take(block, PIN_HUB + pin, 3, 3, between)
-        take(block, HUB_PIN + pin, 0, 0, a)
-        take(block, HUB_PIN + pin, 0, 3, by_lump)
-        take(block, HUB_PIN + pin, 3, 0, transposed(by_base))
-        take(block, HUB_PIN + pin, 3, 3, transposed(between))
+        put_symmetric(block, HUB, 3, plus(b, crossed(base_lever, by_base)))
+        pin_hub = PIN_HUB + lump - PIN
+        set_negative(block, pin_hub, 0, 0, a)
+        set_negative(block, pin_hub, 0, 3, by_base)
+        set_negative(block, pin_hub, 3, 0, transposed(by_lump))
+        set_negative(block, pin_hub, 3, 3, between)
     elif base == OUTPUT_SHAFT:  # its unknowns are rotation about z and, where it slides, displacement along z
-        arm, slides = lump - ARM, par.slides
-        connect_shaft(OF_PSI, arm, by_base[2], between[2], work.edge)
-        connect_shaft(OF_S, arm, scale(slides, a[2]), scale(slides, transposed(by_lump)[2]), work.edge)
+        slides = par.slides
+        connect_shaft(OF_PSI, lump, by_base[2], between[2], work.edge)
+        connect_shaft(OF_S, lump, scale(slides, a[2]), scale(slides, transposed(by_lump)[2]), work.edge)
         work.corner[OF_PSI, OF_PSI] += b[2][2] + cross(base_lever, by_base[2])[2]
         work.corner[OF_PSI, OF_S] += slides * by_base[2][2]
-        work.corner[OF_S, OF_PSI] += slides * by_base[2][2]
         work.corner[OF_S, OF_S] += slides * a[2][2]
 
 
 @njit
 def connect_shaft(unknown, arm, f, torque, edge):
-    """Subtract `f` and `torque` from column and row of the shaft's `unknown` in `edge`, at the places of `arm`."""
+    """Write minus `f` and `torque` to the column of the shaft's `unknown` in `edge`, rows of `arm`."""
     for n in range(3):
-        edge[unknown, ARM_SHAFT + arm, n] -= f[n]
-        edge[unknown, SHAFT_ARM + arm, n] -= f[n]
-        edge[unknown, ARM_SHAFT + arm, 3 + n] -= torque[n]
-        edge[unknown, SHAFT_ARM + arm, 3 + n] -= torque[n]
+        edge[unknown, arm, n] = -f[n]
+        edge[unknown, arm, 3 + n] = -torque[n]
 
 
 @njit
@@ -198,11 +193,11 @@ def _directions(pin, j, work):
     frame = FRAME[arm]
     station = work.station[pin, j]
     point = (station[POINT], station[POINT + 1], station[POINT + 2])
-    lever = sub(turn_back(work.relative, frame, point), row(work.pos, body))
+    lever = sub(to_cross(frame, point, work), row(work.pos, body))
     arm_lever = sub(point, row(work.pos, arm))
     for k, first in ((0, NORMAL), (1, TANGENT)):
         u = (station[first], station[first + 1], station[first + 2])
-        u_pin = turn_back(work.relative, frame, u)
+        u_pin = to_cross(frame, u, work)
         about_pin, about_arm = cross(lever, u_pin), cross(arm_lever, u)
         for i in range(3):
             work.vectors[k, i], work.vectors[k, 3 + i] = u_pin[i], about_pin[i]
@@ -211,20 +206,20 @@ def _directions(pin, j, work):
 
 @njit
 def _add_dyads(pin, n, by_n, m, by_m, work):
-    """Add `n` `by_n`^T + `m` `by_m`^T to the four blocks of a pin and its arm; (12,): the pin's six, the arm's six."""
-    body, arm, there, back = PIN + pin, ARM + ARM_OF_PIN[pin], PIN_ARM + pin, ARM_PIN + pin
+    """Add `n` `by_n`^T + `m` `by_m`^T to the blocks of a pin and its arm; (12,): the pin's six, the arm's six."""
+    body, arm, back = PIN + pin, ARM + ARM_OF_PIN[pin], ARM_PIN + pin
     block = work.block
     for i in range(6):
         for j in range(6):
-            block[body, i, j] = fma(m[i], by_m[j], fma(n[i], by_n[j], block[body, i, j]))
-            block[there, i, j] = fma(m[i], by_m[6 + j], fma(n[i], by_n[6 + j], block[there, i, j]))
             block[back, i, j] = fma(m[6 + i], by_m[j], fma(n[6 + i], by_n[j], block[back, i, j]))
+        for j in range(i, 6):
+            block[body, i, j] = fma(m[i], by_m[j], fma(n[i], by_n[j], block[body, i, j]))
             block[arm, i, j] = fma(m[6 + i], by_m[6 + j], fma(n[6 + i], by_n[6 + j], block[arm, i, j]))
 
 
 @njit
 def contact_tangent(pin, cv, par, work):
-    """Add the contact of `pin`: elastic force, damping, film (`cv`: 1/s). Without damping and film it is symmetric."""
+    """Add the contact of `pin`: elastic force, damping, film (`cv`: 1/s), without the skew part of the last two."""
     by_n, by_m = work.by_n, work.by_m
     for j in range(par.n_stations):
         station = work.station[pin, j]
@@ -238,14 +233,14 @@ def contact_tangent(pin, cv, par, work):
         by_rho = where(touching, 1 / station[RHO], 0.0)
         turning = station[V_TANGENT] * by_rho
         nn = station[SLOPE] + cv * damping
-        nm = (damping - film) * turning
-        mn = par.c_t * weight * smooth_step_slope(x) / par.delta_d * station[V_TANGENT]
+        thicker = par.c_t * weight * smooth_step_slope(x) / par.delta_d * station[V_TANGENT]
+        nm = 0.5 * ((damping - film) * turning + thicker)  # the mean of the entries nm and mn
         mm = station[FORCE] * by_rho + film * (cv - station[V_NORMAL] * by_rho)
         _directions(pin, j, work)
         n, m = work.vectors[0], work.vectors[1]
         for i in range(12):
             by_n[i] = fma(nm, m[i], nn * n[i])
-            by_m[i] = fma(mm, m[i], mn * n[i])
+            by_m[i] = fma(mm, m[i], nm * n[i])
         _add_dyads(pin, n, by_n, m, by_m, work)
 
 

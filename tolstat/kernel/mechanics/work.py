@@ -16,24 +16,22 @@ POINT, NORMAL, TANGENT = 0, 3, 6
 RHO, DELTA, V_NORMAL, V_TANGENT, FORCE, SLOPE = 9, 10, 11, 12, 13, 14
 N_STATION = 15
 
-HUB_PIN, PIN_HUB, PIN_ARM, ARM_PIN = N_LUMPS, N_LUMPS + 4, N_LUMPS + 8, N_LUMPS + 12
-"""First matrix of each kind in ``work.block``, after those of the lumps: rows hub, columns pin p; and so on."""
-ARM_SHAFT, SHAFT_ARM, PIN_SHAFT, SHAFT_PIN, HUB_SHAFT, SHAFT_HUB = 0, 4, 8, 12, 16, 17
-"""First vector of each kind in ``work.edge[unknown]``, `OF_PSI` or `OF_S`: column of the output shaft's unknown,
-rows of an arm; its row, columns of an arm; and so on."""
+ARM_PIN, PIN_HUB = N_LUMPS, N_LUMPS + 4
+"""First matrix of each kind in ``work.block``, after those of the lumps: rows of the arm that holds pin p, columns of
+the pin; rows of pin p, columns of the hub. Those below the diagonal are their transposes."""
 OF_PSI, OF_S = 0, 1
 
 FIELDS = {
     "frame_w": (3, 3),  # angular velocity of I, C, F in their own axes
     "frame_dw": (3, 3),  # its derivative
-    "relative": (3, 3, 3),  # components in C to components in I, -, F
-    "relative_w": (3, 3),  # angular velocity of C relative to I, -, F
+    "relative": (3, 3),  # of C relative to I (about x), -, F (about y): cosine and sine of the angle, its rate
     "drive": (2,),  # angular velocity of the input shaft; resisting torque, without the ramp at the start
     "shaft": (2,),  # ideal speed and acceleration of the output shaft
     "turned": (2, 2),  # cosine and sine of the angle theta of the input, and theta_o of the output shaft
     "pos": (N_BODIES, 3),  # X + u
     "vel": (N_BODIES, 3),  # u'
     "rot": (N_BODIES, 3, 3),  # exp(phi x)
+    "series": (N_LUMPS, 3),  # `rotation.coefficients` of its rotation vector
     "spin": (N_BODIES, 3),  # angular velocity relative to the ideal frame
     "force": (N_BODIES, 6),  # force, torque about the reference point
     "load": (8, 6),  # bushing loads on the lump, in the base marker's (e, t, z)
@@ -41,8 +39,12 @@ FIELDS = {
     "mode": (4,),  # contact mode of each pin
     "loads": (N_INSTANT,),  # as `loads.write_loads` writes them
     "station": (4, MAX_STATIONS, N_STATION),  # contact stations, see the column numbers above
-    "block": (N_LUMPS + 16, 6, 6),  # matrices of the tangent, see `HUB_PIN` to `ARM_PIN`; factorised in place
-    "edge": (2, 18, 6),  # its columns and rows psi and s, see `ARM_SHAFT` to `SHAFT_HUB`; of pins and hub: fill-in
+    "block": (N_LUMPS + 8, 6, 6),  # matrices of the tangent, those of lumps above the diagonal; factorised in place
+    "edge": (
+        2,
+        N_LUMPS,
+        6,
+    ),  # its columns psi and s, rows of a lump: of the output arms; of their pins and hub, fill-in
     "corner": (2, 2),  # its rows and columns psi and s; factorised in place
     "vectors": (2, 12),  # d(displacements of a station along n and m) / d(pin, arm)
     "by_n": (12,),  # scratch of contact_tangent: d(forces of that station along n and m) / d(pin, arm)

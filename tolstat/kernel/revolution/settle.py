@@ -23,7 +23,7 @@ from tolstat.kernel.mechanics.loads import (
     write_loads,
 )
 from tolstat.kernel.mechanics.scale import centring_stiffness, stiffness
-from tolstat.kernel.mechanics.topology import N_DOF, N_LUMPS, OUTPUT_SHAFT
+from tolstat.kernel.mechanics.topology import ARM, HUB, N_DOF, N_LUMPS, OUTPUT_SHAFT
 from tolstat.kernel.mechanics.vector import larger
 from tolstat.kernel.mechanics.work import FORCE
 from tolstat.kernel.revolution.bearing import write_equivalent_loads
@@ -239,6 +239,19 @@ def lowest(values):
 
 
 @njit
+def third_differences(s, first, last, samples):
+    """Largest third differences at sample `s` of displacements (m) and rotations (rad), lumps `first` to `last` - 1."""
+    q0, q1, q2, q3 = samples[s - 3].q, samples[s - 2].q, samples[s - 1].q, samples[s].q
+    shift = turn = 0.0
+    for body in range(first, last):
+        for i in range(6 * body, 6 * body + 3):
+            j = i + 3
+            by_shift, by_turn = abs(q3[i] - q0[i] - 3 * (q2[i] - q1[i])), abs(q3[j] - q0[j] - 3 * (q2[j] - q1[j]))
+            shift, turn = by_shift if by_shift > shift else shift, by_turn if by_turn > turn else turn
+    return shift, turn
+
+
+@njit
 def step_error(par, samples):
     """Estimated error of a BDF2 step, as a load relative to the largest one: mean over the recorded revolution.
 
@@ -251,15 +264,10 @@ def step_error(par, samples):
         torque = max(torque, size_of(OF_TORQUES, samples[s].loads))
     total = 0.0
     for s in range(samples.size):
-        q0, q1, q2, q3 = samples[s - 3].q, samples[s - 2].q, samples[s - 1].q, samples[s].q
         by_shift = by_turn = 0.0
-        for body in range(N_LUMPS):
-            k, k_turn = stiffness(body, par)
-            shift = turn = 0.0
-            for i in range(6 * body, 6 * body + 3):
-                j = i + 3
-                shift = max(shift, abs(q3[i] - q0[i] - 3 * (q2[i] - q1[i])))
-                turn = max(turn, abs(q3[j] - q0[j] - 3 * (q2[j] - q1[j])))
+        for first, last in ((HUB, ARM), (ARM, N_LUMPS)):
+            k, k_turn = stiffness(first, par)
+            shift, turn = third_differences(s, first, last, samples)
             by_shift, by_turn = max(by_shift, k * shift), max(by_turn, k_turn * turn)
         total += max(by_shift / force, by_turn / torque)
     return 2 / 9 * total / samples.size

@@ -57,7 +57,9 @@ def generalised(q, work):
     force = work.force[:N_LUMPS].copy()
     for body in range(N_LUMPS):
         phi = tuple(q[6 * body + 3 : 6 * body + 6])
-        turns = np.array([rotation.spin(phi, tuple(axis)) for axis in np.eye(3)])
+        turns = np.array(
+            [rotation.spin(phi, rotation.coefficients(np.dot(phi, phi)), tuple(axis)) for axis in np.eye(3)]
+        )
         force[body, 3:] = turns @ force[body, 3:]
     return force.ravel()
 

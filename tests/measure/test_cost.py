@@ -41,13 +41,13 @@ def these():
 def test_operations_are_those_of_the_structure(these):
     """The elimination does the same for any joint: counted along `linsolve`, block by block."""
     counts = count_apart(list(snapshots(these, 2)))
-    product, dot = 6 * 6 * 2, 11  # of a block with six numbers, of six with six
-    inverse = 6 * (1 + 6 + 5 * 6 * 2)
-    chain = 2 * inverse + 2 * 6 * product + 2 * 6 * product
-    output = 2 * (3 * product + 6 * dot + product + 6 * (dot + 1)) + 4 * (2 * dot + 2)  # psi and s
-    last = inverse + 2 * product + 4 * (dot + 1) + 5
+    three, six = 5, 11  # scalar products
+    inverse = 2 * (18 + three + 7) + 2 * 3 * 3 * three + 2 * 6 * (three + 1)  # of a block, by its 3 x 3 blocks
+    lump = inverse + 6 * 6 * six + 21 * (six + 1)  # and the block of the one that follows
+    corner = 2 * 6 * six + 3 * (six + 1)  # psi and s, of one lump
+    output = 2 * 2 * 6 * (six + 1) + 2 * corner
     for count in counts:
-        assert count["elimination"] == 4 * chain + 2 * output + last
+        assert count["elimination"] == 8 * lump + 2 * output + inverse + corner + 5
         assert count["contact"] < count["residual"]
     assert counts[0]["substitution"] == counts[1]["substitution"]
 

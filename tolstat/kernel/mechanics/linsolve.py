@@ -195,9 +195,10 @@ def invert(m, b):
 
 @njit
 def eliminate(lump, following, between, m):
-    """Eliminate a lump: invert its block, multiply matrix `between` by the inverse, and reduce the block `following`.
+    """Eliminate `lump`: invert its block, multiply matrix `between` by the inverse, and reduce the block `following`.
 
-    `between` has rows of the lump and columns of the one that follows. Returns whether the block is regular and finite.
+    `between` has rows of the lump and columns of the one that follows; `m`: all blocks, shape (n, 6, 6). Returns
+    whether the block is regular and finite.
     """
     regular = invert(m, lump)
     for j in range(5, -1, -1):  # columns up to j are still those before the product

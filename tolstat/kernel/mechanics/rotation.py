@@ -6,6 +6,8 @@ Multibody Dynamics, 2011, ch. 13):
     R = 1 + s1 phi x + s2 phi x phi x            attitude
     w = T phi',  T = 1 + s2 phi x + s3 phi x phi x   angular velocity in the axes that phi is given in
     T^-1 = 1 - phi x / 2 + s4 phi x phi x
+
+A function takes `phi`, the coefficients `s` = (s1, s2, s3) at `phi`, and `rate`, the derivative of `phi`.
 """
 
 import math
@@ -48,7 +50,7 @@ def inverse_coefficient(x):
 
 @njit
 def exponential(phi, s, out, i):
-    """Write R = exp(phi x) to matrix `i` of `out`, shape (n, 3, 3); `s`: `coefficients` at |phi|^2, here and below."""
+    """Write R = exp(phi x) to matrix `i` of `out`, shape (n, 3, 3)."""
     s1, s2, _ = s
     a, b, c = phi
     out[i, 0, 0] = 1 - s2 * (b * b + c * c)

@@ -114,7 +114,7 @@ def put(blocks, b, i, j, a):
 
 @njit
 def put_symmetric(blocks, b, i, a):
-    """Add the symmetric 3 x 3 matrix with columns `a` to block `b` on its diagonal, from row and column `i` on."""
+    """Add the symmetric 3 x 3 matrix with columns `a` to block `b` of `blocks`, from row and column `i` on."""
     for k in range(3):
         blocks[b, i, i + k] += a[k][0]
     for k in range(1, 3):

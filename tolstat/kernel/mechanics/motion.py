@@ -117,7 +117,7 @@ def to_cross(frame, a, work):
 
 @njit
 def velocity_in(frame, velocity, point, work):
-    """Velocity relative to `frame`, I or F, of what moves with `velocity` relative to C at `point`; in axes of `frame`."""
+    """Velocity relative to `frame`, I or F, of what moves with `velocity` in C at `point`; all in axes of `frame`."""
     w = work.relative[frame, 2]
     if frame == FRAME_I:
         return (velocity[0], velocity[1] - w * point[2], velocity[2] + w * point[1])

@@ -7,7 +7,7 @@ beside it: rotation of the loads with the bodies, gyroscopic terms (2 Omega / cv
 """
 
 from tolstat.kernel.mechanics.bushing import markers
-from tolstat.kernel.mechanics.contact import smooth_step, smooth_step_slope
+from tolstat.kernel.mechanics.contact import smooth_step
 from tolstat.kernel.mechanics.dynamics import mass_of
 from tolstat.kernel.mechanics.motion import to_cross
 from tolstat.kernel.mechanics.topology import (
@@ -36,7 +36,6 @@ from tolstat.kernel.mechanics.work import (
     SLOPE,
     TANGENT,
     V_NORMAL,
-    V_TANGENT,
 )
 from tolstat.kernel.simd.jit import njit
 from tolstat.kernel.simd.lane import any_of, fma, where
@@ -219,7 +218,11 @@ def _add_dyads(pin, n, by_n, m, by_m, work):
 
 @njit
 def contact_tangent(pin, cv, par, work):
-    """Add the contact of `pin`: elastic force, damping, film (`cv`: 1/s), without the skew part of the last two."""
+    """Add the contact of `pin`: elastic force, damping, film; `cv`: 1/s.
+
+    What damping and film couple, a force along n with a displacement along m or the reverse, is not symmetric, and left
+    out.
+    """
     by_n, by_m = work.by_n, work.by_m
     for j in range(par.n_stations):
         station = work.station[pin, j]
@@ -231,16 +234,12 @@ def contact_tangent(pin, cv, par, work):
         damping = where(station[FORCE] > 0, par.c_d * weight * smooth_step(x), 0.0)
         # zero where nothing touches: film, damping and force are zero there, and rho can be 0
         by_rho = where(touching, 1 / station[RHO], 0.0)
-        turning = station[V_TANGENT] * by_rho
         nn = station[SLOPE] + cv * damping
-        thicker = par.c_t * weight * smooth_step_slope(x) / par.delta_d * station[V_TANGENT]
-        nm = 0.5 * ((damping - film) * turning + thicker)  # the mean of the entries nm and mn
         mm = station[FORCE] * by_rho + film * (cv - station[V_NORMAL] * by_rho)
         _directions(pin, j, work)
         n, m = work.vectors[0], work.vectors[1]
         for i in range(12):
-            by_n[i] = fma(nm, m[i], nn * n[i])
-            by_m[i] = fma(mm, m[i], nm * n[i])
+            by_n[i], by_m[i] = nn * n[i], mm * m[i]
         _add_dyads(pin, n, by_n, m, by_m, work)
 
 

@@ -60,7 +60,7 @@ from tolstat.kernel.simd.lane import WIDTH, any_of, bits_of, count_of, where
 PATIENCE = WIDTH // 2
 """Number of lanes in need of a new tangent at which it is computed: it costs as much for one lane as for all, and lanes
 that wait stand still."""
-STANDSTILL = 2 * WIDTH
+STANDSTILL = WIDTH
 """Rounds that lanes have waited for a tangent, summed over the lanes, at which it is computed even for fewer than
 `PATIENCE`: these rounds took longer than a tangent does."""
 START_ONLY = 0

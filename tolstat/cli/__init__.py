@@ -45,9 +45,9 @@ PLAIN = {
     },
 }
 """Commands that are no question, by heading of the help: functions of this package, and their first lines."""
-FILES = {"schema": "new", "spectrum": "new", "plan": "run", "extend": "run", "merge": "run"}
-FILES |= {"replay": "simulate", "evaluate": "simulate", "show": "simulate", "verify": "status", "report": "export"}
-FILES |= {"cache": "docs"}
+FILES = dict.fromkeys(("plan", "extend", "merge"), "run") | dict.fromkeys(("verify", "export", "report"), "status")
+FILES |= dict.fromkeys(("replay", "evaluate", "show"), "simulate")
+FILES |= dict.fromkeys(("new", "schema", "spectrum", "cache"), "docs")
 """Files of commands that have none of their own name."""
 ASKED = {question.name.replace("_", "-"): question for question in QUESTIONS if question.heading}
 """Questions by the names of their commands."""

@@ -27,7 +27,7 @@ from typing import Annotated, Any, get_args, get_origin
 import typer
 
 from tolstat.cli._library import points, stores, studies, units
-from tolstat.cli._shared import deliver, fail, progress, say, session, work
+from tolstat.cli._shared import deliver, fail, progress, session, work, write_files
 from tolstat.common.errors import Fault, InputError, TolstatError, gather, raise_all
 from tolstat.common.files import check_target, reason
 from tolstat.display import options
@@ -250,13 +250,8 @@ def function_of(question: Question) -> Callable[..., None]:
             if is_study:
                 what = studies.load(sources[0])
                 points.names_of(point, [at.name for at in what.points], str(sources[0]))
-            settings = {
-                "workers": arguments["workers"],
-                "folder": out or Path(),
-                "study_file": study_file,
-                "point": point,
-            }
-            with work(**settings) as running:
+            workers, folder = arguments["workers"], out or Path()
+            with work(workers=workers, folder=folder, study_file=study_file, point=point) as running:
                 sources = simulate(what, running, **{p.name: arguments[p.name] for p in simulated})
         elif used := [flag_of(p) for p in only_simulated if arguments[p.name] not in (None, p.default)]:
             ways = {"add --run": into_file, "give a study (TOML)": takes_study}
@@ -271,10 +266,7 @@ def function_of(question: Question) -> Callable[..., None]:
                 answer = answer_of(*seen, **{p.name: arguments[p.name] for p in options_of_answer})
             deliver(answer, arguments["wide"], arguments["as_json"])
             if out is not None:
-                with progress("files"):
-                    files = answer.write(out / stem)
-                for path in files:
-                    say(f"wrote {path}")
+                write_files(answer, out / stem)
 
     texts = entries(inspect.getdoc(simulate) or "") | entries(inspect.getdoc(answer_of) or "")
     command: Any = run

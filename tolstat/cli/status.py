@@ -14,10 +14,21 @@ import typer
 
 from tolstat.cli import _library as library
 from tolstat.cli._library import np
-from tolstat.cli._shared import deliver, json_of, print_json, print_table, progress, say, wrapped, write
+from tolstat.cli._shared import (
+    deliver,
+    json_of,
+    print_json,
+    print_table,
+    progress,
+    say,
+    wrapped,
+    write,
+    write_files,
+    write_frame,
+)
 from tolstat.common.cores import available_cores
 from tolstat.common.errors import Fault, StoreError
-from tolstat.common.files import atomic_write, check_target
+from tolstat.common.files import check_target
 from tolstat.common.late import pandas as pd
 from tolstat.display.options import Accepted, AsJson, Opt, Point, ResultPath, Wide, Workers
 from tolstat.display.progress import clock
@@ -195,9 +206,7 @@ def verify(
     facts |= {"checks": {name: check.description for name, check in verification.checks.items()}}
     deliver(library.answers.Answer("verify", "Numerical error", parts, facts), wide, as_json)
     if out is not None:
-        with atomic_write(out) as temporary:
-            pd.DataFrame(library.joints.joint_rows(verification)).to_csv(temporary, index=False, lineterminator="\n")
-        say(f"wrote {out}")
+        write_frame(pd.DataFrame(library.joints.joint_rows(verification)), out)
 
 
 if TYPE_CHECKING:
@@ -261,22 +270,15 @@ def export(
         store = view.store
         if cycles is not None:
             table = library.fatigue.pylife_table(view, nominal=nominal)
-            write(cycles, lambda out: table.to_csv(out, index=False, lineterminator="\n"))
-            _tell(cycles, f"cycles of {table['joint'].nunique()} joints")
+            write_frame(table, cycles, f"cycles of {table['joint'].nunique()} joints")
         if statistics is not None:
             values = library.reports.statistics(view, accepted=accepted)
-            write(statistics, lambda out: out.write(json_of(values) + "\n"))
-            _tell(statistics, "all statistics")
+            write(statistics, lambda out: out.write(json_of(values) + "\n"), "all statistics")
         if joints is not None:
             if joints == "-":
                 list(library.result_file.in_blocks(store, nominal))  # damage is found before anything is printed
-            write(joints, partial(_write_csv, store, nominal))
-            _tell(joints, f"{store.n - (0 if nominal else store.first_sample)} joints")
-
-
-def _tell(target: str, content: str) -> None:
-    if target != "-":
-        say(f"wrote {target}: {content}")
+            n = store.n - (0 if nominal else store.first_sample)
+            write(joints, partial(_write_csv, store, nominal), f"{n} joints")
 
 
 def _write_csv(store: Reader, nominal: bool, stream: TextIO) -> None:
@@ -335,10 +337,7 @@ def report(
             return
         if note := library.recorded.note_on_mounting(view.store):
             say(f"note: {note}")
-        with progress("files"):
-            files = answer.write(stem)
-    for path in files:
-        say(f"wrote {path}")
+        write_files(answer, stem)
 
 
 def _page(file: Path, out: Path, accepted: float, again: int | None, point: str, full: bool, brief: bool) -> None:

@@ -19,7 +19,7 @@ from studies.cirelli2021.page_main import Main, revolutions
 from tolstat.common.columns import RESULT_COLUMNS
 from tolstat.common.tables import Status, Variant
 from tolstat.joint import Joint, operating, varied
-from tolstat.questions.cases import relative_errors
+from tolstat.questions.sweep import relative_errors
 from tolstat.store import ResultFile
 from tolstat.store.recorded import operating_points
 

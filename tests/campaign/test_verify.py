@@ -19,7 +19,7 @@ from tolstat.campaign import verify
 from tolstat.common.errors import InputError, NotApplicable, StoreError
 from tolstat.common.load_kinds import LOAD_KINDS
 from tolstat.common.tables import Method, Options, Simulation, Start, Status, from_names
-from tolstat.questions import accuracy as question
+from tolstat.questions import joints as question
 from tolstat.questions.exceedance.answer import exceedance
 from tolstat.store import ResultFile, Writer, metadata, recorded, verification
 from tolstat.store.verification import Check, Verification
@@ -267,7 +267,7 @@ def test_checks_that_fail_are_counted_and_not_measured(tmp_path):
         found = verification.read(store)
     assert found is not None
     found.checks["reference"].results["status"][0] = Status.NOT_SETTLED
-    assert "1 not settled in reference" in question.note(found)
+    assert "1 not settled in reference" in question.error_note(found)
     # the estimate stands in: invented checks that change nothing
     assert accuracy.by_kind(question.errors(found)[question.TOTAL])[:, 0] == pytest.approx([0.0, 0.2])
 
@@ -331,7 +331,7 @@ def test_lower_fidelity_is_measured_against_the_dynamic_joint(tmp_path):
     assert true.min() > 5e-4  # the inertia of bodies that deviate from the ideal motion
     np.testing.assert_allclose(seen, true, rtol=0.3)
     assert force_and_torque(found.base, found.checks["half_step"].results).max() < 0.1 * true.min()
-    assert "error of numerics and fidelity, measured" in question.note(found)
+    assert "error of numerics and fidelity, measured" in question.error_note(found)
     auto = study.load(written(tmp_path, REAL.replace("steps_per_rev = 12", 'fidelity = "auto"')))
     with pytest.raises(InputError, match="auto"):
         verify.check_study(auto)

@@ -19,7 +19,7 @@ from studies.cirelli2021 import tables as paper
 from tolstat.common.load_kinds import BUSHINGS
 from tolstat.common.tables import RESULT, Status
 from tolstat.joint import ideal
-from tolstat.questions.cases import relative_errors
+from tolstat.questions.sweep import relative_errors
 
 
 def test_printed_tables_have_128_entries_in_the_paper_s_order():

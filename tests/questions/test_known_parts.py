@@ -9,7 +9,7 @@ from tolstat import sampling
 from tolstat.analysis.process import Known
 from tolstat.campaign import extend, run
 from tolstat.common.errors import NotApplicable
-from tolstat.questions.known_parts import known_parts
+from tolstat.questions.parts import known_parts
 from tolstat.report import headline, page
 from tolstat.store import ResultFile
 

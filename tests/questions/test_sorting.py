@@ -14,7 +14,7 @@ from tolstat.cli import app
 from tolstat.common.errors import InputError, NotApplicable
 from tolstat.display.answer import Asked
 from tolstat.joint import nominal_errors
-from tolstat.questions import sorting as question
+from tolstat.questions import parts as question
 from tolstat.report import page
 from tolstat.store import ResultFile
 from tolstat.study.selective import Gauge

@@ -19,7 +19,7 @@ from tolstat.campaign.remedy import remedy
 from tolstat.common.errors import InputError
 from tolstat.common.load_kinds import LOAD_KINDS
 from tolstat.common.tables import FAILED, RESULT, RESULT_FIELDS, SIMULATED, Options, Status
-from tolstat.questions.cases import cases
+from tolstat.questions.sweep import cases
 from tolstat.solver.simulation import simulate_rows
 from tolstat.store import ResultFile, Writer, verification
 from tolstat.store.verification import Check, Verification

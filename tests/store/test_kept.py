@@ -23,7 +23,7 @@ from tolstat.campaign import run as campaign
 from tolstat.campaign.verify import QUICK_CHECKS
 from tolstat.common.columns import KEPT, OPTIONAL_FIELDS, RESULT_COLUMNS, blank_others, kept_columns
 from tolstat.common.errors import InputError, StoreError
-from tolstat.questions import accuracy as question
+from tolstat.questions import joints as question
 from tolstat.questions import sweep
 from tolstat.questions.causes.worst import joint_rows
 from tolstat.questions.exceedance import curves, rows
@@ -197,8 +197,8 @@ def test_replay_and_verify_compare_what_is_stored(tmp_path: Path) -> None:
     assert set(table["load"]) == {"F"}
     assert table["worst"].max() > 0
     assert {row["load"] for row in question.joint_rows(held)} == {f"cross{i}.F" for i in (1, 2, 3, 4)}
-    assert question.note(held).count("F ") == 1
-    assert "T " not in question.note(held)
+    assert question.error_note(held).count("F ") == 1
+    assert "T " not in question.error_note(held)
 
 
 def test_errors_are_relative_to_the_largest_load_kept() -> None:

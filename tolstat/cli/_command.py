@@ -17,7 +17,6 @@ import errno
 import gc
 import inspect
 import re
-import resource
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from inspect import Parameter, Signature
@@ -27,7 +26,7 @@ from typing import Annotated, Any, get_args, get_origin
 import typer
 
 from tolstat.cli._library import points, stores, studies, units
-from tolstat.cli._shared import deliver, fail, progress, say, session, work
+from tolstat.cli._shared import deliver, fail, progress, session, work, write_files
 from tolstat.common.errors import Fault, InputError, TolstatError, gather, raise_all
 from tolstat.common.files import check_target, reason
 from tolstat.display import options
@@ -45,7 +44,7 @@ def exit_codes() -> Iterator[None]:
     """Turn errors that a user can mend into a message and an exit code."""
     try:
         yield
-    except (TolstatError, MemoryError, OSError, ImportError) as error:
+    except (TolstatError, MemoryError, OSError) as error:
         reason = error if isinstance(error, TolstatError) else shortage(error)
         if reason is None:
             raise
@@ -171,45 +170,17 @@ DISK = {
     *(errno.EISDIR, errno.ENOTDIR, errno.ENAMETOOLONG),
 }
 """Numbers of the errors that say that a file cannot be written here."""
-LIBRARIES_MB = 700
-"""Address space that a process takes before it has any joints, MB: libraries and kernels."""
 
 
-def check_memory() -> None:
-    """Refuse to simulate in a process that may not even load the libraries; it would end with any error.
-
-    Raises
-    ------
-    InputError
-        When a process may use less than `LIBRARIES_MB`.
-    """
-    if 0 < _limit_mb() < LIBRARIES_MB:
-        raise InputError([_memory("libraries cannot be loaded")])
-
-
-def shortage(error: MemoryError | OSError | ImportError) -> Fault | None:
+def shortage(error: MemoryError | OSError) -> Fault | None:
     """Describe an error that another machine, or another folder, would not have had; None for any other error."""
-    unloaded = isinstance(error, ImportError) or (isinstance(error, OSError) and error.errno is None)
-    if isinstance(error, MemoryError) or getattr(error, "errno", None) == errno.ENOMEM or (unloaded and _limit_mb()):
-        return _memory("libraries cannot be loaded" if unloaded else str(error) or "no more could be allocated")
-    if isinstance(error, OSError) and error.errno in DISK:
+    if isinstance(error, MemoryError) or error.errno == errno.ENOMEM:
+        remedy = "use fewer workers (--workers 1), keep fewer results ([output]), or end other programs"
+        return Fault("memory", str(error) or "no more could be allocated", remedy)
+    if error.errno in DISK:
         remedy = "check that the folder is writable and the disk has space"
         return Fault(str(error.filename or "a file"), f"cannot be written: {reason(error)}", remedy)
     return None
-
-
-def _memory(short: str) -> Fault:
-    limit, remedy = _limit_mb(), "use fewer workers (--workers 1), keep fewer results ([output]), or end other programs"
-    if not limit:
-        return Fault("memory", short, remedy)
-    allowed = f"a process may use {limit} MB (ulimit -v) and needs {LIBRARIES_MB} MB before any joints"
-    return Fault("memory", f"{short}; {allowed}", f"{remedy}, or raise ulimit -v")
-
-
-def _limit_mb() -> int:
-    """Address space that this process may use, MB; 0 if it is not limited."""
-    soft, _ = resource.getrlimit(resource.RLIMIT_AS)
-    return 0 if soft == resource.RLIM_INFINITY else soft // 10**6
 
 
 READS: dict[str, dict[str, Any]] = {
@@ -250,13 +221,8 @@ def function_of(question: Question) -> Callable[..., None]:
             if is_study:
                 what = studies.load(sources[0])
                 points.names_of(point, [at.name for at in what.points], str(sources[0]))
-            settings = {
-                "workers": arguments["workers"],
-                "folder": out or Path(),
-                "study_file": study_file,
-                "point": point,
-            }
-            with work(**settings) as running:
+            workers, folder = arguments["workers"], out or Path()
+            with work(workers=workers, folder=folder, study_file=study_file, point=point) as running:
                 sources = simulate(what, running, **{p.name: arguments[p.name] for p in simulated})
         elif used := [flag_of(p) for p in only_simulated if arguments[p.name] not in (None, p.default)]:
             ways = {"add --run": into_file, "give a study (TOML)": takes_study}
@@ -271,10 +237,7 @@ def function_of(question: Question) -> Callable[..., None]:
                 answer = answer_of(*seen, **{p.name: arguments[p.name] for p in options_of_answer})
             deliver(answer, arguments["wide"], arguments["as_json"])
             if out is not None:
-                with progress("files"):
-                    files = answer.write(out / stem)
-                for path in files:
-                    say(f"wrote {path}")
+                write_files(answer, out / stem)
 
     texts = entries(inspect.getdoc(simulate) or "") | entries(inspect.getdoc(answer_of) or "")
     command: Any = run

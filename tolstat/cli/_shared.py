@@ -24,6 +24,8 @@ from tolstat.display.progress import Display, display
 from tolstat.display.unseen import visible
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from tolstat.common.tables import Variant
     from tolstat.display.answer import Answer, Column, Rows
     from tolstat.joint import Joint
@@ -158,6 +160,14 @@ def deliver(answer: Answer, wide: bool, as_json: bool = False) -> None:
                 say(part.text)
 
 
+def write_files(answer: Answer, stem: Path) -> None:
+    """Write the files of an answer, see `Answer.write`, and tell their names."""
+    with progress("files"):
+        files = answer.write(stem)
+    for path in files:
+        say(f"wrote {path}")
+
+
 def print_table(columns: Sequence[Column], rows: Rows, wide: bool) -> None:
     """Print a table on standard output, and on standard error the columns left out to fit the line."""
     text, missing = table.fitted(columns, rows, None if wide else table.WIDTH)
@@ -176,13 +186,23 @@ def print_json(values: Any) -> None:
     typer.echo(json_of(values))
 
 
-def write(target: str, content: Callable[[TextIO], object]) -> None:
-    """Write a file as `content` does, or standard output where `target` is ``-``."""
+def write(target: str | Path, content: Callable[[TextIO], object], what: str | None = None) -> None:
+    """Write a file as `content` does, or standard output where `target` is ``-``.
+
+    With `what`, tells the name of the file, and behind it `what` it holds unless that is empty.
+    """
     if target == "-":
         content(sys.stdout)
         return
     with atomic_write(Path(target)) as temporary, temporary.open("w", encoding="utf-8", newline="") as stream:
         content(stream)
+    if what is not None:
+        say(f"wrote {target}: {what}" if what else f"wrote {target}")
+
+
+def write_frame(frame: pd.DataFrame, target: str | Path, what: str = "") -> None:
+    """Write a table as CSV, see `write`."""
+    write(target, lambda stream: frame.to_csv(stream, index=False, lineterminator="\n"), what)
 
 
 @contextmanager

@@ -13,9 +13,9 @@ import typer
 
 from tolstat.cli import _library as library
 from tolstat.cli._library import np
-from tolstat.cli._shared import print_json, print_warnings, progress, say, warn, work, write
+from tolstat.cli._shared import print_json, print_warnings, progress, say, warn, work, write, write_frame
 from tolstat.common.errors import Fault, gather, raise_all
-from tolstat.common.files import atomic_write, check_target, finite
+from tolstat.common.files import check_target, finite
 from tolstat.display.options import AsJson, Opt, Point, ResultPath, SimulatedPath, Trace, Workers
 
 if TYPE_CHECKING:
@@ -96,9 +96,7 @@ def _deliver(result: CaseResult, facts: dict[str, Any], out: Path | None, as_jso
     if state != library.tables.Status.OK:
         warn(f"warning: {state.label}: {library.tables.STATUS_TEXT[state]}\n  hint: {result.remedy()}")
     if out is not None:
-        with atomic_write(out) as temporary:
-            result.to_pandas().to_csv(temporary, index=False, lineterminator="\n")
-        say(f"wrote {out}")
+        write_frame(result.to_pandas(), out)
 
 
 def _largest(largest: dict[str, dict[str, Any]]) -> list[list[str]]:

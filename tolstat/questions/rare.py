@@ -12,9 +12,9 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.analysis import accuracy, prediction
+from tolstat.analysis import prediction
 from tolstat.analysis.prediction import DELIVERY
-from tolstat.analysis.sample import CONFIDENCE
+from tolstat.analysis.sample import CONFIDENCE, Sample
 from tolstat.analysis.subset import Estimate
 from tolstat.campaign import subset
 from tolstat.campaign.pool import kept_workers
@@ -23,14 +23,12 @@ from tolstat.campaign.subset import Subsets
 from tolstat.campaign.work import Work
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.late import special
-from tolstat.common.loads import LOADS, Limit
-from tolstat.common.tables import VALID
+from tolstat.common.loads import LOADS, FloatArray, Limit
 from tolstat.display import text
 from tolstat.display.answer import Answer, Column, Part, Row, Rows, Sentence, Table
 from tolstat.display.options import Delivery, Opt
 from tolstat.questions import shares
-from tolstat.store import ResultFile, error_budget, verification
-from tolstat.store.reader import Reader
+from tolstat.store import ResultFile, error_budget
 from tolstat.store.view import View
 from tolstat.study import Study, subset_of
 
@@ -209,7 +207,7 @@ def seed_row(view: View, delivery: int) -> tuple[dict[str, Any], Rows]:
         unresolved.append(subsets.take(store))
     estimate, wide = walk.estimate(), walk.estimate(prediction.half(CONFIDENCE))
     p, deviation = estimate.probability, estimate.deviation
-    factors = numerical(store, settings.limit, walk.last + before)
+    factors = numerical(view, settings.limit, walk.last)
     low, high = factors or (1.0, 1.0)
     ends = prediction.of_share(wide.lower * low, min(1.0, wide.upper * high), delivery, CONFIDENCE)
     row = {"file": view.path.name, "seed": settings.seed, "reached": walk.reached} | estimate._asdict()
@@ -227,17 +225,17 @@ def seed_row(view: View, delivery: int) -> tuple[dict[str, Any], Rows]:
     return row, levels
 
 
-def numerical(store: Reader, limit: Limit, last: NDArray[np.intp]) -> tuple[float, float] | None:
+def numerical(view: View, limit: Limit, last: NDArray[np.intp]) -> tuple[float, float] | None:
     """Factors on both ends of the interval of a probability by the numerical error of the loads.
 
     Parameters
     ----------
-    store : Reader
+    view : View
         Result file of a subset simulation.
     limit : Limit
         The limit.
     last : ndarray of int, shape (n,)
-        File slots of the states of its last level.
+        Samples that are the states of its last level.
 
     Returns
     -------
@@ -245,26 +243,14 @@ def numerical(store: Reader, limit: Limit, last: NDArray[np.intp]) -> tuple[floa
         Share of the last level above the limit with the loads corrected by what verified joints near it lack, over the
         share as simulated: least and largest, 1 included. None with fewer than `accuracy.LEAST_NEAR` such joints.
     """
-    near = verification.read(store, verification.NEAR)
-    if near is None:
-        return None
-    results = store.results()
-    checks = {name: check.results for name, check in near.checks.items()}
-    lacking, joints = accuracy.corrections(near.base, checks), results[last]
-    valid = np.isin(results["status"], VALID)
-    ends: list[list[NDArray[np.float64]]] = [[], [], []]
+    ends: list[list[FloatArray]] = [[], [], []]
     for name, level in zip(limit.loads, limit.levels, strict=True):
-        load = LOADS[name]
-        distance = np.where(valid, np.abs(load.of(results) - level), np.inf)
-        nearest = np.argsort(distance, kind="stable")[: 2 * accuracy.LEAST_NEAR]
-        errors = lacking[np.isin(near.rows, nearest), accuracy.OBSERVABLES.index(name)]
-        errors = errors[np.isfinite(errors)]
-        if errors.size < accuracy.LEAST_NEAR:
+        load = replace(Sample.of(LOADS[name].of(view.results), view.status, name=name), limit=level)
+        known = error_budget.near(view, load)
+        if known is None:
             return None
-        values = np.where(np.isin(joints["status"], VALID), load.of(joints), -np.inf)
-        low, high = accuracy.corrected(values, np.nan_to_num(accuracy.size(joints, load.kind)), errors)
-        for end, loads in zip(ends, (values, low, high), strict=True):
-            end.append(loads / level)
+        for end, sample in zip(ends, (load, *known), strict=True):
+            end.append(np.nan_to_num(sample.values[last], nan=-np.inf) / level)
     plain, *moved = (float((np.maximum.reduce(end) > 1.0).mean()) for end in ends)
     factors = [share / plain for share in moved] if plain else [1.0]
     return min(1.0, *factors), max(1.0, *factors)

@@ -16,11 +16,10 @@ from tolstat.common.tables import Status
 from tolstat.display import text
 from tolstat.display.answer import Answer, Part, Sentence, Sheet, Table
 from tolstat.joint.sections import mounting_and_law
-from tolstat.questions import accuracy, shares
-from tolstat.questions.cases import cases
+from tolstat.questions import joints, shares
 from tolstat.questions.exceedance import answer as exceedance
 from tolstat.questions.exceedance import curves, rows
-from tolstat.questions.sweep import sweep
+from tolstat.questions.sweep import cases, sweep
 from tolstat.report.headline import headline, life_verdicts, tells_yield
 from tolstat.solver import fidelity
 from tolstat.store import Reader, View, recorded, viewed
@@ -46,9 +45,9 @@ def report(view: View, accepted: float = math.nan) -> Answer:
     store = view.store
     stands_on = [Sentence(text.sentence(mounting_and_law(*recorded.mountings(store))), "lead")]
     if store.case_names or view.method == "sweep":
-        joints = cases(view) if store.case_names else sweep(view)
+        answer = cases(view) if store.case_names else sweep(view)
         notes = [] if store.case_names else [*_notes(view)]
-        return Answer("report", view.name, [*stands_on, *joints.parts, *notes, *_run(view)])
+        return Answer("report", view.name, [*stands_on, *answer.parts, *notes, *_run(view)])
     verdict, lives = headline(view, accepted), life_verdicts(view, accepted)
     facts: dict[str, Any] = {"verdict": verdict.values()} if verdict else {}
     if lives:
@@ -123,7 +122,7 @@ def _notes(view: View) -> Iterator[Part]:
     if view.method != "sweep":
         yield Sentence(exceedance.note(view))
     if view.verification:
-        yield Sentence(accuracy.note(view.verification, view.limits))
+        yield Sentence(joints.error_note(view.verification, view.limits))
 
 
 def _run(view: View) -> Iterator[Part]:

@@ -14,7 +14,7 @@ from tests.conftest import CHEAP
 from tests.support.environment import ROOT
 from tolstat import cli
 from tolstat.cli import LISTED
-from tolstat.questions import PUBLIC, lots, selective
+from tolstat.questions import PUBLIC, QUESTIONS, lots, selective
 
 DOCS = ROOT / "docs"
 PAGES = [
@@ -23,9 +23,7 @@ PAGES = [
     *sorted(path for path in DOCS.rglob("*.md") if path.parent.name != "api"),
 ]
 NOTEBOOKS = sorted((DOCS / "notebooks").glob("*.ipynb"))
-FOLDERS = [path.stem for path in (ROOT / "tolstat" / "questions").iterdir() if not path.stem.startswith("__")]
-QUESTIONS = sorted({*FOLDERS, "lines"} - {"shares"})
-"""Pages of questions: the lines of the drawing, which ``causes`` answers, have one; ``shares`` serves several."""
+OF_QUESTIONS = sorted(path.stem for path in (DOCS / "questions").glob("*.md"))
 PARTS = ["Intervals", "From Python", "On the page", "Limits of validity"]
 """Headings that each page of a question has, after its commands."""
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -129,10 +127,13 @@ def test_every_study_is_in_the_gallery_with_a_picture() -> None:
 
 
 def test_every_question_has_a_page() -> None:
-    assert sorted(path.stem for path in (DOCS / "questions").glob("*.md")) == QUESTIONS
+    """Its own, or that of its file's other questions."""
+    names = [{question.name, (question.file or question.name).partition(".")[0]} for question in QUESTIONS]
+    assert [of_question for of_question in names if not of_question & set(OF_QUESTIONS)] == []
+    assert set(OF_QUESTIONS) <= set().union(*names)
 
 
-@pytest.mark.parametrize("question", QUESTIONS)
+@pytest.mark.parametrize("question", OF_QUESTIONS)
 def test_page_of_a_question_has_all_parts(question: str) -> None:
     text = FENCE.sub("", (DOCS / "questions" / f"{question}.md").read_text(encoding="utf-8"))
     headings = re.findall(r"^## (.*)$", text, flags=re.MULTILINE)

@@ -14,7 +14,19 @@ from tolstat.kernel.mechanics.motion import to_arm, to_cross, velocity_in
 from tolstat.kernel.mechanics.spring import elastic, has_needles
 from tolstat.kernel.mechanics.topology import ARM, ARM_OF_PIN, FRAME, PIN
 from tolstat.kernel.mechanics.vector import add, axpy, choose, cross, dot, row, scale, sub, turn
-from tolstat.kernel.mechanics.work import DELTA, FORCE, NORMAL, POINT, RHO, SLOPE, TANGENT, V_NORMAL, V_TANGENT
+from tolstat.kernel.mechanics.work import (
+    DAMPING,
+    DELTA,
+    FILM,
+    FORCE,
+    NORMAL,
+    POINT,
+    RHO,
+    SLOPE,
+    TANGENT,
+    V_NORMAL,
+    V_TANGENT,
+)
 from tolstat.kernel.simd.jit import njit
 from tolstat.kernel.simd.lane import all_of, any_of, where
 
@@ -74,23 +86,23 @@ def locate(pin, par, work):
 
 @njit
 def press(pin, par, work):
-    """Write each station's normal force, eq. (5), and its slope by delta at constant rate to ``work.station[pin]``."""
-    needles = has_needles(par)
+    """Write force, eq. (5), its slopes by delta and its rate, and the film's constant to ``work.station[pin]``."""
+    needles, steepness = has_needles(par), 1 / par.delta_d
     for j in range(par.n_stations):
         station = work.station[pin, j]
         delta = station[DELTA]
         touching = delta > 0
         if not any_of(touching):
-            station[FORCE] = station[SLOPE] = 0.0
+            station[FORCE] = station[SLOPE] = station[DAMPING] = station[FILM] = 0.0
             continue
-        damping = par.c_d * par.station_weight[j]
-        ramp = smooth_step(delta / par.delta_d)
-        ramp_slope = smooth_step_slope(delta / par.delta_d) / par.delta_d
+        ramp = par.station_weight[j] * smooth_step(delta * steepness)
+        ramp_slope = par.station_weight[j] * smooth_step_slope(delta * steepness) * steepness
         force, slope = elastic(j, delta, par.clearance[pin], needles, par)
-        total = force + damping * ramp * station[V_NORMAL]
+        total = force + par.c_d * ramp * station[V_NORMAL]
         pressed = touching & (total > 0)
         station[FORCE] = where(pressed, total, 0.0)
-        station[SLOPE] = where(pressed, slope + damping * ramp_slope * station[V_NORMAL], 0.0)
+        station[SLOPE] = where(pressed, slope + par.c_d * ramp_slope * station[V_NORMAL], 0.0)
+        station[DAMPING], station[FILM] = where(pressed, par.c_d * ramp, 0.0), par.c_t * ramp
 
 
 @njit
@@ -116,7 +128,7 @@ def contact_load(pin, par, work):
         station = work.station[pin, j]
         if not any_of(station[DELTA] > 0):
             continue
-        drag = par.c_t * par.station_weight[j] * smooth_step(station[DELTA] / par.delta_d) * station[V_TANGENT]
+        drag = station[FILM] * station[V_TANGENT]
         n = (station[NORMAL], station[NORMAL + 1], station[NORMAL + 2])
         m = (station[TANGENT], station[TANGENT + 1], station[TANGENT + 2])
         point = (station[POINT], station[POINT + 1], station[POINT + 2])

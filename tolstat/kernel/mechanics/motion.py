@@ -64,22 +64,18 @@ def ideal_motion(phase, par, work):
     work.drive[0], work.drive[1] = omega, torque
     sa, ca = sine_cosine(par.alpha)
     st, ct = sine_cosine(theta)
-    # cross relative to input fork: tan(beta) = tan(alpha) sin(theta)
-    ta = sa / ca
-    tb = ta * st
-    sec2 = 1 + tb * tb
-    cb = 1 / math.sqrt(sec2)
-    sb = tb * cb
-    db = omega * ta * ct / sec2
-    ddb = -omega * omega * ta * st / sec2 - 2 * ta * st * db * db + domega * ta * ct / sec2
-    # output fork relative to cross: sin(gamma) = sin(alpha) cos(theta)
+    # output fork relative to cross: sin(gamma) = sin(alpha) cos(theta); with secant = 1 / cos(gamma) and
+    # cross relative to input fork: tan(beta) = tan(alpha) sin(theta), cos(beta) = cos(alpha) / cos(gamma)
     sg = sa * ct
-    cg = math.sqrt(1 - sg * sg)
-    dg = -sa * st * omega / cg
+    secant = 1 / math.sqrt(1 - sg * sg)
+    secant2 = secant * secant
+    cg, dg = (1 - sg * sg) * secant, -sa * st * omega * secant
+    cb, sb = ca * secant, sa * st * secant
+    db = omega * sa * ca * ct * secant2
+    ddb = sa * ca * secant2 * (domega * ct - omega * omega * st * (1 + 2 * sg * sg * secant2))
     # output shaft, eq. (2) and its time derivative
-    below = 1 - sg * sg
-    dto = omega * ca / below
-    ddto = -omega * omega * ca * 2 * sa * sa * ct * st / (below * below) + domega * ca / below
+    dto = omega * ca * secant2
+    ddto = ca * secant2 * (domega - 2 * omega * omega * sa * sa * ct * st * secant2)
 
     w, dw = work.frame_w, work.frame_dw
     w[FRAME_I, 0], w[FRAME_I, 1], w[FRAME_I, 2] = 0.0, 0.0, omega
@@ -94,7 +90,7 @@ def ideal_motion(phase, par, work):
     work.relative[FRAME_F, 0], work.relative[FRAME_F, 1], work.relative[FRAME_F, 2] = cg, -sg, -dg
     work.shaft[0], work.shaft[1] = dto, ddto
     work.turned[0, 0], work.turned[0, 1] = ct, st
-    work.turned[1, 0], work.turned[1, 1] = ca * ct / cg, st / cg
+    work.turned[1, 0], work.turned[1, 1] = ca * ct * secant, st * secant
 
 
 @njit

@@ -144,7 +144,7 @@ def relative_to_turned(rot, i, j):
 def _logarithm(half, trace):
     """Rotation vector of a matrix: half the differences of its entries (21, 12), (02, 20), (10, 01), and its trace."""
     y = dot(half, half)  # sin^2 of the angle
-    ratio = 1 + y * (1 / 6 + y * (3 / 40 + y * (5 / 112 + y * (35 / 1152 + y * (63 / 2816)))))  # asin(s)/s
+    ratio = 1 + y * (1 / 6 + y * (3 / 40 + y * (5 / 112 + y * (35 / 1152))))  # asin(s)/s
     small = (y < 1e-3) & (trace > 1)
     if not all_of(small):
         s = math.sqrt(y)

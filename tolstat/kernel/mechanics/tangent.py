@@ -7,7 +7,6 @@ beside it: rotation of the loads with the bodies, gyroscopic terms (2 Omega / cv
 """
 
 from tolstat.kernel.mechanics.bushing import markers
-from tolstat.kernel.mechanics.contact import smooth_step
 from tolstat.kernel.mechanics.dynamics import mass_of
 from tolstat.kernel.mechanics.motion import to_cross
 from tolstat.kernel.mechanics.topology import (
@@ -25,7 +24,9 @@ from tolstat.kernel.mechanics.topology import (
 from tolstat.kernel.mechanics.vector import add, axpy, cross, of_column, row, scale, sub, turn
 from tolstat.kernel.mechanics.work import (
     ARM_PIN,
+    DAMPING,
     DELTA,
+    FILM,
     FORCE,
     NORMAL,
     OF_PSI,
@@ -229,13 +230,10 @@ def contact_tangent(pin, cv, par, work):
         touching = station[DELTA] > 0
         if not any_of(touching):
             continue
-        x, weight = station[DELTA] / par.delta_d, par.station_weight[j]
-        film = par.c_t * weight * smooth_step(x)
-        damping = where(station[FORCE] > 0, par.c_d * weight * smooth_step(x), 0.0)
         # zero where nothing touches: film, damping and force are zero there, and rho can be 0
         by_rho = where(touching, 1 / station[RHO], 0.0)
-        nn = station[SLOPE] + cv * damping
-        mm = station[FORCE] * by_rho + film * (cv - station[V_NORMAL] * by_rho)
+        nn = station[SLOPE] + cv * station[DAMPING]
+        mm = station[FORCE] * by_rho + station[FILM] * (cv - station[V_NORMAL] * by_rho)
         _directions(pin, j, work)
         n, m = work.vectors[0], work.vectors[1]
         for i in range(12):

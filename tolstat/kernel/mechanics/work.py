@@ -13,8 +13,8 @@ from tolstat.kernel.mechanics.topology import N_BODIES, N_DOF, N_LUMPS
 
 # columns of work.station
 POINT, NORMAL, TANGENT = 0, 3, 6
-RHO, DELTA, V_NORMAL, V_TANGENT, FORCE, SLOPE = 9, 10, 11, 12, 13, 14
-N_STATION = 15
+RHO, DELTA, V_NORMAL, V_TANGENT, FORCE, SLOPE, DAMPING, FILM = 9, 10, 11, 12, 13, 14, 15, 16
+N_STATION = 17
 
 ARM_PIN, PIN_HUB = N_LUMPS, N_LUMPS + 4
 """First matrix of each kind in ``work.block``, after those of the lumps: rows of the arm that holds pin p, columns of

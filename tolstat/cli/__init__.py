@@ -70,6 +70,8 @@ EPILOG = (
 
 def function_of(name: str) -> Callable[..., None]:
     """Import the function of a command."""
+    if name in ("run", "extend"):
+        _command.check_memory()  # before libraries are loaded
     if name in ASKED:
         return _command.function_of(ASKED[name])
     function: Callable[..., None] = getattr(import_module(f"tolstat.cli.{FILES.get(name, name)}"), name)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import errno
 import os
 import resource
+import subprocess
+import sys
 import tempfile
 from pathlib import Path
 from types import SimpleNamespace
@@ -13,7 +15,7 @@ import pytest
 from typer.testing import CliRunner
 
 from tests.support import corruption, synthetic
-from tests.support.environment import ROOT
+from tests.support.environment import ROOT, environment
 from tolstat import cli
 from tolstat.common.errors import InputError
 from tolstat.common.files import check_target, reason
@@ -47,6 +49,24 @@ def test_errors_that_no_machine_would_mend_stay_errors(monkeypatch: pytest.Monke
     monkeypatch.setattr("tolstat.study.load", fails)
     done = CliRunner().invoke(cli.app, ["run", str(ROOT / "studies" / "iso2768_f.toml")])
     assert isinstance(done.exception, OSError)
+
+
+@pytest.mark.slow
+def test_a_process_that_may_use_too_little_memory_says_so(tmp_path: Path) -> None:
+    limit = 400 * 10**6
+    done = subprocess.run(
+        [sys.executable, "-m", "tolstat", "run", str(ROOT / "studies" / "iso2768_f.toml"), "--out", "a.h5"],
+        env=environment() | {"OPENBLAS_NUM_THREADS": "1"},
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (limit, limit)),
+    )
+    assert done.returncode == 2
+    assert "error: memory: " in done.stderr
+    assert "may use 400 MB (ulimit -v) and needs 700 MB" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_folder_that_cannot_be_written_is_told_before_the_first_joint(

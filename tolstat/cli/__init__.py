@@ -45,9 +45,13 @@ PLAIN = {
     },
 }
 """Commands that are no question, by heading of the help: functions of this package, and their first lines."""
-FILES = dict.fromkeys(("plan", "extend", "merge"), "run") | dict.fromkeys(("verify", "export", "report"), "status")
-FILES |= dict.fromkeys(("replay", "evaluate", "show"), "simulate")
-FILES |= dict.fromkeys(("new", "schema", "spectrum", "cache"), "docs")
+FILES = {
+    **dict.fromkeys(("plan", "extend", "merge"), "run"),
+    **dict.fromkeys(("replay", "evaluate", "show"), "simulate"),
+    **dict.fromkeys(("status", "verify", "export", "report"), "results"),
+    **dict.fromkeys(("schema", "spectrum"), "new"),
+    "cache": "docs",
+}
 """Files of commands that have none of their own name."""
 ASKED = {question.name.replace("_", "-"): question for question in QUESTIONS if question.heading}
 """Questions by the names of their commands."""
@@ -66,6 +70,8 @@ EPILOG = (
 
 def function_of(name: str) -> Callable[..., None]:
     """Import the function of a command."""
+    if name in ("run", "extend"):
+        _command.check_memory()  # before libraries are loaded
     if name in ASKED:
         return _command.function_of(ASKED[name])
     function: Callable[..., None] = getattr(import_module(f"tolstat.cli.{FILES.get(name, name)}"), name)

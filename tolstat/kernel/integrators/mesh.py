@@ -14,8 +14,8 @@ import math
 
 import numpy as np
 
+from tolstat.kernel.codes import FORCE, LAST_ITERATION_BELOW, TOLERANCE, TORQUE
 from tolstat.kernel.integrators import trbdf2
-from tolstat.kernel.integrators.memory import FORCE, LAST_ITERATION_BELOW, TOLERANCE, TORQUE
 from tolstat.kernel.mechanics.dynamics import mass_of
 from tolstat.kernel.mechanics.scale import set_weight, stiffness, typical_force
 from tolstat.kernel.mechanics.topology import N_LUMPS, PSI, S

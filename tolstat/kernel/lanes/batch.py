@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tolstat.common.tables import PARAM, Options
-from tolstat.kernel.integrators.memory import MEMORY
+from tolstat.kernel.codes import MEMORY
 from tolstat.kernel.lanes.lane_memory import aligned_zeros, lane_dtype
 from tolstat.kernel.mechanics.loads import N_INSTANT
 from tolstat.kernel.mechanics.scale import set_weight, typical_force
@@ -29,7 +29,7 @@ MOTION = np.dtype(
 - ``aux``: acceleration at the first stage of a part; at input angles, the third last solution
 - ``residual``; ``weight``: factors that make residuals dimensionless
 - ``ahead``: expected change of q in the next step, where a better prediction than a Taylor series is known
-- ``memory``: see `integrators.memory`
+- ``memory``: see `kernel.codes`
 """
 
 HOLD, RELAX, CHECK, STEP, LOOK, ANGLE, PART = range(7)

@@ -6,8 +6,7 @@ of the lane's joint; `control` and `motion` are read joint by joint.
 """
 
 from tolstat.common.tables import MAX_ITERATIONS
-from tolstat.kernel.codes import NEWTON_FAILED, NOT_SETTLED, OK, QUASISTATIC, TR_BDF2
-from tolstat.kernel.integrators.memory import AHEAD, H_OLD, STAGED_STEP
+from tolstat.kernel.codes import AHEAD, H_OLD, NEWTON_FAILED, NOT_SETTLED, OK, QUASISTATIC, STAGED_STEP, TR_BDF2
 from tolstat.kernel.integrators.mesh import cells_of, next_level, note_cell
 from tolstat.kernel.integrators.trbdf2 import GAMMA
 from tolstat.kernel.lanes.batch import ANGLE, CHECK, HOLD, PART, RELAX, STEP, start_newton

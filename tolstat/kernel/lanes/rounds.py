@@ -4,9 +4,8 @@
 lanes that begin a step, stage or angle, and lanes whose trial point is accepted before that.
 """
 
-from tolstat.kernel.codes import QUASISTATIC, TR_BDF2
+from tolstat.kernel.codes import AHEAD, H_OLD, LAST_ITERATION_BELOW, QUASISTATIC, STAGED_STEP, TR_BDF2, TRAPEZOIDAL
 from tolstat.kernel.integrators import bdf2, trbdf2
-from tolstat.kernel.integrators.memory import AHEAD, H_OLD, LAST_ITERATION_BELOW, STAGED_STEP, TRAPEZOIDAL
 from tolstat.kernel.lanes.batch import CHECK, STEP
 from tolstat.kernel.lanes.equilibrium import CA_REGULAR, CV_REGULAR, CV_STATIC, ENOUGH, FAR
 from tolstat.kernel.mechanics.linsolve import factorise, solve

@@ -9,7 +9,7 @@ They count among the largest and smallest loads; the recorded samples stay as th
 
 import math
 
-from tolstat.kernel.integrators.memory import H_OLD, LAST_ITERATION_BELOW, TRAPEZOIDAL
+from tolstat.kernel.codes import H_OLD, LAST_ITERATION_BELOW, TRAPEZOIDAL
 from tolstat.kernel.mechanics.loads import (
     DECIDING,
     INTERPOLATED,

@@ -10,7 +10,7 @@ where pseudo-transient continuation leads from there.
 
 import math
 
-from tolstat.kernel.integrators.memory import AHEAD
+from tolstat.kernel.codes import AHEAD
 from tolstat.kernel.mechanics.loads import SPEED_ERROR
 from tolstat.kernel.mechanics.motion import drive_and_load, speed_ratio
 from tolstat.kernel.mechanics.topology import N_DOF

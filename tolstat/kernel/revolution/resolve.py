@@ -11,8 +11,7 @@ import numpy as np
 
 from tolstat.common import tables
 from tolstat.common.tables import KERNEL_RESULT, Options
-from tolstat.kernel.codes import NOT_FINITE, NOT_SETTLED, OK
-from tolstat.kernel.integrators.memory import STAGED_STEP, TOLERANCE
+from tolstat.kernel.codes import NOT_FINITE, NOT_SETTLED, OK, STAGED_STEP, TOLERANCE
 from tolstat.kernel.integrators.mesh import CELL, cells_of, forget_mesh, refine_mesh, set_scale
 from tolstat.kernel.mechanics.loads import FORCES, N_AVERAGED, N_DECIDING, N_INSTANT, TORQUES
 from tolstat.kernel.mechanics.scale import SMALLEST_FORCE, typical_force

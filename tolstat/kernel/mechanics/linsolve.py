@@ -171,7 +171,7 @@ def invert(m, b):
     )
     x, regular = invert_three(x)
     w0, w1, w2 = times_three(x, y0), times_three(x, y1), times_three(x, y2)
-    t, also = invert_three(
+    t, rest_regular = invert_three(
         (
             m[b, 3, 3] - vector.dot(y0, w0),
             m[b, 3, 4] - vector.dot(y0, w1),
@@ -190,7 +190,7 @@ def invert(m, b):
     m[b, 0, 0], m[b, 0, 1] = x[0] + vector.dot(w[0], v[0]), x[1] + vector.dot(w[0], v[1])
     m[b, 0, 2], m[b, 1, 1] = x[2] + vector.dot(w[0], v[2]), x[3] + vector.dot(w[1], v[1])
     m[b, 1, 2], m[b, 2, 2] = x[4] + vector.dot(w[1], v[2]), x[5] + vector.dot(w[2], v[2])
-    return regular & also
+    return regular & rest_regular
 
 
 @njit

@@ -40,11 +40,7 @@ FIELDS = {
     "loads": (N_INSTANT,),  # as `loads.write_loads` writes them
     "station": (4, MAX_STATIONS, N_STATION),  # contact stations, see the column numbers above
     "block": (N_LUMPS + 8, 6, 6),  # matrices of the tangent, those of lumps above the diagonal; factorised in place
-    "edge": (
-        2,
-        N_LUMPS,
-        6,
-    ),  # its columns psi and s, rows of a lump: of the output arms; of their pins and hub, fill-in
+    "edge": (2, N_LUMPS, 6),  # its columns psi and s, rows of the output arms; of their pins and the hub: fill-in
     "corner": (2, 2),  # its rows and columns psi and s; factorised in place
     "vectors": (2, 12),  # d(displacements of a station along n and m) / d(pin, arm)
     "by_n": (12,),  # scratch of contact_tangent: d(forces of that station along n and m) / d(pin, arm)

@@ -44,7 +44,7 @@ solver = { start = "ramp", max_revs = 2, max_refinements = 0 }
 [[variant]]
 name = "stationary"
 cases = []
-operation = { alpha = "30 deg", speed = "1000 rpm", torque = "5 N*m" }
+operation = { alpha = "30 deg", speed = "1000 rpm", torque = "4.5 N*m" }
 solver = { steps_per_rev = 180 }
 
 [[variant]]

@@ -82,7 +82,8 @@ def test_all_hard_cases_end_in_a_result_or_a_status(hard: Path) -> None:
     assert (results["closure"][rings] < 1e-2).all()
     results, family = results[~rings], family[~rings]
     ended = {name: {Status(s).label for s in results["status"][family == name]} for name in family}
-    assert ended.pop("85 deg") == {"newton_failed", "not_resolved"}
+    assert ended.pop("85 deg") == {"not_resolved"}
+    assert ended.pop("85 deg, 5 revolutions") == {"newton_failed"}
     for name in (
         "20000 rpm",
         "20000 rpm, 60 revolutions",
@@ -95,15 +96,16 @@ def test_the_setting_that_the_message_names_solves_the_case(hard: Path) -> None:
     with ResultFile.open(hard) as store:
         results, design = store.results(), store.design()
         family = [store.variants[i].family for i in design["variant"]]
-    (dear,) = results[(np.array(family) == "85 deg") & (results["status"] == Status.NEWTON_FAILED)]
-    assert "solver.steps_per_rev = 720" in remedy(dear, Options()._asdict())
-    assert 0 <= dear["failed_theta"] < 2 * np.pi
+    for dear in results[np.array(family) == "85 deg, 5 revolutions"]:
+        assert dear["status"] == Status.NEWTON_FAILED
+        assert "solver.steps_per_rev = 720" in remedy(dear, Options()._asdict())
+        assert 0 <= dear["failed_theta"] < 2 * np.pi
 
 
 def test_the_report_has_a_row_for_each_joint(hard: Path) -> None:
     report = build(hard)
     rows = pd.read_csv(hard.parent / "hard_cases.csv")
-    assert len(rows) == 42
+    assert len(rows) == 44
     assert rows["note"][0].startswith("what the others are compared with")
     assert rows["cost"][0] == 1.0
     assert re.search("^85 deg, .*: 40 iterations a step were spent at", report.notes, flags=re.MULTILINE)

@@ -42,7 +42,8 @@ FUZZ = Campaign(
 HARD = Campaign(
     "hard_cases",
     [
-        "variants hard_cases.toml nominal overdamped 'clearance 0' '10 kN m' '45 deg' '85 deg, 5 revolutions' '12 steps'",
+        "variants hard_cases.toml nominal overdamped 'clearance 0' '10 kN m' '45 deg' "
+        "'85 deg, 5 revolutions' '12 steps'",
         'sed \'|, "tilt of 5 deg", "E x 1e-3", "E x 1e3",|,|\' hard_cases.toml',
         "run hard_cases.toml",
     ],

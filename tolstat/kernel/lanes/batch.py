@@ -10,7 +10,7 @@ from tolstat.kernel.lanes.lane_memory import aligned_zeros, lane_dtype
 from tolstat.kernel.mechanics.loads import N_INSTANT
 from tolstat.kernel.mechanics.scale import set_weight, typical_force
 from tolstat.kernel.mechanics.topology import N_DOF
-from tolstat.kernel.mechanics.work import WORK
+from tolstat.kernel.mechanics.work import FACTORS, WORK
 from tolstat.kernel.revolution.peaks import PEAKS
 from tolstat.kernel.revolution.resolve import Pasts, make_pasts
 from tolstat.kernel.revolution.settle import make_samples
@@ -97,7 +97,7 @@ def make_batch(options: Options, width: int = WIDTH) -> Batch:
     """Allocate `width` lanes."""
     control = np.dtype([(name, "f8") for name in NUMBERS] + [(name, "i8", width) for name in INTEGERS])
     pars = aligned_zeros(1, lane_dtype(PARAM, width)).view(np.recarray)
-    layouts = [lane_dtype(dtype, width) for dtype in (WORK, WORK, MOTION, control, PEAKS)]
+    layouts = [lane_dtype(dtype, width) for dtype in (WORK, FACTORS, MOTION, control, PEAKS)]
     work, tangent, motion, state, peaks = (aligned_zeros(1, layout).view(np.recarray)[0] for layout in layouts)
     words = pars.view(np.float64).view(np.ndarray)
     samples, fine = make_samples(width, options.steps_per_rev), np.zeros((width, 3, N_INSTANT))

@@ -8,7 +8,7 @@ from numba.core import types
 from numba.core.datamodel import models
 from numba.extending import intrinsic, overload, register_model
 
-from tolstat.kernel.simd.lane import LANE, WIDTH
+from tolstat.kernel.simd.lane import LANE, SINGLE, WIDTH
 
 ALIGNMENT = 8 * WIDTH
 """Alignment of every lane in memory, bytes."""
@@ -30,11 +30,11 @@ class LaneRecordModel(models.RecordModel):
 
 def record_of_lanes(record):
     """Numba type of a record whose float fields are lanes; `record` is the type of the NumPy record."""
-    fields = []
+    fields, lanes_of = [], {types.float64: LANE, types.float32: SINGLE}
     for name, field in record.fields.items():
         ty = field.type
-        if isinstance(ty, types.NestedArray) and ty.dtype == types.float64:
-            shape, value = ty.shape[:-1], LANE if ty.shape[-1] == WIDTH else types.float64
+        if isinstance(ty, types.NestedArray) and ty.dtype in lanes_of:
+            shape, value = ty.shape[:-1], lanes_of[ty.dtype] if ty.shape[-1] == WIDTH else ty.dtype
             ty = types.NestedArray(value, shape) if shape else value
         fields.append((name, {"type": ty, "offset": field.offset}))
     return LaneRecord(fields, record.size, record.aligned)
@@ -52,7 +52,7 @@ def as_lanes(memory):
 
 
 def _without_last_axis(dtype):
-    return np.dtype((dtype.base, dtype.shape[:-1])) if dtype.base == np.float64 else dtype
+    return np.dtype((dtype.base, dtype.shape[:-1])) if dtype.base.kind == "f" else dtype
 
 
 @intrinsic
@@ -82,7 +82,7 @@ def lane_dtype(dtype, width=WIDTH):
     names, formats, offsets, offset = [], [], [], 0
     for name in dtype.names:
         base, shape = dtype[name].base, dtype[name].shape
-        formats.append((base, (*shape, width) if base == np.float64 else shape))
+        formats.append((base, (*shape, width) if base.kind == "f" else shape))
         names.append(name)
         offsets.append(offset)
         offset += -(-np.dtype(formats[-1]).itemsize // ALIGNMENT) * ALIGNMENT

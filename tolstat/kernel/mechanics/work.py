@@ -53,6 +53,8 @@ All vectors of a body are in axes of its ideal frame.
 """
 
 WORK = np.dtype([(name, np.float64, shape) for name, shape in FIELDS.items()])
+FACTORS = np.dtype([(name, np.float32, FIELDS[name]) for name in ("block", "edge", "corner", "solution")])
+"""A factorised tangent in use, in single precision: what that leaves of a residual is less than the tangent's age does."""
 
 
 def make_work():

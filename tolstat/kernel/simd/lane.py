@@ -1,6 +1,7 @@
 """Lanes: one value for each of several joints, in one SIMD register. Kernels accept plain numbers or lanes.
 
-`Lane` is a Numba type whose value is an LLVM vector of doubles, `Mask` one of booleans. Arithmetic, square root and
+`Lane` is a Numba type whose value is an LLVM vector of doubles, `Single` one of single-precision numbers, `Mask` one of
+booleans. Arithmetic, square root and
 comparison act on each lane separately with the instructions that plain numbers use, so that a joint has the same bits
 in any lane, beside any other joints, or alone. A mask cannot be the condition of an ``if``: kernels select values with
 `where`, and skip work with `any_of`, `all_of`.
@@ -20,6 +21,7 @@ WIDTH = 8 if get_host_cpu_features().get("avx512f") else 4
 """Number of lanes: doubles in a register of 512 or 256 bits. No result depends on it."""
 
 DOUBLES = ir.VectorType(ir.DoubleType(), WIDTH)
+SINGLES = ir.VectorType(ir.FloatType(), WIDTH)
 BOOLS = ir.VectorType(ir.IntType(1), WIDTH)
 
 
@@ -32,14 +34,29 @@ class LaneType(types.Type):
         super().__init__(name=f"Lane{WIDTH}")
 
     def unify(self, typingctx, other):
-        """Common type of lanes and plain numbers: lanes."""
-        return self if isinstance(other, types.Integer | types.Float) else None
+        """Common type of lanes and plain numbers, or lanes of single precision: lanes."""
+        return self if isinstance(other, types.Integer | types.Float | SingleType) else None
 
     def can_convert_from(self, typingctx, other):
-        """Plain numbers convert to lanes: the same value in every lane."""
+        """Plain numbers convert to lanes: the same value in every lane; those of single precision do, too."""
         from numba.core.typeconv import Conversion
 
-        return Conversion.safe if isinstance(other, types.Integer | types.Float) else None
+        return Conversion.safe if isinstance(other, types.Integer | types.Float | SingleType) else None
+
+
+class SingleType(types.Type):
+    """`WIDTH` numbers of single precision, one per joint."""
+
+    bitwidth = 32 * WIDTH
+
+    def __init__(self):
+        super().__init__(name=f"Single{WIDTH}")
+
+    def can_convert_from(self, typingctx, other):
+        """Lanes convert by rounding, as plain numbers do where they are stored."""
+        from numba.core.typeconv import Conversion
+
+        return Conversion.unsafe if isinstance(other, LaneType) else None
 
 
 class MaskType(types.Type):
@@ -59,7 +76,7 @@ class MaskType(types.Type):
         return Conversion.safe if isinstance(other, types.Boolean) else None
 
 
-LANE, MASK = LaneType(), MaskType()
+LANE, SINGLE, MASK = LaneType(), SingleType(), MaskType()
 
 
 @register_model(LaneType)
@@ -68,6 +85,14 @@ class LaneModel(models.PrimitiveModel):
 
     def __init__(self, dmm, fe_type):
         super().__init__(dmm, fe_type, DOUBLES)
+
+
+@register_model(SingleType)
+class SingleModel(models.PrimitiveModel):
+    """A vector of single-precision numbers."""
+
+    def __init__(self, dmm, fe_type):
+        super().__init__(dmm, fe_type, SINGLES)
 
 
 @register_model(MaskType)
@@ -90,13 +115,19 @@ def _number_to_lane(context, builder, fromty, toty, val):
     return _splat(builder, context.cast(builder, val, fromty, types.float64), DOUBLES)
 
 
+@lower_cast(SingleType, LaneType)
+def _widen(context, builder, fromty, toty, val):
+    return builder.fpext(val, DOUBLES)
+
+
+@lower_cast(LaneType, SingleType)
+def _round(context, builder, fromty, toty, val):
+    return builder.fptrunc(val, SINGLES)
+
+
 @lower_cast(types.Boolean, MaskType)
 def _boolean_to_mask(context, builder, fromty, toty, val):
     return _splat(builder, builder.trunc(val, ir.IntType(1)) if val.type.width > 1 else val, BOOLS)
-
-
-def _number(ty):
-    return isinstance(ty, LaneType | types.Integer | types.Float)
 
 
 def _operator(function, returns, operands, allowed, emit):
@@ -114,8 +145,12 @@ def _operator(function, returns, operands, allowed, emit):
         return emit(builder, *args)
 
 
+CONVERTED = {LANE: types.Integer | types.Float | SingleType, SINGLE: (), MASK: types.Boolean}
+"""Types of operands, beside lanes, singles or masks themselves, that convert to these."""
+
+
 def _fits(allowed, ty):
-    return ty == allowed or isinstance(ty, types.Boolean if allowed == MASK else types.Integer | types.Float)
+    return ty == allowed or isinstance(ty, CONVERTED[allowed])
 
 
 def _intrinsic_of(name):
@@ -130,8 +165,10 @@ def _intrinsic_of(name):
 
 for _name, _instruction in (("add", "fadd"), ("sub", "fsub"), ("mul", "fmul"), ("truediv", "fdiv")):
     for _function in (getattr(operator, _name), getattr(operator, f"i{_name}")):
-        _operator(_function, LANE, 2, LANE, lambda builder, a, b, name=_instruction: getattr(builder, name)(a, b))
-_operator(operator.neg, LANE, 1, LANE, lambda builder, a: builder.fneg(a))
+        for _type in (LANE, SINGLE):
+            _operator(_function, _type, 2, _type, lambda builder, a, b, name=_instruction: getattr(builder, name)(a, b))
+for _type in (LANE, SINGLE):
+    _operator(operator.neg, _type, 1, _type, lambda builder, a: builder.fneg(a))
 for _function, _sign in (
     (operator.lt, "<"),
     (operator.le, "<="),
@@ -242,10 +279,18 @@ def fma(a, b, c):
     return a * b + c
 
 
+FUSED = (
+    (f"v{WIDTH}f64", LANE, DOUBLES),
+    (f"v{WIDTH}f32", SINGLE, SINGLES),
+    ("f64", types.float64, ir.DoubleType()),
+    ("f32", types.float32, ir.FloatType()),
+)
+"""LLVM's name of the operands, Numba's and LLVM's type: the first that one of the operands has is that of all."""
+
+
 @intrinsic
 def _fused(typingctx, a, b, c):
-    vector = LANE in (a, b, c)
-    name, ty, emitted = (f"v{WIDTH}f64", LANE, DOUBLES) if vector else ("f64", types.float64, ir.DoubleType())
+    name, ty, emitted = next(kind for kind in FUSED if kind[1] in (a, b, c))
 
     def codegen(context, builder, sig, args):
         function = cgutils.get_or_insert_function(
@@ -292,21 +337,28 @@ def _where(condition, a, b):
     return lambda condition, a, b: a if condition else b
 
 
-@intrinsic
-def _fenced_select(typingctx, mask, new, old):
-    def codegen(context, builder, sig, args):
-        fence = cgutils.get_or_insert_function(
-            builder.module, ir.FunctionType(DOUBLES, [DOUBLES]), f"llvm.arithmetic.fence.v{WIDTH}f64"
-        )
-        return builder.select(args[0], args[1], builder.call(fence, [args[2]]))
+def _fenced_select(ty, emitted, suffix):
+    def typing(typingctx, mask, new, old):
+        def codegen(context, builder, sig, args):
+            fence = cgutils.get_or_insert_function(
+                builder.module, ir.FunctionType(emitted, [emitted]), f"llvm.arithmetic.fence.v{WIDTH}{suffix}"
+            )
+            return builder.select(args[0], args[1], builder.call(fence, [args[2]]))
 
-    return LANE(MASK, LANE, LANE), codegen
+        return ty(MASK, ty, ty), codegen
+
+    return intrinsic(typing)
+
+
+_retained, _retained_single = _fenced_select(LANE, DOUBLES, "f64"), _fenced_select(SINGLE, SINGLES, "f32")
 
 
 @overload(retain, inline="never")
 def _retain(condition, new, old):
+    if condition == MASK and old == SINGLE:
+        return lambda condition, new, old: _retained_single(condition, new, old)
     if condition == MASK:
-        return lambda condition, new, old: _fenced_select(condition, new, old)
+        return lambda condition, new, old: _retained(condition, new, old)
     return lambda condition, new, old: new if condition else old
 
 

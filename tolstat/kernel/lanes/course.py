@@ -149,7 +149,7 @@ def advance(lane, options, control, motion):
 def step(lane, par, lanes, options, control, motion, samples, notes, out):
     """Record the grid point that a lane has reached and set up the next step; return the status."""
     k = control.k[lane]
-    record(k, lane, lanes[0], lanes[1], lanes[2].v, samples)
+    record(k, lane, lanes[0], lanes[1], samples)
     motion.memory[AHEAD, lane] = predict_increment(
         k, motion.q[:, lane], motion.v[:, lane], motion.ahead[:, lane], samples
     )
@@ -167,7 +167,7 @@ def step(lane, par, lanes, options, control, motion, samples, notes, out):
 def finish_closeup_part(lane, par, lanes, options, control, motion, fine, out):
     """Record a part of a closer look and set up the next one; return `OK` after the last part of the step."""
     j, part = control.looked[lane], control.grid[lane]
-    record_loads(lane, lanes[0], lanes[1], lanes[2].v, fine[j % 3])
+    record_loads(lane, lanes[1], fine[j % 3])
     count_in(j, fine, out)
     control.looked[lane] += 1
     control.part[lane] += 1
@@ -185,7 +185,7 @@ def finish_angle(lane, par, lanes, options, control, motion, samples, out):
     k, n = control.k[lane], options.steps_per_rev
     control.steps[lane] += 1
     control.passed[lane] = 1.0
-    record(k, lane, lanes[0], lanes[1], lanes[2].v, samples)
+    record(k, lane, lanes[0], lanes[1], samples)
     samples[k % n].tau = motion.q[PSI, lane]
     if k == n:
         k = 0
@@ -307,7 +307,7 @@ def part(lane, par, lanes, options, control, motion, samples, fine, past, out):
     if not control.error[lane] <= 1:
         status = reject_cell(lane, options, control, motion, past)
         return status, status == NOT_SETTLED
-    record_loads(lane, lanes[0], lanes[1], lanes[2].v, fine[control.part[lane] % 3])
+    record_loads(lane, lanes[1], fine[control.part[lane] % 3])
     count_in(control.part[lane], fine, past.extremes[0])
     control.steps[lane] += 1
     control.done[lane] += whole >> control.level[lane]
@@ -333,7 +333,7 @@ def finish_cell(lane, par, lanes, options, control, motion, samples, past, out):
     cells = past.mesh.size // samples.size
     if c % cells == 0:
         k = c // cells
-        record(k, lane, lanes[0], lanes[1], lanes[2].v, samples)
+        record(k, lane, lanes[0], lanes[1], samples)
         predict_increment(k, motion.q[:, lane], motion.v[:, lane], motion.ahead[:, lane], samples)
     if c % past.mesh.size == 0:
         halved = turns.halved

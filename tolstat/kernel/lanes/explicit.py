@@ -13,6 +13,7 @@ from tolstat.kernel.lanes.batch import empty, put_joint, put_start, samples_of
 from tolstat.kernel.lanes.lane_memory import as_lanes
 from tolstat.kernel.lanes.lockstep import end_joint
 from tolstat.kernel.mechanics.dynamics import acceleration
+from tolstat.kernel.mechanics.loads import complete_loads
 from tolstat.kernel.mechanics.topology import N_DOF
 from tolstat.kernel.revolution.explicit import (
     begin_explicit,
@@ -121,7 +122,7 @@ def arrive(lane, par, lanes, left, options, batch, samples, past, out):
             return NEWTON_FAILED, False
         start_revolution(lane, par, options, batch)
         return NOT_SETTLED, True
-    record(k, lane, lanes[0], lanes[1], motion.v[:, lane], samples)
+    record(k, lane, lanes[0], lanes[1], samples)
     if k < n:
         return NOT_SETTLED, True
     control.steps[lane] += steps
@@ -170,6 +171,8 @@ def explicit(steps, options, batch, queue):
         rest(lane, batch)
     while queued < len(queue.rows) or any_of(control.live > 0):
         arrived = bits_of(control.until <= 0)
+        if arrived > 0:
+            complete_loads(lanes[0], lanes[1])
         for lane in range(at.joint.size):
             trail = Trail(pasts.loads[lane], pasts.revolution[lane], pasts.notes[lane])
             past = Past(trail, pasts.turns[lane], pasts.extremes[lane], pasts.begun[lane], pasts.mesh[lane])

@@ -38,6 +38,7 @@ from tolstat.kernel.lanes.equilibrium import CV_STATIC
 from tolstat.kernel.lanes.lane_memory import as_lanes
 from tolstat.kernel.lanes.rounds import begin, classify_lanes, correct, refactorise
 from tolstat.kernel.mechanics.dynamics import residual
+from tolstat.kernel.mechanics.loads import complete_loads, write_loads
 from tolstat.kernel.mechanics.topology import N_DOF
 from tolstat.kernel.revolution.closeup import STEPS as STEPS_AGAIN
 from tolstat.kernel.revolution.closeup import on_a_peak, recall, switches
@@ -249,6 +250,9 @@ def lockstep(options, patience, batch, queue, tally):
         solved = solved | last
         if controlled and any_of(solved & (control.stage > 0)):
             control.error = load_error(control.h, par, motion)
+        if any_of(solved & (control.phase >= STEP)):
+            write_loads(motion.v, par, work)
+            complete_loads(par, work)
         acting, arrived = bits_of(solved | failed), bits_of(solved)
         # what follows stands here, not in a function of its own: passing the lanes to one cost 7 % of the time
         for lane in range(controls.joint.size):

@@ -9,8 +9,9 @@ import numpy as np
 
 from tolstat.common.load_kinds import CONTACTS, LOAD_KINDS, SPAN, measure_of
 from tolstat.kernel.mechanics.topology import INPUT_SHAFT, PSI
+from tolstat.kernel.mechanics.vector import row
 from tolstat.kernel.simd.jit import njit
-from tolstat.kernel.simd.lane import pick, where
+from tolstat.kernel.simd.lane import where
 
 FORCES, TORQUES, CONTACT_FORCES, SPEED_ERROR = (SPAN[key].start for key in ("F", "T", "contact", "psi"))
 AXIAL, LATERAL, MOMENT, DRIVE = (SPAN[key].start for key in ("axial", "lateral", "moment", "drive"))
@@ -50,15 +51,7 @@ OTHERS = np.setdiff1d(np.arange(N_INSTANT), DECIDING)
 
 
 @njit
-def output_speed(lane, work, v):
-    """Speed ratio tau and its error Psi, eq. (13), from the velocities `v`, (56,)."""
-    speed, rate = pick(work.drive[0], lane), pick(v[PSI], lane)
-    tau = (pick(work.shaft[0], lane) + rate) / speed
-    return tau, rate / (speed * tau)
-
-
-@njit
-def shaft_load(shaft, lane, par, work):
+def shaft_load(shaft, par, work):
     """Force (N) and moment about O (N m) that the joint exerts on a shaft, in axes of its ideal frame.
 
     Along an output shaft that slides the force is what its bearing carries, k_a s + c_a s' - F_a.
@@ -67,48 +60,48 @@ def shaft_load(shaft, lane, par, work):
     ----------
     shaft : int
         0 input shaft, 1 output shaft.
-    lane, par, work
+    par, work
         As in `write_loads`.
     """
     body = INPUT_SHAFT + shaft
-    x, y, z = pick(work.force[body, 0], lane), pick(work.force[body, 1], lane), pick(work.force[body, 2], lane)
-    m_x, m_y = pick(work.force[body, 3], lane), pick(work.force[body, 4], lane)
-    m_z = pick(work.force[body, 5], lane)
+    x, y, z = row(work.force, body)
+    m_x, m_y, m_z = work.force[body, 3], work.force[body, 4], work.force[body, 5]
     if shaft == 1:
-        s, rate = pick(work.pos[body, 2], lane), pick(work.vel[body, 2], lane)
-        carried = pick(par.k_a, lane) * s + pick(par.c_a, lane) * rate - pick(par.F_a, lane)
-        z = where(pick(par.slides, lane) > 0, carried, z)
+        s, rate = work.pos[body, 2], work.vel[body, 2]
+        z = where(par.slides > 0, par.k_a * s + par.c_a * rate - par.F_a, z)
         m_x, m_y = m_x - s * y, m_y + s * x
     return (x, y, z), (m_x, m_y, m_z)
 
 
 @njit
-def write_loads(lane, psi, par, work):
+def write_loads(v, par, work):
     """Write all loads at one instant to ``work.loads``, in place of moduli (`MODULUS`) their squares.
+
+    ``work.output`` gets speed ratio and its error, eq. (13).
 
     Parameters
     ----------
-    lane : int
-        Lane of the joint, or `ALL` for all lanes at once.
-    psi : float
-        Error of the speed ratio, eq. (13).
+    v : ndarray, shape (56,)
+        Velocities, m/s and rad/s.
     par : record of PARAM
-        The joint.
+        The joint, or the joints of all lanes.
     work : record of WORK
         Holds bushing loads, contact forces, and the resultants on the shafts.
     """
-    loads = work.loads
+    loads, speed = work.loads, work.drive[0]
+    tau = (work.shaft[0] + v[PSI]) / speed
+    work.output[0], work.output[1] = tau, v[PSI] / (speed * tau)
     for b in range(8):
         for kind in range(2):
             i = 3 * kind
-            x, y, z = pick(work.load[b, i], lane), pick(work.load[b, i + 1], lane), pick(work.load[b, i + 2], lane)
+            x, y, z = work.load[b, i], work.load[b, i + 1], work.load[b, i + 2]
             loads[(FORCES, TORQUES)[kind] + b] = x * x + y * y + z * z
     for pin in range(4):
         for i in range(len(CONTACTS)):
-            loads[CONTACT_FORCES + len(CONTACTS) * pin + i] = pick(work.contact[pin, i], lane)
-    loads[SPEED_ERROR] = abs(psi)
+            loads[CONTACT_FORCES + len(CONTACTS) * pin + i] = work.contact[pin, i]
+    loads[SPEED_ERROR] = abs(work.output[1])
     for shaft in range(2):
-        f, m = shaft_load(shaft, lane, par, work)
+        f, m = shaft_load(shaft, par, work)
         loads[AXIAL + shaft] = abs(f[2])
         loads[LATERAL + shaft] = f[0] * f[0] + f[1] * f[1]
         loads[MOMENT + shaft] = m[0] * m[0] + m[1] * m[1]
@@ -117,10 +110,22 @@ def write_loads(lane, psi, par, work):
 
 
 @njit
-def load_at(i, lane, work):
-    """Load `i` of the joint in a lane, from ``work.loads``."""
-    load = pick(work.loads[i], lane)
-    return math.sqrt(load) if MODULUS[i] else load
+def complete_loads(par, work):
+    """Take the roots of the squares that `write_loads` has written; write the loads of the shafts to ``work.shafts``.
+
+    These are forces and moments on the input shaft in G, on the output shaft in Ry(alpha): axes that do not turn.
+    """
+    for i in range(N_INSTANT):
+        if MODULUS[i]:
+            work.loads[i] = math.sqrt(work.loads[i])
+    for shaft in range(2):
+        cosine, sine = work.turned[shaft, 0], work.turned[shaft, 1]
+        first = 0
+        for x, y, z in shaft_load(shaft, par, work):
+            work.shafts[shaft, first] = cosine * x - sine * y
+            work.shafts[shaft, first + 1] = sine * x + cosine * y
+            work.shafts[shaft, first + 2] = z
+            first += 3
 
 
 @njit

@@ -37,7 +37,9 @@ FIELDS = {
     "load": (8, 6),  # bushing loads on the lump, in the base marker's (e, t, z)
     "contact": (4, 3),  # normal force at the outer and inner end station of each pin, resultant of all its stations
     "mode": (4,),  # contact mode of each pin
+    "output": (2,),  # speed ratio of the output shaft and its error Psi, eq. (13)
     "loads": (N_INSTANT,),  # as `loads.write_loads` writes them
+    "shafts": (2, 6),  # force and moment about O on input and output shaft, in axes that do not turn
     "station": (4, MAX_STATIONS, N_STATION),  # contact stations, see the column numbers above
     "block": (N_LUMPS + 8, 6, 6),  # matrices of the tangent, those of lumps above the diagonal; factorised in place
     "edge": (2, N_LUMPS, 6),  # its columns psi and s, rows of the output arms; of their pins and the hub: fill-in
@@ -54,7 +56,7 @@ All vectors of a body are in axes of its ideal frame.
 
 WORK = np.dtype([(name, np.float64, shape) for name, shape in FIELDS.items()])
 FACTORS = np.dtype([(name, np.float32, FIELDS[name]) for name in ("block", "edge", "corner", "solution")])
-"""A factorised tangent in use, in single precision: what that leaves of a residual is less than the tangent's age does."""
+"""A factorised tangent in use, in single precision: its age leaves more of a residual than rounding does."""
 
 
 def make_work():

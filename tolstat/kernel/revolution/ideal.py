@@ -4,6 +4,7 @@ import math
 
 from tolstat.kernel.codes import NOT_FINITE, OK, OUTSIDE_MODEL
 from tolstat.kernel.mechanics.ideal_loads import ideal_loads
+from tolstat.kernel.mechanics.loads import complete_loads, write_loads
 from tolstat.kernel.revolution.outcome import clear_results, clear_samples, finish, inside_model, is_finite
 from tolstat.kernel.revolution.settle import record, summarise
 from tolstat.kernel.simd.jit import njit
@@ -28,7 +29,9 @@ def ideal_revolution(par, options, at_rest, work, samples, notes, out):
     n = samples.size
     for k in range(n):
         ideal_loads(math.copysign(2 * math.pi * k / n, par.omega), at_rest, par, work)
-        record(k, 0, par, work, at_rest, samples)
+        write_loads(at_rest, par, work)
+        complete_loads(par, work)
+        record(k, 0, par, work, samples)
     out.closure, out.revolutions, out.period, out.steps = 0.0, 1.0, 1, n
     summarise(par, samples, out)
     finish(OK if is_finite(out) else NOT_FINITE, n, n, options, out)

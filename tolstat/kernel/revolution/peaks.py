@@ -16,9 +16,8 @@ from tolstat.kernel.mechanics.loads import (
     N_INSTANT,
     write_loads,
 )
-from tolstat.kernel.mechanics.topology import PSI
 from tolstat.kernel.simd.jit import njit
-from tolstat.kernel.simd.lane import ALL, any_of, pick, retain, where
+from tolstat.kernel.simd.lane import any_of, pick, retain, where
 
 PEAKS = np.dtype(
     [
@@ -53,7 +52,7 @@ def follow_value(i, load, peaks):
 @njit
 def follow(par, work, v, peaks):
     """Include the loads in ``work`` in `peaks`; `v`: velocities that they were evaluated at, (56,)."""
-    write_loads(ALL, v[PSI] / (work.shaft[0] + v[PSI]), par, work)
+    write_loads(v, par, work)
     for i in range(N_INSTANT):
         follow_value(i, work.loads[i], peaks)
 

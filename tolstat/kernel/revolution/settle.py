@@ -16,9 +16,7 @@ from tolstat.kernel.mechanics.loads import (
     OF_MEASURE,
     OF_TORQUES,
     OTHERS,
-    load_at,
-    output_speed,
-    shaft_load,
+    complete_loads,
     size_of,
     write_loads,
 )
@@ -81,13 +79,13 @@ def pressed(pin, lane, par, work):
 @njit
 def replace(i, lane, work, sample):
     """Record load `i` in `sample`; return its change since the revolution before, NaN in the first one."""
-    load, before = load_at(i, lane, work), sample.loads[i]
+    load, before = pick(work.loads[i], lane), sample.loads[i]
     sample.loads[i] = load
     return abs(load - before)
 
 
 @njit
-def record(k, lane, par, work, v, samples):
+def record(k, lane, par, work, samples):
     """Record a grid point, and the change of the loads that decide since the revolution before.
 
     Parameters
@@ -99,16 +97,13 @@ def record(k, lane, par, work, v, samples):
     par : record of PARAM
         The joint.
     work : record of WORK
-        The joint's last evaluation; its ``loads`` are written.
-    v : ndarray, shape (56,)
-        Velocities at that evaluation, m/s and rad/s.
+        The joint's last evaluation, with complete loads (`loads.complete_loads`).
     samples : ndarray of SAMPLE, shape (n,)
         Written.
     """
     sample = samples[k % samples.size]
     fetch(samples[(k + 2) % samples.size])
-    sample.tau, sample.psi = output_speed(lane, work, v)
-    write_loads(lane, sample.psi, par, work)
+    sample.tau, sample.psi = pick(work.output[0], lane), pick(work.output[1], lane)
     s = pick(work.pos[OUTPUT_SHAFT, 2], lane)
     shift = centring_stiffness(lane, par) * abs(s - sample.s)
     for measure in range(N_MEASURES):
@@ -123,34 +118,23 @@ def record(k, lane, par, work, v, samples):
         sample.change[measure, ALL_LOADS] = change
     sample.s = s
     for i in OTHERS:
-        sample.loads[i] = load_at(i, lane, work)
+        sample.loads[i] = pick(work.loads[i], lane)
     for b in range(8):
         for i in range(6):
             sample.components[b, i] = pick(work.load[b, i], lane)
     for shaft in range(2):
-        write_shaft(shaft, lane, par, work, sample.shafts[shaft])
+        for i in range(6):
+            sample.shafts[shaft, i] = pick(work.shafts[shaft, i], lane)
     for pin in range(4):
         sample.mode[pin] = int(pick(work.mode[pin], lane))
         sample.pressed[pin] = pressed(pin, lane, par, work)
 
 
 @njit
-def record_loads(lane, par, work, v, loads):
-    """Write all loads at one instant, shape (N_INSTANT,); other arguments as of `record`."""
-    _, psi = output_speed(lane, work, v)
-    write_loads(lane, psi, par, work)
+def record_loads(lane, work, loads):
+    """Write all loads at one instant to `loads`, shape (N_INSTANT,); other arguments as of `record`."""
     for i in range(N_INSTANT):
-        loads[i] = load_at(i, lane, work)
-
-
-@njit
-def write_shaft(shaft, lane, par, work, out):
-    """Write force and moment on `shaft` to `out`, (6,): of the input (0) in G, of the output shaft (1) in Ry(alpha)."""
-    cosine, sine = pick(work.turned[shaft, 0], lane), pick(work.turned[shaft, 1], lane)
-    first = 0
-    for x, y, z in shaft_load(shaft, lane, par, work):
-        out[first], out[first + 1], out[first + 2] = cosine * x - sine * y, sine * x + cosine * y, z
-        first += 3
+        loads[i] = pick(work.loads[i], lane)
 
 
 @njit
@@ -315,4 +299,6 @@ def sample(times, states, par, work, samples):
     """
     for k in range(times.size):
         forces(times[k], states[k, :N_DOF], states[k, N_DOF:], par, work)
-        record(k, 0, par, work, states[k, N_DOF:], samples)
+        write_loads(states[k, N_DOF:], par, work)
+        complete_loads(par, work)
+        record(k, 0, par, work, samples)

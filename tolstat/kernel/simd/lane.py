@@ -259,19 +259,14 @@ def _extract(typingctx, lanes, lane):
     return types.float64(LANE, types.intp), codegen
 
 
-ALL = None
-"""In place of the number of a lane: the values of all lanes."""
-
-
 def pick(value, lane):
-    """Value of the joint in `lane`, or those in `ALL` lanes; a plain number is returned as it is."""
+    """Value of the joint in `lane`; a plain number is returned as it is."""
     return value
 
 
 @overload(pick)
 def _pick(value, lane):
-    one = value == LANE and lane != types.none
-    return (lambda value, lane: _extract(value, lane)) if one else (lambda value, lane: value)
+    return (lambda value, lane: _extract(value, lane)) if value == LANE else (lambda value, lane: value)
 
 
 def fma(a, b, c):

@@ -14,7 +14,7 @@ from tolstat.joint.contact import PREDEFINED
 from tolstat.kernel.mechanics import dynamics, linsolve, tangent
 from tolstat.kernel.mechanics.motion import ideal_motion, to_arm, to_cross, velocity_in
 from tolstat.kernel.mechanics.topology import N_DOF, PSI, S
-from tolstat.kernel.mechanics.work import make_work
+from tolstat.kernel.mechanics.work import FIELDS, make_work
 
 OPTIONS = Options()
 
@@ -155,7 +155,8 @@ def test_tangent_is_the_derivative_of_the_residual(params, random_errors, law, s
 @pytest.mark.parametrize("law", ["mode", "sliced"])
 def test_block_elimination_is_lapack(params, random_errors, law, shaft):
     par, t, q, v = loaded(params, random_errors, law, shaft=shaft)
-    work = make_work()
+    doubles = np.dtype([(name, "f8", shape) for name, shape in FIELDS.items()])
+    work = np.zeros(1, doubles).view(np.recarray)[0]
     dynamics.forces(t, q, v, par, work)
     tangent.assemble(2000.0, 4e6, 2000.0, par, work)
     full = dense(work)

@@ -16,7 +16,7 @@ from tolstat.joint.contact import PREDEFINED
 from tolstat.kernel.lanes import lockstep
 from tolstat.kernel.lanes.lane_memory import aligned_zeros, as_lanes, lane_dtype
 from tolstat.kernel.simd.jit import njit_inner
-from tolstat.kernel.simd.lane import WIDTH, all_of, any_of, bits_of, count_of, pick, where
+from tolstat.kernel.simd.lane import WIDTH, all_of, any_of, bits_of, count_of, fma, pick, reciprocal, retain, where
 from tolstat.solver import simulation, stationary
 
 STUDY = REFERENCE.parents[1] / "studies" / "rigid_shafts.toml"
@@ -62,6 +62,32 @@ def test_operations_are_those_of_numpy():
         more = x > y
         assert reduced[:4] == (more.any(), more.all(), more.sum(), sum(int(m) << i for i, m in enumerate(more)))
         np.testing.assert_equal(reduced[4], x[-1])
+
+
+SINGLES = np.dtype([("a", "f4"), ("b", "f4"), ("x", "f8"), ("out", "f4", 9), ("mixed", "f8", 3)])
+"""Two operands in single precision and one in double, and results of operations on them."""
+
+
+@njit_inner
+def single_operations(record):
+    singles = as_lanes(record)
+    a, b, x, out, mixed = singles.a, singles.b, singles.x, singles.out, singles.mixed
+    out[0], out[1], out[2], out[3], out[4] = a + b, a - b, a * b, a / b, -a
+    out[5], out[6], out[7], out[8] = fma(a, b, a), reciprocal(a), x, retain(x > 0, x, b)
+    mixed[0], mixed[1], mixed[2] = a * x, 2.0 * a, fma(a, x, b)
+
+
+def test_singles_compute_in_single_precision_and_with_doubles_in_double():
+    record = aligned_zeros(1, lane_dtype(SINGLES)).view(np.recarray)[0]
+    rng = np.random.default_rng(5)
+    a, b, x = (rng.normal(size=WIDTH).astype(kind) for kind in ("f4", "f4", "f8"))
+    record.a[:], record.b[:], record.x[:] = a, b, x
+    single_operations(record)
+    once = (a.astype("f8") * b + a).astype("f4")  # a product of singles is exact in double precision
+    expected = [a + b, a - b, a * b, a / b, -a, once, 1 / a, x.astype("f4"), np.where(x > 0, x, b).astype("f4")]
+    np.testing.assert_array_equal(record.out, np.array(expected))
+    assert record.out.dtype == np.float32
+    np.testing.assert_allclose(record.mixed, [a * x, 2.0 * a.astype("f8"), a * x + b], rtol=1e-15)
 
 
 def libm(function, *arguments):

@@ -108,7 +108,7 @@ def test_ideal_loads_and_equations_of_motion_fill_the_same_fields(params) -> Non
         assert ideal[name].all(), name
     work = make_work()
     ideal_loads.ideal_loads(0.5, at_rest, par, work)
-    loads.write_loads(0, 0.0, par, work)
+    loads.write_loads(at_rest, par, work)
     assert np.isfinite(work.loads).all()
 
 

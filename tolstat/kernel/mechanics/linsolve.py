@@ -13,7 +13,7 @@ from tolstat.kernel.mechanics.rotation import unspin
 from tolstat.kernel.mechanics.topology import ARM, ARM_OF_PIN, HUB, N_LUMPS, PIN, PSI, S
 from tolstat.kernel.mechanics.work import ARM_PIN, OF_PSI, OF_S, PIN_HUB
 from tolstat.kernel.simd.jit import njit
-from tolstat.kernel.simd.lane import fma
+from tolstat.kernel.simd.lane import fma, reciprocal
 
 
 @njit
@@ -136,7 +136,7 @@ def invert_three(s):
     det = vector.dot((s[0], s[1], s[2]), of_x)
     of_y = fma(s[0], s[5], -s[2] * s[2]), fma(s[1], s[2], -s[0] * s[4])
     of_z = fma(s[0], s[3], -s[1] * s[1])
-    r = 1 / det
+    r = reciprocal(det)
     return (r * of_x[0], r * of_x[1], r * of_x[2], r * of_y[0], r * of_y[1], r * of_z), abs(r) < 1e300
 
 
@@ -236,7 +236,8 @@ def factorise(work):
         if ARM_OF_PIN[p] < 2:  # input fork
             continue
         for unknown in (OF_PSI, OF_S):
-            of_pin = minus_transposed_product(none, m, ARM_PIN + p, edge(e, unknown, arm))
+            put_edge(e, unknown, pin, none)
+            of_pin = minus_transposed_product(edge(e, unknown, pin), m, ARM_PIN + p, edge(e, unknown, arm))
             of_hub = minus_transposed_product(edge(e, unknown, HUB), m, PIN_HUB + p, of_pin)
             put_edge(e, unknown, pin, of_pin)
             put_edge(e, unknown, HUB, of_hub)
@@ -244,9 +245,9 @@ def factorise(work):
         reduce_corner(pin, work)
     regular = regular & invert(m, HUB)
     reduce_corner(HUB, work)
-    pivot = 1 / corner[OF_PSI, OF_PSI]
+    pivot = reciprocal(corner[OF_PSI, OF_PSI])
     factor = corner[OF_PSI, OF_S] * pivot
-    last = 1 / (corner[OF_S, OF_S] - factor * corner[OF_PSI, OF_S])
+    last = reciprocal(corner[OF_S, OF_S] - factor * corner[OF_PSI, OF_S])
     corner[OF_PSI, OF_PSI], corner[OF_PSI, OF_S], corner[OF_S, OF_S] = pivot, factor, last
     return regular & (abs(pivot) < 1e300) & (abs(last) < 1e300)
 

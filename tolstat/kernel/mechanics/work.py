@@ -54,9 +54,11 @@ FIELDS = {
 All vectors of a body are in axes of its ideal frame.
 """
 
-WORK = np.dtype([(name, np.float64, shape) for name, shape in FIELDS.items()])
+SINGLE = ("block", "edge", "corner", "vectors", "by_n", "by_m", "solution")
+"""Fields in single precision, those of the tangent: its age leaves more of a residual than rounding does."""
+WORK = np.dtype([(name, np.float32 if name in SINGLE else np.float64, shape) for name, shape in FIELDS.items()])
 FACTORS = np.dtype([(name, np.float32, FIELDS[name]) for name in ("block", "edge", "corner", "solution")])
-"""A factorised tangent in use, in single precision: its age leaves more of a residual than rounding does."""
+"""A factorised tangent in use."""
 
 
 def make_work():

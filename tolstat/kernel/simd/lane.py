@@ -10,6 +10,7 @@ in any lane, beside any other joints, or alone. A mask cannot be the condition o
 import math
 import operator
 
+import numpy as np
 from llvmlite import ir
 from llvmlite.binding import get_host_cpu_features
 from numba.core import cgutils, types
@@ -53,10 +54,10 @@ class SingleType(types.Type):
         super().__init__(name=f"Single{WIDTH}")
 
     def can_convert_from(self, typingctx, other):
-        """Lanes convert by rounding, as plain numbers do where they are stored."""
+        """Lanes and plain numbers convert by rounding."""
         from numba.core.typeconv import Conversion
 
-        return Conversion.unsafe if isinstance(other, LaneType) else None
+        return Conversion.unsafe if isinstance(other, types.Integer | types.Float | LaneType) else None
 
 
 class MaskType(types.Type):
@@ -115,6 +116,12 @@ def _number_to_lane(context, builder, fromty, toty, val):
     return _splat(builder, context.cast(builder, val, fromty, types.float64), DOUBLES)
 
 
+@lower_cast(types.Float, SingleType)
+@lower_cast(types.Integer, SingleType)
+def _number_to_single(context, builder, fromty, toty, val):
+    return _splat(builder, context.cast(builder, val, fromty, types.float32), SINGLES)
+
+
 @lower_cast(SingleType, LaneType)
 def _widen(context, builder, fromty, toty, val):
     return builder.fpext(val, DOUBLES)
@@ -131,11 +138,11 @@ def _boolean_to_mask(context, builder, fromty, toty, val):
 
 
 def _operator(function, returns, operands, allowed, emit):
-    """Define a Python operator or function for lanes or masks; `emit` (builder, *values) generates its code."""
+    """Define a Python operator or function for lanes, singles or masks; `emit` (builder, *values) generates code."""
 
     class Template(AbstractTemplate):
         def generic(self, args, kws):
-            if len(args) == operands and allowed in args and all(_fits(allowed, a) for a in args):
+            if len(args) == operands and _fit(allowed, function, args):
                 return signature(returns, *[allowed] * operands)
 
     infer_global(function)(Template)
@@ -145,12 +152,23 @@ def _operator(function, returns, operands, allowed, emit):
         return emit(builder, *args)
 
 
-CONVERTED = {LANE: types.Integer | types.Float | SingleType, SINGLE: (), MASK: types.Boolean}
-"""Types of operands, beside lanes, singles or masks themselves, that convert to these."""
+ARITHMETIC = {
+    getattr(operator, f"{prefix}{name}"): f"f{instruction}"
+    for name, instruction in (("add", "add"), ("sub", "sub"), ("mul", "mul"), ("truediv", "div"))
+    for prefix in ("", "i")
+}
+"""LLVM's instruction for each operator of singles; other functions of singles are those of lanes."""
 
 
-def _fits(allowed, ty):
-    return ty == allowed or isinstance(ty, CONVERTED[allowed])
+def _fit(allowed, function, args):
+    """Whether operands convert to `allowed`. As with plain numbers, a single and a double make a double."""
+    if allowed == MASK:
+        return MASK in args and all(isinstance(a, MaskType | types.Boolean) for a in args)
+    singles = all(a == SINGLE for a in args) and (function in ARITHMETIC or function == operator.neg)
+    if allowed == SINGLE or singles:
+        return allowed == SINGLE and singles
+    lanes = LANE in args or SINGLE in args
+    return lanes and all(isinstance(a, LaneType | SingleType | types.Integer | types.Float) for a in args)
 
 
 def _intrinsic_of(name):
@@ -163,11 +181,9 @@ def _intrinsic_of(name):
     return emit
 
 
-for _name, _instruction in (("add", "fadd"), ("sub", "fsub"), ("mul", "fmul"), ("truediv", "fdiv")):
-    for _function in (getattr(operator, _name), getattr(operator, f"i{_name}")):
-        for _type in (LANE, SINGLE):
-            _operator(_function, _type, 2, _type, lambda builder, a, b, name=_instruction: getattr(builder, name)(a, b))
 for _type in (LANE, SINGLE):
+    for _function, _instruction in ARITHMETIC.items():
+        _operator(_function, _type, 2, _type, lambda builder, a, b, name=_instruction: getattr(builder, name)(a, b))
     _operator(operator.neg, _type, 1, _type, lambda builder, a: builder.fneg(a))
 for _function, _sign in (
     (operator.lt, "<"),
@@ -274,18 +290,19 @@ def fma(a, b, c):
     return a * b + c
 
 
-FUSED = (
-    (f"v{WIDTH}f64", LANE, DOUBLES),
-    (f"v{WIDTH}f32", SINGLE, SINGLES),
-    ("f64", types.float64, ir.DoubleType()),
-    ("f32", types.float32, ir.FloatType()),
-)
-"""LLVM's name of the operands, Numba's and LLVM's type: the first that one of the operands has is that of all."""
+FUSED = {
+    (True, False): (f"v{WIDTH}f64", LANE, DOUBLES),
+    (True, True): (f"v{WIDTH}f32", SINGLE, SINGLES),
+    (False, False): ("f64", types.float64, ir.DoubleType()),
+    (False, True): ("f32", types.float32, ir.FloatType()),
+}
+"""By whether operands are lanes, and all of single precision: LLVM's name, Numba's type, LLVM's type."""
 
 
 @intrinsic
 def _fused(typingctx, a, b, c):
-    name, ty, emitted = next(kind for kind in FUSED if kind[1] in (a, b, c))
+    operands = {a, b, c}
+    name, ty, emitted = FUSED[bool(operands & {LANE, SINGLE}), operands <= {SINGLE, types.float32}]
 
     def codegen(context, builder, sig, args):
         function = cgutils.get_or_insert_function(
@@ -299,6 +316,26 @@ def _fused(typingctx, a, b, c):
 @overload(fma)
 def _fma(a, b, c):
     return lambda a, b, c: _fused(a, b, c)
+
+
+def reciprocal(x):
+    """Return 1 / x, in the precision of `x`."""
+    return x.dtype.type(1) / x if isinstance(x, np.floating) else 1 / x
+
+
+@intrinsic
+def _inverse(typingctx, x):
+    def codegen(context, builder, sig, args):
+        (value,) = args
+        one = ir.Constant(value.type, [1.0] * WIDTH if x in (LANE, SINGLE) else 1.0)
+        return builder.fdiv(one, value)
+
+    return x(x), codegen
+
+
+@overload(reciprocal)
+def _reciprocal(x):
+    return lambda x: _inverse(x)
 
 
 def where(condition, a, b):

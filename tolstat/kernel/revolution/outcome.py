@@ -92,7 +92,8 @@ def check_settled(k, iterations, par, options, samples, notes, out):
     """
     n, twelfth = options.steps_per_rev, options.steps_per_rev // CHECKS_PER_REV
     out.revolutions = k / n
-    if n + 2 * twelfth <= k < 2 * n and (k - n) % twelfth == 0:
+    early = n + 2 * twelfth <= k < 2 * n and (k - n) % twelfth == 0
+    if early and not out.step_error > EARLY_STEP_ERROR:  # as it is once a motion that repeats has too large an error
         first, last, bound = (k - n) // 2 + 1, k - n + 1, options.settle_tol
         closure_of_bushings = closure_error(first, last, BUSHINGS_ONLY, samples)
         closure = closure_error(first, last, ALL_LOADS, samples)

@@ -80,28 +80,18 @@ class MaskType(types.Type):
 LANE, SINGLE, MASK = LaneType(), SingleType(), MaskType()
 
 
-@register_model(LaneType)
-class LaneModel(models.PrimitiveModel):
-    """A vector of doubles, in registers and in memory."""
+def _stored_as(vector):
+    """Data model of a type whose values are LLVM's `vector`, in registers and in memory."""
 
-    def __init__(self, dmm, fe_type):
-        super().__init__(dmm, fe_type, DOUBLES)
+    class Model(models.PrimitiveModel):
+        def __init__(self, dmm, fe_type):
+            super().__init__(dmm, fe_type, vector)
 
-
-@register_model(SingleType)
-class SingleModel(models.PrimitiveModel):
-    """A vector of single-precision numbers."""
-
-    def __init__(self, dmm, fe_type):
-        super().__init__(dmm, fe_type, SINGLES)
+    return Model
 
 
-@register_model(MaskType)
-class MaskModel(models.PrimitiveModel):
-    """A vector of bits."""
-
-    def __init__(self, dmm, fe_type):
-        super().__init__(dmm, fe_type, BOOLS)
+for _type, _vector in ((LaneType, DOUBLES), (SingleType, SINGLES), (MaskType, BOOLS)):
+    register_model(_type)(_stored_as(_vector))
 
 
 def _splat(builder, value, vector_type):
@@ -206,41 +196,23 @@ _operator(min, LANE, 2, LANE, lambda builder, a, b: builder.select(builder.fcmp_
 def _each(function_name):
     """Code generator: a scalar libm call for each lane."""
 
-    def emit(builder, value):
+    def emit(builder, *values):
+        double = ir.DoubleType()
         function = cgutils.get_or_insert_function(
-            builder.module, ir.FunctionType(ir.DoubleType(), [ir.DoubleType()]), function_name
+            builder.module, ir.FunctionType(double, [double] * len(values)), function_name
         )
         out = ir.Constant(DOUBLES, ir.Undefined)
         for i in range(WIDTH):
             index = ir.IntType(32)(i)
-            out = builder.insert_element(out, builder.call(function, [builder.extract_element(value, index)]), index)
+            value = builder.call(function, [builder.extract_element(one, index) for one in values])
+            out = builder.insert_element(out, value, index)
         return out
 
     return emit
 
 
-for _function in (math.sin, math.cos, math.tan):
-    _operator(_function, LANE, 1, LANE, _each(_function.__name__))
-
-
-@infer_global(math.atan2)
-class _Atan2(AbstractTemplate):
-    def generic(self, args, kws):
-        if LANE in args:
-            return signature(LANE, LANE, LANE)
-
-
-@lower_builtin(math.atan2, LaneType, LaneType)
-def _atan2(context, builder, sig, args):
-    function = cgutils.get_or_insert_function(
-        builder.module, ir.FunctionType(ir.DoubleType(), [ir.DoubleType()] * 2), "atan2"
-    )
-    out = ir.Constant(DOUBLES, ir.Undefined)
-    for i in range(WIDTH):
-        index = ir.IntType(32)(i)
-        value = builder.call(function, [builder.extract_element(a, index) for a in args])
-        out = builder.insert_element(out, value, index)
-    return out
+for _function, _operands in ((math.sin, 1), (math.cos, 1), (math.tan, 1), (math.atan2, 2)):
+    _operator(_function, LANE, _operands, LANE, _each(_function.__name__))
 
 
 @intrinsic
@@ -364,9 +336,7 @@ def all_of(condition):
 
 @overload(where, inline="never")
 def _where(condition, a, b):
-    if condition == MASK:
-        return lambda condition, a, b: _select(condition, a, b)
-    return lambda condition, a, b: a if condition else b
+    return (lambda condition, a, b: _select(condition, a, b)) if condition == MASK else where
 
 
 def _fenced_select(ty, emitted, suffix):
@@ -387,21 +357,8 @@ _retained, _retained_single = _fenced_select(LANE, DOUBLES, "f64"), _fenced_sele
 
 @overload(retain, inline="never")
 def _retain(condition, new, old):
-    if condition == MASK and old == SINGLE:
-        return lambda condition, new, old: _retained_single(condition, new, old)
-    if condition == MASK:
-        return lambda condition, new, old: _retained(condition, new, old)
-    return lambda condition, new, old: new if condition else old
-
-
-@overload(any_of)
-def _any_of(condition):
-    return (lambda condition: _any(condition)) if condition == MASK else (lambda condition: condition)
-
-
-@overload(all_of)
-def _all_of(condition):
-    return (lambda condition: _all(condition)) if condition == MASK else (lambda condition: condition)
+    of_mask = _retained_single if old == SINGLE else _retained
+    return (lambda condition, new, old: of_mask(condition, new, old)) if condition == MASK else retain
 
 
 def bits_of(condition):
@@ -414,27 +371,27 @@ def count_of(condition):
     return int(condition)
 
 
-@intrinsic
-def _bits(typingctx, mask):
-    def codegen(context, builder, sig, args):
-        return builder.zext(builder.bitcast(args[0], ir.IntType(WIDTH)), ir.IntType(64))
+def _integer_of(emit):
+    def typing(typingctx, mask):
+        def codegen(context, builder, sig, args):
+            bits = builder.bitcast(args[0], ir.IntType(WIDTH))
+            return builder.zext(emit(builder, bits), ir.IntType(64))
 
-    return types.int64(MASK), codegen
+        return types.int64(MASK), codegen
 
-
-@intrinsic
-def _count(typingctx, mask):
-    def codegen(context, builder, sig, args):
-        return builder.zext(builder.ctpop(builder.bitcast(args[0], ir.IntType(WIDTH))), ir.IntType(64))
-
-    return types.int64(MASK), codegen
+    return intrinsic(typing)
 
 
-@overload(bits_of)
-def _bits_of(condition):
-    return (lambda condition: _bits(condition)) if condition == MASK else (lambda condition: int(condition))
+_bits, _count = _integer_of(lambda builder, bits: bits), _integer_of(lambda builder, bits: builder.ctpop(bits))
 
 
-@overload(count_of)
-def _count_of(condition):
-    return (lambda condition: _count(condition)) if condition == MASK else (lambda condition: int(condition))
+def _define(function, of_mask):
+    """Let compiled code evaluate `function` of a mask by `of_mask`, of a plain boolean as Python does."""
+
+    @overload(function)
+    def choose(condition):
+        return (lambda condition: of_mask(condition)) if condition == MASK else function
+
+
+for _function, _of_mask in ((any_of, _any), (all_of, _all), (bits_of, _bits), (count_of, _count)):
+    _define(_function, _of_mask)

@@ -19,8 +19,6 @@ start is forgotten within the first twelfth. The first number is the closure err
 ``settle_tol``, the second that of all loads, since a shaft carries the sum of two of them, the third the step error, up
 to which that holds. Of 12 000 joints none was settled by bushing loads alone that would not have been at the end of the
 second revolution (docs/notes/steps.md)."""
-LATER_STEP_ERROR = 0.01
-"""Step error up to which a start that is forgotten later, within up to half a revolution, is enough likewise."""
 
 
 @njit
@@ -94,10 +92,8 @@ def check_settled(k, iterations, par, options, samples, notes, out):
     """
     n, twelfth = options.steps_per_rev, options.steps_per_rev // CHECKS_PER_REV
     out.revolutions = k / n
-    early = n + 2 * twelfth <= k < 2 * n and (k - n) % twelfth == 0
-    allowed = EARLY_STEP_ERROR if k == n + 2 * twelfth else LATER_STEP_ERROR
-    if early and not out.step_error > allowed:  # it is NaN until a motion repeats
-        first, last, bound = (k - n) // 2 + 1, k - n + 1, options.settle_tol
+    if k == n + 2 * twelfth:
+        first, last, bound = twelfth + 1, 2 * twelfth + 1, options.settle_tol
         closure_of_bushings = closure_error(first, last, BUSHINGS_ONLY, samples)
         closure = closure_error(first, last, ALL_LOADS, samples)
         out.closure = with_slow_decay(closure, out.revolutions, par, notes)
@@ -105,10 +101,10 @@ def check_settled(k, iterations, par, options, samples, notes, out):
         small = small and out.closure <= EARLY_SUMS * bound
         if small:
             out.step_error = step_error(par, samples)
-            if out.step_error <= allowed:
+            if out.step_error <= EARLY_STEP_ERROR:
                 return OK
     if k >= 2 * n and (k * CHECKS_PER_REV) % n < CHECKS_PER_REV:
-        closure, out.step_error = closure_error(0, n, ALL_LOADS, samples), np.nan
+        closure = closure_error(0, n, ALL_LOADS, samples)
         note_closure(out.revolutions, closure, notes)
         out.closure = with_slow_decay(closure, out.revolutions, par, notes)
         if out.closure <= options.settle_tol:

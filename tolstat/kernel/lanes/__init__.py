@@ -8,8 +8,8 @@ queue : Queue
     The joints, and where their results are written.
 control, motion : records
     Those of the batch, read joint by joint or, in functions of all lanes, read as lanes.
-tangent : record of WORK, read as lanes
-    Blocks of the factorised tangents.
+tangent : record of FACTORS, read as lanes
+    The factorised tangents in use.
 lanes : tuple
     Parameters, work and motion of all joints, read as lanes.
 joint : int

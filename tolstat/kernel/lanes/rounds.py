@@ -123,7 +123,7 @@ def classify_lanes(options, motion, control):
 
 @njit
 def keep_tangent(mask, new, old):
-    """Copy a factorised tangent in the lanes of the mask; `new`, `old`: records of WORK."""
+    """Copy a factorised tangent in the lanes of the mask, from `new`, a record of WORK, to `old`, one of FACTORS."""
     for b in range(new.block.shape[0]):
         for i in range(6):
             for j in range(i if b < N_LUMPS else 0, 6):

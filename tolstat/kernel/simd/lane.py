@@ -1,10 +1,9 @@
 """Lanes: one value for each of several joints, in one SIMD register. Kernels accept plain numbers or lanes.
 
 `Lane` is a Numba type whose value is an LLVM vector of doubles, `Single` one of single-precision numbers, `Mask` one of
-booleans. Arithmetic, square root and
-comparison act on each lane separately with the instructions that plain numbers use, so that a joint has the same bits
-in any lane, beside any other joints, or alone. A mask cannot be the condition of an ``if``: kernels select values with
-`where`, and skip work with `any_of`, `all_of`.
+booleans. Arithmetic, square root and comparison act on each lane separately with the instructions that plain numbers
+use, so that a joint has the same bits in any lane, beside any other joints, or alone. A mask cannot be the condition of
+an ``if``: kernels select values with `where`, and skip work with `any_of`, `all_of`.
 """
 
 import math

@@ -168,6 +168,21 @@ def test_block_elimination_is_lapack(params, random_errors, law, shaft):
     np.testing.assert_allclose(work.solution, expected, rtol=1e-9, atol=1e-12 * np.abs(expected).max())
 
 
+@SHAFTS
+def test_single_precision_bears_the_shortest_steps(params, random_errors, shaft):
+    """With steps of 10 ns, m / h^2 is some 1e17 N/m, and a product of three of them beyond the largest single."""
+    par, t, q, v = loaded(params, random_errors, "mode", shaft=shaft)
+    work = make_work()
+    dynamics.forces(t, q, v, par, work)
+    tangent.assemble(2e8, 4e16, 2e8, par, work)
+    full, rhs = dense(work), np.random.default_rng(1).normal(size=N_DOF)
+    assert linsolve.factorise(work)
+    work.solution[:] = rhs
+    linsolve.solve(np.zeros(N_DOF), work)
+    expected = np.linalg.solve(full, rhs)
+    np.testing.assert_allclose(work.solution, expected, rtol=1e-4, atol=1e-9 * np.abs(expected).max())
+
+
 def test_a_singular_block_is_reported(params):
     work = make_work()
     dynamics.forces(0.0, np.zeros(N_DOF), np.zeros(N_DOF), params()[0], work)

@@ -128,15 +128,18 @@ def less(a, s, b):
 
 @njit
 def invert_three(s):
-    """Inverse of a symmetric 3 x 3 matrix, and whether its determinant is finite and not zero.
+    """Inverse of a symmetric 3 x 3 matrix with a positive trace, and whether it is regular and finite.
 
-    Matrices are given by their entries 00, 01, 02, 11, 12, 22.
+    Matrices are given by their entries 00, 01, 02, 11, 12, 22. They are scaled to the trace 1: with short steps the
+    determinant, the third power of m / h^2, would be too large for single precision.
     """
+    size = reciprocal(s[0] + s[3] + s[5])
+    s = (size * s[0], size * s[1], size * s[2], size * s[3], size * s[4], size * s[5])
     of_x = fma(s[3], s[5], -s[4] * s[4]), fma(s[2], s[4], -s[1] * s[5]), fma(s[1], s[4], -s[2] * s[3])
     det = vector.dot((s[0], s[1], s[2]), of_x)
     of_y = fma(s[0], s[5], -s[2] * s[2]), fma(s[1], s[2], -s[0] * s[4])
     of_z = fma(s[0], s[3], -s[1] * s[1])
-    r = reciprocal(det)
+    r = size * reciprocal(det)
     return (r * of_x[0], r * of_x[1], r * of_x[2], r * of_y[0], r * of_y[1], r * of_z), abs(r) < 1e300
 
 

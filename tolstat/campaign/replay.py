@@ -15,7 +15,7 @@ from tolstat.common import loads
 from tolstat.common.channels import BUSHING_LOADS, SHAFT_LOADS, LoadHistory
 from tolstat.common.errors import Fault, InputError, input_error
 from tolstat.common.late import pandas as pd
-from tolstat.common.load_kinds import CONTACTS, PINS
+from tolstat.common.load_kinds import CONTACTS, PINS, measure_of
 from tolstat.common.tables import Options, Simulation, Status
 from tolstat.joint import ideal, nominal_errors, perturb
 from tolstat.solver.compilation import warm_up
@@ -54,7 +54,8 @@ class CaseResult(NamedTuple):
 
         ``max`` holds the largest value of each load that can have a limit, by name: its ``unit`` and the value in this
         joint (``joint``); where the joint without errors was simulated, too, also the value there
-        (``without_errors``) and the relative difference (``change``).
+        (``without_errors``) and the relative difference (``change``), None for a load that is zero there, up to the
+        solver's accuracy.
         """
         row = self.simulation.results[0]
         facts = {
@@ -79,7 +80,8 @@ class CaseResult(NamedTuple):
         if self.nominal is None:
             return facts
         nominal = float(load.of(self.nominal)[0])
-        change = value / nominal - 1.0 if nominal else math.nan
+        accuracy = self.options.newton_tol * loads.of_kind(self.nominal, measure_of(load.kind)).max()
+        change = value / nominal - 1.0 if nominal > accuracy else math.nan
         return facts | {"without_errors": _number(nominal), "change": _number(change)}
 
     def remedy(self) -> str:

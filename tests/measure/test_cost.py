@@ -42,7 +42,8 @@ def test_operations_are_those_of_the_structure(these):
     """The elimination does the same for any joint: counted along `linsolve`, block by block."""
     counts = count_apart(list(snapshots(these, 2)))
     three, six = 5, 11  # scalar products
-    inverse = 2 * (18 + three + 7) + 2 * 3 * 3 * three + 2 * 6 * (three + 1)  # of a block, by its 3 x 3 blocks
+    scaled = 3 + 6 + 1  # trace and its reciprocal, entries, factor of the inverse
+    inverse = 2 * (18 + three + 7 + scaled) + 2 * 3 * 3 * three + 2 * 6 * (three + 1)  # of a block, by its 3 x 3 blocks
     lump = inverse + 6 * 6 * six + 21 * (six + 1)  # and the block of the one that follows
     corner = 2 * 6 * six + 3 * (six + 1)  # psi and s, of one lump
     output = 2 * 2 * 6 * (six + 1) + 2 * corner

@@ -133,13 +133,13 @@ def invert_three(s):
     Matrices are given by their entries 00, 01, 02, 11, 12, 22. They are scaled to the trace 1: with short steps the
     determinant, the third power of m / h^2, would be too large for single precision.
     """
-    size = reciprocal(s[0] + s[3] + s[5])
-    s = (size * s[0], size * s[1], size * s[2], size * s[3], size * s[4], size * s[5])
+    scale = reciprocal(s[0] + s[3] + s[5])
+    s = (scale * s[0], scale * s[1], scale * s[2], scale * s[3], scale * s[4], scale * s[5])
     of_x = fma(s[3], s[5], -s[4] * s[4]), fma(s[2], s[4], -s[1] * s[5]), fma(s[1], s[4], -s[2] * s[3])
     det = vector.dot((s[0], s[1], s[2]), of_x)
     of_y = fma(s[0], s[5], -s[2] * s[2]), fma(s[1], s[2], -s[0] * s[4])
     of_z = fma(s[0], s[3], -s[1] * s[1])
-    r = size * reciprocal(det)
+    r = scale * reciprocal(det)
     return (r * of_x[0], r * of_x[1], r * of_x[2], r * of_y[0], r * of_y[1], r * of_z), abs(r) < 1e300
 
 
@@ -239,7 +239,7 @@ def factorise(work):
         if ARM_OF_PIN[p] < 2:  # input fork
             continue
         for unknown in (OF_PSI, OF_S):
-            put_edge(e, unknown, pin, none)
+            put_edge(e, unknown, pin, none)  # read back, the zeros have the precision of the tangent
             of_pin = minus_transposed_product(edge(e, unknown, pin), m, ARM_PIN + p, edge(e, unknown, arm))
             of_hub = minus_transposed_product(edge(e, unknown, HUB), m, PIN_HUB + p, of_pin)
             put_edge(e, unknown, pin, of_pin)

@@ -146,7 +146,7 @@ ARITHMETIC = {
     for name, instruction in (("add", "add"), ("sub", "sub"), ("mul", "mul"), ("truediv", "div"))
     for prefix in ("", "i")
 }
-"""LLVM's instruction for each operator of singles; other functions of singles are those of lanes."""
+"""LLVM's instruction for each operator of singles, beside the minus sign; for other functions singles convert to lanes."""
 
 
 def _fit(allowed, function, args):
@@ -154,9 +154,9 @@ def _fit(allowed, function, args):
     if allowed == MASK:
         return MASK in args and all(isinstance(a, MaskType | types.Boolean) for a in args)
     singles = all(a == SINGLE for a in args) and (function in ARITHMETIC or function == operator.neg)
-    if allowed == SINGLE or singles:
-        return allowed == SINGLE and singles
-    lanes = LANE in args or SINGLE in args
+    if allowed == SINGLE:
+        return singles
+    lanes = (LANE in args or SINGLE in args) and not singles
     return lanes and all(isinstance(a, LaneType | SingleType | types.Integer | types.Float) for a in args)
 
 

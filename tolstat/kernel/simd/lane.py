@@ -146,7 +146,7 @@ ARITHMETIC = {
     for name, instruction in (("add", "add"), ("sub", "sub"), ("mul", "mul"), ("truediv", "div"))
     for prefix in ("", "i")
 }
-"""LLVM's instruction for each operator of singles, beside the minus sign; for other functions singles convert to lanes."""
+"""LLVM's instruction for each operator of singles, beside the minus sign; other functions convert singles to lanes."""
 
 
 def _fit(allowed, function, args):

@@ -159,12 +159,12 @@ class Options(NamedTuple):
     steps_per_rev: int = 180
     max_revs: int = 20
     settle_tol: float = 1e-4
-    newton_tol: float = 3e-6
+    newton_tol: float = 6e-6
     newton_max_iter: int = 12
     max_halvings: int = 16
     rtol: float = 0.0
     fidelity: int = int(Fidelity.DYNAMIC)
-    peak_substeps: int = 40
+    peak_substeps: int = 36
     max_refinements: int = 3
     duration: int = 100
 

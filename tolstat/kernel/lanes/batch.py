@@ -38,7 +38,7 @@ residual after it (`CHECK`). Dynamics: sub-step of the output grid (`STEP`), ste
 parts (`LOOK`, see `closeup`), part of a cell of the `mesh` (`PART`). Quasi-statics: input angle (`ANGLE`)."""
 
 NUMBERS = (
-    *("t", "h", "cv", "ca", "before", "iteration", "factorised", "at_roundoff"),
+    *("t", "h", "cv", "ca", "before", "iteration", "factorised", "t_tangent", "at_roundoff"),
     *("phase", "live", "fresh", "passed", "origin", "grid", "pseudo", "stage", "error", "worst"),
     *("count", "until", "steps", "iterations", "halvings", "factorisations"),
 )
@@ -46,14 +46,16 @@ INTEGERS = ("joint", "k", "level", "done", "tries", "left", "part", "looked", "b
 """State machine of one lane: phase, step, Newton iteration. Fields of a batch's ``control``.
 
 - ``t``, ``h``: time that the trial point belongs to, length of the step or part, s
-- ``cv``, ``ca``: dv/dq (1/s) and da/dq (1/s^2); ``factorised``: cv of the tangent in use, 0 if there is none
+- ``cv``, ``ca``: dv/dq (1/s) and da/dq (1/s^2); ``factorised``, ``t_tangent``: cv and time (s) of the tangent in
+  use, cv 0 if there is none
 - ``before``, ``iteration``: last residual, number of iterations; ``at_roundoff``: 1 if the last change was rounding
 - ``phase``: `HOLD` to `PART`; ``live``: 1 if the lane has a joint; ``fresh``: 1 if it is to begin a step or angle;
   ``passed``: 1 if its trial point is accepted then
 - ``origin``, ``grid``: start and length of the step of the output grid, cell, or part of a closer look, s
 - ``pseudo``: step of pseudo-time, s; ``tries``: number of such steps
 - ``stage``: of a step or part of TR-BDF2, 0 or 1; ``error``: of a part; ``worst``: of the cell's worst part
-- ``count``, ``until``: explicit steps of the revolution that are done; steps up to the next point of the output grid
+- ``count``, ``until``: explicit steps of the revolution that are done; steps up to the next point of the output grid,
+  of a closer look: parts of its step
 - ``steps``, ``iterations``, ``halvings``, ``factorisations``: work so far
 - ``joint``: index of the joint; ``k``: grid point, cell or angle that is being solved
 - ``level``: halvings of the sub-step or part; at an angle, attempts that failed; in pseudo-time, as `course.FROM_GUESS`

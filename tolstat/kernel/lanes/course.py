@@ -171,7 +171,7 @@ def finish_closeup_part(lane, par, lanes, options, control, motion, fine, out):
     count_in(j, fine, out)
     control.looked[lane] += 1
     control.part[lane] += 1
-    if control.part[lane] == options.peak_substeps:
+    if control.part[lane] == control.until[lane]:
         return OK
     n, h = options.steps_per_rev, grid_step(par, options)
     control.origin[lane] = (n + control.k[lane] - 1) * h + control.part[lane] * part

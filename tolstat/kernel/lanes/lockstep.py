@@ -41,7 +41,7 @@ from tolstat.kernel.mechanics.dynamics import residual
 from tolstat.kernel.mechanics.loads import complete_loads, write_loads
 from tolstat.kernel.mechanics.topology import N_DOF
 from tolstat.kernel.revolution.closeup import STEPS as STEPS_AGAIN
-from tolstat.kernel.revolution.closeup import on_a_peak, recall, switches
+from tolstat.kernel.revolution.closeup import divide, on_a_peak, recall, switches
 from tolstat.kernel.revolution.outcome import (
     clear_results,
     clear_samples,
@@ -148,8 +148,9 @@ def next_closeup_step(lane, k, looking, par, options, batch, samples, out):
             control.left[lane] = STEPS_AGAIN
         if rings or control.left[lane] > 0:
             control.phase[lane], control.k[lane], control.part[lane] = LOOK, k, 0
-            control.origin[lane], control.grid[lane] = (n + k - 1) * h, h / options.peak_substeps
+            control.origin[lane] = (n + k - 1) * h
             control.done[lane] = control.level[lane] = 0
+            divide(lane, par, options, control, batch.motion)
             set_substep(lane, options, control, batch.motion)
             return True
         looking = False
@@ -234,7 +235,7 @@ def lockstep(options, patience, batch, queue, tally):
         if any_of(control.fresh > 0):
             begin(options, motion, control)
         residual(control.t, motion.q, motion.v, motion.a, par, options, work, motion.residual)
-        solved, failed, stale, moving, last, now = classify_lanes(options, motion, control)
+        solved, failed, stale, moving, last, now = classify_lanes(options, par, motion, control)
         tally[0] += 1
         tally[1] += count_of(control.live > 0)
         waiting = count_of(stale)

@@ -4,6 +4,8 @@
 lanes that begin a step, stage or angle, and lanes whose trial point is accepted before that.
 """
 
+import math
+
 from tolstat.kernel.codes import AHEAD, H_OLD, LAST_ITERATION_BELOW, QUASISTATIC, STAGED_STEP, TR_BDF2, TRAPEZOIDAL
 from tolstat.kernel.integrators import bdf2, trbdf2
 from tolstat.kernel.lanes.batch import CHECK, STEP
@@ -17,6 +19,10 @@ from tolstat.kernel.simd.lane import retain, where
 
 SLOW = 0.2
 """Ratio of successive residuals above which the tangent is renewed."""
+OLD = math.radians(7)
+"""Turn of the input shaft after which a point that needs a correction gets a new tangent. Contact normals turn with the
+shaft: an older tangent leaves a tenth of a residual, and the prediction multiplies that by 15, so that errors would
+grow from step to step until `newton_tol` stops them."""
 ROUNDOFF = 10 * 2.0**-52
 """Change of the unknowns, relative to the largest of them, that is no more than their rounding."""
 
@@ -96,7 +102,7 @@ def scaled_size(motion):
 
 
 @njit
-def classify_lanes(options, motion, control):
+def classify_lanes(options, par, motion, control):
     """Classify the lanes by their residuals.
 
     Returns
@@ -115,7 +121,8 @@ def classify_lanes(options, motion, control):
     failed = live & ~solved & (checked | ~finite | (control.iteration == options.newton_max_iter))
     going = live & ~solved & ~failed
     slow = (control.iteration > 0) & (now > SLOW * control.before)
-    stale = going & ((control.factorised != control.cv) | slow)
+    old = (control.iteration == 0) & (abs(par.omega) * (control.t - control.t_tangent) > OLD)
+    stale = going & ((control.factorised != control.cv) | slow | old)
     control.before = where(going & ~stale, now, control.before)
     moving = going & ~stale
     return solved, failed, stale, moving, moving & (now <= motion.memory[LAST_ITERATION_BELOW]), now
@@ -145,6 +152,7 @@ def refactorise(mask, control, par, work, tangent):
     good = factorise(work)
     keep_tangent(mask, work, tangent)
     control.factorised = where(mask, control.cv, control.factorised)
+    control.t_tangent = where(mask, control.t, control.t_tangent)
     control.factorisations = where(mask, control.factorisations + 1, control.factorisations)
     return good
 

@@ -31,10 +31,12 @@ REACH = 7.0
 bridge."""
 STEPS = 2
 """Least number of steps of the grid that are integrated again: the one in which the contact switches, and the next."""
+FEWER = 3
+"""Factor by which later steps have fewer parts: the ringing has decayed by then."""
 LONGEST = 4 * math.pi
 """Longest part that the trapezoidal rule takes, in units of sqrt(m/k) of a pin on its bushing: two periods. In longer
 ones ringing dies away, but the trapezoidal rule would go on with it."""
-LAST_ITERATION_FACTOR = 300.0
+LAST_ITERATION_FACTOR = 150.0
 """Residual, in units of `newton_tol`, up to which one more iteration with the same tangent is the last, in parts that
 the trapezoidal rule takes: they are so short that it takes off all but a hundredth."""
 
@@ -94,7 +96,7 @@ def count_in(j, fine, out):
 
 @njit
 def recall(s, lane, par, options, samples, motion):
-    """Restore recorded sample `s` as the last accepted point of a lane, for steps in `options.peak_substeps` parts.
+    """Restore recorded sample `s` as the last accepted point of a lane.
 
     `motion`: record of MOTION. Accelerations are those of BDF2's formula for equal steps.
     """
@@ -103,8 +105,19 @@ def recall(s, lane, par, options, samples, motion):
         motion.q0[i, lane], motion.v0[i, lane] = here.q[i], here.v[i]
         motion.q1[i, lane], motion.v1[i, lane] = before.q[i], before.v[i]
         motion.a0[i, lane] = (3 * here.v[i] - 4 * before.v[i] + first.v[i]) / (2 * h)
-    resolved = h / options.peak_substeps <= LONGEST * math.sqrt(par.pin_mass / stiffness(PIN, par)[0])
     motion.memory[H_OLD, lane] = h
-    if resolved:
-        motion.memory[TRAPEZOIDAL, lane] = 1.0
-        motion.memory[LAST_ITERATION_BELOW, lane] = LAST_ITERATION_FACTOR * options.newton_tol
+
+
+@njit
+def divide(lane, par, options, control, motion):
+    """Divide the step of a lane that is integrated again in parts, and choose the rule that takes them.
+
+    `control`, `motion`: records of the batch; ``left`` of `control`: steps left, at most 0 in later steps.
+    """
+    h, parts = grid_step(par, options), options.peak_substeps
+    if control.left[lane] <= 0:
+        parts = max(1, parts // FEWER)
+    resolved = h / parts <= LONGEST * math.sqrt(par.pin_mass / stiffness(PIN, par)[0])
+    control.until[lane], control.grid[lane] = parts, h / parts
+    motion.memory[TRAPEZOIDAL, lane] = resolved
+    motion.memory[LAST_ITERATION_BELOW, lane] = LAST_ITERATION_FACTOR * options.newton_tol if resolved else 0.0

@@ -31,7 +31,7 @@ REACH = 7.0
 bridge."""
 STEPS = 2
 """Least number of steps of the grid that are integrated again: the one in which the contact switches, and the next."""
-FEWER = 3
+FEWER = 4
 """Factor by which later steps have fewer parts: the ringing has decayed by then."""
 LONGEST = 4 * math.pi
 """Longest part that the trapezoidal rule takes, in units of sqrt(m/k) of a pin on its bushing: two periods. In longer

@@ -231,3 +231,10 @@ def test_lanes_wait_for_a_tangent_no_longer_than_allowed(monkeypatch):
     monkeypatch.setattr(lockstep, "PATIENCE", WIDTH + 1)
     _, filled, tangents = kernel_states.tally(kernel_states.Sample(params, options))
     assert 0 < (filled - evaluations) / tangents <= lockstep.STANDSTILL
+
+
+def test_a_tangent_serves_seven_degrees(params):
+    """With a tolerance that no prediction meets, each fourth step of two degrees gets a new one."""
+    made = simulation.simulate_rows(params(), Options(newton_tol=1e-10, peak_substeps=1, max_refinements=0)).results[0]
+    assert made["status"] == Status.OK
+    assert made["factorisations"] >= made["steps"] / 4

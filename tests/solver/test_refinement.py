@@ -10,6 +10,8 @@ from tolstat import joint, sampling, study
 from tolstat.campaign.remedy import remedy
 from tolstat.common.load_kinds import LOAD_KINDS, measure_of
 from tolstat.common.tables import RESULT, Method, Options, Status
+from tolstat.kernel.lanes.batch import make_batch
+from tolstat.kernel.revolution.closeup import STEPS, divide
 from tolstat.solver import refinement
 from tolstat.solver.simulation import simulate_rows
 
@@ -66,6 +68,16 @@ def test_a_closer_look_at_a_slow_joint_adds_no_ringing() -> None:
     params["omega"] = 20 * 2 * np.pi / 60
     true = simulate_rows(params, PLAIN._replace(steps_per_rev=1440)).results
     assert (changes(simulate_rows(params, Options()).results, true) < 5e-4).all()
+
+
+def test_later_steps_of_a_closer_look_have_a_quarter_of_the_parts() -> None:
+    par = parameters("rigid_shafts.toml", 163)
+    par["omega"] = 2 * np.pi / 180  # a step of two degrees takes a second
+    batch = make_batch(Options(), 1)
+    for left, parts in ((STEPS, 36), (1, 36), (0, 9), (-1, 9)):
+        batch.control.left[0] = left
+        divide(0, par.view(np.recarray)[0], Options(), batch.control, batch.motion)
+        assert (batch.control.until[0], batch.control.grid[0]) == (parts, pytest.approx(1 / parts))
 
 
 @pytest.mark.slow

@@ -82,7 +82,7 @@ def test_all_hard_cases_end_in_a_result_or_a_status(hard: Path) -> None:
     assert (results["closure"][rings] < 1e-2).all()
     results, family = results[~rings], family[~rings]
     ended = {name: {Status(s).label for s in results["status"][family == name]} for name in family}
-    assert ended.pop("85 deg") == {"not_resolved"}
+    assert ended.pop("85 deg") <= {"not_resolved", "newton_failed"}  # moves chaotically to its last iteration
     assert ended.pop("85 deg, 5 revolutions") == {"newton_failed"}
     for name in (
         "20000 rpm",

@@ -99,14 +99,14 @@ def test_start_is_near_the_place_where_the_shaft_rests(params, random_errors, fo
 @pytest.mark.parametrize(("alpha", "torque", "rpm"), [(2, 10, 3000), (2, 1, 500), (15, 10, 500)])
 @pytest.mark.slow
 def test_a_slow_shaft_has_settled_where_the_joint_is_said_to_have(alpha, torque, rpm):
-    """Largest loads within the tolerance of those of 100 revolutions."""
+    """Largest loads within twice the tolerance of those of 100 revolutions."""
     point = {"alpha": np.radians(alpha), "torque": float(torque), "speed": rpm * np.pi / 30}
     par = sliding(drawn(25, **point), 0.0, 2e4, 0.0)
     options = OPTIONS._replace(max_refinements=0, peak_substeps=1)
     long = simulate_rows(par, options._replace(max_revs=100, settle_tol=1e-12)).results
     found = simulate_rows(par, options._replace(max_revs=60)).results
     assert (found["status"] == Status.OK).all()
-    assert difference(found, long).max() < 1.5e-4
+    assert difference(found, long).max() < 2e-4
 
 
 def test_closure_counts_what_a_slow_decay_has_ahead(params):

@@ -37,7 +37,7 @@ UNKNOWN = 255
 NEWTON_SHARE, SETTLE_SHARE = 0.01, 0.3
 """Residual that ends Newton's iteration, relative to the joint's largest force: the smaller one of `NEWTON_SHARE` times
 the tolerance and `SETTLE_SHARE` times the closure error that is to be detected."""
-LAST_ITERATION_FACTOR = 20.0
+LAST_ITERATION_FACTOR = 10.0
 """Residual, in units of the one above, up to which one more iteration with the same tangent is the last."""
 
 

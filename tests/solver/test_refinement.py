@@ -74,7 +74,7 @@ def test_later_steps_of_a_closer_look_have_a_quarter_of_the_parts() -> None:
     par = parameters("rigid_shafts.toml", 163)
     par["omega"] = 2 * np.pi / 180  # a step of two degrees takes a second
     batch = make_batch(Options(), 1)
-    for left, parts in ((STEPS, 36), (1, 36), (0, 9), (-1, 9)):
+    for left, parts in ((STEPS, 40), (1, 40), (0, 10), (-1, 10)):
         batch.control.left[0] = left
         divide(0, par.view(np.recarray)[0], Options(), batch.control, batch.motion)
         assert (batch.control.until[0], batch.control.grid[0]) == (parts, pytest.approx(1 / parts))

@@ -164,7 +164,7 @@ class Options(NamedTuple):
     max_halvings: int = 16
     rtol: float = 0.0
     fidelity: int = int(Fidelity.DYNAMIC)
-    peak_substeps: int = 36
+    peak_substeps: int = 40
     max_refinements: int = 3
     duration: int = 100
 

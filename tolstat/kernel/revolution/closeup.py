@@ -24,7 +24,7 @@ from tolstat.kernel.mechanics.topology import N_DOF, PIN
 from tolstat.kernel.revolution.settle import grid_step, peak
 from tolstat.kernel.simd.jit import njit
 
-KINK = 3e-4
+KINK = 2e-4
 """Third difference of a load's samples, in units of its measure, up to which ringing is too weak to count."""
 REACH = 7.0
 """Distance of a load from its largest value, in units of the third difference of its samples, that ringing may

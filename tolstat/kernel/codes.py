@@ -8,9 +8,9 @@ TR_BDF2 = int(Method.TR_BDF2)
 RAMP = int(Start.RAMP)
 DYNAMIC, QUASISTATIC = int(Fidelity.DYNAMIC), int(Fidelity.QUASISTATIC)
 
-H_OLD, AHEAD, STAGED_STEP, LAST_ITERATION_BELOW, TOLERANCE, FORCE, TORQUE, TRAPEZOIDAL = range(8)
-MEMORY = 8
+H_OLD, AHEAD, STAGED_STEP, LAST_ITERATION_BELOW, TOLERANCE, FORCE, TORQUE, TRAPEZOIDAL, MASSLESS = range(9)
+MEMORY = 9
 """Indices into ``memory`` of a joint's motion: last accepted step, s; whether ``ahead`` is used (1); length of the last
 step if its first stage is kept (else 0); weighted residual up to which one more iteration needs no check; for
 error-controlled steps: tolerance, and the force (N) and torque (N m) that errors are relative to; whether BDF2 gives
-way to the trapezoidal rule (1)."""
+way to the trapezoidal rule (1); number of steps left that neglect inertia, see `course.MASSLESS_SHARE`."""

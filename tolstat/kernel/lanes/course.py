@@ -6,7 +6,17 @@ of the lane's joint; `control` and `motion` are read joint by joint.
 """
 
 from tolstat.common.tables import MAX_ITERATIONS
-from tolstat.kernel.codes import AHEAD, H_OLD, NEWTON_FAILED, NOT_SETTLED, OK, QUASISTATIC, STAGED_STEP, TR_BDF2
+from tolstat.kernel.codes import (
+    AHEAD,
+    H_OLD,
+    MASSLESS,
+    NEWTON_FAILED,
+    NOT_SETTLED,
+    OK,
+    QUASISTATIC,
+    STAGED_STEP,
+    TR_BDF2,
+)
 from tolstat.kernel.integrators.mesh import cells_of, next_level, note_cell
 from tolstat.kernel.integrators.trbdf2 import GAMMA
 from tolstat.kernel.lanes.batch import ANGLE, CHECK, HOLD, PART, RELAX, STEP, start_newton
@@ -46,6 +56,9 @@ OUT_OF_REVOLUTIONS = -1
 """Status, in addition to those of a joint, after the last revolution without settling."""
 MAX_RATIO = 2.0
 """Largest ratio of a step to the one before, for the stability of BDF2."""
+MASSLESS_SHARE = 60
+"""A joint's first steps from an equilibrium neglect the inertia of the unknowns: one in so many of a revolution, at
+least one. Inertia then sets in on a joint that moves almost as it will when settled; from rest the joint would ring."""
 
 
 @njit
@@ -133,6 +146,8 @@ def advance(lane, options, control, motion):
     whole = 1 << options.max_halvings
     control.steps[lane] += 1
     control.passed[lane] = 1.0
+    if motion.memory[MASSLESS, lane] > 0:
+        finish_massless_step(lane, control, motion)
     motion.memory[H_OLD, lane], motion.memory[AHEAD, lane] = control.h[lane], 0.0
     motion.memory[STAGED_STEP, lane] = control.h[lane]
     control.done[lane] += whole >> control.level[lane]
@@ -143,6 +158,17 @@ def advance(lane, options, control, motion):
         return False
     control.done[lane] = control.level[lane] = 0
     return True
+
+
+@njit
+def finish_massless_step(lane, control, motion):
+    """Count a step without inertia; the velocity before the first one is taken to be that after it."""
+    if motion.memory[H_OLD, lane] == 0:
+        for i in range(N_DOF):
+            motion.v0[i, lane] = motion.v[i, lane]
+    motion.memory[MASSLESS, lane] -= 1
+    if motion.memory[MASSLESS, lane] == 0:
+        control.factorised[lane] = 0.0
 
 
 @njit
@@ -214,6 +240,8 @@ def next_phase(lane, par, options, control, motion):
         resume(lane, par, options, control, motion)
     else:
         start_motion(lane, par, options, control, motion)
+    if control.phase[lane] == STEP and options.method != TR_BDF2:
+        motion.memory[MASSLESS, lane] = max(1, options.steps_per_rev // MASSLESS_SHARE)
 
 
 @njit
@@ -241,6 +269,9 @@ def fall_back(lane, par, options, control, motion):
         else:
             start_relaxing(lane, AT_ANGLE, control)
             search(lane, par, options, control, motion)
+    elif motion.memory[MASSLESS, lane] > 0:
+        motion.memory[MASSLESS, lane] = 0.0
+        set_substep(lane, options, control, motion)
     else:
         control.halvings[lane] += 1
         control.level[lane] += 1

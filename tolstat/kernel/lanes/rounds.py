@@ -6,7 +6,16 @@ lanes that begin a step, stage or angle, and lanes whose trial point is accepted
 
 import math
 
-from tolstat.kernel.codes import AHEAD, H_OLD, LAST_ITERATION_BELOW, QUASISTATIC, STAGED_STEP, TR_BDF2, TRAPEZOIDAL
+from tolstat.kernel.codes import (
+    AHEAD,
+    H_OLD,
+    LAST_ITERATION_BELOW,
+    MASSLESS,
+    QUASISTATIC,
+    STAGED_STEP,
+    TR_BDF2,
+    TRAPEZOIDAL,
+)
 from tolstat.kernel.integrators import bdf2, trbdf2
 from tolstat.kernel.lanes.batch import CHECK, STEP
 from tolstat.kernel.lanes.equilibrium import CA_REGULAR, CV_REGULAR, CV_STATIC, ENOUGH, FAR
@@ -32,7 +41,7 @@ def begin_steps(begins, passed, motion, control):
     """Accept the last sub-step where it passed; predict the trial point of the next one where one begins (BDF2)."""
     h = control.h
     coefficients = bdf2.formula(h, motion.memory[H_OLD], motion.memory[TRAPEZOIDAL])
-    known = motion.memory[AHEAD] > 0
+    known, massless = motion.memory[AHEAD] > 0, motion.memory[MASSLESS] > 0
     for i in range(N_DOF):
         q, v, a, q0, v0 = motion.q[i], motion.v[i], motion.a[i], motion.q0[i], motion.v0[i]
         before = retain(passed, q0, motion.q1[i]), retain(passed, v0, motion.v1[i])
@@ -42,9 +51,9 @@ def begin_steps(begins, passed, motion, control):
         guess = bdf2.trial(h, coefficients, last, before, known, motion.ahead[i])
         motion.q[i] = retain(begins, guess[0], q)
         motion.v[i] = retain(begins, guess[1], v)
-        motion.a[i] = retain(begins, guess[2], a)
+        motion.a[i] = retain(begins, where(massless, 0.0, guess[2]), a)
     control.cv = where(begins, coefficients[0], control.cv)
-    control.ca = where(begins, coefficients[0] * coefficients[0], control.ca)
+    control.ca = where(begins, where(massless, 0.0, coefficients[0] * coefficients[0]), control.ca)
 
 
 @njit

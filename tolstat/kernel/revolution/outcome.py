@@ -92,8 +92,8 @@ def check_settled(k, iterations, par, options, samples, notes, out):
     """
     n, twelfth = options.steps_per_rev, options.steps_per_rev // CHECKS_PER_REV
     out.revolutions = k / n
-    if k == n + 2 * twelfth:
-        first, last, bound = twelfth + 1, 2 * twelfth + 1, options.settle_tol
+    if k in (n + twelfth, n + 2 * twelfth):
+        first, last, bound = (k - n) // 2 + 1, k - n + 1, options.settle_tol
         closure_of_bushings = closure_error(first, last, BUSHINGS_ONLY, samples)
         closure = closure_error(first, last, ALL_LOADS, samples)
         out.closure = with_slow_decay(closure, out.revolutions, par, notes)

@@ -12,13 +12,12 @@ from tolstat.kernel.revolution.trail import closure_trend, note_closure, with_sl
 from tolstat.kernel.simd.jit import njit
 
 CHECKS_PER_REV = 12
-"""Checks of the closure error per revolution, once two revolutions are recorded."""
+"""Checks of the closure error per revolution, from the second one on."""
 EARLY_CLOSURE, EARLY_SUMS, EARLY_STEP_ERROR = 0.1, 0.2, 0.02
-"""A joint whose motion at one twelfth to two twelfths of a revolution is repeated a revolution later has settled: the
-start is forgotten within the first twelfth. The first number is the closure error of bushing loads there, in units of
+"""A smooth joint has settled in its second revolution once the later half of what it has repeated of the first one is
+the same: it has forgotten its start. The first number is the closure error of bushing loads there, in units of
 ``settle_tol``, the second that of all loads, since a shaft carries the sum of two of them, the third the step error, up
-to which that holds. Of 12 000 joints none was settled by bushing loads alone that would not have been at the end of the
-second revolution (docs/notes/steps.md)."""
+to which that holds (docs/notes/steps.md)."""
 
 
 @njit
@@ -72,6 +71,14 @@ def clear_samples(samples, notes):
 
 
 @njit
+def is_smooth(par, samples, out):
+    """Whether the step error, written at the first of these checks, is small enough for a joint to settle early."""
+    if not out.step_error >= 0:
+        out.step_error = step_error(par, samples)
+    return out.step_error <= EARLY_STEP_ERROR
+
+
+@njit
 def check_settled(k, iterations, par, options, samples, notes, out):
     """Check closure error and work at grid point `k`; return `NOT_SETTLED` while the joint is to continue.
 
@@ -90,20 +97,18 @@ def check_settled(k, iterations, par, options, samples, notes, out):
     out : record of KERNEL_RESULT
         ``closure`` and ``revolutions`` are written.
     """
-    n, twelfth = options.steps_per_rev, options.steps_per_rev // CHECKS_PER_REV
+    n = options.steps_per_rev
+    due = (k * CHECKS_PER_REV) % n < CHECKS_PER_REV
     out.revolutions = k / n
-    if k in (n + twelfth, n + 2 * twelfth):
-        first, last, bound = (k - n) // 2 + 1, k - n + 1, options.settle_tol
-        closure_of_bushings = closure_error(first, last, BUSHINGS_ONLY, samples)
+    if due and n < k < 2 * n and is_smooth(par, samples, out):
+        first, last = (k - n) // 2 + 1, k - n + 1
         closure = closure_error(first, last, ALL_LOADS, samples)
         out.closure = with_slow_decay(closure, out.revolutions, par, notes)
-        small = with_slow_decay(closure_of_bushings, out.revolutions, par, notes) <= EARLY_CLOSURE * bound
-        small = small and out.closure <= EARLY_SUMS * bound
-        if small:
-            out.step_error = step_error(par, samples)
-            if out.step_error <= EARLY_STEP_ERROR:
+        if out.closure <= EARLY_SUMS * options.settle_tol:
+            closure = closure_error(first, last, BUSHINGS_ONLY, samples)
+            if with_slow_decay(closure, out.revolutions, par, notes) <= EARLY_CLOSURE * options.settle_tol:
                 return OK
-    if k >= 2 * n and (k * CHECKS_PER_REV) % n < CHECKS_PER_REV:
+    if due and k >= 2 * n:
         closure = closure_error(0, n, ALL_LOADS, samples)
         note_closure(out.revolutions, closure, notes)
         out.closure = with_slow_decay(closure, out.revolutions, par, notes)
@@ -142,7 +147,7 @@ def write_diagnostics(status, par, options, notes, samples, out):
 
     The closure trend of a joint that has not settled is fitted over the second half of ``max_revs``.
     """
-    if options.fidelity == DYNAMIC and not out.step_error <= EARLY_STEP_ERROR:  # else known from the early check
+    if options.fidelity == DYNAMIC and not (out.step_error >= 0 and out.revolutions < 2):  # else known since a check
         out.step_error = step_error(par, samples)
     since = 0.0 if status == OK else 0.5 * options.max_revs
     out.closure_trend, _ = closure_trend(since, notes)

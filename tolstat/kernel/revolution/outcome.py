@@ -7,17 +7,16 @@ import numpy as np
 from tolstat.common.tables import MAX_ITERATIONS
 from tolstat.kernel.codes import DYNAMIC, NEWTON_FAILED, NOT_SETTLED, OK
 from tolstat.kernel.mechanics.loads import DECIDING, N_AVERAGED, N_LOADS
-from tolstat.kernel.revolution.settle import ALL_LOADS, BUSHINGS_ONLY, closure_error, step_error
+from tolstat.kernel.revolution.settle import ALL_LOADS, closure_error, step_error
 from tolstat.kernel.revolution.trail import closure_trend, note_closure, with_slow_decay
 from tolstat.kernel.simd.jit import njit
 
 CHECKS_PER_REV = 12
 """Checks of the closure error per revolution, from the second one on."""
-EARLY_CLOSURE, EARLY_SUMS, EARLY_STEP_ERROR = 0.1, 0.2, 0.02
+EARLY_CLOSURE, EARLY_STEP_ERROR = 0.2, 0.02
 """A smooth joint has settled in its second revolution once the later half of what it has repeated of the first one is
-the same: it has forgotten its start. The first number is the closure error of bushing loads there, in units of
-``settle_tol``, the second that of all loads, since a shaft carries the sum of two of them, the third the step error, up
-to which that holds (docs/notes/steps.md)."""
+the same: it has forgotten its start. The first number is the closure error there, in units of ``settle_tol``, the
+second the step error, up to which that holds (docs/notes/steps.md)."""
 
 
 @njit
@@ -104,10 +103,8 @@ def check_settled(k, iterations, par, options, samples, notes, out):
         first, last = (k - n) // 2 + 1, k - n + 1
         closure = closure_error(first, last, ALL_LOADS, samples)
         out.closure = with_slow_decay(closure, out.revolutions, par, notes)
-        if out.closure <= EARLY_SUMS * options.settle_tol:
-            closure = closure_error(first, last, BUSHINGS_ONLY, samples)
-            if with_slow_decay(closure, out.revolutions, par, notes) <= EARLY_CLOSURE * options.settle_tol:
-                return OK
+        if out.closure <= EARLY_CLOSURE * options.settle_tol:
+            return OK
     if due and k >= 2 * n:
         closure = closure_error(0, n, ALL_LOADS, samples)
         note_closure(out.revolutions, closure, notes)

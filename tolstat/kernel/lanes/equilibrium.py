@@ -15,9 +15,9 @@ CV_STATIC = 1e-200
 """cv = dv/dq of an equilibrium: so small that rate terms vanish, but not zero, which would mean that no tangent is
 stored."""
 CV_REGULAR, CA_REGULAR = 10.0, 100.0
-"""cv (1/s) and ca (1/s^2) in the tangent of an equilibrium, those of an implicit step of 0.1 s: damping and inertia
-regularise directions without stiffness, and are a thousandth of the stiffness of a loaded contact. The residual
-contains neither."""
+"""cv (1/s) and ca (1/s^2) in the tangent of an equilibrium, ca also in that of a step without inertia; those of an
+implicit step of 0.1 s: damping and inertia regularise directions without stiffness, and are a thousandth of the
+stiffness of a loaded contact. The residual contains neither."""
 
 FAR = 1.0
 """Size of an unknown, m or rad, above which Newton's iteration for an equilibrium has diverged."""

@@ -156,7 +156,7 @@ def keep_tangent(mask, new, old):
 def refactorise(mask, control, par, work, tangent):
     """Compute new tangents in the lanes of the mask; return where, of all lanes, the factorisation succeeded."""
     static = control.cv == CV_STATIC
-    cv, ca = where(static, CV_REGULAR, control.cv), where(static, CA_REGULAR, control.ca)
+    cv, ca = where(static, CV_REGULAR, control.cv), where(control.ca > 0, control.ca, CA_REGULAR)
     assemble(cv, ca, where(static, 0.0, control.cv), par, work)
     good = factorise(work)
     keep_tangent(mask, work, tangent)

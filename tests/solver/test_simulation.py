@@ -232,6 +232,8 @@ def test_smooth_joints_settle_in_their_second_revolution(name):
     smooth = early["step_error"] <= 0.02
     assert smooth.mean() > 0.7
     assert (early["revolutions"] < 2)[smooth].mean() > 0.95
+    if name == "rigid_shafts":
+        assert early["revolutions"][smooth].mean() < 1.13  # 1.16 if joints start from rest
     assert late["revolutions"].min() > 2
     for kind in (kind for kind in LOAD_KINDS if kind.decides):
         largest = late[f"{measure_of(kind).key}_max"].max(axis=1)

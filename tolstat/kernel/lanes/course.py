@@ -147,7 +147,9 @@ def advance(lane, options, control, motion):
     control.steps[lane] += 1
     control.passed[lane] = 1.0
     if motion.memory[MASSLESS, lane] > 0:
-        finish_massless_step(lane, control, motion)
+        motion.memory[MASSLESS, lane] -= 1
+        if motion.memory[MASSLESS, lane] == 0:
+            control.factorised[lane] = 0.0
     motion.memory[H_OLD, lane], motion.memory[AHEAD, lane] = control.h[lane], 0.0
     motion.memory[STAGED_STEP, lane] = control.h[lane]
     control.done[lane] += whole >> control.level[lane]
@@ -158,17 +160,6 @@ def advance(lane, options, control, motion):
         return False
     control.done[lane] = control.level[lane] = 0
     return True
-
-
-@njit
-def finish_massless_step(lane, control, motion):
-    """Count a step without inertia; the velocity before the first one is taken to be that after it."""
-    if motion.memory[H_OLD, lane] == 0:
-        for i in range(N_DOF):
-            motion.v0[i, lane] = motion.v[i, lane]
-    motion.memory[MASSLESS, lane] -= 1
-    if motion.memory[MASSLESS, lane] == 0:
-        control.factorised[lane] = 0.0
 
 
 @njit

@@ -40,5 +40,5 @@ def test_a_joint_is_the_same_without_compilation(settings: dict[str, int]) -> No
     """BDF2 with a closer look, TR-BDF2, equilibria, closed forms; fused multiply-adds may round otherwise."""
     plain, compiled = simulated(settings, NUMBA_DISABLE_JIT="1"), simulated(settings)
     assert plain[2] == compiled[2]
-    assert plain[1] == pytest.approx(compiled[1], rel=0.03)  # single precision rounds otherwise, too
+    assert plain[1] == pytest.approx(compiled[1], rel=0.05)  # single precision rounds otherwise, too
     np.testing.assert_allclose(plain[0], compiled[0], rtol=1e-7)

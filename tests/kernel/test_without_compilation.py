@@ -19,7 +19,7 @@ operation = joint.Operation.model_construct(alpha=0.3, speed=50.0, torque=100.0)
 errors = joint.nominal_errors(1)
 errors["pin1.offset_t"] = 2e-5
 par = joint.perturb(joint.load("cirelli2021", {}, "test", None), operation, errors)
-coarse = Options(steps_per_rev=12, max_revs=2, max_refinements=0, peak_substeps=2)
+coarse = Options(steps_per_rev=24, max_revs=2, max_refinements=0, peak_substeps=2)
 results = simulation.simulate_rows(par, coarse._replace(**json.loads(sys.argv[1]))).results
 print(json.dumps([results["F_max"][0].tolist(), int(results["newton_iterations"][0]), int(results["status"][0])]))
 """
@@ -40,5 +40,5 @@ def test_a_joint_is_the_same_without_compilation(settings: dict[str, int]) -> No
     """BDF2 with a closer look, TR-BDF2, equilibria, closed forms; fused multiply-adds may round otherwise."""
     plain, compiled = simulated(settings, NUMBA_DISABLE_JIT="1"), simulated(settings)
     assert plain[2] == compiled[2]
-    assert plain[1] == pytest.approx(compiled[1], rel=0.05)  # single precision rounds otherwise, too
+    assert plain[1] == pytest.approx(compiled[1], rel=0.03)  # single precision rounds otherwise, too
     np.testing.assert_allclose(plain[0], compiled[0], rtol=1e-7)

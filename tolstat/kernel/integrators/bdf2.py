@@ -2,8 +2,8 @@
 
 At the new point (3 y_2 - 4 y_1 + y_0) / (2 h) approximates y', for equal steps; with r the ratio of the step to the one
 before, ((1+2r)/(1+r) y_2 - (1+r) y_1 + r^2/(1+r) y_0) / h. Zero-stable for r < 1 + sqrt(2). The first step is implicit
-Euler. Algebraic order 2, L-stable. The trapezoidal rule, y_1' = 2 (y_1 - y_0) / h - y_0', damps nothing: a closer look
-at ringing takes it, a few steps long.
+Euler, without inertia if it leaves an equilibrium (`lanes.course`). Algebraic order 2, L-stable. The trapezoidal rule,
+y_1' = 2 (y_1 - y_0) / h - y_0', damps nothing: a closer look at ringing takes it, a few steps long.
 """
 
 from tolstat.kernel.simd.jit import njit

@@ -71,7 +71,7 @@ def clear_samples(samples, notes):
 
 @njit
 def is_smooth(par, samples, out):
-    """Whether the step error, written at the first of these checks, is small enough for a joint to settle early."""
+    """Whether the step error of a joint, written to `out` when this is first asked, lets it settle early."""
     if not out.step_error >= 0:
         out.step_error = step_error(par, samples)
     return out.step_error <= EARLY_STEP_ERROR
@@ -94,7 +94,7 @@ def check_settled(k, iterations, par, options, samples, notes, out):
     samples, notes
         As in all kernels; the closure error is noted.
     out : record of KERNEL_RESULT
-        ``closure`` and ``revolutions`` are written.
+        ``closure`` and ``revolutions`` are written, and in the second revolution ``step_error``.
     """
     n = options.steps_per_rev
     due = (k * CHECKS_PER_REV) % n < CHECKS_PER_REV
@@ -144,7 +144,7 @@ def write_diagnostics(status, par, options, notes, samples, out):
 
     The closure trend of a joint that has not settled is fitted over the second half of ``max_revs``.
     """
-    if options.fidelity == DYNAMIC and not (out.step_error >= 0 and out.revolutions < 2):  # else known since a check
+    if options.fidelity == DYNAMIC and not (out.step_error >= 0 and out.revolutions < 2):  # see `is_smooth`
         out.step_error = step_error(par, samples)
     since = 0.0 if status == OK else 0.5 * options.max_revs
     out.closure_trend, _ = closure_trend(since, notes)

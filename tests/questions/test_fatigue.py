@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from tests.support import naive
 from tolstat.analysis import cycles
 from tolstat.analysis.cycles import Cycles
-from tolstat.common.channels import BUSHING_LOADS, LOAD_HISTORIES, SHAFT_LOADS, channels_of
+from tolstat.common.channels import BUSHING_LOADS, COMPONENTS, LOAD_HISTORIES, PLANES, SHAFT_LOADS, signals_of
 from tolstat.common.load_kinds import SHAFTS
 from tolstat.solver import histories
 
@@ -42,22 +42,23 @@ def noise(seed=1, n=500):
     return np.random.default_rng(seed).normal(size=n)
 
 
-def of_signals(*signals):
+def of_signals(*signals, name="cross1.F_e"):
     """Cycles of joints with one channel, as the store gives them."""
     table = np.zeros((len(signals), 1, 300, 2))
     number = np.zeros((len(signals), 1))
     for i, signal in enumerate(signals):
         ranges, means = histories.periodic(signal)
         table[i, 0, : len(ranges), 0], table[i, 0, : len(ranges), 1] = ranges, means
+        table[i, 0, 0] = np.ptp(signal), 0.5 * (np.max(signal) + np.min(signal))
         number[i] = len(ranges)
-    return Cycles.of_revolution(("cross1.F_e",), table[..., 0], table[..., 1], number)
+    return Cycles.of_revolution((name,), table[..., 0], table[..., 1], number)
 
 
 def test_the_standards_example():
     ranges, means = histories.periodic(ASTM)
     assert ranges.tolist() == [9, 7, 4, 3]
     assert means.tolist() == [0.5, 0.5, 1.0, -0.5]
-    assert doctest.testmod(histories) == (0, 2)
+    assert doctest.testmod(histories) == (0, 3)
 
 
 @settings(max_examples=300, deadline=None)
@@ -129,55 +130,79 @@ def test_cycles_of_pylife():
         assert pairs(*histories.periodic(signal)) == pairs(np.ptp(ends, axis=1), ends.mean(axis=1))
 
 
-def test_a_joints_channels_are_its_components_and_moduli():
+def components_of(history):
+    return [signal.name for signal in COMPONENTS.values() if signal.history == history]
+
+
+def test_cycles_of_a_joint_are_those_of_its_components():
     rng = np.random.default_rng(5)
-    loads = rng.normal(size=(40, 8, 6)) + np.arange(6)
-    loads[:, 7] *= 1e-6  # cycles below the gate, but not those of the modulus
-    counted = histories.count({"loads": loads})
-    names = [channel.name for channel in channels_of(BUSHING_LOADS)]
-    assert names[5:9] == ["cross1.T_z", "cross1.F", "cross1.T", "cross2.F_e"]
-    for c, name in enumerate(names):
-        b, i = divmod(c, 8)
-        signal = loads[:, b, i] if i < 6 else np.linalg.norm(loads[:, b, 3 * i - 18 : 3 * i - 15], axis=1)
-        kind = slice(0, 3) if "F" in name else slice(3, 6)
-        ranges, means = histories.periodic(signal, histories.GATE * np.linalg.norm(loads[..., kind], axis=-1).max())
-        assert counted["cycle_count"][c] == len(ranges), name
-        kept = min(len(ranges), histories.KEPT)
-        np.testing.assert_allclose(counted["cycles"][c, :kept, 0], ranges[:kept], rtol=1e-6)
-        np.testing.assert_allclose(counted["cycles"][c, :kept, 1], means[:kept], rtol=1e-5, atol=1e-6)
-        assert not counted["cycles"][c, kept:].any()
-    assert (counted["cycle_count"][:56] > 0).all()
-    assert not counted["cycle_count"][56:].any()
-    loads[3, 2, 1] = np.nan
-    assert np.isnan(histories.count({"loads": loads})["cycles"]).all()
-
-
-def test_cycles_of_shafts_are_counted_from_a_fraction_of_the_largest_bushing_load_on():
-    rng = np.random.default_rng(8)
-    loads, shafts = 1e3 * rng.normal(size=(60, 8, 6)), rng.normal(size=(60, 2, 6))
-    shafts[:, 0] *= 0.02  # some of its cycles are below the gate
-    counted = histories.count({"loads": loads, "shafts": shafts})
+    loads = {history.name: rng.normal(size=(40, *history.shape)) + np.arange(6) for history in LOAD_HISTORIES}
+    loads["loads"][:, 7] *= 1e-6  # cycles below the gate
+    loads["shafts"][:, 0] *= 2e-4  # some of them are
+    counted = histories.cycles(loads)
     assert {name: values.shape for name, values in counted.items()} == {
         name: spec.shape for name, spec in histories.cycle_specs().items()
     }
-    largest = {"N": np.linalg.norm(loads[..., :3], axis=-1).max(), "N*m": np.linalg.norm(loads[..., 3:], axis=-1).max()}
-    expected = {}
-    for i, shaft in enumerate(SHAFTS):
-        x, y, z, m_x, m_y, m_z = shafts[:, i].T
-        own = {"f_x": x, "f_y": y, "f_z": z, "m_x": m_x, "m_y": m_y, "m_z": m_z}
-        own |= {"axial": np.abs(z), "lateral": np.hypot(x, y), "moment": np.hypot(m_x, m_y)}
-        own |= {"drive": np.abs(m_z)} if shaft == "input" else {}
-        expected |= {f"{shaft}.{name}": signal for name, signal in own.items()}
-    channels = channels_of(SHAFT_LOADS)
-    assert [channel.name for channel in channels] == list(expected)
-    for c, channel in enumerate(channels):
-        signal, gate = expected[channel.name], histories.GATE * largest[channel.unit]
-        ranges, _ = histories.periodic(signal, gate)
-        assert counted["shaft_cycle_count"][c] == len(ranges), channel.name
-        kept = min(len(ranges), histories.KEPT)
-        np.testing.assert_allclose(counted["shaft_cycles"][c, :kept, 0], ranges[:kept], rtol=1e-6)
-    whole = [len(histories.periodic(signal)[0]) for signal in expected.values()]
-    assert (counted["shaft_cycle_count"] < whole).any()  # the gate leaves some out
+    bushing = loads["loads"]
+    largest = {
+        "N": np.linalg.norm(bushing[..., :3], axis=-1).max(),
+        "N*m": np.linalg.norm(bushing[..., 3:], axis=-1).max(),
+    }
+    for history in LOAD_HISTORIES:
+        kept, number = (counted[f"{history.prefix}{name}"] for name in ("cycles", "cycle_count"))
+        for c, name in enumerate(components_of(history)):
+            signal = loads[history.name][:, c // 6, c % 6]
+            ranges, means = histories.periodic(signal, histories.GATE * largest[COMPONENTS[name].unit])
+            assert number[c] == len(ranges), name
+            if len(ranges) == 0:  # the level of a load that hardly varies
+                ranges, means = np.array([np.ptp(signal)]), np.array([0.5 * (signal.max() + signal.min())])
+            k = min(len(ranges), histories.KEPT)
+            np.testing.assert_allclose(kept[c, :k, 0], ranges[:k], rtol=1e-6)
+            np.testing.assert_allclose(kept[c, :k, 1], means[:k], rtol=1e-5, atol=1e-6)
+            assert not kept[c, k:].any()
+    assert (counted["cycle_count"][:42] > 0).all()
+    assert not counted["cycle_count"][42:].any()
+    assert 0 < counted["shaft_cycle_count"][:3].max() < 20  # the gate leaves some out
+    assert components_of(BUSHING_LOADS)[4:8] == ["cross1.T_t", "cross1.T_z", "cross2.F_e", "cross2.F_t"]
+    assert components_of(SHAFT_LOADS)[5:8] == ["input.m_z", "output.f_x", "output.f_y"]
+    bushing[3, 2, 1] = np.nan
+    assert np.isnan(histories.cycles(loads)["cycles"]).all()
+
+
+def test_cycles_along_a_direction_are_those_of_the_sum():
+    rng = np.random.default_rng(6)
+    loads = {history.name: rng.normal(size=(40, *history.shape)) for history in LOAD_HISTORIES}
+    places = {"cross2.F": ("loads", 1, 1, 2), "fork3.T": ("loads", 6, 3, 4), "output.lateral": ("shafts", 1, 0, 1)}
+    for plane, (history, place, x, y) in places.items():
+        first, second = loads[history][:, place, x], loads[history][:, place, y]
+        ranges, _, number = histories.count(loads, signals_of(f"{plane} at 30 deg"), kept=40)
+        gate = 0.01  # above that of the count
+        expected = histories.periodic(np.sqrt(0.75) * first + 0.5 * second, gate)[0]
+        np.testing.assert_allclose(ranges[0][ranges[0] > gate], expected, rtol=1e-12)
+        assert number[0] >= len(expected)
+        every = signals_of(f"{plane} at worst")
+        counted = Cycles.of_revolution(
+            tuple(signal.name for signal in every), *(table[None] for table in histories.count(loads, every, kept=40))
+        )
+        fine = [f"{plane} at {angle:g} deg" for angle in np.arange(0.0, 180.0, 0.5)]
+        single = histories.count(loads, tuple(signal for name in fine for signal in signals_of(name)), kept=40)
+        along = Cycles.of_revolution(tuple(fine), *(table[None] for table in single))
+        worst = counted.worst(5.0)
+        assert worst.channels == (f"{plane} at worst",)
+        most, reached = cycles.equivalent_load(along, 5.0).max(), cycles.equivalent_load(worst, 5.0)[0, 0]
+        assert most * (1 - 0.0022) < reached <= most
+    assert set(PLANES) == {
+        *(f"{place}{i}.{kind}" for place in ("cross", "fork") for i in (1, 2, 3, 4) for kind in "FT"),
+        *(f"{shaft}.{kind}" for shaft in SHAFTS for kind in ("lateral", "moment")),
+    }
+
+
+def test_starts_take_the_place_of_the_largest_cycle():
+    here = of_signals([3.0, 5.0, 3.5, 4.5], [-1.0, 2.0], [5.0, 5.0]).with_starts(0.25)
+    line = cycles.Line(3.0, 1.0, 1.0)
+    whole = [0.25 * 5.0**3 + 0.75 * 2.0**3 + 1.0, 0.25 * 3.0**3 + 0.75 * 3.0**3, 0.25 * 5.0**3]
+    np.testing.assert_allclose(cycles.damage(here, line, 1.0)[:, 0], whole)
+    np.testing.assert_allclose(here.number[:, 0], [2.0, 1.0, 0.25])
 
 
 def test_equivalent_load_and_damage_of_constant_amplitude():
@@ -230,9 +255,9 @@ def test_small_cycles_are_those_below_a_share_of_the_largest_load_of_their_kind(
     for values in loads.values():
         values[:, :2, 0], values[:, :2, 5] = 1000.0 * (waves + 0.9), 10.0 * (waves + 0.9)
     loads["loads"][0, 2, 1], loads["loads"][0, 2, 4] = 1000.0, 10.0
-    counted = histories.count(loads)
+    counted = histories.cycles(loads)
     for history in LOAD_HISTORIES:
-        names = [channel.name for channel in channels_of(history)]
+        names = components_of(history)
         numbers = dict(zip(names, counted[f"{history.prefix}cycle_count"], strict=True))
         for component in (history.components[0], history.components[5]):
             assert [numbers[f"{place}.{component}"] for place in history.places[:2]] == [0, 4]

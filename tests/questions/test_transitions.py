@@ -7,48 +7,85 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.questions.test_fatigue import of_signals
+from tests.questions.test_fatigue import needs, of_signals
 from tolstat.analysis import cycles
+from tolstat.analysis.cycles import Cycles
 from tolstat.analysis.design import Independent
+from tolstat.common.channels import COMPONENTS, LOAD_HISTORIES, signals_of
 from tolstat.common.tables import Status
-from tolstat.questions.fatigue import loads
 from tolstat.questions.fatigue.duty import Joints
 from tolstat.solver import histories
 from tolstat.study.fatigue import Fatigue
 
 
-def course(levels, visits, turns):
-    """Load that goes through so many revolutions at each visit, a cosine between the two levels of the point."""
-    wave = np.cos(2 * np.pi * np.arange(40) / 40)
-    each = [0.5 * (levels[v][0] + levels[v][1]) + 0.5 * (levels[v][1] - levels[v][0]) * wave for v in visits]
-    return np.concatenate([np.append(np.tile(own, turns), own[0]) for own in each])
-
-
-@pytest.mark.parametrize("seed", range(6))
-def test_cycles_between_points_are_those_of_the_whole_course(seed):
-    """Oracle: all cycles of a course of many revolutions, without those of the revolutions themselves."""
-    rng = np.random.default_rng(seed)
-    levels = np.sort(rng.normal(size=(4, 2)) + 3 * rng.normal(size=(4, 1)), axis=1)
-    visits, turns = rng.integers(0, 4, 12), 50
-    visits = visits[np.flatnonzero(np.diff(visits, append=visits[0] - 9))]
-    ranges, means, numbers = histories.between(visits, levels[None, :, 0], levels[None, :, 1])
-    whole, middles = histories.periodic(course(levels, visits, turns))
-    own = {round(high - low, 9) for low, high in levels}
-    between = np.array([r for r in whole if round(r, 9) not in own])
-    np.testing.assert_allclose(np.sort(np.repeat(ranges[0], numbers[0].astype(int))), np.sort(between))
-    steady = sum(turns * np.ptp(levels[v]) ** 3 for v in visits)
-    added = float(numbers[0] @ ranges[0] ** 3)
-    # a cycle between points may take the place of one of a revolution, once a visit
-    assert -1e-9 < steady + added - np.sum(whole**3) < steady / turns
-    assert set(means[0][numbers[0] > 0].round(9)) <= set(middles.round(9))
-
-
 def test_cycles_between_points_by_hand():
     low, high = np.array([[0.0, 10.0, -5.0], [-1.0, -2.0, 0.0]]), np.array([[1.0, 11.0, 5.0], [1.0, 2.0, np.nan]])
-    ranges, means, numbers = histories.between([0, 1, 0, 1], low[:1, :2], high[:1, :2])
+    ranges, means, numbers, replaced = histories.between([0, 1, 0, 1], low[:1, :2], high[:1, :2])
     assert (ranges.tolist(), means.tolist(), numbers.tolist()) == ([[11.0]], [[5.5]], [[2.0]])
+    assert replaced.tolist() == [[2.0, 0.0]]  # from 11 by 1 to 0 and back by 1: no cycle from 1 to 0
     assert histories.between([0, 1], low[1:, :2], high[1:, :2])[0].tolist() == [[3.0]]  # from 2 to -1
     assert np.isnan(histories.between([0, 1, 2], low, high)[0][1]).all()
+
+
+def of_loads(loads, signals):
+    """Cycles of one joint at a point."""
+    names = tuple(signal.name for signal in signals)
+    return Cycles.of_revolution(names, *(table[None] for table in histories.count(loads, signals, kept=40)))
+
+
+def course(signals, visits, turns):
+    """Load over the sequence: whole revolutions at each visit, from its largest value to the same again."""
+    rolled = [np.roll(signal, -int(np.argmax(signal))) for signal in signals]
+    each = [np.append(np.tile(rolled[v], turns[v]), rolled[v][0]) for v in visits]
+    whole = np.concatenate(each)
+    return np.append(np.roll(whole, -int(np.argmax(whole))), whole.max())
+
+
+@needs("rainflow")
+@pytest.mark.parametrize("seed", range(12))
+def test_damage_of_a_sequence_is_that_of_the_histories_one_after_the_other(seed):
+    """Oracle: the package rainflow on the whole course, every channel; some constant at a point, some nearly."""
+    import rainflow
+
+    rng = np.random.default_rng(seed)
+    theta = 2 * np.pi * np.arange(60)[:, None, None] / 60
+    signals = tuple(
+        s for name in (*COMPONENTS, "cross1.F at 30 deg", "output.moment at 77 deg") for s in signals_of(name)
+    )
+    points = []
+    for _ in range(4):
+        loads = {}
+        for history in LOAD_HISTORIES:
+            waves = (
+                rng.normal(size=history.shape) * np.cos(k * theta + rng.uniform(0, 6, history.shape)) for k in (1, 2, 3)
+            )
+            size = rng.choice([0.0, 1e-6, 1.0], size=history.shape)
+            loads[history.name] = 5.0 * rng.normal(size=history.shape) + size * sum(waves)
+        points.append(loads)
+    visits = rng.integers(0, 4, 9)
+    visits = visits[np.flatnonzero(np.diff(visits, append=visits[0] - 9))]
+    turns = rng.integers(1, 4, 4)  # revolutions at each visit
+    used, number = np.unique(visits, return_counts=True)
+    total = float(number @ turns[used])
+    shares = number * turns[used] / total
+    duty = tuple((f"p{p}", share) for p, share in zip(used, shares, strict=True))
+    settings = Fatigue(visits=tuple(f"p{p}" for p in visits), turns=total)
+    joints = Joints(np.full(1, Status.OK), Independent(), settings, 1, duty)
+    parts = [of_loads(points[p], signals) for p in used]
+    low, high = (np.stack([getattr(part, end) for part in parts], axis=2) for end in ("low", "high"))
+    mixed = cycles.duty_cycle(parts, shares, joints.transitions(low, high))
+    of_point = [
+        [p[s.history.name][:, s.history.places.index(s.place)] @ np.array(s.factors) for p in points] for s in signals
+    ]
+    constant = np.array([[np.ptp(signal) < 1e-3 for signal in each] for each in of_point])[:, used]
+    assert constant.any()
+    assert not constant.all()
+    for m in (3.0, 5.0):
+        found = total * cycles.moment(mixed, m)[0]
+        for c, each in enumerate(of_point):
+            whole = rainflow.extract_cycles(course(each, visits, turns))
+            expected = sum(count * size**m for size, _, count, _, _ in whole)
+            assert found[c] == pytest.approx(expected, rel=1e-9), signals[c].name
 
 
 def test_a_duty_cycle_with_a_sequence_adds_its_cycles():
@@ -56,13 +93,17 @@ def test_a_duty_cycle_with_a_sequence_adds_its_cycles():
     parts = [of_signals(wave, wave) for wave in waves]
     settings = Fatigue(visits=("a", "b", "a", "b"), turns=100.0)
     joints = Joints(np.full(2, Status.OK), Independent(), settings, 2, (("a", 0.5), ("b", 0.5)))
-    mixed = loads._mixed(joints, parts, [0.5, 0.5])
-    expected = 0.5 * 1.0 + 0.5 * (1.0 + 0.2**3) + 2 / 100 * 11.0**3
-    np.testing.assert_allclose(cycles.moment(mixed, 3.0), expected)
-    np.testing.assert_allclose(mixed.number, 0.5 + 1.0 + 0.02)
+
+    def mixed(parts):
+        low, high = (np.stack([getattr(part, end) for part in parts], axis=2) for end in ("low", "high"))
+        return cycles.duty_cycle(parts, [0.5, 0.5], joints.transitions(low, high))
+
+    between = 2 / 100 * (11.0**3 - 1.0)  # each takes the place of the largest cycle of a revolution at the lower point
+    np.testing.assert_allclose(cycles.moment(mixed(parts), 3.0), 0.5 + 0.5 * (1.0 + 0.2**3) + between)
+    np.testing.assert_allclose(mixed(parts).number, 0.5 + 1.0)
     assert "4 visits in 100 revolutions" in joints.duty_in_words[1]
     alone = replace(joints, settings=Fatigue())
     assert alone.transitions(np.zeros((2, 1, 2)), np.ones((2, 1, 2))) is None
     assert "gives no [fatigue.sequence]" in alone.duty_in_words[1]
-    constant = loads._mixed(joints, [parts[0], of_signals(np.zeros(3), np.zeros(3))], [0.5, 0.5])
-    np.testing.assert_allclose(cycles.moment(constant, 3.0), 0.5)
+    constant = mixed([parts[0], of_signals(np.full(3, 7.0), np.full(3, 7.0))])
+    np.testing.assert_allclose(cycles.moment(constant, 3.0), 0.5 + 2 / 100 * (7.0**3 - 1.0))

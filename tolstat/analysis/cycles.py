@@ -1,4 +1,4 @@
-"""Which cycles does a load go through in a revolution? Mixtures, spectra, fatigue damage, and the time above a level.
+"""Which cycles does a load go through in a revolution? Mixtures, starts, spectra, damage, and the time above a level.
 
 Cycles are those of one periodic revolution: all numbers are per revolution. `sample.Sample` has the distribution of
 these values over the *joints*; `share_of_revolution_above` gives the share of a *revolution* during which a load is
@@ -10,7 +10,7 @@ there is no mean-load correction.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,9 +25,10 @@ class Cycles(NamedTuple):
     Attributes
     ----------
     channels : tuple of str
-        Names of the loads, keys of `channels.CHANNELS`.
+        Names of the signals, `channels.Signal.name`. Of several with one name the worst counts, see `worst`.
     ranges, means : ndarray, shape (n, channels, k)
-        Range and mean of each cycle, N or N m; a range of 0 marks an empty place, NaN a joint without results.
+        Range and mean of each cycle, in the unit of the signal; a range of 0 marks an empty place, NaN a joint without
+        results.
     number : ndarray, shape (n, channels)
         Cycles per revolution, including those not stored among the k; NaN for joints without results.
     repeats : ndarray, shape (n, channels, k)
@@ -35,7 +36,9 @@ class Cycles(NamedTuple):
     omitted : ndarray, shape (n, channels, points)
         Cycles per revolution at each operating point that are not stored.
     ceiling : ndarray, shape (n, channels, points)
-        Range that none of these exceeds, N or N m.
+        Range that none of these exceeds.
+    low, high : ndarray, shape (n, channels)
+        Smallest and largest value at all operating points together.
     """
 
     channels: tuple[str, ...]
@@ -45,29 +48,80 @@ class Cycles(NamedTuple):
     repeats: FloatArray
     omitted: FloatArray
     ceiling: FloatArray
+    low: FloatArray
+    high: FloatArray
 
     @classmethod
     def of_revolution(
         cls, channels: tuple[str, ...], ranges: NDArray[Any], means: NDArray[Any], number: FloatArray
     ) -> Cycles:
-        """Cycles of one revolution, of which the largest k are stored."""
+        """Cycles of one revolution, of which the largest k are stored, descending.
+
+        The first is from the smallest to the largest value, also where `number` is 0: then it does not count.
+        """
+        low, high = (means[..., 0] + end * ranges[..., 0].astype(float) for end in (-0.5, 0.5))
+        ranges = np.where(number[..., None] == 0, 0.0, ranges)
         stored = ranges > 0
         omitted = np.maximum(number - stored.sum(axis=2), 0.0)[..., None]
         ceiling = np.min(ranges, axis=2, initial=np.inf, where=stored)[..., None].astype(float)
-        return cls(channels, ranges, means, number, np.ones(ranges.shape), omitted, ceiling)
+        return cls(channels, ranges, means, number, np.ones(ranges.shape), omitted, ceiling, low, high)
 
     def of(self, channel: str) -> Cycles:
-        """Select one channel; the axis of channels stays, with length 1."""
-        c = self.channels.index(channel)
-        return self._picked((slice(None), slice(c, c + 1)))._replace(channels=(channel,))
+        """Select the signals of one name; the axis of channels stays."""
+        c = [i for i, name in enumerate(self.channels) if name == channel]
+        return self._picked((slice(None), c))._replace(channels=(channel,) * len(c))
 
     def rows(self, joints: slice) -> Cycles:
         """Select joints."""
         return self._picked((joints,))
 
-    def _picked(self, part: tuple[slice, ...]) -> Cycles:
-        names = ("ranges", "means", "number", "repeats", "omitted", "ceiling")
-        return self._replace(**{name: getattr(self, name)[part] for name in names})
+    def spread(self, rows: NDArray[np.intp], n: int) -> Cycles:
+        """Put the joints in `rows` of a table of n joints; NaN in the others."""
+
+        def spread(values: NDArray[Any]) -> NDArray[Any]:
+            table = np.full((n, *values.shape[1:]), np.nan, values.dtype)
+            table[rows] = values
+            return table
+
+        return self._each(spread)
+
+    def worst(self, m: float) -> Cycles:
+        """Of signals with one name, those of the one that is damaged most in each joint by the exponent m."""
+        names = tuple(dict.fromkeys(self.channels))
+        if names == self.channels:
+            return self
+        damaged, index = (
+            np.nan_to_num(moment(self, m), posinf=np.inf),
+            np.empty((len(self.number), len(names)), np.intp),
+        )
+        for c, name in enumerate(names):
+            same = np.array([i for i, other in enumerate(self.channels) if other == name])
+            index[:, c] = same[np.argmax(damaged[:, same], axis=1)]
+        return self._picked((np.arange(len(index))[:, None], index))._replace(channels=names)
+
+    def with_starts(self, starts: float) -> Cycles:
+        """Add starts from standstill, so many per revolution.
+
+        Each goes from zero to the extremes and back; its cycle takes the place of the largest of one revolution.
+        """
+        if not starts:
+            return self
+        largest = np.argmax(np.nan_to_num(self.ranges), axis=2)[..., None]
+        repeats, there = self.repeats.copy(), np.take_along_axis(self.repeats, largest, axis=2)
+        left = np.maximum(there - starts, 0.0)
+        np.put_along_axis(repeats, largest, left, axis=2)
+        replaced = (there - left)[..., 0] * (np.take_along_axis(self.ranges, largest, axis=2)[..., 0] > 0)
+        low, high = np.minimum(self.low, 0.0), np.maximum(self.high, 0.0)
+        started = high - low, 0.5 * (high + low), np.full(low.shape, starts)
+        tables = zip((self.ranges, self.means, repeats), started, strict=True)
+        ranges, means, repeats = (np.concatenate([table, new[..., None]], axis=2) for table, new in tables)
+        return self._replace(ranges=ranges, means=means, repeats=repeats, number=self.number + starts - replaced)
+
+    def _picked(self, part: tuple[Any, ...]) -> Cycles:
+        return self._each(lambda values: values[part])
+
+    def _each(self, function: Callable[[NDArray[Any]], NDArray[Any]]) -> Cycles:
+        return Cycles(self.channels, *map(function, self[1:]))
 
 
 class Transitions(NamedTuple):
@@ -76,14 +130,17 @@ class Transitions(NamedTuple):
     Attributes
     ----------
     ranges, means : ndarray, shape (n, channels, k)
-        Range and mean, N or N m; a range of 0 marks an empty place.
+        Range and mean; a range of 0 marks an empty place.
     repeats : ndarray, shape (n, channels, k)
         Occurrences per revolution.
+    replaced : ndarray, shape (n, channels, points)
+        Largest cycles of revolutions at each point that these take the place of, per revolution.
     """
 
     ranges: FloatArray
     means: FloatArray
     repeats: FloatArray
+    replaced: FloatArray
 
 
 def duty_cycle(parts: Sequence[Cycles], shares: Sequence[float], transitions: Transitions | None = None) -> Cycles:
@@ -92,11 +149,11 @@ def duty_cycle(parts: Sequence[Cycles], shares: Sequence[float], transitions: Tr
     Parameters
     ----------
     parts : sequence of Cycles
-        Row i is the same joint in each.
+        Of one revolution; row i is the same joint in each.
     shares : sequence of float
         Shares of the revolutions, positive, with the sum 1.
     transitions : Transitions, optional
-        Cycles beside those at the points.
+        Cycles between the points.
 
     Returns
     -------
@@ -106,12 +163,17 @@ def duty_cycle(parts: Sequence[Cycles], shares: Sequence[float], transitions: Tr
     tables = [(part.ranges, part.means, share * part.repeats) for part, share in zip(parts, shares, strict=True)]
     number = np.sum([share * part.number for part, share in zip(parts, shares, strict=True)], axis=0)
     if transitions is not None:
-        tables.append(transitions)
-        number = number + transitions.repeats.sum(axis=2)
+        for p, (part, (_, _, repeats)) in enumerate(zip(parts, tables, strict=True)):
+            replaced = np.where(part.number > 0, np.minimum(transitions.replaced[..., p], repeats[..., 0]), 0.0)
+            repeats[..., 0] -= replaced
+            number -= replaced
+        tables.append(transitions[:3])
+        number += transitions.repeats.sum(axis=2)
     ranges, means, repeats = (np.concatenate(table, axis=2) for table in zip(*tables, strict=True))
     omitted = np.concatenate([share * part.omitted for part, share in zip(parts, shares, strict=True)], axis=2)
     ceiling = np.concatenate([part.ceiling for part in parts], axis=2)
-    return Cycles(parts[0].channels, ranges, means, number, repeats, omitted, ceiling)
+    low, high = np.min([part.low for part in parts], axis=0), np.max([part.high for part in parts], axis=0)
+    return Cycles(parts[0].channels, ranges, means, number, repeats, omitted, ceiling, low, high)
 
 
 def spectrum(cycles: Cycles, numbers: ArrayLike) -> FloatArray:

@@ -234,13 +234,14 @@ def export(
 
     For Parquet or Excel: tolstat.open(FILE).to_pandas() has the same columns.
 
-    If the study has several operating points, --statistics is of the worst of them, and the other files need --point.
+    If the study has several operating points, --statistics is of the worst of them, --pylife of the duty cycle, and
+    --csv needs --point.
 
     --statistics writes the verdict, the share above each limit, quantiles, capability, the numerical error and the
     versions; causes of a load: tolstat causes FILE --by LOAD --json.
 
-    --pylife writes the cycles per revolution, one row per joint, channel and class of range and mean, if the study
-    keeps cycles or load histories. To read it as a pandas Series: tolstat docs fatigue
+    --pylife writes every cycle of each load component: range, mean, and how often it occurs in a revolution, those
+    between operating points and of starts included. To read it with pyLife: tolstat docs fatigue
 
     Example: tolstat export iso2768_f.h5 --csv joints.csv
 
@@ -269,7 +270,7 @@ def export(
         view = opened.view().at(point or "")
         store = view.store
         if cycles is not None:
-            table = library.fatigue.pylife_table(view, nominal=nominal)
+            table = library.fatigue.pylife_frame(view, nominal=nominal)
             write_frame(table, cycles, f"cycles of {table['joint'].nunique()} joints")
         if statistics is not None:
             values = library.reports.statistics(view, accepted=accepted)

@@ -1,7 +1,7 @@
-"""Registry of the loads over the input angle: what histories hold, and the channels that follow from it.
+"""Registry of the loads over the input angle: what histories hold, the channels and the signals that follow from it.
 
-They follow from the components of the kinds of loads, `load_kinds.LOAD_KINDS`. Time above, causes over the input angle
-and load cycles read them.
+They follow from the components of the kinds of loads, `load_kinds.LOAD_KINDS`. A channel is drawn over the input angle;
+cycles are counted of a signal, which has a sign.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.load_kinds import BUSHINGS, LOAD_KINDS, SHAFTS, Kind
+from tolstat.common.load_kinds import BUSHINGS, LOAD_KINDS, PLACES, SHAFTS, Kind
 
 
 class LoadHistory(NamedTuple):
@@ -30,7 +30,7 @@ class LoadHistory(NamedTuple):
         Components at each place, those of forces first.
     axes : tuple of str
         Names of the axes of places and components in a result file.
-    meaning, channels : str
+    meaning, signals : str
         What it holds, and what the channels are that follow from it, for the reader of the file.
     """
 
@@ -40,7 +40,7 @@ class LoadHistory(NamedTuple):
     components: tuple[str, ...]
     axes: tuple[str, str]
     meaning: str
-    channels: str
+    signals: str
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -59,7 +59,7 @@ BUSHING_LOADS = LoadHistory(
     ("F_e", "F_t", "F_z", "T_e", "T_t", "T_z"),
     ("bushing", "component"),
     "force e, t, z (N), torque e, t, z (N m) of bushings cross 1-4, fork 1-4 on the lump, in base marker axes",
-    "of bushings cross 1-4, fork 1-4 in turn: force e, t, z, torque e, t, z, modulus of force, of torque",
+    "of bushings cross 1-4, fork 1-4 in turn: force e, t, z, torque e, t, z",
 )
 SHAFT_LOADS = LoadHistory(
     "shafts",
@@ -69,8 +69,7 @@ SHAFT_LOADS = LoadHistory(
     ("shaft", "shaft_component"),
     "force x, y, z (N) and moment x, y, z (N m) about O that the joint exerts on input and output shaft, in axes that "
     "do not turn: z along the shaft, y along the fork's pins at theta = 90 deg",
-    "of input and output shaft in turn: force x, y, z, moment x, y, z, modulus of axial force, of lateral force, of "
-    "bending moment, of the input shaft's driving torque",
+    "of input and output shaft in turn: force x, y, z, moment x, y, z",
 )
 LOAD_HISTORIES = (BUSHING_LOADS, SHAFT_LOADS)
 """Registry of the loads over the input angle."""
@@ -130,13 +129,79 @@ def _channels() -> Iterator[Channel]:
 
 CHANNELS = {channel.name: channel for channel in _channels()}
 """Loads over the input angle by name, history after history."""
-UNIT_OF_CHANNEL = {name: channel.unit for name, channel in CHANNELS.items()}
-"""SI unit of each channel."""
 
 
-def channels_of(history: LoadHistory) -> tuple[Channel, ...]:
-    """Channels that follow from a history, in the order of `CHANNELS`."""
-    return tuple(channel for channel in CHANNELS.values() if channel.history == history)
+class Signal(NamedTuple):
+    """Sum of the components at one place, each times a factor: a component, a direction, or the stress at a point.
+
+    Attributes
+    ----------
+    name : str
+        ``cross1.F_t``, ``cross1.F at 30 deg``. Of several with one name, the worst counts.
+    unit : str
+        SI unit.
+    history : LoadHistory
+        What holds the components.
+    place : str
+        Where they act.
+    factors : tuple of float
+        Factor of each component of the history.
+    """
+
+    name: str
+    unit: str
+    history: LoadHistory
+    place: str
+    factors: tuple[float, ...]
+
+
+def _components() -> Iterator[Signal]:
+    for channel in CHANNELS.values():
+        if not channel.is_modulus:
+            factors = np.zeros(len(channel.history.components))
+            factors[channel.components] = 1.0
+            yield Signal(channel.name, channel.unit, channel.history, channel.place, tuple(factors.tolist()))
+
+
+COMPONENTS = {signal.name: signal for signal in _components()}
+"""Components by name, history after history."""
+
+
+def _planes() -> Iterator[tuple[str, tuple[str, str]]]:
+    for channel in CHANNELS.values():
+        names = channel.history.components[channel.components]
+        if len(names) == 3:  # of a bushing: across the arm's axis z, across the pin's axis e
+            names = names[:2] if PLACES[channel.place].group == "fork" else names[1:]
+        if len(names) == 2:
+            yield channel.name, (f"{channel.place}.{names[0]}", f"{channel.place}.{names[1]}")
+
+
+PLANES = dict(_planes())
+"""Two components across the axis of pin, arm or shaft, by name of a modulus: of ``cross1.F`` those along t and z."""
+WORST = "worst"
+AROUND = 24
+"""Number of directions in half a turn of which the worst counts (opposite ones have the same cycles); the load between
+two of them is at most 1 - cos(3.75 deg), 0.2 %, above theirs."""
+
+
+def signals_of(name: str) -> tuple[Signal, ...]:
+    """Signals of a name: of a component, ``cross1.F_t``; along a direction, ``cross1.F at 30 deg``, ``... at worst``.
+
+    The angle is from the first component of `PLANES` towards the second.
+    """
+    if name in COMPONENTS:
+        return (COMPONENTS[name],)
+    plane, _, direction = name.partition(" at ")
+    first, second = (COMPONENTS[component] for component in PLANES[plane])
+    degrees = 180.0 * np.arange(AROUND) / AROUND if direction == WORST else [float(direction.removesuffix(" deg"))]
+    angles = np.radians(degrees)
+    factors = np.outer(np.cos(angles), first.factors) + np.outer(np.sin(angles), second.factors)
+    return tuple(first._replace(name=name, factors=tuple(each)) for each in factors.tolist())
+
+
+def unit_of(name: str) -> str:
+    """SI unit of a signal, by its name."""
+    return signals_of(name)[0].unit
 
 
 def histories_of(names: Iterable[str]) -> tuple[LoadHistory, ...]:

@@ -53,7 +53,7 @@ KERNELS: dict[str, Callable[[Options], object]] = {
     "explicit.count_steps": lambda options: simulation.explicit_steps(_outside_model(torque_reverses=True), options),
     "starts.write_starts": lambda options: simulation.starts(np.zeros(1, PARAM).view(np.recarray), options),
     "ideal.ideal_revolution": partial(_simulate, 1),
-    "rainflow.count_joint": lambda options: histories.count(
+    "rainflow.count_joint": lambda options: histories.cycles(
         {history.name: np.zeros((2, *history.shape)) for history in LOAD_HISTORIES}
     ),
 }

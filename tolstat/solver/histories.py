@@ -6,6 +6,7 @@ four-point method gives the same cycles when its residue is appended to itself a
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any, Literal
@@ -13,8 +14,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tolstat.common.channels import BUSHING_LOADS, CHANNELS, LOAD_HISTORIES, SHAFT_LOADS, LoadHistory, channels_of
-from tolstat.common.load_kinds import CONTACTS, SPAN, measure_of
+from tolstat.common.channels import BUSHING_LOADS, COMPONENTS, LOAD_HISTORIES, SHAFT_LOADS, LoadHistory, Signal
+from tolstat.common.load_kinds import CONTACTS, SPAN
 from tolstat.common.tables import HistorySpec, Options
 
 Histories = Literal["none", "cycles", "harmonics", "harmonics+cycles", "full"]
@@ -77,7 +78,7 @@ def extracted(
         BUSHING_LOADS.name: np.ascontiguousarray(samples["components"]),
         SHAFT_LOADS.name: np.ascontiguousarray(samples["shafts"]),
     }
-    sample = count(loads) if "cycles" in histories else {}
+    sample = cycles(loads) if "cycles" in histories else {}
     if "harmonics" in histories:
         sample |= coefficients(loads, specs["coefficients_real"].shape[-1])
     return sample
@@ -149,12 +150,13 @@ def restore(real: NDArray[Any], imag: NDArray[Any], samples: int) -> NDArray[np.
 
 
 def cycle_specs() -> dict[str, HistorySpec]:
-    """Describe what `count` gives for a joint, as histories of a result file."""
+    """Describe what `cycles` gives for a joint, as histories of a result file."""
     result: dict[str, HistorySpec] = {}
     for history in LOAD_HISTORIES:
-        n, channel = len(channels_of(history)), f"{history.prefix}channel"
+        n, channel = math.prod(history.shape), f"{history.prefix}channel"
         text = "range and mean of the largest rainflow cycles of the last revolution, descending, 0 where there are "
-        text += f"none; {history.channels}"
+        text += "none; where none is counted, the first is the range of the load, up to the gate, and its middle; "
+        text += history.signals
         result |= {
             f"{history.prefix}cycles": HistorySpec((n, KEPT, 2), "f4", "N, N*m", text, (channel, "cycle", "of_cycle")),
             f"{history.prefix}cycle_count": HistorySpec(
@@ -203,11 +205,12 @@ def periodic(signal: ArrayLike, gate: float = 0.0) -> tuple[NDArray[np.float64],
 
 def between(
     visits: Sequence[int], low: NDArray[np.float64], high: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Rainflow cycles that a sequence of operating points closes beside those at each point.
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Rainflow cycles that a sequence of operating points closes, and those of revolutions that they replace.
 
-    The sequence repeats. A visit begins and ends at the largest load of the point, with the smallest between; cycles
-    between the two values of one point are those of its revolutions, and left out.
+    The sequence repeats. A visit is of whole revolutions, from the largest load of the point to the same again. Of each
+    the first goes here into the sequence, with the smallest load between: cycles between the two loads of one point are
+    those of a revolution; where one of them closes with another point, the revolution lacks its largest cycle.
 
     Parameters
     ----------
@@ -219,12 +222,16 @@ def between(
     Returns
     -------
     ranges, means, numbers : ndarray, shape (n, k)
-        Cycles of each row, and how often each occurs in the sequence; 0 in empty places, ranges NaN where a load is.
+        Cycles between points of each row, and how often each occurs in the sequence; 0 in empty places, ranges NaN
+        where a load is.
+    replaced : ndarray, shape (n, points)
+        Largest cycles of revolutions at each point that these take the place of.
 
     Examples
     --------
-    >>> between([0, 1], np.array([[0.0, 10.0]]), np.array([[1.0, 11.0]]))[0].tolist()
-    [[11.0]]
+    >>> ranges, _, _, replaced = between([0, 1], np.array([[0.0, 10.0]]), np.array([[1.0, 11.0]]))
+    >>> ranges.tolist(), replaced.tolist()
+    ([[11.0]], [[1.0, 0.0]])
     """
     points = high.shape[1]
     levels = np.hstack([high, low]).astype(float)
@@ -232,11 +239,14 @@ def between(
     orders, which = np.unique(ranks, axis=0, return_inverse=True)  # which cycles close depends on the order alone
     course = np.column_stack([visits, points + np.asarray(visits), visits]).ravel()
     closed: list[tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]] = []
-    for order in orders:
+    replaced = np.empty((len(orders), points))
+    for i, order in enumerate(orders):
         sizes, middles = periodic(order[course])
         by_rank = np.argsort(order)
         top, bottom = (by_rank[np.rint(middles + end * sizes).astype(int)] for end in (0.5, -0.5))
-        pairs, times = np.unique((2 * points * top + bottom)[top % points != bottom % points], return_counts=True)
+        own = top % points == bottom % points
+        replaced[i] = np.bincount(visits, minlength=points) - np.bincount(top[own] % points, minlength=points)
+        pairs, times = np.unique((2 * points * top + bottom)[~own], return_counts=True)
         closed.append((*np.divmod(pairs, 2 * points), times))
     ranges, means, numbers = np.zeros((3, len(levels), max([1, *(len(times) for *_, times in closed)])))
     for row, index in enumerate(which.ravel()):
@@ -244,57 +254,76 @@ def between(
         upper, lower, k = levels[row, top], levels[row, bottom], len(times)
         ranges[row, :k], means[row, :k], numbers[row, :k] = upper - lower, 0.5 * (upper + lower), times
     ranges[np.isnan(levels).any(axis=1)] = np.nan
-    return ranges, means, numbers
+    return ranges, means, numbers, replaced[which.ravel()]
 
 
-def count(loads: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
-    """Rainflow cycles of all channels of a joint.
+def cycles(loads: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """Rainflow cycles of all load components of a joint.
 
     Parameters
     ----------
     loads : mapping of str to ndarray
-        By name of `LOAD_HISTORIES`, (samples, places, components) each, N and N m, over one revolution. Those of
-        bushings are needed: cycles of all loads are counted from a fraction of their largest ones on.
+        As in `count`, of all histories.
 
     Returns
     -------
     dict
-        By name of `cycle_specs`, for each history given: ``cycles`` (channels, KEPT, 2), N and N m, and ``cycle_count``
-        (channels,); the channels are `channels_of` the history. NaN and 0 when a load is not finite.
+        By name of `cycle_specs`, for each history: ``cycles`` (components, KEPT, 2), N and N m, and ``cycle_count``
+        (components,). NaN and 0 when a load is not finite.
     """
-    from tolstat.kernel.revolution import rainflow
-
-    described = cycle_specs()
-    counted: dict[str, NDArray[Any]] = {}
+    described, counted = cycle_specs(), dict[str, NDArray[Any]]()
     finite = all(np.isfinite(values).all() for values in loads.values())
-    for history in (history for history in LOAD_HISTORIES if history.name in loads):
+    for history in LOAD_HISTORIES:
         names = [f"{history.prefix}{name}" for name in ("cycles", "cycle_count")]
         table, number = (described[name].blank(1)[0] for name in names)
         if finite:
-            ranges, means = np.empty((2, len(number), KEPT))
-            values, cycles = np.ascontiguousarray(loads[history.name], dtype=float), np.empty(len(number), np.int64)
-            gates = _gates(history, loads[BUSHING_LOADS.name])
-            rainflow.count_joint(values, _signals(history), gates, ranges, means, cycles)
-            table[...], number[...] = np.stack([ranges, means], axis=-1), cycles
+            own = tuple(signal for signal in COMPONENTS.values() if signal.history == history)
+            ranges, means, number[...] = count(loads, own)
+            table[...] = np.stack([ranges, means], axis=-1)
         counted |= dict(zip(names, (table, number), strict=True))
     return counted
 
 
-def _gates(history: LoadHistory, bushing: NDArray[Any]) -> NDArray[np.float64]:
-    """Range up to which no cycle of a channel is counted: a share of the bushings' largest force or torque."""
-    kinds = [measure_of(channel.kind) for channel in channels_of(history)]
-    spans = {kind.key: CHANNELS[f"{BUSHING_LOADS.places[0]}.{kind.symbol}"].components for kind in kinds}
-    size = {key: np.linalg.norm(bushing[..., span].astype(float), axis=-1).max() for key, span in spans.items()}
-    return GATE * np.array([size[kind.key] for kind in kinds])
+def count(
+    loads: Mapping[str, NDArray[Any]], signals: tuple[Signal, ...], kept: int = KEPT
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+    """Rainflow cycles of some signals of a joint over one revolution.
+
+    Parameters
+    ----------
+    loads : mapping of str to ndarray
+        By name of `LOAD_HISTORIES`, (samples, places, components) each, N and N m, finite. Those of bushings are
+        needed: no cycle counts up to a fraction of their largest ones, see `GATE`.
+    signals : tuple of Signal
+        Signals, (c,).
+    kept : int
+        Maximum number of cycles of each, the largest ones.
+
+    Returns
+    -------
+    ranges, means : ndarray, shape (c, kept)
+        Descending, 0 in empty places, in the unit of the signal. Of a signal none of whose cycles counts, the first is
+        from its smallest to its largest value.
+    number : ndarray, shape (c,)
+        Number of cycles, those not kept included.
+    """
+    from tolstat.kernel.revolution import rainflow
+
+    places, factors = _tables(signals)
+    bushing = loads[BUSHING_LOADS.name]
+    sizes = [np.linalg.norm(bushing[..., part].astype(float), axis=-1).max() for part in (slice(3), slice(3, 6))]
+    gates = GATE * (np.abs(factors) @ np.repeat(sizes, 3))
+    histories = [loads[history.name] for history in LOAD_HISTORIES if history.name in loads]
+    values = np.ascontiguousarray(np.concatenate(histories, axis=1), dtype=float)
+    ranges, means = np.empty((2, len(signals), kept))
+    number = np.empty(len(signals), np.int64)
+    rainflow.count_joint(values, places, factors, gates, ranges, means, number)
+    return ranges, means, number
 
 
 @cache
-def _signals(history: LoadHistory) -> NDArray[np.int64]:
-    """Place, first component and end, and whether it is a modulus, of each channel of a history, (channels, 4)."""
-    return np.array(
-        [
-            (history.places.index(channel.place), channel.components.start, channel.components.stop, channel.is_modulus)
-            for channel in channels_of(history)
-        ],
-        dtype=np.int64,
-    )
+def _tables(signals: tuple[Signal, ...]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Place of each signal among those of all histories, and its factors, (signals, components)."""
+    names = [(history, place) for history in LOAD_HISTORIES for place in history.places]
+    places = [names.index((signal.history, signal.place)) for signal in signals]
+    return np.array(places, np.int64), np.array([signal.factors for signal in signals])

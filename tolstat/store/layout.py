@@ -15,7 +15,7 @@ import numpy as np
 from h5py import h5d, h5p
 from numpy.typing import NDArray
 
-from tolstat.common.channels import BUSHING_LOADS, MEASURING, SHAFT_LOADS, LoadHistory, channels_of
+from tolstat.common.channels import BUSHING_LOADS, COMPONENTS, MEASURING, SHAFT_LOADS, LoadHistory
 from tolstat.common.columns import DESIGN_COLUMNS, ERROR_COLUMNS, LEDGER_COLUMNS, Column, drawn_columns, kept_columns
 from tolstat.common.load_kinds import BUSHINGS, CONTACTS, PINS, SHAFTS
 from tolstat.common.tables import SCHEMA_VERSION, HistorySpec, Mode, Status
@@ -255,7 +255,7 @@ def _allocated(dtype: str | None, blank: bool = False) -> h5p.PropDCID:
 
 
 def _names(history: LoadHistory) -> tuple[str, ...]:
-    return tuple(channel.name for channel in channels_of(history))
+    return tuple(signal.name for signal in COMPONENTS.values() if signal.history == history)
 
 
 AXES: dict[str, tuple[tuple[str, ...], str]] = {

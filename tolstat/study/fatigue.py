@@ -13,11 +13,11 @@ from pydantic import AfterValidator, Field, ValidationInfo, WithJsonSchema, fiel
 
 from tolstat.analysis.strength import Line
 from tolstat.common import units
-from tolstat.common.channels import UNIT_OF_CHANNEL
+from tolstat.common.channels import BUSHING_LOADS, CHANNELS, COMPONENTS, PLANES, WORST, Channel, unit_of
 from tolstat.common.errors import gather, input_error
 from tolstat.common.load_kinds import BUSHINGS
 from tolstat.common.notation import schema_of_positive, schema_of_quantity
-from tolstat.common.strict import Strict, did_you_mean, read_section, read_toml, refuse
+from tolstat.common.strict import Strict, did_you_mean, dotted, read_section, read_toml, refuse
 from tolstat.study.selection import Assignments, Entry, Reading, entries, quantity, resolve, select
 
 Positive = Annotated[units.Number, AfterValidator(units.positive)]
@@ -25,7 +25,6 @@ Exponent = Annotated[units.Number, Field(ge=1, le=30)]
 PerForce = Annotated[float, units.Quantity("1/m^2")]
 PerTorque = Annotated[float, units.Quantity("1/m^3")]
 PositiveStress = Annotated[units.Stress, AfterValidator(units.positive)]
-COMPONENTS = ("F_e", "F_t", "F_z", "T_e", "T_t", "T_z")
 ROUND = {"T_et": ("T_e", "T_t"), "T_tz": ("T_t", "T_z")}
 """Moments that bend a round section, by the key that gives their stress at its surface: of an arm and of a pin."""
 PLACES = 24
@@ -98,15 +97,16 @@ class StressPointEntry(Strict):
 
     @property
     def per_load(self) -> tuple[tuple[float, ...], ...]:
-        """Stress per load component at each place, in the order of `COMPONENTS`, 1/m^2 and 1/m^3."""
-        factors = np.array([float(getattr(self, name)) for name in COMPONENTS])
+        """Stress per load component at each place, in the order of `BUSHING_LOADS`, 1/m^2 and 1/m^3."""
+        names = BUSHING_LOADS.components
+        factors = np.array([float(getattr(self, name)) for name in names])
         bent = {pair: value for name, pair in ROUND.items() if (value := float(getattr(self, name)))}
         places = []
         for angle in 2.0 * np.pi * np.arange(PLACES if bent else 1) / PLACES:
             at_place = factors.copy()
             for (first, second), value in bent.items():
-                at_place[COMPONENTS.index(first)] += value * np.cos(angle)
-                at_place[COMPONENTS.index(second)] += value * np.sin(angle)
+                at_place[names.index(first)] += value * np.cos(angle)
+                at_place[names.index(second)] += value * np.sin(angle)
             places.append(tuple(at_place.tolist()))
         return tuple(places)
 
@@ -165,11 +165,11 @@ class Settings(Strict):
     line: dict[str, Any] = Field(
         default_factory=dict,
         json_schema_extra={"x-table": "lines"},
-        examples=[{"cross*.T": {"m": 5, "S0": "150 N*m", "N0": 2e6}}],
+        examples=[{"cross*.T at worst": {"m": 5, "S0": "150 N*m", "N0": 2e6}}],
     )
-    """S–N lines by channel or pattern"""
+    """S–N lines by load component or direction, or pattern"""
     starts: Annotated[units.Number, AfterValidator(units.not_negative)] = Field(default=0.0, examples=[2e4])
-    """starts from standstill in the service life, for points"""
+    """starts from standstill in the service life"""
     sequence: SequenceEntry | None = Field(
         default=None, examples=[{"points": "drive start drive climb", "revolutions": 9e4}]
     )
@@ -226,7 +226,7 @@ class Fatigue:
     reference_cycles : float
         Number of cycles that the damage-equivalent loads refer to.
     lines : dict
-        Name of a channel to (m, S0, N0) of its S–N line; S0 a range, N or N m.
+        Name of a component or direction to (m, S0, N0) of its S–N line; S0 a range, N or N m.
     starts : float
         Starts from standstill in the service life.
     points : tuple of StressPoint
@@ -293,14 +293,14 @@ def read(file: Reading) -> Fatigue:
         file.fault("fatigue.sequence.points", f"no operating point {unknown[0]!r}", did_you_mean(unknown[0], names))
     for entry in entries(of_channels if isinstance(of_channels, Mapping) else {}, "fatigue", "line"):
         with gather(file.faults):
-            channels = resolve(entry, UNIT_OF_CHANNEL, file.place)
-            claims.claim(entry, channels)
+            selected = counted_names(entry, file.place)
+            claims.claim(entry, selected)
             line = file.model(LineEntry, entry.value, *entry.path)
             size = Entry(entry.pattern, (*entry.path, "S0"), line.S0)
-            value = quantity(size, UNIT_OF_CHANNEL[channels[0]], file.place)
+            value = quantity(size, unit_of(selected[0]), file.place)
             if value <= 0:
                 file.fault(size.path, f"{line.S0!r} is not positive", "give a range above zero")
-            lines |= dict.fromkeys(channels, (line.m, value, line.N0))
+            lines |= dict.fromkeys(selected, (line.m, value, line.N0))
     points = []
     for name, point in settings.point.items():
         bushings = select(point.bushing, BUSHINGS)
@@ -318,6 +318,43 @@ def read(file: Reading) -> Fatigue:
         turns=settings.sequence.revolutions if settings.sequence else 1.0,
         **given,
     )
+
+
+def counted_names(entry: Entry, place: str) -> list[str]:
+    """Names that an entry selects of what cycles are counted of: components, or directions of a force or moment.
+
+    Parameters
+    ----------
+    entry : Entry
+        Its pattern is ``cross*.F_t``, ``cross1.F at 30 deg`` or ``output.moment at worst``, see `channels.signals_of`.
+    place : str
+        File name shown in faults.
+
+    Raises
+    ------
+    InputError
+        When it selects nothing, quantities of different units, or a modulus.
+    """
+    plane, at, direction = (part.strip() for part in entry.pattern.partition(" at "))
+    where = f"{place}: {dotted(entry.path)}"
+    if not at:
+        unsigned = [channel for name in select(plane, CHANNELS) if (channel := CHANNELS[name]).is_modulus]
+        if unsigned and not select(plane, COMPONENTS):
+            found = f"{unsigned[0].name} has no sign: its cycles are not those of the load"
+            raise input_error(where, found, _signed(unsigned[0]))
+        return resolve(entry, {name: signal.unit for name, signal in COMPONENTS.items()}, place)
+    names = resolve(entry._replace(pattern=plane), {name: CHANNELS[name].unit for name in PLANES}, place)
+    if direction != WORST:
+        angle = quantity(entry._replace(value=direction), "rad", place)
+        direction = f"{math.degrees(angle):.9g} deg"
+    return [f"{name} at {direction}" for name in names]
+
+
+def _signed(modulus: Channel) -> str:
+    """Remedy for a modulus: its components, and directions where it has several."""
+    components = [f"{modulus.place}.{name}" for name in modulus.history.components[modulus.components]]
+    directions = f', or "{modulus.name} at 30 deg", "{modulus.name} at {WORST}"' if modulus.name in PLANES else ""
+    return f"write {', '.join(components)}{directions}"
 
 
 def of_text(text: str, place: str) -> Fatigue:

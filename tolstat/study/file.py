@@ -231,10 +231,7 @@ def _check_known(file: Reading, method: str) -> None:
 
 
 def _check_output(file: Reading, output: Output) -> None:
-    """Note a fatigue section where no cycles are stored, but for points, and limits of loads that are not stored."""
-    given = file.data.get("fatigue")
-    if output.histories == "none" and isinstance(given, Mapping) and "point" not in given:
-        file.fault("fatigue", "has no effect without histories", 'write histories = "cycles" in [output]')
+    """Note limits of loads that are not stored."""
     stored = {column.name for column in output.columns}
     lacking = [name for load in file.limits for name in load_of(load).columns if name not in stored]
     if lacking:

@@ -16,7 +16,7 @@ from pydantic import BaseModel
 
 from tolstat.analysis.process import LEAST_PARTS, MOST_PARTS
 from tolstat.common import loads, strict
-from tolstat.common.channels import UNIT_OF_CHANNEL
+from tolstat.common.channels import COMPONENTS, PLANES
 from tolstat.common.files import data_dir
 from tolstat.common.loads import UNIT_OF_LOAD
 from tolstat.common.notation import schema_of_positive, schema_of_quantity
@@ -239,8 +239,15 @@ def _definitions() -> dict[str, Schema]:
         fits.KEY: of_model(fits.FitEntry),
         "points": {"type": "object", "additionalProperties": of_model(StressPointEntry)},
         "line": of_model(LineEntry),
-        "lines": _table("", _entries("line", UNIT_OF_CHANNEL)),
+        "lines": _lines(),
     }
+
+
+def _lines() -> Schema:
+    """Schema of S–N lines by component, or by direction of a force or moment."""
+    components = _table("", _entries("line", dict.fromkeys(COMPONENTS, "N")))
+    directions = _table("", _entries("line", dict.fromkeys(PLANES, "N")), " at .+")
+    return components | {"patternProperties": components["patternProperties"] | directions["patternProperties"]}
 
 
 def study() -> Schema:

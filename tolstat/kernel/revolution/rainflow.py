@@ -1,7 +1,5 @@
 """Rainflow cycles of a periodic load: one revolution that repeats (ASTM E1049-85, 5.4.5)."""
 
-import math
-
 import numpy as np
 
 from tolstat.kernel.simd.jit import njit
@@ -72,7 +70,8 @@ def count(x, gate, points, ranges, means):
     points : (n + 1,) array
         Scratch.
     ranges, means : (k,) arrays
-        Written: the largest cycles in descending order, 0 where there are none.
+        Written: the largest cycles in descending order, 0 where there are none. Where none is counted, the first is the
+        whole range of the signal about its middle, so that its level is known.
 
     Returns
     -------
@@ -82,6 +81,7 @@ def count(x, gate, points, ranges, means):
     ranges[:] = 0.0
     means[:] = 0.0
     reversals = turning_points(x, points)
+    highest, lowest = points[0], np.min(points[:reversals])
     cycles = m = 0
     for i in range(reversals):
         points[m] = points[i]  # the stack of open reversals lies in the part already read
@@ -93,36 +93,35 @@ def count(x, gate, points, ranges, means):
                 cycles += 1
             points[m - 3] = points[m - 1]
             m -= 2
+    if cycles == 0:
+        ranges[0], means[0] = highest - lowest, 0.5 * (highest + lowest)
     return cycles
 
 
 @njit
-def count_joint(loads, signals, gates, ranges, means, cycles):
-    """Rainflow cycles of the channels of a joint.
+def count_joint(loads, places, factors, gates, ranges, means, cycles):
+    """Rainflow cycles of signals of a joint, each a sum of load components at one place times factors.
 
     Parameters
     ----------
     loads : (n, places, components) array
         Components at each place over one revolution, finite.
-    signals : (channels, 4) array of int
-        Place, first component, end of the components, and whether a channel is their modulus.
-    gates : (channels,) array
+    places : (signals,) array of int
+        Place of each signal.
+    factors : (signals, components) array
+        Factor of each component.
+    gates : (signals,) array
         Cycles up to this range are not counted.
-    ranges, means : (channels, k) arrays
+    ranges, means : (signals, k) arrays
         Written, see `count`.
-    cycles : (channels,) array of int
+    cycles : (signals,) array of int
         Written: number of cycles.
     """
     n = loads.shape[0]
     x, points = np.empty(n), np.empty(n + 1)
-    for c in range(len(signals)):
-        place, first, end, is_modulus = signals[c]
+    for c in range(len(places)):
         for s in range(n):
-            if is_modulus:
-                square = 0.0
-                for i in range(first, end):
-                    square += loads[s, place, i] ** 2
-                x[s] = math.sqrt(square)
-            else:
-                x[s] = loads[s, place, first]
+            x[s] = 0.0
+            for i in range(loads.shape[2]):
+                x[s] += factors[c, i] * loads[s, places[c], i]
         cycles[c] = count(x, gates[c], points, ranges[c], means[c])

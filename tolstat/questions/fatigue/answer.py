@@ -10,7 +10,7 @@ from typing import Annotated
 import numpy as np
 
 from tolstat.analysis import binomial, prediction, strength
-from tolstat.common.channels import CHANNELS
+from tolstat.common.channels import signals_of, unit_of
 from tolstat.common.errors import NotApplicable
 from tolstat.common.loads import unit_text
 from tolstat.common.tables import Status
@@ -19,12 +19,13 @@ from tolstat.display.answer import Answer, Asked, Axes, Panel, Panels, Part, Sen
 from tolstat.display.options import Delivery, Loads, Opt
 from tolstat.display.style import ticker
 from tolstat.display.table import Column, Row, Rows, by_share, of_shares
-from tolstat.questions.fatigue import loads, parts
+from tolstat.questions.fatigue import counting, loads, parts
+from tolstat.questions.fatigue.counting import Counted
 from tolstat.questions.fatigue.duty import ANY, Joints, members, section, settings_of
-from tolstat.questions.fatigue.loads import SHARES, Loading, channels, load_cycles
+from tolstat.questions.fatigue.loads import SHARES, channels, load_cycles
 from tolstat.store.revolutions import held
 from tolstat.store.view import View
-from tolstat.study.fatigue import StressPoint
+from tolstat.study.fatigue import Fatigue, StressPoint
 
 JOINTS = 5000
 """Maximum number of samples, the first ones, whose cycles the page evaluates: more add little and take memory."""
@@ -49,7 +50,7 @@ def _life(*lives: float) -> str:
 def _line_of_load(row: Row) -> str:
     if row["channel"] == ANY:
         return "-"
-    return f"{text.value(row['S0'], CHANNELS[row['channel']].unit)} at {row['N0']:g} cycles, m = {row['m']:g}"
+    return f"{text.value(row['S0'], unit_of(row['channel']))} at {row['N0']:g} cycles, m = {row['m']:g}"
 
 
 _LAST = SHARES[-1]
@@ -102,9 +103,10 @@ def fatigue(
 
     For each [fatigue.point] of the study: the damage sum, the life that 90 % of the parts reach, and the share of the
     parts that fail in the service life, with 95 % intervals. Without load histories in the file, the joints are
-    simulated again. From cycles in the file: quantiles of the damage-equivalent load over the joints, and for each S-N
-    line of a load the share of joints whose damage sum exceeds 1. Without --by, prints the most loaded component of
-    the force and of the moment of each bushing. All settings are those of [fatigue] in the study of the first FILE.
+    simulated again. From cycles of load components, or of a force or moment along a direction: quantiles of the
+    damage-equivalent load over the joints, and for each S-N line of a load the share of joints whose damage sum exceeds
+    1. Without --by, prints the most loaded component of the force and of the moment of each bushing. All settings are
+    those of [fatigue] in the study of the first FILE.
 
     The operating points of FILE form a duty cycle, by the share of the time that [[operation]] gives each; so do
     several files, with the same joints at one operating point each.
@@ -119,7 +121,8 @@ def fatigue(
     shares : list of float, optional
         Share of the revolutions, once for each FILE in the same order; sum 1; default: 1 for one file.
     by : list of str, optional
-        Component or pattern, such as cross1.F_t or "cross*.F_t"; repeatable; default: all of bushings.
+        Component or direction, such as cross1.F_t, "cross*.F_t", "cross1.F at 30 deg" or "cross1.F at worst";
+        repeatable; default: components of bushings.
     joints : int, optional
         Evaluate the first N joints only; default: all.
     delivery : int
@@ -128,8 +131,9 @@ def fatigue(
     Returns
     -------
     Answer
-        Of a study with points table ``points``, see `parts.part_failures`; of files with cycles or histories tables
-        ``loads``, see `loads.equivalent_loads`, and of channels with an S–N line ``damages``, see `loads.damages`.
+        Of a study with points table ``points``, see `parts.part_failures`; else, or with cycles in the files, S–N lines
+        of loads or `by`, tables ``loads``, see `loads.equivalent_loads`, and of loads with an S–N line ``damages``, see
+        `loads.damages`.
         Fact ``duty``: shares of the revolutions by operating point, if there are several.
 
     Raises
@@ -137,16 +141,16 @@ def fatigue(
     InputError
         When the shares are not shares or not known, the campaigns have different joints, or nothing is selected.
     StoreError
-        When a file holds no histories and its study no points, or its joints are no sample of a production.
+        When the joints of a file are no sample of a production.
     """
-    has_points = bool(section(views[0]).points)
+    settings = section(views[0])
     has_cycles = all(part.store.history_specs for view in views for part in view.parts)
     shown_parts: list[Part] = []
     duty: Sequence[tuple[str, float]] = ()
-    if has_points:
+    if settings.points:
         stressed = parts.load_stresses(views, shares or None, joints)
         duty, shown_parts = stressed.duty, _of_parts(stressed, delivery)
-    if by or has_cycles or not has_points:
+    if by or has_cycles or settings.lines or not settings.points:
         loading = load_cycles(views, shares or None, channels(by) if by else None, joints)
         rows = loads.equivalent_loads(loading)
         shown = [] if by else loads.most_loaded(rows)
@@ -160,11 +164,13 @@ def fatigue_on_page(view: View, asked: Asked) -> Answer:
     shown_parts: list[Part] = []
     if view.method != "sweep" and view.count(Status.OK):
         with asked.noting("load cycles are left out"):
+            settings = section(view)
             joints = JOINTS if held(view.store) else min(asked.replay, JOINTS)
-            if section(view).points and joints:
+            if settings.points and joints:
                 shown_parts += _of_parts(parts.load_stresses([view], samples=joints), prediction.DELIVERY)
-            if view.store.history_specs:
-                loading = load_cycles([view], samples=JOINTS)
+            joints = _joints_with_lines(view, settings, asked.replay)
+            if (settings.lines or view.store.history_specs) and joints:
+                loading = load_cycles([view], samples=joints)
                 rows = loads.equivalent_loads(loading)
                 leading = loads.leading(rows)
                 seen = sorted((row for row in rows if row["channel"] in leading), key=lambda r: (r["channel"], r["m"]))
@@ -193,20 +199,25 @@ def life_verdicts(view: View, accepted: float = math.nan, samples: int = JOINTS)
     StoreError
         When a file holds joints that are no sample of a production.
     """
-    settings, store = section(view), view.store
-    has_points, has_lines = bool(settings.points), bool(settings.lines and store.history_specs)
-    if not (has_points or has_lines) or not settings_of(*members([view], None)).required:
+    settings = section(view)
+    if not (settings.points or settings.lines) or not settings_of(*members([view], None)).required:
         return []
     verdicts = []
-    if has_points and (held(store) or samples):
-        stressed = parts.load_stresses([view], samples=JOINTS if held(store) else min(samples, JOINTS))
+    if settings.points and (joints := JOINTS if held(view.store) else min(samples, JOINTS)):
+        stressed = parts.load_stresses([view], samples=joints)
         row = parts.failures_over_life(stressed, [stressed.settings.revolutions])[0]._asdict()
         verdicts.append(_verdict("failures of parts", "have a failed part", row, stressed, accepted))
-    if has_lines:
-        loading = load_cycles([view], names=tuple(settings.lines), samples=JOINTS)
+    if settings.lines and (joints := _joints_with_lines(view, settings, samples)):
+        loading = load_cycles([view], names=tuple(settings.lines), samples=joints)
         sums = loads.damages(loading)[-1]
         verdicts.append(_verdict("damage by loads", "have a damage sum above 1", sums, loading, accepted))
     return verdicts
+
+
+def _joints_with_lines(view: View, settings: Fatigue, again: int) -> int:
+    """Number of joints evaluated by loads; at most `again` where they have to be simulated again for an S–N line."""
+    signals = [signal for name in settings.lines for signal in signals_of(name)]
+    return JOINTS if counting.held(view.store, signals) else min(again, JOINTS)
 
 
 def _verdict(about: str, what: str, row: Row, joints: Joints, accepted: float) -> verdict.Verdict:
@@ -229,7 +240,7 @@ def _verdict(about: str, what: str, row: Row, joints: Joints, accepted: float) -
     return judged._replace(notes=(first,) if joints.total > joints.status.size else ())
 
 
-def _of_parts(stressed: parts.Stressed, delivery: int) -> list[Part]:
+def _of_parts(stressed: Counted, delivery: int) -> list[Part]:
     rows = parts.part_failures(stressed, delivery)
     panel = Panel(
         "failures-over-life",
@@ -243,7 +254,7 @@ def _of_parts(stressed: parts.Stressed, delivery: int) -> list[Part]:
     return [Panels([panel]), table, *map(Sentence, _notes_on_parts(stressed, rows))]
 
 
-def _of_loads(loading: Loading, rows: Rows, seen: Rows, delivery: int) -> list[Part]:
+def _of_loads(loading: Counted, rows: Rows, seen: Rows, delivery: int) -> list[Part]:
     panels = [
         Panel(
             f"spectrum-{channel}",
@@ -262,7 +273,7 @@ def _of_loads(loading: Loading, rows: Rows, seen: Rows, delivery: int) -> list[P
     return [*shown_parts, *map(Sentence, _notes_on_loads(loading, rows))]
 
 
-def _notes_on_parts(stressed: parts.Stressed, rows: Rows) -> Iterator[str]:
+def _notes_on_parts(stressed: Counted, rows: Rows) -> Iterator[str]:
     """Number of joints, meaning of the columns, restrictions."""
     settings, n = stressed.settings, stressed.status.size
     starts = f" with {settings.starts:g} starts" if settings.starts else ""
@@ -277,22 +288,26 @@ def _notes_on_parts(stressed: parts.Stressed, rows: Rows) -> Iterator[str]:
     if not stressed.design.has_interval("mean"):
         yield "no intervals: they hold for independent samples only"
     if stressed.apart > MAX_APART:
-        yield f"joints simulated again differ from the file by up to {stressed.apart:.1g} of a largest load"
+        yield _apart(stressed)
 
 
-def _notes_on_loads(loading: Loading, rows: Rows) -> Iterator[str]:
+def _notes_on_loads(loading: Counted, rows: Rows) -> Iterator[str]:
     """Number of joints, definition of the loads, restrictions."""
     settings = loading.settings
     cycles = f"loads are ranges: {settings.reference_cycles:g} cycles of them do the damage of "
     yield f"{loading.settled}; {cycles}{settings.service_life}"
     yield from loading.duty_in_words
-    if loading.visits:
-        yield "of a load that is constant at one of the points they are not known, and not counted"
+    if loading.apart > MAX_APART:
+        yield _apart(loading)
     if not loading.design.has_interval("quantile"):
         yield "no intervals: order statistics hold for independent samples only"
     lacking = max((row["lacking"] for row in rows), default=0.0)
     if lacking > MAX_LACKING:
         yield f"cycles that the file does not hold may add {lacking:.2g} of a sum of S^m"
+
+
+def _apart(counted: Counted) -> str:
+    return f"joints simulated again differ from the file by up to {counted.apart:.1g} of a largest load"
 
 
 def _lines(points: Sequence[StressPoint]) -> Iterator[str]:
@@ -308,7 +323,7 @@ def _lines(points: Sequence[StressPoint]) -> Iterator[str]:
         yield f"S–N line{where}: {knee}{scatter}{mean}, damage sum {line.D_c:g}"
 
 
-def _draw_failures(ax: Axes, stressed: parts.Stressed, life: float) -> None:
+def _draw_failures(ax: Axes, stressed: Counted, life: float) -> None:
     """Draw the share of the joints with a failed part against revolutions, with its band and the service life."""
     service = stressed.settings.revolutions
     first, last = sorted([service, life if math.isfinite(life) and life > 0 else service])
@@ -326,7 +341,7 @@ def _draw_failures(ax: Axes, stressed: parts.Stressed, life: float) -> None:
     ax.set(xlabel="revolutions of the input shaft", ylabel="joints with a failed part")
 
 
-def _draw_spectrum(ax: Axes, loading: Loading, channel: str) -> None:
+def _draw_spectrum(ax: Axes, loading: Counted, channel: str) -> None:
     """Draw the spectra of one channel as step curves, with their bands."""
     rows = loads.spectrum(loading, channel)
     ceiling = max(row["estimate"] for row in rows)
@@ -352,5 +367,5 @@ def _draw_spectrum(ax: Axes, loading: Loading, channel: str) -> None:
         axis.set_major_formatter(ticker.FuncFormatter(lambda value, _: f"{value:g}"))
         axis.set_minor_formatter(ticker.NullFormatter())
     ax.set_xticks([t for t in (0.01, 0.03, 0.1, 0.3, 1, 2, 3, 4, 6, 8, 12, 16) if x[0] <= t <= ax.get_xlim()[1]])
-    unit = unit_text(CHANNELS[channel].unit)
+    unit = unit_text(unit_of(channel))
     ax.set(xlabel="cycles a revolution with at least this range", ylabel=f"range of {channel} [{unit}]")

@@ -79,12 +79,12 @@ class Joints:
         return visited if len(set(visited)) > 1 else []
 
     def transitions(self, low: FloatArray, high: FloatArray) -> Transitions | None:
-        """Cycles that the sequence of operating points closes beside those at each of them.
+        """Cycles that the sequence of operating points closes.
 
         Parameters
         ----------
         low, high : ndarray, shape (n, channels, points)
-            Smallest and largest load at each point of `duty`; NaN where it is not known.
+            Smallest and largest load at each point of `duty`; NaN for joints without results.
 
         Returns
         -------
@@ -94,8 +94,9 @@ class Joints:
         if not self.visits:
             return None
         levels = (table.reshape(-1, len(self.duty)) for table in (low, high))
-        ranges, means, numbers = (table.reshape(*low.shape[:2], -1) for table in between(self.visits, *levels))
-        return Transitions(ranges, means, numbers / self.settings.turns)
+        tables = between(self.visits, *levels)
+        ranges, means, numbers, replaced = (table.reshape(*low.shape[:2], -1) for table in tables)
+        return Transitions(ranges, means, numbers / self.settings.turns, replaced / self.settings.turns)
 
 
 def members(views: Sequence[View], shares: Sequence[float] | None) -> tuple[Sequence[View], list[float]]:

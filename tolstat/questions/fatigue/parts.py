@@ -3,23 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tolstat.analysis import prediction, strength
-from tolstat.analysis.cycles import Cycles, duty_cycle
+from tolstat.analysis.cycles import Cycles
 from tolstat.analysis.sample import Sample
-from tolstat.common import bisection, channels
+from tolstat.common import bisection
+from tolstat.common.channels import BUSHING_LOADS, Signal
 from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import FloatArray
 from tolstat.common.tables import FAILED, Status
 from tolstat.display.table import Rows
-from tolstat.questions.fatigue import duty
-from tolstat.solver import histories
-from tolstat.store import reader, revolutions
+from tolstat.questions.fatigue import counting, duty
+from tolstat.questions.fatigue.counting import Counted
 from tolstat.store.view import View
 from tolstat.study.fatigue import Fatigue, StressPoint
 
@@ -29,46 +27,7 @@ LONGEST = 1e12
 """Lives beyond so many service lives are given as infinite."""
 
 
-class Stresses(NamedTuple):
-    """Stresses of joints at the p places of all points over a revolution, or over a mixture of revolutions.
-
-    Attributes
-    ----------
-    cycles : Cycles
-        Rainflow cycles, Pa; its channels are the name of the point of each place. NaN for a joint that has not settled.
-    low, high : ndarray, shape (n, p)
-        Smallest and largest stress, Pa, at all operating points together.
-    """
-
-    cycles: Cycles
-    low: FloatArray
-    high: FloatArray
-
-    def rows(self, joints: slice) -> Stresses:
-        """Select joints."""
-        return Stresses(self.cycles.rows(joints), self.low[joints], self.high[joints])
-
-
-@dataclass(frozen=True)
-class Stressed(duty.Joints):
-    """Stresses of joints.
-
-    Attributes
-    ----------
-    own : Stresses
-        Stresses of the n samples.
-    nominal : Stresses
-        Stresses of the nominal joint; no rows if there is none that settled.
-    apart : float
-        As in `revolutions.Revolutions`.
-    """
-
-    own: Stresses
-    nominal: Stresses
-    apart: float
-
-
-def load_stresses(views: Sequence[View], shares: Sequence[float] | None = None, samples: int | None = None) -> Stressed:
+def load_stresses(views: Sequence[View], shares: Sequence[float] | None = None, samples: int | None = None) -> Counted:
     """Stress cycles of a campaign, or of the same joints in several campaigns that make up a duty cycle.
 
     The stress of each point is formed from the load components at each input angle before cycles are counted. Where a
@@ -84,79 +43,30 @@ def load_stresses(views: Sequence[View], shares: Sequence[float] | None = None, 
     samples : int, optional
         Number of samples, from the first; by default all.
 
+    Returns
+    -------
+    Counted
+        Its channels are the name of the point of each place, its unit Pa. NaN for a joint that has not settled.
+
     Raises
     ------
     InputError
         When the study has no points, the shares are not shares, or the campaigns have different joints.
-    StoreError
-        When a file holds joints that are no sample of a production.
     """
     views, shares = duty.members(views, shares)
     joints = duty.joints_of(views, shares, samples)
-    if not joints.settings.points:
+    points = joints.settings.points
+    if not points:
         remedy = 'add [fatigue.point."NAME"] to the study, and run it again; no joint is simulated anew'
         raise InputError([Fault(str(views[0].path), "its study names no point of a part", remedy)])
-    # row 0 is the nominal joint of a duty cycle, if it has settled at all operating points
-    both = int(all((view.nominal["status"] == Status.OK).any() for view in views))
-    rows = np.append(np.zeros(both, np.intp), 1 + np.flatnonzero(joints.valid))
-    slots = [np.append(view.nominal_slots[:both], view.slots(rows[both:] - 1)) for view in views]
-    settled = [stresses_of(view.store, those, joints.settings.points) for view, those in zip(views, slots, strict=True)]
-    parts = [_spread(stresses, rows, 1 + joints.status.size) for stresses, _ in settled]
-    low, high = (np.stack([getattr(part, end) for part in parts], axis=2) for end in ("low", "high"))
-    mixed = duty_cycle([part.cycles for part in parts], shares, joints.transitions(low, high))
-    whole = Stresses(mixed, low.min(axis=2), high.max(axis=2))
-    apart = max(difference for _, difference in settled)
-    return Stressed(**vars(joints), own=whole.rows(slice(1, None)), nominal=whole.rows(slice(both)), apart=apart)
+    every = 1 + max(int(view.store.options["steps_per_rev"]) for view in views) // 2
+    return counting.count(views, shares, joints, stresses_at(points), joints.valid, every)
 
 
-def stresses_of(store: reader.Reader, slots: NDArray[np.intp], points: Sequence[StressPoint]) -> tuple[Stresses, float]:
-    """Stresses of settled joints over one revolution, and `Revolutions.apart`.
-
-    Parameters
-    ----------
-    store : ResultFile
-        The campaign.
-    slots : ndarray of int, shape (m,)
-        File slots, ascending.
-    points : sequence of StressPoint
-        Points of the parts.
-    """
-    places = [(point, np.array(factors)) for point in points for factors in point.per_load]
-    low, high = np.zeros((2, len(slots), len(places)))
-    counted: list[tuple[FloatArray, FloatArray]] = []
-    apart = 0.0
-    for part, components, difference in revolutions.of_components(store, slots, [channels.BUSHING_LOADS]):
-        apart, loads = max(apart, difference), components[channels.BUSHING_LOADS.name]
-        signals, noise = zip(*(_signal(loads, *place) for place in places), strict=True)
-        low[part], high[part] = (np.stack([end(s, axis=1) for s in signals], axis=1) for end in (np.min, np.max))
-        for joint in range(len(loads)):
-            counted += [histories.periodic(s[joint], gate[joint]) for s, gate in zip(signals, noise, strict=True)]
-    number = np.array([len(ranges) for ranges, _ in counted], float).reshape(low.shape)
-    table = np.zeros((2, len(counted), max(1, int(number.max(initial=0.0)))))
-    for i, joint_cycles in enumerate(counted):
-        table[:, i, : len(joint_cycles[0])] = joint_cycles
-    names = tuple(point.name for point, _ in places)
-    ranges, means = table.reshape(2, *low.shape, -1)
-    return Stresses(Cycles.of_revolution(names, ranges, means, number), low, high), apart
-
-
-def _signal(loads: NDArray[np.floating], point: StressPoint, factors: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Stress over the revolution, (m, samples), and the range up to which cycles may be numerical noise, (m,), Pa."""
-    at_bushing = loads[:, :, channels.BUSHING_LOADS.places.index(point.bushing)].astype(float)
-    return at_bushing @ factors, histories.GATE * np.max(np.abs(at_bushing) @ np.abs(factors), axis=1)
-
-
-def _spread(part: Stresses, rows: NDArray[np.intp], n: int) -> Stresses:
-    """Put joints in rows of a table of n joints; NaN in the others."""
-
-    def spread(values: FloatArray) -> FloatArray:
-        table = np.full((n, *values.shape[1:]), np.nan)
-        table[rows] = values
-        return table
-
-    cycles = part.cycles
-    ranges, means, number = map(spread, (cycles.ranges, cycles.means, cycles.number))
-    return Stresses(Cycles.of_revolution(cycles.channels, ranges, means, number), spread(part.low), spread(part.high))
+def stresses_at(points: Sequence[StressPoint]) -> list[Signal]:
+    """Stress at each place of each point, Pa."""
+    places = [(point, factors) for point in points for factors in point.per_load]
+    return [Signal(point.name, "Pa", BUSHING_LOADS, point.bushing, factors) for point, factors in places]
 
 
 class Evaluated(NamedTuple):
@@ -166,12 +76,12 @@ class Evaluated(NamedTuple):
     line: strength.Line
 
 
-def part_failures(stressed: Stressed, delivery: int = prediction.DELIVERY) -> Rows:
+def part_failures(stressed: Counted, delivery: int = prediction.DELIVERY) -> Rows:
     """Damage, life and probability of failure at each point of the parts.
 
     Parameters
     ----------
-    stressed : Stressed
+    stressed : Counted
         Stress cycles of the joints, from `load_stresses`.
     delivery : int
         Number of joints of the next delivery.
@@ -187,7 +97,7 @@ def part_failures(stressed: Stressed, delivery: int = prediction.DELIVERY) -> Ro
         joint); the fields of `analysis.strength.Failures`, ``confidence``, ``next_lower`` and
         ``next_upper`` (prediction interval for the failures in the next delivery).
     """
-    points, nominal = (evaluated(stresses, stressed.settings) for stresses in (stressed.own, stressed.nominal))
+    points, nominal = (evaluated(cycles, stressed.settings) for cycles in (stressed.cycles, stressed.nominal))
     heads = [_damage(stressed, p, points[p], nominal[p]) for p in range(len(points))]
     groups = [slice(p, p + 1) for p in range(len(points))]
     if len(points) > 1:
@@ -203,14 +113,14 @@ def part_failures(stressed: Stressed, delivery: int = prediction.DELIVERY) -> Ro
     return rows
 
 
-def failures_over_life(stressed: Stressed, revolutions: Sequence[float]) -> list[strength.Failures]:
+def failures_over_life(stressed: Counted, revolutions: Sequence[float]) -> list[strength.Failures]:
     """Share of the joints with a failed part at any point after numbers of revolutions."""
-    points = evaluated(stressed.own, stressed.settings)
+    points = evaluated(stressed.cycles, stressed.settings)
     return [failures(stressed, points, number / stressed.settings.revolutions) for number in revolutions]
 
 
 def failures(
-    stressed: Stressed, points: Sequence[Evaluated], lives: float = 1.0, confidence: float = duty.CONFIDENCE
+    stressed: Counted, points: Sequence[Evaluated], lives: float = 1.0, confidence: float = duty.CONFIDENCE
 ) -> strength.Failures:
     """Share of the joints of which a part has failed at any of some points after so many service lives.
 
@@ -232,7 +142,7 @@ def _chances(points: Sequence[Evaluated], lives: float = 1.0) -> FloatArray:
     return -np.expm1(survive)
 
 
-def evaluated(stresses: Stresses, settings: Fatigue) -> list[Evaluated]:
+def evaluated(cycles: Cycles, settings: Fatigue) -> list[Evaluated]:
     """Cycles in the service life at each point, each at the stress ratio of the point's S–N line.
 
     Of several places around a section each joint has those of the one at which it fails first.
@@ -240,32 +150,19 @@ def evaluated(stresses: Stresses, settings: Fatigue) -> list[Evaluated]:
     collectives, begin = [], 0
     for point in settings.points:
         end = begin + len(point.per_load)
-        places = [_in_service(stresses, place, point.line, settings) for place in range(begin, end)]
+        places = [_in_service(cycles, place, point.line, settings.revolutions) for place in range(begin, end)]
         collectives.append(Evaluated(strength.weakest(places, point.line), point.line))
         begin = end
     return collectives
 
 
-def _in_service(stresses: Stresses, place: int, line: strength.Line, settings: Fatigue) -> strength.Collective:
-    """Cycles of the joints at one place in the service life.
-
-    A start goes from the unstressed joint to the extremes of the revolution and back; its cycle, between the extremes
-    and zero, takes the place of the largest cycle of one revolution.
-    """
-    cycles = stresses.cycles
-    ranges, means = cycles.ranges[:, place], cycles.means[:, place]
-    numbers = cycles.repeats[:, place] * settings.revolutions
-    if settings.starts:
-        joints = np.arange(len(ranges))
-        numbers[joints, np.argmax(np.nan_to_num(ranges), axis=1)] -= settings.starts
-        numbers = np.maximum(numbers, 0.0)
-        low, high = np.minimum(stresses.low[:, place], 0.0), np.maximum(stresses.high[:, place], 0.0)
-        ranges, means = np.column_stack([ranges, high - low]), np.column_stack([means, 0.5 * (high + low)])
-        numbers = np.column_stack([numbers, np.full(len(ranges), settings.starts)])
-    return strength.sort_out(strength.at_ratio(ranges, means, line.M, line.R), numbers, line)
+def _in_service(cycles: Cycles, place: int, line: strength.Line, revolutions: float) -> strength.Collective:
+    """Cycles of the joints at one place in the service life."""
+    ranges = strength.at_ratio(cycles.ranges[:, place], cycles.means[:, place], line.M, line.R)
+    return strength.sort_out(ranges, cycles.repeats[:, place] * revolutions, line)
 
 
-def _damage(stressed: Stressed, p: int, joints: Evaluated, nominal: Evaluated) -> dict[str, Any]:
+def _damage(stressed: Counted, p: int, joints: Evaluated, nominal: Evaluated) -> dict[str, Any]:
     """Damage sums at a point, of the nominal joint and over the joints."""
     point = stressed.settings.points[p]
     sample = Sample.of(strength.damage_at(*joints), stressed.status, stressed.design)
@@ -274,7 +171,7 @@ def _damage(stressed: Stressed, p: int, joints: Evaluated, nominal: Evaluated) -
     return head | {name: sample.quantile(share).estimate for name, share in (("median", 0.5), ("upper_99", 0.99))}
 
 
-def _life(stressed: Stressed, points: Sequence[Evaluated]) -> dict[str, float]:
+def _life(stressed: Counted, points: Sequence[Evaluated]) -> dict[str, float]:
     """Revolutions after which a share `SHARE` of the parts has failed, with the ends of an interval."""
     some, ends = stressed.valid.any(), stressed.design.has_interval("mean")
     shares: dict[str, tuple[bool, Callable[[float], float]]] = {

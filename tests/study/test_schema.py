@@ -66,7 +66,7 @@ name = "clearance"
 points = 3
 vary.contact.D_P = { from = "76.0 mm", to = "75.6 mm" }
 [fatigue]
-line."cross*.T" = { m = 5, S0 = "150 N*m", N0 = 2e6 }
+line."cross*.T at worst" = { m = 5, S0 = "150 N*m", N0 = 2e6 }
 """
 BROKEN = [
     ("[operation]", "[operatoin]"),

@@ -273,7 +273,7 @@ def function(
     Parameters
     ----------
     study : Study
-        Study whose joints differ, by tolerances, a sweep or a list; how it samples is left to the other tool.
+        Study with tolerances, a sweep or listed joints; how it samples is left to the other tool.
     loads : sequence of str, optional
         Names of loads or patterns such as ``cross*.F``; by default those with limits, without limits those of reports.
     point : str
@@ -288,12 +288,9 @@ def function(
     Raises
     ------
     InputError
-        When the study draws no errors and lists no joints; a load or the point is unknown.
+        When a load or the point is unknown.
     """
     faults = []
-    if not _names(study):
-        found = "the study draws no errors, so that nothing is left to give"
-        faults.append(study.fault("tolerances", found, 'add tolerances, and sampling.method = "random"'))
     chosen: dict[str, None] = {}
     for pattern in (study.asked or SHOWN_LOADS) if loads is None else loads:
         names = select(pattern, UNIT_OF_LOAD)

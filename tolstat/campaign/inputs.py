@@ -53,7 +53,7 @@ def columns_of(values: Any, needed: Sequence[str], others: Collection[str], attr
         try:
             columns[name] = np.ascontiguousarray(values[name], float)
         except (TypeError, ValueError):
-            faults.append(Fault(f"{place}: {name}", "is not numbers", "give a number for each joint, in SI units"))
+            faults.append(Fault(f"{place}: {name}", "has no numbers", "give a number for each joint, in SI units"))
     shapes = {name: column.shape for name, column in columns.items()}
     first = next(iter(shapes.values()), (0,))
     for name, shape in shapes.items():

@@ -10,13 +10,14 @@ import numpy as np
 import pytest
 
 from tests.support.environment import ROOT
+from tolstat.campaign.function import function
 from tolstat.campaign.run import run
 from tolstat.cli.results import export
 from tolstat.cli.simulate import evaluate
 from tolstat.common.columns import holds
 from tolstat.common.errors import InputError
 from tolstat.common.loads import LOADS
-from tolstat.common.tables import SIMULATED, Status
+from tolstat.common.tables import SIMULATED, STATUS_TEXT, Status
 from tolstat.store.result_file import ResultFile
 from tolstat.study import load
 
@@ -76,3 +77,22 @@ def test_a_case_is_no_study(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="tolstat simulate"):
         evaluate(ROOT / "studies" / "tilted_pin.toml", errors=tmp_path / "x.csv", out=str(tmp_path / "y.csv"))
     assert not (tmp_path / "y.csv").exists()
+
+
+@pytest.mark.slow
+def test_columns_that_are_left_out_and_joints_outside_the_model_are_told(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Degrees without their unit end as a status and a sentence on units, not as loads."""
+    caplog.set_level(logging.INFO, "tolstat")
+    path = ROOT / "studies" / "iso2768_f.toml"
+    names = function(load(path), ["psi"]).names
+    cells = ["0.5" if name == "pin1.tilt_t" else "0" for name in names]
+    text = ",".join([*names, "part", "status"]) + "\n" + ",".join([*cells, "A7", "ok"]) + "\n"
+    (tmp_path / "x.csv").write_text(text, encoding="utf-8")
+    evaluate(path, errors=tmp_path / "x.csv", out=str(tmp_path / "y.csv"), loads=["psi"])
+    assert rows_of(tmp_path / "y.csv") == [{"status": "outside_model", "psi": ""}]
+    assert "x.csv: columns left out: part, 1 of results" in caplog.text
+    assert f"1 outside_model: {STATUS_TEXT[Status.OUTSIDE_MODEL]}" in caplog.text
+    assert "errors are in m and rad" in caplog.text
+    assert "hint: check the units" in caplog.text

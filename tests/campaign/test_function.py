@@ -3,6 +3,7 @@
 import multiprocessing
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import tolstat
@@ -72,8 +73,21 @@ def test_faults():
     with pytest.raises(InputError, match=r"(?s)did you mean 'cross1'.*is no load") as caught:
         tolstat.function(load(MAIN), ["cros1.F", "cross1.G"])
     assert len(caught.value.faults) == 2
-    with pytest.raises(InputError, match="draws no errors"):
-        tolstat.function(load(STUDIES / "clearance.toml"))
+
+
+def test_listed_joints_are_given_by_their_errors_and_number():
+    swept, listed = (tolstat.function(load(STUDIES / f"{name}.toml"), ["psi"]) for name in ("clearance", "hard_cases"))
+    assert swept.names == ["variant"]
+    assert swept.units["pin1.tilt_z"] == "rad"
+    assert listed.names[-1] == "variant"
+    assert "pin1.tilt_z" in listed.names
+    assert swept.distributions is None
+    for f in (swept, listed):
+        with pytest.raises(InputError, match=r"sampling.*: is '(sweep|cases)': joints are listed, not drawn"):
+            f.uniform(np.zeros((1, 1)))
+    for wrong in (-1, 39, 1.5, np.nan):
+        with pytest.raises(InputError, match=r"variant: .* is no joint of the study\n.*from 0 to 38"):
+            swept({"variant": [0, wrong]})
 
 
 def dependent(key):
@@ -122,6 +136,46 @@ def test_kernels_that_some_joints_need_are_compiled_before_processes_start(monke
     f(np.zeros((functions.LEAST_SHARED, len(f.names))))
     assert compiled[0] is None
     assert len(compiled[1]) == 64
+
+
+@pytest.mark.slow
+def test_names_go_before_positions():
+    """A table with names in any order, and one with all errors, gives the loads of its joints; others are refused."""
+    study = study_of(TEXT)
+    f = tolstat.function(study, ["cross1.F", "psi"], workers=1)
+    drawn = tolstat.draw(study, range(1, 4))
+    expected = f(np.column_stack([drawn[name] for name in f.names]))
+    assert len(np.unique(expected[:, 0])) == 3
+    frame = pd.DataFrame({name: drawn[name] for name in f.names[::-1]})
+    assert f(frame).tobytes() == f(drawn).tobytes() == f({name: frame[name] for name in frame}).tobytes()
+    assert f(frame).tobytes() == expected.tobytes()
+    u = np.linspace(0.1, 0.9, 2 * len(f.cube_names)).reshape(2, -1)
+    cube = pd.DataFrame(u, columns=f.cube_names)
+    assert f.uniform(cube[f.cube_names[::-1]]).tobytes() == f.uniform(u).tobytes()
+    with pytest.raises(
+        InputError, match=r"(?s)lack pin1.offset_t\n.*f.names.*'pin1.offset_x' is unknown\n.*did you mean"
+    ):
+        f(frame.rename(columns={"pin1.offset_t": "pin1.offset_x"}))
+    with pytest.raises(InputError, match=r"lack pin1.offset_t, pin2.tilt_t\n.*f.cube_names"):
+        f.uniform(cube.drop(columns=["pin1.offset_t", "pin2.tilt_t"]))
+    assert study.errors == {"pin3.offset_e": 5e-5}
+    assert f(frame.assign(**{"pin3.offset_e": 5e-5})).tobytes() == expected.tobytes()
+    assert f(frame.assign(**{"pin3.offset_e": 0.0})).tobytes() != expected.tobytes()
+
+
+@pytest.mark.slow
+def test_arrays_in_other_units_are_outside_the_model():
+    """Degrees taken for rad and mm taken for m have no loads, whichever error they are."""
+    f = tolstat.function(load(MAIN), ["cross1.F"], workers=1)
+    x = np.zeros((6, len(f.names)))
+    wrong = {"pin1.tilt_t": 172.0, "hole3.tilt_z": 6.28, "hole2.offset_e": 0.1, "pin2.diameter": -0.03}
+    for row, (name, value) in enumerate(wrong.items()):
+        x[row, f.names.index(name)] = value
+    x[4, f.names.index("pin1.tilt_t")] = np.radians(0.5)
+    y = f(x)
+    assert f.status.tolist() == [Status.OUTSIDE_MODEL] * 4 + [Status.OK] * 2
+    assert np.isnan(y[:4]).all()
+    assert np.isfinite(y[4:]).all()
 
 
 @pytest.mark.slow

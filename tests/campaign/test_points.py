@@ -177,7 +177,8 @@ def test_what_needs_one_point_asks_for_it(whole):
         with pytest.raises(InputError, match="no single operating point"):
             store.at("low+mid")
         frame = store.at("mid").to_pandas()
-        np.testing.assert_array_equal(frame["operation.alpha"], 0.4 + store.errors()["operation.alpha"][1:])
+        np.testing.assert_array_equal(frame["operation.alpha"], store.errors()["operation.alpha"][1:])
+        np.testing.assert_array_equal(frame["alpha"], 0.4 + store.errors()["operation.alpha"][1:])
         assert repr(store).startswith("<result file 'whole.h5': 39 joints (low: ")
 
 

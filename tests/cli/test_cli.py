@@ -25,6 +25,7 @@ from tolstat.common.load_kinds import BUSHINGS
 from tolstat.common.tables import Simulation, Status
 from tolstat.display import text
 from tolstat.store import ResultFile
+from tolstat.store.result_file import OPERATING
 
 COMMANDS = tuple(LISTED)
 HEAVY = {"numpy", "numba", "pandas", "pint", "matplotlib", "h5py", "scipy"}
@@ -184,7 +185,7 @@ def test_export_has_a_row_for_every_joint_and_units_in_the_second_line(tmp_path)
     done = call("export", path, "--csv", out)
     assert (done.exit_code, done.stdout) == (0, "")
     table = pd.read_csv(out, header=[0, 1], index_col=0)
-    assert list(table.columns) == [(c.name, c.unit) for c in ERROR_COLUMNS + RESULT_COLUMNS]
+    assert list(table.columns) == [(c.name, c.unit) for c in (*ERROR_COLUMNS, *OPERATING, *RESULT_COLUMNS)]
     assert list(table.index) == list(range(1, 61))
     with ResultFile.open(path) as store:
         errors, results = store.errors()[1:], store.results()[1:]

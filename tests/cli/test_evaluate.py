@@ -6,19 +6,34 @@ import pytest
 from tolstat.cli.simulate import MAX_FAULTS, read_table
 from tolstat.common.errors import InputError
 
-NAMES = {"pin1.tilt_t": "rad", "pin1.offset_t": "m", "material.E_factor": "1"}
+NAMES = ["pin1.tilt_t", "pin1.offset_t", "material.E_factor"]
+UNITS = {"pin1.tilt_t": "rad", "pin1.tilt_z": "rad", "pin1.offset_t": "m", "material.E_factor": "1"}
 
 
 def table(tmp_path, text):
     (tmp_path / "x.csv").write_text(text, encoding="utf-8")
-    return read_table(tmp_path / "x.csv", NAMES)
+    return read_table(tmp_path / "x.csv", NAMES, UNITS)
 
 
 def test_columns_in_any_order_and_units(tmp_path):
-    si = table(tmp_path, "part,material.E_factor,pin1.tilt_t,pin1.offset_t\nA,1.1,0.25,1e-5\n")
-    assert si.tolist() == [[0.25, 1e-5, 1.1]]
-    units = table(tmp_path, "pin1.offset_t, pin1.tilt_t ,material.E_factor,row\num,deg,,1\n\n10,180,1,7\n20,90,2,8\n")
-    np.testing.assert_allclose(units, [[np.pi, 1e-5, 1.0], [np.pi / 2, 2e-5, 2.0]], rtol=1e-15)
+    si, others = table(tmp_path, "part,material.E_factor,pin1.tilt_t,pin1.offset_t\nA,1.1,0.25,1e-5\n")
+    assert {name: values.tolist() for name, values in si.items()} == {
+        "pin1.tilt_t": [0.25],
+        "pin1.offset_t": [1e-5],
+        "material.E_factor": [1.1],
+    }
+    assert others == ["part"]
+    head = "pin1.offset_t, pin1.tilt_t ,material.E_factor,row\num,deg,,1\n"
+    units, others = table(tmp_path, f"{head}\n10,180,1,7\n20,90,2,8\n")
+    found = [units[name] for name in NAMES]
+    np.testing.assert_allclose(found, [[np.pi, np.pi / 2], [1e-5, 2e-5], [1.0, 2.0]], rtol=1e-15)
+    assert others == ["row"]
+
+
+def test_an_error_that_the_study_does_not_draw_is_read(tmp_path):
+    si, others = table(tmp_path, "pin1.tilt_z,material.E_factor,pin1.tilt_t,pin1.offset_t\ndeg,,deg,um\n90,1,0,0\n")
+    assert si["pin1.tilt_z"].tolist() == [np.pi / 2]
+    assert others == []
 
 
 def test_faults_come_at_once_with_their_lines(tmp_path):

@@ -137,7 +137,7 @@ def test_without_an_accepted_share_the_yield_leads_where_its_interval_tells_some
 def test_joints_without_a_result_have_a_cause_and_a_remedy(tmp_path):
     said, card = everywhere(interfering(tmp_path), 0.01)
     assert said["notes"][0].startswith("36 outside_model: ")
-    assert "Row 1: negative clearance" in said["notes"][0]
+    assert "Row 1: check the units" in said["notes"][0]
     assert card.notes == tuple(said["notes"])
 
 

@@ -42,7 +42,7 @@ def test_a_released_file_is_read() -> None:
         assert store.complete
         loads, modes = store.histories("loads"), store.histories("mode")
     pd.testing.assert_frame_equal(frame[expected.columns], expected, check_exact=True, check_dtype=False)
-    x = frame["pin1.offset_t"].to_numpy() + 2 * frame["operation.alpha"].to_numpy()
+    x = frame["pin1.offset_t"].to_numpy() + 2 * frame["alpha"].to_numpy()
     np.testing.assert_array_equal(loads, fakes.history(fakes.SPECS["loads"], x))
     np.testing.assert_array_equal(modes, fakes.history(fakes.SPECS["mode"], x))
 

@@ -25,6 +25,7 @@ from tolstat.common.tables import Simulation, Status
 from tolstat.store import ResultFile, Writer, metadata
 from tolstat.store.hdf5 import text
 from tolstat.store.metadata import Metadata
+from tolstat.store.result_file import OPERATING
 
 
 def simulation(study: fakes.Study, rows: np.ndarray) -> Simulation:
@@ -105,7 +106,7 @@ def test_frame_holds_all_rows_and_columns(tmp_path: Path, study: fakes.Study) ->
     with ResultFile.open(tmp_path / "a.h5") as store:
         frame, without = store.to_pandas(nominal=True), store.to_pandas()
         results = store.results()
-    columns = ERROR_COLUMNS + RESULT_COLUMNS
+    columns = ERROR_COLUMNS + OPERATING + RESULT_COLUMNS
     assert list(frame.columns) == ["nominal", *(c.name for c in columns)]
     assert frame.attrs["units"] == {"nominal": "1"} | {c.name: c.unit for c in columns}
     assert frame["nominal"].tolist() == [True] + [False] * (study.n - 1)

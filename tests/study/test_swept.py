@@ -77,6 +77,22 @@ def test_without_the_nominal_joint(tmp_path: Path) -> None:
     assert s.design["variant"].tolist() == load(tmp_path).design["variant"][1:].tolist()
 
 
+def test_joints_of_a_sweep_have_each_operating_point(tmp_path: Path) -> None:
+    point = '[operation]\nalpha = "30 deg"\nspeed = "1200 rpm"\ntorque = "250 N*m"\n'
+    low = point.replace("[operation]", '[[operation]]\nname = "low"')
+    high = low.replace("low", "high").replace("30 deg", "10 deg").replace("250 N*m", "400 N*m")
+    s = load(tmp_path, (point, low + high))
+    errors, rows = sampling.draw(s), np.arange(s.rows)
+    with Writer.create(tmp_path / "a.h5", s, [errors]) as store:
+        store.finish()
+    with ResultFile.open(tmp_path / "a.h5") as store:
+        for name, torque, alpha in (("low", 250.0, 30.0), ("high", 400.0, 10.0)):
+            params = recorded.perturbed(s.at(name), rows, errors)
+            np.testing.assert_array_equal(params["torque"], torque)
+            np.testing.assert_array_equal(params["alpha"], np.radians(alpha))
+            assert recorded.parameters(store.at(name), rows).tobytes() == params.tobytes()
+
+
 @pytest.mark.slow
 def test_a_file_replays_its_sweep(tmp_path: Path) -> None:
     s = load(tmp_path)
@@ -89,6 +105,7 @@ def test_a_file_replays_its_sweep(tmp_path: Path) -> None:
         assert recorded.recall(store).identity() == s.identity()
         frame = store.to_pandas(nominal=True)
         axes = swept_axes(store.view())
+    np.testing.assert_array_equal(frame["variant"], s.design["variant"])
     np.testing.assert_allclose(frame["pin.d"], [s.joints[v].pin.d for v in s.design["variant"]])
     assert [(axis.label, axis.unit) for axis in axes] == [("pin.d", "mm"), ("pin*.clearance", "mm"), ("cross.R", "mm")]
     np.testing.assert_allclose(axes[0].values, np.repeat([16.0, 20.0, 24.0], 10))

@@ -138,9 +138,9 @@ def simulate_beside(params: NDArray[np.void], options: Options) -> Simulation:
     return Simulation(results, {})
 
 
-def work_beside(options: Options) -> BlockWork:
-    """Return how a worker simulates blocks without histories."""
-    return _work([options], "none", 0, {})
+def work_beside(*options: Options) -> BlockWork:
+    """Return how a worker simulates blocks with any of these options, without histories."""
+    return _work([*options], "none", 0, {})
 
 
 def settings_in_use(study: Study, store: Reader) -> list[Options]:

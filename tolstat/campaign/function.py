@@ -15,40 +15,46 @@ from tolstat import sampling
 from tolstat.campaign import pool
 from tolstat.campaign.block import Block, Timed, results_of, simulate_block
 from tolstat.campaign.blocks import MAX_BLOCK, MIN_BLOCKS_PER_WORKER, SOME, compile_missing, work_beside
+from tolstat.campaign.inputs import Array, columns_of
 from tolstat.campaign.run import choose_fidelity
 from tolstat.common.cores import available_cores
-from tolstat.common.errors import Fault, InputError, raise_all
+from tolstat.common.errors import Fault, InputError, input_error, raise_all
 from tolstat.common.loads import LOADS, SHOWN_LOADS, UNIT_OF_LOAD
 from tolstat.common.tables import VALID, Options
-from tolstat.joint import nominal_errors, perturb
+from tolstat.joint import nominal_errors
 from tolstat.solver.simulation import simulate_rows
-from tolstat.store.recorded import settings
+from tolstat.store.recorded import parameters_of, settings
 from tolstat.study import Study, axes
-from tolstat.study.selection import select, suggestion
+from tolstat.study.selection import UNITS, select, suggestion
 
 if TYPE_CHECKING:
     import openturns
-
-Array = NDArray[np.float64]
 
 STEP = 0.1
 """Step of the finite differences that OpenTURNS takes for derivatives, in standard deviations of the input."""
 
 LEAST_SHARED = 256
 """Number of joints from which on worker processes are started: fewer take less time than the start, on the main job."""
+VARIANT = "variant"
+"""Column of a study with several joints: which of them, by its number."""
 
 
 class Function:
     """Loads of joints as a function of their errors; see `function`.
 
-    ``f(x)`` takes errors, (n, d), SI, in the order of `names`, and returns loads, (n, m), SI, in the order of `loads`;
-    NaN where a joint has no valid one, and `status` says why. It equals what a campaign of the study stores for the
-    same errors, to the last bit. Inside ``with f:`` worker processes stay from one call to the next.
+    ``f(x)`` takes errors of joints, SI, and returns loads, (n, m), SI, in the order of `loads`; NaN where a joint has
+    no valid one, and `status` says why. A DataFrame, mapping or structured array gives errors by name: all of `names`,
+    and any others of `units`; an array, (n, d), gives those of `names` by position. Errors are deviations, as
+    `tolstat.draw` and exports have them, those of ``operation.*`` from the operating point. Loads equal what a campaign
+    of the study stores for the same errors, to the last bit. Inside ``with f:`` worker processes stay from one call to
+    the next.
 
     Attributes
     ----------
     names : list of str
-        Errors that the study draws; all others are those of the study.
+        Errors in which joints of the study differ, and ``variant`` if it has several joints.
+    units : dict of str to str
+        SI unit of each column that `f` takes; errors that are not given are those of the study.
     cube_names : list of str
         Coordinates of the unit cube that `uniform` maps to errors.
     loads : list of str
@@ -70,7 +76,8 @@ class Function:
     def __init__(self, study: Study, loads: Sequence[str], point: str, workers: int | None) -> None:
         self._whole, self.study = study, study.at(point)
         self.loads, self.workers = list(loads), workers
-        self.names, self.cube_names = sampling.columns(study), sampling.streams(study)
+        self.names, self.cube_names = _names(study), sampling.streams(study)
+        self.units = UNITS | ({VARIANT: "1"} if VARIANT in self.names else {})
         self.limits = {name: self.study.limits[name] for name in loads if name in self.study.limits}
         self.copula = study.copula
         zones = [name for name in study.tolerances if axes.is_zone(name)]
@@ -91,36 +98,49 @@ class Function:
     def __repr__(self) -> str:
         return f"<function of {len(self.names)} errors, {len(self.loads)} loads, of study {self.study.name!r}>"
 
-    def __call__(self, x: Array) -> Array:
-        """Loads of joints, (n, m), from their errors `x`, (n, d).
-
-        Raises
-        ------
-        ValueError
-            When `x` has another shape.
-        """
-        columns = _columns(x, self.names, "names")
-        errors = nominal_errors(len(columns[0]))
-        for name, value in self.study.errors.items():
-            errors[name] = value
-        for name, column in zip(self.names, columns, strict=True):
-            errors[name] = column
-        return self._simulate(errors)
-
-    def uniform(self, u: Array) -> Array:
-        """Errors of joints, (n, d), SI, from points `u` of the unit cube, (n, k), in the order of `cube_names`.
-
-        A campaign draws its errors so from independent random numbers: zones, fits and correlation are in them.
+    def __call__(self, x: Any) -> Array:
+        """Loads of joints, (n, m), from their errors `x`: by name, or an array (n, d) in the order of `names`.
 
         Raises
         ------
         InputError
-            When joints of the study depend on each other: with lots of several joints, and matched by classes.
+            When columns of `x` are missing or unknown, or a variant is not one of the study.
         ValueError
-            When `u` has another shape.
+            When an array has another shape.
+        """
+        columns = columns_of(x, self.names, [name for name in self.units if name not in self.names], "names")
+        n = len(next(iter(columns.values())))
+        variant = self._variants(columns.pop(VARIANT, np.zeros(n)))
+        errors = nominal_errors(n)
+        for name, value in (self.study.errors | columns).items():
+            errors[name] = value
+        return self._simulate(errors, variant)
+
+    def _variants(self, numbers: Array) -> NDArray[np.intp]:
+        last = len(self.study.joints) - 1
+        wrong = numbers[~np.isin(numbers, np.arange(last + 1))]
+        if wrong.size:
+            raise input_error(VARIANT, f"{wrong[0]:g} is no joint of the study", f"give whole numbers from 0 to {last}")
+        return numbers.astype(np.intp)
+
+    def uniform(self, u: Any) -> Array:
+        """Errors of joints, (n, d), SI, in the order of `names`, from points `u` of the unit cube.
+
+        The coordinates of `u` come by name, or as an array (n, k) in the order of `cube_names`. A campaign draws its
+        errors so from independent random numbers: zones, fits and correlation are in them.
+
+        Raises
+        ------
+        InputError
+            When joints of the study are listed, or depend on each other: with lots of several joints, and matched by
+            classes; when coordinates are missing or unknown.
+        ValueError
+            When an array has another shape.
         """
         self._check_free()
-        errors = sampling.from_probabilities(self.study, np.array(_columns(u, self.cube_names, "cube_names")).T)
+        columns = columns_of(u, self.cube_names, (), "cube_names")
+        probabilities = np.column_stack([columns[name] for name in self.cube_names])
+        errors = sampling.from_probabilities(self.study, probabilities)
         return np.column_stack([errors[name] for name in self.names])
 
     @cached_property
@@ -128,16 +148,17 @@ class Function:
         """Loads of the joint without errors, (m,), SI."""
         status = self.status
         try:
-            return np.asarray(self._simulate(nominal_errors(1))[0])
+            return np.asarray(self._simulate(nominal_errors(1), np.zeros(1, np.intp))[0])
         finally:
             self.status = status
 
     @cached_property
-    def options(self) -> Options:
-        """Solver options of a campaign of the study; those of fidelity "auto" come from its pilot."""
-        solver = self._whole.solver
-        options = settings(solver, choose_fidelity(self._whole) if solver.fidelity == "auto" else {})
-        compile_missing(options)
+    def options(self) -> list[Options]:
+        """Solver options of each joint of the study; those of fidelity "auto" come from the pilot of a campaign."""
+        choice = choose_fidelity(self._whole) if self._whole.solver.fidelity == "auto" else {}
+        options = [settings(solver, choice) for solver in self._whole.solvers]
+        for each in dict.fromkeys(options):
+            compile_missing(each)
         return options
 
     def openturns(self, cube: bool = False) -> tuple[openturns.Function, openturns.Distribution]:
@@ -208,28 +229,33 @@ class Function:
         return problem if len(set(labels)) == len(labels) else problem | {"groups": labels}
 
     def _check_free(self) -> None:
-        """Refuse a study whose joints depend on each other: no cube of independent numbers gives their errors."""
+        """Refuse a study of whose joints no cube of independent numbers gives the errors."""
         key, found = _dependence(self.study)
         if key:
             remedy = f"remove {key}, or give errors that tolstat.draw(study) draws to f(x)"
             raise InputError([self.study.fault(key, found, remedy)])
 
-    def _simulate(self, errors: NDArray[np.void]) -> Array:
+    def _simulate(self, errors: NDArray[np.void], variant: NDArray[np.intp]) -> Array:
         n, workers = len(errors), self.workers or available_cores()
         self.simulated += n
-        joint, operation, options = self.study.joint, self.study.operation, self.options
+        study, distinct = self.study, list(dict.fromkeys(self.options))
+        option = np.array([distinct.index(own) for own in self.options])[variant]
         loads, self.status = np.full((n, len(self.loads)), np.nan), np.zeros(n, np.uint8)
         is_alone = n < LEAST_SHARED or workers == 1
         size = MAX_BLOCK if is_alone else min(MAX_BLOCK, -(-n // (MIN_BLOCKS_PER_WORKER * workers)))
-        parts = [np.arange(first, min(first + size, n)) for first in range(0, n, size)]
-        blocks = (Block("", slots, perturb(joint, operation, errors[slots]), options) for slots in parts)
+        parts = []
+        for number in range(len(distinct)):
+            here = np.flatnonzero(option == number)
+            parts += [(here[first : first + size], distinct[number]) for first in range(0, here.size, size)]
+        blocks = (Block("", slots, parameters_of(study, variant[slots], errors[slots]), own) for slots, own in parts)
         finished: Generator[tuple[Block, Timed | pool.Lost], None, None]
         if is_alone:
             finished = ((block, simulate_block(simulate_rows, "none", 0, {}, block)) for block in blocks)
         else:
             some = np.unique(np.linspace(0, n - 1, min(n, SOME)).astype(np.intp))
-            compile_missing(options, perturb(joint, operation, errors[some]))  # once, before the processes start
-            finished = pool.map_blocks(work_beside(options), blocks, workers)
+            for own in distinct:  # once, before the processes start
+                compile_missing(own, parameters_of(study, variant[some], errors[some]))
+            finished = pool.map_blocks(work_beside(*distinct), blocks, workers)
         with closing(finished):
             for block, result in finished:
                 table = results_of(block, result)
@@ -247,7 +273,7 @@ def function(
     Parameters
     ----------
     study : Study
-        Study with toleranced errors; how it samples is left to the other tool.
+        Study with tolerances, a sweep or listed joints; how it samples is left to the other tool.
     loads : sequence of str, optional
         Names of loads or patterns such as ``cross*.F``; by default those with limits, without limits those of reports.
     point : str
@@ -262,12 +288,9 @@ def function(
     Raises
     ------
     InputError
-        When the study draws no errors, a load or the point is unknown.
+        When a load or the point is unknown.
     """
     faults = []
-    if not study.tolerances or study.sweep or study.listed is not None:
-        found = "the study draws no errors, so that nothing is left to give"
-        faults.append(study.fault("tolerances", found, 'add tolerances, and sampling.method = "random"'))
     chosen: dict[str, None] = {}
     for pattern in (study.asked or SHOWN_LOADS) if loads is None else loads:
         names = select(pattern, UNIT_OF_LOAD)
@@ -278,24 +301,18 @@ def function(
     return Function(study, list(chosen), point, workers)
 
 
-def _columns(values: Array, names: Sequence[str], attribute: str) -> list[Array]:
-    """Columns of a table with these names, which an attribute of `Function` lists.
-
-    Raises
-    ------
-    ValueError
-        When it has not one column for each of them.
-    """
-    table = np.asarray(values, float)
-    if table.ndim != 2 or table.shape[1] != len(names):
-        needed = f"(n, {len(names)}), a row for each joint and a column for each of f.{attribute}"
-        remedy = "give [x] for one joint" if table.shape == (len(names),) else f"they are {', '.join(names)}"
-        raise ValueError(f"an array of shape {needed} is needed, not {table.shape}; {remedy}")
-    return [np.ascontiguousarray(column) for column in table.T]
+def _names(study: Study) -> list[str]:
+    """Columns in which joints of a study differ: errors that are drawn, swept or listed, and the number of a joint."""
+    swept = [name for axis in study.sweep for name in axis.names if name in UNITS]
+    values = (*study.listed.cases.values(), *study.listed.points) if study.listed else ()
+    errors = dict.fromkeys([*sampling.columns(study), *swept, *(name for errors in values for name in errors)])
+    return [*errors, *([VARIANT] if len(study.joints) > 1 else [])]
 
 
 def _dependence(study: Study) -> tuple[str, str]:
-    """Key of a study that makes its joints depend on each other, and how; empty if they do not."""
+    """Key of a study whose joints are no independent draws, and why; empty if they are."""
+    if not study.tolerances:
+        return "sampling.method", f"is {study.sampling.method!r}: joints are listed, not drawn"
     if study.sampling.is_matched:
         return "sampling.selective", "pins and holes are matched by classes, so joints depend on each other"
     if study.sampling.joints_per_lot > 1:

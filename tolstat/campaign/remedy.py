@@ -27,7 +27,7 @@ MAX_REVS, MAX_STEPS = 1000, 20_000
 WITHOUT_RESULTS = {
     Status.CRASHED: "simulate it again: tolstat run STUDY --retry crashed; if it crashes again, report the error",
     Status.INVALID_INPUT: "a parameter is not finite: check the tolerances in the study",
-    Status.OUTSIDE_MODEL: "negative clearance, |alpha| >= 90 deg, no speed or no stiffness: change joint or tolerances",
+    Status.OUTSIDE_MODEL: "check the units (errors in tables are in m and rad), else change joint or tolerances",
 }
 """Remedies that do not depend on the results of the joint."""
 

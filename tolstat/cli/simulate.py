@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -137,10 +137,12 @@ def evaluate(
 ) -> None:
     """Simulate joints whose errors another program gives.
 
-    The first line of the CSV file has the names of the errors that STUDY draws, in any order; the second their units,
-    or SI units hold. Other columns are left out. The output has a row for each joint in the same order: its status,
-    then its loads, with the names in the first line and the units in the second. A load is empty where a joint has
-    none.
+    The first line of the CSV file has the names of errors, in any order; the second their units, or SI units hold.
+    Errors are deviations, those of operation.* from the operating point, as tolstat export writes them. The errors
+    in which joints of STUDY differ must be there; others that are not are those of STUDY. If STUDY has several
+    joints, a column variant says which. Other columns are left out and named. The output has a row for each joint in
+    the same order: its status, then its loads, with the names in the first line and the units in the second. A load
+    is empty where a joint has none.
 
     Example: tolstat evaluate studies/iso2768_f.toml --in joints.csv --out y.csv
 
@@ -160,32 +162,47 @@ def evaluate(
     if out != "-":
         check_target(Path(out), errors)
     f = library.function.function(library.studies.load(study), loads, point=point, workers=workers)
-    si = {field.name: "1" if uniform else field.unit for field in library.tables.ERROR_FIELDS}
-    columns = read_table(errors, {name: si.get(name, "1") for name in (f.cube_names if uniform else f.names)})
+    names, units = (f.cube_names, dict.fromkeys(f.cube_names, "1")) if uniform else (f.names, f.units)
+    columns, others = read_table(errors, names, units)
+    if others:
+        results = [name for name in others if name in library.columns.RESULT_NAMES]
+        listed = [name for name in others if name not in results] + [f"{len(results)} of results"] * bool(results)
+        say(f"{errors}: columns left out: {', '.join(listed)}")
     with work(workers=workers) as shown:
         shown.display.stage("simulation")
         y = f(f.uniform(columns) if uniform else columns)
     head = [["status", *f.loads], ["", *(library.load_units.UNIT_OF_LOAD[name] for name in f.loads)]]
     rows = library.text.csv_rows([[library.tables.Status(number).label for number in f.status], *y.T.tolist()])
     write(out, lambda stream: csv.writer(stream, lineterminator="\n").writerows([*head, *rows]))
-    without = int((~np.isin(f.status, library.tables.VALID)).sum())
-    say(f"{'' if out == '-' else f'wrote {out}: '}{len(y)} joints, {without} of them without a valid load")
+    invalid = f.status[~np.isin(f.status, library.tables.VALID)]
+    say(f"{'' if out == '-' else f'wrote {out}: '}{len(y)} joints, {invalid.size} of them without a valid load")
+    for state in map(library.tables.Status, np.unique(invalid)):
+        hint = library.remedy.WITHOUT_RESULTS.get(state)
+        say(f"{int((invalid == state).sum())} {state.label}: {library.tables.STATUS_TEXT[state]}")
+        if hint:
+            say(f"  hint: {hint}")
 
 
-def read_table(path: Path, names: Mapping[str, str]) -> NDArray[np.float64]:
+def read_table(
+    path: Path, needed: Sequence[str], units: Mapping[str, str]
+) -> tuple[dict[str, NDArray[np.float64]], list[str]]:
     """Read columns of a CSV file: names in the first line, and units in the second if a cell of it is no number.
 
     Parameters
     ----------
     path : Path
         The file.
-    names : mapping of str to str
-        Columns to read, and the SI unit of each; others are left out.
+    needed : sequence of str
+        Columns that it must have.
+    units : mapping of str to str
+        Columns that are read if it has them, and the SI unit of each; others are left out.
 
     Returns
     -------
-    ndarray, (n, len(names))
+    columns : dict of str to ndarray, (n,)
         SI.
+    others : list of str
+        Columns that are left out.
 
     Raises
     ------
@@ -197,10 +214,10 @@ def read_table(path: Path, names: Mapping[str, str]) -> NDArray[np.float64]:
     head = rows.pop(0)[1] if rows else []
     faults = [
         Fault(f"{path}:1", f"{'more than one' if name in head else 'no'} column {name!r}", "give one for each error")
-        for name in names
-        if head.count(name) != 1
+        for name in dict.fromkeys([*needed, *units])
+        if head.count(name) > 1 or (name in needed and name not in head)
     ]
-    columns = {name: head.index(name) for name in names if name in head}
+    columns = {name: head.index(name) for name in units if name in head}
     for line, cells in rows:
         if len(cells) != len(head):
             length = f"has {len(cells)} cells, the first line {len(head)}"
@@ -212,9 +229,9 @@ def read_table(path: Path, names: Mapping[str, str]) -> NDArray[np.float64]:
         for name, column in columns.items():
             unit = cells[column]
             try:
-                factors[name] = library.units.to_si(f"1 {unit}" if unit not in ("", "1") else 1.0, names[name])
+                factors[name] = library.units.to_si(f"1 {unit}" if unit not in ("", "1") else 1.0, units[name])
             except ValueError:
-                remedy = f"write {names[name]}, or another such unit"
+                remedy = f"write {units[name]}, or another such unit"
                 faults.append(Fault(f"{path}:{line}: {name}", f"{unit!r} is no unit of it", remedy))
     if not rows and not faults:
         faults.append(Fault(str(path), "has no joints", "give a row of numbers for each"))
@@ -227,7 +244,8 @@ def read_table(path: Path, names: Mapping[str, str]) -> NDArray[np.float64]:
         rest = Fault(str(path), f"and {len(faults) - MAX_FAULTS} more faults", "mend these first")
         faults = [*faults[:MAX_FAULTS], rest]
     raise_all(faults)
-    return values * list(factors.values())
+    by_name = {name: values[:, number] * factors[name] for number, name in enumerate(columns)}
+    return by_name, [name for name in head if name not in columns]
 
 
 def show(

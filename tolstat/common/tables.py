@@ -28,6 +28,9 @@ LIFE_EXPONENT = 10 / 3
 MAX_ITERATIONS = 40
 """Upper bound on a joint's Newton iterations per step of the longest run allowed, so that no joint blocks a campaign.
 Joints that never settle take some 8 to 10."""
+MAX_TILT, MAX_SHIFT = 0.1, 0.1
+"""Range of the model: largest tilt of an axis, rad, and largest offset and clearance as shares of R. Drawings allow a
+tenth of it at most; numbers beyond it are mostly in another unit."""
 MOST_ITERATIONS = 3_000_000
 """Newton iterations that the refinement of a joint may take: half a minute of a core."""
 
@@ -111,8 +114,9 @@ STATUS_TEXT = {
     Status.INVALID_INPUT: "parameters are not finite numbers; results are NaN",
     Status.NEWTON_FAILED: "a step failed at the smallest sub-step, or too many iterations were spent; results are NaN",
     Status.NOT_FINITE: "the solution overflowed; results are NaN",
-    Status.OUTSIDE_MODEL: "negative clearance (interference fit), |alpha| of 90 deg or more, no speed, or stiffness "
-    "not positive: the model has no meaning there; results are NaN",
+    Status.OUTSIDE_MODEL: "negative clearance (interference fit), an axis tilted by more than 0.1 rad (5.7 deg), an "
+    "offset or a clearance above a tenth of R, |alpha| of 90 deg or more, no speed, or stiffness not positive: the "
+    "model has no meaning there; errors are in m and rad; results are NaN",
 }
 
 

@@ -196,14 +196,15 @@ def _axis(errors: Table, feature: str, triad: Array) -> tuple[Array, Array]:
     """Shift and direction of a feature's axis in its frame, both of shape (n, 3).
 
     The direction is exp(epsilon x) e, epsilon = tilt_t t + tilt_z z, as a finite rotation; as epsilon is
-    normal to e, Rodrigues' formula leaves cos|epsilon| e + sin|epsilon|/|epsilon| (epsilon x e).
+    normal to e, Rodrigues' formula leaves cos|epsilon| e + sin|epsilon|/|epsilon| (epsilon x e). Angles beyond half a
+    turn count as half a turn: 6.28 deg taken for 6.28 rad, nearly a whole turn, must not pass for a small tilt.
     """
     e, t, z = triad
     point = sum(
         np.multiply.outer(errors[f"{feature}.offset_{name}"], axis) for name, axis in zip("etz", triad, strict=True)
     )
     about_t, about_z = errors[f"{feature}.tilt_t"], errors[f"{feature}.tilt_z"]
-    angle = np.hypot(about_t, about_z)
+    angle = np.minimum(np.hypot(about_t, about_z), np.pi)
     ratio = np.sinc(angle / np.pi)
     axis = np.multiply.outer(np.cos(angle), e)
     axis += np.multiply.outer(ratio * about_z, t) - np.multiply.outer(ratio * about_t, z)

@@ -137,8 +137,12 @@ def parameters(store: Reader, rows: NDArray[np.intp]) -> NDArray[np.void]:
 
 def perturbed(study: Study, rows: NDArray[np.intp], errors: NDArray[np.void]) -> NDArray[np.void]:
     """Parameters of `rows` of the campaign, (m,) table PARAM, each computed from the joint and point of its variant."""
-    params = np.empty(len(rows), PARAM)
-    variant = variants(study, rows)
+    return parameters_of(study, variants(study, rows), errors)
+
+
+def parameters_of(study: Study, variant: NDArray[np.integer], errors: NDArray[np.void]) -> NDArray[np.void]:
+    """Parameters of joints, (m,) table PARAM, from their errors and the index of the variant of each, (m,)."""
+    params = np.empty(len(errors), PARAM)
     for number in np.unique(variant):
         here = variant == number
         params[here] = perturb(study.joints[number], study.operations[number], errors[here])

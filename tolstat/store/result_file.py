@@ -26,13 +26,16 @@ if TYPE_CHECKING:
 
 AT_ONCE = 8192
 """Maximum number of rows of a block of `in_blocks`."""
-OPERATING = {
-    "operation.alpha": "misalignment of the shafts",
-    "operation.speed": "angular velocity of the input shaft",
-    "operation.torque": "resisting torque on the output shaft",
-    "operation.axial_force": "axial force on the output shaft",
-}
-"""Meaning of the columns that an export holds as the joint's own values instead of deviations."""
+OPERATING = tuple(
+    Column(name, unit, f"{meaning} of the joint: operating point plus deviation", "f8", name, ())
+    for name, unit, meaning in (
+        ("alpha", "rad", "misalignment of the shafts"),
+        ("speed", "rad/s", "angular velocity of the input shaft"),
+        ("torque", "N*m", "resisting torque on the output shaft"),
+        ("axial_force", "N", "axial force on the output shaft"),
+    )
+)
+"""Columns that an export has beside errors and results; the deviations are errors, ``operation.alpha`` and so on."""
 
 
 class ResultFile(Reader):
@@ -89,8 +92,9 @@ class ResultFile(Reader):
         -------
         pandas.DataFrame
             Index ``row``: row of the campaign. Columns: case, variant, family and group for a study that lists its
-            joints; how each joint was drawn, where that is recorded; errors; kept results, ``status`` as
-            text. ``attrs["units"]`` has the SI unit of each column.
+            joints; how each joint was drawn, where that is recorded; errors; ``alpha``, ``speed``, ``torque`` and
+            ``axial_force`` of each joint: the operating point plus the errors ``operation.alpha`` and so on; kept
+            results, ``status`` as text. ``attrs["units"]`` has the SI unit of each column.
         """
         (frame,) = in_blocks(self, nominal, max(self.n, 1))
         return frame
@@ -171,8 +175,7 @@ class NamedLoads(Mapping[str, "pd.Series[float]"]):
 
 def described(store: Reader) -> dict[str, Column]:
     """Columns with unit and description that an export has, by name; see `ResultFile.to_pandas` for the others."""
-    errors = [c._replace(description=OPERATING.get(c.name, c.description)) for c in ERROR_COLUMNS]
-    return {c.name: c for c in (*drawn_columns(store.sampling), *errors, *store.columns)}
+    return {c.name: c for c in (*drawn_columns(store.sampling), *ERROR_COLUMNS, *OPERATING, *store.columns)}
 
 
 def in_blocks(store: Reader, nominal: bool, at_once: int = AT_ONCE) -> Iterator[pd.DataFrame]:
@@ -194,7 +197,7 @@ def _frame(store: Reader, rows: slice, nominal: bool, listed: Mapping[str, NDArr
         origin = store.origin(rows)
         data |= {c.name: c.of(origin) for c in drawn}
     data |= {c.name: c.of(errors) for c in ERROR_COLUMNS}
-    data |= {f"operation.{name}": values for name, values in recorded.operating_points(store, rows).items()}
+    data |= recorded.operating_points(store, rows)
     data |= {c.name: c.of(results) for c in store.columns}
     if store.retries:
         data["attempt"] = store.attempt(rows)
@@ -208,7 +211,7 @@ def _frame(store: Reader, rows: slice, nominal: bool, listed: Mapping[str, NDArr
 def _listed(store: Reader) -> dict[str, NDArray[Any]]:
     """Columns of joints that the study lists: case and family by name, variant and group by index; or of a sweep."""
     if not store.case_names:
-        return recorded.swept(store) if store.variants else {}
+        return recorded.swept(store) | {"variant": store.design()["variant"]} if store.variants else {}
     design = store.design()
     families = np.array([variant.family for variant in store.variants], dtype=object)
     return {

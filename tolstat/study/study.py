@@ -249,7 +249,9 @@ class Study(Case):
         only_one(name, names, f"{self.path}: operation")
         own = self.points[names.index(name)]
         limits = limits_at(self.limits, [own.name], names)
-        return replace(self, operation=own.operation, points=(Point("", own.operation, 1.0),), limits=limits)
+        swept = self.swept and replace(self.swept, operations=(own.operation,) * len(self.swept.joints))
+        points = (Point("", own.operation, 1.0),)
+        return replace(self, operation=own.operation, points=points, limits=limits, swept=swept)
 
     @property
     def variants(self) -> tuple[Variant, ...]:

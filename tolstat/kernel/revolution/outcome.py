@@ -4,9 +4,11 @@ import math
 
 import numpy as np
 
-from tolstat.common.tables import MAX_ITERATIONS
+from tolstat.common.tables import MAX_ITERATIONS, MAX_SHIFT, MAX_TILT
 from tolstat.kernel.codes import DYNAMIC, NEWTON_FAILED, NOT_SETTLED, OK
 from tolstat.kernel.mechanics.loads import DECIDING, N_AVERAGED, N_LOADS
+from tolstat.kernel.mechanics.topology import ARM, PIN, TRIAD
+from tolstat.kernel.mechanics.vector import dot, row
 from tolstat.kernel.revolution.settle import ALL_LOADS, closure_error, step_error
 from tolstat.kernel.revolution.trail import closure_trend, note_closure, with_slow_decay
 from tolstat.kernel.simd.jit import njit
@@ -17,6 +19,12 @@ EARLY_CLOSURE, EARLY_STEP_ERROR = 0.2, 0.02
 """A smooth joint has settled in its second revolution once the later half of what it has repeated of the first one is
 the same: it has forgotten its start. The first number is the closure error there, in units of ``settle_tol``, the
 second the step error, up to which that holds (docs/notes/steps.md)."""
+
+
+@njit
+def is_near(body, point, axis, R):
+    """Whether the axis of a pin or hole, vectors `point` and `axis`, is near its ideal one; a NaN is not."""
+    return dot(point, point) <= (MAX_SHIFT * R) ** 2 and dot(axis, row(TRIAD[body], 0)) >= math.cos(MAX_TILT)
 
 
 @njit
@@ -37,7 +45,9 @@ def inside_model(par):
         bears = bears or par.station_k2[j] > 0 or par.station_k3[j] > 0
     good = good and bears
     for pin in range(4):
-        good = good and par.clearance[pin] >= 0
+        good = good and 0 <= par.clearance[pin] <= MAX_SHIFT * par.R
+        good = good and is_near(PIN + pin, row(par.pin_point, pin), row(par.pin_axis, pin), par.R)
+        good = good and is_near(ARM + pin, row(par.hole_point, pin), row(par.hole_axis, pin), par.R)
     return good
 
 

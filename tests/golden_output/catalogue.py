@@ -19,8 +19,6 @@ COMMANDS = (
         "lots",
         "worst",
         "causes",
-        "angles",
-        "pairs",
         "fatigue",
         "bearing-life",
         "orders",

@@ -92,8 +92,6 @@ SORTING = Campaign(
         "causes": [
             *forms("causes sorting.h5 --by cross1.T --top 5"),
             "causes sorting.h5 --logarithm",
-            "angles sorting.h5 --by cross1.F --joints 200 --out angles",
-            "pairs sorting.h5",
         ],
         "reweight": forms("reweight sorting.h5 --set 'pin*.tilt_[tz].cpk=0.6' --set 'hole*.diameter.cpk=1.2'"),
         "reweight_out": ["reweight sorting.h5 --set 'pin*.tilt_[tz].cpk=0.6' --out changed"],

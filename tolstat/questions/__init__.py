@@ -89,8 +89,6 @@ QUESTIONS = (
     Question("quantiles", "", "Estimate quantiles and tolerance limits of each load.", "folded", "exceedance.answer"),
     Question("capability", "Read", "Compute yield and Cpk against each limit of the study.", "folded", counted=True),
     Question("causes", "Read", "Compute which tolerances and errors cause a load.", "folded", "causes.errors"),
-    Question("pairs", "Read", "Find which errors of pin and hole together cause a load.", "folded", "causes.pairs"),
-    Question("angles", "Read", "Compute which errors scatter a load at each angle.", "folded", "causes.angles"),
     Question("worst", "Read", "List the joints with the largest load and their errors.", "folded", "causes.worst"),
     Question("drawings", "", "Draw the joint, its errors and its worst rows.", "folded", "drawings.answer"),
     Question("histograms", "", "Draw histograms of the loads, and of the errors drawn.", "folded"),

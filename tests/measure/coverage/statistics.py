@@ -77,7 +77,6 @@ STATISTICS = {
     "difference of means": Statistic("`compare`", MEANS),
     "index alone": Statistic("`causes`", ABOUT, "fewer than 50 joints"),
     "index in all": Statistic("`causes`: bounds", LEAST, "fewer than 50 joints"),
-    "index over the revolution": Statistic("`angles`", ABOUT, "fewer than 50 joints"),
     "index alone, exchanged": Statistic("`causes --run`, `causes STUDY`", ABOUT, EXCHANGED),
     "index in all, exchanged": Statistic("`causes --run`, `causes STUDY`", ABOUT, EXCHANGED),
     "index of the event": Statistic("`causes --run`", ABOUT, "no joint, or every joint, above the limit"),

@@ -99,10 +99,6 @@ SORTING = Campaign(
             *forms("shape: allocate sorting.h5 --target 'P(any limit) < 0.2'"),
             "shape: allocate sorting.h5 --target 'P(cross*.T > 60 N*m) < 0.05' --keep 'pin*.diameter' --out new",
         ],
-        "time_above": [
-            *forms("time-above sorting.h5"),
-            "time-above sorting.h5 --by cross1.T --level '30 N*m' --curves --out above",
-        ],
         "fatigue": forms("fatigue sorting.h5"),
     },
 )

@@ -1,7 +1,7 @@
 """Registry of the loads over the input angle: what histories hold, and the channels that follow from it.
 
-They follow from the components of the kinds of loads, `load_kinds.LOAD_KINDS`. Time above, causes over the input angle
-and load cycles read them.
+They follow from the components of the kinds of loads, `load_kinds.LOAD_KINDS`. Causes over the input angle, orbits and
+load cycles read them.
 """
 
 from __future__ import annotations

@@ -94,7 +94,6 @@ QUESTIONS = (
     Question("histograms", "", "Draw histograms of the loads, and of the errors drawn.", "folded"),
     Question("modes", "", "Compute the shares of the revolution in which pins touch.", "folded", "joints"),
     Question("accuracy", "", "Give the numerical error of the loads, from checks of joints.", "folded", "joints", True),
-    Question("time_above", "Read", "Estimate how much of a revolution loads are above levels."),
     Question("reweight", "Decide", "Estimate exceedances for changed tolerances."),
     Question("allocate", "Decide", "Propose the cheapest tolerances that meet the targets."),
     Question("compare", "Decide", "Compare the exceedances and loads of two campaigns."),

@@ -32,12 +32,11 @@ CONTROL = "normal approximation, wrong on purpose"
 """Statistic that no command shows: an interval that misses. A measurement that passes it shows nothing."""
 
 STATISTICS = {
-    "share": Statistic("`report`, `fatigue`, `bearing-life`, `time-above`", LEAST),
+    "share": Statistic("`report`, `fatigue`, `bearing-life`", LEAST),
     "share, joints without a load": Statistic("`report`: total interval", LEAST),
-    "quantile": Statistic("`report`, `fatigue`, `time-above`", LEAST),
+    "quantile": Statistic("`report`, `fatigue`", LEAST),
     "equivalent load": Statistic("`fatigue`", LEAST),
     "band": Statistic("`report`: band of the whole curve", LEAST),
-    "mean time above": Statistic("`time-above`", ABOUT),
     "share of failed parts": Statistic("`fatigue`", LEAST),
     "yield and ppm": Statistic("`capability`", LEAST),
     "next delivery": Statistic("`report`, `capability`", LEAST),

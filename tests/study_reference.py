@@ -22,7 +22,6 @@ from tolstat.study.model import SweepEntry
 from tolstat.study.points import PointEntry
 from tolstat.study.schema import of_model
 from tolstat.study.selection import TOLERANCED
-from tolstat.study.selective import RejectEntry, SelectiveEntry
 from tolstat.study.tolerances.entry import Banded, LotEntry, SingleEntry
 from tolstat.study.tolerances.fits import FitEntry
 from tolstat.study.tolerances.kinds import ZONE_KINDS, kinds_of
@@ -202,7 +201,6 @@ def tables() -> dict[str, str]:
     found = {name: key_table(made["properties"], made.get("required", ())) for name, made in with_keys.items()}
     entries = {
         "sweep": SweepEntry,
-        "reject": RejectEntry,
         "range": Range,
         "line": LineEntry,
         "sequence": SequenceEntry,
@@ -222,7 +220,6 @@ def tables() -> dict[str, str]:
             "joint file": "\n\n".join(joint_tables()),
             "band": key_table(_own(Banded, SingleEntry)),
             "lot": model_table(LotEntry),
-            "selective": model_table(SelectiveEntry),
             "distributions": "\n\n".join(distributions()),
             "zones": zones(),
             "error names": errors(),

@@ -21,7 +21,6 @@ STUDY = (ROOT / "studies" / "iso2768_f.toml").read_text(encoding="utf-8")
 SHORT = {
     "lots": ("--lots", "30", "--joints", "2"),
     "rare": ("--n", "20", "--p0", "0.5", "--repeats", "1"),
-    "selective": ("--n", "40"),
     "verify": ("--joints", "1"),
 }
 """Options with which an example takes seconds."""

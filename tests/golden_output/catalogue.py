@@ -22,9 +22,8 @@ COMMANDS = (
         "fatigue",
         "bearing-life",
         "orders",
-        "sorting",
     ),
-    *("reweight", "allocate", "compare", "shafts", "rare", "selective", "export", "docs", "cache"),
+    *("reweight", "allocate", "compare", "shafts", "rare", "export", "docs", "cache"),
 )
 
 
@@ -116,7 +115,6 @@ MAIN = Campaign(
             "causes iso2768_f.h5 --by cross1.X",
             "fatigue iso2768_f.h5",
             "bearing-life iso2768_f.h5",
-            "sorting iso2768_f.h5",
             "lots iso2768_f.h5",
             "reweight iso2768_f.h5 --set pin1.offset_t.cpk=1.2",
             "allocate iso2768_f.h5 --target 'P(any limit) < 0.1'",

@@ -1,7 +1,7 @@
 """``python -m tests.measure.gallery FOLDER``: pictures of docs/gallery that no command draws by itself.
 
 FOLDER holds the result files ``welded_fork.h5``, ``overnight.h5``, ``fuzz.h5``, ``hard_cases.h5``,
-``needle_bearings.h5``, ``duty_cycle.h5``, ``known_parts.h5``, ``sorting.h5``, ``lots.h5``, and, compared with
+``needle_bearings.h5``, ``duty_cycle.h5``, ``known_parts.h5``, ``lots.h5``, and, compared with
 ``iso2768_f.h5``, ``rigid_shafts.h5`` and ``line_bored.h5``, of some joints or all, and gets a picture of each, and
 ``tilted_pin.png``.
 """
@@ -84,13 +84,6 @@ def known_parts(folder: Path) -> None:
     with tolstat.open(folder / "known_parts.h5") as store:
         answer = tolstat.known_parts(store.view())
     as_on_page(answer, (6.5, 3.6), folder / "known_parts.png")
-
-
-def sorting(folder: Path) -> None:
-    """Draw yield and cost before and after sorting, as the page does."""
-    with tolstat.open(folder / "sorting.h5") as store:
-        answer = tolstat.sorting(store.view())
-    as_on_page(answer, (6.5, 2.6), folder / "sorting.png")
 
 
 def overnight(folder: Path) -> None:
@@ -248,7 +241,7 @@ def hard_cases(folder: Path) -> None:
 def main(folder: Path) -> None:
     """Draw what the folder has the results of."""
     tilted_pin(folder)
-    drawn = (welded_fork, overnight, fuzz, hard_cases, needle_bearings, duty_cycle, known_parts, sorting, lots)
+    drawn = (welded_fork, overnight, fuzz, hard_cases, needle_bearings, duty_cycle, known_parts, lots)
     for draw in (*drawn, rigid_shafts, line_bored):
         if (folder / f"{draw.__name__}.h5").exists():
             draw(folder)

@@ -103,7 +103,7 @@ def test_they_affect_no_result(tmp_path: Path) -> None:
     assert s.identity() == other.identity()
 
 
-@pytest.mark.parametrize("name", ["rigid_shafts", "iso2768_f", "needle_bearings", "selective", "welded_fork"])
+@pytest.mark.parametrize("name", ["rigid_shafts", "iso2768_f", "needle_bearings", "line_bored", "welded_fork"])
 def test_a_value_is_as_if_written_in_the_study(tmp_path: Path, name: str) -> None:
     s = study.load(STUDIES / f"{name}.toml", 8)
     for own in assumptions(s):

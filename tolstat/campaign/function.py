@@ -115,7 +115,7 @@ class Function:
         Raises
         ------
         InputError
-            When joints of the study depend on each other: with lots of several joints, and matched by classes.
+            When joints of the study depend on each other: with lots of several joints.
         ValueError
             When `u` has another shape.
         """
@@ -296,8 +296,6 @@ def _columns(values: Array, names: Sequence[str], attribute: str) -> list[Array]
 
 def _dependence(study: Study) -> tuple[str, str]:
     """Key of a study that makes its joints depend on each other, and how; empty if they do not."""
-    if study.sampling.is_matched:
-        return "sampling.selective", "pins and holes are matched by classes, so joints depend on each other"
     if study.sampling.joints_per_lot > 1:
         return "sampling.joints_per_lot", "joints of one lot depend on each other"
     return "", ""

@@ -76,8 +76,6 @@ QUESTIONS = (
     Question("sweep", "", "Compare the largest loads of the joints of a sweep.", "open"),
     Question("cases", "", "Compare the largest loads of the listed joints.", file="sweep"),
     Question("known_parts", "", "Estimate what measured parts leave open of each share.", "open", "parts"),
-    Question("sorting", "Decide", "Compute yield and cost before and after parts are sorted.", "open", "parts"),
-    Question("selective", "Decide", "Compute yield and unmatched parts of selective assembly.", "open"),
     Question("lots", "Read", "Compute which share of a lot or of a delivery exceeds limits.", "open", counted=True),
     Question("orders", "Read", "Estimate the orders of the loads that the shafts carry.", "open"),
     Question("shafts", "Read", "Estimate which share of drive shafts exceeds limits.", "open", counted=True),

@@ -20,7 +20,6 @@ from tests.measure.coverage.trial import (
     sample_of,
 )
 from tolstat.analysis import binomial, capability, cycles, strength
-from tolstat.analysis.binomial import clopper_pearson
 from tolstat.common.loads import FloatArray
 
 

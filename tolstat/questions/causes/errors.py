@@ -356,7 +356,7 @@ def _of_samples(view: View, load: Sample, logarithm: bool, confidence: float) ->
     x = np.column_stack([components[name] for name in names])
     response = (_logarithm(load.name, values) if logarithm else values)[:MAX_JOINTS]
     parts: dict[str, NamedTuple] = {"srrc": ranks.regression(x, values[:MAX_JOINTS], confidence, independent)}
-    if study.copula.names or study.sampling.is_matched:
+    if study.copula.names:
         first = sensitivity.first_order(x, response, confidence, independent)
     else:
         first, parts["total"] = sensitivity.first_and_total(x, response, confidence, independent)

@@ -138,10 +138,6 @@ class ToleranceEntry(strict.Strict):
         """Return the number of parts that mean and deviation were estimated from; 0 if they are taken as exact."""
         return 0
 
-    def gauge_of(self, site: Site) -> tuple[float, float, float] | None:
-        """Return the band outside which parts are scrapped, and the gauge's deviation, SI; None if none is."""
-        return None
-
     @model_validator(mode="after")
     def _can_be_built(self, info: ValidationInfo) -> Self:
         self.quantities((info.context or {})["site"])

@@ -9,7 +9,7 @@ that share a lot have the same scores of the lot, whose number follows from i.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray

@@ -63,20 +63,11 @@ PARTS = Campaign(
 )
 LOTS = Campaign(
     "lots",
-    [cheap("lots"), "lots lots.toml --lots 30 --joints 3"],
-    usual("lots_lots.h5")
+    [cheap("lots"), "sed '|joints_per_lot = 20|joints_per_lot = 3|' lots.toml", "run lots.toml --n 90"],
+    usual("lots.h5")
     | {
-        "lots": [
-            *forms("lots lots_lots.h5"),
-            "lots lots_lots.h5 --delivery 60 --from-lots 3 --accept '20 %'",
-            "lots lots.toml --lots 30 --joints 4",
-        ],
-        "drawn": [
-            "sed '|joints_per_lot = 20|joints_per_lot = 3|' lots.toml",
-            "run lots.toml --n 90 --out drawn.h5",
-            "status drawn.h5",
-            "compare drawn.h5 lots_lots.h5",
-        ],
+        "delivery": plain("capability lots.h5 --delivery 60"),
+        "other_seed": ["run lots.toml --n 90 --set sampling.seed=7 --out other.h5", "compare other.h5 lots.h5"],
     },
 )
 DECIDED = Campaign(

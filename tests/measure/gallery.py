@@ -14,6 +14,7 @@ from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
+from scipy.stats import binom
 
 import tolstat
 from tests.support.environment import ROOT
@@ -153,10 +154,20 @@ def duty_cycle(folder: Path) -> None:
 
 
 def lots(folder: Path) -> None:
-    """Draw the shares of the lots, as the page does."""
+    """Draw which share of the lots has at most a share of joints above a limit, and as if lots were alike."""
     with tolstat.open(folder / "lots.h5") as store:
-        answer = tolstat.lots(store.view())
-    as_on_page(answer, (7, 3.6), folder / "lots.png")
+        size = int(store.sampling["joints_per_lot"])
+        above = (store.view().load("any limit").values > 1.0).reshape(-1, size).sum(axis=1)
+    at = np.arange(above.max() + 2)
+    alike = binom.cdf(at, size, above.mean() / size)
+    figure, ax = plt.subplots(figsize=(7, 3.6), layout="constrained")
+    own = [np.mean(above <= k) for k in at]
+    for values, colour, label in ((own, "#0072B2", "lots simulated"), (alike, "#777777", "if lots were alike")):
+        ax.step(100 * at / size, 100 * np.array(values), where="post", color=colour, label=label)
+    ax.set(xlabel="joints of a lot above a limit (%)", ylabel="lots with at most so many (%)", ylim=(0, 104))
+    ax.grid(alpha=0.3)
+    ax.legend()
+    save(figure, folder / "lots.png")
 
 
 def compared(folder: Path, name: str) -> None:

@@ -76,7 +76,6 @@ QUESTIONS = (
     Question("sweep", "", "Compare the largest loads of the joints of a sweep.", "open"),
     Question("cases", "", "Compare the largest loads of the listed joints.", file="sweep"),
     Question("known_parts", "", "Estimate what measured parts leave open of each share.", "open", "parts"),
-    Question("lots", "Read", "Compute which share of a lot or of a delivery exceeds limits.", "open", counted=True),
     Question("orders", "Read", "Estimate the orders of the loads that the shafts carry.", "open"),
     Question("shafts", "Read", "Estimate which share of drive shafts exceeds limits.", "open", counted=True),
     Question("bearing_life", "Read", "Compute the life of the pins' bearings.", "open", "bearing_life.answer", True),

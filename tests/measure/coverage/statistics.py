@@ -46,9 +46,9 @@ STATISTICS = {
     "share at a stop": Statistic("`run --until`", LEAST, "Sobol' points, Latin hypercubes"),
     "share, replicates": Statistic("`report`, `capability`", ABOUT, "one replicate"),
     "quantile, replicates": Statistic("`report`", ABOUT, "one replicate"),
-    "share, lots": Statistic("`lots`, `report`, `capability`", ABOUT, "fewer than 30 lots"),
+    "share, lots": Statistic("`report`, `capability`", ABOUT, "fewer than 30 lots"),
     "quantile, lots": Statistic("`report`", ABOUT, "fewer than 30 lots"),
-    "next delivery, lots": Statistic("`lots`", ABOUT, "fewer than 30 lots"),
+    "next delivery, lots": Statistic("`report`, `capability`", ABOUT, "fewer than 30 lots"),
     "return load": Statistic(
         "`capability --one-in`", TAIL, "less than 50 joints in the tail; a tail that is not Pareto's, or short"
     ),

@@ -64,13 +64,6 @@ def test_the_joint_that_comes_with_tolstat_says_what_is_assumed(tmp_path: Path) 
         (['contact.z = "24 mm"'], ("clearance",)),  # its coefficients are no longer those of the joint file
         (['pin.l = "30 mm"'], ("place of the cross bushings",)),
         (['contact.law = "needles"', 'bearing = { needles = 32, needle_length = "22 mm" }'], ("contact law",)),
-        (
-            [
-                "contact.law = 'stations'",
-                "contact.stations = [{ s_over_z = 0.5, k1 = '1 N/mm^2', k2 = '1 N/mm', weight = 1 }]",
-            ],
-            ("contact law", "H", "clearance"),
-        ),
     ],
 )
 def test_what_the_study_sets_is_given(tmp_path: Path, keys: list[str], names_given: tuple[str, ...]) -> None:

@@ -14,7 +14,7 @@ from typing import Any
 
 from tolstat.common.columns import holds
 from tolstat.common.errors import Fault, collected, gather, input_error
-from tolstat.common.loads import LOADS, UNIT_OF_LOAD, load_of, split
+from tolstat.common.loads import LOADS, UNIT_OF_LIMIT, load_of, split
 from tolstat.common.strict import dotted, validate
 from tolstat.common.tables import FINEST_STEPS
 from tolstat.joint import Joint, reading
@@ -116,8 +116,8 @@ def _limits(file: Reading) -> dict[str, float]:
     for entry in file.entries("limits"):
         with gather(file.faults):
             pattern, where = split(entry.pattern)
-            names = selection.resolve(entry._replace(pattern=pattern), UNIT_OF_LOAD, file.place)
-            value = selection.quantity(entry, UNIT_OF_LOAD[names[0]], file.place)
+            names = selection.resolve(entry._replace(pattern=pattern), UNIT_OF_LIMIT, file.place)
+            value = selection.quantity(entry, UNIT_OF_LIMIT[names[0]], file.place)
             if names_of_points:  # if not, the points have faults of their own
                 chosen = points.names_of(where, names_of_points, f"{file.place}: {dotted(entry.path)}")
                 names = [points.at(name, chosen, names_of_points) for name in names]

@@ -18,7 +18,7 @@ from tolstat.analysis.process import LEAST_PARTS, MOST_PARTS
 from tolstat.common import loads, strict
 from tolstat.common.channels import UNIT_OF_CHANNEL
 from tolstat.common.files import data_dir
-from tolstat.common.loads import UNIT_OF_LOAD
+from tolstat.common.loads import UNIT_OF_LIMIT
 from tolstat.common.notation import schema_of_positive, schema_of_quantity
 from tolstat.common.units import EXAMPLES
 from tolstat.joint import Joint, Operation
@@ -191,7 +191,7 @@ def sections() -> dict[str, Schema]:
         "case": _listed(CaseEntry),
         "variant": _listed(VariantEntry),
         "assumed": _listed(Assumed),
-        "limits": _table(limited, _entries("limit", UNIT_OF_LOAD), end=f"(?:{loads.AT}[A-Za-z].*)?"),
+        "limits": _table(limited, _entries("limit", UNIT_OF_LIMIT), end=f"(?:{loads.AT}[A-Za-z].*)?"),
         "fatigue": of_model(Settings),
         "output": of_model(Output),
     }

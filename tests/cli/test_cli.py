@@ -502,14 +502,14 @@ def test_simulate_of_a_joint_that_fails_is_data_with_a_warning(case, monkeypatch
 def test_probable_mistakes_are_warnings(tmp_path, monkeypatch, command):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("tolstat.campaign.replay.simulate_case", lambda _: simulated("ok", 1.5))
-    text = synthetic.STUDY.replace("n = 60", "n = 2").replace("[operation]", 'material.G = "90 GPa"\n[operation]')
+    text = synthetic.STUDY.replace("n = 60", "n = 2").replace("[operation]", 'cross.r_b = "10 mm"\n[operation]')
     if command == "simulate":
         text = text.partition("[tolerances]")[0]
     (tmp_path / "own.toml").write_text(text, encoding="utf-8")
     done = call(command, "own.toml", *(["--no-verify", "--no-report", "--workers", 1] if command == "run" else []))
     assert done.exit_code == 0, done.stderr
-    assert done.stderr.count("warning: own.toml: joint.material.G: 90 GPa does not agree with E and nu") == 1
-    assert "hint: leave G out, or check E and nu" in done.stderr
+    assert done.stderr.count("warning: own.toml: joint.cross.r_b: 10 mm is less than half of pin.d") == 1
+    assert "hint: give pin.l, from the hub" in done.stderr
 
 
 @pytest.mark.parametrize("arguments", [("simulate", "--out"), ("export", "--csv")])

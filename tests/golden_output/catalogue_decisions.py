@@ -75,13 +75,14 @@ DECIDED = Campaign(
     [cheap("iso2768_f"), f"sed '{HISTORIES}' iso2768_f.toml", "run iso2768_f.toml --n 480"],
     usual("iso2768_f.h5")
     | {
+        "page": ["report iso2768_f.h5 --out page.html --accept '10 %' --replay 200"],
         "capability_rare": plain("capability iso2768_f.h5 --one-in 1000 --delivery 50"),
         "causes": [
             *forms("causes iso2768_f.h5 --by cross1.T --top 5"),
             "causes iso2768_f.h5 --logarithm",
         ],
-        "reweight": forms("reweight iso2768_f.h5 --set 'pin*.tilt_[tz].cpk=0.6' --set 'hole*.diameter.cpk=1.2'"),
-        "reweight_out": ["reweight iso2768_f.h5 --set 'pin*.tilt_[tz].cpk=0.6' --out changed"],
+        "reweight": forms("reweight iso2768_f.h5 --set 'pin*.tilt_[tz].cpk=1.2' --set 'hole*.diameter.cpk=1.2'"),
+        "reweight_out": ["reweight iso2768_f.h5 --set 'pin*.tilt_[tz].cpk=1.2' --out changed"],
         "allocate": [
             *forms("shape: allocate iso2768_f.h5 --target 'P(any limit) < 0.2'"),
             "shape: allocate iso2768_f.h5 --target 'P(cross*.T > 60 N*m) < 0.05' --keep 'pin*.diameter' --out new",
@@ -127,6 +128,8 @@ WHAT_IF = Campaign(
         f"sed '{FIT}' iso2768_f.toml",
         """sed '|"pin*.diameter" = { lower = "-0.030 mm", upper = "0 mm", distribution = "normal", cpk = 1.0 }||' """
         "iso2768_f.toml",
+        """sed '|iso2768 = "f", nominal = "36.4 mm"|plus_minus = "0.25 deg"|' iso2768_f.toml""",
+        """sed '|iso2768 = "f", nominal = "22 mm"|plus_minus = "0.05 deg"|' iso2768_f.toml""",
         "sed '|60 N*m|34 N*m|' iso2768_f.toml",
         "run iso2768_f.toml --n 240",
         "causes iso2768_f.h5 --run --budget '20 min'",

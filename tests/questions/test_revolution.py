@@ -140,6 +140,6 @@ def test_few_settled_joints_and_other_loads_have_no_picture(known, tmp_path):
     few = synthetic.store(tmp_path)
     with ResultFile.open(few) as store:
         (said,) = over_angle(store.view(), ["cross1.F"])
-        assert "60 settled joints, 100 are needed" in said.text
+        assert "60 settled joints to evaluate, 100 are needed" in said.text
         assert over_angle(store.view(), []) == []
         assert followed(store.view(), ["cross1.F", "pin1.contact", "any limit"]) == ["cross1.F"]

@@ -84,7 +84,11 @@ def over_angle(view: View, loads: Sequence[str], joints: int = JOINTS) -> list[P
     if not loads:
         return []
     if len(samples) < MIN_JOINTS:
-        return [Sentence(f"nothing over the input angle: {len(samples)} settled joints, {MIN_JOINTS} are needed")]
+        return [
+            Sentence(
+                f"nothing over the input angle: {len(samples)} settled joints to evaluate, {MIN_JOINTS} are needed"
+            )
+        ]
     found = revolutions.read(view.store, np.concatenate([nominal, view.slots(samples)]), loads)
     errors = sampling.components(view.study, view.errors(samples, sampling.columns(view.study)))
     x, panels, peaks = np.column_stack(list(errors.values())), list[Panel](), list[str]()

@@ -110,7 +110,6 @@ _NEARLY_ALL = np.array([1e-3, 1.0 - 1e-3])
 """Probabilities between which an error of the operating point must be zero."""
 
 
-NotNegative = Annotated[Value, AfterValidator(units.not_negative)]
 Positive = Annotated[Value, AfterValidator(units.positive)]
 HalfWidth = Annotated[float, _reader(PLUS_MINUS), AfterValidator(units.positive), OF_ERROR]
 PositiveNumber = Annotated[units.Number, AfterValidator(units.positive)]

@@ -8,10 +8,9 @@ from typing import Any
 
 from tolstat.common.columns import OPTIONAL_FIELDS, RESULT_COLUMNS
 from tolstat.common.load_kinds import LOAD_KINDS
-from tolstat.common.loads import LOADS
+from tolstat.common.loads import LOADS, UNIT_OF_LIMIT
 from tolstat.common.tables import ERROR_FIELDS
 from tolstat.joint import Operation
-from tolstat.joint.contact import Station
 from tolstat.joint.orders import Partner, SpeedOrder, TorqueOrder
 from tolstat.study import schema
 from tolstat.study.costs import CostEntry
@@ -22,7 +21,6 @@ from tolstat.study.model import SweepEntry
 from tolstat.study.points import PointEntry
 from tolstat.study.schema import of_model
 from tolstat.study.selection import TOLERANCED
-from tolstat.study.selective import RejectEntry, SelectiveEntry
 from tolstat.study.tolerances.entry import Banded, LotEntry, SingleEntry
 from tolstat.study.tolerances.fits import FitEntry
 from tolstat.study.tolerances.kinds import ZONE_KINDS, kinds_of
@@ -117,7 +115,6 @@ def joint_tables() -> Iterator[str]:
     made = schema.joint()
     yield key_table(made["properties"])
     yield from _joint_sections(made, "")
-    yield f"`contact.stations`: {of_model(Station)['description']}\n\n{model_table(Station)}"
 
 
 def _joint_sections(made: Mapping[str, Any], before: str) -> Iterator[str]:
@@ -175,7 +172,9 @@ def loads() -> str:
     """Table of the loads that can have a limit."""
     lines = ["| load | unit | meaning |", "|---|---|---|"]
     for of in LOAD_KINDS:
-        names = [name for name, load in LOADS.items() if load.kind == of]
+        names = [name for name in UNIT_OF_LIMIT if LOADS[name].kind == of]
+        if not names:
+            continue
         text = f"`{names[0]}`" + (f" … `{names[-1]}`" if len(names) > 1 else "")
         lines.append(f"| {text} | {'' if of.unit == '1' else of.unit} | largest {of.meaning} |")
     return "\n".join(lines)
@@ -202,7 +201,6 @@ def tables() -> dict[str, str]:
     found = {name: key_table(made["properties"], made.get("required", ())) for name, made in with_keys.items()}
     entries = {
         "sweep": SweepEntry,
-        "reject": RejectEntry,
         "range": Range,
         "line": LineEntry,
         "sequence": SequenceEntry,
@@ -222,7 +220,6 @@ def tables() -> dict[str, str]:
             "joint file": "\n\n".join(joint_tables()),
             "band": key_table(_own(Banded, SingleEntry)),
             "lot": model_table(LotEntry),
-            "selective": model_table(SelectiveEntry),
             "distributions": "\n\n".join(distributions()),
             "zones": zones(),
             "error names": errors(),

@@ -10,11 +10,10 @@ from pathlib import Path
 import pytest
 
 import tolstat
-from tests.conftest import CHEAP
 from tests.support.environment import ROOT
 from tolstat import cli
 from tolstat.cli import LISTED
-from tolstat.questions import PUBLIC, QUESTIONS, lots, selective
+from tolstat.questions import PUBLIC, QUESTIONS
 
 DOCS = ROOT / "docs"
 PAGES = [
@@ -169,11 +168,6 @@ def folder(example_files: Path, tmp_path_factory: pytest.TempPathFactory) -> Pat
     """Folder with the study and the files that the examples name, where they may write."""
     made = Path(shutil.copytree(example_files, tmp_path_factory.mktemp("docs") / "examples"))
     shutil.copy(made / "iso2768_f.h5", made / "histories.h5")
-    for name in ("lots", "selective"):
-        study = made / "studies" / f"{name}.toml"
-        study.write_text(
-            study.read_text(encoding="utf-8").replace("[sampling]", f"[output]\n{CHEAP}"), encoding="utf-8"
-        )
     tolstat.run(
         tolstat.load(made / "studies" / "known_parts.toml", n=60), made / "known_parts.h5", workers=1, check=False
     )
@@ -183,11 +177,6 @@ def folder(example_files: Path, tmp_path_factory: pytest.TempPathFactory) -> Pat
         study = made / f"{name}.toml"
         study.write_text("[[variant]]".join([head, *variants[:1]]), encoding="utf-8")
         tolstat.run(tolstat.load(study), made / f"{name}.h5", workers=1, check=False)
-    few = lots.study_of(tolstat.load(made / "studies" / "lots.toml"), 30, 2)
-    tolstat.run(few, made / "lots_lots.h5", workers=1, check=False)
-    for classes in (1, 3):
-        few = selective.study_of(tolstat.load(made / "studies" / "selective.toml"), classes, 20)
-        tolstat.run(few, made / f"selective_k{classes}.h5", workers=1, check=False)
     return made
 
 

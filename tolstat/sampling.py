@@ -3,8 +3,7 @@
 The errors of joint i depend on the seed, i and the error's name only: not on the number of joints, not on which
 others are drawn with it, and not on other errors that are added to the study later. There are two exceptions: `lhs` has
 as many strata as joints, and with `pick_freeze` the number of joints per point depends on the number of groups. Joints
-that share a lot have the same scores of the lot, whose number follows from i. With selective assembly the class of
-joint i has a stream of its own, and its diameters depend on the tolerances of all diameters.
+that share a lot have the same scores of the lot, whose number follows from i.
 """
 
 from __future__ import annotations
@@ -17,14 +16,12 @@ from numpy.typing import NDArray
 
 from tolstat.analysis import process
 from tolstat.common.columns import IMPORTANCE, SUBSET
-from tolstat.common.errors import InputError
 from tolstat.common.late import special
 from tolstat.common.tables import ERROR_FIELDS
 from tolstat.joint import MEANS, Operation, nominal_errors
 from tolstat.study import Study, axes
 from tolstat.study.design import Design, sobol
 from tolstat.study.proposal import component, weights
-from tolstat.study.selective import matching
 from tolstat.study.tolerances.distributions import score
 from tolstat.study.tolerances.zone_laws import plane_scores
 
@@ -141,15 +138,7 @@ def from_probabilities(study: Study, u: Array) -> Table:
     Returns
     -------
     ndarray, (n,), dtype ERROR
-
-    Raises
-    ------
-    InputError
-        When pins and holes are matched by classes: their diameters depend on each other.
     """
-    if study.sampling.is_matched:
-        remedy = "remove sampling.selective, or change the study and run it as another campaign"
-        raise InputError([study.fault("sampling.selective", "matches diameters: joints have no free scores", remedy)])
     table = nominal_errors(len(u))
     for name, value in study.errors.items():
         table[name] = value
@@ -273,12 +262,7 @@ def _fill_scatter(samples: Table, study: Study, numbers: range) -> None:
     if study.proposals:
         scores, part = _proposed(study, list(u), numbers)
         u = {name: np.where(part == 0, u[name], _probability(scores[name])) for name in u}
-    depending = _of_lots(study, u, numbers) if study.sampling.joints_per_lot > 1 else {}
-    if study.sampling.is_matched and study.sampling.selective is not None:
-        u_class = _stream(study.sampling.seed, "selective", numbers.start).random(len(numbers))
-        classes = matching(study.sampling.selective, study.entries, study.tolerances)
-        depending |= classes.probabilities(u_class, u)
-    _fill_from(samples, study, u, depending)
+    _fill_from(samples, study, u, _of_lots(study, u, numbers) if study.sampling.joints_per_lot > 1 else {})
 
 
 def _of_lots(study: Study, u: dict[str, Array], numbers: range) -> dict[str, Array]:
@@ -294,16 +278,16 @@ def _of_lots(study: Study, u: dict[str, Array], numbers: range) -> dict[str, Arr
     return probabilities
 
 
-def _fill_from(samples: Table, study: Study, u: dict[str, Array], depending: Mapping[str, Array] | None = None) -> None:
+def _fill_from(samples: Table, study: Study, u: dict[str, Array], of_lots: Mapping[str, Array] | None = None) -> None:
     """Set the errors that scatter, from independent probabilities `u` of their columns.
 
-    Errors in `depending` have these probabilities instead: of those that depend on other joints or on the class.
+    Errors in `of_lots`, which depend on other joints, have these probabilities instead.
     """
     names = study.copula.names
     if names:
         correlated = study.copula.apply(np.column_stack([u[name] for name in names]))
         u |= {name: correlated[:, i] for i, name in enumerate(names)}
-    u |= depending or {}
+    u |= of_lots or {}
     vectors: dict[str, dict[str, Array]] = {}
     for name, distribution in study.tolerances.items():
         if not axes.is_zone(name):

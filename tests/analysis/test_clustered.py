@@ -93,23 +93,24 @@ def test_quantile_inverts_the_curve():
     assert abs(found.estimate - norm.ppf(0.9)) < 0.2
 
 
-def test_prediction_of_many_lots_is_the_law_itself_and_deliveries_of_several_lots_scatter_less():
+def test_prediction_of_many_lots_is_the_law_itself():
     predict = partial(clustered.delivery, of_beta(0.2, 0.25, 5000, 20), np.full(5000, 20))
-    exact = betabinom(60, 0.6, 2.4)
-    assert np.abs(predict(60).probability - exact.pmf(np.arange(61))).max() < 0.004
-    assert predict(60).more_than(0.5) == pytest.approx(exact.sf(30), abs=0.01)
-    assert predict(2000).more_than(0.5) == pytest.approx(beta(0.6, 2.4).sf(0.5), abs=0.01)
-    several = predict(61, 4).probability  # lots of 15, 15, 15 and 16 joints
-    parts = [betabinom(size, 0.6, 2.4).pmf(np.arange(size + 1)) for size in (15, 15, 15, 16)]
-    sums = np.convolve(np.convolve(parts[0], parts[1]), np.convolve(parts[2], parts[3]))
-    assert np.abs(several - sums).max() < 0.004
-    one, four = predict(60).ends(), predict(60, 4).ends()
-    assert one[0] <= four[0] < four[1] < one[1]
+    assert np.abs(predict(60) - betabinom(60, 0.6, 2.4).pmf(np.arange(61))).max() < 0.004
+    assert predict(2000)[1001:].sum() == pytest.approx(beta(0.6, 2.4).sf(0.5), abs=0.01)
+    assert predict(2000).sum() == pytest.approx(1.0)
+
+
+def predicted(counts):
+    """Prediction interval for 500 joints of a new lot, where lots of 20 joints have these counts above the level."""
+    above = (np.arange(20) < np.array(counts)[:, None]).ravel()
+    load = Sample.of(above.astype(float), np.ones(above.size), Clustered(np.repeat(np.arange(len(counts)), 20)))
+    return load.delivery(0.5, 500)
 
 
 def test_prediction_of_few_lots_is_wider_and_none_bad_leaves_room():
-    few, many = (clustered.delivery([0, 2, 4, 1, 0] * times, [20] * 5 * times, 500) for times in (6, 200))
-    assert few.ends()[1] > many.ends()[1]
-    none = clustered.delivery([0] * 50, [20] * 50, 500)
-    assert none.ends()[0] == 0.0
-    assert none.ends()[1] == prediction.of_counts(0, 0, 1000, 500)[1] > 0.0
+    few, many = (predicted([0, 2, 4, 1, 0] * times) for times in (6, 200))
+    assert few[1] > many[1]
+    independent = prediction.of_counts(42, 42, 600, 500)
+    assert few[0] <= independent[0] < independent[1] < few[1]
+    assert predicted([0] * 50) == (0.0, prediction.of_counts(0, 0, 1000, 500)[1])
+    assert np.isnan(predicted([1] * 29)).all()

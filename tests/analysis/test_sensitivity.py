@@ -93,9 +93,9 @@ def test_linear_model_has_the_shares_of_its_slopes():
 
 def test_few_joints_give_an_error_without_effect_no_share_on_average_and_without_correction_they_do():
     rng = np.random.default_rng(50)
-    x, y = rng.standard_normal((sensitivity.FEWEST, 40)), rng.standard_normal((sensitivity.FEWEST, 500))
-    assert abs(sensitivity.first_order(x, y).estimate.mean()) < 0.005
-    assert share_explained(x, y[:, 0]).mean() > 0.1
+    x, loads = rng.standard_normal((sensitivity.FEWEST, 40)), rng.standard_normal((100, sensitivity.FEWEST))
+    assert abs(np.mean([sensitivity.first_order(x, y).estimate for y in loads])) < 0.01
+    assert share_explained(x, loads[0]).mean() > 0.1
 
 
 def test_errors_of_few_values_and_of_one_value():
@@ -108,41 +108,9 @@ def test_errors_of_few_values_and_of_one_value():
         sensitivity.first_and_total(x, x[:, 1])
 
 
-def test_contributions_against_shaft_angle_are_those_of_each_angle():
-    rng = np.random.default_rng(9)
-    x, angles = rng.standard_normal((800, 3)), np.linspace(0, 2 * np.pi, 24, endpoint=False)
-    loads = 10.0 + np.outer(x[:, 0], np.cos(angles)) + np.outer(x[:, 1], np.sin(angles))
-    whole = sensitivity.first_order(x, loads)
-    assert whole.estimate.shape == (3, 24)
-    one = sensitivity.first_order(x, loads[:, 5])
-    assert whole.upper[:, 5] == pytest.approx(one.upper)
-    assert whole.variance[5] == pytest.approx(one.variance)
-    truth = np.stack([np.cos(angles) ** 2, np.sin(angles) ** 2, 0 * angles])
-    assert np.abs(whole.estimate * whole.variance - truth).max() < 0.2
-    assert whole.estimate[0].argmax() in (0, 12)
-    assert np.isnan(sensitivity.first_order(x, np.zeros((800, 2))).estimate).all()
-
-
-@pytest.mark.slow
-def test_shares_over_the_revolution_cover_and_their_plain_mean_does_not():
-    theta = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
-    slopes = np.stack([1.0 + 0.5 * np.sin(theta), 0.7 * np.cos(theta), 0.0 * theta])
-    share = slopes**2 / (slopes**2).sum(axis=0)
-    truth = (slopes**2).sum(axis=1) / (slopes**2).sum()
-    rng, covered, plain = np.random.default_rng(2011), np.zeros(3), np.zeros(3)
-    for _ in range(SEEDS):
-        x = rng.standard_normal((800, 3))
-        at_angles, overall = sensitivity.over_revolution(x, x @ slopes)
-        half = 0.5 * (overall.upper - overall.lower)
-        covered += np.abs(overall.estimate - truth) <= half + 1e-12
-        plain += np.abs(at_angles.estimate.mean(axis=1) - truth) <= half
-    assert np.all(covered[:2] / SEEDS >= LEAST)
-    assert np.all(covered[:2] / SEEDS < 0.995)  # not by being wide
-    assert np.all(plain[:2] / SEEDS < LEAST)
-    assert at_angles.estimate == pytest.approx(share, abs=0.15)
-    single = sensitivity.first_order(x, x @ slopes)
-    for mine, theirs in zip(at_angles, single, strict=True):
-        assert mine == pytest.approx(theirs, rel=1e-9, abs=1e-12)
+def test_a_load_that_does_not_scatter_has_no_indices():
+    x = np.random.default_rng(9).standard_normal((800, 3))
+    assert np.isnan(sensitivity.first_order(x, np.zeros(800)).estimate).all()
 
 
 @pytest.mark.slow

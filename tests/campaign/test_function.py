@@ -90,21 +90,14 @@ def test_listed_joints_are_given_by_their_errors_and_number():
             swept({"variant": [0, wrong]})
 
 
-def dependent(key):
-    text = TEXT.replace("n = 64", "n = 128").replace('[[correlation]]\nbetween = ["pin*.diameter"]\nrho = 0.6\n', "")
-    if key == "joints_per_lot":
-        lot = '"uniform", lot = { share = 0.3 } }'
-        return study_of(text.replace('"uniform" }', lot) + "joints_per_lot = 4\n")
-    return load(STUDIES / "selective.toml")
-
-
-@pytest.mark.parametrize("key", ["joints_per_lot", "selective"])
-def test_joints_that_depend_on_each_other_have_no_cube(key):
+def test_joints_of_a_lot_have_no_cube():
     """The refusal names the key and another way, which works."""
-    study = dependent(key)
+    text = TEXT.replace("n = 64", "n = 128").replace('[[correlation]]\nbetween = ["pin*.diameter"]\nrho = 0.6\n', "")
+    study = study_of(text.replace('"uniform" }', '"uniform", lot = { share = 0.3 } }') + "joints_per_lot = 4\n")
+    words = r"sampling\.joints_per_lot.*\n.*remove sampling\.joints_per_lot, or give errors"
     f = tolstat.function(study, ["psi"])
     for use in (lambda: f.uniform(np.full((2, len(f.cube_names)), 0.5)), f.salib):
-        with pytest.raises(InputError, match=rf"sampling\.{key}.*\n.*remove sampling\.{key}, or give errors") as caught:
+        with pytest.raises(InputError, match=words) as caught:
             use()
         assert "depend on each other" in str(caught.value)
     assert f.distributions is None

@@ -208,9 +208,9 @@ def test_worst_command(tmp_path: Path) -> None:
     done = CliRunner().invoke(cli.app, ["worst", str(path), "--by", "fork1.T", "--top", "3"])
     assert done.exit_code == 0
     lines = done.stdout.splitlines()
-    assert lines[0].startswith("row")
-    assert "fork1.T [N*m]" in lines[0]
+    assert lines[0].split() == ["load", "largest", "row", "largest", "errors,", "in", "σ"]
     assert len(lines) == 4
+    assert f"tolstat replay {path} --row {lines[1].split()[4]} --out trace.csv" in " ".join(done.stderr.split())
     done = CliRunner().invoke(cli.app, ["worst", str(path), "--by", "fork1.T", "--json"])
     found = json.loads(done.stdout)
     joints = found["tables"]["joints"]["rows"]

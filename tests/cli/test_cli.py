@@ -498,28 +498,19 @@ def test_simulate_of_a_joint_that_fails_is_data_with_a_warning(case, monkeypatch
     assert "hint: try more" in done.stderr
 
 
-UNDAMPED = """
-contact.law = "stations"
-contact.stations = [
-  { s_over_z = 0.5, k1 = "1.6e6 N/mm^2", k2 = "1.8e5 N/mm", weight = 1.0 },
-  { s_over_z = -0.5, k1 = "1.6e6 N/mm^2", k2 = "1.8e5 N/mm", weight = 0.0 },
-]
-"""
-
-
 @pytest.mark.parametrize("command", ["simulate", "plan", "run"])
 @pytest.mark.slow
 def test_probable_mistakes_are_warnings(tmp_path, monkeypatch, command):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("tolstat.campaign.replay.simulate_case", lambda _: simulated("ok", 1.5))
-    text = synthetic.STUDY.replace("n = 60", "n = 2").replace("[operation]", f"{UNDAMPED}[operation]")
+    text = synthetic.STUDY.replace("n = 60", "n = 2").replace("[operation]", 'cross.r_b = "10 mm"\n[operation]')
     if command == "simulate":
         text = text.partition("[tolerances]")[0]
     (tmp_path / "own.toml").write_text(text, encoding="utf-8")
     done = call(command, "own.toml", *(["--no-verify", "--no-report", "--workers", 1] if command == "run" else []))
     assert done.exit_code == 0, done.stderr
-    assert done.stderr.count("warning: own.toml: joint.contact.stations[1]: can touch alone with weight 0") == 1
-    assert "hint: give it a weight" in done.stderr
+    assert done.stderr.count("warning: own.toml: joint.cross.r_b: 10 mm is less than half of pin.d") == 1
+    assert "hint: give pin.l, from the hub" in done.stderr
 
 
 @pytest.mark.parametrize("arguments", [("simulate", "--out"), ("export", "--csv")])

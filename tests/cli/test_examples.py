@@ -19,9 +19,7 @@ from tolstat.cli import LISTED, app
 COMMANDS = list(LISTED)
 STUDY = (ROOT / "studies" / "iso2768_f.toml").read_text(encoding="utf-8")
 SHORT = {
-    "lots": ("--lots", "30", "--joints", "2"),
     "rare": ("--n", "20", "--p0", "0.5", "--repeats", "1"),
-    "selective": ("--n", "40"),
     "verify": ("--joints", "1"),
 }
 """Options with which an example takes seconds."""
@@ -79,7 +77,6 @@ TABLES = {
     "capability": ("--one-in", 100),
     "worst": (),
     "causes": (),
-    "pairs": (),
     "reweight": ("--set", "pin*.offset_t.cpk=1.2"),
     "allocate": ("--target", "P(cross1.F > 700 N) < 0.25"),
     "compare": ("other.h5", "--by", "cross1.F"),

@@ -16,18 +16,13 @@ COMMANDS = (
     *(
         "assumptions",
         "capability",
-        "lots",
         "worst",
         "causes",
-        "angles",
-        "pairs",
         "fatigue",
         "bearing-life",
         "orders",
-        "time-above",
-        "sorting",
     ),
-    *("reweight", "allocate", "compare", "shafts", "rare", "selective", "export", "docs", "cache"),
+    *("reweight", "allocate", "compare", "shafts", "rare", "export", "docs", "cache"),
 )
 
 
@@ -119,9 +114,6 @@ MAIN = Campaign(
             "causes iso2768_f.h5 --by cross1.X",
             "fatigue iso2768_f.h5",
             "bearing-life iso2768_f.h5",
-            "time-above iso2768_f.h5",
-            "sorting iso2768_f.h5",
-            "lots iso2768_f.h5",
             "reweight iso2768_f.h5 --set pin1.offset_t.cpk=1.2",
             "allocate iso2768_f.h5 --target 'P(any limit) < 0.1'",
             "replay iso2768_f.h5 --row 900",

@@ -12,6 +12,12 @@ CASES = (
     '[grid]\\n"operation.alpha" = ["5 deg", "20 deg"]|'
 )
 """Edit of a sweep: cases, a family of joints, a grid."""
+OFFSETS = '"{}*.offset_[etz]" = {{ iso2768 = "f", nominal = "72.8 mm", distribution = "normal", cpk = 1.0 }}'
+FIT = (
+    '|"hole*.diameter" = { lower = "0 mm", upper = "0.030 mm", distribution = "normal", cpk = 1.0 }|'
+    'fit = { basic = "76 mm", code = "H9/f9", distribution = "normal", cpk = 1.0 }|'
+)
+"""Edits of a study: without offsets, and with a fit."""
 
 SOBOL = Campaign(
     "sobol",
@@ -57,55 +63,31 @@ PARTS = Campaign(
 )
 LOTS = Campaign(
     "lots",
-    [cheap("lots"), "lots lots.toml --lots 30 --joints 3"],
-    usual("lots_lots.h5")
+    [cheap("lots"), "sed '|joints_per_lot = 20|joints_per_lot = 3|' lots.toml", "run lots.toml --n 90"],
+    usual("lots.h5")
     | {
-        "lots": [
-            *forms("lots lots_lots.h5"),
-            "lots lots_lots.h5 --delivery 60 --from-lots 3 --accept '20 %'",
-            "lots lots.toml --lots 30 --joints 4",
-        ],
-        "drawn": [
-            "sed '|joints_per_lot = 20|joints_per_lot = 3|' lots.toml",
-            "run lots.toml --n 90 --out drawn.h5",
-            "status drawn.h5",
-            "compare drawn.h5 lots_lots.h5",
-        ],
+        "delivery": plain("capability lots.h5 --delivery 60"),
+        "other_seed": ["run lots.toml --n 90 --set sampling.seed=7 --out other.h5", "compare other.h5 lots.h5"],
     },
 )
-FITTED = Campaign(
-    "selective",
-    [cheap("selective"), "selective selective.toml --classes 1 --classes 3 --n 64"],
-    usual("selective_k3.h5")
+DECIDED = Campaign(
+    "decided",
+    [cheap("iso2768_f"), f"sed '{HISTORIES}' iso2768_f.toml", "run iso2768_f.toml --n 480"],
+    usual("iso2768_f.h5")
     | {
-        "selective": plain("selective selective.toml --classes 1 --classes 3 --n 64"),
-        "one": ["report selective_k1.h5"],
-    },
-)
-SORTING = Campaign(
-    "sorting",
-    [f"sed '{HISTORIES}' sorting.toml", "run sorting.toml --n 480"],
-    usual("sorting.h5")
-    | {
-        "sorting": forms("sorting sorting.h5"),
-        "capability_rare": plain("capability sorting.h5 --one-in 1000 --delivery 50"),
+        "page": ["report iso2768_f.h5 --out page.html --accept '10 %' --replay 200"],
+        "capability_rare": plain("capability iso2768_f.h5 --one-in 1000 --delivery 50"),
         "causes": [
-            *forms("causes sorting.h5 --by cross1.T --top 5"),
-            "causes sorting.h5 --logarithm",
-            "angles sorting.h5 --by cross1.F --joints 200 --out angles",
-            "pairs sorting.h5",
+            *forms("causes iso2768_f.h5 --by cross1.T --top 5"),
+            "causes iso2768_f.h5 --logarithm",
         ],
-        "reweight": forms("reweight sorting.h5 --set 'pin*.tilt_[tz].cpk=0.6' --set 'hole*.diameter.cpk=1.2'"),
-        "reweight_out": ["reweight sorting.h5 --set 'pin*.tilt_[tz].cpk=0.6' --out changed"],
+        "reweight": forms("reweight iso2768_f.h5 --set 'pin*.tilt_[tz].cpk=1.2' --set 'hole*.diameter.cpk=1.2'"),
+        "reweight_out": ["reweight iso2768_f.h5 --set 'pin*.tilt_[tz].cpk=1.2' --out changed"],
         "allocate": [
-            *forms("shape: allocate sorting.h5 --target 'P(any limit) < 0.2'"),
-            "shape: allocate sorting.h5 --target 'P(cross*.T > 60 N*m) < 0.05' --keep 'pin*.diameter' --out new",
+            *forms("shape: allocate iso2768_f.h5 --target 'P(any limit) < 0.2'"),
+            "shape: allocate iso2768_f.h5 --target 'P(cross*.T > 60 N*m) < 0.05' --keep 'pin*.diameter' --out new",
         ],
-        "time_above": [
-            *forms("time-above sorting.h5"),
-            "time-above sorting.h5 --by cross1.T --level '30 N*m' --curves --out above",
-        ],
-        "fatigue": forms("fatigue sorting.h5"),
+        "fatigue": forms("fatigue iso2768_f.h5"),
     },
 )
 FROZEN = Campaign(
@@ -140,22 +122,27 @@ LISTED = Campaign(
 WHAT_IF = Campaign(
     "what_if",
     [
-        cheap("selective"),
-        'sed \'|selective = { classes = 3, gauge = "2 um", split = "width" }||\' selective.toml',
-        'sed \'|"hole*.tilt_[tz]" = { plus_minus = "0.25|"hole*.tilt_t" = { plus_minus = "0.05|\' selective.toml',
-        "sed '|60 N*m|34 N*m|' selective.toml",
-        "run selective.toml --n 240",
-        "causes selective.h5 --run --budget '20 min'",
+        cheap("iso2768_f"),
+        f"sed '|{OFFSETS.format('pin')}||' iso2768_f.toml",
+        f"sed '|{OFFSETS.format('hole')}||' iso2768_f.toml",
+        f"sed '{FIT}' iso2768_f.toml",
+        """sed '|"pin*.diameter" = { lower = "-0.030 mm", upper = "0 mm", distribution = "normal", cpk = 1.0 }||' """
+        "iso2768_f.toml",
+        """sed '|iso2768 = "f", nominal = "36.4 mm"|plus_minus = "0.25 deg"|' iso2768_f.toml""",
+        """sed '|iso2768 = "f", nominal = "22 mm"|plus_minus = "0.05 deg"|' iso2768_f.toml""",
+        "sed '|60 N*m|34 N*m|' iso2768_f.toml",
+        "run iso2768_f.toml --n 240",
+        "causes iso2768_f.h5 --run --budget '20 min'",
     ],
     {
-        "causes": forms("causes selective.h5", "causes selective.h5 --by cross1.T"),
-        "page": ["status selective.h5", "report selective.h5 --out page.html"],
+        "causes": forms("causes iso2768_f.h5", "causes iso2768_f.h5 --by cross1.T"),
+        "page": ["status iso2768_f.h5", "report iso2768_f.h5 --out page.html"],
         "assumptions": [
-            "assumptions selective.h5",
-            "assumptions selective.h5 --run --accept '50 %'",
-            *forms("assumptions selective.h5 --accept '50 %'"),
-            "report selective.h5 --accept '50 %'",
+            "assumptions iso2768_f.h5",
+            "assumptions iso2768_f.h5 --run --accept '50 %'",
+            *forms("assumptions iso2768_f.h5 --accept '50 %'"),
+            "report iso2768_f.h5 --accept '50 %'",
         ],
-        "kept": ["extend selective.h5 --n 250 --no-report", "causes selective.h5"],
+        "kept": ["extend iso2768_f.h5 --n 250 --no-report", "causes iso2768_f.h5"],
     },
 )

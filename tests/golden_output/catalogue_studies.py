@@ -77,7 +77,6 @@ POINTS = Campaign(
             "export duty_cycle.h5 --statistics statistics.json --point climb",
             "replay duty_cycle.h5 --row 5 --point climb",
             "replay duty_cycle.h5 --row 5",
-            "time-above duty_cycle.h5",
             "report duty_cycle.h5 --point nowhere",
         ],
         "verify": ["verify duty_cycle.h5 --near 'cross1.F at drive > 2 kN' --joints 2", "report duty_cycle.h5"],
@@ -108,7 +107,6 @@ WELDED = Campaign(
             "fatigue welded_fork.h5 --joints 20 --out equivalent.csv --delivery 50",
             "fatigue welded_fork.h5 welded_fork.h5 --share 0.5 --share 0.5",
         ],
-        "time_above": forms("time-above welded_fork.h5 --by cross1.F --level '1400 N' --curves --out above"),
         "cycles": ["export welded_fork.h5 --pylife cycles.csv", "export welded_fork.h5 --csv joints.csv"],
     },
 )

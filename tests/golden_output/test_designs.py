@@ -8,7 +8,7 @@ from tests.golden_output import catalogue_decisions as catalogue
 from tests.golden_output.catalogue import Campaign, cases
 from tests.golden_output.conftest import Check
 
-CAMPAIGNS = (catalogue.LOTS, catalogue.FITTED, catalogue.FROZEN, catalogue.LISTED)
+CAMPAIGNS = (catalogue.LOTS, catalogue.FROZEN, catalogue.LISTED)
 
 
 @pytest.mark.slow

@@ -320,14 +320,6 @@ def test_factor_on_E(joint, operation):
         assert_allclose(p[name], scale * nominal[name], rtol=1e-14, err_msg=name)
 
 
-STATIONS = [
-    {"s_over_z": -0.5, "k1": "1.6e6 N/mm^2", "k2": "1.8e5 N/mm", "weight": 1.0},
-    {"s_over_z": 0.5, "k1": "1.6e6 N/mm^2", "k2": "1.8e5 N/mm", "weight": 1.0},
-    {"s_over_z": 0.0, "k1": "7.18e7 N/mm^2", "k2": "8.4e5 N/mm", "weight": 0.0},
-]
-"""The law `mode` of the default joint, written as stations."""
-
-
 @pytest.mark.parametrize(
     ("law", "s", "k1", "k2", "weight"),
     [
@@ -347,51 +339,9 @@ def test_a_law_is_a_set_of_stations(joint, law, s, k1, k2, weight):
         assert sum(stations.k2) == pytest.approx(joint.contact.k2u)
 
 
-def test_stations_of_one_s_own(joint, operation):
-    own = joints.load("cirelli2021", {"contact": {"law": "stations", "stations": STATIONS}}, "case.toml")
-    errors = one(material__E_factor=1.3, pin1__offset_t=1e-5)
-    mine, mode = joints.perturb(own, operation, errors), joints.perturb(joint, operation, errors)
-    for name in PARAM.names:
-        assert_allclose(mine[name], mode[name], rtol=1e-12, err_msg=name)
-    assert validate(Joint, own.given("json"), "file.h5") == own
-    values = {"contact.law": "stations", "contact.stations": [dict(x) for x in own.contact.stations]}
-    assert joints.varied(joint, values).contact.stations == own.contact.stations
-    assert not own.warnings()
-
-
-def test_an_override_of_the_law_leaves_out_the_keys_of_the_other(tmp_path):
-    path = tmp_path / "own.toml"
-    text, _, _ = FILE.read_text(encoding="utf-8").partition("# What is assumed")
-    for key in ("n_stations", "k1u", "k2u", "k1p", "k2p", "H", "fit_load"):
-        text = re.sub(rf"(?m)^{key} = .*$", "", text)
-    rows = ", ".join(
-        f'{{ s_over_z = {x["s_over_z"]}, k1 = "{x["k1"]}", k2 = "{x["k2"]}", weight = {x["weight"]} }}'
-        for x in STATIONS
-    )
-    path.write_text(text.replace('law = "mode"', f'law = "stations"\nstations = [{rows}]'), encoding="utf-8")
-    assert joints.load(path, {}, "case.toml").contact.law == "stations"
-    coefficients = {"k1u": "7.5e7 N/mm^2", "k2u": "1.2e6 N/mm", "H": 6.9}
-    again = joints.load(path, {"contact": {"law": "mode"} | coefficients}, "case.toml")
-    assert again.contact.stations is None
-    assert set(faults({"contact": {"law": "mode"}}, path)) == {"case.toml: joint.contact.H"}
-    told = faults({"contact": {"law": "mode", "H": 6.9}}, path)["case.toml: joint.contact"]
-    assert (told.found, told.remedy) == ("missing keys k1u, k2u", "give them, or fit_load")
-
-
 @pytest.mark.parametrize(
     ("contact", "key", "found"),
     [
-        ({"law": "stations"}, "stations", "missing key"),
-        ({"law": "stations", "stations": []}, "stations", "has 0 stations"),
-        ({"law": "stations", "stations": 17 * STATIONS[:1]}, "stations", "has 17 stations"),
-        ({"law": "stations", "stations": STATIONS, "k1u": "1 N/m^2"}, "k1u", 'no effect with law = "stations"'),
-        ({"law": "stations", "stations": STATIONS, "fit_load": "1 N"}, "fit_load", "no effect with law"),
-        ({"stations": STATIONS}, "stations", 'no effect with law = "mode"'),
-        ({"law": "stations", "stations": [STATIONS[0] | {"s_over_z": 0.6}]}, "stations[0].s_over_z", "beyond the end"),
-        ({"law": "stations", "stations": [STATIONS[0] | {"k1": "-1 N/m^2"}]}, "stations[0].k1", "not be negative"),
-        ({"law": "stations", "stations": [STATIONS[0] | {"k3": "1 N/m"}]}, "stations[0].k3", "unknown key"),
-        ({"law": "stations", "stations": [STATIONS[0] | {"weight": -1.0}]}, "stations[0].weight", "not be negative"),
-        ({"law": "stations", "stations": [STATIONS[0] | {"k2": "0 N/m"}]}, "stations", "no station has k2 > 0"),
         ({"k1p": "3.8e7 N/mm^2"}, "k1p", "2 k1p exceeds k1u"),
         ({"k2p": "6.1e5 N/mm"}, "k2p", "2 k2p exceeds k2u"),
         ({"H": 1.9}, "H", "the middle station would be negative"),
@@ -403,22 +353,6 @@ def test_stations_without_sense_are_faults(contact, key, found):
     assert set(told) == {f"case.toml: joint.contact.{key}"}
     assert found in told[f"case.toml: joint.contact.{key}"].found
     assert told[f"case.toml: joint.contact.{key}"].remedy
-
-
-@pytest.mark.parametrize(
-    ("changes", "warned"),
-    [
-        ({}, []),
-        ({0: {"weight": 0.0}}, [0]),
-        ({0: {"weight": 0.0}, 1: {"weight": 0.0}}, [0, 1]),
-        ({0: {"weight": 0.0, "k1": "0 N/m^2", "k2": "0 N/m"}}, [2]),
-        ({0: {"k1": "0 N/m^2", "k2": "0 N/m"}}, []),
-    ],
-)
-def test_a_station_that_can_touch_alone_without_damping_is_a_warning(changes, warned):
-    stations = [x | changes.get(i, {}) for i, x in enumerate(STATIONS)]
-    own = joints.load("cirelli2021", {"contact": {"law": "stations", "stations": stations}}, "case.toml")
-    assert [w.place for w in own.warnings()] == [f"contact.stations[{i}]" for i in warned]
 
 
 @pytest.mark.parametrize("n", [1, 2, 5, MAX_STATIONS])

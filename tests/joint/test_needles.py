@@ -132,7 +132,6 @@ def faults(overrides):
         ({}, {"needles": 32}, "bearing", "missing key needle_length, needed with contact.law"),
         ({}, NEEDLES | {"needle_length": "146 mm"}, "bearing", "needles of 146 mm reach past the joint centre"),
         ({"fit_load": None}, NEEDLES, "contact.fit_load", 'missing key, needed with law = "needles"'),
-        ({"stations": []}, NEEDLES, "contact.stations", "has 0 stations"),
     ],
 )
 def test_what_needles_need(contact, bearing, place, found):

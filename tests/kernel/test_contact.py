@@ -13,7 +13,7 @@ from tests.support.environment import ROOT
 from tolstat import joint as joints
 from tolstat.common.load_kinds import RESULTANT, SPAN
 from tolstat.common.tables import RESULT, Mode, Options, iterations_allowed
-from tolstat.joint.contact import PREDEFINED
+from tolstat.joint.contact import LAWS
 from tolstat.kernel.mechanics import dynamics, rotation
 from tolstat.kernel.mechanics.topology import N_DOF, N_LUMPS, PIN, S
 from tolstat.kernel.mechanics.work import DELTA, FORCE, NORMAL, V_NORMAL, make_work
@@ -64,7 +64,7 @@ def generalised(q, work):
     return force.ravel()
 
 
-@pytest.mark.parametrize("law", PREDEFINED)
+@pytest.mark.parametrize("law", LAWS)
 def test_contact_forces_are_minus_the_gradient_of_the_stations_energy(params, random_errors, law):
     par, q = contacts_alone(params, random_errors, law)
     work = make_work()
@@ -91,7 +91,7 @@ def blended(stations, uniform, point):
     return w * law[0] + (1 - w) * law[1]
 
 
-@pytest.mark.parametrize("law", PREDEFINED)
+@pytest.mark.parametrize("law", LAWS)
 def test_contacts_do_no_work_around_a_loop(params, random_errors, law):
     """Four pins go around loops of position and tilt; the work falls with the quadrature, that of a blend does not."""
     par, middle = contacts_alone(params, random_errors, law)

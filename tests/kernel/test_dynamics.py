@@ -10,7 +10,7 @@ from tests.support import naive
 from tests.support.kernel_states import dense
 from tolstat.common.load_kinds import INNER, OUTER, RESULTANT
 from tolstat.common.tables import Mode, Options
-from tolstat.joint.contact import PREDEFINED
+from tolstat.joint.contact import LAWS
 from tolstat.kernel.mechanics import dynamics, linsolve, tangent
 from tolstat.kernel.mechanics.motion import ideal_motion, to_arm, to_cross, velocity_in
 from tolstat.kernel.mechanics.topology import N_DOF, PSI, S
@@ -70,7 +70,7 @@ def test_frames_are_those_of_the_output_shaft(params, phase, alpha, orders):
 
 
 @SHAFTS
-@pytest.mark.parametrize("law", PREDEFINED)
+@pytest.mark.parametrize("law", LAWS)
 def test_loads_are_those_of_the_naive_twin(params, random_errors, law, shaft):
     par, t, q, v = loaded(params, random_errors, law, shaft=shaft)
     work = make_work()
@@ -99,7 +99,7 @@ def test_contact_modes_are_those_of_the_naive_twin(params, random_errors, law):
 
 @ORDERS
 @SHAFTS
-@pytest.mark.parametrize("law", PREDEFINED)
+@pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("seed", [1, 2])
 def test_accelerations_balance_the_naive_twin(params, random_errors, law, seed, shaft, orders):
     """Momentum and angular momentum of every body change by the forces on it, in world coordinates."""
@@ -125,7 +125,7 @@ def test_residual_of_the_acceleration_is_zero(params, random_errors, shaft):
 
 
 @SHAFTS
-@pytest.mark.parametrize("law", PREDEFINED)
+@pytest.mark.parametrize("law", LAWS)
 def test_tangent_is_the_derivative_of_the_residual(params, random_errors, law, shaft):
     """Up to what the tangent leaves out on purpose, which must cost Newton less than a tenth a step."""
     par, t, q, v = loaded(params, random_errors, law, shaft=shaft)

@@ -13,7 +13,7 @@ from tests.kernel.test_dynamics import OPTIONS, ORDERS, SHAFTS, loaded
 from tests.support import energy, naive
 from tests.support.kernel_energy import ENERGY, ENERGY_FIELDS
 from tolstat.common.tables import PARAM, Method, Options, Status
-from tolstat.joint.contact import PREDEFINED
+from tolstat.joint.contact import LAWS
 from tolstat.kernel.mechanics import dynamics
 from tolstat.kernel.mechanics.topology import ARM, FRAME, HUB, N_BODIES, N_DOF, PIN, PSI
 from tolstat.kernel.mechanics.work import make_work
@@ -88,7 +88,7 @@ def test_kinetic_energy_is_that_of_particles(params, random_errors):
 
 @ORDERS
 @SHAFTS
-@pytest.mark.parametrize("law", PREDEFINED)
+@pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_powers_are_the_rate_of_the_stored_energy(params, random_errors, law, seed, shaft, orders):
     """To 0.5 % of the smallest of them, so that none can be wrong by more; differences extrapolated to h = 0.

@@ -12,7 +12,7 @@ from tests.support import kernel_states, trajectory
 from tolstat import joint as joints
 from tolstat import sampling, study
 from tolstat.common.tables import PARAM, Fidelity, Method, Options, Start, Status, iterations_allowed
-from tolstat.joint.contact import PREDEFINED
+from tolstat.joint.contact import LAWS
 from tolstat.kernel.lanes import lockstep
 from tolstat.kernel.lanes.lane_memory import aligned_zeros, as_lanes, lane_dtype
 from tolstat.kernel.simd.jit import njit_inner
@@ -127,7 +127,7 @@ def mixed(cirelli):
     """
     rng = np.random.default_rng(11)
     rows = []
-    for law in PREDEFINED:
+    for law in LAWS:
         joint = joint_with_law(law)
         n = 7
         operation = joints.Operation.model_construct(alpha=0.3, speed=52.0, torque=100.0)

@@ -7,12 +7,12 @@ import pytest
 from scipy.optimize import brentq
 
 from tests.conftest import with_law
-from tolstat.joint.contact import PREDEFINED
+from tolstat.joint.contact import LAWS
 from tolstat.kernel.mechanics.spring import elastic, has_needles, penetration
 from tolstat.kernel.revolution.outcome import inside_model
 
 
-@pytest.mark.parametrize("law", PREDEFINED)
+@pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("clearance", [0.0, 1e-6, 1e-4])
 def test_slope_and_inverse(params, law, clearance):
     par = with_law(params(), law)[0]

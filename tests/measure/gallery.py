@@ -1,7 +1,7 @@
 """``python -m tests.measure.gallery FOLDER``: pictures of docs/gallery that no command draws by itself.
 
 FOLDER holds the result files ``welded_fork.h5``, ``overnight.h5``, ``fuzz.h5``, ``hard_cases.h5``,
-``needle_bearings.h5``, ``duty_cycle.h5``, ``known_parts.h5``, ``sorting.h5``, ``lots.h5``, and, compared with
+``needle_bearings.h5``, ``duty_cycle.h5``, ``known_parts.h5``, ``lots.h5``, and, compared with
 ``iso2768_f.h5``, ``rigid_shafts.h5`` and ``line_bored.h5``, of some joints or all, and gets a picture of each, and
 ``tilted_pin.png``.
 """
@@ -14,6 +14,7 @@ from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
+from scipy.stats import binom
 
 import tolstat
 from tests.support.environment import ROOT
@@ -86,13 +87,6 @@ def known_parts(folder: Path) -> None:
     as_on_page(answer, (6.5, 3.6), folder / "known_parts.png")
 
 
-def sorting(folder: Path) -> None:
-    """Draw yield and cost before and after sorting, as the page does."""
-    with tolstat.open(folder / "sorting.h5") as store:
-        answer = tolstat.sorting(store.view())
-    as_on_page(answer, (6.5, 2.6), folder / "sorting.png")
-
-
 def overnight(folder: Path) -> None:
     """Draw the share of joints above a limit, with 95 % intervals, against their mean clearance."""
     with tolstat.open(folder / "overnight.h5") as store:
@@ -160,10 +154,20 @@ def duty_cycle(folder: Path) -> None:
 
 
 def lots(folder: Path) -> None:
-    """Draw the shares of the lots, as the page does."""
+    """Draw which share of the lots has at most a share of joints above a limit, and as if lots were alike."""
     with tolstat.open(folder / "lots.h5") as store:
-        answer = tolstat.lots(store.view())
-    as_on_page(answer, (7, 3.6), folder / "lots.png")
+        size = int(store.sampling["joints_per_lot"])
+        above = (store.view().load("any limit").values > 1.0).reshape(-1, size).sum(axis=1)
+    at = np.arange(above.max() + 2)
+    alike = binom.cdf(at, size, above.mean() / size)
+    figure, ax = plt.subplots(figsize=(7, 3.6), layout="constrained")
+    own = [np.mean(above <= k) for k in at]
+    for values, colour, label in ((own, "#0072B2", "lots simulated"), (alike, "#777777", "if lots were alike")):
+        ax.step(100 * at / size, 100 * np.array(values), where="post", color=colour, label=label)
+    ax.set(xlabel="joints of a lot above a limit (%)", ylabel="lots with at most so many (%)", ylim=(0, 104))
+    ax.grid(alpha=0.3)
+    ax.legend()
+    save(figure, folder / "lots.png")
 
 
 def compared(folder: Path, name: str) -> None:
@@ -248,7 +252,7 @@ def hard_cases(folder: Path) -> None:
 def main(folder: Path) -> None:
     """Draw what the folder has the results of."""
     tilted_pin(folder)
-    drawn = (welded_fork, overnight, fuzz, hard_cases, needle_bearings, duty_cycle, known_parts, sorting, lots)
+    drawn = (welded_fork, overnight, fuzz, hard_cases, needle_bearings, duty_cycle, known_parts, lots)
     for draw in (*drawn, rigid_shafts, line_bored):
         if (folder / f"{draw.__name__}.h5").exists():
             draw(folder)

@@ -21,7 +21,7 @@ from tests.support.stepping import CV_FACTORISED, H_OLD, make_state, reset
 from tests.support.trajectory import advance
 from tolstat import joint, sampling, study
 from tolstat.common.tables import RESULT, SIMULATED, Options, Status, iterations_allowed
-from tolstat.joint.contact import PREDEFINED
+from tolstat.joint.contact import LAWS
 from tolstat.kernel.integrators import first_order
 from tolstat.kernel.mechanics.topology import N_DOF, N_LUMPS, S
 from tolstat.kernel.mechanics.work import WORK, make_work
@@ -177,7 +177,7 @@ def main() -> None:
     parser.add_argument("study", type=Path)
     parser.add_argument("--joints", type=int, default=128)
     parser.add_argument("--torque", type=float, nargs="*", default=[None], metavar="N_M")
-    parser.add_argument("--law", nargs="*", default=["mode"], choices=PREDEFINED)
+    parser.add_argument("--law", nargs="*", default=["mode"], choices=list(LAWS))
     parser.add_argument("--exponents", type=int, default=0, metavar="K", help="of K joints that are ok, all others too")
     parser.add_argument("--steps", type=int, default=2880, help="steps a revolution of the exponents")
     given = parser.parse_args()

@@ -167,7 +167,7 @@ def shown(path):
         view = store.view()
         found = {}
         for question in QUESTIONS:
-            if isinstance(question, Question) and question.name in ("pairs", "causes", "angles", "worst"):
+            if isinstance(question, Question) and question.name in ("causes", "worst"):
                 with suppress(NotApplicable):
                     found[question.name] = question.on_page(view, asked).blocks()
         return found, asked.notes, view.loads(view.leading)
@@ -192,7 +192,7 @@ def test_page_has_causes_and_worst_joints_of_the_leading_loads(tmp_path):
     assert list(dict.fromkeys(row[0] for row in body(table))) == [load.name for load in leading]
     for load in leading:
         values = np.sort(load.values[np.isin(load.status, SIMULATED) & np.isfinite(load.values)])[::-1]
-        own = [row[2] for row in body(table) if row[0] == load.name]
+        own = [row[1] for row in body(table) if row[0] == load.name]
         assert own == [value(x, load.unit) for x in values[: worst.ON_PAGE]]
 
 
@@ -207,7 +207,6 @@ def test_page_leaves_out_what_a_file_cannot_tell(tmp_path):
     assert list(found) == ["worst"]
     assert [note.partition(":")[0] for note in notes] == [
         *(f"no causes of {x.name}" for x in leading),
-        "no pairs of errors",
     ]
     design = synthetic.STUDY.replace("n = 60", 'method = "pick_freeze"\ngroups = "error"\nn = 100')
     found, notes, _ = shown(synthetic.store(tmp_path, design, "design"))

@@ -288,17 +288,7 @@ def test_joints_without_results_have_no_values():
         cycles.equivalent_load(here, 3.0),
         cycles.damage(here, cycles.Line(3.0, 1.0, 1e6), 1e6),
         cycles.spectrum(here, [1.0])[..., 0],
-        cycles.share_of_revolution_above([noise(1), [np.nan] * 500], 0.0)[:, None],
     ]
     for value in values:
         assert np.isfinite(value[0]).all()
         assert np.isnan(value[1]).all()
-
-
-def test_share_of_revolution_above_a_level_of_a_cosine():
-    wave = np.cos(2 * np.pi * np.arange(2000) / 2000)
-    for level in (-2.0, -0.5, 0.0, 0.9, 1.0, 2.0):
-        expected = np.arccos(np.clip(level, -1, 1)) / np.pi
-        assert cycles.share_of_revolution_above([wave], level)[0] == pytest.approx(expected, abs=2e-4)
-    assert cycles.share_of_revolution_above([[2.0, 2.0]], 1.0) == [1.0]
-    assert cycles.share_of_revolution_above([[2.0, 2.0]], 2.0) == [0.0]

@@ -11,18 +11,17 @@ import tolstat
 from tests.support import exceedance, fakes, synthetic
 from tests.support.views import view
 from tolstat import sampling
-from tolstat.analysis import allocation, clustered
+from tolstat.analysis import allocation
 from tolstat.campaign import stop_rule
 from tolstat.campaign.extend import merge
 from tolstat.cli import app
-from tolstat.common.errors import InputError, NotApplicable, StoreError
+from tolstat.common.errors import InputError
 from tolstat.common.loads import ANY_LIMIT
 from tolstat.common.tables import Status
-from tolstat.display import drawing
-from tolstat.display.answer import Asked
-from tolstat.display.table import fitted
-from tolstat.questions import lots as question
+from tolstat.display.answer import Sentence
 from tolstat.questions.capability import capability
+from tolstat.questions.capability import of_lots as of_lots_in
+from tolstat.report.page import write_page
 
 LIMIT = {"cross1.F": 700.0, "fork1.T": 40.0}
 STUDY = (
@@ -42,32 +41,26 @@ n = 60
 )
 
 
-def of_lots(n=801, size=20, **kwargs):
-    made = view(n, limits=LIMIT, **kwargs)
+def of_lots(n=801, size=20, limits=LIMIT, **kwargs):
+    made = view(n, limits=limits, **kwargs)
     made.store.sampling["joints_per_lot"] = size
     return made
 
 
-def test_table_counts_lots_and_predicts_the_next_delivery():
+def lots_of(made, **kwargs):
+    return capability(made, **kwargs).tables["lots"].rows[-1]
+
+
+def test_table_has_the_shares_of_the_lots_and_the_next_delivery():
     made = of_lots()
-    answer = question.lots(made, delivery=100, accepted=0.1)
     above = made.load(ANY_LIMIT).values > 1.0
-    by_lot = above.reshape(-1, 20).sum(axis=1)
-    row = answer.tables["limits"].rows[-1]
-    assert (answer.frame("lots")[ANY_LIMIT] == by_lot).all()
-    assert answer.facts == {"joints_per_lot": 20}
-    assert (row["lots"], row["n"], row["count"]) == (40, 800, above.sum())
-    assert row["without"] == np.mean(by_lot == 0)
-    best = np.sort(by_lot) / 20
+    row, best = lots_of(made, delivery=100), np.sort(above.reshape(-1, 20).mean(axis=1))
+    assert (row["load"], row["lots"]) == (ANY_LIMIT, 40)
     assert (row["median"], row["high"], row["worst"]) == (best[[19, 20]].mean(), best[35], best[39])
-    assert row["lower"] < row["estimate"] == above.mean() < row["upper"]
-    predicted = clustered.delivery(by_lot, np.full(40, 20), 100)
-    assert (row["next_lower"], row["next_upper"]) == predicted.ends()
-    assert row["bad"] == predicted.more_than(0.1)
-    assert "bad deliveries: more than 10 % of the joints above" in [getattr(part, "text", "") for part in answer.parts]
-    table, plain = answer.tables["limits"], question.lots(made).tables["limits"]
-    assert "bad deliveries" in fitted(table.columns, table.rows)[0]
-    assert "bad deliveries" not in fitted(plain.columns, plain.rows)[0]
+    assert (row["next_lower"], row["next_upper"]) == made.load(ANY_LIMIT).delivery(1.0, 100)
+    assert row["next_lower"] < 100 * above.mean() < row["next_upper"]
+    said = [part.text for part in capability(made, delivery=100).parts if isinstance(part, Sentence)]
+    assert said[0] == "40 lots of 20 joints; delivery: 100 joints of one new lot, 95 % prediction interval"
 
 
 def test_joints_without_a_load_count_both_ways():
@@ -77,10 +70,11 @@ def test_joints_without_a_load_count_both_ways():
             if table.dtype[name].base.kind == "f":
                 table[name][:60] = np.nan
 
-    whole, lossy = (question.lots(of_lots(change=change)).tables["limits"].rows[-1] for change in (None, lose))
-    assert lossy["n_failed"] == 60
-    assert lossy["next_upper"] > whole["next_upper"]
-    assert lossy["upper"] > whole["upper"]
+    whole, lossy = (of_lots(change=change) for change in (None, lose))
+    assert capability(lossy).frame("limits")["n_failed"].iloc[-1] == 60
+    assert lots_of(lossy)["next_upper"] > lots_of(whole)["next_upper"]
+    good = [capability(made).frame("limits").iloc[-1] for made in (whole, lossy)]
+    assert good[1]["ppm_upper"] > good[0]["ppm_upper"]
 
 
 def test_joints_that_share_lots_are_not_independent_anywhere():
@@ -90,18 +84,17 @@ def test_joints_that_share_lots_are_not_independent_anywhere():
     load = made.load("cross1.F")
     independent = exceedance.exceedance(load.values, load.status, 700.0)
     assert load.above(700.0).lower != independent.lower
-    assert np.isnan(load.delivery(700.0, 1000)).all()
+    alone = view(801, limits=LIMIT).load("cross1.F")
+    assert load.delivery(700.0, 1000)[1] > alone.delivery(700.0, 1000)[1]
     assert capability(made).frame("limits")["cpk_lower"].isna().all()
     assert np.isfinite(capability(made).frame("limits")["ppm_lower"]).all()
     assert load.quantile(0.5).lower < load.quantile(0.5).estimate
 
 
 def test_what_needs_independent_joints_is_refused(tmp_path):
-    plan = question.study_of(tolstat.load(_study(tmp_path)), 30, 2)
     rule = stop_rule.parse("P(cross1.F > 700 N) width < 0.1", {})
     with pytest.raises(InputError, match="share lots"):
-        stop_rule.run_until(plan, tmp_path / "a.h5", rule, print)
-    assert question.study_of(tolstat.load(plan.path)).sampling.joints_per_lot == question.JOINTS
+        stop_rule.run_until(_study(tmp_path, 2), tmp_path / "a.h5", rule, print)
 
 
 def test_halves_are_of_whole_lots():
@@ -111,31 +104,21 @@ def test_halves_are_of_whole_lots():
     assert set(lot[checked]) == {1, 3, 5}
 
 
-def test_fewer_than_thirty_lots_and_joints_on_their_own_are_refused():
-    with pytest.raises(StoreError, match="joints of 29 lots"):
-        question.lots(of_lots(n=29 * 20 + 1))
-    assert np.isnan(of_lots(n=29 * 20 + 1).load("cross1.F").above(700.0).lower)
-    with pytest.raises(NotApplicable, match="its own lot"):
-        question.lots(view(limits=LIMIT))
-    with pytest.raises(NotApplicable):
-        question.lots_on_page(view(limits=LIMIT), Asked("a.h5"))
-    (few,) = question.lots_on_page(of_lots(n=29 * 20 + 1), Asked("a.h5")).parts
-    assert few.text == "No lots: has joints of 29 lots simulated, and fewer than 30 have no interval."
-    with pytest.raises(InputError, match="600 lots of 500 joints"):
-        question.lots(of_lots(), from_lots=600)
+def test_fewer_than_thirty_lots_and_joints_on_their_own_have_no_table():
+    few = of_lots(n=29 * 20 + 1)
+    (said,) = of_lots_in(few)
+    assert said.text == "no shares of lots: joints of 29 lots simulated, 30 are needed"
+    assert np.isnan(few.load("cross1.F").above(700.0).lower)
+    assert np.isnan(few.load("cross1.F").delivery(700.0, 100)).all()
+    assert of_lots_in(view(limits=LIMIT)) == []
+    assert of_lots_in(of_lots(limits={})) == []
 
 
-def test_a_delivery_of_more_lots_than_joints_is_refused_before_anything_is_simulated(tmp_path):
-    words = ["lots", str(_study(tmp_path)), "--delivery", "5", "--from-lots", "6", "--out", str(tmp_path / "out")]
-    done = CliRunner().invoke(app, words)
-    assert (done.exit_code, (tmp_path / "out").exists()) == (2, False)
-    assert "6 lots of 5 joints" in done.stderr
-
-
-def _study(folder):
+def _study(folder, size):
+    """Study of thirty lots."""
     path = folder / "small.toml"
-    path.write_text(STUDY, encoding="utf-8")
-    return path
+    path.write_text(STUDY.replace("n = 60", f"n = {30 * size}\njoints_per_lot = {size}"), encoding="utf-8")
+    return tolstat.load(path)
 
 
 def _bytes(path):
@@ -152,7 +135,7 @@ def _perturb(joint, operation, errors):
 
 @pytest.mark.slow
 def test_from_toml_to_page_with_the_same_bytes_however_it_is_run(tmp_path):
-    plan = question.study_of(tolstat.load(_study(tmp_path)), 30, 4)
+    plan = _study(tmp_path, 4)
     whole, merged, stopped = (tmp_path / f"{name}.h5" for name in ("whole", "merged", "stopped"))
     run = partial(fakes.run, plan, block=None, draw_blocks=sampling.draw_blocks, perturb=_perturb)
     run(whole)
@@ -161,31 +144,17 @@ def test_from_toml_to_page_with_the_same_bytes_however_it_is_run(tmp_path):
         run(part, block=30, rows=rows)
     merge(parts, merged)
     run(stopped, until_row=17)
-    with pytest.raises(StoreError, match="joints of 4 lots"), tolstat.open(stopped) as store:
-        tolstat.lots(store.view())
+    with tolstat.open(stopped) as store:
+        assert "lots" not in tolstat.capability(store.view()).tables
     run(stopped, block=50)
     assert [_bytes(path) == _bytes(whole) for path in (merged, stopped)] == [True, True]
-    done = CliRunner().invoke(app, ["lots", str(whole), "--json"])
-    assert len(json.loads(done.stdout)["tables"]["lots"]["rows"]) == 30
-    with tolstat.open(whole) as store:
-        assert store.view().study.sampling.joints_per_lot == 4
-        answer = question.lots_on_page(store.view(), Asked(whole))
-    panel = answer.parts[0].panels[0]
-    assert panel.title == "30 lots: which share of their joints is bad"
-    assert "path" in drawing.svg(panel)[0]
-
-
-@pytest.mark.slow
-def test_command_simulates_a_study_into_a_folder_and_options_of_a_simulation_need_a_study(tmp_path, monkeypatch):
-    fakes.replace_functions(monkeypatch, **fakes.FUNCTIONS | {"draw_blocks": sampling.draw_blocks, "perturb": _perturb})
-    words = ["lots", str(_study(tmp_path)), "--lots", "30", "--joints", "3", "--workers", "1"]
-    out = tmp_path / "out"
-    done = CliRunner().invoke(app, [*words, "--out", str(out)])
-    assert done.exit_code == 0, done.stderr
-    names = ["small_lots.h5", *(f"small_lots_{name}" for name in ("limits.csv", "lots.csv", "lots.png", "lots.svg"))]
-    assert sorted(path.name for path in out.iterdir()) == names
-    again = CliRunner().invoke(app, ["lots", str(out / "small_lots.h5"), "--delivery", "60"])
-    assert "of 60" in again.stdout
-    refused = CliRunner().invoke(app, ["lots", str(out / "small_lots.h5"), "--lots", "40"])
-    assert refused.exit_code == 2
-    assert "hint: give a study (TOML)" in refused.stderr
+    done = CliRunner().invoke(app, ["capability", str(whole), "--json"])
+    row = json.loads(done.stdout)["tables"]["lots"]["rows"][-1]
+    assert row["lots"] == 30
+    done = CliRunner().invoke(app, ["export", str(whole), "--statistics", "-"])
+    assert json.loads(done.stdout)["capability"]["tables"]["lots"]["rows"][-1] == row
+    report = CliRunner().invoke(app, ["report", str(whole), "--out", str(tmp_path)])
+    assert "Which share of a lot is above each limit" in report.stdout
+    assert (tmp_path / "whole_lots.csv").exists()
+    page = write_page(whole, tmp_path / "page.html", replay=0).read_text(encoding="utf-8")
+    assert "of one new lot exceed" in page

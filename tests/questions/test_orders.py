@@ -231,7 +231,7 @@ def test_joints_of_a_sweep_are_simulated_again_each_at_its_own_operating_point(t
     ("change", "asked"),
     [
         (("[limits]", "[limits]"), False),
-        (("[limits]", '[limits]\n"psi_2x" = 0.01'), True),
+        (("[limits]", '[limits]\n"input.moment_2x" = "1 N*m"'), True),
         (("[limits]", '[limits]\n"input.axial" = "1 kN"'), True),
         (("[limits]", f"[output]\nresults = [{OTHERS}, 'output.moment_max']\n[limits]"), True),
         (("[limits]", f"[output]\nresults = [{OTHERS}]\n[limits]"), False),

@@ -188,7 +188,7 @@ def pattern(random_numbers: random.Random, word: str) -> str:
 
 @pytest.mark.parametrize(
     ("units", "made"),
-    [(TOLERANCED, schema.sections()["tolerances"]), (schema.UNIT_OF_LOAD, schema.sections()["limits"])],
+    [(TOLERANCED, schema.sections()["tolerances"]), (schema.UNIT_OF_LIMIT, schema.sections()["limits"])],
 )
 def test_no_pattern_that_selects_something_is_refused(units: dict[str, str], made: dict[str, Any]) -> None:
     numbers, selecting = random.Random(5), 0

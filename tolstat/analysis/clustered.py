@@ -147,6 +147,7 @@ class Clustered(Design):
     interval = "Student's t over lots, on the logit"
     covers = f"bands: pointwise 95 % intervals of the settled joints, {interval}"
     of_quantiles = "over lots"
+    of_delivery = " of one new lot"
     ranks_at_once = 2000
     innermost = True  # a share has a higher end with no joint above than with one
 
@@ -166,6 +167,22 @@ class Clustered(Design):
         """Joints above each level, (lots, m), and joints that count, (lots,), of each lot of `numbers`."""
         return counts_by_group(x, self._lots, levels)
 
+    def delivery(
+        self, lower: Column, upper: Column, level: float, number: int, confidence: float
+    ) -> tuple[float, float]:
+        """See `Design.delivery`: joints of one new lot; the interval contains that of independent joints."""
+        tail, ends = 0.5 * (1.0 - confidence), []
+        for x in (lower, upper):
+            above, joints = (counted.astype(np.intp) for counted in self.counts(x, [level]))
+            above, joints = above[joints > 0, 0], joints[joints > 0]
+            if len(joints) < LEAST:
+                return np.nan, np.nan
+            k, n, below = int(above.sum()), int(joints.sum()), np.cumsum(delivery(above, joints, number))
+            low, high = prediction.of_counts(k, k, n, number, confidence)
+            least, most = (float(np.searchsorted(below, share)) for share in (tail, 1.0 - tail))
+            ends.append((min(least, low), min(max(most, high), float(number))))
+        return ends[0][0], ends[1][1]
+
     def units(self, n: int) -> NDArray[np.intp]:
         """See `Design.units`: the lots."""
         return self.numbers[self._lots]
@@ -175,37 +192,8 @@ class Clustered(Design):
         return Clustered(self.numbers[self._lots[joints]])
 
 
-class Delivery(NamedTuple):
-    """Prediction of the number of joints above a limit in the next delivery.
-
-    Attributes
-    ----------
-    probability : ndarray, shape (number + 1,)
-        Probability of each number.
-    counts : tuple of int
-        Joints above the limit, and joints, that this is known from.
-    """
-
-    probability: FloatArray
-    counts: tuple[int, int]
-
-    def ends(self, confidence: float = 0.95) -> tuple[float, float]:
-        """Prediction interval of the number, ends included; it contains that of independent joints (Thatcher 1964)."""
-        above, joints = self.counts
-        number, tail = self.probability.size - 1, 0.5 * (1.0 - confidence)
-        low, high = prediction.of_counts(above, above, joints, number, confidence)
-        below = np.cumsum(self.probability)
-        least, most = (float(np.searchsorted(below, share)) for share in (tail, 1.0 - tail))
-        return min(least, low), min(max(most, high), float(number))
-
-    def more_than(self, share: float) -> float:
-        """Probability that more than a share of the delivery is above the limit."""
-        allowed = int(np.floor(share * (self.probability.size - 1) * (1.0 + 1e-12)))
-        return float(self.probability[allowed + 1 :].sum())
-
-
-def delivery(above: ArrayLike, joints: ArrayLike, number: int, lots: int = 1) -> Delivery:
-    """Predict the next delivery from the posterior distribution of the law of the lots' shares.
+def delivery(above: ArrayLike, joints: ArrayLike, number: int) -> FloatArray:
+    """Predict how many joints of one new lot are above a limit, from the posterior distribution of the lots' law.
 
     The prior distribution of the mean is Jeffreys' of a share, that of the correlation of two joints of a lot uniform.
 
@@ -214,9 +202,12 @@ def delivery(above: ArrayLike, joints: ArrayLike, number: int, lots: int = 1) ->
     above, joints : array_like, shape (lots,)
         Joints above a limit, and joints, of each lot.
     number : int
-        Joints of the delivery.
-    lots : int
-        New lots that they come from, equally many of each but for one.
+        Joints of the new lot.
+
+    Returns
+    -------
+    ndarray, shape (number + 1,)
+        Probability of each number.
     """
     k, n = np.asarray(above, dtype=np.intp), np.asarray(joints, dtype=np.intp)
     p = (k.sum() + 0.5) / (n.sum() + 1.0)
@@ -225,13 +216,5 @@ def delivery(above: ArrayLike, joints: ArrayLike, number: int, lots: int = 1) ->
     means = special.logit(p) + np.linspace(-REACH, REACH, GRID) * min(float(error), 1.0)
     a, b, (weight,) = _posterior(k[:, None], n[:, None], means, SPREADS)
     likely = weight > NEGLIGIBLE
-    a, b, weight = a[likely], b[likely], weight[likely] / weight[likely].sum()
-    small, more = divmod(number, lots)
-    spectrum = np.ones((weight.size, (number + 1) // 2 + 1), dtype=complex)
-    for size, count in ((small, lots - more), (small + 1, more)):
-        if count and size:
-            padded = np.zeros((weight.size, number + 1))
-            padded[:, : size + 1] = np.exp(log_beta_binomial(np.arange(size + 1), size, a[:, None], b[:, None]))
-            spectrum = spectrum * np.fft.rfft(padded) ** count
-    pmf = np.fft.irfft(weight @ spectrum, number + 1).clip(0.0)
-    return Delivery(np.asarray(pmf / pmf.sum()), (int(k.sum()), int(n.sum())))
+    a, b, weight = a[likely, None], b[likely, None], weight[likely] / weight[likely].sum()
+    return np.asarray(weight @ np.exp(log_beta_binomial(np.arange(number + 1), number, a, b)))

@@ -1,8 +1,7 @@
-"""Which cycles does a load go through in a revolution? Mixtures, starts, spectra, damage, and the time above a level.
+"""Which cycles does a load go through in a revolution? Mixtures, starts, spectra, and fatigue damage.
 
 Cycles are those of one periodic revolution: all numbers are per revolution. `sample.Sample` has the distribution of
-these values over the *joints*; `share_of_revolution_above` gives the share of a *revolution* during which a load is
-above a level.
+these values over the *joints*.
 
 S is a range, twice an amplitude. S–N lines have no knee and no endurance limit (Miner's rule in its elementary form);
 there is no mean-load correction.
@@ -203,36 +202,6 @@ def spectrum(cycles: Cycles, numbers: ArrayLike) -> FloatArray:
         values[..., q] = np.where(reached[..., -1] >= number, here, 0.0)
     values[np.isnan(cycles.number)] = np.nan
     return values
-
-
-def share_of_revolution_above(loads: ArrayLike, level: float) -> FloatArray:
-    """Share of a revolution during which a load is above a level; not a probability.
-
-    Parameters
-    ----------
-    loads : array_like, shape (n, samples)
-        One load of each joint over a revolution, interpolated linearly, from the last sample back to the first too.
-    level : float
-        Level in the unit of the loads.
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        Between 0 and 1; NaN for joints without results.
-
-    Examples
-    --------
-    >>> share_of_revolution_above([[0.0, 1.0, 2.0, 1.0]], level=1.5).tolist()
-    [0.25]
-    """
-    x = np.asarray(loads, dtype=float)
-    following = np.roll(x, -1, axis=1)
-    high, low = np.maximum(x, following), np.minimum(x, following)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        part = np.where(high > low, (high - level) / (high - low), high > level)
-    share: FloatArray = np.clip(part, 0.0, 1.0).mean(axis=1)
-    share[np.isnan(x).any(axis=1)] = np.nan
-    return share
 
 
 class Line(NamedTuple):

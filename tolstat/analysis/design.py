@@ -47,6 +47,8 @@ class Design:
         Sentence on how joints count; empty if equally.
     of_quantiles : str
         What the intervals of quantiles are of.
+    of_delivery : str
+        What the further joints of `delivery` are of, after "joints"; empty if they are as independent as these.
     ranks_at_once : int
         Number of ranks at which an end of the interval of a quantile is searched at once: many where the ends of shares
         may rise with the level.
@@ -61,6 +63,7 @@ class Design:
     caveat: str = ""
     counting: ClassVar[str] = ""
     of_quantiles: ClassVar[str] = "of order statistics"
+    of_delivery: ClassVar[str] = ""
     ranks_at_once: ClassVar[int] = 16
     innermost: ClassVar[bool] = False
 

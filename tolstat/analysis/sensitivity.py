@@ -8,6 +8,7 @@ below by effects of one and two errors, from above by adding all variance that t
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -34,17 +35,17 @@ class FirstOrder(NamedTuple):
 
     Attributes
     ----------
-    estimate, lower, upper : ndarray, shape (d,) or (d, m)
+    estimate, lower, upper : ndarray, shape (d,)
         Corrected for chance: the estimate for an error without effect has the mean 0 and may be negative. The interval
         is NaN for dependent samples, an index is NaN where error or load does not scatter.
-    variance : ndarray, shape () or (m,)
+    variance : float
         Variance of the load, in its unit squared; an index times the variance is the error's contribution.
     """
 
     estimate: FloatArray
     lower: FloatArray
     upper: FloatArray
-    variance: FloatArray
+    variance: float
 
 
 class Total(NamedTuple):
@@ -70,23 +71,20 @@ class Total(NamedTuple):
 
 
 class Fit(NamedTuple):
-    """Mean of m loads given one error, fitted to n joints.
+    """Mean of a load given one error, fitted to n joints.
 
     Attributes
     ----------
-    mean, influence : ndarray, shape (n, m)
+    mean, influence : ndarray, shape (n,)
         Fitted mean less that of all joints, and influence function of the share.
-    share, chance : ndarray, shape (m,)
+    share, chance : float
         Share of the variance, and variance of its estimate in the absence of any effect.
-    degrees : int
-        Degrees of freedom of the fit.
     """
 
     mean: FloatArray
     influence: FloatArray
-    share: FloatArray
-    chance: FloatArray
-    degrees: int
+    share: float
+    chance: float
 
 
 def first_order(x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: bool = True) -> FirstOrder:
@@ -101,8 +99,8 @@ def first_order(x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: bool 
     ----------
     x : array_like, shape (n, d)
         Errors of the joints, any units; joints with a valid load only.
-    y : array_like, shape (n,) or (n, m)
-        Load of each joint, or m of them, such as the load at m shaft angles.
+    y : array_like, shape (n,)
+        Load of each joint.
     confidence : float
         Confidence level of the interval.
     iid : bool
@@ -111,7 +109,7 @@ def first_order(x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: bool 
     Returns
     -------
     FirstOrder
-        Indices of each error, and of each load where there are several.
+        Indices of each error.
 
     Raises
     ------
@@ -126,57 +124,13 @@ def first_order(x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: bool 
     [0.2, 0.8]
     """
     errors, loads = _checked(x, y)
-    at_angles, _ = over_revolution(errors, loads.reshape(len(loads), -1), confidence, iid)
-    return FirstOrder(*(field.reshape(field.shape[:-1] + loads.shape[1:]) for field in at_angles))
-
-
-def over_revolution(
-    x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: bool = True
-) -> tuple[FirstOrder, FirstOrder]:
-    """First-order indices of a load at each shaft angle, and over the whole revolution.
-
-    Indices over the revolution are shares of the sum of the variances at all angles (Lamboni, Monod and Makowski 2011):
-    each angle is weighted with the variance of the load there.
-
-    Parameters
-    ----------
-    x : array_like, shape (n, d)
-        Errors of the joints.
-    y : array_like, shape (n, m)
-        Load of each joint at m shaft angles.
-    confidence, iid
-        As in `first_order`.
-
-    Returns
-    -------
-    at_angles : FirstOrder
-        As of `first_order`, (d, m) and (m,).
-    overall : FirstOrder
-        Shares over the revolution, (d,); `variance` is the mean over the angles, ().
-
-    Raises
-    ------
-    ValueError
-        As `first_order`.
-    """
-    errors, loads = _checked(x, y)
-    n, centred = len(loads), (loads - loads.mean(axis=0)).reshape(len(loads), -1)
-    variance, square = centred.var(axis=0), centred**2
-    whole, wider, overall = variance.sum(), _wider(square), _wider(square.sum(axis=1))
-    # chance contributions at two angles are correlated as the loads at these angles are
-    alike = ((centred.T @ centred / n) ** 2).sum() / whole**2 if whole > 0 else np.nan
-    local = np.full((2, errors.shape[1], centred.shape[1]), np.nan)
-    over_all = np.full((2, errors.shape[1]), np.nan)
+    e = loads - loads.mean()
+    share, error = np.full((2, errors.shape[1]), np.nan)
     for i, column in enumerate(errors.T):
-        if np.ptp(column) > 0 and whole > 0:
-            fit = _fit(column, centred)
-            local[0, i], local[1, i] = fit.share, _error(fit.influence, fit.chance) * wider
-            share, influence = np.nan_to_num(fit.share), np.nan_to_num(fit.influence)
-            over_all[0, i] = variance @ share / whole
-            influence_over_all = (influence @ variance + square @ (share - over_all[0, i])) / whole
-            over_all[1, i] = _error(influence_over_all, alike * _chance(over_all[0, i], fit.degrees, n)) * overall
-    at_angles = _with_ends(local[0], local[1], variance, confidence, iid)
-    return at_angles, _with_ends(over_all[0], over_all[1], np.asarray(variance.mean()), confidence, iid)
+        if np.ptp(column) > 0 and e.var() > 0:
+            fit = _fit(column, e)
+            share[i], error[i] = fit.share, _error(fit.influence, fit.chance)
+    return _with_ends(share, error * _wider(e**2), float(e.var()), confidence, iid)
 
 
 def first_and_total(x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: bool = True) -> tuple[FirstOrder, Total]:
@@ -213,14 +167,14 @@ def first_and_total(x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: b
     if loads.ndim != 1 or np.ptp(loads) == 0 or (np.ptp(errors, axis=0) == 0).any():
         raise ValueError("give one load and errors that scatter")
     e = loads - loads.mean()
-    fits = [_fit(column, e[:, None]) for column in errors.T]
-    first = np.array([fit.share[0] for fit in fits])
-    influence = np.column_stack([fit.influence[:, 0] for fit in fits])
-    chance = np.array([fit.chance[0] for fit in fits])
+    fits = [_fit(column, e) for column in errors.T]
+    first = np.array([fit.share for fit in fits])
+    influence = np.column_stack([fit.influence for fit in fits])
+    chance = np.array([fit.chance for fit in fits])
     wider = _wider(e**2)
-    alone = _with_ends(first, _error(influence, chance) * wider, np.asarray(e.var()), confidence, iid)
+    alone = _with_ends(first, _error(influence, chance) * wider, float(e.var()), confidence, iid)
     # subtract significant effects of single errors, which would be noise in the estimates of pairs
-    main = sum((fit.mean[:, 0] for fit, s, c in zip(fits, first, chance, strict=True) if s > 2 * c**0.5), 0.0 * e)
+    main = sum((fit.mean for fit, s, c in zip(fits, first, chance, strict=True) if s > 2 * c**0.5), 0.0 * e)
     pairs, of_pairs, chance_of_pairs = _interactions(errors, e - main, e.var())
     influence_of_pairs = of_pairs - pairs.sum(axis=1) * (e**2 / e.var())[:, None]
     estimate = first + pairs.sum(axis=1)
@@ -237,9 +191,7 @@ def first_and_total(x: ArrayLike, y: ArrayLike, confidence: float = 0.95, iid: b
     return alone, Total(estimate, lower, upper, pairs, float(rest))
 
 
-def _with_ends(
-    estimate: FloatArray, error: FloatArray, variance: FloatArray, confidence: float, iid: bool
-) -> FirstOrder:
+def _with_ends(estimate: FloatArray, error: FloatArray, variance: float, confidence: float, iid: bool) -> FirstOrder:
     half = WIDER * half_width(confidence) * error if iid else np.full(estimate.shape, np.nan)
     return FirstOrder(estimate, np.clip(estimate - half, 0, 1), np.clip(estimate + half, 0, 1), variance)
 
@@ -252,7 +204,7 @@ def _checked(x: ArrayLike, y: ArrayLike) -> tuple[FloatArray, FloatArray]:
 
 
 def _fit(column: FloatArray, centred: FloatArray) -> Fit:
-    """Fit the mean of loads, (n, m), given one error: continuous, linear in pieces of equally many joints.
+    """Fit the mean of a load, (n,), given one error: continuous, linear in pieces of equally many joints.
 
     With mean m(x), deviation e and share S = Var m / Var e, the influence function of S is
     (m² + 2 m (e - m) - S e²) / Var e.
@@ -268,12 +220,11 @@ def _fit(column: FloatArray, centred: FloatArray) -> Fit:
     scatters = size > 1e-12 * n
     basis, degrees = axes[:, scatters] / np.sqrt(size[scatters]), int(scatters.sum())
     mean = hats @ (basis @ (basis.T @ (hats.T @ centred)))
-    with np.errstate(invalid="ignore", divide="ignore"):
-        variance = (centred**2).mean(axis=0)
-        inside = ((centred - mean) ** 2).sum(axis=0) / (n - 1 - degrees)
-        share = 1.0 - inside / (variance * n / (n - 1))
-        influence = (mean * (2.0 * centred - mean) - share * centred**2) / variance
-    return Fit(mean, influence, share, _chance(share, degrees, n), degrees)
+    variance = (centred**2).mean()
+    inside = ((centred - mean) ** 2).sum() / (n - 1 - degrees)
+    share = float(1.0 - inside / (variance * n / (n - 1)))
+    influence = (mean * (2.0 * centred - mean) - share * centred**2) / variance
+    return Fit(mean, influence, share, 2.0 * degrees * ((1.0 - share) / n) ** 2)
 
 
 def _interactions(errors: FloatArray, left: FloatArray, variance: float) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -301,21 +252,15 @@ def _interactions(errors: FloatArray, left: FloatArray, variance: float) -> tupl
     return pairs, of_pairs, chance
 
 
-def _chance(share: FloatArray, degrees: int, n: int) -> FloatArray:
-    """Variance of an estimated share in the absence of any effect, where the influence function vanishes."""
-    return np.asarray(2.0 * degrees * ((1.0 - share) / n) ** 2)
-
-
-def _error(influence: FloatArray, chance: FloatArray) -> NDArray[np.float64]:
+def _error(influence: FloatArray, chance: FloatArray | float) -> NDArray[np.float64]:
     """Standard errors. The influence function of noisy coefficients counts chance variance twice: subtract it once."""
     plain = influence.var(axis=0) / len(influence)
     return np.asarray(np.sqrt(np.maximum(plain - chance, chance)))
 
 
-def _wider(square: FloatArray) -> FloatArray:
-    """Factor on standard errors, (...), by squared deviations of loads, (n, ...): large for few joints and skew loads.
+def _wider(square: FloatArray) -> float:
+    """Factor on standard errors, by squared deviations of loads, (n,): large for few joints and skew loads.
 
     Effectively (sum of squares)² / sum of their squares joints make up a variance, a third of them if loads are normal.
     """
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return np.asarray(1.0 + FEW * (square**2).sum(axis=0) / square.sum(axis=0) ** 2)
+    return 1.0 + FEW * float((square**2).sum() / square.sum() ** 2) if square.any() else math.nan

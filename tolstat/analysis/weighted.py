@@ -187,11 +187,6 @@ class Weighted(Design):
         drawn = None if self.from_tolerances is None else self.from_tolerances[joints]
         return Weighted(self.weights[joints], self.heaviest, drawn, self._withheld)
 
-    def times(self, factors: FloatArray, largest: float = 1.0) -> Weighted:
-        """Return the design with weights times factors, (n,), of mean 1 again; `largest` is the largest factor."""
-        mean = float(np.average(factors, weights=self.weights))
-        return Weighted(self.weights * factors / mean, self.heaviest * largest / mean)
-
     def refuses(self, claim: Claim) -> tuple[str, str] | None:
         """See `Design.refuses`: only shares and quantiles take the weights into account."""
         if claim in self.claims:

@@ -132,8 +132,8 @@ class Function:
         Raises
         ------
         InputError
-            When joints of the study are listed, or depend on each other: with lots of several joints, and matched by
-            classes; when coordinates are missing or unknown.
+            When joints of the study are listed, or depend on each other: with lots of several joints; when coordinates
+            are missing or unknown.
         ValueError
             When an array has another shape.
         """
@@ -313,8 +313,6 @@ def _dependence(study: Study) -> tuple[str, str]:
     """Key of a study whose joints are no independent draws, and why; empty if they are."""
     if not study.tolerances:
         return "sampling.method", f"is {study.sampling.method!r}: joints are listed, not drawn"
-    if study.sampling.is_matched:
-        return "sampling.selective", "pins and holes are matched by classes, so joints depend on each other"
     if study.sampling.joints_per_lot > 1:
         return "sampling.joints_per_lot", "joints of one lot depend on each other"
     return "", ""

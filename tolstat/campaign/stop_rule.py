@@ -21,7 +21,7 @@ from tolstat.campaign.pool import kept_workers
 from tolstat.common.columns import holds
 from tolstat.common.errors import Fault, InputError, collected, gather, input_error
 from tolstat.common.files import finite
-from tolstat.common.loads import ANY_LIMIT, AT, UNIT_OF_LOAD, Limit, load_of
+from tolstat.common.loads import ANY_LIMIT, AT, UNIT_OF_LIMIT, Limit, load_of
 from tolstat.common.strict import did_you_mean
 from tolstat.store import Reader, View, Writer
 from tolstat.study import Study
@@ -137,10 +137,10 @@ def limit_of(text: str, limits: Mapping[str, float], option: str, example: str) 
     if match is None:
         raise input_error(option, f"{text.strip()!r} is not a limit", example)
     entry = Entry(match["load"], (match["load"],), match["level"])
-    if not set(entry.pattern) & set("*?[") and entry.pattern not in UNIT_OF_LOAD:
-        raise input_error(option, f"{entry.pattern!r} is not a load", did_you_mean(entry.pattern, list(UNIT_OF_LOAD)))
-    loads = resolve(entry, UNIT_OF_LOAD, option)
-    level = quantity(entry, UNIT_OF_LOAD[loads[0]], option)
+    if not set(entry.pattern) & set("*?[") and entry.pattern not in UNIT_OF_LIMIT:
+        raise input_error(option, f"{entry.pattern!r} is not a load", did_you_mean(entry.pattern, list(UNIT_OF_LIMIT)))
+    loads = resolve(entry, UNIT_OF_LIMIT, option)
+    level = quantity(entry, UNIT_OF_LIMIT[loads[0]], option)
     return Limit(entry.pattern, tuple(loads), (level,) * len(loads))
 
 

@@ -1,4 +1,4 @@
-"""The loads of a joint that can have a limit: name, where its values are, place, kind.
+"""The loads of a joint: name, where its values are, place, kind.
 
 They follow from the registry `load_kinds.LOAD_KINDS`: each place of a kind has one load, or one for each order. Limits,
 reports, checks of the numerical error, selection of results and export read them.
@@ -167,9 +167,11 @@ def limits_in_words(limits: Mapping[str, float]) -> str:
 
 
 LOADS = {load.name: load for load in _entries()}
-"""Every load that can have a limit, by name."""
+"""Every load, by name."""
 UNIT_OF_LOAD = {load.name: load.unit for load in LOADS.values()}
 """SI unit of each load."""
+UNIT_OF_LIMIT = {load.name: load.unit for load in LOADS.values() if load.kind.key != "psi_orders"}
+"""SI unit of each load that can have a limit: all but the amplitudes of Psi by order."""
 SHOWN_LOADS = tuple(load.name for load in LOADS.values() if load.kind.shown)
 """Loads that every report shows if the study keeps them: force and bending moment of each bushing."""
 PANELS = tuple((group, kind) for group in ("cross", "fork") for kind in LOAD_KINDS if kind.shown)

@@ -7,11 +7,11 @@ f(delta) = k1 delta^2 + k2 delta + k3 delta^(9/8) sqrt(delta/(delta + b c)) and 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 
 import numpy as np
-from pydantic import AfterValidator, Field, ValidationInfo, field_validator
+from pydantic import Field, ValidationInfo, field_validator
 
 from tolstat.common import units
 from tolstat.common.fields import MAX_STATIONS
@@ -45,33 +45,6 @@ class Stations(NamedTuple):
     k3: Array
     weight: Array
     b: float = 0.0
-
-
-def _check_position(ratio: float) -> float:
-    if not abs(ratio) <= 0.5:
-        raise refuse(f"{ratio:g} is beyond the end of the contact", "give a number from -0.5 to 0.5")
-    return ratio
-
-
-class Station(Strict):
-    """A contact station of one's own, for law `stations`."""
-
-    s_over_z: Annotated[units.Number, AfterValidator(_check_position)] = Field(examples=[0.5])
-    """place along the contact, from -0.5 (inner end) to 0.5 (outer end)"""
-    k1: QuadraticStiffness = Field(examples=["1.6e6 N/mm^2"])
-    """quadratic coefficient of the force"""
-    k2: Annotated[units.Stiffness, NOT_NEGATIVE] = Field(examples=["1.8e5 N/mm"])
-    """linear coefficient of the force"""
-    weight: Ratio = Field(examples=[1.0])
-    """weight of damping `c_d` and film `c_t`"""
-
-
-def _check_stations(stations: tuple[Station, ...] | None) -> tuple[Station, ...] | None:
-    if stations is not None and not 1 <= len(stations) <= MAX_STATIONS:
-        raise refuse(f"has {len(stations)} stations", f"give 1 to {MAX_STATIONS} stations")
-    if stations is not None and not any(station.k2 > 0.0 for station in stations):
-        raise refuse("no station has k2 > 0", "give at least one station k2 > 0")
-    return stations
 
 
 class Law(NamedTuple):
@@ -143,40 +116,21 @@ def _needles(contact: Contact, bearing: Bearing | None) -> Stations:
     return Stations(0.5 * bearing.needle_length * x, 0.0 * weight, 0.0 * weight, 0.5 * k3 * weight, weight, b)
 
 
-def _given(contact: Contact, bearing: Bearing | None) -> Stations:
-    assert contact.stations is not None
-    stations = sorted(contact.stations, key=lambda station: -station.s_over_z)
-    s, k1, k2, weight = np.array([[x.s_over_z, x.k1, x.k2, x.weight] for x in stations]).T
-    return Stations(contact.z * s, k1, k2, np.zeros(len(stations)), weight)
-
-
-DEFAULT, GIVEN = "mode", "stations"
+DEFAULT = "mode"
 LAWS = {
     DEFAULT: Law(_mode, middle=True),
     "uniform": Law(_uniform),
     "point": Law(_point),
     "sliced": Law(_sliced, ("n_stations",)),
     "needles": Law(_needles, ("n_stations", "fit_load"), ("needles", "needle_length"), from_coefficients=False),
-    GIVEN: Law(_given, ("stations",), from_coefficients=False),
 }
 """Registry of the contact laws, by the word for ``contact.law``."""
-PREDEFINED = tuple(name for name in LAWS if name != GIVEN)
-"""Laws whose stations follow from other keys."""
-COEFFICIENTS = (
-    *("k1u", "k2u", "k1p", "k2p", "H"),
-    *dict.fromkeys(key for name in PREDEFINED for key in ("fit_load", *LAWS[name].needs)),
-)
-"""Keys that define the stations of all laws but `GIVEN`."""
+COEFFICIENTS = ("k1u", "k2u", "k1p", "k2p", "H", "fit_load", "n_stations")
+"""Keys that define the stations."""
 if TYPE_CHECKING:
     LawName = str
 else:
     LawName = Literal[tuple(LAWS)]
-
-
-def keys_valid_for(contact: Mapping[str, Any], law: object) -> dict[str, Any]:
-    """Keys of a contact section that remain valid when an override sets `law`."""
-    other = COEFFICIENTS if law == GIVEN else (GIVEN,)
-    return {key: value for key, value in contact.items() if key not in other}
 
 
 def _has_middle(info: ValidationInfo) -> bool:
@@ -195,12 +149,6 @@ class Contact(Strict):
         default=None, validate_default=True
     )
     """stations of a pin, for laws `sliced` and `needles`"""
-    stations: Annotated[tuple[Station, ...] | None, AfterValidator(_check_stations)] = Field(
-        default=None,
-        validate_default=True,
-        examples=[[{"s_over_z": 0.5, "k1": "1.6e6 N/mm^2", "k2": "1.8e5 N/mm", "weight": 1.0}]],
-    )
-    """stations of one's own, for law `stations`"""
     D_H: Diameter = follows("contact.D_H", "diameter of the hole")
     D_P: Diameter = follows("contact.D_P", "diameter of the pin in the hole, not above `D_H`")
     clearance: Annotated[units.Length, NOT_NEGATIVE] = follows(
@@ -232,16 +180,13 @@ class Contact(Strict):
             raise refuse("a pin of {D_P} does not fit into a hole of {D_H}", "give D_P <= D_H", "D_P", "D_H")
         return value
 
-    @field_validator(GIVEN, *COEFFICIENTS)
+    @field_validator(*COEFFICIENTS)
     @classmethod
     def _of_law(cls, value: object, info: ValidationInfo) -> object:
-        """Refuse a key that the law does not use, or needs and lacks; an invalid law has a fault of its own."""
+        """Refuse to lack a key that the law needs; an invalid law has a fault of its own."""
         law, key = info.data.get("law"), str(info.field_name)
         if law is not None and value is None and key in LAWS[law].needs:
             raise refuse(f'missing key, needed with law = "{law}"', f'add {key}, or write law = "{DEFAULT}"')
-        if law is not None and value is not None and (key == GIVEN) != (law == GIVEN):
-            remedy = 'write law = "stations"' if key == GIVEN else "remove it: each station has its own coefficients"
-            raise refuse(f'has no effect with law = "{law}"', remedy)
         return value
 
     @field_validator("k1p", "k2p")
@@ -284,17 +229,3 @@ class Contact(Strict):
     def ends(self) -> Array:
         """Distance of the pin's ends from P along its axis, m, the outer one first."""
         return 0.5 * self.z * np.array([1.0, -1.0])
-
-    def undamped_ends(self) -> list[int]:
-        """Indices in ``stations`` of undamped stations that can touch alone, where the pin's whirl has no damping.
-
-        Along a straight pin the largest displacement is at an end, so that a station with stiffness can touch alone if
-        no station farther out has stiffness; a station with a weight that is at least as far out damps it.
-        """
-        undamped = set()
-        for side in (1.0, -1.0):
-            carrying = [(side * x.s_over_z, i) for i, x in enumerate(self.stations or ()) if x.k1 > 0.0 or x.k2 > 0.0]
-            damping = [side * x.s_over_z for x in self.stations or () if x.weight > 0.0]
-            if carrying and max(carrying)[0] > max(damping, default=-1.0):
-                undamped.add(max(carrying)[1])
-        return sorted(undamped)

@@ -13,7 +13,7 @@ from tolstat.common.errors import Fault
 from tolstat.common.strict import Strict, refuse
 from tolstat.joint import derived
 from tolstat.joint.bearing import Bearing
-from tolstat.joint.contact import COEFFICIENTS, LAWS, Contact, keys_valid_for
+from tolstat.joint.contact import COEFFICIENTS, LAWS, Contact
 from tolstat.joint.derived import DERIVED
 from tolstat.joint.material import Array
 from tolstat.joint.sections import Arm, Bushing, Cross, Hub, Material, Pin, Shaft
@@ -145,14 +145,11 @@ class Joint(Strict):
 
     def warnings(self) -> list[Fault]:
         """Settings that can be simulated but are probably not intended, by key path in the joint file."""
-        found = "can touch alone with weight 0: nothing damps the whirl of the pin there"
-        remedy = "give it a weight, or a station with a weight beyond it"
-        stations = [Fault(f"contact.stations[{i}]", found, remedy) for i in self.contact.undamped_ends()]
         overlap = []
         if 2.0 * self.cross.r_b < self.pin.d:
             found = f"{1e3 * self.cross.r_b:.4g} mm is less than half of pin.d: the pins overlap in the hub"
             overlap = [Fault("cross.r_b", found, "give pin.l, from the hub to the middle of the hole, or cross.r_b")]
-        return [*self._inherited, *self._anisotropic(), *overlap, *stations]
+        return [*self._inherited, *self._anisotropic(), *overlap]
 
     def remember(self, inherited: Iterable[Fault], replaced: Mapping[str, str]) -> None:
         """Keep the warnings about values that overrides leave, and the diameters that overrides replace."""
@@ -230,10 +227,7 @@ def overridden(data: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, An
 
 
 def laid_over(below: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
-    """Replace keys of a joint by those of `over`, and remove those of another contact law or a third of a bearing."""
-    contact, new = below.get("contact"), over.get("contact")
-    if isinstance(contact, Mapping) and isinstance(new, Mapping) and "law" in new:
-        below = {**below, "contact": keys_valid_for(contact, new["law"])}
+    """Replace keys of a joint by those of `over`, and remove a third of a bearing."""
     return merged(_without(below, derived.replaced(leaves(over), leaves(below))), over)
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from tolstat.analysis import capability as indices
 from tolstat.analysis import extreme
+from tolstat.analysis.clustered import LEAST, Clustered
 from tolstat.analysis.prediction import DELIVERY
 from tolstat.common.cores import mapped
 from tolstat.common.errors import Fault, InputError, NotApplicable
@@ -46,6 +47,15 @@ LIMITS = (
     Column("Cpk by sigma", lambda row: text.formed(row["cpk_normal"], ".2f"), rank=4),
 )
 """Columns of the table ``limits``; the total interval is that of the yield."""
+LOTS = (
+    Column("load", shares.word("load")),
+    Column("limit", shares.limit),
+    Column("median lot", shares.share("median")),
+    Column("one lot in ten", lambda row: f"> {text.percent(row['high'])}"),
+    Column("worst lot", shares.share("worst")),
+    Column("above in delivery", text.delivery),
+)
+"""Columns of the table ``lots``, shares of the joints of a lot."""
 RETURNS = (
     Column("load", shares.word("load")),
     Column("one joint in", lambda row: f"{row['one_in']:,.0f}".replace(",", " ")),
@@ -67,7 +77,7 @@ def capability(
 
     Gives for each limit, and for all limits together, the share of joints below it (yield) and the process capability
     index Cpk, each with its 95 % interval; with --wide or --json also a prediction interval for the number of joints
-    above the limit in the next delivery.
+    above the limit in the next delivery. Where joints share lots, gives the shares of the lots, too.
 
     With --one-in N, gives also the load that one in N joints exceeds, and the median of the largest load of N joints,
     from a generalised Pareto distribution fitted to the tail. N may exceed the number of simulated joints: the
@@ -87,7 +97,8 @@ def capability(
     Returns
     -------
     Answer
-        Table ``limits``, see `limit_rows`, and with `one_in` table ``one_in``, see `return_rows`.
+        Table ``limits``, see `limit_rows`; where joints share lots, ``lots``, see `of_lots`; with `one_in` table
+        ``one_in``, see `return_rows`.
 
     Raises
     ------
@@ -104,6 +115,7 @@ def capability(
     view.check("index")
     rows = limit_rows(view, delivery=delivery)
     parts: list[Part] = [Table("limits", "Against each limit, and all of them together", LIMITS, rows)]
+    parts += of_lots(view, delivery)
     notes = [Sentence(note) for note in (*_notes(rows), error_budget.unknown(view)) if note]
     if not one_in:
         return Answer("capability", "Capability", [*parts, *notes])
@@ -178,6 +190,40 @@ def limit_rows(view: View, confidence: float = 0.95, delivery: int = DELIVERY) -
             both = dict.fromkeys(both, np.nan)
         rows.append(row | both | {"normal_p": index.normal_p, "needed": index.needed})
     return rows
+
+
+def of_lots(view: View, delivery: int = DELIVERY) -> list[Part]:
+    """Which share of a lot is above each limit, and how many joints of the next delivery; for joints that share lots.
+
+    Parameters
+    ----------
+    view : View
+        A campaign; one without lots or limits has no parts.
+    delivery : int
+        Number of joints of the next delivery, all of one new lot.
+
+    Returns
+    -------
+    list of Part
+        Table ``lots``, one row per limit, the last for all together: ``load``, ``unit``, ``limit``; ``lots``, number of
+        them; ``median``, ``high`` (90 %) and ``worst`` of the shares of their joints that are above the limit;
+        ``next_lower``, ``next_upper``, prediction interval for the joints above it in the ``delivery``. A sentence.
+    """
+    if not isinstance(view.design, Clustered) or not view.limits:
+        return []
+    rows = []
+    for load in view.loads([*view.limits, ANY_LIMIT]):
+        good = shares.good(view, load.name, delivery=delivery)
+        above, joints = view.design.counts(load.value, [good["limit"]])
+        of_lot = above[joints > 0, 0] / joints[joints > 0]
+        if len(of_lot) < LEAST:
+            return [Sentence(f"no shares of lots: joints of {len(of_lot)} lots simulated, {LEAST} are needed")]
+        row = {key: good[key] for key in ("load", "unit", "limit", "next_lower", "next_upper", "delivery")}
+        row |= {"lots": len(of_lot), "median": float(np.median(of_lot)), "worst": float(of_lot.max())}
+        rows.append(row | {"high": float(np.quantile(of_lot, 0.9, method="inverted_cdf"))})
+    size = view.store.sampling["joints_per_lot"]
+    words = f"{len(of_lot)} lots of {size} joints; delivery: {delivery} joints of one new lot, 95 % prediction interval"
+    return [Table("lots", "Which share of a lot is above each limit", LOTS, rows), Sentence(words)]
 
 
 def return_rows(view: View, name: str, one_in: Sequence[float], confidence: float = 0.95) -> Rows:

@@ -171,7 +171,7 @@ def _causes(pair: Shafts) -> Rows:
     loads = [view.load(ANY_LIMIT) for view in pair]
     samples = [np.flatnonzero(load.is_valid)[:MOST] for load in loads]
     above = [load.values[rows] > (load.limit or 0.0) for load, rows in zip(loads, samples, strict=True)]
-    if study.copula.names or study.sampling.is_matched or min(map(len, samples)) < FEWEST:
+    if study.copula.names or min(map(len, samples)) < FEWEST:
         return []
     weights = shares_of_variance(*(float(flags.mean()) for flags in above))
     if not sum(weights) > 0:

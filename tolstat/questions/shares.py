@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tolstat.analysis import binomial, difference, prediction, reweight
-from tolstat.analysis.design import SAMPLE, Claim
+from tolstat.analysis.design import SAMPLE
 from tolstat.analysis.estimates import Exceedance
 from tolstat.analysis.prediction import DELIVERY
 from tolstat.analysis.reweight import Ratios, Share
@@ -65,13 +65,8 @@ def shares(lower: str, upper: str) -> Cell:
     return lambda row: text.span(row[lower], row[upper])
 
 
-def percent(key: str) -> Cell:
-    """Make a `Column.cell` of a share, in per cent with one digit behind the point; the unit is in the heading."""
-    return lambda row: f"{round(100.0 * row[key], 1) + 0.0:.1f}"  # no -0
-
-
 def between(key: str) -> Cell:
-    """Make a `Column.cell` of the interval ``KEY_lower``, ``KEY_upper`` of a share, as `percent`."""
+    """Make a `Column.cell` of the interval ``KEY_lower``, ``KEY_upper`` of a share, in per cent without the unit."""
     return lambda row: text.ends(100.0 * row[f"{key}_lower"], 100.0 * row[f"{key}_upper"], ".1f")
 
 
@@ -131,8 +126,8 @@ def unusable(view: View, reason: str, remedy: str) -> StoreError:
     return StoreError(str(Fault(str(view.path), reason, remedy)))
 
 
-def check_sample(view: View, statistic: Claim, whole: bool = False) -> None:
-    """Refuse joints that are no sample of a production, or do not support a statistic; or that are not `whole`.
+def check_sample(view: View) -> None:
+    """Refuse joints that are no sample of a production, or cannot be compared with changed ones.
 
     Raises
     ------
@@ -141,10 +136,10 @@ def check_sample(view: View, statistic: Claim, whole: bool = False) -> None:
         what can be used.
     """
     view.check_drawn()
-    view.check(statistic)
+    view.check("difference")
     if view.study.groups:
         raise unusable(view, "holds a pick-freeze design", SAMPLE)
-    if whole and not view.store.whole:
+    if not view.store.whole:
         remedy = "merge all slices first: tolstat merge SLICE... --out FILE"
         raise unusable(view, "holds a part of the campaign only", remedy)
 

@@ -16,7 +16,7 @@ from tolstat.common.tables import Status
 from tolstat.display import text
 from tolstat.display.answer import Answer, Part, Sentence, Sheet, Table
 from tolstat.joint.sections import mounting_and_law
-from tolstat.questions import joints, shares
+from tolstat.questions import capability, joints, shares
 from tolstat.questions.exceedance import answer as exceedance
 from tolstat.questions.exceedance import curves, rows
 from tolstat.questions.sweep import cases, sweep
@@ -114,6 +114,7 @@ def _tables(view: View, accepted: float) -> Iterator[Part]:
         yield Table("exceedance", "Exceedance curves", (), rows.curve_rows(view))
         yield replace(table, columns=()) if view.limits else table
     yield from exceedance.limit_tables(view, accepted)
+    yield from capability.of_lots(view)
 
 
 def _notes(view: View) -> Iterator[Part]:
@@ -163,9 +164,8 @@ def statistics(view: View, accepted: float = math.nan) -> dict[str, Any]:
         JSON values in SI units, null if unknown: ``study``, ``method``, ``confidence``; ``verdict``, with ``answer``
         of the joints as drawn (null without an accepted share), ``stands_on``, ``sentence`` and ``notes``, null without
         limits; ``joints``, numbers by status; ``lives``, verdicts on required lives, only where the study requires one
-        that is known without simulation; the answers ``exceedance``, ``lots``, ``bearing_life``, ``capability`` and
-        ``accuracy``, each with
-        ``facts``, ``sentences`` and ``tables``, null where the file cannot give it;
+        that is known without simulation; the answers ``exceedance``, ``bearing_life``, ``capability`` and
+        ``accuracy``, each with ``facts``, ``sentences`` and ``tables``, null where the file cannot give it;
         ``joint``, mounting of the shafts and contact law in words; ``fidelity``, a sentence on the fidelity of the
         results; ``provenance``.
 

@@ -25,7 +25,7 @@ from tolstat.joint.reading import DEFAULT_JOINT, examples
 from tolstat.joint.sections import mounting_and_law, quantities
 from tolstat.questions import QUESTIONS, joints, shares
 from tolstat.questions.assumptions import answer, sentences, variations
-from tolstat.questions.causes import lines, worst
+from tolstat.questions.causes import lines, revolution
 from tolstat.questions.drawings.answer import place_of
 from tolstat.questions.exceedance import rows as exceedance
 from tolstat.report.answer import stopped
@@ -114,7 +114,8 @@ def compose(view: View, asked: Asked, full: bool = False, brief: bool = False) -
             blocks = [block for block in answer.blocks() if isinstance(block, Sentence | Panels)]
             sections.append(Section("lines", answer.title, blocks[:2]))
     else:
-        worst.begin_replay(view, asked)
+        if asked.replay:
+            revolution.begin_replay(view, asked)
         if len(view.points) > 1:
             point = view.point_of(view.most_exceeded) if view.leading else view.points[0]
             remedy = f"tolstat report {asked.path.name} --point {point} --out PAGE.html"
@@ -311,7 +312,7 @@ def _cards(view: View, verdict: Verdict | None) -> list[Verdict]:
             cards.append(Verdict("", together.value, together.words, ("Yield",)))
         if (interval := text.ends(row["next_lower"], row["next_upper"], ".0f")) != "-":
             exceeded = "at least one limit" if len(view.limits) > 1 else "the limit"
-            predicted = f"of the next {row['delivery']} joints exceed {exceeded}"
+            predicted = f"of the next {row['delivery']} joints{view.design.of_delivery} exceed {exceeded}"
             cards.append(Verdict("", interval, predicted, ("95 % prediction interval",)))
     if verdict is not None and verdict.load and verdict.load not in verdict.words:
         most = next(row for row in exceedance.limit_rows(view) if row["load"] == verdict.load)

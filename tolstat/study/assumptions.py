@@ -13,7 +13,6 @@ from tolstat.common.errors import Fault, input_error
 from tolstat.common.load_kinds import PINS
 from tolstat.common.tables import HOLES
 from tolstat.joint import derived
-from tolstat.joint.contact import keys_valid_for
 from tolstat.joint.derived import get
 from tolstat.joint.model import leaves, merged, nested
 from tolstat.joint.reading import with_keys
@@ -176,16 +175,9 @@ def _keys_of_study(study: Study) -> dict[str, Any]:
 
 
 def _given_keys(study: Study) -> set[str]:
-    """Dotted keys of the joint that a study sets, that follow from these, or that its contact law removes."""
+    """Dotted keys of the joint that a study sets, or that follow from these."""
     values = leaves(_keys_of_study(study))
-    keys = derived.changed(values.keys(), leaves(study.joint.given("json")))
-    if "contact.law" in values:
-        named = {
-            key.removeprefix("contact.") for entry in study.joint.assumed for v in entry.values for key in leaves(v)
-        }
-        removed = named - keys_valid_for(dict.fromkeys(named), values["contact.law"]).keys()
-        keys |= {f"contact.{key}" for key in removed if "." not in key}
-    return keys
+    return derived.changed(values.keys(), leaves(study.joint.given("json")))
 
 
 WIDE = 10.0

@@ -14,14 +14,14 @@ from typing import Any
 
 from tolstat.common.columns import holds
 from tolstat.common.errors import Fault, collected, gather, input_error
-from tolstat.common.loads import LOADS, UNIT_OF_LOAD, load_of, split
+from tolstat.common.loads import LOADS, UNIT_OF_LIMIT, load_of, split
 from tolstat.common.strict import dotted, validate
 from tolstat.common.tables import FINEST_STEPS
 from tolstat.joint import Joint, reading
 from tolstat.joint.derived import BEARING
 from tolstat.joint.model import Assumed, leaves, merged
 from tolstat.joint.reading import faults_of_assumed
-from tolstat.study import fatigue, listing, points, proposal, rewriting, selection, selective
+from tolstat.study import fatigue, listing, points, proposal, rewriting, selection
 from tolstat.study.design import Design
 from tolstat.study.model import MAX_ROWS, Output, Sampling, Solver, Subset
 from tolstat.study.selection import TOLERANCED, Assignments, Reading
@@ -33,13 +33,13 @@ OF_CASE = ("joint", "operation", "solver", "errors")
 """Sections that a case may have, too."""
 SECTIONS = (
     *OF_CASE,
-    *("tolerances", "correlation", "sampling", "proposal", "sweep", "grid", "case", "variant", "assumed", "reject"),
+    *("tolerances", "correlation", "sampling", "proposal", "sweep", "grid", "case", "variant", "assumed"),
     *("limits", "fatigue", "output"),
 )
 """Sections of a study, in the order of the reference."""
 BESIDE_FIT = ("is set by tolerances.fit already", "remove one of the two")
 """Fault and remedy of a diameter."""
-SCATTER = ("tolerances", "correlation", "errors", "reject")
+SCATTER = ("tolerances", "correlation", "errors")
 """Sections that define the joints of most sampling methods; the first is required."""
 SECTIONS_OF = {
     "sweep": ("sweep", "errors"),
@@ -116,8 +116,8 @@ def _limits(file: Reading) -> dict[str, float]:
     for entry in file.entries("limits"):
         with gather(file.faults):
             pattern, where = split(entry.pattern)
-            names = selection.resolve(entry._replace(pattern=pattern), UNIT_OF_LOAD, file.place)
-            value = selection.quantity(entry, UNIT_OF_LOAD[names[0]], file.place)
+            names = selection.resolve(entry._replace(pattern=pattern), UNIT_OF_LIMIT, file.place)
+            value = selection.quantity(entry, UNIT_OF_LIMIT[names[0]], file.place)
             if names_of_points:  # if not, the points have faults of their own
                 chosen = points.names_of(where, names_of_points, f"{file.place}: {dotted(entry.path)}")
                 names = [points.at(name, chosen, names_of_points) for name in names]
@@ -147,7 +147,6 @@ READERS: dict[str, Callable[[Reading], Any]] = {
     "sampling": _sampling,
     "sweep": listing.axes_of_sweep,
     "limits": _limits,
-    "rejects": selective.read,
     "fatigue": fatigue.read,
     "output": lambda file: file.model(Output, file.data.get("output", {}), "output"),
     "groups": correlation.groups,
@@ -187,10 +186,6 @@ def _check_method(file: Reading, sampling: Sampling) -> None:
     if sampling.joints_per_lot > 1 and not file.scatter.lots:
         remedy = "write lot = { share = 0.3 } in an entry of [tolerances], or remove the key"
         file.fault("sampling.joints_per_lot", "has no effect: no tolerance has a lot", remedy)
-    if sampling.is_matched and sampling.selective is not None:
-        depending = {*file.copula.names, *file.scatter.lots, *file.scatter.accepted}
-        for found, remedy in selective.faults(sampling.selective, file.scatter, depending):
-            file.fault("sampling.selective", found, remedy)
     if sampling.method == "cases" and file.data.get("limits"):
         file.fault("limits", "has no effect with 'cases'", "remove it: listed joints have no exceedance")
     if sampling.method == "subset":
@@ -366,9 +361,6 @@ def subset_of(study: Study, sampling: Mapping[str, Any]) -> Study:
         if not study.tolerances:
             remedy = 'give a study with [tolerances] and sampling.method = "random"'
             faults.append(Fault(str(study.path), "has no tolerances to draw joints from", remedy))
-        if study.sampling.is_matched:
-            found = "matches diameters by classes, which a subset simulation does not draw"
-            faults.append(study.fault("sampling.selective", found, "remove it"))
         for load in (LOADS[name] for name in sampling["levels"]):
             if not holds(study.output.columns, load.name):
                 found, remedy = f"leaves out {load.name}, which --limit needs", f"add {', '.join(load.columns)}"

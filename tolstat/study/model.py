@@ -14,7 +14,6 @@ from tolstat.common.strict import Strict, refuse
 from tolstat.common.tables import Options, from_names
 from tolstat.common.units import Number
 from tolstat.study import selection
-from tolstat.study.selective import SelectiveEntry
 from tolstat.study.tolerances.entry import Value
 
 _DEFAULTS = Options()
@@ -108,21 +107,16 @@ class Sampling(Strict):
     joints_per_lot: int = Field(default=1, strict=True, ge=1, le=MAX_SAMPLES, examples=[20])
     """joints of a lot, for errors with `lot`; with 1 each joint is its own lot, and all are independent"""
 
-    selective: SelectiveEntry | None = Field(default=None, examples=[{"classes": 3}])
-    """pins and holes are measured, sorted in classes, and matched class to class"""
-
     @model_serializer(mode="wrap")
     def _without_foreign_keys(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
         """Leave out `groups` unless the method is ``pick_freeze``, and `replicates` unless there are several.
 
-        Identities of other methods do not have them, nor `joints_per_lot` where each joint is its own lot, nor
-        `selective` of one class.
+        Identities of other methods do not have them, nor `joints_per_lot` where each joint is its own lot.
         """
         has_effect = {
             "groups": self.method == "pick_freeze",
             "replicates": self.replicates > 1,
             "joints_per_lot": self.joints_per_lot > 1,
-            "selective": self.is_matched,
         }
         return {key: value for key, value in write(self).items() if has_effect.get(key, True)}
 
@@ -146,8 +140,6 @@ class Sampling(Strict):
         if self.n is not None and self.n % self.replicates:
             least = self.replicates * -(-self.n // self.replicates)
             raise refuse(f"n = {self.n} is no multiple of replicates = {self.replicates}", f"give n = {least}")
-        if self.is_matched and self.method != "random":
-            raise refuse(f"selective is given with {self.method!r}", 'remove it, or write method = "random"')
         if self.joints_per_lot > 1 and self.method != "random":
             raise refuse(f"joints_per_lot is given with {self.method!r}", 'remove it, or write method = "random"')
         least = LEAST * self.joints_per_lot
@@ -161,11 +153,6 @@ class Sampling(Strict):
                 "nominal_first is given with 'cases'", "remove it: each group has its own joint without errors"
             )
         return self
-
-    @property
-    def is_matched(self) -> bool:
-        """Whether pins and holes are sorted in several classes."""
-        return self.selective is not None and self.selective.classes > 1
 
     @property
     def first_sample(self) -> int:

@@ -309,8 +309,6 @@ def _check_bonus(study: Study, name: str, place: str) -> None:
     """Refuse changes of a position with a bonus and of its diameter: they move what a part's zone is."""
     if study.has_bonus(name):
         found = "a position with a bonus by maximum material cannot be changed, nor its diameter"
-        if study.sampling.is_matched and name.endswith(".diameter"):
-            found = "a diameter that is matched by classes cannot be changed"
         raise input_error(place, found, "run a study of its own")
 
 

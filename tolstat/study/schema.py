@@ -18,7 +18,7 @@ from tolstat.analysis.process import LEAST_PARTS, MOST_PARTS
 from tolstat.common import loads, strict
 from tolstat.common.channels import COMPONENTS, PLANES
 from tolstat.common.files import data_dir
-from tolstat.common.loads import UNIT_OF_LOAD
+from tolstat.common.loads import UNIT_OF_LIMIT
 from tolstat.common.notation import schema_of_positive, schema_of_quantity
 from tolstat.common.units import EXAMPLES
 from tolstat.joint import Joint, Operation
@@ -33,7 +33,6 @@ from tolstat.study.model import Output, Sampling, Solver, SweepEntry
 from tolstat.study.points import PointEntry
 from tolstat.study.proposal import MAX_SHIFT, MAX_WIDEN, ProposalEntry
 from tolstat.study.selection import GIVEN, TOLERANCED, UNITS
-from tolstat.study.selective import MEASURABLE, RejectEntry
 from tolstat.study.tolerances import fits
 from tolstat.study.tolerances.correlation import Correlation
 from tolstat.study.tolerances.kinds import KINDS as TOLERANCES
@@ -168,7 +167,6 @@ def sections() -> dict[str, Schema]:
     """JSON schema of each table of a study, in the order of the reference."""
     text = "Joint file, and keys that replace some of its own, such as contact.clearance."
     swept = "Errors by name or pattern, and keys of the joint, that take equally spaced values; several make a grid."
-    gauged = "Joints that are rejected at assembly by a measured error or clearance; affects no result."
     grid = {
         name: {"type": "array", "minItems": 1, "items": schema} for name, schema in _entries("quantity", UNITS).items()
     }
@@ -193,8 +191,7 @@ def sections() -> dict[str, Schema]:
         "case": _listed(CaseEntry),
         "variant": _listed(VariantEntry),
         "assumed": _listed(Assumed),
-        "reject": _table(gauged, _entries("reject", MEASURABLE)),
-        "limits": _table(limited, _entries("limit", UNIT_OF_LOAD), end=f"(?:{loads.AT}[A-Za-z].*)?"),
+        "limits": _table(limited, _entries("limit", UNIT_OF_LIMIT), end=f"(?:{loads.AT}[A-Za-z].*)?"),
         "fatigue": of_model(Settings),
         "output": of_model(Output),
     }
@@ -219,7 +216,6 @@ def _definitions() -> dict[str, Schema]:
         "tolerance": {"anyOf": [of_model(model) for model in TOLERANCES.values()]},
         "quantity": schema_of_quantity("error", EXAMPLES["m"]),
         "sweep": of_model(SweepEntry),
-        "reject": of_model(RejectEntry),
         "limit": schema_of_positive(schema_of_quantity("error", EXAMPLES["N"])),
     }
     return {

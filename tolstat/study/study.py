@@ -27,7 +27,6 @@ from tolstat.study.fatigue import Fatigue
 from tolstat.study.model import Output, Sampling, Solver, SweepAxis
 from tolstat.study.points import Point, Setting, limits_at, only_one
 from tolstat.study.proposal import Proposal
-from tolstat.study.selective import Gauge
 from tolstat.study.tolerances.correlation import Copula, Group, Lot
 from tolstat.study.tolerances.distributions import Distribution
 from tolstat.study.tolerances.entry import Toleranced
@@ -149,8 +148,6 @@ class Study(Case):
         Errors that ``sampling.method`` ``pick_freeze`` exchanges together; empty for other methods.
     fit : Fit, optional
         Fit by ISO 286 that gives the diameters.
-    rejects : tuple of Gauge
-        Inspections at assembly; like limits they affect no joint.
     assumed : tuple of Assumed
         Assumptions that the study adds to those of its joint, see `assumptions`; they affect no joint.
     signals : tuple of str
@@ -173,7 +170,6 @@ class Study(Case):
     fatigue: Fatigue = field(default_factory=Fatigue)
     groups: tuple[Group, ...] = ()
     fit: Fit | None = None
-    rejects: tuple[Gauge, ...] = ()
     assumed: tuple[Assumed, ...] = ()
     signals: tuple[str, ...] = ()
 
@@ -269,11 +265,10 @@ class Study(Case):
         return self._different.table if self._different else np.broadcast_to(np.zeros(1, DESIGN), self.rows)
 
     def has_bonus(self, name: str) -> bool:
-        """Whether `name` is a position with a bonus, or the diameter of such a feature or of one matched by classes."""
+        """Whether `name` is a position with a bonus, or the diameter of such a feature."""
         feature, _, key = name.partition(".")
         axis = self.axes.get(feature)
-        bonus = axis is not None and axis.bonus is not None and key.startswith(("position", "diameter"))
-        return bonus or (self.sampling.is_matched and key == "diameter")
+        return axis is not None and axis.bonus is not None and key.startswith(("position", "diameter"))
 
     @property
     def samples(self) -> int:

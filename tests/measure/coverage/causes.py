@@ -79,8 +79,6 @@ def experiments() -> Iterator[Experiment]:
     for share in (0.1, 0.02):
         for n in (1024, 4096):
             yield _tail(share, n)
-    for n in (200, 800):
-        yield _angles(n)
 
 
 def _given_data(load: Load, n: int) -> Experiment:
@@ -176,18 +174,3 @@ def _larger(one: FloatArray, other: FloatArray, first: int = 0) -> float:
     """P(value of one density > that of another), of densities at equally spaced points from index `first` on."""
     one, other = (own[first:] / own[first:].sum() for own in (one, other))
     return float(one @ (np.cumsum(other) - 0.5 * other))
-
-
-def _angles(n: int, m: int = 24) -> Experiment:
-    """Shares over the revolution of a load whose errors act with sine, cosine and a product."""
-    angle = 2.0 * np.pi * np.arange(m) / m
-    acts = np.stack([np.sin(angle), 0.5 * np.cos(angle), 0.3 * np.ones(m)])
-    truth = (acts**2).sum(axis=1) / (acts**2).sum()
-
-    def once(rng: Rng) -> list[Found]:
-        x = rng.standard_normal((n, 3))
-        y = (x + 0.3 * (x**2 - 1.0)) / math.sqrt(1.0 + 2.0 * 0.3**2) @ acts
-        return found(sensitivity.over_revolution(x, y)[1], truth)
-
-    asked = (Asked("index over the revolution", f"error {k + 1}", n) for k in range(3))
-    return Experiment(tuple(asked), once)

@@ -1,4 +1,4 @@
-"""Experiments on what is computed from independent joints: capability, damage, time above a level, failures, stops."""
+"""Experiments on what is computed from independent joints: capability, damage, failures, stops."""
 
 from __future__ import annotations
 
@@ -20,7 +20,6 @@ from tests.measure.coverage.trial import (
     sample_of,
 )
 from tolstat.analysis import binomial, capability, cycles, strength
-from tolstat.analysis.binomial import clopper_pearson
 from tolstat.common.loads import FloatArray
 
 
@@ -35,7 +34,6 @@ def experiments() -> Iterator[Experiment]:
             yield _equivalent(exponent, n)
     for n in (60, 1024):
         for part in _PARTS:
-            yield _of_revolution(part, n)
             yield _failed(part, n)
     for share in (0.5, 0.05, 0.002):
         yield _until(share)
@@ -92,16 +90,6 @@ _PARTS = (
         "zero but in 1 of 200", lambda rng, n: np.where(rng.random(n) < 0.005, 1.0 - 0.5 * rng.random(n), 0.0), 0.00375
     ),
 )
-
-
-def _of_revolution(part: _Part, n: int) -> Experiment:
-    """Mean time above a level, as `questions.time_above` has it."""
-
-    def once(rng: Rng) -> list[Found]:
-        lower, upper = clopper_pearson(part.draw(rng, n).sum(), n)
-        return [Found(float(lower), float(upper), part.mean)]
-
-    return Experiment((Asked("mean time above", part.name, n),), once)
 
 
 def _failed(part: _Part, n: int) -> Experiment:

@@ -21,7 +21,7 @@ from tests.measure.coverage.trial import (
     sample_of,
     shares_at,
 )
-from tolstat.analysis import clustered, prediction
+from tolstat.analysis import prediction
 from tolstat.analysis.binomial import simultaneous
 from tolstat.analysis.clustered import Clustered
 from tolstat.analysis.design import Independent, Replicated
@@ -185,8 +185,7 @@ def _of_lots(law: _Lots, share: float, number: int) -> Experiment:
 
     def once(rng: Rng) -> list[Found]:
         sample = sample_of(law.draw(rng, number, JOINTS, share).ravel(), design)
-        above, joints = design.counts(sample.value, [level])
-        ends = clustered.delivery(above[:, 0], joints, DELIVERY).ends()
+        ends = sample.delivery(level, DELIVERY)
         truth = float((law.draw(rng, 1, DELIVERY, share) > level).sum())
         return [*judged(sample), Found(*ends, truth)]
 

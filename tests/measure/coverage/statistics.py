@@ -32,12 +32,11 @@ CONTROL = "normal approximation, wrong on purpose"
 """Statistic that no command shows: an interval that misses. A measurement that passes it shows nothing."""
 
 STATISTICS = {
-    "share": Statistic("`report`, `fatigue`, `bearing-life`, `time-above`", LEAST),
+    "share": Statistic("`report`, `fatigue`, `bearing-life`", LEAST),
     "share, joints without a load": Statistic("`report`: total interval", LEAST),
-    "quantile": Statistic("`report`, `fatigue`, `time-above`", LEAST),
+    "quantile": Statistic("`report`, `fatigue`", LEAST),
     "equivalent load": Statistic("`fatigue`", LEAST),
     "band": Statistic("`report`: band of the whole curve", LEAST),
-    "mean time above": Statistic("`time-above`", ABOUT),
     "share of failed parts": Statistic("`fatigue`", LEAST),
     "yield and ppm": Statistic("`capability`", LEAST),
     "next delivery": Statistic("`report`, `capability`", LEAST),
@@ -47,9 +46,9 @@ STATISTICS = {
     "share at a stop": Statistic("`run --until`", LEAST, "Sobol' points, Latin hypercubes"),
     "share, replicates": Statistic("`report`, `capability`", ABOUT, "one replicate"),
     "quantile, replicates": Statistic("`report`", ABOUT, "one replicate"),
-    "share, lots": Statistic("`lots`, `report`, `capability`", ABOUT, "fewer than 30 lots"),
+    "share, lots": Statistic("`report`, `capability`", ABOUT, "fewer than 30 lots"),
     "quantile, lots": Statistic("`report`", ABOUT, "fewer than 30 lots"),
-    "next delivery, lots": Statistic("`lots`", ABOUT, "fewer than 30 lots"),
+    "next delivery, lots": Statistic("`report`, `capability`", ABOUT, "fewer than 30 lots"),
     "return load": Statistic(
         "`capability --one-in`", TAIL, "less than 50 joints in the tail; a tail that is not Pareto's, or short"
     ),
@@ -77,7 +76,6 @@ STATISTICS = {
     "difference of means": Statistic("`compare`", MEANS),
     "index alone": Statistic("`causes`", ABOUT, "fewer than 50 joints"),
     "index in all": Statistic("`causes`: bounds", LEAST, "fewer than 50 joints"),
-    "index over the revolution": Statistic("`angles`", ABOUT, "fewer than 50 joints"),
     "index alone, exchanged": Statistic("`causes --run`, `causes STUDY`", ABOUT, EXCHANGED),
     "index in all, exchanged": Statistic("`causes --run`, `causes STUDY`", ABOUT, EXCHANGED),
     "index of the event": Statistic("`causes --run`", ABOUT, "no joint, or every joint, above the limit"),

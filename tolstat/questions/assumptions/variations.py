@@ -201,7 +201,7 @@ def check(view: View) -> None:
     if view.store.variants or view.method in ("sweep", "cases"):
         remedy = "give the file of a study with tolerances and one joint"
         raise unusable(view, "holds several joints: a share stands on the values of one", remedy)
-    check_sample(view, "difference", whole=True)
+    check_sample(view)
     if not view.limits:
         remedy = "write [limits] and run the study again, which simulates nothing anew"
         raise unusable(view, "has no limits: nothing stands on what is assumed", remedy)

@@ -14,6 +14,7 @@ import numpy as np
 from tolstat import sampling
 from tolstat.analysis import pick_freeze, ranks, sensitivity
 from tolstat.analysis.sample import Sample
+from tolstat.common.channels import histories_of
 from tolstat.common.cores import mapped
 from tolstat.common.errors import Fault, InputError, NotApplicable, TolstatError
 from tolstat.common.loads import ANY_LIMIT, FloatArray, unit_text
@@ -22,8 +23,9 @@ from tolstat.display import drawing, style
 from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Part, Row, Rows, Sentence, Table, has
 from tolstat.display.options import Costs, Load, Top
 from tolstat.questions import shares
-from tolstat.questions.causes import lines
+from tolstat.questions.causes import lines, revolution
 from tolstat.questions.causes.simulation import simulate as simulate
+from tolstat.store.revolutions import held
 from tolstat.store.view import View
 
 SIGNIFICANT = 0.05
@@ -99,7 +101,8 @@ def causes(view: View, by: Load = None, top: Top = 12, logarithm: bool = False, 
 
     Gives for each error: the share of the load's variance that it explains alone and in interactions (first-order and
     total Sobol' indices), the direction of its effect (rank regression), and the probability that a joint above the
-    limit (without a limit: above the 90 % quantile) has a larger, or a more extreme, error than a joint below.
+    limit (without a limit: above the 90 % quantile) has a larger, or a more extreme, error than a joint below. Where
+    the file holds load histories, tells which error scatters the load most at its peak over the input angle.
 
     With STUDY, simulates a pick-freeze design into STUDY_causes.h5, each point with two joints and one more for each
     group of errors; it gives total indices with intervals instead of bounds. To resume after an interruption, run the
@@ -156,6 +159,8 @@ def causes(view: View, by: Load = None, top: Top = 12, logarithm: bool = False, 
         parts.append(Sentence(f"which line of the drawing to change: {command}"))
     parts += [Panels([_tornado(of_errors)]), _table("errors", of_errors, top)]
     parts += map(Sentence, _notes(of_errors, "" if view.altered else command))
+    stored = [name for name in revolution.followed(view, [load]) if held(view.store, histories_of([name]))]
+    parts += revolution.over_angle(view, stored)
     return Answer("causes", "Causes by error", parts, facts)
 
 
@@ -178,6 +183,9 @@ def causes_on_page(view: View, asked: Asked) -> Answer:
     introduction.append(LOGARITHMS * any(of_errors.facts["logarithm"] for of_errors in each))
     introduction.append("" if each[0].with_intervals else "No intervals: the samples are not independent.")
     parts: list[Part] = [Sentence(" ".join(filter(None, introduction)), "lead"), Panels(list(map(_tornado, each)))]
+    with asked.noting("nothing over the input angle"):
+        names = [str(of_errors.facts["load"]) for of_errors in each if asked.replay]
+        parts += revolution.over_angle(view, revolution.followed(view, names), asked.replay)
     command = "" if view.altered else f"tolstat causes {quote(view.path.name)} --run"
     for of_errors in each:
         parts.append(_table(f"errors_{of_errors.facts['load']}", of_errors, SHOWN))
@@ -348,7 +356,7 @@ def _of_samples(view: View, load: Sample, logarithm: bool, confidence: float) ->
     x = np.column_stack([components[name] for name in names])
     response = (_logarithm(load.name, values) if logarithm else values)[:MAX_JOINTS]
     parts: dict[str, NamedTuple] = {"srrc": ranks.regression(x, values[:MAX_JOINTS], confidence, independent)}
-    if study.copula.names or study.sampling.is_matched:
+    if study.copula.names:
         first = sensitivity.first_order(x, response, confidence, independent)
     else:
         first, parts["total"] = sensitivity.first_and_total(x, response, confidence, independent)

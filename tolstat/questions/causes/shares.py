@@ -127,7 +127,7 @@ def evaluate(view: View, by: str, costs: Path | None = None) -> Lines | None:
     StoreError
         When the joints are not drawn from tolerances, or differ in weight.
     """
-    check_sample(view, "difference", whole=True)
+    check_sample(view)
     joints = Joints(view, by, view.altered)
     rows = joints.rows() if np.isfinite(joints.base).any() else []
     rows = rows if costs is None else _with_costs(view.study, rows, costs)

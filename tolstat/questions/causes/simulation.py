@@ -112,7 +112,7 @@ def simulate(
         return [work.run(study.load(source.path, text=text), f"{source.path.stem}_causes.h5")]
     with Writer.open(source) as store, kept_workers():
         view = View(store)
-        check_sample(view, "difference", whole=True)
+        check_sample(view)
         load = by or view.decisive
         view.load(load)  # which refuses what is none
         sets.check_code(store)

@@ -110,7 +110,6 @@ _NEARLY_ALL = np.array([1e-3, 1.0 - 1e-3])
 """Probabilities between which an error of the operating point must be zero."""
 
 
-NotNegative = Annotated[Value, AfterValidator(units.not_negative)]
 Positive = Annotated[Value, AfterValidator(units.positive)]
 HalfWidth = Annotated[float, _reader(PLUS_MINUS), AfterValidator(units.positive), OF_ERROR]
 PositiveNumber = Annotated[units.Number, AfterValidator(units.positive)]
@@ -137,10 +136,6 @@ class ToleranceEntry(strict.Strict):
     def measured_parts(self, site: Site) -> int:
         """Return the number of parts that mean and deviation were estimated from; 0 if they are taken as exact."""
         return 0
-
-    def gauge_of(self, site: Site) -> tuple[float, float, float] | None:
-        """Return the band outside which parts are scrapped, and the gauge's deviation, SI; None if none is."""
-        return None
 
     @model_validator(mode="after")
     def _can_be_built(self, info: ValidationInfo) -> Self:

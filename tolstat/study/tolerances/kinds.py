@@ -26,7 +26,6 @@ from tolstat.study.tolerances.entry import (
     Banded,
     Diameter,
     HalfBand,
-    NotNegative,
     Positive,
     PositiveNumber,
     SingleEntry,
@@ -57,16 +56,9 @@ class NormalEntry(Banded):
     known_from: int | None = Field(default=None, strict=True, ge=LEAST_PARTS, le=MOST_PARTS, examples=[50])
     """number of measured parts that mean and sigma were estimated from; affects no result"""
 
-    gauge: NotNegative | None = Field(default=None, examples=["0.01 mm"])
-    """parts outside the band are scrapped, by a gauge of this standard deviation; affects no result"""
-
     def measured_parts(self, site: Site) -> int:
         """See `ToleranceEntry.measured_parts`."""
         return self.known_from or 0
-
-    def gauge_of(self, site: Site) -> tuple[float, float, float] | None:
-        """See `ToleranceEntry.gauge_of`."""
-        return None if self.gauge is None else (*self.needed_band(site), self.gauge)
 
     def build(self, site: Site) -> tolerance.Normal | tolerance.TruncatedNormal:
         """See `ToleranceEntry.build`."""
@@ -74,15 +66,12 @@ class NormalEntry(Banded):
             raise refuse(
                 "known_from is of parts as they are made, truncate of parts that are sorted", "remove one of them"
             )
-        if self.gauge is not None and self.truncate:
-            raise refuse("gauge scraps parts, with truncate none are left to scrap", "remove one of them")
-        self.gauge_of(site)
         band = self.needed_band(site) if self.std is None else self.band(site)
         if self.std is not None and self.cpk is not None:
             raise refuse("std and cpk both define the standard deviation", "remove one of them")
-        if self.std is not None and (self.truncate or self.gauge is not None) != (band is not None):
-            found = "with std, a band and truncate or gauge need each other"
-            raise refuse(found, "give a band and truncate = true or a gauge, or neither")
+        if self.std is not None and self.truncate != (band is not None):
+            found = "with std, a band and truncate need each other"
+            raise refuse(found, "give a band and truncate = true, or neither")
         mean = self.mean
         if mean is None:
             mean = site.center if band is None else 0.5 * sum(band)

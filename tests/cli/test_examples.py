@@ -80,8 +80,6 @@ TABLES = {
     "worst": (),
     "causes": (),
     "pairs": (),
-    "reweight": ("--set", "pin*.offset_t.cpk=1.2"),
-    "allocate": ("--target", "P(cross1.F > 700 N) < 0.25"),
     "compare": ("other.h5", "--by", "cross1.F"),
 }
 

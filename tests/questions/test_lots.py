@@ -11,7 +11,7 @@ import tolstat
 from tests.support import exceedance, fakes, synthetic
 from tests.support.views import view
 from tolstat import sampling
-from tolstat.analysis import allocation, clustered
+from tolstat.analysis import clustered
 from tolstat.campaign import stop_rule
 from tolstat.campaign.extend import merge
 from tolstat.cli import app
@@ -102,13 +102,6 @@ def test_what_needs_independent_joints_is_refused(tmp_path):
     with pytest.raises(InputError, match="share lots"):
         stop_rule.run_until(plan, tmp_path / "a.h5", rule, print)
     assert question.study_of(tolstat.load(plan.path)).sampling.joints_per_lot == question.JOINTS
-
-
-def test_halves_are_of_whole_lots():
-    lot = np.repeat(np.arange(7), 5)[3:]
-    searched, checked = allocation.halves(lot, 100)
-    assert set(lot[searched]) == {0, 2, 4, 6}
-    assert set(lot[checked]) == {1, 3, 5}
 
 
 def test_fewer_than_thirty_lots_and_joints_on_their_own_are_refused():

@@ -96,9 +96,7 @@ def test_same_bytes_in_slices_in_blocks_and_stopped(folder, tmp_path):
     assert found[0] == found[1] == found[2]
 
 
-def test_diameters_that_are_matched_are_neither_reweighted_nor_drawn_from_scores(folder, tmp_path):
-    with tolstat.open(folder / "k3.h5") as store, pytest.raises(InputError, match="matched by classes"):
-        tolstat.reweight(store.view(), ["pin*.diameter.cpk=1.3"])
+def test_studies_without_classes_or_limits_are_refused(tmp_path):
     plain = tmp_path / "plain.toml"
     plain.write_text(STUDY.replace("selective", "# selective"), encoding="utf-8")
     with pytest.raises(InputError, match="missing key selective"):

@@ -7,8 +7,8 @@ import pytest
 from scipy.stats import norm
 from typer.testing import CliRunner
 
-from tests.sampling.test_importance import load
 from tests.support import synthetic
+from tolstat import study
 from tolstat.analysis import binomial
 from tolstat.cli import app
 from tolstat.common.errors import InputError, NotApplicable
@@ -31,6 +31,11 @@ PLAN = (
 @pytest.fixture(scope="module")
 def stored(tmp_path_factory):
     return synthetic.store(tmp_path_factory.mktemp("sorting"), PLAN.replace("GAUGE", "0 mm"))
+
+
+def load(folder, text):
+    (folder / "plan.toml").write_text(text, encoding="utf-8")
+    return study.load(folder / "plan.toml")
 
 
 def accepted(values, lower, upper, deviation):

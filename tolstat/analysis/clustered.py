@@ -125,8 +125,8 @@ def _posterior(
     np.add.at(times, (np.tile(np.arange(k.shape[1]), len(k)), which.ravel()), 1.0)
     log = times @ np.array([log_beta_binomial(above, of, a, b) for above, of in pairs.T])
     log += 0.5 * np.log(mean * (1.0 - mean)) + np.log(r * (1.0 - r))
-    weight = np.exp(log - log.max(axis=1, keepdims=True))
-    return a, b, weight / weight.sum(axis=1, keepdims=True)
+    posterior = np.exp(log - log.max(axis=1, keepdims=True))
+    return a, b, posterior / posterior.sum(axis=1, keepdims=True)
 
 
 class Clustered(Design):
@@ -223,15 +223,15 @@ def delivery(above: ArrayLike, joints: ArrayLike, number: int, lots: int = 1) ->
     spread = max(float(np.nan_to_num(interval(k, n).correlation)), 0.05)
     error = np.sqrt((1.0 + (n.mean() - 1.0) * spread) / (n.sum() * p * (1.0 - p)))
     means = special.logit(p) + np.linspace(-REACH, REACH, GRID) * min(float(error), 1.0)
-    a, b, (weight,) = _posterior(k[:, None], n[:, None], means, SPREADS)
-    likely = weight > NEGLIGIBLE
-    a, b, weight = a[likely], b[likely], weight[likely] / weight[likely].sum()
+    a, b, (posterior,) = _posterior(k[:, None], n[:, None], means, SPREADS)
+    likely = posterior > NEGLIGIBLE
+    a, b, posterior = a[likely], b[likely], posterior[likely] / posterior[likely].sum()
     small, more = divmod(number, lots)
-    spectrum = np.ones((weight.size, (number + 1) // 2 + 1), dtype=complex)
+    spectrum = np.ones((posterior.size, (number + 1) // 2 + 1), dtype=complex)
     for size, count in ((small, lots - more), (small + 1, more)):
         if count and size:
-            padded = np.zeros((weight.size, number + 1))
+            padded = np.zeros((posterior.size, number + 1))
             padded[:, : size + 1] = np.exp(log_beta_binomial(np.arange(size + 1), size, a[:, None], b[:, None]))
             spectrum = spectrum * np.fft.rfft(padded) ** count
-    pmf = np.fft.irfft(weight @ spectrum, number + 1).clip(0.0)
+    pmf = np.fft.irfft(posterior @ spectrum, number + 1).clip(0.0)
     return Delivery(np.asarray(pmf / pmf.sum()), (int(k.sum()), int(n.sum())))

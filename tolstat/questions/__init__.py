@@ -75,7 +75,6 @@ QUESTIONS = (
     Question("exceedance", "", "Estimate the share of joints above each load.", "open", "exceedance.answer", True),
     Question("sweep", "", "Compare the largest loads of the joints of a sweep.", "open"),
     Question("cases", "", "Compare the largest loads of the listed joints.", file="sweep"),
-    Question("known_parts", "", "Estimate what measured parts leave open of each share.", "open", "parts"),
     Question("sorting", "Decide", "Compute yield and cost before and after parts are sorted.", "open", "parts"),
     Question("selective", "Decide", "Compute yield and unmatched parts of selective assembly.", "open"),
     Question("lots", "Read", "Compute which share of a lot or of a delivery exceeds limits.", "open", counted=True),
@@ -97,8 +96,6 @@ QUESTIONS = (
     Question("modes", "", "Compute the shares of the revolution in which pins touch.", "folded", "joints"),
     Question("accuracy", "", "Give the numerical error of the loads, from checks of joints.", "folded", "joints", True),
     Question("time_above", "Read", "Estimate how much of a revolution loads are above levels."),
-    Question("reweight", "Decide", "Estimate exceedances for changed tolerances."),
-    Question("allocate", "Decide", "Propose the cheapest tolerances that meet the targets."),
     Question("compare", "Decide", "Compare the exceedances and loads of two campaigns."),
     Question("rare", "Decide", "Estimate a rare exceedance by subset simulation."),
 )

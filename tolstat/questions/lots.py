@@ -95,7 +95,7 @@ def study_of(study: Study, number: int | None = None, joints: int | None = None)
     lots_of_study = study.samples // size_of_study if size_of_study > 1 else LOTS
     size = joints or (size_of_study if size_of_study > 1 else JOINTS)
     keys = {"method": "random", "n": size * (number or lots_of_study), "joints_per_lot": size, "replicates": None}
-    changed = with_keys(study.text, {("sampling",): keys | {"groups": None}}, str(study.path))
+    changed = with_keys(study.text, {("sampling",): keys}, str(study.path))
     return load(study.path, text=changed)
 
 

@@ -1,4 +1,4 @@
-"""Shares above the limits by what is done with parts, and by what is known of them: sorted parts, and measured ones."""
+"""Shares above the limits where parts are sorted."""
 
 from __future__ import annotations
 
@@ -9,12 +9,15 @@ from typing import Any
 
 import numpy as np
 
+from tolstat.analysis.design import Design
+from tolstat.analysis.estimates import Column as Values
+from tolstat.analysis.estimates import Estimate
 from tolstat.analysis.sample import CONFIDENCE, Sample, total_interval
-from tolstat.analysis.weighted import Weighted
 from tolstat.common.errors import NotApplicable
+from tolstat.common.late import special
 from tolstat.common.loads import ANY_LIMIT, FloatArray
 from tolstat.display import drawing, style, text
-from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Part, Row, Rows, Sentence, Table
+from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Row, Rows, Sentence, Table
 from tolstat.display.options import Costs
 from tolstat.questions import shares
 from tolstat.store import error_budget
@@ -28,6 +31,8 @@ from tolstat.study.selective import PARTS, Gauge
 MADE, SCRAPPED, INSPECTED = "all joints", "parts scrapped", "joints rejected"
 """Stages: parts as they are made; without those that are scrapped; without joints that are rejected, too."""
 TITLE = "Parts scrapped, joints rejected"
+FEW = 20.0
+"""Effective number of joints on a side of a level below which a joint added there is as likely to be kept as any."""
 ON_PAGE = (
     "Each joint counts by the probability that the gauges accept its parts, and the inspection the joint. The verdict, "
     "and all else on this page, is on all joints.",
@@ -56,6 +61,35 @@ STAGES = (
     Column("cost of a joint", _cost("cost"), rank=2),
     Column("of a good one", _cost("cost_good")),
 )
+
+
+class _Kept(Design):
+    """Independent joints that are kept with a probability each, (n,).
+
+    The interval is Clopper and Pearson's for the effective number of joints (Korn and Graubard 1998), each end with one
+    more joint on the side that moves it outward: of the largest probability there or, with few joints, of any.
+    """
+
+    claims = frozenset(("share",))
+
+    def __init__(self, kept: FloatArray) -> None:
+        self._kept = kept
+
+    def shares(self, x: Values, levels: FloatArray, confidence: float) -> Estimate[FloatArray]:
+        """See `Design.shares`."""
+        counts, (level,) = ~np.isnan(x.values), levels
+        sides = np.where([x.values > level, x.values <= level], self._kept, 0.0)[:, counts]
+        total, squares = sides.sum(axis=1), (sides**2).sum(axis=1)
+        few = total**2 < FEW * squares
+        added = np.where(few, self._kept.max(), sides.max(axis=1, initial=0.0))
+        first, other = total + added, total[::-1]
+        share = first / (first + other)
+        spread = (1.0 - share) ** 2 * (squares + added**2) + share**2 * squares[::-1]
+        effective = share * (1.0 - share) * (first + other) ** 2 / np.where(other > 0.0, spread, 1.0)
+        ends = special.betaincinv(share * effective, (1.0 - share) * effective, 0.5 * (1.0 + confidence))
+        ends = np.where(other > 0.0, ends, 1.0)
+        estimate = total[:1] / total.sum()
+        return Estimate(estimate, 1.0 - ends[1:], ends[:1])
 
 
 def sorting(view: View, costs: Costs = None) -> Answer:
@@ -116,13 +150,13 @@ def _parts(view: View, costs: Costs) -> tuple[Panel, Table, Table]:
     if not (scrap or study.rejects) or not view.limits:
         remedy = "give an entry of [tolerances] a gauge, or add [reject]; and [limits]"
         raise shares.inapplicable(view, "is of a study that sorts nothing, or has no limits", remedy)
-    if not view.design.has_interval("reweighting"):
+    if not view.design.has_interval("difference"):
         raise shares.unusable(view, "holds joints that are not independent", 'write sampling.method = "random"')
-    probability, base = np.ones(view.n), view.design.counts_as(view.n)
+    probability = np.ones(view.n)
     parts: list[dict[str, Any]] = []
     for part, price in _prices(scaling.tolerances(study), costs).items():
         used = _accepted(view, [gauge for gauge in scrap if gauge.part == part])
-        share, probability = float(np.average(used, weights=base)), probability * used
+        share, probability = float(np.mean(used)), probability * used
         parts.append({"part": part, "scrapped": 1.0 - share, "cost": price, "cost_used": price / share})
     cost_made, cost = (sum(row[key] for row in parts) for key in ("cost", "cost_used"))
     stages: list[tuple[str, FloatArray | None, float, float]] = [(MADE, None, 0.0, cost_made)]
@@ -130,7 +164,7 @@ def _parts(view: View, costs: Costs) -> tuple[Panel, Table, Table]:
         stages.append((SCRAPPED, probability, 0.0, cost))
     if study.rejects:
         passed = _accepted(view, study.rejects)
-        share = float(np.average(passed, weights=base * probability))
+        share = float(np.average(passed, weights=probability))
         stages.append((INSPECTED, probability * passed, 1.0 - share, cost / share))
     loads = view.loads([*([ANY_LIMIT] if len(view.limits) > 1 else []), *view.limits])
     rows = [_row(view, load, *stage) for load in loads for stage in stages]
@@ -163,8 +197,7 @@ def _row(view: View, load: Sample, stage: str, kept: FloatArray | None, rejected
     assert load.limit is not None
     loads = error_budget.with_error(view, load)
     if kept is not None:
-        base = load.design if isinstance(load.design, Weighted) else Weighted(np.ones(view.n), 1.0)
-        loads = tuple(replace(end, design=base.times(kept)) for end in loads)
+        loads = tuple(replace(end, design=_Kept(kept)) for end in loads)
     share = loads[0].above(load.limit).estimate
     lower, upper = total_interval(loads, load.limit, CONFIDENCE)
     row = {"stage": stage, "load": load.name, "unit": load.unit, "level": load.limit, "estimate": share}
@@ -190,100 +223,3 @@ def _panel(rows: Rows) -> Panel:
     description = "; ".join(f"{row['stage']}: {text.percent(row['estimate'])}" for row in rows)
     labels = [row["stage"] for row in rows]
     return Panel("stages", "Joints above a limit, before and after", description, draw, size, rows=labels)
-
-
-DRAWN = 6
-"""Maximum number of shares in the picture."""
-LEAST = 1e-5
-"""Smallest share that the picture shows."""
-INTERVALS = {
-    "joints": ("lower", "upper", style.COLOURS[0]),
-    "parts": ("parts_lower", "parts_upper", style.COLOURS[1]),
-    "both": ("both_lower", "both_upper", style.INK),
-}
-"""Keys of the ends of each interval and its colour, from the top of a row of the picture."""
-OF_BOTH = ("expected", "parts_lower", "parts_upper", "both_lower", "both_upper", "unsupported")
-"""Keys of a row for the fields of `known_share.KnownShare`."""
-COLUMNS = (
-    Column("load > limit", text.limit),
-    Column("share as stated", shares.share("estimate")),
-    Column("joints", shares.shares("lower", "upper")),
-    Column("parts", shares.shares("parts_lower", "parts_upper")),
-    Column("both", shares.shares("both_lower", "both_upper")),
-    Column("next joint", shares.share("expected"), rank=1),
-    Column("not supported", shares.share("unsupported"), rank=2),
-)
-EXPLANATION = (
-    "Joints: the tolerances are as stated, and the joints are a sample. Parts: the process may be any that the "
-    "parts make likely. Both: the verdict's, with joints without a valid load and the numerical error. Grey line: "
-    "the share at the tolerances as stated."
-)
-
-
-def known_parts(view: View) -> Answer:
-    """Estimate what measured parts leave open of each share.
-
-    Parameters
-    ----------
-    view : View
-        A campaign of a study with limits, some of whose tolerances are known from measured parts.
-
-    Returns
-    -------
-    Answer
-        Table ``intervals``, one row for `ANY_LIMIT`, if there are several limits, and for each limit, those exceeded
-        most first: ``load``, ``unit``, ``level``; ``estimate``, ``lower``, ``upper``, share at the tolerances as stated
-        with the interval of the joints; the fields of `known_share.KnownShare`, the last two ends with ``both_`` before
-        them.
-
-    Raises
-    ------
-    NotApplicable
-        When the study takes its tolerances as exact or has no limits, or no joint is simulated.
-    """
-    process = error_budget.known_parts(view)
-    if process is None or not view.counts.done:
-        remedy = "give an entry of [tolerances] known_from, and the study [limits]"
-        raise shares.inapplicable(view, "has no share that measured parts leave open", remedy)
-    rows = [_known(view, process, name) for name in (*view.limits, *([ANY_LIMIT] if len(view.limits) > 1 else []))]
-    rows.sort(key=lambda row: (row["load"] != ANY_LIMIT, -row["estimate"]))
-    drawn = [row for row in rows if not math.isnan(row["both_upper"])][:DRAWN]
-    entries = ", ".join(f"{entry.pattern} from {entry.parts}" for entry in process.entries)
-    words = (f"Mean and deviation are estimated from measured parts: {entries}.", EXPLANATION)
-    parts: list[Part] = [Panels([_intervals(drawn)], beside=list(map(Sentence, words)))] if drawn else []
-    parts.append(Table("intervals", "Shares above the limits, with what leaves them open", COLUMNS, rows))
-    if len(drawn) < min(len(rows), DRAWN):
-        most = text.percent(max(row["unsupported"] for row in rows))
-        parts.append(Sentence(f"The joints do not support {most} of the likely processes. {process.remedy}.", "lead"))
-    return Answer("known_parts", "Tolerances known from measured parts", parts)
-
-
-def _known(view: View, process: error_budget.KnownParts, name: str) -> Row:
-    load = view.load(name)
-    assert load.limit is not None
-    above = load.above(load.limit)
-    row = {"load": name, "unit": load.unit, "level": load.limit}
-    row |= {key: getattr(above, key) for key in ("estimate", "lower", "upper")}
-    return row | dict(zip(OF_BOTH, process.share(name, CONFIDENCE), strict=True))
-
-
-def _intervals(rows: Rows) -> Panel:
-    """Picture of the three intervals of some shares."""
-
-    def draw(ax: Axes) -> None:
-        """Draw the three intervals of each share, below each other; shares on a logarithmic axis."""
-        ends = [row[end] for row in rows for low, high, _ in INTERVALS.values() for end in (low, high)]
-        low = max(0.7 * min(end for end in ends if end > LEAST), LEAST)
-        style.share_axis(ax, low, "x", min(1.3 * max(ends), 1.0))
-        for i, row in enumerate(rows):
-            for k, (label, (lower, upper, colour)) in enumerate(INTERVALS.items()):
-                look: Any = {"color": colour, "lw": 3.0, "solid_capstyle": "butt", "label": label}
-                ax.plot([max(row[lower], 0.1 * low), row[upper]], [i + 0.24 * (k - 1)] * 2, **look)
-            if row["estimate"] > low:
-                ax.plot([row["estimate"]] * 2, [i - 0.36, i + 0.36], color=style.FAINT, lw=1.2)
-        ax.set_xlabel("share of the joints above the limit, 95 % intervals")
-
-    labels, size = [text.limit(row) for row in rows], (drawing.WIDTH, 0.47 * len(rows) + drawing.BOTTOM + 0.38)
-    spans = "; ".join(f"{row['load']}: {text.span(row['both_lower'], row['both_upper'])}" for row in rows)
-    words = f"Intervals of both: {spans}"
-    return Panel("intervals", "What joints and parts leave open", words, draw, size, rows=labels)

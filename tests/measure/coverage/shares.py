@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import ndtri
 from scipy.stats import norm, qmc
+from tolstat.analysis.weighted import Weighted
 
 from tests.measure.coverage.trial import (
     Asked,
@@ -26,7 +27,6 @@ from tolstat.analysis.binomial import simultaneous
 from tolstat.analysis.clustered import Clustered
 from tolstat.analysis.design import Independent, Replicated
 from tolstat.analysis.sample import Sample, total_interval
-from tolstat.analysis.weighted import Weighted
 from tolstat.common.loads import FloatArray
 
 SHARES, QUANTILES = (0.5, 0.05, 0.002), (0.5, 0.9, 0.99)

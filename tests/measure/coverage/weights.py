@@ -9,13 +9,13 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import brentq
 from scipy.stats import chi2, norm
-
-from tests.measure.coverage.trial import Asked, Experiment, Found, Law, Rng, found, fresh_share, sample_of
-from tolstat.analysis import allocation, known_share, process, reweight
 from tolstat.analysis.known_share import Mixture
 from tolstat.analysis.process import Known, Sums
 from tolstat.analysis.reweight import Ratios
 from tolstat.analysis.weighted import Weighted
+
+from tests.measure.coverage.trial import Asked, Experiment, Found, Law, Rng, found, fresh_share, sample_of
+from tolstat.analysis import allocation, known_share, process, reweight
 from tolstat.common.loads import FloatArray
 from tolstat.study.tolerances import density_ratio
 from tolstat.study.tolerances.distributions import Normal

@@ -34,7 +34,7 @@ SPREAD = (0.05, 0.5, 0.95)
 TITLE = "Causes over the input angle"
 LINES = 4
 """Number of errors whose share is drawn."""
-OVER_REVOLUTION = "Share of the variance over the whole revolution, every angle weighted by its variance"
+OVER_REVOLUTION = "Share of the variance over the whole revolution, every angle counted by its variance"
 
 
 COLUMNS = (
@@ -66,7 +66,7 @@ def angles(
     Parameters
     ----------
     view : View
-        A campaign whose joints are drawn from tolerances, all of the same weight.
+        A campaign whose joints are drawn from tolerances.
     by : str, optional
         Force or torque, such as cross1.F or output.moment; by default the load whose limit most joints exceed.
     joints : int
@@ -107,7 +107,7 @@ def angles(
 def angles_on_page(view: View, asked: Asked) -> Answer:
     """Causes of the leading loads over the input angle; of a load with a long tail, those of its logarithm."""
     followed = [load for load in view.leading if load in CHANNELS]
-    cannot = view.method == "sweep" or not view.count(*VALID) or view.design.refuses("index") or view.study.groups
+    cannot = view.method == "sweep" or not view.count(*VALID) or view.design.refuses("index")
     if cannot or not (asked.replay and followed) or len(view.points) > 1:  # histories are those of one point
         raise NotApplicable
     with asked.noting("nothing over the input angle"):
@@ -163,7 +163,7 @@ def against_angle(
     Parameters
     ----------
     view : View
-        A campaign whose joints are drawn from tolerances, all of the same weight.
+        A campaign whose joints are drawn from tolerances.
     loads : sequence of str
         Keys of `channels.CHANNELS`: ``cross1.F``, ``output.moment``.
     joints : int
@@ -181,7 +181,7 @@ def against_angle(
     InputError
         When a name is not a load over the input angle.
     StoreError
-        When the joints are not drawn from tolerances, differ in weight or form a pick-freeze design, or fewer than
+        When the joints are not drawn from tolerances, or fewer than
         `MIN_JOINTS` have settled.
     """
     for name in loads:

@@ -64,7 +64,7 @@ def pairs(view: View, by: Load = None) -> Answer:
     Parameters
     ----------
     view : View
-        A campaign whose joints are drawn from tolerances, all of the same weight.
+        A campaign whose joints are drawn from tolerances.
     by : str, optional
         Load, such as cross1.F or fork2.T; by default the one whose limit most joints exceed.
 
@@ -83,7 +83,7 @@ def pairs(view: View, by: Load = None) -> Answer:
     InputError
         When there is no such load, or the study does not keep it.
     StoreError
-        When joints are not drawn from tolerances, differ in weight, or too few are valid.
+        When joints are not drawn from tolerances, or too few are valid.
     """
     view.check_drawn()
     view.check("index")
@@ -115,7 +115,7 @@ def pairs(view: View, by: Load = None) -> Answer:
 
 def pairs_on_page(view: View, asked: Asked) -> Answer:
     """Pairs that matter for the load with the limit exceeded most; none where a single error tells more than a pair."""
-    if not (view.sampled and view.limits and view.leading) or view.design.refuses("index") or view.study.groups:
+    if not (view.sampled and view.limits and view.leading) or view.design.refuses("index"):
         raise NotApplicable
     with asked.noting("no pairs of errors"):
         answer = pairs(view)

@@ -174,9 +174,6 @@ def folder(example_files: Path, tmp_path_factory: pytest.TempPathFactory) -> Pat
         study.write_text(
             study.read_text(encoding="utf-8").replace("[sampling]", f"[output]\n{CHEAP}"), encoding="utf-8"
         )
-    tolstat.run(
-        tolstat.load(made / "studies" / "known_parts.toml", n=60), made / "known_parts.h5", workers=1, check=False
-    )
     for name in ("clearance", "hard_cases"):
         text = (made / "studies" / f"{name}.toml").read_text(encoding="utf-8")
         head, *variants = text.split("[[variant]]")

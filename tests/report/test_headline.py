@@ -12,7 +12,6 @@ from tests.support.views import view
 from tolstat import sampling
 from tolstat.analysis import prediction
 from tolstat.analysis.binomial import clopper_pearson, needed
-from tolstat.analysis.sample import Sample
 from tolstat.cli import app
 from tolstat.common.tables import RESULT, Simulation, Status
 from tolstat.display.answer import Asked
@@ -201,22 +200,6 @@ def test_the_joint_verdict_covers_joints_without_a_load():
     row = exceedance.all_limits(view(failed=3, limits={"cross1.F": 2000.0, "cross2.F": 3000.0}))
     assert (row["count"], row["n_failed"]) == (0, 3)
     assert ends(row)[1] == pytest.approx(clopper_pearson(3, 200)[1])
-
-
-@pytest.mark.parametrize(("accepted", "answer"), [(0.02, "no"), (0.5, "none")])
-def test_where_the_weights_support_no_joint_share_one_limit_can_only_be_missed(monkeypatch, accepted, answer):
-    made = apart(100)
-    few = "few joints have most of the weight: 1 effective"
-    monkeypatch.setattr(Sample, "doubt", lambda self, level: few if self.name == "any limit" else "")
-    found = headline.headline(made, accepted)
-    assert found.answer == answer
-    if answer == "no":
-        assert "exceed 700 N on cross1.F" in found.words
-        assert found.notes[-1].startswith(
-            "No share of the joints that exceed at least one limit: above any limit, few joints"
-        )
-    else:
-        assert "above any limit, few joints have most of the weight" in found.words
 
 
 def test_of_limits_that_are_exceeded_equally_often_the_leading_load_is_named_and_marked():

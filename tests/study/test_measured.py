@@ -86,7 +86,9 @@ def test_of_a_lognormal_law_the_logarithm_is_open(tmp_path):
 
 
 def test_of_accepted_parts_those_made_are_open(tmp_path):
-    position = '"pin*.position" = { zone = "⌀0.1 mm", over = "22 mm", distribution = "normal", material_condition = "reject" }'
+    position = (
+        '"pin*.position" = { zone = "⌀0.1 mm", over = "22 mm", distribution = "normal", material_condition = "reject" }'
+    )
     diameter = ENTRY.replace("offset_t", "diameter").replace("0.1 mm", "0.03 mm").replace("cpk", "known_from = 9, cpk")
     plan = load(tmp_path, synthetic.STUDY.replace(ENTRY, f"{position}\n{diameter}"))
     changed = with_value(plan, {"pin*.diameter.spread": 2.0}).tolerances["pin1.diameter"]

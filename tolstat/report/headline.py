@@ -75,11 +75,6 @@ def _judged(view: View, records: Sequence[table.Row], accepted: float, standing:
     row, worst = _decisive(view, records), exceedance.most_exceeded(view, records)
     several, answers = len(records) > 1, [verdict(record, accepted) for record in records]
     answer = verdict(row, accepted)
-    alone = several and answer == "none" and "no" in answers  # the joints above one limit are too many already
-    if alone:
-        broken = [record for record, judged in zip(records, answers, strict=True) if judged == "no"]
-        row = worst = exceedance.most_exceeded(view, broken)
-        answer, standing = "no", None
     numbers = ", ".join(f"{answers.count(key)} {word}" for key, word in WORDS.items() if key in answers)
     notes: tuple[str, ...] = (f"of {len(records)} limits, each by itself: {numbers}",) if several else ()
     if answer == "none":
@@ -87,9 +82,7 @@ def _judged(view: View, records: Sequence[table.Row], accepted: float, standing:
     value, words = _sentence(view, row, accepted, answer, standing)
     if first := _without_errors(view):
         words = f"{first}. {words}" if value == WORDS[answer] else f"{words}. {text.capital(first)}"
-    if alone:
-        notes += (_untold(view, records),)
-    elif several and worst["count"] and not np.isnan(worst["estimate"]):
+    if several and worst["count"]:
         words += _most_often(view, records, worst)
     if value == WORDS["no"]:
         better = lines.advice(view, row["load"], accepted)
@@ -139,11 +132,6 @@ def tells_yield(view: View) -> bool:
 def _decisive(view: View, records: Sequence[table.Row]) -> table.Row:
     """Row on which the verdict is: that of the joints above at least one limit, or of the only limit."""
     return exceedance.all_limits(view) if len(records) > 1 else records[0]
-
-
-def _untold(view: View, records: Sequence[table.Row]) -> str:
-    """Why the verdict is on one of several limits."""
-    return f"No share of the joints that exceed at least one limit: {_reason(view, [_decisive(view, records)])}"
 
 
 def _words(view: View, row: table.Row) -> str:

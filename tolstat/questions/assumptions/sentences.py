@@ -11,12 +11,15 @@ import numpy as np
 from tolstat.analysis import binomial
 from tolstat.display import table, text
 from tolstat.questions.assumptions.variations import ALL, AXIAL, SHAFT, Standing, widths, written
+from tolstat.store.recorded import mentions
 from tolstat.store.view import View
 from tolstat.study.measured import left_open
 from tolstat.study.widths import COARSER, HALF
 
 KEPT = {"yes": "kept", "no": "not kept"}
 """Sides of the accepted share in words."""
+KEYS_OF_PARTS = ("known_from", "law")
+"""Keys of an entry of ``[tolerances]`` that is known from measured parts."""
 _NAMED = 2
 """Largest number of assumptions, or variations, that a sentence names."""
 _MOST = 20_000
@@ -100,6 +103,8 @@ def of_parts(view: View, standing: Standing | None) -> str:
     ``10 parts measured: their spread is known to −27 … +65 %; with the larger one 4.1 %``. Of several entries the one
     with the largest share then, without joints of these the one with the fewest parts.
     """
+    if not mentions(view.store, KEYS_OF_PARTS, "tolerances"):  # the study is not read for the others
+        return ""
     shares = {row["keys"]: float(row["share"]) for row in standing.rows} if standing else {}
     each = []
     for entry in view.study.known:

@@ -168,9 +168,6 @@ def folder(example_files: Path, tmp_path_factory: pytest.TempPathFactory) -> Pat
     """Folder with the study and the files that the examples name, where they may write."""
     made = Path(shutil.copytree(example_files, tmp_path_factory.mktemp("docs") / "examples"))
     shutil.copy(made / "iso2768_f.h5", made / "histories.h5")
-    tolstat.run(
-        tolstat.load(made / "studies" / "known_parts.toml", n=60), made / "known_parts.h5", workers=1, check=False
-    )
     for name in ("clearance", "hard_cases"):
         text = (made / "studies" / f"{name}.toml").read_text(encoding="utf-8")
         head, *variants = text.split("[[variant]]")

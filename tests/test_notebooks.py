@@ -79,5 +79,5 @@ def test_other_tools_agree(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
     assert ours / 3 < theirs < 3 * ours
     assert math.isnan(middle)
     assert above < ours / 2
-    for key in ("total", "SALib ST"):
+    for key in ("in_all", "SALib ST"):
         assert set(names["table"][key].nlargest(2).index) == {"pin*.tilt_[tz]", "hole*.tilt_[tz]"}

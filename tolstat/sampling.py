@@ -1,9 +1,8 @@
 """Draw the errors of a study's joints, before any of them is simulated.
 
 The errors of joint i depend on the seed, i and the error's name only: not on the number of joints, not on which
-others are drawn with it, and not on other errors that are added to the study later. There are two exceptions: `lhs` has
-as many strata as joints, and with `pick_freeze` the number of joints per point depends on the number of groups. Joints
-that share a lot have the same scores of the lot, whose number follows from i.
+others are drawn with it, and not on other errors that are added to the study later. One exception: `lhs` has as many
+strata as joints. Joints that share a lot have the same scores of the lot, whose number follows from i.
 """
 
 from __future__ import annotations
@@ -14,14 +13,12 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.analysis import process
-from tolstat.common.columns import IMPORTANCE, SUBSET
+from tolstat.common.columns import SUBSET
 from tolstat.common.late import special
 from tolstat.common.tables import ERROR_FIELDS
 from tolstat.joint import MEANS, Operation, nominal_errors
 from tolstat.study import Study, axes
 from tolstat.study.design import Design, sobol
-from tolstat.study.proposal import component, weights
 from tolstat.study.tolerances.distributions import score
 from tolstat.study.tolerances.zone_laws import plane_scores
 
@@ -60,8 +57,6 @@ def draw(study: Study, rows: range | None = None) -> Table:
         _fill_grid(samples, study, numbers)
     elif study.listed is not None:
         _fill_listed(samples, study.listed, numbers)
-    elif study.groups:
-        _fill_frozen(samples, study, numbers)
     else:
         _fill_scatter(samples, study, numbers)
     return table
@@ -78,29 +73,13 @@ def draw_blocks(study: Study, rows: range) -> Iterator[Table]:
 
 
 def origin_blocks(study: Study, rows: range) -> Iterator[Table] | None:
-    """Return tables of how `rows` are drawn, of at most `BLOCK` rows each; None if the method has none."""
-    if study.sampling.method == "subset":
-        return iter([_level_0(study, rows)])
-    if study.sampling.method != "importance":
+    """Return a table of how `rows` are drawn, those of level 0 of a subset simulation; None for other methods."""
+    if study.sampling.method != "subset":
         return None
-    return (_origin(study, rows[first : first + BLOCK]) for first in range(0, len(rows), BLOCK))
-
-
-def _level_0(study: Study, rows: range) -> Table:
     table = np.zeros(len(rows), SUBSET)
     table["level"][: len(rows) - len(study.sampling.samples(rows))] = -1  # the nominal joint
     table["parent"] = -1
-    return table
-
-
-def _origin(study: Study, rows: range) -> Table:
-    table = np.zeros(len(rows), IMPORTANCE)
-    table["component"] = -1  # the nominal joint
-    numbers = study.sampling.samples(rows)
-    drawn = table[len(rows) - len(numbers) :]
-    scores, drawn["component"] = _proposed(study, streams(study), numbers)
-    drawn["weight"] = weights(study.proposals, scores)
-    return table
+    return iter([table])
 
 
 def scores(study: Study, numbers: range) -> Array:
@@ -243,25 +222,8 @@ def _fill_listed(samples: Table, design: Design, numbers: range) -> None:
         samples[name] -= np.array([_nominal(operation, name) for operation in design.operations])[variant]
 
 
-def _fill_frozen(samples: Table, study: Study, numbers: range) -> None:
-    """Set the joints of each point: A, B, and for each group a copy of A with the errors of that group taken from B."""
-    size = len(study.groups) + 2
-    points = range(numbers.start // size, -(-numbers.stop // size))
-    point, part = np.divmod(np.arange(numbers.start, numbers.stop), size)
-    a, b = (_uniforms(streams(study), points, study, which) for which in ("", " B"))
-    u = {}
-    for number, group in enumerate(study.groups, start=2):
-        of_b, row = (part == 1) | (part == number), point - points.start
-        for stream in (stream for name in group.names for stream in axes.streams_of(name)):
-            u[stream] = np.where(of_b, b[stream][row], a[stream][row])
-    _fill_from(samples, study, u)
-
-
 def _fill_scatter(samples: Table, study: Study, numbers: range) -> None:
     u = _uniforms(streams(study), numbers, study)
-    if study.proposals:
-        scores, part = _proposed(study, list(u), numbers)
-        u = {name: np.where(part == 0, u[name], _probability(scores[name])) for name in u}
     _fill_from(samples, study, u, _of_lots(study, u, numbers) if study.sampling.joints_per_lot > 1 else {})
 
 
@@ -307,11 +269,8 @@ def _in_direction(radius: Array, direction: Array) -> Array:
     return np.array([radius * np.cos(direction), radius * np.sin(direction)])
 
 
-def _uniforms(names: Sequence[str], numbers: range, study: Study, stream: str = "") -> dict[str, Array]:
-    """Probabilities in (0, 1) of the samples `numbers`, independent from name to name; shape (len(numbers),) each.
-
-    Random probabilities of different `stream` are independent too; `sobol` and `lhs` ignore `stream`.
-    """
+def _uniforms(names: Sequence[str], numbers: range, study: Study) -> dict[str, Array]:
+    """Probabilities in (0, 1) of the samples `numbers`, independent from name to name; shape (len(numbers),) each."""
     seed, n, first = study.sampling.seed, len(numbers), numbers.start
     if study.sampling.method in ("sobol", "lhs"):
         size = study.samples // study.sampling.replicates
@@ -319,7 +278,7 @@ def _uniforms(names: Sequence[str], numbers: range, study: Study, stream: str = 
         parts = [_design(names, study, i // size, range(max(first, i) - i, min(numbers.stop - i, size))) for i in ends]
         return {name: np.concatenate([part[name] for part in parts] or [np.empty(0)]) for name in names}
     # a stream may give 0 itself, once in 2^53 draws
-    return {name: np.maximum(_stream(seed, name + stream, first).random(n), 2.0**-54) for name in names}
+    return {name: np.maximum(_stream(seed, name, first).random(n), 2.0**-54) for name in names}
 
 
 def _design(names: Sequence[str], study: Study, replicate: int, numbers: range) -> dict[str, Array]:
@@ -331,27 +290,6 @@ def _design(names: Sequence[str], study: Study, replicate: int, numbers: range) 
     suffix = f" {replicate}" if replicate else ""
     here = slice(numbers.start, numbers.stop)
     return {name: _stratified(n, _stream(seed, f"lhs {name}{suffix}"))[here] for name in names}
-
-
-def _proposed(study: Study, names: Sequence[str], numbers: range) -> tuple[dict[str, Array], NDArray[np.intp]]:
-    """Standard normal scores of the samples `numbers`, and the component of the mixture that each was drawn from.
-
-    A sample i drawn from the tolerances (component 0) equals sample i of the random campaign.
-    """
-    part = component(study.proposals, _stream(study.sampling.seed, "proposal", numbers.start).random(len(numbers)))
-    scores = {name: special.ndtri(u) for name, u in _uniforms(names, numbers, study).items()}
-    for number, proposal in enumerate(study.proposals, 1):
-        here = part == number
-        for name, (mean, deviation) in proposal.scores.items():
-            scores[name][here] = mean + deviation * scores[name][here]
-        for known in proposal.processes:
-            first = known.streams[0]
-            u, v = (_stream(study.sampling.seed, f"{key} {first}", numbers.start) for key in ("deviation", "mean"))
-            spread = process.deviation(np.maximum(u.random(len(numbers))[here], 2.0**-54), known.parts)
-            middle = spread * special.ndtri(np.maximum(v.random(len(numbers))[here], 2.0**-54)) / np.sqrt(known.parts)
-            for name in known.streams:
-                scores[name][here] = middle + spread * scores[name][here]
-    return scores, part
 
 
 def _probability(scores: Array) -> Array:

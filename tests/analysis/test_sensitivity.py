@@ -1,4 +1,4 @@
-"""Causes: Sobol' indices, rank regression and the tail, on functions with known answers; coverage over seeds."""
+"""Causes: Sobol' indices and the tail, on functions with known answers; coverage over seeds."""
 
 import numpy as np
 import pytest
@@ -114,29 +114,6 @@ def test_a_load_that_does_not_scatter_has_no_indices():
 
 
 @pytest.mark.slow
-def test_rank_coefficients_cover_over_seeds_and_without_the_groups_number_they_do_not():
-    rng, covered, narrow = np.random.default_rng(77), [], []
-    rho = SLOPES / np.sqrt(SLOPES @ SLOPES)
-    truth = 6.0 / np.pi * np.arcsin(0.5 * rho)  # Spearman's of a normal pair; the errors are independent
-    for _ in range(SEEDS):
-        found = ranks.regression(*linear(200, rng))
-        half = 0.5 * (found.upper - found.lower)
-        covered.append(np.abs(found.estimate - truth) <= half)
-        narrow.append(np.abs(found.estimate - truth) <= half / np.sqrt(ranks.GROUPS))
-    assert np.all(np.mean(covered, axis=0) >= LEAST)
-    assert np.all(np.mean(narrow, axis=0) < LEAST)
-
-
-def test_rank_coefficients_do_not_see_how_a_monotone_load_is_bent():
-    x, y = linear(500, np.random.default_rng(1))
-    straight, bent = ranks.regression(x, y), ranks.regression(x, np.exp(5.0 * y))
-    assert bent.estimate == pytest.approx(straight.estimate)
-    assert np.sign(bent.estimate[:3]).tolist() == [1, 1, -1]
-    assert straight.r2 > 0.9
-    assert ranks.regression(x, y**2).r2 < 0.1
-
-
-@pytest.mark.slow
 def test_probability_of_the_larger_error_covers_and_a_binomial_interval_does_not():
     rng, shift, covered, narrow = np.random.default_rng(4), 0.8, [], []
     above = np.arange(300) < 25
@@ -180,8 +157,6 @@ def test_direction_and_size_are_told_apart():
     ("call", "message"),
     [
         (lambda: sensitivity.first_order(np.zeros((10, 2)), np.zeros(10)), "too few"),
-        (lambda: ranks.regression(np.zeros((30, 2)), np.arange(30)), "too few"),
-        (lambda: ranks.regression(np.zeros((80, 2)), np.arange(80)), "scatter"),
         (lambda: ranks.tail(np.eye(60), np.arange(60) < 3), "3 of 60 joints"),
     ],
 )
@@ -221,5 +196,5 @@ def test_exchanging_the_sides_of_a_limit_mirrors_the_interval():
 def test_dependent_samples_have_no_interval():
     x, y = linear(300, np.random.default_rng(6))
     ends = [sensitivity.first_order(x, y, iid=False).lower, sensitivity.first_and_total(x, y, iid=False)[1].upper]
-    ends += [ranks.regression(x, y, iid=False).lower, ranks.tail(x, y > 0.8, iid=False).size.upper]
+    ends.append(ranks.tail(x, y > 0.8, iid=False).size.upper)
     assert np.isnan(ends).all()

@@ -344,7 +344,7 @@ def test_completion_knows_the_commands_and_loads_nothing_heavy():
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, env=os.environ | asked
     )
-    assert done.stdout.split() == ["replay", "report", "reweight"]
+    assert done.stdout.split() == ["replay", "report"]
     assert done.stderr.strip() == "[]"
 
 

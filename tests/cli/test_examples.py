@@ -77,8 +77,6 @@ TABLES = {
     "capability": ("--one-in", 100),
     "worst": (),
     "causes": (),
-    "reweight": ("--set", "pin*.offset_t.cpk=1.2"),
-    "allocate": ("--target", "P(cross1.F > 700 N) < 0.25"),
     "compare": ("other.h5", "--by", "cross1.F"),
 }
 

@@ -22,7 +22,7 @@ COMMANDS = (
         "bearing-life",
         "orders",
     ),
-    *("reweight", "allocate", "compare", "shafts", "rare", "export", "docs", "cache"),
+    *("compare", "shafts", "rare", "export", "docs", "cache"),
 )
 
 
@@ -114,8 +114,6 @@ MAIN = Campaign(
             "causes iso2768_f.h5 --by cross1.X",
             "fatigue iso2768_f.h5",
             "bearing-life iso2768_f.h5",
-            "reweight iso2768_f.h5 --set pin1.offset_t.cpk=1.2",
-            "allocate iso2768_f.h5 --target 'P(any limit) < 0.1'",
             "replay iso2768_f.h5 --row 900",
             "report iso2768_f.h5 --point cruise",
             "report iso2768_f.h5 --accept '300 %'",

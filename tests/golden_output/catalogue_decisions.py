@@ -5,7 +5,6 @@ from __future__ import annotations
 from tests.golden_output.catalogue import Campaign, forms, plain, usual
 from tests.golden_output.catalogue_studies import HISTORIES, cheap
 
-PROPOSAL = '|[limits]|[[proposal]]\\nshare = 0.4\\nwiden = 1.3\\nshift = { "pin1.tilt_z" = 1.0 }\\n\\n[limits]|'
 CASES = (
     '|[sweep]|[[case]]\\nname = "tilt"\\nerrors.pin1.tilt_z = "0.4 deg"\\n\\n[[variant]]\\nname = "family"\\n'
     'points = 3\\nvary.contact.clearance = { from = "0.05 mm", to = "0.15 mm" }\\nnote = "narrower and wider"\\n\\n'
@@ -40,15 +39,6 @@ LHS = Campaign(
     ],
     usual("lhs.h5") | {"extend": ["extend lhs.h5 --n 128"], "compare": ["compare lhs.h5 lhs.h5 --json"]},
 )
-IMPORTANCE = Campaign(
-    "importance",
-    [
-        cheap("iso2768_f"),
-        f"sed '{PROPOSAL}' iso2768_f.toml",
-        "run iso2768_f.toml --n 96 --set sampling.method=importance",
-    ],
-    usual("iso2768_f.h5"),
-)
 PARTS = Campaign(
     "known_parts",
     ["run known_parts.toml --n 96"],
@@ -57,8 +47,12 @@ PARTS = Campaign(
         "more_parts": [
             "sed '|known_from = 30|known_from = 200|' known_parts.toml",
             "run known_parts.toml --n 96",
-            "capability known_parts.h5",
-        ]
+        ],
+        "assumptions": [
+            "assumptions known_parts.h5 --run --accept '20 %'",
+            *forms("assumptions known_parts.h5 --accept '20 %'"),
+            "report known_parts.h5 --accept '20 %'",
+        ],
     },
 )
 LOTS = Campaign(
@@ -81,21 +75,7 @@ DECIDED = Campaign(
             *forms("causes iso2768_f.h5 --by cross1.T --top 5"),
             "causes iso2768_f.h5 --logarithm",
         ],
-        "reweight": forms("reweight iso2768_f.h5 --set 'pin*.tilt_[tz].cpk=1.2' --set 'hole*.diameter.cpk=1.2'"),
-        "reweight_out": ["reweight iso2768_f.h5 --set 'pin*.tilt_[tz].cpk=1.2' --out changed"],
-        "allocate": [
-            *forms("shape: allocate iso2768_f.h5 --target 'P(any limit) < 0.2'"),
-            "shape: allocate iso2768_f.h5 --target 'P(cross*.T > 60 N*m) < 0.05' --keep 'pin*.diameter' --out new",
-        ],
         "fatigue": forms("fatigue iso2768_f.h5"),
-    },
-)
-FROZEN = Campaign(
-    "pick_freeze",
-    [cheap("iso2768_f"), "causes iso2768_f.toml --points 50 --by cross1.F"],
-    {
-        "causes": forms("causes iso2768_f_causes.h5 --by cross1.F"),
-        "status": ["status iso2768_f_causes.h5", "report iso2768_f_causes.h5", "capability iso2768_f_causes.h5"],
     },
 )
 RARE = Campaign(

@@ -1,4 +1,4 @@
-"""What commands say about joints of lots, of sorted parts, of a pick-freeze design, and listed ones."""
+"""What commands say about joints of lots, of sorted parts, and listed ones."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from tests.golden_output import catalogue_decisions as catalogue
 from tests.golden_output.catalogue import Campaign, cases
 from tests.golden_output.conftest import Check
 
-CAMPAIGNS = (catalogue.LOTS, catalogue.FROZEN, catalogue.LISTED)
+CAMPAIGNS = (catalogue.LOTS, catalogue.LISTED)
 
 
 @pytest.mark.slow

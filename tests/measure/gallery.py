@@ -25,6 +25,7 @@ from tolstat.display import style
 from tolstat.display.answer import Answer
 from tolstat.display.blocks import Panel, Panels
 from tolstat.joint import operating
+from tolstat.questions.shares import with_ends
 
 mpl.use("Agg")
 from matplotlib import pyplot as plt
@@ -81,10 +82,22 @@ def welded_fork(folder: Path) -> None:
 
 
 def known_parts(folder: Path) -> None:
-    """Draw the three intervals of the shares exceeded most, as the page does."""
+    """Draw the share as drawn, and with each spread and mean that the parts leave open, after `assumptions --run`."""
     with tolstat.open(folder / "known_parts.h5") as store:
-        answer = tolstat.known_parts(store.view())
-    as_on_page(answer, (6.5, 3.6), folder / "known_parts.png")
+        answer = tolstat.assumptions(store.view())
+    rows = [row for row in answer.tables["assumptions"].rows if row["because"].endswith("parts measured")]
+    drawn = [answer.facts[key] for key in ("share", "lower", "upper")]
+    rows = [{"label": "as the parts show", **with_ends("share", drawn)}, *rows]
+    with style.settings():
+        figure, ax = plt.subplots(figsize=(6.5, 3.6), layout="constrained")
+        for y, row in enumerate(rows):
+            share, *ends = (100.0 * row[f"share{end}"] for end in ("", "_lower", "_upper"))
+            ax.plot(ends, [y, y], color=style.INK, lw=1.6)
+            ax.plot(share, y, "o", color=style.COLOURS[0], ms=6.0)
+        ax.set_yticks(range(len(rows)), [row["label"] for row in rows])
+        ax.invert_yaxis()
+        ax.set_xlabel("share of the joints that exceed a limit, per cent")
+        save(figure, folder / "known_parts.png")
 
 
 def overnight(folder: Path) -> None:

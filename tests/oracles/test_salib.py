@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.analysis.test_sensitivity import ISHIGAMI_FIRST, ISHIGAMI_TOTAL
-from tolstat.analysis import pick_freeze, sensitivity
+from tolstat.analysis import exchanged, sensitivity
 
 pytest.importorskip("SALib", reason="pip install .[oracles]")
 from SALib.analyze import rbd_fast, sobol
@@ -27,7 +27,7 @@ def test_indices_of_saltellis_design(n):
     loads = ishigami(saltelli.sample(PROBLEM, n, calc_second_order=False, seed=1))
     theirs = sobol.analyze(PROBLEM, loads, calc_second_order=False, num_resamples=2000, seed=1)
     a, b, ab = loads[::5], loads[4::5], loads.reshape(n, 5)[:, 1:4]
-    found = pick_freeze.indices(a, b, ab)
+    found = exchanged.indices(a, b, ab)
     np.testing.assert_allclose(found.total.estimate, theirs["ST"], rtol=0, atol=1e-12)
     shift = loads.mean() - 0.5 * (a.mean() + b.mean())
     centred = found.first.estimate - shift * (ab - a[:, None]).mean(axis=0) / found.variance
@@ -43,7 +43,7 @@ def test_both_are_near_the_closed_form():
     """With 4096 points of Sobol' both are within 0.0011 of the closed form (Homma and Saltelli 1996)."""
     loads = ishigami(saltelli.sample(PROBLEM, 4096, calc_second_order=False, seed=1))
     theirs = sobol.analyze(PROBLEM, loads, calc_second_order=False, num_resamples=2, seed=1)
-    found = pick_freeze.indices(loads[::5], loads[4::5], loads.reshape(-1, 5)[:, 1:4])
+    found = exchanged.indices(loads[::5], loads[4::5], loads.reshape(-1, 5)[:, 1:4])
     for first, total in ((found.first.estimate, found.total.estimate), (theirs["S1"], theirs["ST"])):
         np.testing.assert_allclose(first, ISHIGAMI_FIRST, rtol=0, atol=0.0015)
         np.testing.assert_allclose(total, ISHIGAMI_TOTAL, rtol=0, atol=0.0015)

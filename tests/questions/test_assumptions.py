@@ -362,11 +362,6 @@ SWEEP = synthetic.SWEEP.replace("points = 11", "points = 5") + '[limits]\n"cross
 REFUSED = {
     "no limits": (TEXT.partition("[limits]")[0] + ASSUMED, "has no limits"),
     "a sweep": (SWEEP, "holds several joints"),
-    "weights": (
-        TEXT.replace("seed = 3", 'seed = 3\nmethod = "importance"')
-        + '\n[[proposal]]\nshare = 0.5\nwiden = { "pin[12].offset_z" = 1.7 }\n',
-        "weight",
-    ),
 }
 
 

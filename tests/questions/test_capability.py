@@ -8,7 +8,7 @@ from scipy.special import nctdtr
 from scipy.stats import betabinom, lognorm, norm, normaltest, t
 
 from tests.support.views import view
-from tolstat.analysis import binomial, capability, extreme, prediction
+from tolstat.analysis import binomial, capability, prediction
 from tolstat.analysis.design import Listed
 from tolstat.analysis.sample import Sample
 from tolstat.common.loads import ANY_LIMIT
@@ -190,20 +190,6 @@ def test_indices_that_must_not_be_used_are_not_given():
     made = view(limits={"cross1.F": 700.0}, failed=60)
     assert limits_of(made)[["cpk", "cpk_lower", "cpk_normal"]].isna().all(axis=None)
     assert "as uncertain as sampling" in notes_of(made)
-
-
-def test_a_tail_that_is_not_generalised_pareto_is_not_extrapolated(monkeypatch):
-    made = view(limits={"cross1.F": 700.0}, n=2001)
-    good = question.capability(made, one_in=[1000.0])
-    assert np.isfinite(good.frame("one_in")["estimate"]).all()
-    assert [part for part in good.parts if isinstance(part, Sentence) and part.place == "warning"] == []
-    monkeypatch.setattr(extreme, "NO_TAIL", 1.1)
-    poor = question.capability(made, one_in=[1000.0])
-    table = poor.frame("one_in")
-    assert table.loc[0, "estimate":"shape_upper"].isna().all()
-    assert table["p"].notna().all()
-    (warning,) = (part.text for part in poor.parts if isinstance(part, Sentence) and part.place == "warning")
-    assert warning.startswith("cross1.F: the tail is not generalised Pareto")
 
 
 @pytest.mark.parametrize("n", [20, 61, 3000])

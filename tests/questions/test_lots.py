@@ -11,7 +11,6 @@ import tolstat
 from tests.support import exceedance, fakes, synthetic
 from tests.support.views import view
 from tolstat import sampling
-from tolstat.analysis import allocation
 from tolstat.campaign import stop_rule
 from tolstat.campaign.extend import merge
 from tolstat.cli import app
@@ -95,13 +94,6 @@ def test_what_needs_independent_joints_is_refused(tmp_path):
     rule = stop_rule.parse("P(cross1.F > 700 N) width < 0.1", {})
     with pytest.raises(InputError, match="share lots"):
         stop_rule.run_until(_study(tmp_path, 2), tmp_path / "a.h5", rule, print)
-
-
-def test_halves_are_of_whole_lots():
-    lot = np.repeat(np.arange(7), 5)[3:]
-    searched, checked = allocation.halves(lot, 100)
-    assert set(lot[searched]) == {0, 2, 4, 6}
-    assert set(lot[checked]) == {1, 3, 5}
 
 
 def test_fewer_than_thirty_lots_and_joints_on_their_own_have_no_table():

@@ -1,22 +1,19 @@
-"""Zones in questions: other zones by reweighting, scaled entries, causes by component."""
+"""Zones in questions: other zones, scaled entries, causes by component."""
 
 from __future__ import annotations
-
-from functools import partial
 
 import numpy as np
 import pytest
 
 from tests.support import synthetic
 from tests.support.synthetic import HEAD
-from tolstat import sampling, study
+from tolstat import study
 from tolstat.common.errors import InputError
 from tolstat.common.tables import Simulation
 from tolstat.questions.causes.errors import causes
 from tolstat.store import View, Writer
 from tolstat.study import scaling
 from tolstat.study.scaling import changed
-from tolstat.study.tolerances.density_ratio import log_ratios
 
 ENTRIES = (
     HEAD
@@ -43,28 +40,6 @@ def load(folder, text=ENTRIES):
     return study.load(folder / "plan.toml")
 
 
-def test_reweighted_joints_have_the_moments_of_narrower_zones(tmp_path):
-    plan = load(tmp_path)
-    new = changed(plan, NARROWER)
-    assert sum(new[name] != plan.tolerances[name] for name in new) == 11
-    assert sum(name.startswith("hole") and new[name] == plan.tolerances[name] for name in new) == 2
-    errors = sampling.draw(plan)[1:]
-    values = partial(sampling.values, plan, errors)
-    ratios = np.exp(log_ratios(new, plan.tolerances, plan.copula, values, len(errors)))
-    assert ratios.mean() == pytest.approx(1.0, abs=0.08)
-    text = ENTRIES
-    for old, narrow in (("0.05 mm", "0.04 mm"), ("0.02 mm", "0.018 mm"), ('"0.04 mm"', '"0.036 mm"')):
-        text = text.replace(f"⌀{old}" if '"' not in old else old, f"⌀{narrow}" if '"' not in old else narrow)
-    text = text.replace('⌀0.1 mm", over = "36', '⌀0.09 mm", over = "36').replace("dia 0.1", "dia 0.09")
-    fresh = sampling.draw(load(tmp_path, text + "seed = 5\n"))[1:]
-    for name in ("pin1.offset_t", "pin2.tilt_z", "hole1.offset_z", "hole1.tilt_t", "hole4.offset_t", "hole3.tilt_t"):
-        moment = np.average(errors[name] ** 2, weights=ratios)
-        plain = np.mean(errors[name] ** 2)
-        assert moment == pytest.approx(np.mean(fresh[name] ** 2), rel=0.1), name
-        if name != "hole1.offset_z":
-            assert moment < 0.95 * plain, name
-
-
 @pytest.mark.parametrize(
     ("setting", "found"),
     [
@@ -75,7 +50,7 @@ def test_reweighted_joints_have_the_moments_of_narrower_zones(tmp_path):
         ("pin1.position.zone=0.09 mm", "must say that it is a diameter"),
     ],
 )
-def test_changes_that_no_weight_can_make(tmp_path, setting, found):
+def test_changes_to_another_shape_are_refused(tmp_path, setting, found):
     with pytest.raises(InputError, match=found):
         changed(load(tmp_path), [setting])
 
@@ -86,7 +61,6 @@ def test_zones_are_scaled_as_written(tmp_path):
     assert "hole[12].position" not in found  # its direction has a zone, too
     assert len(found) == 5
     assert found["output_holes.position"].width == pytest.approx(1e-4)
-    assert [t.widens for t in found.values()] == [False, False, True, False, False]
     new = scaling.rewritten(plan, {pattern: t.scaled(0.5, 3) for pattern, t in found.items()}, 3)
     assert '"pin[12].position" = { zone = "⌀0.05 mm", over = "36 mm", distribution = "normal" }' in new
     half = load(tmp_path, new)

@@ -12,7 +12,6 @@ from tests.support.views import view
 from tolstat import sampling
 from tolstat.analysis import prediction
 from tolstat.analysis.binomial import clopper_pearson, needed
-from tolstat.analysis.sample import Sample
 from tolstat.cli import app
 from tolstat.common.tables import RESULT, Simulation, Status
 from tolstat.display.answer import Asked
@@ -26,12 +25,10 @@ from tolstat.store import ResultFile, Writer
 from tolstat.study import load
 
 ONE = synthetic.STUDY.partition("[limits]")[0] + '[limits]\n"cross1.F" = "1500 N"\n'
-PROPOSAL = '\n[[proposal]]\nshare = 0.5\nwiden = { "pin[12].offset_t" = 1.7 }\n'
 
 
 def study(n=60, method="random", text=ONE):
-    made = text.replace("n = 60", f'n = {n}\nmethod = "{method}"')
-    return made + PROPOSAL if method == "importance" else made
+    return text.replace("n = 60", f'n = {n}\nmethod = "{method}"')
 
 
 def interfering(folder):
@@ -67,10 +64,6 @@ MISLEADING = {
     "failed at one point": (failed_at_one_point, "none", "66.7 % of the joints have no result (40 of 60)"),
     "Sobol'": (lambda d: synthetic.store(d, study(64, "sobol")), "none", "shares of Sobol' points have no interval"),
     "Latin hypercube": (lambda d: synthetic.store(d, study(64, "lhs")), "none", "a Latin hypercube have no interval"),
-    "importance": (
-        lambda d: synthetic.store(d, study(300, "importance")), "open",
-        "open: 0 % exceed 1500 N on cross1.F (0 .. 2.31 %); 1 % is accepted",
-    ),
     "interrupted": (
         lambda d: synthetic.store(d, study(600), simulated=300), "open",
         "open: 0 % exceed 1500 N on cross1.F (0 .. 1.23 %); 1 % is accepted; 368 joints would decide it",
@@ -120,11 +113,6 @@ def test_no_verdict_says_more_than_the_file(tmp_path, name):
         ("all failed", "no verdict: 100 % of the joints have no result (60 of 60)"),
         ("half interfering", "no verdict: 59 % of the joints have no result (36 of 61)"),
         ("Sobol'", "100 % of the joints keep the limit (64 of 64; no interval)"),
-        (
-            "importance",
-            "0 % of the joints exceed 1500 N on cross1.F, the limit exceeded most (total interval 0 .. 2.31 %; "
-            "whatever the proposals miss, at most 2.25 %)",
-        ),
         ("interrupted", "100 % of the joints keep the limit (299 of 299; total interval 98.8 .. 100 %)"),
         ("three joints", "no verdict: 3 joints are too few"),
     ],
@@ -212,22 +200,6 @@ def test_the_joint_verdict_covers_joints_without_a_load():
     row = exceedance.all_limits(view(failed=3, limits={"cross1.F": 2000.0, "cross2.F": 3000.0}))
     assert (row["count"], row["n_failed"]) == (0, 3)
     assert ends(row)[1] == pytest.approx(clopper_pearson(3, 200)[1])
-
-
-@pytest.mark.parametrize(("accepted", "answer"), [(0.02, "no"), (0.5, "none")])
-def test_where_the_weights_support_no_joint_share_one_limit_can_only_be_missed(monkeypatch, accepted, answer):
-    made = apart(100)
-    few = "few joints have most of the weight: 1 effective"
-    monkeypatch.setattr(Sample, "doubt", lambda self, level: few if self.name == "any limit" else "")
-    found = headline.headline(made, accepted)
-    assert found.answer == answer
-    if answer == "no":
-        assert "exceed 700 N on cross1.F" in found.words
-        assert found.notes[-1].startswith(
-            "No share of the joints that exceed at least one limit: above any limit, few joints"
-        )
-    else:
-        assert "above any limit, few joints have most of the weight" in found.words
 
 
 def test_of_limits_that_are_exceeded_equally_often_the_leading_load_is_named_and_marked():

@@ -284,7 +284,6 @@ def test_limits_and_their_verdicts_stand_on_the_page(view, html):
 @pytest.mark.parametrize(("low", "high", "answer"), [(0.01, 0.05, "yes"), (0.04, 0.06, "open"), (0.051, 0.2, "no")])
 def test_a_limit_is_kept_when_the_whole_interval_is_below_what_is_accepted(low, high, answer):
     counted = {"n": 100, "n_failed": 0, "n_unsettled": 0, "count": 4, "bound_lower": 0.04, "bound_upper": 0.04}
-    counted["unsearched_upper"] = np.nan  # joints of equal weight
     wide = counted | {"outer_lower": 0.03, "outer_upper": 0.04, "total_lower": low, "total_upper": high}
     assert verdict.verdict(wide, 0.05) == answer
     narrow = counted | {"outer_lower": low, "outer_upper": high, "total_lower": np.nan, "total_upper": np.nan}
@@ -435,35 +434,6 @@ def test_wrong_options_write_nothing(path, tmp_path, monkeypatch, arguments, sai
     assert said in done.stderr
     assert "hint:" in done.stderr
     assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.slow
-def test_joints_of_different_weight_are_counted_by_it_and_told_so(tmp_path):
-    proposal = '\n[[proposal]]\nshare = 0.5\nwiden = { "pin[12].offset_t" = 1.7 }\n'
-    text = synthetic.WHOLE.replace("n = 60", 'method = "importance"\nn = 300') + proposal
-    path = synthetic.store(tmp_path, text, failed=3)
-    page.write_page(path, tmp_path / "page.html", accepted=0.05, replay=0)
-    html = (tmp_path / "page.html").read_text(encoding="utf-8")
-    sections = Reading(html).sections
-    assert among(sections, ["verdict", "exceedance", "failed", "worst", "modes", "provenance"])
-    assert not {"capability", "causes"} & set(sections)
-    with ResultFile.open(path) as store:
-        weights, results = store.origin()["weight"][1:], store.results()[1:]
-    valid = results["status"] == Status.OK
-    above = (results["F_max"][:, 0] > 700.0) & valid
-    share = weights[above].sum() / weights[valid].sum()
-    assert abs(share - above.sum() / valid.sum()) > 1e-3
-    assert f"{100 * share:.3g} %" in html
-    assert "counted by their weights" in html
-    assert "Causes are left out" in html
-
-
-def test_a_design_for_indices_has_its_causes_and_no_shares(tmp_path):
-    text = synthetic.STUDY.replace("n = 60", 'method = "pick_freeze"\ngroups = "error"\nn = 100')
-    sections, said = words(synthetic.store(tmp_path, text))
-    assert "causes" in sections
-    assert "capability" not in sections
-    assert "pin1.offset_t" in said
 
 
 def test_what_is_no_sample_has_no_page(tmp_path):

@@ -154,7 +154,7 @@ MANY = (
 )
 
 
-@pytest.mark.parametrize("method", ["random", "sobol", "lhs", "pick_freeze"])
+@pytest.mark.parametrize("method", ["random", "sobol", "lhs"])
 def test_what_is_drawn_is_found_again_in_the_errors(make: Make, method: str) -> None:
     s = make(*MANY, n=1000, method=method)
     errors = sampling.draw(s)
@@ -171,15 +171,6 @@ def test_what_is_drawn_is_found_again_in_the_errors(make: Make, method: str) -> 
         assert np.abs(matrix).max() < 0.15
         for name, own in scores.items():
             assert stats.kstest(own, stats.norm.cdf).pvalue > 1e-3, name
-
-
-def test_pick_freeze_exchanges_what_is_drawn(make: Make) -> None:
-    s = make(*MANY, n=50, method="pick_freeze")
-    errors = sampling.draw(s)[1:].reshape(50, len(s.groups) + 2)
-    for name in s.tolerances:
-        values = np.array([sampling.values(s, block, name) for block in errors])
-        for number, group in enumerate(s.groups, start=2):
-            np.testing.assert_allclose(values[:, number], values[:, int(name in group.names)], rtol=1e-9, err_msg=name)
 
 
 def test_zones_leave_other_draws_as_they_are(make: Make) -> None:

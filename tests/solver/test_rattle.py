@@ -16,7 +16,6 @@ from tests.support.environment import ROOT
 from tolstat import joint, sampling, study
 from tolstat.analysis.estimates import Inexact
 from tolstat.analysis.sample import Sample
-from tolstat.analysis.weighted import Weighted
 from tolstat.campaign import plan
 from tolstat.common.tables import PARAM, RESULT, Method, Options, Status, iterations_allowed
 from tolstat.joint import ideal
@@ -242,8 +241,6 @@ def test_a_stationary_joint_counts_on_both_sides_of_a_limit_inside_its_interval(
     for level, least, count, most in ((5.5, 3, 3, 3), (6.5, 2, 3, 3), (7.5, 2, 2, 3), (8.0, 1, 1, 2), (8.5, 1, 1, 1)):
         found = replace(Sample.of(values, status), inexact=ends).above(level)
         assert (found.bound_lower, found.estimate, found.bound_upper) == (least / 4, count / 4, most / 4)
-        row = replace(Sample.of(values, status, Weighted(np.ones(4))), inexact=ends).above(level)
-        assert (row.bound_lower, row.bound_upper) == pytest.approx((least / 4, most / 4))
     assert exceedance.exceedance(values, status, 6.5).bound_lower == 0.75
 
 

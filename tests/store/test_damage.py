@@ -193,12 +193,11 @@ def test_damage_is_told_before_anything_goes_to_standard_output(path: Path, monk
     assert (done.exit_code, done.stdout) == (2, "")
 
 
-@pytest.mark.parametrize(("name", "message"), [("origin/weight", "origin/weight"), ("origin/component", "origin/comp")])
+@pytest.mark.parametrize(("name", "message"), [("origin/level", "origin/level"), ("origin/parent", "origin/parent")])
 def test_how_joints_were_drawn_is_checked(tmp_path: Path, name: str, message: str) -> None:
-    proposal = '[[proposal]]\nshare = 0.5\nwiden = { "pin*.offset_t" = 2.0 }\n'
-    source = synthetic.STUDY.replace("n = 60", 'n = 60\nmethod = "importance"')
-    (tmp_path / "a.toml").write_text(source + proposal, encoding="utf-8")
-    plan, rows = study.load(tmp_path / "a.toml"), range(61)
+    (tmp_path / "a.toml").write_text(synthetic.STUDY, encoding="utf-8")
+    settings = {"load": "cross1.F", "levels": {"cross1.F": 900.0}, "per_level": 60, "p0": 0.1}
+    plan, rows = study.subset_of(study.load(tmp_path / "a.toml"), settings), range(61)
     Writer.create(tmp_path / "a.h5", plan, draw_blocks(plan, rows), origin=origin_blocks(plan, rows)).close()
     damage.flip_in(tmp_path / "a.h5", name, 5, 0)
     with ResultFile.open(tmp_path / "a.h5") as store, pytest.raises(StoreError, match=f"damaged: {message}"):

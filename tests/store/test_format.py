@@ -124,19 +124,18 @@ def test_codes_carry_their_meanings(whole: Path) -> None:
         assert text(file["nominal"].attrs, "flag_meanings") == "joint_with_errors nominal_joint"
 
 
-def test_meanings_of_cases_families_and_proposals_are_words(whole: Path, tmp_path: Path) -> None:
+def test_meanings_of_cases_and_families_are_words(whole: Path, tmp_path: Path) -> None:
     with h5py.File(whole) as file:
         held = metadata.read(file)
     variants = [tables.Variant(family, {}) for family in ("a b", "a b", "c")]
     design = metadata.Design(cases=("ideal", "tilted by 1°"), variants=variants)
-    codes = layout.meanings_of(held.model_copy(update={"design": design, "identity": {"proposal": [[0.5, {}]]}}))
+    codes = layout.meanings_of(held.model_copy(update={"design": design}))
     with h5py.File(tmp_path / "b.h5", "w") as file:
         for name, meanings in codes.items():
             layout.put_meanings(file.create_dataset(name, (2,), "i4"), meanings)
         told = {name: text(dataset.attrs, "flag_meanings") for name, dataset in file.items()}
     assert told["case"] == "ideal tilted_by_1_"
     assert told["variant"] == "a_b_0 a_b_1 c"
-    assert told["component"] == "nominal_joint tolerances proposal_1"
 
 
 def test_axes_of_histories_have_names(tmp_path: Path) -> None:

@@ -23,7 +23,6 @@ from tolstat.common.errors import InputError
 from tolstat.common.strict import Strict
 from tolstat.study import schema, starter
 from tolstat.study.model import Subset
-from tolstat.study.proposal import RANGES, ProposalEntry
 from tolstat.study.selection import TOLERANCED, Entry, resolve
 from tolstat.study.tolerances.entry import Site
 
@@ -52,9 +51,6 @@ between = ["pin1.offset_t", "pin2.offset_t"]
 rho = 0.6
 [sampling]
 n = 8
-[[proposal]]
-share = 0.3
-shift."pin*.offset_t" = 2.0
 [limits]
 "cross*.F" = "700 N"
 psi = 1e-3
@@ -90,7 +86,6 @@ BROKEN = [
     ("n = 8", 'method = "subset"'),
     ('"cross*.F"', '"cross*.G"'),
     ('"700 N"', "700"),
-    ("share = 0.3", "part = 0.3"),
     ("errors.pin1.tilt_z", "error.pin1.tilt_z"),
     ('to = "75.6 mm"', 'until = "75.6 mm"'),
     ('S0 = "150 N*m"', "S0 = 150"),
@@ -129,28 +124,6 @@ def test_the_case_and_the_joints_are_accepted() -> None:
 
 def test_a_study_with_all_kinds_of_tables_is_accepted() -> None:
     assert faults("study", GOOD) == []
-
-
-def test_every_vector_of_a_zone_can_be_shifted() -> None:
-    """Names of what is drawn, from studies with each kind of zone."""
-    zone, over = '{ zone = "⌀0.02 mm", distribution = "normal"', ', over = "22 mm"'
-    plane = f'{zone.replace("⌀", "")}{over}, about = "t" }}'
-    tables = {
-        "ends": f'"*.position" = {zone}{over} }}',
-        "middle": f'"*.position" = {zone.replace("0.02", "0.1")}{over} }}\n"pin*.perpendicularity" = {zone}{over} }}',
-        "components": f'"hole*.angularity" = {plane}\n"*_pins.coaxiality" = {zone}{over} }}',
-        "offsets": '"*.offset_radial" = { plus_minus = "0.1 mm", distribution = "rayleigh" }',
-    }
-    drawn = set()
-    for entries in tables.values():
-        text = f"{GOOD.partition('[errors]')[0]}[tolerances]\n{entries}\n[sampling]\nn = 8\n"
-        drawn |= study.load("x.toml", text=text).tolerances.keys()
-    assert {"pin1.position", "pin1.position_outer", "input_pins.coaxiality_pin3", "hole1.angularity_t"} <= drawn
-    for key in ("shift", "widen"):
-        proposal = {"share": 0.3, key: dict.fromkeys(sorted(drawn), 2.0)}
-        VALIDATORS["study"].validate({**tomllib.loads(GOOD), "proposal": [proposal]})
-        wrong = {"share": 0.3, key: {"pin1.position_pin3": 2.0}}
-        assert not VALIDATORS["study"].is_valid({**tomllib.loads(GOOD), "proposal": [wrong]})
 
 
 def test_several_operating_points_are_accepted_in_a_study_only() -> None:
@@ -231,12 +204,6 @@ def readable(field: FieldInfo, example: object) -> bool:
             adapter.validate_python(example, context={"site": Site("pin1.tilt_z", unit, 0.0, ROOT / "studies")})
             return True
     return False
-
-
-@pytest.mark.parametrize("key", list(RANGES))
-def test_a_proposal_states_the_ranges_of_its_keys(key: str) -> None:
-    low, high = RANGES[key]
-    assert f"from {low:g} to {high:.6g}" in schema.of_model(ProposalEntry)["properties"][key]["description"]
 
 
 SIDES = {"minimum": -1.0, "exclusiveMinimum": 0.0, "maximum": 1.0, "exclusiveMaximum": 0.0}

@@ -1,8 +1,7 @@
-"""Shares and quantiles of arrays of loads, whose joints are drawn independently, listed or weighted."""
+"""Shares and quantiles of arrays of loads, whose joints are drawn independently or listed."""
 
 from tolstat.analysis.design import Listed
 from tolstat.analysis.sample import Sample
-from tolstat.analysis.weighted import Weighted
 
 
 def exceedance(values, status, level, confidence=0.95, iid=True):
@@ -11,7 +10,3 @@ def exceedance(values, status, level, confidence=0.95, iid=True):
 
 def quantile(values, status, share, confidence=0.95, iid=True):
     return Sample.of(values, status, None if iid else Listed()).quantile(share, confidence)
-
-
-def weighted_exceedance(values, status, weights, level):
-    return Sample.of(values, status, Weighted(weights)).above(level)

@@ -125,8 +125,8 @@ def _posterior(
     np.add.at(times, (np.tile(np.arange(k.shape[1]), len(k)), which.ravel()), 1.0)
     log = times @ np.array([log_beta_binomial(above, of, a, b) for above, of in pairs.T])
     log += 0.5 * np.log(mean * (1.0 - mean)) + np.log(r * (1.0 - r))
-    weight = np.exp(log - log.max(axis=1, keepdims=True))
-    return a, b, weight / weight.sum(axis=1, keepdims=True)
+    posterior = np.exp(log - log.max(axis=1, keepdims=True))
+    return a, b, posterior / posterior.sum(axis=1, keepdims=True)
 
 
 class Clustered(Design):
@@ -214,7 +214,7 @@ def delivery(above: ArrayLike, joints: ArrayLike, number: int) -> FloatArray:
     spread = max(float(np.nan_to_num(interval(k, n).correlation)), 0.05)
     error = np.sqrt((1.0 + (n.mean() - 1.0) * spread) / (n.sum() * p * (1.0 - p)))
     means = special.logit(p) + np.linspace(-REACH, REACH, GRID) * min(float(error), 1.0)
-    a, b, (weight,) = _posterior(k[:, None], n[:, None], means, SPREADS)
-    likely = weight > NEGLIGIBLE
-    a, b, weight = a[likely, None], b[likely, None], weight[likely] / weight[likely].sum()
-    return np.asarray(weight @ np.exp(log_beta_binomial(np.arange(number + 1), number, a, b)))
+    a, b, (posterior,) = _posterior(k[:, None], n[:, None], means, SPREADS)
+    likely = posterior > NEGLIGIBLE
+    a, b, posterior = a[likely, None], b[likely, None], posterior[likely] / posterior[likely].sum()
+    return np.asarray(posterior @ np.exp(log_beta_binomial(np.arange(number + 1), number, a, b)))

@@ -1,6 +1,6 @@
 """What the joints of a campaign allow to conclude: the contract of a sampling design, and the plainest ones.
 
-Independent joints of equal weight; joints that are listed: sweeps, cases, designs, and one set of Sobol' points or one
+Independent joints; joints that are listed: sweeps, cases, and one set of Sobol' points or one
 Latin hypercube. The joints of such a set are not independent of each other, so formulas for independent samples do not
 give the uncertainty of its estimates. Sets of different seeds are independent, and so are the replicates of one file,
 which are consecutive blocks of its joints.
@@ -18,9 +18,9 @@ from tolstat.analysis.binomial import clopper_pearson, half_width
 from tolstat.analysis.estimates import Column, Estimate
 from tolstat.common.loads import FloatArray
 
-Claim = Literal["share", "quantile", "mean", "difference", "index", "tail", "band", "delivery", "reweighting"]
+Claim = Literal["share", "quantile", "mean", "difference", "index", "band", "delivery"]
 """What is estimated from joints. An index is one of capability or of sensitivity, or a number of joints needed; a band
-holds for a whole curve; reweighting counts the joints by other weights."""
+holds for a whole curve."""
 FEW = 20
 """Number of joints on a side of a level below which an interval over units contains that of independent joints, too."""
 SAMPLE = 'give the file of a study with sampling.method "random", "sobol" or "lhs"'
@@ -41,10 +41,6 @@ class Design:
         Name of the interval of a share.
     covers : str
         Sentence on the intervals of shares.
-    caveat : str
-        What else they depend on; empty if nothing.
-    counting : str
-        Sentence on how joints count; empty if equally.
     of_quantiles : str
         What the intervals of quantiles are of.
     of_delivery : str
@@ -60,8 +56,6 @@ class Design:
     claims: ClassVar[frozenset[Claim]] = frozenset()
     interval: str = ""
     covers: str = "no intervals: Clopper–Pearson holds for independent samples only"
-    caveat: str = ""
-    counting: ClassVar[str] = ""
     of_quantiles: ClassVar[str] = "of order statistics"
     of_delivery: ClassVar[str] = ""
     ranks_at_once: ClassVar[int] = 16
@@ -107,22 +101,6 @@ class Design:
         """Number of the unit of each of n joints, (n,): units are independent of each other."""
         return np.arange(n)
 
-    def counts_as(self, n: int) -> FloatArray:
-        """What each of n joints counts as, (n,); the mean is 1."""
-        return np.ones(n)
-
-    def doubt(self, x: Column, level: float) -> str:
-        """Return why the share above a level is not supported; empty if it is."""
-        return ""
-
-    def upper_if_missed(self, x: Column, level: float, confidence: float) -> float:
-        """Upper end of a share whatever was not drawn where it matters; NaN where the design misses nothing."""
-        return np.nan
-
-    def smallest(self, n: int, shares: FloatArray) -> float:
-        """Smallest share of n joints that a curve shows: that of one joint."""
-        return 1.0 / n
-
     def delivery(
         self, lower: Column, upper: Column, level: float, number: int, confidence: float
     ) -> tuple[float, float]:
@@ -152,7 +130,7 @@ class Design:
 class Independent(Design):
     """Joints drawn one by one from the tolerances: every claim has an interval."""
 
-    claims = frozenset(("share", "quantile", "mean", "difference", "index", "tail", "band", "delivery", "reweighting"))
+    claims = frozenset(("share", "quantile", "mean", "difference", "index", "band", "delivery"))
     interval = "Clopper–Pearson's"
     covers = "bands: pointwise 95 % Clopper–Pearson intervals of the settled joints"
 

@@ -190,8 +190,8 @@ def means(a: Sample, b: Sample, paired: bool, confidence: float = 0.95) -> Diffe
     else:
         parts = np.array([x.var(ddof=1) / x.size, y.var(ddof=1) / y.size])
         error = float(np.sqrt(parts.sum()))
-        weights = (parts**2 / np.array([x.size - 1.0, y.size - 1.0])).sum()
-        degrees = parts.sum() ** 2 / weights if weights else x.size + y.size - 2.0
+        inverse = (parts**2 / np.array([x.size - 1.0, y.size - 1.0])).sum()
+        degrees = parts.sum() ** 2 / inverse if inverse else x.size + y.size - 2.0
     half = float(half_width(confidence, degrees)) * error
     return Difference(of_a, of_b, of_b - of_a, of_b - of_a - half, of_b - of_a + half)
 

@@ -144,11 +144,6 @@ class Sample:
         return lost.size - unsettled, unsettled
 
     @property
-    def counts_as(self) -> FloatArray:
-        """What each valid joint counts as, in the order of the joints."""
-        return self.design.counts_as(self.values.size)[self.is_valid]
-
-    @property
     def long_tailed(self) -> bool:
         """Whether all valid loads are positive and the largest exceeds `LONG_TAIL` times the median."""
         valid = self.valid
@@ -242,14 +237,6 @@ class Sample:
         how = self.design.ranks_at_once, self.design.innermost
         upper, lower = _first(high_enough, n, *how), n - 1 - _first(low_enough, n, *how)
         return float(loads[lower]) if lower >= 0 else -np.inf, float(loads[upper]) if upper < n else np.inf
-
-    def doubt(self, level: float) -> str:
-        """Return why the share above a level is not supported; empty if it is."""
-        return self.design.doubt(self.value, level)
-
-    def upper_if_missed(self, level: float, confidence: float = CONFIDENCE) -> float:
-        """See `Design.upper_if_missed`; joints without a valid load count above the level."""
-        return self.design.upper_if_missed(self.upper, level, confidence)
 
     def delivery(self, level: float, number: int, confidence: float = CONFIDENCE) -> tuple[float, float]:
         """Prediction interval for the number above a level among further joints; see `Design.delivery`.

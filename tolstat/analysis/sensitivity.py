@@ -245,9 +245,9 @@ def _interactions(errors: FloatArray, left: FloatArray, variance: float) -> tupl
     c[same] = spread[same] = 0.0
     blocks = (d, DEGREE, d, DEGREE)
     pairs = ((n * c**2 - spread) / (n - 1)).reshape(blocks).sum(axis=(1, 3)) / variance
-    weighted = p @ c
-    weighted *= p
-    of_pairs = 2.0 * left[:, None] * weighted.reshape(n, d, DEGREE).sum(axis=2) / variance
+    products = p @ c
+    products *= p
+    of_pairs = 2.0 * left[:, None] * products.reshape(n, d, DEGREE).sum(axis=2) / variance
     chance: FloatArray = 2.0 * (spread**2).reshape(blocks).sum(axis=(1, 3)) / (n * variance) ** 2
     return pairs, of_pairs, chance
 

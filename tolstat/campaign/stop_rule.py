@@ -206,7 +206,7 @@ def run_until(study: Study, out: Path, rule: Statement, run: Callable[[int], obj
         When the joints are not independent samples, or the study does not keep a load.
     """
     if study.sampling.method != "random":
-        found = f"sampling.method is {study.sampling.method!r}: its interval needs independent samples of equal weight"
+        found = f"sampling.method is {study.sampling.method!r}: its interval needs independent samples"
         raise input_error("--until", found, 'write sampling.method = "random" in the study')
     if study.sampling.joints_per_lot > 1:
         found = "joints share lots: the interval of a stop needs independent samples"

@@ -84,13 +84,13 @@ def exchanged(study: Study, line: Group, numbers: range) -> Change:
 
 
 def about_joint(study: Study, keys: Mapping[str, Any]) -> dict[str, Any]:
-    """Return `Altered.about` of samples of the campaign with `keys` of the joint."""
+    """Return `Altered.about` of samples of the campaign with `keys` of what is assumed."""
     label = ", ".join(f"{key} = {value}" for key, value in keys.items())
     return {"kind": JOINT, "label": label, "seed": study.sampling.seed, "keys": dict(keys)}
 
 
 def with_joint(study: Study, keys: Mapping[str, Any], numbers: range) -> Change:
-    """Joint i is sample i of the campaign with `keys` of the joint.
+    """Joint i is sample i of the campaign with `keys` of what is assumed, see `assumptions.with_value`.
 
     Raises
     ------

@@ -105,29 +105,23 @@ def holds(kept: Iterable[Column], load: str) -> bool:
     return {c.name for c in kept}.issuperset(LOADS[load].columns)
 
 
-IMPORTANCE_FIELDS = (
-    Field("component", "1", "what it was drawn from: 0 the tolerances, k proposal k; -1 the nominal joint", "i4"),
-    Field("weight", "1", "density of its errors under the tolerances over that under the mixture; 0 if not drawn"),
-)
 SUBSET_FIELDS = (
     Field("level", "1", "level of the subset simulation: 0 is drawn from the tolerances, -1 the nominal joint", "i4"),
     Field("parent", "1", "row of the joint whose errors were moved to give these; -1 at level 0", "i8"),
 )
-DRAWN_FIELDS: dict[str, tuple[Field, ...]] = {"importance": IMPORTANCE_FIELDS, "subset": SUBSET_FIELDS}
+DRAWN_FIELDS: dict[str, tuple[Field, ...]] = {"subset": SUBSET_FIELDS}
 """Columns of the table by sampling method; other methods have no such table."""
-IMPORTANCE, SUBSET = dtype_of(IMPORTANCE_FIELDS), dtype_of(SUBSET_FIELDS)
+SUBSET = dtype_of(SUBSET_FIELDS)
 
 METHODS = {
     "random": "random sampling",
     "sobol": "Sobol' points",
     "lhs": "Latin hypercube",
     "sweep": "sweep",
-    "importance": "importance sampling",
-    "pick_freeze": "pick-freeze design",
 }
 """Sampling methods in words."""
 DRAWN = ("random", "sobol", "lhs")
-"""Sampling methods that draw every joint from the tolerances, all with the same weight."""
+"""Sampling methods that draw every joint from the tolerances."""
 
 
 def drawn_columns(sampling: Mapping[str, Any]) -> tuple[Column, ...]:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from tolstat.common.fields import PARAM_FIELDS, Field, dtype_of
 from tolstat.common.load_kinds import JOINT, LOAD_KINDS, OVER, PINS
 
-SCHEMA_VERSION = 11
+SCHEMA_VERSION = 12
 """Version of the result file: raise it with every change of its layout, and so of the fields of errors and results."""
 HOLES = tuple(f"hole{i}" for i in (1, 2, 3, 4))
 STEPS_PER_ITERATION = 5

@@ -10,7 +10,6 @@ from tolstat.display import table, text
 
 WORDS = {
     "yes": "kept",
-    "searched": "consistent with what was searched",
     "no": "not kept",
     "open": "open",
     "none": "no verdict",
@@ -24,7 +23,7 @@ class Verdict(NamedTuple):
     Attributes
     ----------
     answer : str
-        ``yes``, ``searched``, ``no``, ``open``, ``none`` (no verdict); empty if no accepted share is given and a share
+        ``yes``, ``no``, ``open``, ``none`` (no verdict); empty if no accepted share is given and a share
         can be.
     value, words : str
         The answer or, without one, a share or its interval; the rest of the sentence, without full stop.
@@ -63,8 +62,8 @@ class Verdict(NamedTuple):
 
     @property
     def shade(self) -> str:
-        """``yes``, ``no`` or ``open`` of the page: also open where what is assumed, or was not searched, decides."""
-        return "open" if self.is_turned or self.answer in ("none", "searched") else self.answer
+        """``yes``, ``no`` or ``open`` of the page: also open where what is assumed decides, or there is none."""
+        return "open" if self.is_turned or self.answer == "none" else self.answer
 
     def values(self) -> dict[str, Any]:
         """JSON values: the answer of the joints as drawn in words, null without one, the sentence, other attributes."""

@@ -75,7 +75,6 @@ QUESTIONS = (
     Question("exceedance", "", "Estimate the share of joints above each load.", "open", "exceedance.answer", True),
     Question("sweep", "", "Compare the largest loads of the joints of a sweep.", "open"),
     Question("cases", "", "Compare the largest loads of the listed joints.", file="sweep"),
-    Question("known_parts", "", "Estimate what measured parts leave open of each share.", "open", "parts"),
     Question("orders", "Read", "Estimate the orders of the loads that the shafts carry.", "open"),
     Question("shafts", "Read", "Estimate which share of drive shafts exceeds limits.", "open", counted=True),
     Question("bearing_life", "Read", "Compute the life of the pins' bearings.", "open", "bearing_life.answer", True),
@@ -91,8 +90,6 @@ QUESTIONS = (
     Question("histograms", "", "Draw histograms of the loads, and of the errors drawn.", "folded"),
     Question("modes", "", "Compute the shares of the revolution in which pins touch.", "folded", "joints"),
     Question("accuracy", "", "Give the numerical error of the loads, from checks of joints.", "folded", "joints", True),
-    Question("reweight", "Decide", "Estimate exceedances for changed tolerances."),
-    Question("allocate", "Decide", "Propose the cheapest tolerances that meet the targets."),
     Question("compare", "Decide", "Compare the exceedances and loads of two campaigns."),
     Question("rare", "Decide", "Estimate a rare exceedance by subset simulation."),
 )

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from functools import partial
 from typing import Annotated, Any
 
 import numpy as np
 
 from tolstat.analysis import capability as indices
-from tolstat.analysis import extreme
 from tolstat.analysis.clustered import LEAST, Clustered
 from tolstat.analysis.prediction import DELIVERY
-from tolstat.common.cores import mapped
 from tolstat.common.errors import Fault, InputError, NotApplicable
 from tolstat.common.loads import ANY_LIMIT
 from tolstat.common.tables import VALID
@@ -28,10 +25,9 @@ NOT_NORMAL = 0.01
 """p-value of the test of normality below which the index of a normal load tells no share above the limit."""
 ON_PAGE = (1e3, 1e4, 1e5)
 """Numbers of joints of which one exceeds the rare loads on the page."""
-FIGURES: tuple[str, ...] = ("estimate", "lower", "upper", "bound_lower", "bound_upper")
-FIGURES += tuple(f"{key}{end}" for key in ("fleet", "shape") for end in ("", "_lower", "_upper"))
-"""Keys of `return_rows` that are NaN where a tail is not extrapolated."""
-RARE = "Load that one in N joints exceeds; median of the largest load of N joints"
+FIGURES = ("estimate", "lower", "upper", "bound_lower", "bound_upper")
+"""Keys of `return_rows` that are NaN beyond the joints."""
+RARE = "Load that one in N joints exceeds"
 
 LIMITS = (
     Column("load", shares.word("load")),
@@ -61,11 +57,8 @@ RETURNS = (
     Column("one joint in", lambda row: f"{row['one_in']:,.0f}".replace(",", " ")),
     Column("exceeds", shares.value("estimate")),
     Column("95 % interval", shares.values("lower", "upper")),
-    Column("largest of so many", shares.value("fleet")),
-    Column("interval of it", shares.values("fleet_lower", "fleet_upper"), rank=2),
-    Column("fit, p", lambda row: f"{row['p']:.2g}", rank=1),
 )
-"""Columns of the table ``one_in``; the largest of N joints is the median of it over fleets of N."""
+"""Columns of the table ``one_in``."""
 
 
 def capability(
@@ -79,9 +72,8 @@ def capability(
     index Cpk, each with its 95 % interval; with --wide or --json also a prediction interval for the number of joints
     above the limit in the next delivery. Where joints share lots, gives the shares of the lots, too.
 
-    With --one-in N, gives also the load that one in N joints exceeds, and the median of the largest load of N joints,
-    from a generalised Pareto distribution fitted to the tail. N may exceed the number of simulated joints: the
-    intervals show the uncertainty of the extrapolation.
+    With --one-in N, gives also the load that one in N joints exceeds, from the joints in their order: N is at most
+    their number. Beyond, tolstat rare simulates the joints that matter.
 
     Example: tolstat capability iso2768_f.h5 --one-in 1000
 
@@ -105,9 +97,9 @@ def capability(
     NotApplicable
         When the study has no limits, or its joints are no sample of a production.
     StoreError
-        When joints differ in weight.
+        When the joints are no random sample.
     InputError
-        When N is too small, or the tail has too few joints.
+        When N is not above one.
     """
     if not view.limits or view.method in ("sweep", "cases"):
         remedy = 'give the result file of a study with [limits] and sampling.method "random", "sobol" or "lhs"'
@@ -119,15 +111,10 @@ def capability(
     notes = [Sentence(note) for note in (*_notes(rows), error_budget.unknown(view)) if note]
     if not one_in:
         return Answer("capability", "Capability", [*parts, *notes])
-    try:
-        rare = [row for load in view.limits for row in return_rows(view, load, one_in)]
-    except ValueError as error:
-        reason, _, remedy = str(error).partition(": ")
-        raise InputError([Fault("--one-in", reason, remedy)]) from error
-    parts += [Table("one_in", RARE, RETURNS, rare), *notes]
-    if refused := shares.grouped((row["load"], row["refusal"]) for row in rare if row["refusal"]):
-        warning = f"{refused}: not extrapolated; tolstat rare, a subset simulation, needs no tail"
-        parts.append(Sentence(warning, "warning"))
+    if min(one_in) <= 1.0:
+        raise InputError([Fault("--one-in", f"{min(one_in):g} is not above one", "give the number of joints N")])
+    rare = [row for load in view.limits for row in return_rows(view, load, one_in)]
+    parts += [Table("one_in", RARE, RETURNS, rare), *notes, *_beyond(view, rare)]
     return Answer("capability", "Capability and rare loads", parts)
 
 
@@ -136,26 +123,12 @@ def capability_on_page(view: View, asked: Asked) -> Answer:
     if not (view.sampled and view.count(*VALID)) or view.design.refuses("index"):
         raise NotApplicable
     parts = list(capability(view).parts) if view.limits else []
-    if error_budget.known_parts(view) is not None:
-        parts.append(Sentence("for the tolerances as stated: what measured parts leave open is not in these"))
-    tails = [partial(_rare_loads, view, name) for name in view.leading]
-    by_load = dict(zip(view.leading, mapped(tails, min(asked.processes, 2)), strict=True))
-    if rows := [row for rare in by_load.values() if not isinstance(rare, str) for row in rare]:
-        parts.append(Table("one_in", f"{RARE}, from a generalised Pareto tail", RETURNS, rows))
-    if reasons := shares.grouped((name, rare) for name, rare in by_load.items() if isinstance(rare, str)):
-        parts.append(Sentence(f"Rare loads. {reasons}."))
+    rare = [row for name in view.leading for row in return_rows(view, name, ON_PAGE)]
+    if rows := [row for row in rare if not math.isnan(row["estimate"])]:
+        parts += [Table("one_in", RARE, RETURNS, rows), *_beyond(view, rare)]
     if not parts:
         raise NotApplicable
     return Answer("capability", "Capability and rare loads" if view.limits else "Rare loads", parts)
-
-
-def _rare_loads(view: View, name: str) -> Rows | str:
-    """Return loads of a load, or why it has none."""
-    try:
-        rows = return_rows(view, name, ON_PAGE)
-    except ValueError as error:
-        return str(error)
-    return f"{rows[0]['refusal']}: not extrapolated" if rows[0]["refusal"] else rows
 
 
 def limit_rows(view: View, confidence: float = 0.95, delivery: int = DELIVERY) -> Rows:
@@ -227,7 +200,7 @@ def of_lots(view: View, delivery: int = DELIVERY) -> list[Part]:
 
 
 def return_rows(view: View, name: str, one_in: Sequence[float], confidence: float = 0.95) -> Rows:
-    """Return loads, "1 in N joints", and the median of the largest of a fleet of N, from a generalised Pareto tail.
+    """Return loads, "1 in N joints": quantiles, as far as the joints reach.
 
     Parameters
     ----------
@@ -236,7 +209,7 @@ def return_rows(view: View, name: str, one_in: Sequence[float], confidence: floa
     name : str
         Load.
     one_in : sequence of float
-        Numbers of joints N, so large that the load exceeded by one joint in N lies in the fitted tail.
+        Numbers of joints N, above one.
     confidence : float
         Confidence level of the intervals.
 
@@ -244,24 +217,28 @@ def return_rows(view: View, name: str, one_in: Sequence[float], confidence: floa
     -------
     sequence of mapping
         One row for each N: ``load``, ``unit``, ``one_in``, ``estimate``, ``lower``, ``upper``, ``bound_lower`` and
-        ``bound_upper`` (unresolved joints counted below, above), ``fleet``, ``fleet_lower``, ``fleet_upper``,
-        ``shape``, ``shape_lower``, ``shape_upper``, ``p`` (goodness of fit), ``n_above``, ``refusal`` (why the
-        tail is not extrapolated, see `extreme.Tail`; else empty). SI units. Loads and shape are NaN where it is not.
-
-    Raises
-    ------
-    ValueError
-        When the tail has too few joints (`TooThinError`), or N is too small to lie in it.
+        ``bound_upper`` (unresolved joints counted below, above), see `estimates.Quantile`. SI units. NaN where N is
+        larger than the number of valid joints.
     """
-    load = view.load(name)
-    tail = extreme.fit(load, None, confidence)
-    rows = []
+    load, rows = view.load(name), []
     for number in one_in:
-        figures = *tail.level(1.0 / number), *tail.bounds(1.0 / number), *tail.largest(int(number)), *tail.shape
+        found = load.quantile(1.0 - 1.0 / number, confidence)._asdict()
+        reached = number <= load.valid.size
         row: dict[str, Any] = {"load": name, "unit": load.unit, "one_in": number}
-        row |= dict.fromkeys(FIGURES, np.nan) if tail.refusal else dict(zip(FIGURES, figures, strict=True))
-        rows.append({**row, "p": tail.p, "n_above": tail.n_above, "refusal": tail.refusal})
+        rows.append(row | {key: found[key] if reached else math.nan for key in FIGURES})
     return rows
+
+
+def _beyond(view: View, rows: Rows) -> Iterator[Sentence]:
+    """Sentence on loads that are rarer than the joints show, with the command that estimates how rare a load is."""
+    if any(math.isnan(row["estimate"]) for row in rows):
+        name, study = rows[0]["load"], f"{view.store.study_name}.toml"
+        level = view.load(name).limit
+        limit = f"{name} > {'LEVEL' if level is None else text.value(level, view.load(name).unit)}"
+        yield Sentence(
+            f"one in more than {view.load(name).valid.size} joints is beyond these joints; how rare a load is that "
+            f'none of them has: tolstat rare {study} --limit "{limit}"'
+        )
 
 
 def _notes(rows: Rows) -> Iterator[str]:

@@ -90,7 +90,7 @@ def histograms(view: View) -> Answer:
         words = "Small pictures: all errors that an entry of the tolerances sets, in one histogram; between the dashed "
         words += f"lines its tolerance band.{f' The first {JOINTS} joints.' if view.n > JOINTS else ''}"
         pictures = Panels([_drawn_panel(histogram, k, errors) for k, histogram in enumerate(errors)], small=True)
-        parts += [pictures, Sentence(f"{words} {view.design.counting}".rstrip())]
+        parts += [pictures, Sentence(words)]
     if not parts:
         remedy = "give the result file of a study with [tolerances] whose joints are drawn at random"
         raise inapplicable(view, "holds no errors or loads of a random sample", remedy)
@@ -100,7 +100,7 @@ def histograms(view: View) -> Answer:
 def drawn(view: View) -> list[Drawn]:
     """Histogram of the errors of each entry, in the study's order, over the first `JOINTS` joints.
 
-    Joints are counted by their weights. Entries that say more than one thing, such as zones of offset and tilt, have
+    Entries that say more than one thing, such as zones of offset and tilt, have
     several; empty for joints that are no sample of a production, and for a study without tolerances.
 
     Raises
@@ -127,17 +127,16 @@ def drawn(view: View) -> list[Drawn]:
         return []
     samples = np.arange(min(view.n, JOINTS))
     table = view.errors(samples, sorted({name for names in errors_of.values() for name in names}))
-    weights = view.design.counts_as(view.n)[: len(samples)]
     histograms = []
     for (pattern, number, unit, band), names in errors_of.items():
         others = dict.fromkeys(other for name in names for other in entries_of[name] if other != pattern)
-        counted = _counted(np.concatenate([table[name] for name in names]), np.tile(weights, len(names)), band)
+        counted = _counted(np.concatenate([table[name] for name in names]), band)
         histograms.append(Drawn(pattern, number, tuple(names), unit, band, counted[0], tuple(others), *counted[1:]))
     return histograms
 
 
 def of_load(load: Sample) -> tuple[loads.FloatArray, loads.FloatArray]:
-    """Histogram of a load over its valid joints, counted by weight; bins of equal ratio where it has a long tail.
+    """Histogram of a load over its valid joints; bins of equal ratio where it has a long tail.
 
     Returns
     -------
@@ -146,27 +145,27 @@ def of_load(load: Sample) -> tuple[loads.FloatArray, loads.FloatArray]:
     share : ndarray, shape (m,)
         Share of the joints in each bin.
     """
-    values, weights = load.values[load.is_valid], load.counts_as
+    values = load.values[load.is_valid]
     low, high = float(values.min()), float(values.max())
     high = high if high > low else low + max(1e-3 * abs(low), 1e-12)
     edges = np.geomspace(low, high, BINS + 1) if load.long_tailed else np.linspace(low, high, BINS + 1)
     edges[0], edges[-1] = low, high  # rounding must not put the extreme values outside
-    return edges, _shares(values, edges, weights)
+    return edges, _shares(values, edges)
 
 
 def _counted(
-    values: loads.FloatArray, weights: loads.FloatArray, band: tuple[float, float] | None
+    values: loads.FloatArray, band: tuple[float, float] | None
 ) -> tuple[float, loads.FloatArray, loads.FloatArray]:
     """Share outside the band, edges, and shares in the bins; the bins cover values and band."""
     ends = band or ()
-    outside = weights[(values < band[0]) | (values > band[1])].sum() / weights.sum() if band else np.nan
+    outside = ((values < band[0]) | (values > band[1])).mean() if band else np.nan
     low, high = min([values.min(), *ends]), max([values.max(), *ends])
     edges = np.linspace(low, high, BINS + 1) if high > low else np.array([low, low + max(abs(low), 1e-9) * 1e-3])
-    return float(outside), edges, _shares(values, edges, weights)
+    return float(outside), edges, _shares(values, edges)
 
 
-def _shares(values: loads.FloatArray, edges: loads.FloatArray, weights: loads.FloatArray) -> loads.FloatArray:
-    return np.asarray(np.histogram(values, edges, weights=weights)[0] / weights.sum())
+def _shares(values: loads.FloatArray, edges: loads.FloatArray) -> loads.FloatArray:
+    return np.asarray(np.histogram(values, edges)[0] / values.size)
 
 
 def _load_panel(load: Sample) -> Panel:

@@ -122,7 +122,7 @@ def failed(view: View) -> Answer:
     parts: list[Part] = [Table("states", "Number of joints by status", plain(states), states)]
     compared: Rows = []
     words = "Their errors are not compared with those of the others, which takes ten joints or more on either side, "
-    words += "drawn from the tolerances with equal weight."
+    words += "drawn from the tolerances."
     with suppress(TolstatError):
         compared = their_errors(view)
     if compared:
@@ -186,7 +186,7 @@ def their_errors(view: View) -> Rows:
     sequence of mapping
         ``error``, then ``direction`` and ``size`` with ``_lower``, ``_upper`` and ``_p``, `ranks.Part`;
         the error that differs most first. Empty if there are too few joints of either kind, or if the joints are not
-        drawn from tolerances with equal weights.
+        drawn from tolerances.
 
     Raises
     ------
@@ -197,7 +197,7 @@ def their_errors(view: View) -> Rows:
     bad = np.isin(view.status[samples], (*FAILED, *UNSETTLED))
     if min(int(bad.sum()), int((~bad).sum())) < ranks.FEWEST:
         return []
-    if view.method == "sweep" or view.design.refuses("difference") or view.study.groups:
+    if view.method == "sweep" or view.design.refuses("difference"):
         return []
     scores = sampling.normal_scores(view.study, view.errors(samples))
     scores = {name: column for name, column in scores.items() if np.ptp(column) > 0}

@@ -306,6 +306,7 @@ def _sentences(limit: Limit, estimate: Estimate, facts: Row, seeds: Rows) -> Ite
         yield f"with the numerical error near the limit: {lower:.3g} .. {upper:.3g}"
     low, high, number = facts["next_lower"], facts["next_upper"], facts["delivery"]
     yield f"of the next {number} joints, {low:.0f} .. {high:.0f} are above the limit (95 % prediction interval)"
+    yield "this probability is that of the assumed distributions: no simulation tells whether parts have such tails"
 
 
 def _notes(row: Row, view: View, limit: Limit) -> Iterator[str]:

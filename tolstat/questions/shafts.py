@@ -94,7 +94,7 @@ def shafts(view: View) -> Answer:
     NotApplicable
         When the study has no drive shaft.
     StoreError
-        When joints differ in weight.
+        When the joints are no sample of a production.
     """
     pair = _places(view)
     view.check("index")
@@ -173,20 +173,20 @@ def _causes(pair: Shafts) -> Rows:
     above = [load.values[rows] > (load.limit or 0.0) for load, rows in zip(loads, samples, strict=True)]
     if study.copula.names or min(map(len, samples)) < FEWEST:
         return []
-    weights = shares_of_variance(*(float(flags.mean()) for flags in above))
-    if not sum(weights) > 0:
+    portions = shares_of_variance(*(float(flags.mean()) for flags in above))
+    if not sum(portions) > 0:
         return []
     parts: dict[str, tuple[float, ...]] = {}
     wide: dict[str, float] = {}
     for place, view in enumerate(pair):
-        weight, independent = weights[place], isinstance(view.design, Independent)
+        portion, independent = portions[place], isinstance(view.design, Independent)
         errors = sampling.components(study, view.errors(samples[place], sampling.columns(study)))
         errors = {name: column for name, column in errors.items() if np.ptp(column) > 0}
         index = first_order(np.column_stack(list(errors.values())), above[place].astype(float), iid=independent)
         for entry in study.entries:
             of_entry = [name in entry.quantities or name[:-2] in entry.quantities for name in errors]
-            caused = weight * np.nan_to_num(index.estimate[of_entry])
-            half = weight * (index.upper - index.estimate)[of_entry] if weight else np.zeros(1)
+            caused = portion * np.nan_to_num(index.estimate[of_entry])
+            half = portion * (index.upper - index.estimate)[of_entry] if portion else np.zeros(1)
             parts[entry.pattern] = (*parts.get(entry.pattern, ()), float(caused.sum()))
             wide[entry.pattern] = wide.get(entry.pattern, 0.0) + float((half**2).sum())
     rows = []

@@ -10,12 +10,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tolstat.analysis import binomial, difference, prediction, reweight
-from tolstat.analysis.design import SAMPLE
+from tolstat.analysis import binomial, difference
 from tolstat.analysis.estimates import Exceedance
 from tolstat.analysis.prediction import DELIVERY
-from tolstat.analysis.reweight import Ratios, Share
-from tolstat.analysis.sample import CONFIDENCE, Sample, total_interval
+from tolstat.analysis.sample import Sample, total_interval
 from tolstat.campaign import what_if as sets
 from tolstat.campaign.what_if import Change
 from tolstat.campaign.work import Work
@@ -132,13 +130,10 @@ def check_sample(view: View) -> None:
     Raises
     ------
     StoreError
-        Joints are not drawn from tolerances, form a pick-freeze design, or are a part of the campaign's. The hint names
-        what can be used.
+        Joints are not drawn from tolerances, or are a part of the campaign's. The hint names what can be used.
     """
     view.check_drawn()
     view.check("difference")
-    if view.study.groups:
-        raise unusable(view, "holds a pick-freeze design", SAMPLE)
     if not view.store.whole:
         remedy = "merge all slices first: tolstat merge SLICE... --out FILE"
         raise unusable(view, "holds a part of the campaign only", remedy)
@@ -171,39 +166,6 @@ def _good(view: View, name: str, confidence: float, delivery: int) -> Mapping[st
 def counts(above: Exceedance) -> dict[str, int]:
     """Columns of a table: numbers of joints, of those without a valid load, and of those above a level."""
     return {"n": above.n, "n_failed": above.n_failed, "n_unsettled": above.n_unsettled, "count": above.count}
-
-
-def reweighted(
-    samples: Sequence[Sample], ratios: Ratios, level: float, delivery: int
-) -> tuple[Share, tuple[float, float], dict[str, float]]:
-    """Share of the joints above a level under other tolerances.
-
-    Parameters
-    ----------
-    samples : sequence of Sample
-        Load of some joints and, where it is known, with both ends of its numerical error.
-    ratios : Ratios
-        Density ratios of these joints.
-    level, delivery
-        The level, and the number of joints of the next delivery.
-
-    Returns
-    -------
-    Share
-        Of the load as simulated.
-    tuple of float
-        Ends of the interval, with the numerical error where it is known.
-    dict
-        Columns of the prediction interval.
-    """
-
-    def ends(confidence: float) -> tuple[float, float]:
-        each = [reweight.share_above(sample, ratios, level, confidence) for sample in samples]
-        return min(share.lower for share in each), max(share.upper for share in each)
-
-    predicted = prediction.of_share(*ends(prediction.half(CONFIDENCE)), delivery, CONFIDENCE)
-    share = reweight.share_above(samples[0], ratios, level, CONFIDENCE)
-    return share, ends(CONFIDENCE), prediction.columns(predicted, delivery)
 
 
 class Yield(NamedTuple):

@@ -23,7 +23,6 @@ from tolstat.questions.exceedance import rows as exceedance
 from tolstat.questions.exceedance.rows import ends, share_of, verdict
 from tolstat.questions.fatigue import answer as fatigue
 from tolstat.questions.shares import unresolved_matter
-from tolstat.store import error_budget
 from tolstat.store.view import View
 
 
@@ -53,6 +52,8 @@ def headline(view: View, accepted: float = np.nan) -> Verdict | None:
     if standing is not None and judged.answer != "none":
         more = sentences.more(standing, view.path.name)
         judged = judged._replace(stands_on=sentences.values(standing), notes=(*judged.notes, *filter(None, [more])))
+    if judged.answer != "none" and (parts := sentences.of_parts(view, standing)):
+        judged = judged._replace(words=f"{judged.words}. {parts}")
     unresolved = _causes(view) if unresolved_matter(_decisive(view, records)) else ()
     return judged._replace(notes=(*unresolved, *judged.notes, *_pending(view)))
 
@@ -74,24 +75,14 @@ def _judged(view: View, records: Sequence[table.Row], accepted: float, standing:
     row, worst = _decisive(view, records), exceedance.most_exceeded(view, records)
     several, answers = len(records) > 1, [verdict(record, accepted) for record in records]
     answer = verdict(row, accepted)
-    alone = several and answer == "none" and "no" in answers  # the joints above one limit are too many already
-    if alone:
-        broken = [record for record, judged in zip(records, answers, strict=True) if judged == "no"]
-        row = worst = exceedance.most_exceeded(view, broken)
-        answer, standing = "no", None
     numbers = ", ".join(f"{answers.count(key)} {word}" for key, word in WORDS.items() if key in answers)
     notes: tuple[str, ...] = (f"of {len(records)} limits, each by itself: {numbers}",) if several else ()
-    if answer == "open" and row.get("parts_lower", np.nan) <= accepted < row.get("parts_upper", np.nan):
-        parts = text.span(row["parts_lower"], row["parts_upper"])
-        notes += (f"not decided by more joints: the parts leave shares of {parts} open. Measure more parts",)
     if answer == "none":
         return Verdict(answer, WORDS[answer], _reason(view, [row]), notes)
     value, words = _sentence(view, row, accepted, answer, standing)
     if first := _without_errors(view):
         words = f"{first}. {words}" if value == WORDS[answer] else f"{words}. {text.capital(first)}"
-    if alone:
-        notes += (_untold(view, records),)
-    elif several and worst["count"] and not np.isnan(worst["estimate"]):
+    if several and worst["count"]:
         words += _most_often(view, records, worst)
     if value == WORDS["no"]:
         better = lines.advice(view, row["load"], accepted)
@@ -108,13 +99,10 @@ def _sentence(view: View, row: table.Row, accepted: float, answer: str, standing
     behind = sentences.of_variations(standing, answer)
     if standing is not None and any(turned := sentences.turned(standing)):
         value, words = turned
-    elif answer == "searched":
-        words = f"at most {most} exceed {limit} if the proposals reach every way to it ({text.span(*ends(row))}); "
-        words += f"whatever they miss, at most {text.percent(row['unsearched_upper'])}"
     elif answer == "yes":
         words = f"at most {most} exceed {limit} ({share}, {interval}){behind}"
     else:
-        if answer == "open" and view.design.has_interval("index") and "both_lower" not in row:
+        if answer == "open" and view.design.has_interval("index"):
             words += f"; {_deciding(row, accepted)}"
         words += f". {behind}" if behind else ""
     return value, words + _not_varied(view, standing)
@@ -138,17 +126,12 @@ def _without_errors(view: View) -> str:
 
 def tells_yield(view: View) -> bool:
     """Whether the share of the joints that keep all limits can be told: of joints that count equally, with a load."""
-    return view.design.refuses("index") is None and error_budget.known_parts(view) is None and bool(view.count(*VALID))
+    return view.design.refuses("index") is None and bool(view.count(*VALID))
 
 
 def _decisive(view: View, records: Sequence[table.Row]) -> table.Row:
     """Row on which the verdict is: that of the joints above at least one limit, or of the only limit."""
     return exceedance.all_limits(view) if len(records) > 1 else records[0]
-
-
-def _untold(view: View, records: Sequence[table.Row]) -> str:
-    """Why the verdict is on one of several limits."""
-    return f"No share of the joints that exceed at least one limit: {_reason(view, [_decisive(view, records)])}"
 
 
 def _words(view: View, row: table.Row) -> str:
@@ -171,27 +154,9 @@ def _most_often(view: View, records: Sequence[table.Row], worst: table.Row) -> s
 
 
 def _yield(view: View, records: Sequence[table.Row], standing: Standing | None) -> Verdict:
-    """Without an accepted share: share of the joints that keep all limits; of weighted joints, that exceed any."""
+    """Without an accepted share: share of the joints that keep all limits."""
     without = view.design.without_interval("share")
     notes: tuple[str, ...] = (without,) if without else ()
-    if view.design.refuses("index") or error_budget.known_parts(view) is not None:
-        row, worst = _decisive(view, records), exceedance.most_exceeded(view, records)
-        if np.isnan(row["estimate"]):
-            known = [record for record in records if not np.isnan(record["estimate"])]
-            if len(records) == 1 or not known or _undecided(known):
-                return Verdict("none", WORDS["none"], _reason(view, [row]), notes)
-            notes += (_untold(view, records),)
-            row = worst = exceedance.most_exceeded(view, known)
-        if _undecided([row]) or np.isnan(ends(row)[0]):
-            return Verdict("none", WORDS["none"], _reason(view, [row]), notes)
-        interval = "total interval" if unresolved_matter(row) else f"total interval {text.span(*ends(row))}"
-        missed = row["unsearched_upper"]
-        missed = "" if np.isnan(missed) else f"; whatever the proposals miss, at most {text.percent(missed)}"
-        most = ", the limit exceeded most" if row is worst else ""
-        words = f"of the joints exceed {_words(view, row)}{most} ({interval}{missed})"
-        if row["load"] == ANY_LIMIT and worst["count"] and not np.isnan(worst["estimate"]):
-            words += _most_often(view, records, worst)
-        return Verdict("", share_of(row), words, notes, worst["load"])
     in_words = shares.together(shares.good(view), len(view.limits))
     if not in_words.decides:
         return Verdict("none", WORDS["none"], _reason(view, [_decisive(view, records)]), notes)
@@ -200,22 +165,10 @@ def _yield(view: View, records: Sequence[table.Row], standing: Standing | None) 
     return Verdict("", in_words.value, words, notes, exceedance.most_exceeded(view, records)["load"])
 
 
-def _undecided(records: Sequence[table.Row]) -> bool:
-    return max(high - low for low, high in map(ends, records)) >= shares.WIDEST
-
-
 def _reason(view: View, records: Sequence[table.Row]) -> str:
     """Why there is no verdict on some limits."""
     lost = max(row["n_failed"] + row["n_unsettled"] for row in records)
     n = max(row["n"] for row in records)
-    poor = [row for row in records if row["n"] > lost and np.isnan(row["estimate"])]
-    if poor:
-        return f"above {text.limit(poor[0])}, {view.load(poor[0]['load']).doubt(poor[0]['level'])}"
-    known = error_budget.known_parts(view)
-    if known is not None and np.isnan(ends(records[0])[0]):
-        unsupported = text.percent(records[0]["unsupported"])
-        reason = f"the joints do not support {unsupported} of the processes that the measured parts leave open"
-        return f"{reason}. {known.remedy}"
     if any(map(unresolved_matter, records)):
         what = "valid result" if view.count(*UNSETTLED) else "result"
         return f"{text.percent(lost / n)} of the joints have no {what} ({lost} of {n})"

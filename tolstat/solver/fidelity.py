@@ -38,9 +38,8 @@ JOINTS = 24
 MARGIN = 1.5
 """Factor on the worst error of the pilot before it is compared with the budget: a campaign has worse joints than a
 pilot of two dozen."""
-WEIGHTS = {"steps": 2.3, "newton_iterations": 2.6, "factorisations": 4.3}
-"""Weights of the counts in the cost of a joint: microseconds of one core, fitted over fidelities and steps a
-revolution."""
+MICROSECONDS = {"steps": 2.3, "newton_iterations": 2.6, "factorisations": 4.3}
+"""Cost of each count, microseconds of one core, fitted over fidelities and steps a revolution."""
 
 
 def pilot(rows: int, first_sample: int, seed: int) -> NDArray[np.intp]:
@@ -154,7 +153,7 @@ def _entry(rung: Rung, results: NDArray[np.void], truth: NDArray[np.void], names
         "fidelity": rung.fidelity.name.lower(),
         "steps_per_rev": rung.steps_per_rev,
         "worst": float(np.max(errors)) if settled.any() else None,
-        "cost": sum(weight * float(results[name].mean()) for name, weight in WEIGHTS.items()),
+        "cost": sum(cost * float(results[name].mean()) for name, cost in MICROSECONDS.items()),
         "differing": int((results["status"] != truth["status"]).sum()),
     }
 

@@ -30,7 +30,7 @@ ABOUT = "Monte Carlo campaign of Cardan joints: row i is joint i in every datase
 """Description of the whole file."""
 GROUPS = {
     "design": "which of the listed joints each row is",
-    "origin": "how each joint was drawn, where not from the tolerances alone",
+    "origin": "how each joint of a subset simulation was drawn",
     "errors": "errors of each joint, those of the operating point among them, drawn before anything was simulated",
     "points": "results of the same joints at each operating point",
     "results": "status, diagnostics and loads of each joint; NaN where there are none",
@@ -311,13 +311,11 @@ MEANINGS: dict[str, Mapping[int, str]] = {
 
 def meanings_of(metadata: Metadata) -> dict[str, Mapping[int, str]]:
     """Meanings of all columns of a file that hold codes."""
-    proposals = range(1, len(metadata.identity.get("proposal", ())) + 1)
     families = [variant.family for variant in metadata.design.variants]
     shared = {family for family, number in Counter(families).items() if number > 1}
     return MEANINGS | {
         "case": dict(enumerate(metadata.design.cases)),
         "variant": {k: f"{name}_{k}" if name in shared else name for k, name in enumerate(families)},
-        "component": {-1: "nominal_joint", 0: "tolerances"} | {k: f"proposal_{k}" for k in proposals},
     }
 
 

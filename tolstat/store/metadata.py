@@ -167,7 +167,7 @@ def write(file: h5py.File, metadata: Metadata) -> None:
 LIBRARIES = ("numpy", "numba", "scipy", "h5py")
 RESULT_SOURCES = (
     *("kernel", "joint", "common/fields.py", "common/tables.py", "sampling.py"),
-    *("study/tolerances", "study/axes.py", "study/design.py", "study/proposal.py", "analysis/process.py"),
+    *("study/tolerances", "study/axes.py", "study/design.py"),
     *("solver/simulation.py", "solver/refinement.py", "solver/stationary.py", "solver/histories.py"),
 )
 """Sources that, together with the study's identity, determine the results of a campaign."""

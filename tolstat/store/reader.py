@@ -302,7 +302,7 @@ class Reader:
         """
         columns = drawn_columns(self.sampling)
         if not columns:
-            remedy = 'give a result file with sampling.method = "importance", or of tolstat rare'
+            remedy = "give the result file of tolstat rare"
             raise store_error(self.path, "has no record of how its joints were drawn", remedy)
         dtype = dtype_of(DRAWN_FIELDS[self.sampling["method"]])
         return self._table("origin", columns, dtype, slots, dtype.names or ())

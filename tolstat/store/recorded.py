@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
@@ -13,10 +12,7 @@ from numpy.typing import NDArray
 
 from tolstat.analysis.clustered import Clustered
 from tolstat.analysis.design import Design, Independent, Listed, Replicated
-from tolstat.analysis.estimates import frozen
-from tolstat.analysis.weighted import Weighted
 from tolstat.common.errors import Fault, InputError
-from tolstat.common.loads import FloatArray
 from tolstat.common.strict import read_section, validate
 from tolstat.common.tables import PARAM, Options, from_names
 from tolstat.joint import MEANS, Joint, Operation, operating, perturb, varied
@@ -241,27 +237,18 @@ def differing_keys(in_file: Mapping[str, Any], wanted: Mapping[str, Any]) -> lis
     return lines
 
 
-def design_of(store: Reader, weights: FloatArray | None, unfinished: bool) -> Design:
+def design_of(store: Reader, unfinished: bool) -> Design:
     """Sampling design of a file: the first that recognises how its joints were drawn.
 
     Parameters
     ----------
     store : Reader
         The file.
-    weights : ndarray, shape (n,), optional
-        Weights of its samples under importance sampling.
     unfinished : bool
         Whether joints are pending; replicates are then unequal, and do not count as such.
     """
     sampling, skip = store.sampling, store.first_sample
     method, n = str(sampling["method"]), store.n - skip
-    if weights is not None:
-        shares, changes = zip(*store.identity["proposal"], strict=True)
-        # proposals of processes alone leave out no way to a limit
-        others = any(set(changed) != {"parts"} for changed in changes)
-        from_tolerances = frozen(store.origin()["component"][skip:] == 0) if others else None
-        heaviest = 1.0 / (1.0 - math.fsum(shares))  # one over the share of the tolerances
-        return Weighted(weights, heaviest, from_tolerances)
     if sampling.get("joints_per_lot", 1) > 1:
         return Clustered(np.asarray(store.samples) // int(sampling["joints_per_lot"]))
     if sampling.get("replicates", 1) > 1 and n == sampling["n"] and not unfinished:

@@ -1,4 +1,4 @@
-"""View of a result file for questions: study, errors, loads by name, weights, limits; each part is read once."""
+"""View of a result file for questions: study, errors, loads by name, limits; each part is read once."""
 
 from __future__ import annotations
 
@@ -133,13 +133,6 @@ class View:
         return accuracy.usual(self.verification.base, checks)
 
     @cached_property
-    def _weights(self) -> FloatArray | None:
-        """Weight of each joint, (n,), if joints were not drawn from the tolerances alone."""
-        if self.method != "importance":
-            return None
-        return frozen(self.store.origin()["weight"][self.store.first_sample :].copy())
-
-    @cached_property
     def results(self) -> worst.Columns:
         """Columns `LOAD_FIELDS` of the results, (n, ...) each."""
         if len(self.parts) > 1:
@@ -176,7 +169,7 @@ class View:
 
         Several operating points have none.
         """
-        return np.full((4, 4), np.nan) if len(self.parts) > 1 else worst.mode_share(self.store, self._weights)
+        return np.full((4, 4), np.nan) if len(self.parts) > 1 else worst.mode_share(self.store)
 
     def load(self, name: str) -> Sample:
         """Largest load over the revolution of every joint, by its name; ``"cross1.F at cruise"`` at that point only.
@@ -303,7 +296,7 @@ class View:
     @cached_property
     def design(self) -> Design:
         """How the joints were drawn, and what they allow to conclude."""
-        return design_of(self.store, self._weights, bool(self.count(Status.PENDING)))
+        return design_of(self.store, bool(self.count(Status.PENDING)))
 
     @property
     def sampled(self) -> bool:

@@ -155,13 +155,12 @@ def without_load(status: Sequence[NDArray[np.uint8]], stores: Sequence[Reader]) 
     return frozen(np.concatenate([np.empty(0, RESULT), *each]))
 
 
-def mode_share(store: Reader, weights: FloatArray | None) -> FloatArray:
-    """Weighted mean over the valid joints at one operating point, (4, 4); NaN if none is valid or it is not kept."""
-    skip, total, shares = store.first_sample, 0.0, np.zeros((4, 4))
+def mode_share(store: Reader) -> FloatArray:
+    """Mean over the valid joints at one operating point, (4, 4); NaN if none is valid or it is not kept."""
+    total, shares = 0, np.zeros((4, 4))
     for slots in _slots(store):
         block = store.results(slots, ("status", "mode_share"))
         valid = np.isin(block["status"], VALID)
-        weight = np.ones(len(block)) if weights is None else weights[slots.start - skip : slots.stop - skip]
-        shares += np.tensordot(weight[valid], block["mode_share"][valid], 1)
-        total += float(weight[valid].sum())
+        shares += block["mode_share"][valid].sum(axis=0)
+        total += int(valid.sum())
     return frozen(shares / total if total else np.full((4, 4), np.nan))

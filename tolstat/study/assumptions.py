@@ -1,4 +1,4 @@
-"""What a study assumes: values that nobody measured, errors taken as exact; and values that are hardly meant."""
+"""What a study assumes: values that nobody measured, or that few parts tell; and values that are hardly meant."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from tolstat.joint import derived
 from tolstat.joint.derived import get
 from tolstat.joint.model import leaves, merged, nested
 from tolstat.joint.reading import with_keys
+from tolstat.study.measured import left_open, of_entries
 from tolstat.study.selection import EXCLUDES, UNITS
 from tolstat.study.study import Study
 from tolstat.study.tolerances.zones import short_axes
@@ -25,14 +26,15 @@ _AXES = {"positions": ("offset_e", "offset_t", "offset_z"), "angles": ("tilt_t",
 
 
 class Assumption(NamedTuple):
-    """Values of the joint that are assumed, and others that they may have.
+    """Values of the joint, or of a process, that are assumed, and others that they may have.
 
     Attributes
     ----------
     name : str
         What is assumed, such as ``contact law``.
     values : tuple of mapping
-        Other values, each dotted keys of the joint with their values as written: ``{"contact.law": "sliced"}``.
+        Other values, each dotted keys of the joint with their values as written: ``{"contact.law": "sliced"}``; or
+        keys of `measured.left_open`.
     because : str
         Why the value is not known.
     varied : bool
@@ -46,16 +48,28 @@ class Assumption(NamedTuple):
 
 
 def assumptions(study: Study) -> tuple[Assumption, ...]:
-    """Assumptions that hold for the joint of a study: those of its joint file, then those that the study adds.
+    """Assumptions that hold for the joint of a study: those of its joint file, those of the study, and measured parts.
 
     An assumption of the joint file is left out if it is `given`, and replaced by one of the study of the same name.
     """
     replaced = {entry.name for entry in study.assumed}
     of_joint = [entry for entry in study.joint.assumed if entry.name not in (*given(study), *replaced)]
-    return tuple(
+    of_values = [
         Assumption(entry.name, tuple(leaves(value) for value in entry.values), entry.because, entry.varied)
         for entry in (*of_joint, *study.assumed)
-    )
+    ]
+    of_parts = [
+        Assumption(_process(key), tuple({key: end} for end in ends), f"{entry.parts} parts measured", True)
+        for entry in study.known
+        for key, ends in left_open(entry).items()
+    ]
+    return (*of_values, *of_parts)
+
+
+def _process(key: str) -> str:
+    """Name of what measured parts leave open: ``spread of pin*.tilt_t``."""
+    pattern, _, field = key.rpartition(".")
+    return f"{field} of {pattern}"
 
 
 def given(study: Study) -> tuple[str, ...]:
@@ -75,17 +89,20 @@ def given(study: Study) -> tuple[str, ...]:
 def with_value(study: Study, keys: Mapping[str, Any]) -> Study:
     """Study with some keys of its joint set, as if written in its ``[joint]``; what follows from them is computed anew.
 
+    Keys of `measured.left_open` change what the entries draw.
+
     Parameters
     ----------
     study : Study
         The study, which is not modified.
     keys : mapping
-        Dotted key of the joint to value as written, such as a value of an `Assumption`.
+        Values of an `Assumption` by their keys.
 
     Returns
     -------
     Study
-        With the same tolerances, seed and sampling, so that row by row its errors are those of `study`. Its text stays.
+        With the same seed and sampling, so that row by row its errors have the scores of those of `study`. Its text
+        stays.
 
     Raises
     ------
@@ -96,8 +113,9 @@ def with_value(study: Study, keys: Mapping[str, Any]) -> Study:
     if study.variants:
         found = "has joints with dimensions of their own: they are no variations of one joint"
         raise input_error(study.path, found, "vary the joint of a study with tolerances")
-    joint = with_keys(study.joint.given("json"), _keys_of_study(study), nested(keys), f"{study.path}: joint")
-    changed = replace(study, joint=joint)
+    of_joint = nested(_of_joint(study, keys))
+    joint = with_keys(study.joint.given("json"), _keys_of_study(study), of_joint, f"{study.path}: joint")
+    changed = replace(study, joint=joint, tolerances=study.tolerances | of_entries(study, keys))
     changed.check_mounting()
     return changed
 
@@ -117,7 +135,7 @@ def together(study: Study, values: Sequence[Mapping[str, Any]]) -> dict[str, Any
     """
     joints = [with_value(study, value).joint for value in values]
     changing = [
-        {key for key in value if get(joint, key) != get(study.joint, key)}
+        {key for key in _of_joint(study, value) if get(joint, key) != get(study.joint, key)}
         for value, joint in zip(values, joints, strict=True)
     ]
     keys_of_joint = leaves(study.joint.given("json"))
@@ -127,6 +145,12 @@ def together(study: Study, values: Sequence[Mapping[str, Any]]) -> dict[str, Any
         following = derived.changed(others, keys_of_joint)
         joined |= {key: text for key, text in value.items() if key in changing[number] or key not in following}
     return joined
+
+
+def _of_joint(study: Study, keys: Mapping[str, Any]) -> dict[str, Any]:
+    """Those of some keys that are of the joint, not of what measured parts leave open."""
+    of_parts = {key for entry in study.known for key in left_open(entry)}
+    return {key: value for key, value in keys.items() if key not in of_parts}
 
 
 def unselected(study: Study) -> tuple[str, ...]:

@@ -161,16 +161,6 @@ def ends(name: str) -> tuple[str, str]:
     return "position_inner", "position_outer"
 
 
-def vectors_of(zone: str) -> tuple[str, ...]:
-    """Names of all quantities that a zone can draw, whatever its entry says: ends, middle, slope or components."""
-    feature, _, key = zone.partition(".")
-    if key == "position":
-        return (zone, *(f"{feature}.{end}" for end in ends(feature)))
-    if key == "coaxiality":
-        return tuple(f"{zone}_{member}" for member in PAIRS[feature])
-    return (zone, *(f"{zone}_{about}" for about in "tz")) if key in ORIENTATIONS else (zone,)
-
-
 def columns_of(name: str) -> tuple[str, ...]:
     """Columns of the table ERROR that hold a quantity or zone."""
     if not is_zone(name):

@@ -21,7 +21,7 @@ from tolstat.joint import Joint, reading
 from tolstat.joint.derived import BEARING
 from tolstat.joint.model import Assumed, leaves, merged
 from tolstat.joint.reading import faults_of_assumed
-from tolstat.study import fatigue, listing, points, proposal, rewriting, selection
+from tolstat.study import fatigue, listing, points, rewriting, selection
 from tolstat.study.design import Design
 from tolstat.study.model import MAX_ROWS, Output, Sampling, Solver, Subset
 from tolstat.study.selection import TOLERANCED, Assignments, Reading
@@ -33,7 +33,7 @@ OF_CASE = ("joint", "operation", "solver", "errors")
 """Sections that a case may have, too."""
 SECTIONS = (
     *OF_CASE,
-    *("tolerances", "correlation", "sampling", "proposal", "sweep", "grid", "case", "variant", "assumed"),
+    *("tolerances", "correlation", "sampling", "sweep", "grid", "case", "variant", "assumed"),
     *("limits", "fatigue", "output"),
 )
 """Sections of a study, in the order of the reference."""
@@ -44,11 +44,8 @@ SCATTER = ("tolerances", "correlation", "errors")
 SECTIONS_OF = {
     "sweep": ("sweep", "errors"),
     "cases": ("case", "grid", "variant"),
-    "importance": (*SCATTER, "proposal"),
 }
 """Sections that define the joints of the other sampling methods; the first is required."""
-INDEPENDENT = ("random", "importance")
-"""Sampling methods whose joints can be reweighted to the processes that measured parts leave open, with intervals."""
 
 
 def _joint(file: Reading) -> Joint | None:
@@ -143,13 +140,11 @@ READERS: dict[str, Callable[[Reading], Any]] = {
     "errors": lambda file: selection.fixed_errors(file, file.table("errors"), ("errors",), file.claims),
     "scatter": _scatter,
     "copula": correlation.read,
-    "proposals": proposal.read,
     "sampling": _sampling,
     "sweep": listing.axes_of_sweep,
     "limits": _limits,
     "fatigue": fatigue.read,
     "output": lambda file: file.model(Output, file.data.get("output", {}), "output"),
-    "groups": correlation.groups,
     "listed": _listed,
     "swept": listing.swept,
 }
@@ -162,7 +157,6 @@ def _check(file: Reading) -> None:
         _check_sections(file, file.sampling)
         _check_method(file, file.sampling)
         _check_points(file, file.sampling)
-        _check_known(file, file.sampling.method)
     if file.output is not None:
         _check_output(file, file.output)
     if file.output is not None and file.solver is not None:
@@ -191,9 +185,6 @@ def _check_method(file: Reading, sampling: Sampling) -> None:
     if sampling.method == "subset":
         remedy = 'write "random", and run: tolstat rare STUDY --limit "cross1.F > 900 N"'
         file.fault("sampling.method", "'subset' is set by tolstat rare, not in a study", remedy)
-    if sampling.method == "importance" and not file.data.get("proposal"):
-        remedy = "add [[proposal]] with share, and widen, shift or parts"
-        file.fault("proposal", "missing table: distributions to draw joints from beside the tolerances", remedy)
     joints = math.prod(axis.points for axis in file.sweep)
     if joints > MAX_ROWS:
         file.fault("sweep", f"gives {joints} joints", f"give at most {MAX_ROWS}")
@@ -209,20 +200,6 @@ def _check_points(file: Reading, sampling: Sampling) -> None:
     for name in (name for axis in file.sweep for name in axis.names if name.startswith("operation.")):
         remedy = "write one [operation], or sweep other errors"
         file.fault(f"sweep.{name}", "is given by several [[operation]] already", remedy)
-
-
-def _check_known(file: Reading, method: str) -> None:
-    """Note entries known from measured parts whose joints could not be reweighted to other means and deviations."""
-    for entry in (entry for entry in file.scatter.entries if entry.parts):
-        key, known = dotted(("tolerances", entry.pattern)), f"is known from {entry.parts} measured parts"
-        if method not in INDEPENDENT:
-            remedy = 'write method = "importance", and a [[proposal]] with parts'
-            file.fault(key, f"{known}, which needs independent joints, not {method!r}", remedy)
-        if correlated := sorted(set(entry.names) & set(file.copula.names)):
-            file.fault(key, f"{known}, and {correlated[0]} is correlated", "remove the correlation, or known_from")
-        if accepted := sorted(set(entry.names) & file.scatter.accepted):
-            remedy = 'remove known_from or the bonus, or write material_condition = "fills"'
-            file.fault(key, f"{known}, and parts are accepted by {accepted[0]} and a position", remedy)
 
 
 def _check_output(file: Reading, output: Output) -> None:
@@ -369,4 +346,4 @@ def subset_of(study: Study, sampling: Mapping[str, Any]) -> Study:
         with gather(faults):
             read = validate(Subset, kept | {"n": sampling["per_level"]} | dict(sampling), "subset simulation")
     output = study.output.model_copy(update={"histories": "none"})
-    return replace(study, sampling=read, proposals=(), output=output)
+    return replace(study, sampling=read, output=output)

@@ -75,7 +75,7 @@ class Solver(Strict):
         return from_names(settings | ({"fidelity": "dynamic"} if self.fidelity == "auto" else {}))
 
 
-SamplingMethod = Literal["random", "sobol", "lhs", "sweep", "cases", "importance", "pick_freeze", "subset"]
+SamplingMethod = Literal["random", "sobol", "lhs", "sweep", "cases", "subset"]
 
 
 def _of_a_file(schema: dict[str, Any]) -> None:
@@ -87,19 +87,14 @@ class Sampling(Strict):
     """How many joints there are, and how they are drawn."""
 
     method: SamplingMethod = Field(default="random", json_schema_extra=_of_a_file, examples=["sobol"])
-    """`random`; `sobol`, scrambled Sobol' points; `lhs`, Latin hypercube; `importance`, random, from [tolerances] and
-    [[proposal]]; `pick_freeze`, joints that share errors, for Sobol' indices; `sweep`, the grid of [sweep]; `cases`,
-    the joints of [[case]], [[variant]] and [grid]"""
+    """`random`; `sobol`, scrambled Sobol' points; `lhs`, Latin hypercube; `sweep`, the grid of [sweep]; `cases`, the
+    joints of [[case]], [[variant]] and [grid]"""
     n: int | None = Field(default=None, strict=True, ge=1, le=MAX_SAMPLES, examples=[1024])
-    """number of joints without the nominal one; needed by all methods but `sweep` and `cases`; with `pick_freeze` of
-    pairs of random joints"""
+    """number of joints without the nominal one; needed by all methods but `sweep` and `cases`"""
     seed: int = Field(default=0, strict=True, ge=0, lt=2**63, examples=[2021])
     """seed of all draws"""
     nominal_first: Flag = Field(default=True, examples=[False])
     """whether row 0 is the joint without errors, which statistics leave out; not with `cases`"""
-    groups: Literal["tolerance", "error"] = Field(default="tolerance", examples=["error"])
-    """what `pick_freeze` exchanges together: all errors of an entry of [tolerances], or each alone"""
-
     replicates: int = Field(default=1, strict=True, ge=1, le=1000, examples=[8])
     """number of independent randomisations that `n` is divided into, with `sobol` or `lhs`: shares and quantiles then
     have intervals"""
@@ -109,12 +104,8 @@ class Sampling(Strict):
 
     @model_serializer(mode="wrap")
     def _without_foreign_keys(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Leave out `groups` unless the method is ``pick_freeze``, and `replicates` unless there are several.
-
-        Identities of other methods do not have them, nor `joints_per_lot` where each joint is its own lot.
-        """
+        """Leave out `replicates` of one, and `joints_per_lot` of one: they have no effect."""
         has_effect = {
-            "groups": self.method == "pick_freeze",
             "replicates": self.replicates > 1,
             "joints_per_lot": self.joints_per_lot > 1,
         }
@@ -146,8 +137,6 @@ class Sampling(Strict):
         if self.joints_per_lot > 1 and (self.n or 0) < least:
             found = f"{self.n} joints, {self.joints_per_lot} a lot, are fewer than {LEAST} lots"
             raise refuse(found, f"give n = {least} or more, or a smaller joints_per_lot")
-        if self.method != "pick_freeze" and "groups" in self.model_fields_set:
-            raise refuse(f"groups is given with {self.method!r}", 'remove it, or write method = "pick_freeze"')
         if self.method == "cases" and self.nominal_first:
             raise refuse(
                 "nominal_first is given with 'cases'", "remove it: each group has its own joint without errors"

@@ -14,7 +14,6 @@ from tolstat.common.strict import did_you_mean
 from tolstat.study import rewriting, selection
 from tolstat.study.study import Study
 from tolstat.study.tolerances import fits, kinds, zones
-from tolstat.study.tolerances.density_ratio import unbounded
 from tolstat.study.tolerances.distributions import Distribution
 from tolstat.study.tolerances.entry import Site, Toleranced, ToleranceEntry
 from tolstat.study.tolerances.zones import ZoneEntry
@@ -102,8 +101,8 @@ class Tolerance(NamedTuple):
 
     @property
     def widens(self) -> bool:
-        """Whether the tolerance may become wider: not if it is bounded, nor if it refines a position."""
-        return unbounded(self.distribution(self.entry)) and not self.site.shared
+        """Whether the tolerance may become wider: not if it refines a position."""
+        return not self.site.shared
 
 
 def tolerances(study: Study) -> list[Tolerance]:

@@ -14,7 +14,6 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from tolstat.analysis.process import LEAST_PARTS, MOST_PARTS
 from tolstat.common import loads, strict
 from tolstat.common.channels import COMPONENTS, PLANES
 from tolstat.common.files import data_dir
@@ -24,14 +23,13 @@ from tolstat.common.units import EXAMPLES
 from tolstat.joint import Joint, Operation
 from tolstat.joint.model import Assumed
 from tolstat.joint.reading import DEFAULT_JOINT
-from tolstat.study.axes import is_zone, vectors_of
+from tolstat.study.axes import is_zone
 from tolstat.study.design import KEYS
 from tolstat.study.fatigue import LineEntry, Settings, StressPointEntry
 from tolstat.study.file import OF_CASE
 from tolstat.study.listing import CaseEntry, Range, VariantEntry
 from tolstat.study.model import Output, Sampling, Solver, SweepEntry
 from tolstat.study.points import PointEntry
-from tolstat.study.proposal import MAX_SHIFT, MAX_WIDEN, ProposalEntry
 from tolstat.study.selection import GIVEN, TOLERANCED, UNITS
 from tolstat.study.tolerances import fits
 from tolstat.study.tolerances.correlation import Correlation
@@ -157,12 +155,6 @@ def _pure(part: Schema) -> Schema:
     return {key: value for key, value in part.items() if key not in ("examples", "not")} | schema_of_quantity("1", "")
 
 
-def _numbers(low: float, high: float, kind: str = "number") -> Schema:
-    """JSON schema of numbers by name of what is drawn: errors, and vectors of zones."""
-    drawn = [quantity for name in TOLERANCED for quantity in (vectors_of(name) if is_zone(name) else (name,))]
-    return _table("", {name: {"type": kind, "minimum": low, "maximum": high} for name in drawn})
-
-
 def sections() -> dict[str, Schema]:
     """JSON schema of each table of a study, in the order of the reference."""
     text = "Joint file, and keys that replace some of its own, such as contact.clearance."
@@ -185,7 +177,6 @@ def sections() -> dict[str, Schema]:
         "tolerances": scatter | {"properties": {fits.KEY: {"x-table": fits.KEY}} | scatter["properties"]},
         "correlation": _listed(Correlation),
         "sampling": of_model(Sampling),
-        "proposal": _listed(ProposalEntry),
         "sweep": _table(swept, _entries("sweep", UNITS | KEYS)),
         "grid": _table("Values at which all cases are run, by name or pattern; several entries make a grid.", grid),
         "case": _listed(CaseEntry),
@@ -211,7 +202,6 @@ def _definitions() -> dict[str, Schema]:
         "description": "name of a joint that comes with tolstat, or path of a joint file from the folder of this file",
         "examples": [DEFAULT_JOINT],
     }
-    factor: Schema = {"type": "number", "minimum": 1 / MAX_WIDEN, "maximum": MAX_WIDEN}
     entries: dict[str, Schema] = {
         "tolerance": {"anyOf": [of_model(model) for model in TOLERANCES.values()]},
         "quantity": schema_of_quantity("error", EXAMPLES["m"]),
@@ -229,9 +219,6 @@ def _definitions() -> dict[str, Schema]:
         "range": of_model(Range),
         "operation": _overriding(of_model(Operation)),
         "solver": of_model(Solver),
-        "widen": {"anyOf": [factor, _numbers(1 / MAX_WIDEN, MAX_WIDEN)]},
-        "shift": _numbers(-MAX_SHIFT, MAX_SHIFT),
-        "parts": _numbers(LEAST_PARTS, MOST_PARTS, "integer"),
         fits.KEY: of_model(fits.FitEntry),
         "points": {"type": "object", "additionalProperties": of_model(StressPointEntry)},
         "line": of_model(LineEntry),

@@ -68,7 +68,7 @@ class DutyCycle(NamedTuple):
 
 
 def duty_cycle(time: FloatArray, torque: FloatArray, speed: FloatArray, alpha: FloatArray, m: float) -> DutyCycle:
-    """Choose operating points by the damage of revolutions and, with the same weight, of changes of the torque.
+    """Choose operating points by the damage of revolutions and, counted alike, of changes of the torque.
 
     Damage of a revolution is proportional to the torque to the power m, that of a rainflow cycle of the torque to its
     range to this power, half of it at either end.
@@ -86,9 +86,9 @@ def duty_cycle(time: FloatArray, torque: FloatArray, speed: FloatArray, alpha: F
         When the shaft never turns, or turns without torque.
     """
     steps = np.diff(time)
-    weight = 0.5 * (np.append(steps, 0.0) + np.append(0.0, steps))
+    lasting = 0.5 * (np.append(steps, 0.0) + np.append(0.0, steps))
     turning = np.abs(speed) > STANDING * np.abs(speed).max()
-    revolutions = np.where(turning, weight * np.abs(speed) / (2.0 * np.pi), 0.0)
+    revolutions = np.where(turning, lasting * np.abs(speed) / (2.0 * np.pi), 0.0)
     damage = revolutions * np.abs(torque / max(np.abs(torque).max(), np.finfo(float).tiny)) ** m
     if not damage.sum() > 0:
         raise ValueError("has no torque while the shaft turns")
@@ -108,7 +108,7 @@ def duty_cycle(time: FloatArray, torque: FloatArray, speed: FloatArray, alpha: F
     def sums(values: FloatArray) -> FloatArray:
         return np.asarray(np.bincount(label, values)[order])
 
-    seconds, turns = sums(np.where(turning, weight, 0.0)), sums(revolutions)
+    seconds, turns = sums(np.where(turning, lasting, 0.0)), sums(revolutions)
     size = (sums(revolutions * np.abs(torque) ** m) / turns) ** (1.0 / m)
     number = np.full(label.max() + 1, -1)
     number[order] = np.arange(len(order))
@@ -121,10 +121,10 @@ def duty_cycle(time: FloatArray, torque: FloatArray, speed: FloatArray, alpha: F
         sums(revolutions * alpha) / turns,
         np.sign(sums(revolutions * speed)) * 2.0 * np.pi * turns / seconds,
         torques,
-        seconds / weight[turning].sum(),
+        seconds / lasting[turning].sum(),
         sums(damage) / damage.sum(),
         damage_of_visits,
-        float(weight[~turning].sum() / weight.sum()),
+        float(lasting[~turning].sum() / lasting.sum()),
         visits,
         len(all_visits) - len(visits),
         float(turns.sum()),

@@ -26,8 +26,7 @@ from tolstat.study.design import Design
 from tolstat.study.fatigue import Fatigue
 from tolstat.study.model import Output, Sampling, Solver, SweepAxis
 from tolstat.study.points import Point, Setting, limits_at, only_one
-from tolstat.study.proposal import Proposal
-from tolstat.study.tolerances.correlation import Copula, Group, Lot
+from tolstat.study.tolerances.correlation import Copula, Lot
 from tolstat.study.tolerances.distributions import Distribution
 from tolstat.study.tolerances.entry import Toleranced
 from tolstat.study.tolerances.fits import Fit
@@ -127,8 +126,6 @@ class Study(Case):
         Correlation of the errors of a joint.
     lots : dict of str to Lot
         How errors depend on the lot of their joint.
-    proposals : tuple of Proposal
-        Distributions of importance sampling beside the tolerances; empty unless ``sampling.method`` is ``importance``.
     sampling : Sampling
         How many, and how they are drawn.
     sweep : tuple of SweepAxis
@@ -144,8 +141,6 @@ class Study(Case):
         Settings for the evaluation of load cycles.
     output : Output
         What is stored of each joint.
-    groups : tuple of Group
-        Errors that ``sampling.method`` ``pick_freeze`` exchanges together; empty for other methods.
     fit : Fit, optional
         Fit by ISO 286 that gives the diameters.
     assumed : tuple of Assumed
@@ -162,13 +157,11 @@ class Study(Case):
     axes: Mapping[str, Axis] = field(default_factory=dict)
     copula: Copula = field(default_factory=Copula)
     lots: Mapping[str, Lot] = field(default_factory=dict)
-    proposals: tuple[Proposal, ...] = ()
     sweep: tuple[SweepAxis, ...] = ()
     swept: Design | None = None
     listed: Design | None = None
     limits: dict[str, float] = field(default_factory=dict)
     fatigue: Fatigue = field(default_factory=Fatigue)
-    groups: tuple[Group, ...] = ()
     fit: Fit | None = None
     assumed: tuple[Assumed, ...] = ()
     signals: tuple[str, ...] = ()
@@ -275,8 +268,6 @@ class Study(Case):
         """Number of joints, the nominal one not counted."""
         if self.listed:
             return len(self.listed.table)
-        if self.groups:
-            return (self.sampling.n or 0) * (len(self.groups) + 2)
         return self.sampling.n or math.prod(axis.points for axis in self.sweep)
 
     @property
@@ -331,8 +322,6 @@ class Study(Case):
         optional = {
             "axes": {name: axis.describe() for name, axis in self.axes.items()},
             "lots": {name: list(lot) for name, lot in self.lots.items()},
-            "proposal": [proposal.identity() for proposal in self.proposals],
-            "groups": [[group.label, list(group.names)] for group in self.groups],
             "swept": [variant.values for variant in self.swept.variants] if self.swept else [],
         }
         parts |= {name: part for name, part in optional.items() if part}

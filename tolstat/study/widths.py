@@ -229,7 +229,7 @@ def applied(study: Study, distributions: Mapping[str, Distribution]) -> Study:
     """
     sampling = study.sampling.model_copy(update={"method": "random", "joints_per_lot": 1})
     tolerances = study.tolerances | dict(distributions)
-    return replace(study, sampling=sampling, tolerances=tolerances, proposals=(), groups=())
+    return replace(study, sampling=sampling, tolerances=tolerances)
 
 
 def words(study: Study, line: Group, step: str) -> str:

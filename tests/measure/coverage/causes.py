@@ -1,4 +1,4 @@
-"""Experiments on causes: Sobol' indices, rank regression, the tail, indices of lines that are exchanged."""
+"""Experiments on causes: Sobol' indices, the tail, indices of lines that are exchanged."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import numpy as np
 from scipy.stats import norm
 
 from tests.measure.coverage.trial import Asked, Experiment, Found, Rng, found
-from tolstat.analysis import pick_freeze, ranks, sensitivity
+from tolstat.analysis import exchanged, ranks, sensitivity
 from tolstat.common.loads import FloatArray
 
-WEIGHTS = np.array([1.0, 0.5, 0.0])
-"""Weights of the three errors in the loads."""
+SLOPES = np.array([1.0, 0.5, 0.0])
+"""Slopes of the loads in the three errors."""
 LONG = "the variance of a load with a long tail is that of few joints; `causes --run` decomposes its logarithm"
 BENT = "few joints for a load with several bends in an error"
 
@@ -32,7 +32,7 @@ class Load(NamedTuple):
 
 def loads() -> list[Load]:
     """Linear, skew, and Ishigami's function."""
-    square = WEIGHTS**2
+    square = SLOPES**2
     share = square / square.sum()
     a, b = 7.0, 0.1
     pi4, pi8 = np.pi**4, np.pi**8
@@ -40,9 +40,9 @@ def loads() -> list[Load]:
     mixed = b**2 * pi8 * (1.0 / 18.0 - 1.0 / 50.0)
     variance = parts.sum() + mixed
     return [
-        Load("linear", _normal, lambda x: x @ WEIGHTS, share, share),
-        _exponential("exponential", WEIGHTS, LONG),
-        _exponential("slightly skew", 0.3 * WEIGHTS),
+        Load("linear", _normal, lambda x: x @ SLOPES, share, share),
+        _exponential("exponential", SLOPES, LONG),
+        _exponential("slightly skew", 0.3 * SLOPES),
         Load(
             "Ishigami",
             lambda rng, shape: rng.uniform(-np.pi, np.pi, shape),
@@ -53,11 +53,11 @@ def loads() -> list[Load]:
     ]
 
 
-def _exponential(name: str, weights: FloatArray, known: str = "") -> Load:
-    square = weights**2
+def _exponential(name: str, slopes: FloatArray, known: str = "") -> Load:
+    square = slopes**2
     whole = math.expm1(square.sum())
     first, total = np.expm1(square) / whole, 1.0 - np.expm1(square.sum() - square) / whole
-    return Load(name, _normal, lambda x: np.exp(x @ weights), first, total, known)
+    return Load(name, _normal, lambda x: np.exp(x @ slopes), first, total, known)
 
 
 def _normal(rng: Rng, shape: tuple[int, ...]) -> FloatArray:
@@ -69,13 +69,10 @@ def experiments() -> Iterator[Experiment]:
     for load in loads():
         for n in (200, 2000):
             yield _given_data(load, n)
-            yield _pick_freeze(load, n)
+            yield _by_pairs(load, n)
     for share in (0.5, 0.05):
         for n in (200, 2000):
             yield _event(share, n)
-    for weights in ((1.0, 0.5, 0.0), (1.0, 1.0, 1.0)):
-        for n in (200, 2000):
-            yield _ranks(np.array(weights), n)
     for share in (0.1, 0.02):
         for n in (1024, 4096):
             yield _tail(share, n)
@@ -94,7 +91,7 @@ def _given_data(load: Load, n: int) -> Experiment:
     return Experiment(tuple(asked), once)
 
 
-def _exchanged(asked: list[Asked], estimator: Callable[..., pick_freeze.Indices], load: Load, n: int) -> Experiment:
+def _exchanged(asked: list[Asked], estimator: Callable[..., exchanged.Indices], load: Load, n: int) -> Experiment:
     """Indices from the loads of points A and B, and of A with one error of B."""
 
     def once(rng: Rng) -> list[Found]:
@@ -106,15 +103,15 @@ def _exchanged(asked: list[Asked], estimator: Callable[..., pick_freeze.Indices]
     return Experiment(tuple(asked), once, refusal=(ValueError,))
 
 
-def _pick_freeze(load: Load, n: int) -> Experiment:
+def _by_pairs(load: Load, n: int) -> Experiment:
     cases = [(f"{load.name}, error {k + 1}", n) for k in range(3)]
     asked = [Asked(f"{name}, exchanged", *case) for name in ("index alone", "index in all") for case in cases]
-    return _exchanged(asked, pick_freeze.indices, load, n)
+    return _exchanged(asked, exchanged.indices, load, n)
 
 
 def _event(share: float, n: int) -> Experiment:
     """Indices of the event that a linear load is above a level."""
-    size = math.sqrt(float((WEIGHTS**2).sum()))
+    size = math.sqrt(float((SLOPES**2).sum()))
     z = float(norm.isf(share))
 
     x = np.linspace(-8.0, 8.0, 16_001)
@@ -127,31 +124,19 @@ def _event(share: float, n: int) -> Experiment:
         given = norm.sf((z - math.sqrt(part) * x) / math.sqrt(1.0 - part))
         return float(density @ (given - share) ** 2) / (share * (1.0 - share))
 
-    parts = WEIGHTS**2 / size**2
+    parts = SLOPES**2 / size**2
     first, total = (np.array([f(float(p)) for p in parts]) for f in (of, lambda p: 1.0 - of(1.0 - p)))
     cases = [f"linear, {share:g}, {word}, error {k + 1}" for word in ("alone", "in all") for k in range(3)]
-    load = Load("event", _normal, lambda x: (x @ WEIGHTS > z * size).astype(float), first, total)
-    return _exchanged([Asked("index of the event", case, n) for case in cases], pick_freeze.of_event, load, n)
-
-
-def _ranks(weights: FloatArray, n: int) -> Experiment:
-    """Spearman's correlations of normal errors with their sum, of which all monotone functions have the same ranks."""
-    truth = 6.0 / np.pi * np.arcsin(0.5 * weights / math.sqrt(float((weights**2).sum())))
-    name = "exponential of a sum, weights " + ", ".join(f"{w:g}" for w in weights)
-
-    def once(rng: Rng) -> list[Found]:
-        x = rng.standard_normal((n, 3))
-        return found(ranks.regression(x, np.exp(x @ weights)), truth)
-
-    return Experiment(tuple(Asked("rank regression", f"{name}, error {k + 1}", n) for k in range(3)), once)
+    load = Load("event", _normal, lambda x: (x @ SLOPES > z * size).astype(float), first, total)
+    return _exchanged([Asked("index of the event", case, n) for case in cases], exchanged.of_event, load, n)
 
 
 def _tail(share: float, n: int) -> Experiment:
     """Errors of joints above a limit beside those of the others, for a sum."""
-    size, z = math.sqrt(float((WEIGHTS**2).sum())), float(norm.isf(share))
+    size, z = math.sqrt(float((SLOPES**2).sum())), float(norm.isf(share))
     x = np.linspace(-8.0, 8.0, 16_001)
     direction, far = [], []
-    for w in WEIGHTS:
+    for w in SLOPES:
         beyond = norm.sf((z * size - w * x) / math.sqrt(size**2 - w**2))
         above, below = (norm.pdf(x) * part for part in (beyond, 1.0 - beyond))
         direction.append(_larger(above, below))
@@ -159,7 +144,7 @@ def _tail(share: float, n: int) -> Experiment:
 
     def once(rng: Rng) -> list[Found]:
         errors = rng.standard_normal((n, 3))
-        own = ranks.tail(errors, errors @ WEIGHTS > z * size)
+        own = ranks.tail(errors, errors @ SLOPES > z * size)
         return found(own.direction, direction) + found(own.size, far)
 
     asked = [

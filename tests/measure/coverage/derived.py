@@ -1,4 +1,4 @@
-"""Experiments on what is computed from independent joints: capability, damage, failures, stops."""
+"""Experiments on what is computed from independent joints, or measured parts: capability, damage, failures, stops."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tests.measure.coverage.trial import (
     quantiles_at,
     sample_of,
 )
-from tolstat.analysis import binomial, capability, cycles, strength
+from tolstat.analysis import binomial, capability, cycles, measured, strength
 from tolstat.common.loads import FloatArray
 
 
@@ -37,6 +37,8 @@ def experiments() -> Iterator[Experiment]:
             yield _failed(part, n)
     for share in (0.5, 0.05, 0.002):
         yield _until(share)
+    for parts in (5, 10, 50):
+        yield _process(parts)
 
 
 def _capability(law: Law, n: int) -> Experiment:
@@ -114,3 +116,19 @@ def _until(share: float, width: float = 0.02, most: int = 20_000) -> Experiment:
         return [Found(float(lower), float(upper), share)]
 
     return Experiment((Asked("share at a stop", f"any law, {share:g}, narrower than {width:g}", most),), once)
+
+
+def _process(parts: int) -> Experiment:
+    """Standard deviation and mean of a process, from normal parts."""
+
+    def once(rng: Rng) -> list[Found]:
+        sample = rng.standard_normal(parts)
+        mean, deviation = float(sample.mean()), float(sample.std(ddof=1))
+        spreads, means = measured.spreads(parts, 0.95), measured.means(parts, 0.95)
+        return [
+            Found(deviation * spreads[0], deviation * spreads[1], 1.0),
+            Found(mean + deviation * means[0], mean + deviation * means[1], 0.0),
+        ]
+
+    asked = (Asked("process, measured parts", f"normal, {word}", parts) for word in ("spread", "mean"))
+    return Experiment(tuple(asked), once)

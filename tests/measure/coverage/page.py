@@ -10,7 +10,7 @@ import numpy as np
 
 from studies.precision.measuring import markdown as as_markdown
 from tests.measure.coverage.run import MOST, Coverage
-from tests.measure.coverage.statistics import CONTROL, NONE, STATISTICS
+from tests.measure.coverage.statistics import CONTROL, STATISTICS
 from tests.measure.coverage.trial import Row
 from tolstat.display.text import align
 
@@ -118,17 +118,13 @@ def _legend(found: Coverage) -> str:
         f"Seeds 0 to {seeds - 1}{apart}. Covered: least of the cases, with its 95 % interval, and their median; cases "
         f"count in which at least {100 * ENOUGH:.0f} % of the seeds give an interval. Above, below: largest share of "
         "the intervals that lie above the truth, and below it. Given: share of the seeds with an interval. Width: "
-        "median, over that of as many independent joints of equal weight."
+        "median, over that of as many independent joints."
     )
 
 
 def _verdict(found: Coverage, bullet: str = "") -> list[str]:
     """Sentences: which rows miss, whether the wrong estimator is found."""
-    missing = [
-        row
-        for row in found.rows
-        if found.misses(row) and row.asked.statistic != CONTROL and STATISTICS[row.asked.statistic].claim != NONE
-    ]
+    missing = [row for row in found.rows if found.misses(row) and row.asked.statistic != CONTROL]
     told = [f"{bullet}{_sentence(row)}" for row in missing]
     controls = [row for row in found.rows if row.asked.statistic == CONTROL]
     parts = []

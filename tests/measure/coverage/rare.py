@@ -1,4 +1,4 @@
-"""Experiments on rare loads: tails, subset simulation, and loads of joints that never repeat."""
+"""Experiments on rare loads: subset simulation, and loads of joints that never repeat."""
 
 from __future__ import annotations
 
@@ -7,23 +7,14 @@ from collections.abc import Callable, Iterator
 
 from scipy.stats import chi2, norm
 
-from tests.measure.coverage.trial import Asked, Experiment, Found, Rng, found, fresh_share, laws, sample_of
-from tolstat.analysis import extreme
+from tests.measure.coverage.trial import Asked, Experiment, Found, Rng, found, fresh_share, laws
 from tolstat.analysis.subset import Walk
 from tolstat.common.loads import FloatArray
 from tolstat.solver import stationary
 
-SLOW = dict.fromkeys(
-    ("normal", "gamma of shape 3", "lognormal"), "its tail is Pareto's far out only: the upper end is too low"
-)
-"""Laws whose tail approaches its limiting law slowly."""
-
 
 def experiments() -> Iterator[Experiment]:
     """All of this file."""
-    for name in ("exponential", "gamma of shape 3", "Pareto tail, k = 0.2", "normal", "lognormal", "uniform"):
-        for n in (800, 4000):
-            yield _tail(name, n)
     for name in _states():
         for share in (1e-3, 1e-6):
             for n in (300, 1000):
@@ -31,23 +22,6 @@ def experiments() -> Iterator[Experiment]:
     for name in ("exponential", "normal", "uniform"):
         for revolutions in (16, 32, 64):
             yield _stationary(name, revolutions)
-
-
-def _tail(name: str, n: int) -> Experiment:
-    law = laws()[name]
-    shares = (0.1 / n, 0.01 / n)
-    loads = [float(law.ppf(1.0 - share)) for share in shares]
-    asked = [Asked("return load", f"{name}, 1 in {1.0 / share:.0f}", n, known=SLOW.get(name, "")) for share in shares]
-    of_share = fresh_share(n, shares[0])
-    asked.append(Asked("share above, from the tail", f"{name}, {shares[0]:.2e}", n, of_share, SLOW.get(name, "")))
-
-    def once(rng: Rng) -> list[Found]:
-        tail = extreme.fit(sample_of(law.draw(rng, n)))
-        own = [*(tail.level(share) for share in shares), tail.probability(max(loads[0], tail.threshold))]
-        truths = (*loads, shares[0])
-        return [Found(e.lower, e.upper, truth, not tail.refusal) for e, truth in zip(own, truths, strict=True)]
-
-    return Experiment(tuple(asked), once, refusal=(extreme.TooThinError,))
 
 
 def _states() -> dict[str, tuple[int, Callable[[FloatArray], FloatArray], Callable[[float], float]]]:

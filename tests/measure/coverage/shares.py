@@ -24,16 +24,13 @@ from tests.measure.coverage.trial import (
 from tolstat.analysis import prediction
 from tolstat.analysis.binomial import simultaneous
 from tolstat.analysis.clustered import Clustered
-from tolstat.analysis.design import Independent, Replicated
+from tolstat.analysis.design import Design, Independent, Replicated
 from tolstat.analysis.sample import Sample, total_interval
-from tolstat.analysis.weighted import Weighted
 from tolstat.common.loads import FloatArray
 
 SHARES, QUANTILES = (0.5, 0.05, 0.002), (0.5, 0.9, 0.99)
 JOINTS, DELIVERY = 20, 500
 """Joints of a lot, and of its next delivery."""
-OTHERS = 0.8
-"""Share of the joints of importance sampling that do not come from the tolerances."""
 
 
 def experiments() -> Iterator[Experiment]:
@@ -55,14 +52,6 @@ def experiments() -> Iterator[Experiment]:
         for share in (0.5, 0.1, 0.02, 0.002):
             yield _of_lots(lot, share, 50)
         yield _of_lots(lot, 0.1, 30)
-    for beta in (2.0, 3.0, 4.75):
-        for n in (500, 2000):
-            yield _weighted("sum, moved to the limit", 10, n, beta, shift=beta)
-    for scale, beta, d in ((1.3, 3.0, 20), (1.6, 3.0, 5), (1.6, 4.0, 5)):
-        yield _weighted(f"sum, {scale:g} times as wide", d, 4000, beta, scale=scale)
-    yield _weighted("both sides, 1.6 times as wide", 5, 4000, 3.0, scale=1.6, both=True)
-    for beta in (3.0, 4.0):
-        yield _weighted("both sides, moved to one", 10, 2000, beta, shift=beta, both=True)
 
 
 def _independent(law: Law, n: int) -> Experiment:
@@ -104,11 +93,17 @@ def _unresolved(law: Law, n: int) -> Experiment:
     return Experiment((Asked("share, joints without a load", f"{law.name}, 0.05, half of those above lost", n),), once)
 
 
+class _OfShare(Independent):
+    """Deliveries from the interval of the share, as of designs that have no counts."""
+
+    delivery = Design.delivery
+
+
 def _delivered(share: float, n: int) -> Experiment:
     """Joints above a limit in the next delivery, a random number itself."""
     number = prediction.DELIVERY
     case = f"any law, {share:g}, {number} joints delivered"
-    designs = Independent(), Weighted(np.ones(n), 1.0)  # from counts, and from an interval of the share
+    designs = Independent(), _OfShare()
 
     def once(rng: Rng) -> list[Found]:
         above, truth = int(rng.binomial(n, share)), float(rng.binomial(number, share))
@@ -190,30 +185,3 @@ def _of_lots(law: _Lots, share: float, number: int) -> Experiment:
         return [*judged(sample), Found(*ends, truth)]
 
     return Experiment((*asked, Asked("next delivery, lots", case, n)), once)
-
-
-def _weighted(
-    name: str, d: int, n: int, beta: float, shift: float = 0.0, scale: float = 1.0, both: bool = False
-) -> Experiment:
-    """Importance sampling of a sum of `d` normal errors above `beta`, or beyond it on both sides.
-
-    Proposals are moved by `shift` along the sum, or `scale` times as wide; moved ones do not reach the other side.
-    """
-    m, kept, step = round(OTHERS * n), 1.0 - OTHERS, shift / np.sqrt(d)
-    share = float((1 + both) * norm.sf(beta))
-    searched = not (both and shift)
-
-    def once(rng: Rng) -> list[Found]:
-        x = np.concatenate([step + scale * rng.standard_normal((m, d)), rng.standard_normal((n - m, d))])
-        ratio = np.exp(0.5 * (x**2 - ((x - step) / scale) ** 2).sum(axis=1)) / scale**d
-        loads = x.sum(axis=1) / np.sqrt(d)
-        design = Weighted(1.0 / (kept + OTHERS * ratio), 1.0 / kept, np.arange(n) >= m)
-        sample = sample_of(np.abs(loads) if both else loads, design)
-        missed = Found(-np.inf, sample.upper_if_missed(beta), share)
-        return [missed, *shares_at(sample, {beta: share})] if searched else [missed]
-
-    case = f"{name}, {share:.1e}"
-    asked = [Asked("share, whatever proposals miss", case, n)]
-    if searched:
-        asked.append(Asked("share, importance sampling", case, n, fresh_share(n, share)))
-    return Experiment(tuple(asked), once)

@@ -62,9 +62,9 @@ def found(own: Any, truths: Iterable[float]) -> list[Found]:
 
 
 def shares_at(sample: Sample, truths: Mapping[float, float]) -> list[Found]:
-    """Shares of the joints above levels, with the true share of each level; refused where the design has a doubt."""
+    """Shares of the joints above levels, with the true share of each level."""
     rows = sample.curve(list(truths))
-    return [Found(r["lower"], r["upper"], truths[r["level"]], not sample.doubt(r["level"])) for r in rows]
+    return [Found(r["lower"], r["upper"], truths[r["level"]]) for r in rows]
 
 
 def quantiles_at(sample: Sample, truths: Mapping[float, float]) -> list[Found]:

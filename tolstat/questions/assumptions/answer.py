@@ -76,7 +76,7 @@ def assumptions(view: View, accepted: Accepted = math.nan) -> Answer:
     NotApplicable
         When the file holds no joints with other values.
     StoreError
-        When the joints are not those of one joint, not drawn from tolerances, differ in weight, or have no limits.
+        When the joints are not those of one joint, not drawn from tolerances, or have no limits.
     """
     standing = variations.evaluate(view, accepted)
     if not standing.rows:

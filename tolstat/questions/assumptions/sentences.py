@@ -10,12 +10,16 @@ import numpy as np
 
 from tolstat.analysis import binomial
 from tolstat.display import table, text
-from tolstat.questions.assumptions.variations import ALL, AXIAL, SHAFT, Standing, widths
+from tolstat.questions.assumptions.variations import ALL, AXIAL, SHAFT, Standing, widths, written
+from tolstat.store.recorded import mentions
 from tolstat.store.view import View
+from tolstat.study.measured import left_open
 from tolstat.study.widths import COARSER, HALF
 
 KEPT = {"yes": "kept", "no": "not kept"}
 """Sides of the accepted share in words."""
+KEYS_OF_PARTS = ("known_from", "law")
+"""Keys of an entry of ``[tolerances]`` that is known from measured parts."""
 _NAMED = 2
 """Largest number of assumptions, or variations, that a sentence names."""
 _MOST = 20_000
@@ -91,6 +95,26 @@ def of_variations(standing: Standing | None, answer: str) -> str:
             far = max(alone, key=lambda row: abs(row["change"]))
             sides.append(f"{word} in {len(decided)} ({text.percent(far['share'])} {_condition(far['label'])})")
     return f"Of {n} variations of what is assumed: {', '.join(sides) or 'open in all'}"
+
+
+def of_parts(view: View, standing: Standing | None) -> str:
+    """Words on what measured parts leave open; empty where the study takes its tolerances as exact.
+
+    ``10 parts measured: their spread is known to −27 … +65 %; with the larger one 4.1 %``. Of several entries the one
+    with the largest share then, without joints of these the one with the fewest parts.
+    """
+    if not mentions(view.store, KEYS_OF_PARTS, "tolerances"):  # the study is not read for the others
+        return ""
+    shares = {row["keys"]: float(row["share"]) for row in standing.rows} if standing else {}
+    each = []
+    for entry in view.study.known:
+        key, (low, high) = next(iter(left_open(entry).items()))
+        share = shares.get(written({key: high}), math.nan)
+        ends = " … ".join(f"{100.0 * (end - 1.0):+.0f}" for end in (low, high)).replace("-", "−")
+        words = f"their spread is known to {ends} %"
+        words += "" if math.isnan(share) else f"; with the larger one {text.percent(share)}"
+        each.append((np.nan_to_num(share), -entry.parts, f"{entry.parts} parts of {entry.pattern} measured: {words}"))
+    return max(each)[-1] if each else ""
 
 
 def not_varied(standing: Standing, file: str) -> str:

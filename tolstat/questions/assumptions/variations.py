@@ -48,7 +48,7 @@ class Variation(NamedTuple):
     label : str
         The values in words.
     keys : mapping
-        Dotted keys of the joint, and their values as written.
+        Dotted keys of the joint, or of what measured parts leave open, and their values as written.
     because : str
         Why the value is not known; of all assumptions together, what the variation consists of.
     """
@@ -166,11 +166,8 @@ def _evaluate(view: View, accepted: float) -> Standing:
         missing = (ALL,) if len(together_in_file) < len(combined) else ()
     looks = 2 if len({len(loads) for _, loads in simulated}) > 1 else 1
     confidence = 1.0 - 0.05 / max(looks * len(simulated), 1)
-    load, parts = joints.load, error_budget.known_parts(view)
+    load = joints.load
     interval = total_interval(error_budget.with_error(view, load), joints.level, 0.95)
-    if parts is not None:
-        known = parts.share(load.name, 0.95)
-        interval = known.lower, known.upper
     drawn, side = (load.above(joints.level).estimate, *interval), side_of(interval, accepted)
     rows = [_row(variation, joints, loads, confidence) for variation, loads in simulated]
     for row in rows:
@@ -284,8 +281,7 @@ class _Joints(ChangedJoints):
 
 
 def _row(variation: Variation, joints: _Joints, loads: FloatArray, confidence: float) -> dict[str, Any]:
-    keys = ", ".join(f"{key} = {_written(value)}" for key, value in variation.keys.items())  # as a joint file has them
-    row: dict[str, Any] = variation._asdict() | {"keys": keys}
+    row: dict[str, Any] = variation._asdict() | {"keys": written(variation.keys)}
     row |= {"n": len(loads), "n_failed": int(np.isnan(loads).sum())}
     share, change = joints.share(loads, confidence), (np.nan,) * 3
     with suppress(ValueError):  # no joint has a load both as drawn and with the other values
@@ -303,7 +299,8 @@ def _share(loads: FloatArray, level: float) -> float:
 def label_of(name: str, values: Mapping[str, Any]) -> str:
     """Label of a value of an assumption: ``shaft slides``, ``law sliced``, ``clearance 0.05 mm``, ``fork (l_f 30 mm)``.
 
-    Where the name is long it is the key alone, ``r_b 30 mm``.
+    Where the name is long it is the key alone, ``r_b 30 mm``. Of measured parts ``spread of pin*.tilt_t × 1.28``, and
+    ``mean of pin*.tilt_t +0.31 σ``.
 
     Parameters
     ----------
@@ -317,11 +314,18 @@ def label_of(name: str, values: Mapping[str, Any]) -> str:
     if LAW in values:
         return f"law {values[LAW]}"
     key, value = next(iter(values.items()))
+    if key == "{2}.{0}".format(*name.partition(" of ")):  # of measured parts
+        return f"{name} × {value:.3g}" if name.startswith("spread") else f"{name} {value:+.2g} σ".replace(" -", " −")
     last = key.rpartition(".")[2]
     if last in name.split():
         return f"{name} {_written(value)}"
     symbol = f"{last} {_written(value)}"
     return symbol if len(name) > _LONGEST else f"{name} ({symbol})"
+
+
+def written(keys: Mapping[str, Any]) -> str:
+    """Keys and values as a joint file has them: ``contact.law = sliced``."""
+    return ", ".join(f"{key} = {_written(value)}" for key, value in keys.items())
 
 
 def _written(value: Any) -> str:

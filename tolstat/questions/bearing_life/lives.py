@@ -127,10 +127,10 @@ def lives_of(view: View) -> Lives:
     hourly = duty[:, None] * speeds / (2.0 * np.pi) * rating_life.turns_per_revolution(swings, critical) * HOUR
     turns = hourly.sum(axis=0)
     with np.errstate(divide="ignore", invalid="ignore"):
-        weights = np.where(turns > 0.0, hourly / turns, duty[:, None])[:, :, None]
+        turned = np.where(turns > 0.0, hourly / turns, duty[:, None])[:, :, None]
         largest = loads.max(axis=0)
         relative = np.where(largest > 0.0, loads / largest, 0.0 * loads)
-        load = largest * (weights * relative**LIFE_EXPONENT).sum(axis=0) ** (1.0 / LIFE_EXPONENT)
+        load = largest * (turned * relative**LIFE_EXPONENT).sum(axis=0) ** (1.0 / LIFE_EXPONENT)
         pins = bearing.factor * rating_life.basic_life(load, bearing.C) / turns[:, None]
     hours = np.column_stack([pins, rating_life.system_life(pins)])
     small = [swings < part * critical * (1.0 - 1e-9) for part in (1.0, rating_life.FRETTING)]

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tolstat import sampling
-from tolstat.analysis import pick_freeze, ranks, sensitivity
+from tolstat.analysis import ranks, sensitivity
 from tolstat.analysis.sample import Sample
 from tolstat.common.channels import histories_of
 from tolstat.common.cores import mapped
@@ -37,9 +37,9 @@ JOINTS = 20_000
 MIN_JOINTS = 200
 """Minimum number of valid joints."""
 MAX_JOINTS = sensitivity.MOST
-"""Maximum number of joints (the first ones) for shares and ranks, and on either side of the tail: more add little, and
+"""Maximum number of joints (the first ones) for shares, and on either side of the tail: more add little, and
 a million joints with fifty errors do not fit into a gigabyte."""
-KINDS = ("first", "total", "srrc", "direction", "size")
+KINDS = ("first", "total", "direction", "size")
 TAIL = KINDS[-2:]
 
 Parts = Mapping[str, NamedTuple]
@@ -60,15 +60,14 @@ class Indices(NamedTuple):
     Attributes
     ----------
     facts : mapping
-        ``load``, ``unit``, ``logarithm``; ``joints`` (valid), ``used`` (of them for shares and ranks),
+        ``load``, ``unit``, ``logarithm``; ``joints`` (valid), ``used`` (of them for shares),
         ``without_load``; ``level`` at which the tail begins, SI: the study's limit or, without one, the 90 % quantile;
         ``above``: number of joints above it; ``std`` of the load or its logarithm; ``additive``: sum of the
-        first-order indices; ``r2`` of the rank regression, NaN for a pick-freeze design.
+        first-order indices.
     rows : sequence of mapping
         One row per error that scatters (two per vector of a zone), the largest first-order index first: ``error``; with
-        ``_lower`` and ``_upper``: ``first``, ``total`` (NaN for correlated errors), ``srrc``, ``direction`` and
-        ``size``; the last two also with ``_p``, and NaN if too few joints are on either side of the level. For a
-        pick-freeze design, one row per group of errors, with ``first`` and ``total`` only.
+        ``_lower`` and ``_upper``: ``first``, ``total`` (NaN for correlated errors), ``direction`` and ``size``; the
+        last two also with ``_p``, and NaN if too few joints are on either side of the level.
     """
 
     facts: Mapping[str, Any]
@@ -78,11 +77,6 @@ class Indices(NamedTuple):
     def quantity(self) -> str:
         """Name of the decomposed quantity: the load, or its logarithm."""
         return f"log {self.facts['load']}" if self.facts["logarithm"] else str(self.facts["load"])
-
-    @property
-    def of_design(self) -> bool:
-        """Whether the joints are a pick-freeze design."""
-        return math.isnan(self.facts["r2"])
 
     @property
     def with_intervals(self) -> bool:
@@ -100,20 +94,16 @@ def causes(view: View, by: Load = None, top: Top = 12, logarithm: bool = False, 
     stays as drawn. To go on, run the same command again.
 
     Gives for each error: the share of the load's variance that it explains alone and in interactions (first-order and
-    total Sobol' indices), the direction of its effect (rank regression), and the probability that a joint above the
-    limit (without a limit: above the 90 % quantile) has a larger, or a more extreme, error than a joint below. Where
-    the file holds load histories, tells which error scatters the load most at its peak over the input angle.
-
-    With STUDY, simulates a pick-freeze design into STUDY_causes.h5, each point with two joints and one more for each
-    group of errors; it gives total indices with intervals instead of bounds. To resume after an interruption, run the
-    same command again. STUDY_causes.h5 can be given as FILE afterwards.
+    total Sobol' indices), and the probability that a joint above the limit (without a limit: above the 90 % quantile)
+    has a larger, or a more extreme, error than a joint below. Where the file holds load histories, tells which error
+    scatters the load most at its peak over the input angle.
 
     Example: tolstat causes iso2768_f.h5 --by cross1.F
 
     Parameters
     ----------
     view : View
-        A campaign whose joints are drawn from tolerances, all of the same weight.
+        A campaign whose joints are drawn from tolerances.
     by : str, optional
         Load, such as cross1.F or psi, or "any limit"; default: all limits, or the only one.
     top : int
@@ -135,7 +125,7 @@ def causes(view: View, by: Load = None, top: Top = 12, logarithm: bool = False, 
         When there is no such load, the study does not keep it, or `logarithm` is set and a value is not positive; with
         every fault of the costs, and when the file holds no joints with a line changed that they are for.
     StoreError
-        When the file has too few valid joints, or joints that are not drawn from tolerances or differ in weight.
+        When the file has too few valid joints, or joints that are not drawn from tolerances.
 
     Examples
     --------
@@ -155,7 +145,7 @@ def causes(view: View, by: Load = None, top: Top = 12, logarithm: bool = False, 
         with suppress(NotApplicable):  # joints of other lines, or at other operating points
             changed = lines.lines(view, load, costs=costs)
             parts, facts = list(changed.parts), {**facts, "lines": changed.facts}
-    elif not of_errors.of_design:
+    else:
         parts.append(Sentence(f"which line of the drawing to change: {command}"))
     parts += [Panels([_tornado(of_errors)]), _table("errors", of_errors, top)]
     parts += map(Sentence, _notes(of_errors, "" if view.altered else command))
@@ -209,18 +199,13 @@ def _has_narrow_bounds(rows: Rows) -> bool:
 def _table(name: str, of_errors: Indices, shown: int) -> Table:
     """Table of all errors; people see the `shown` with the largest shares, and those with an effect on the tail.
 
-    Shares of the variance in per cent and rank coefficients, with intervals; probability that a joint of the tail has
-    the larger error (``direction``) and the error farther from the middle (``size``), where ``*`` marks
-    p < `SIGNIFICANT`.
+    Shares of the variance in per cent, with intervals; probability that a joint of the tail has the larger error
+    (``direction``) and the error farther from the middle (``size``), where ``*`` marks p < `SIGNIFICANT`.
     """
-    total = shares.estimated("in all, %", "total", ends=(0.0, 1.0))
-    if not of_errors.of_design:  # given data yield bounds only
-        total = Column("in all, %", shares.between("total"), shown=_has_narrow_bounds, rank=3)
     columns = [
         Column("error", shares.word("error")),
         shares.estimated("alone, %", "first", ends=(0.0, 1.0)),
-        total,
-        shares.estimated("rank coefficient", "srrc", form="+.2f"),
+        Column("in all, %", shares.between("total"), shown=_has_narrow_bounds, rank=3),
         Column("tail: larger", partial(_tail, name="direction"), shown=has("direction"), rank=2),
         Column("tail: farther out", partial(_tail, name="size"), shown=has("size"), rank=1),
     ]
@@ -240,20 +225,17 @@ def _notes(of_errors: Indices, command: str) -> list[str]:
     facts, rows = of_errors
     unit, std = unit_text(facts["unit"]), f"{facts['std']:.4g}"
     std = f"{std}, of the logarithm" if facts["logarithm"] else f"{std} {unit}".rstrip()
-    what, tail = "groups of errors", "; from a pick-freeze design"
-    if not of_errors.of_design:
-        what, tail = "errors", f", ranks {100 * facts['r2']:.0f} %"
-        tail += f"; tail: {facts['above']} joints above {facts['level']:.5g} {unit}".rstrip()
+    tail = f"; tail: {facts['above']} joints above {facts['level']:.5g} {unit}".rstrip()
     notes = [
         f"{facts['load']}: {facts['joints']} joints, {facts['without_load']} without a valid load left out; "
         f"standard deviation {std}",
-        f"{what} alone explain {100 * facts['additive']:.0f} % of the variance{tail}",
+        f"errors alone explain {100 * facts['additive']:.0f} % of the variance{tail}",
     ]
     if (used := facts["used"]) < facts["joints"]:
-        notes.append(f"shares and ranks are from the first {used} joints, the tail from at most as many on either side")
+        notes.append(f"shares are from the first {used} joints, the tail from at most as many on either side")
     if all(math.isnan(row["total"]) for row in rows):
         notes.append("errors are correlated: shares overlap, and shares in all are not given")
-    elif not (of_errors.of_design or _has_narrow_bounds(rows)):
+    elif not _has_narrow_bounds(rows):
         remedy = f"; {command} gives them" if command else ""
         notes.append(f"no shares in all: given joints bound them too widely{remedy}")
     return notes if of_errors.with_intervals else [*notes, shares.NO_INTERVALS]
@@ -294,13 +276,13 @@ def indices(
     Parameters
     ----------
     view : View
-        A campaign whose joints are drawn from tolerances, all of the same weight.
+        A campaign whose joints are drawn from tolerances.
     by : str
         A load that can have a limit (``cross1.F``, ``pin2.contact``, ``psi``).
     logarithm : bool
         Decompose the variance of the load's logarithm: for a load whose variance a few joints dominate.
     joints : int, optional
-        Number of samples to use, from the first; by default all. Of a pick-freeze design all are used.
+        Number of samples to use, from the first; by default all.
     confidence : float
         Confidence level of all intervals.
 
@@ -313,22 +295,20 @@ def indices(
     InputError
         When there is no such load, the study does not keep it, or `logarithm` is set and a value is not positive.
     StoreError
-        When the file has too few valid joints, or joints that are not drawn from tolerances or differ in weight.
+        When the file has too few valid joints, or joints that are not drawn from tolerances.
     """
     view.check_drawn()
     view.check("index")
     load = view.load(by)
-    if joints is not None and not view.study.groups:
+    if joints is not None:
         load = load.only(np.arange(min(joints, view.n)))
-    estimate = _of_design if view.study.groups else _of_samples
-    names, parts, variance = estimate(view, load, logarithm, confidence)
+    names, parts, variance = _of_samples(view, load, logarithm, confidence)
     first: Any = parts["first"]
-    regression: Any = parts.get("srrc")
     valid, level = load.valid, shares.tail_level(load)
     facts = {"load": load.name, "unit": load.unit, "logarithm": logarithm, "joints": valid.size}
-    facts |= {"used": min(valid.size, MAX_JOINTS) if regression else valid.size, "without_load": sum(load.unresolved)}
+    facts |= {"used": min(valid.size, MAX_JOINTS), "without_load": sum(load.unresolved)}
     facts |= {"level": level, "above": int((valid > level).sum()), "std": math.sqrt(variance)}
-    facts |= {"additive": float(first.estimate.sum()), "r2": regression.r2 if regression else math.nan}
+    facts |= {"additive": float(first.estimate.sum())}
     columns: dict[str, Any] = {"error": names}
     for kind in KINDS:
         estimates = parts[kind]._asdict() if kind in parts else {}
@@ -343,10 +323,9 @@ def _of_samples(view: View, load: Sample, logarithm: bool, confidence: float) ->
     study, independent = view.study, view.design.has_interval("index")
     samples = np.flatnonzero(load.is_valid)
     values = load.values[samples]
-    needed = max(MIN_JOINTS, len(sampling.streams(study)) + 2 * ranks.GROUPS)
-    if values.size < needed:
+    if values.size < MIN_JOINTS:
         what = "load on all limits" if load.name == ANY_LIMIT else load.name
-        raise shares.unusable(view, f"has {values.size} joints with a valid {what}", f"run {needed} joints or more")
+        raise shares.unusable(view, f"has {values.size} joints with a valid {what}", f"run {MIN_JOINTS} joints or more")
     if np.ptp(values) == 0:
         same = f"has the same {load.name} in all joints: no error causes it"
         raise shares.unusable(view, same, "name another load with --by")
@@ -355,7 +334,7 @@ def _of_samples(view: View, load: Sample, logarithm: bool, confidence: float) ->
     names = [name for name, values_of_error in components.items() if np.ptp(values_of_error) > 0]
     x = np.column_stack([components[name] for name in names])
     response = (_logarithm(load.name, values) if logarithm else values)[:MAX_JOINTS]
-    parts: dict[str, NamedTuple] = {"srrc": ranks.regression(x, values[:MAX_JOINTS], confidence, independent)}
+    parts: dict[str, NamedTuple] = {}
     if study.copula.names:
         first = sensitivity.first_order(x, response, confidence, independent)
     else:
@@ -367,21 +346,6 @@ def _of_samples(view: View, load: Sample, logarithm: bool, confidence: float) ->
         z = np.column_stack([scores[name] for name in names])
         parts |= ranks.tail(z, above[chosen], confidence, independent)._asdict()
     return names, parts | {"first": first}, float(first.variance)
-
-
-def _of_design(view: View, load: Sample, logarithm: bool, confidence: float) -> tuple[list[str], Parts, float]:
-    """Names of groups, their Sobol' indices and variance from a pick-freeze design."""
-    groups = view.study.groups
-    if not view.store.whole:
-        raise shares.unusable(view, "holds a slice of a design", "merge all slices first: tolstat merge")
-    values = _logarithm(load.name, load.values) if logarithm else load.values
-    points = values.reshape(-1, len(groups) + 2)
-    try:
-        index = pick_freeze.indices(points[:, 0], points[:, 1], points[:, 2:], confidence)
-    except ValueError as error:
-        remedy = f"run {pick_freeze.FEWEST} points or more; decompose the logarithm of a load with a long tail"
-        raise shares.unusable(view, str(error), remedy) from error
-    return [group.label for group in groups], {"first": index.first, "total": index.total}, float(index.variance)
 
 
 def _logarithm(name: str, values: FloatArray) -> FloatArray:

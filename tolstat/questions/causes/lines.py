@@ -115,7 +115,7 @@ def lines(view: View, by: Load = None, accepted: Accepted = math.nan, costs: Cos
     InputError
         When there is no such load, or the study does not keep it; with every fault of the costs.
     StoreError
-        When the joints are not drawn from tolerances, or differ in weight.
+        When the joints are not drawn from tolerances.
     """
     changed = shares.evaluate(view, by or view.decisive, costs)
     if changed is None:

@@ -59,8 +59,8 @@ class Band(NamedTuple):
 
 
 def followed(view: View, names: Sequence[str]) -> list[str]:
-    """Those of some loads that are followed over the input angle; of several operating points, or of a design, none."""
-    return [] if len(view.points) > 1 or view.study.groups else [name for name in names if name in CHANNELS]
+    """Those of some loads that are followed over the input angle; of several operating points none."""
+    return [] if len(view.points) > 1 else [name for name in names if name in CHANNELS]
 
 
 def over_angle(view: View, loads: Sequence[str], joints: int = JOINTS) -> list[Part]:
@@ -69,7 +69,7 @@ def over_angle(view: View, loads: Sequence[str], joints: int = JOINTS) -> list[P
     Parameters
     ----------
     view : View
-        A campaign whose joints are drawn from tolerances, all of the same weight.
+        A campaign whose joints are drawn from tolerances.
     loads : sequence of str
         Keys of `channels.CHANNELS`; without any, there are no parts.
     joints : int

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tolstat.analysis import difference, pick_freeze
+from tolstat.analysis import difference, exchanged
 from tolstat.campaign import what_if as sets
 from tolstat.common.loads import ANY_LIMIT, FloatArray
 from tolstat.display import text
@@ -125,7 +125,7 @@ def evaluate(view: View, by: str, costs: Path | None = None) -> Lines | None:
     InputError
         When there is no such load, or the study does not keep it; with every fault of the costs.
     StoreError
-        When the joints are not drawn from tolerances, or differ in weight.
+        When the joints are not drawn from tolerances.
     """
     check_sample(view)
     joints = Joints(view, by, view.altered)
@@ -212,15 +212,15 @@ class Joints(ChangedJoints):
     def indices(self, lines: Sequence[str]) -> list[dict[str, Any]]:
         """Rows of `Lines.indices`, in the order of these lines."""
         rows = []
-        for about, exchanged in self.changes(sets.EXCHANGE):
-            n = min(len(exchanged), len(self.base) // 2)
-            if about["label"] not in lines or n < pick_freeze.FEWEST:
+        for about, loads in self.changes(sets.EXCHANGE):
+            n = min(len(loads), len(self.base) // 2)
+            if about["label"] not in lines or n < exchanged.FEWEST:
                 continue
             row: dict[str, Any] = {"line": about["label"], "pairs": n} | dict.fromkeys(INDICES, np.nan)
-            joints = self.base[: 2 * n : 2], self.base[1 : 2 * n : 2], exchanged[:n]
-            loads = [np.log(values) if self.load.long_tailed else values for values in joints]
+            joints = self.base[: 2 * n : 2], self.base[1 : 2 * n : 2], loads[:n]
+            response = [np.log(values) if self.load.long_tailed else values for values in joints]
             events = [np.where(np.isfinite(values), values > self.level, np.nan) for values in joints]
-            pairs = (("", loads, pick_freeze.indices), ("above_", events, pick_freeze.of_event))
+            pairs = (("", response, exchanged.indices), ("above_", events, exchanged.of_event))
             for name, (a, b, ab), estimate in pairs:
                 with suppress(ValueError):  # too few joints with a load, or none, or all of them, above the level
                     indices = estimate(a, b, ab[:, None])

@@ -1,4 +1,4 @@
-"""Simulate what tells causes: a pick-freeze design, or joints with each line of the drawing changed.
+"""Simulate what tells causes: joints with each line of the drawing changed.
 
 The lines are compared on the latter, more and more of them, until their order is settled.
 """
@@ -13,12 +13,10 @@ from typing import Annotated, Literal
 
 import numpy as np
 
-from tolstat import study
 from tolstat.campaign import what_if as sets
 from tolstat.campaign.pool import kept_workers
 from tolstat.campaign.what_if import Change
 from tolstat.campaign.work import Work
-from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import ANY_LIMIT
 from tolstat.display.options import Load, Opt
 from tolstat.questions.causes import shares
@@ -26,8 +24,7 @@ from tolstat.questions.shares import Simulation, check_sample, own_joints
 from tolstat.store import Writer
 from tolstat.store.hdf5 import store_error
 from tolstat.store.view import View
-from tolstat.study import Study, widths
-from tolstat.study.rewriting import with_keys
+from tolstat.study import widths
 from tolstat.study.tolerances.correlation import Group
 from tolstat.study.widths import STEPS
 
@@ -37,11 +34,7 @@ RELIABLE = 2000
 """Number of simulated joints whose time, with the start of the workers, says more than the pilot's."""
 BUDGET_S = 300.0
 """Default time limit, s."""
-POINTS = 1024
-"""Default number of points of a pick-freeze design."""
 
-Groups = Literal["tolerance", "error"]
-"""Errors that a pick-freeze design exchanges together."""
 Each = Literal["entry", "feature", "error"]
 """What a line is."""
 LINES = {"entry": widths.lines, "feature": widths.features, "error": widths.errors}
@@ -49,17 +42,15 @@ LINES = {"entry": widths.lines, "feature": widths.features, "error": widths.erro
 
 
 def simulate(
-    source: Study | Path,
+    path: Path,
     work: Work,
     by: Load = None,
-    points: Annotated[int, Opt("N", least=50)] = POINTS,
-    groups: Groups = "tolerance",
     each: Each = "entry",
     group: Annotated[list[str] | None, Opt("NAME=PATTERN,...")] = None,
     budget: Annotated[float, Opt("TIME", unit="s")] = BUDGET_S,
     most: Annotated[int, Opt("N", least=LEAST)] = MOST,
 ) -> list[Path]:
-    """Simulate a pick-freeze design of a study, or into a result file joints with other widths of each line.
+    """Simulate joints of a campaign with other widths of each line, and keep their loads in the file.
 
     Of a file with several operating points those that `by` or a limit of the study is about. Ends when the order of the
     lines is settled, the time is up, or each change has `most` joints. What is done by then stays in the file; the same
@@ -67,16 +58,12 @@ def simulate(
 
     Parameters
     ----------
-    source : Study or Path
-        The study, or the result file of a campaign whose joints are drawn from tolerances.
+    path : Path
+        Result file of a campaign whose joints are drawn from tolerances.
     work : Work
         Workers, folder, progress and messages.
     by : str, optional
         Load whose limit orders the lines; by default all limits together, or the only one.
-    points : int
-        With STUDY: number of points of the pick-freeze design.
-    groups : {"tolerance", "error"}
-        With STUDY: exchange all errors of a tolerance together, or each error by itself.
     each : {"entry", "feature", "error"}
         With --run: a line is an entry of [tolerances], a pin with its hole, or an error.
     group : list of str, optional
@@ -89,28 +76,16 @@ def simulate(
     Returns
     -------
     list of Path
-        The result file.
+        The file.
 
     Raises
     ------
     InputError
-        When options of the one are given with the other, with every fault of `group`, or when there is no such load.
+        With every fault of `group`, or when there is no such load.
     StoreError
         When the file cannot be used, or was made by other code.
     """
-    of_study = {"--points": points != POINTS, "--groups": groups != "tolerance"}
-    of_file = {"--each": each != "entry", "--group": bool(group)}
-    of_file |= {"--budget": budget != BUDGET_S, "--most": most != MOST}
-    refused, about, remedy = of_file, "about what --run simulates into FILE", "give a result file"
-    if isinstance(source, Path):
-        refused, about, remedy = of_study, "about the design of a study", "give a study (TOML)"
-    if used := [option for option, is_given in refused.items() if is_given]:
-        raise InputError([Fault(", ".join(used), f"{'are' if len(used) > 1 else 'is'} {about}", remedy)])
-    if not isinstance(source, Path):
-        keys = {"method": "pick_freeze", "n": points, "groups": groups}
-        text = with_keys(source.text, {("sampling",): keys}, str(source.path))
-        return [work.run(study.load(source.path, text=text), f"{source.path.stem}_causes.h5")]
-    with Writer.open(source) as store, kept_workers():
+    with Writer.open(path) as store, kept_workers():
         view = View(store)
         check_sample(view)
         load = by or view.decisive
@@ -119,14 +94,14 @@ def simulate(
         lines = [*LINES[each](view.study), *widths.named(view.study, group or ())]
         if not lines:
             remedy = 'name what a study can change: --group "tilts = pin*.tilt_*, hole*.tilt_*"'
-            raise store_error(source, "has no line that can be changed", remedy)
+            raise store_error(path, "has no line that can be changed", remedy)
         work.tell("each change is one line of the drawing; all else of the joint stays as drawn")
         # at the points that the load, a limit or joints in the file are about; at all of them if there is no limit
         loads = [*(() if load == ANY_LIMIT else (load,)), *(view.limits or ("",))]
         loads += [name for change in view.altered.values() for name in change.names]
         simulation = Simulation(store, view, work, loads)
         work.tell(_Looks(simulation, view, lines, load, budget, most).run())
-    return [source]
+    return [path]
 
 
 class _Looks:

@@ -18,12 +18,11 @@ from tolstat.questions import shares
 from tolstat.questions.exceedance import rows as of
 from tolstat.questions.exceedance.curves import forest_panel, leading_panel, reader
 from tolstat.questions.exceedance.rows import verdict
-from tolstat.store import error_budget
 from tolstat.store.recorded import joint_of
 from tolstat.store.view import View
 
-SAMPLED, TOTAL, BOTH = (shares.shares(f"{kind}lower", f"{kind}upper") for kind in ("", "total_", "both_"))
-"""Cells of the interval of sampling, the total one (the first is shown where it differs), and that of parts, too."""
+SAMPLED, TOTAL = (shares.shares(f"{kind}lower", f"{kind}upper") for kind in ("", "total_"))
+"""Cells of the interval of sampling, which is shown where it differs from the total one, and of that."""
 
 
 def _outer(row: Row) -> str:
@@ -41,8 +40,6 @@ LIMITS = (
     Column("95 % interval", SAMPLED, shown=lambda rows: any(SAMPLED(row) != TOTAL(row) for row in rows), rank=3),
     Column("with unresolved joints", _outer, shown=has_unresolved, rank=2),
     Column("total interval", TOTAL, shown=has("numerical_error")),
-    Column("with measured parts", BOTH, shown=lambda rows: "both_lower" in rows[0], rank=1),
-    Column("at most, if ways are missed", shares.share("unsearched_upper"), shown=has("unsearched_upper")),
 )
 """Columns of the table ``limits``. Joints above are counted among the valid ones, as the share is; the last columns
 count failed and unsettled joints below, then above the limit, and shift every load by the numerical error."""
@@ -222,12 +219,8 @@ def _quantiles(view: View, title: str, whole: bool) -> Table:
 
 def note(view: View) -> str:
     """Sentence on what the intervals cover."""
-    doubts = [(name, view.load(name).doubt(level)) for name, level in view.limits.items()]
-    poor = [f"{name} ({doubt})" for name, doubt in doubts if doubt]
     clauses = [
         view.design.covers,
-        f"no share, needs more joints or other proposals: {', '.join(poor)}" if poor else "",
-        view.design.caveat,
         "light bands: with the others counted below and above every x" * (view.count(*VALID, Status.PENDING) < view.n),
     ]
     return "; ".join(clause for clause in clauses if clause)
@@ -251,14 +244,11 @@ def _how(view: View, accepted: float) -> Iterator[str]:
         yield "Points: share of the joints with a valid load. Grey: with failed and unsettled joints below and above."
         yield text.sentence(view.design.without_interval("share"))
         return
-    counting = f"{view.design.counting} ".lstrip()
     yield (
-        f"{counting}Points: share of the joints with a valid load. Blue: its interval ({view.design.interval}), 95 % "
+        f"Points: share of the joints with a valid load. Blue: its interval ({view.design.interval}), 95 % "
         "for each limit by itself. Grey: the total interval. Failed and unsettled joints are counted below the limit "
         "at its lower end and above it at its upper end; it covers the numerical error, too, where it is known."
     )
-    if error_budget.known_parts(view) is not None:
-        yield "Grey covers what the measured parts leave open of the process, too."
     if len(view.points) > 1:
         yield "A limit that names no operating point is about the largest load over all of them."
     if not math.isnan(accepted):

@@ -84,7 +84,7 @@ def _draw(ax: Axes, loads: Mapping[int, Sample], others: Sequence[Sample] = ()) 
     low, high = min([low, *near]), max([high, *near])
     margin = 0.05 * max(high - low, reach)
     low, high = max(low - margin, min(low, 0.0)), high + margin
-    floor = 0.5 * min(loads[i].design.smallest(x["n"][0], x["estimate"]) for i, x in tables.items())
+    floor = 0.5 * min(1.0 / x["n"][0] for x in tables.values())
     ax.set_xlim(low, high)
     style.share_axis(ax, floor)
     for i, table in tables.items():

@@ -20,11 +20,6 @@ SHARES = (0.5, 0.9, 0.95, 0.99)
 COVERED = 0.99
 """Share of the joints that the tolerance limit covers."""
 ERROR_BUDGET = ("numerical_lower", "numerical_upper", "total_lower", "total_upper")
-_ENDS = tuple(f"{kind}{end}" for kind in ("", "bound_", "outer_") for end in ("lower", "upper"))
-WITHHELD = ("estimate", *_ENDS, *ERROR_BUDGET)
-"""Shares and intervals, which are not given where the weights of joints do not support them."""
-KNOWN = ("expected", "parts_lower", "parts_upper", "unsupported")
-"""Fields of `known_share.KnownShare` that a row has where tolerances are known from measured parts."""
 MAX_LEVELS = 600
 """Maximum number of points of a curve."""
 READER_LEVELS = 240
@@ -39,11 +34,7 @@ def limit_rows(view: View) -> Rows:
     sequence of mapping
         One row per limit, in the study's order: ``load``, ``unit``, ``nominal``, then the fields of
         `analysis.estimates.Exceedance` (``level`` is the limit), then ``confidence``, the error budget, see
-        `_above_limit`, and ``unsearched_upper``, the upper end whatever the proposals of importance sampling miss.
-        Where tolerances are known from measured parts also ``both_lower``, ``both_upper`` and the fields `KNOWN`, see
-        `known_share.KnownShare`: with unresolved joints and the numerical error; NaN without support.
-        Loads in SI units. Shares and intervals are NaN where weighted joints do not support them, see
-        `Sample.doubt`.
+        `_above_limit`. Loads in SI units.
     """
     return view.kept("limit_rows", lambda: [_above_limit(view, view.load(name)) for name in view.limits])
 
@@ -76,13 +67,7 @@ def _above_limit(view: View, load: Sample) -> dict[str, Any]:
         budget = [*estimates, *total_interval(loads, level, CONFIDENCE)]
     row = {"load": load.name, "unit": load.unit, "nominal": load.nominal} | vars(load.above(level, CONFIDENCE))
     row |= {"confidence": CONFIDENCE, "numerical_error": error_budget.relative(view, load.name)}
-    row |= dict(zip(ERROR_BUDGET, budget, strict=True))
-    row["unsearched_upper"] = max(end.upper_if_missed(level, CONFIDENCE) for end in (loads[0], loads[-1]))
-    if (parts := error_budget.known_parts(view)) is not None:
-        known = parts.share(load.name, CONFIDENCE)
-        row |= {"both_lower": known.lower, "both_upper": known.upper}
-        row |= {name: getattr(known, name) for name in KNOWN}
-    return row | dict.fromkeys(WITHHELD, np.nan) if load.doubt(level) else row
+    return row | dict(zip(ERROR_BUDGET, budget, strict=True))
 
 
 def point_rows(view: View) -> Rows:
@@ -92,15 +77,15 @@ def point_rows(view: View) -> Rows:
     -------
     sequence of mapping
         One row per limit that holds at several points, in the study's order: ``load``, ``unit``, ``level``, and under
-        the name of each point of the view the share there; NaN where the limit does not hold, or weighted joints do not
-        support it. No rows for a view of one point.
+        the name of each point of the view the share there; NaN where the limit does not hold. No rows for a view of one
+        point.
     """
     rows = []
     for name, level in view.limits.items():
         at, plain = view.narrowed(name)
         if len(at.points) > 1:
             loads = {part.points[0]: part.load(plain) for part in at.parts}
-            shares = {p: np.nan if load.doubt(level) else load.above(level).estimate for p, load in loads.items()}
+            shares = {p: load.above(level).estimate for p, load in loads.items()}
             blank = dict.fromkeys(view.points, np.nan)
             rows.append({"load": name, "unit": load_of(name).unit, "level": level} | blank | shares)
     return rows
@@ -206,9 +191,8 @@ def verdict(row: Row, accepted: float) -> str:
     Returns
     -------
     str
-        ``yes`` (below), ``no`` (above), ``searched`` (below if the proposals of importance sampling reach every way to
-        the limit; whatever they miss, it may be above), ``open`` (neither), ``none``: no interval, or joints without a
-        valid load decide, so that more joints do not help; empty without an accepted share.
+        ``yes`` (below), ``no`` (above), ``open`` (neither), ``none``: no interval, or joints without a valid load
+        decide, so that more joints do not help; empty without an accepted share.
     """
     if np.isnan(accepted):
         return ""
@@ -216,19 +200,13 @@ def verdict(row: Row, accepted: float) -> str:
     if np.isnan(low):
         return "none"
     if high <= accepted or low > accepted:
-        missed = row["unsearched_upper"] > accepted  # False for joints of equal weight
-        return "no" if low > accepted else "searched" if missed else "yes"
+        return "no" if low > accepted else "yes"
     undecided = row["bound_lower"] <= accepted < row["bound_upper"]
     return "none" if not row["n"] or (undecided and unresolved_matter(row)) else "open"
 
 
 def ends(row: Row) -> tuple[float, float]:
-    """Interval that covers sampling, unresolved joints and, if known, the numerical error.
-
-    Where tolerances are known from measured parts it covers what these leave open, too.
-    """
-    if "both_lower" in row:
-        return row["both_lower"], row["both_upper"]
+    """Interval that covers sampling, unresolved joints and, if known, the numerical error."""
     wide = (row["total_lower"], row["total_upper"])
     return (row["outer_lower"], row["outer_upper"]) if np.isnan(wide[0]) else wide
 

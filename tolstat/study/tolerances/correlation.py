@@ -194,43 +194,18 @@ def correlated(copula: Copula, lots: Mapping[str, Lot], place: str) -> Copula:
 
 
 class Group(NamedTuple):
-    """Errors that are taken from another joint, or changed, together: a line of the drawing, or errors that correlate.
+    """Errors that are taken from another joint, or changed, together: a line of the drawing.
 
     Attributes
     ----------
     label : str
-        Pattern of the entry of ``[tolerances]``, name of a group, feature or error; correlated errors without a pattern
-        are labelled by the first and the number of others.
+        Pattern of the entry of ``[tolerances]``, name of a group, feature or error.
     names : tuple of str
         The errors, or zones.
     """
 
     label: str
     names: tuple[str, ...]
-
-
-def groups(file: Reading) -> tuple[Group, ...]:
-    """Groups of errors that a pick-freeze design exchanges together, in the order of ``[tolerances]``.
-
-    They are, by ``sampling.groups``: every error by itself, of a zone every vector; or those of an entry together.
-    Groups that a correlation links become one. Other designs have none.
-    """
-    if file.sampling is None or file.sampling.method != "pick_freeze":
-        return ()
-    entries, copula = file.scatter.entries, file.copula
-    if file.sampling.groups == "error":
-        parts = [Group(name, (name,)) for entry in entries for name in entry.names]
-    else:
-        parts = [Group(entry.pattern, entry.names) for entry in entries]
-    for i, j in np.argwhere(np.triu(copula.matrix, 1)):
-        first, second = (next(p for p in parts if copula.names[k] in p.names) for k in (i, j))
-        if first is not second:
-            parts[parts.index(first)] = Group(first.label, first.names + second.names)
-            parts.remove(second)
-    return tuple(
-        p if "*" in p.label or len(p.names) == 1 else p._replace(label=f"{p.names[0]} and {len(p.names) - 1} more")
-        for p in parts
-    )
 
 
 def correlations(copula: Copula, tolerances: Mapping[str, Distribution]) -> pd.DataFrame:

@@ -20,7 +20,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field
 
-from tolstat.analysis.process import LEAST_PARTS
+from tolstat.analysis.measured import LEAST_PARTS
 from tolstat.common import strict, units
 from tolstat.common.files import about_encoding, finite, read_input
 from tolstat.common.late import stats

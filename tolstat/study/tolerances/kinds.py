@@ -12,7 +12,7 @@ from typing import Annotated, Literal, NamedTuple
 
 from pydantic import Field
 
-from tolstat.analysis.process import LEAST_PARTS, MOST_PARTS
+from tolstat.analysis.measured import LEAST_PARTS, MOST_PARTS
 from tolstat.common import strict
 from tolstat.common.errors import gather, input_error
 from tolstat.common.strict import refuse

@@ -1,4 +1,4 @@
-"""Sobol' indices from a pick-freeze design: it needs joints of its own, but no fit and no assumption on the load.
+"""Sobol' indices from joints with exchanged errors: they need joints of their own, but no assumption on the load.
 
 Joints A and B are independent; AB_i is A with the errors of group i from B. So A and AB_i have all errors but group i
 in common, B and AB_i have group i alone in common.
@@ -136,7 +136,7 @@ def _recovered(
     variance: tuple[float, float, float],
     confidence: float,
 ) -> Estimate[FloatArray]:
-    """Weighted sum of counts, (k, d), as shares of the points, over the variance, of which both ends are given."""
+    """Signed sum of counts, (k, d), as shares of the points, over the variance, of which both ends are given."""
     shares = cells / counts
     low, high = clopper_pearson(cells, counts, confidence)
     least, estimate, most = variance

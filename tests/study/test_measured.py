@@ -1,4 +1,4 @@
-"""Entries that are known from measured parts: what they draw, what is refused, and what is no part of the identity."""
+"""Entries that are known from measured parts: what they draw and leave open, and what is no part of the identity."""
 
 import numpy as np
 import pytest
@@ -6,6 +6,7 @@ import pytest
 from tests.support import synthetic
 from tolstat import study
 from tolstat.common.errors import InputError
+from tolstat.study.assumptions import assumptions, together, with_value
 from tolstat.study.tolerances.distributions import LogNormal, Normal
 
 KNOWN = synthetic.STUDY.replace("cpk = 1.0 }", "cpk = 1.0, known_from = 30 }")
@@ -55,10 +56,41 @@ def test_a_sample_with_a_law_has_its_mean_and_deviation(tmp_path):
         (entry('law = "normal", unit = "mm"'), "needs either file and column, or values"),
         (KNOWN.replace("known_from = 30", "known_from = 3"), "known_from"),
         (KNOWN.replace("known_from = 30", "known_from = 30, truncate = true"), "of parts that are sorted"),
-        (KNOWN.replace("n = 60", 'n = 64\nmethod = "sobol"'), "needs independent joints, not 'sobol'"),
-        (KNOWN + '[[correlation]]\nbetween = ["pin*.offset_t"]\nrho = 0.5\n', "is correlated"),
     ],
 )
 def test_what_cannot_be_known_is_refused_with_the_reason(tmp_path, text, found):
     with pytest.raises(InputError, match=found):
         load(tmp_path, text)
+
+
+def test_values_of_one_process_are_those_of_all_its_errors(tmp_path):
+    plan = load(tmp_path, KNOWN)
+    *_, spread, mean = assumptions(plan)
+    assert (spread.name, mean.name) == ("spread of pin*.offset_t", "mean of pin*.offset_t")
+    assert (spread.because, mean.varied) == ("30 parts measured", True)
+    keys = together(plan, [spread.values[1], mean.values[0]])
+    changed, plain = with_value(plan, keys).tolerances, plan.tolerances["pin1.offset_t"]
+    wider, moved = spread.values[1]["pin*.offset_t.spread"], mean.values[0]["pin*.offset_t.mean"]
+    assert wider > 1.0 > 0.0 > moved
+    assert changed["pin1.offset_t"] == Normal(plain.mean + moved * plain.sigma, wider * plain.sigma)
+    assert all(changed[f"pin{k}.offset_t"] == changed["pin1.offset_t"] for k in (2, 3, 4))
+    assert with_value(plan, keys).joint == plan.joint
+
+
+def test_of_a_lognormal_law_the_logarithm_is_open(tmp_path):
+    (tmp_path / "parts.csv").write_text("d\n" + "\n".join(str(1.0 + v) for v in VALUES), encoding="utf-8")
+    plan = load(tmp_path, entry('law = "lognormal", unit = "mm", file = "parts.csv", column = "d"'))
+    keys = {"pin*.offset_t.spread": 2.0, "pin*.offset_t.mean": 0.5}
+    log, changed = plan.tolerances["pin1.offset_t"].log, with_value(plan, keys).tolerances["pin1.offset_t"].log
+    assert changed == Normal(log.mean + 0.5 * log.sigma, 2.0 * log.sigma)
+
+
+def test_of_accepted_parts_those_made_are_open(tmp_path):
+    position = (
+        '"pin*.position" = { zone = "⌀0.1 mm", over = "22 mm", distribution = "normal", material_condition = "reject" }'
+    )
+    diameter = ENTRY.replace("offset_t", "diameter").replace("0.1 mm", "0.03 mm").replace("cpk", "known_from = 9, cpk")
+    plan = load(tmp_path, synthetic.STUDY.replace(ENTRY, f"{position}\n{diameter}"))
+    changed = with_value(plan, {"pin*.diameter.spread": 2.0}).tolerances["pin1.diameter"]
+    assert changed.every == Normal(0.0, 2.0 * plan.tolerances["pin1.diameter"].every.sigma)
+    assert changed.share < plan.tolerances["pin1.diameter"].share

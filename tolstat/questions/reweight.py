@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from shlex import quote
@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat import sampling
+from tolstat.analysis import prediction
 from tolstat.analysis import reweight as weighting
 from tolstat.analysis.prediction import DELIVERY
-from tolstat.analysis.reweight import Ratios
+from tolstat.analysis.reweight import Ratios, Share
 from tolstat.analysis.sample import CONFIDENCE, Sample
 from tolstat.analysis.weighted import Weighted
 from tolstat.common.errors import Fault, raise_all
@@ -147,7 +148,8 @@ def reweight(
         study = quote(f"changed/{view.path.stem}_reweight.toml")
         again = f"fresh joints, same seeds: {command} && tolstat run {study}"
     words = (f"{len(new)} errors changed; {verdict}", error_budget.unknown(view), again)
-    notes, other = [Sentence(note) for note in words if note], Document(".toml", rewritten_with(view.study, settings))
+    notes = [Sentence(note) for note in words if note]
+    other = Document(".toml", lambda _: rewritten_with(view.study, settings))
     table = Table("loads", f"{title}, reweighted", columns, rows)
     return Answer("reweight", "Other tolerances", [table, *notes, other], facts | {"changed": list(new)})
 
@@ -225,7 +227,7 @@ def _share_above(view: View, load: Sample, done: NDArray[np.intp], ratios: Ratio
     assert load.limit is not None
     level, known = load.limit, error_budget.near(view, load)
     samples = [end.only(done) for end in (load, *(known or ()))]
-    share, total, predicted = shares.reweighted(samples, ratios, level, delivery)
+    share, total, predicted = _reweighted(samples, ratios, level, delivery)
     before = samples[0].above(level, CONFIDENCE).estimate
     row = {"load": load.name, "unit": load.unit, "level": level, "before": before}
     row |= {key: getattr(share, key) for key in GIVEN}
@@ -238,3 +240,36 @@ def _quantile(load: Sample, ratios: Ratios, share: float) -> dict[str, Any]:
     before = load.quantile(share, CONFIDENCE).estimate
     row = {"load": load.name, "unit": load.unit, "share": share, "before": before}
     return row | weighting.quantile(load, ratios, share, CONFIDENCE)._asdict()
+
+
+def _reweighted(
+    samples: Sequence[Sample], ratios: Ratios, level: float, delivery: int
+) -> tuple[Share, tuple[float, float], dict[str, float]]:
+    """Share of the joints above a level under other tolerances.
+
+    Parameters
+    ----------
+    samples : sequence of Sample
+        Load of some joints and, where it is known, with both ends of its numerical error.
+    ratios : Ratios
+        Density ratios of these joints.
+    level, delivery
+        The level, and the number of joints of the next delivery.
+
+    Returns
+    -------
+    Share
+        Of the load as simulated.
+    tuple of float
+        Ends of the interval, with the numerical error where it is known.
+    dict
+        Columns of the prediction interval.
+    """
+
+    def ends(confidence: float) -> tuple[float, float]:
+        each = [weighting.share_above(sample, ratios, level, confidence) for sample in samples]
+        return min(share.lower for share in each), max(share.upper for share in each)
+
+    predicted = prediction.of_share(*ends(prediction.half(CONFIDENCE)), delivery, CONFIDENCE)
+    share = weighting.share_above(samples[0], ratios, level, CONFIDENCE)
+    return share, ends(CONFIDENCE), prediction.columns(predicted, delivery)

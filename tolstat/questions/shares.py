@@ -6,36 +6,42 @@ import math
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from tolstat.analysis import binomial, difference, prediction, reweight
+from tolstat.analysis import binomial, difference
 from tolstat.analysis.design import SAMPLE, Claim
 from tolstat.analysis.estimates import Exceedance
 from tolstat.analysis.prediction import DELIVERY
-from tolstat.analysis.reweight import Ratios, Share
-from tolstat.analysis.sample import CONFIDENCE, Sample, total_interval
+from tolstat.analysis.sample import Sample, total_interval
 from tolstat.campaign import what_if as sets
 from tolstat.campaign.what_if import Change
 from tolstat.campaign.work import Work
 from tolstat.common.cores import available_cores
 from tolstat.common.errors import Fault, NotApplicable, StoreError
-from tolstat.common.loads import ANY_LIMIT, FloatArray, split
+from tolstat.common.loads import ANY_LIMIT, FloatArray, Limit, split
 from tolstat.common.tables import Status
 from tolstat.display import text
+from tolstat.display.answer import Document
 from tolstat.display.progress import clock
 from tolstat.display.table import Column, Row, has
 from tolstat.solver.compilation import warm_up
 from tolstat.store import Writer, error_budget, what_if
 from tolstat.store.view import View
 from tolstat.store.what_if import Altered
+from tolstat.study import Study
+from tolstat.study.placing import joint_beside, placed
 from tolstat.study.points import at, names_of
+from tolstat.study.rewriting import with_keys
 
 WIDEST = 0.5
 """Total interval of a yield, or its bounds without one, from which on it says too little for a verdict."""
 TAIL_STARTS_AT = 0.9
 """Share of the joints below the tail, for a load without a limit."""
+NEGLIGIBLE = 0.1
+"""Difference of two shares that does not matter, relative to the share of the joints as drawn."""
 PILOT = 64
 """Number of joints whose time is measured before others are simulated."""
 ORIGIN = {
@@ -45,6 +51,8 @@ ORIGIN = {
 }
 """Where `revolutions.Revolutions` have their loads from, in words."""
 NO_INTERVALS = "no intervals: they hold for independent samples only"
+JOINT_FILE = "_joint.toml"
+"""End of the name of a joint file that is written beside a study."""
 Cell = Callable[[Row], str]
 Estimate = tuple[float, float, float]
 """An estimate, and the ends of its interval."""
@@ -131,6 +139,17 @@ def unusable(view: View, reason: str, remedy: str) -> StoreError:
     return StoreError(str(Fault(str(view.path), reason, remedy)))
 
 
+def study_documents(study: Study, changed: str) -> list[Document]:
+    """Study of a changed text, and the file of its joint where that has to be written, as they run where they lie."""
+    joint = joint_beside(study)
+
+    def of(path: Path) -> str:
+        own = {("joint",): {"base": f"{path.stem}{JOINT_FILE}"}} if joint else {}
+        return with_keys(placed(changed, study.path, path), own, path.name)
+
+    return [Document(".toml", of), *([Document(JOINT_FILE, lambda _: joint)] if joint else [])]
+
+
 def check_sample(view: View, statistic: Claim, whole: bool = False) -> None:
     """Refuse joints that are no sample of a production, or do not support a statistic; or that are not `whole`.
 
@@ -176,39 +195,6 @@ def _good(view: View, name: str, confidence: float, delivery: int) -> Mapping[st
 def counts(above: Exceedance) -> dict[str, int]:
     """Columns of a table: numbers of joints, of those without a valid load, and of those above a level."""
     return {"n": above.n, "n_failed": above.n_failed, "n_unsettled": above.n_unsettled, "count": above.count}
-
-
-def reweighted(
-    samples: Sequence[Sample], ratios: Ratios, level: float, delivery: int
-) -> tuple[Share, tuple[float, float], dict[str, float]]:
-    """Share of the joints above a level under other tolerances.
-
-    Parameters
-    ----------
-    samples : sequence of Sample
-        Load of some joints and, where it is known, with both ends of its numerical error.
-    ratios : Ratios
-        Density ratios of these joints.
-    level, delivery
-        The level, and the number of joints of the next delivery.
-
-    Returns
-    -------
-    Share
-        Of the load as simulated.
-    tuple of float
-        Ends of the interval, with the numerical error where it is known.
-    dict
-        Columns of the prediction interval.
-    """
-
-    def ends(confidence: float) -> tuple[float, float]:
-        each = [reweight.share_above(sample, ratios, level, confidence) for sample in samples]
-        return min(share.lower for share in each), max(share.upper for share in each)
-
-    predicted = prediction.of_share(*ends(prediction.half(CONFIDENCE)), delivery, CONFIDENCE)
-    share = reweight.share_above(samples[0], ratios, level, CONFIDENCE)
-    return share, ends(CONFIDENCE), prediction.columns(predicted, delivery)
 
 
 class Yield(NamedTuple):
@@ -258,8 +244,8 @@ class ChangedJoints:
     ----------
     view : View
         A campaign whose joints are drawn from tolerances.
-    by : str
-        A load, or ``"any limit"``.
+    by : str or Limit
+        A load, ``"any limit"``, or a limit of one's own.
     altered : mapping
         Changes by their digest, as `View.altered`.
 
@@ -273,15 +259,25 @@ class ChangedJoints:
         Load of the joints as drawn, from sample 0 on, NaN without a valid one: the campaign's, then fresh ones.
     """
 
-    def __init__(self, view: View, by: str, altered: Mapping[str, Altered]) -> None:
-        self.load, self._study, self._altered = view.load(by), view.study, altered
-        self.level = tail_level(self.load)
-        levels = view.limits if by == ANY_LIMIT else {by: 1.0}
+    def __init__(self, view: View, by: str | Limit, altered: Mapping[str, Altered]) -> None:
+        self._study, self._altered = view.study, altered
+        if isinstance(by, Limit):
+            self.load, self.level = view.load_of(by), by.level
+            ratios = zip(by.loads, by.levels, strict=True)
+            levels = {name: 1.0 if by.has_one_level else level for name, level in ratios}
+        else:
+            self.load = view.load(by)
+            self.level, levels = tail_level(self.load), view.limits if by == ANY_LIMIT else {by: 1.0}
         self._parts = [(names_at_points(view, name), level) for name, level in levels.items()]
         n = own_joints(view)
         self.base, more = self.load.values[:n], altered.get(what_if.key(sets.as_drawn(view.study, range(0)).about))
         if more is not None and more.first <= n < more.end and (loads := self._of(more)) is not None:
             self.base = np.concatenate([self.base, loads[n - more.first :]])
+
+    def of(self, about: Mapping[str, Any]) -> FloatArray | None:
+        """Load of the joints of a change, as `changes` yields it; None where the file holds none of them."""
+        change = self._altered.get(what_if.key(about))
+        return None if change is None or change.first else self._of(change)
 
     def _of(self, altered: Altered) -> FloatArray | None:
         if not all(altered.holds(names) for names, _ in self._parts):
@@ -313,6 +309,11 @@ class ChangedJoints:
         a = a[: len(b)]
         change = difference.shares(sample_of(a), sample_of(b), [self.level], paired=True, confidence=confidence)
         return float(change.estimate[0]), float(change.outer_lower[0]), float(change.outer_upper[0])
+
+    def tells(self, values: FloatArray, confidence: float = 0.95) -> bool:
+        """Whether it is known what a change does: its difference excludes zero, or is less than `NEGLIGIBLE`."""
+        _, low, high = self.difference(self.base, values, confidence)
+        return not low <= 0.0 <= high or max(-low, high) <= NEGLIGIBLE * self.share(self.base)[0]
 
 
 class Simulation:

@@ -152,7 +152,7 @@ def line(pattern: str, entry: Mapping[str, Any]) -> str:
     return f"{json.dumps(pattern)} = {rewriting.inline(entry)}"
 
 
-def rewritten(study: Study, entries: Mapping[str, Mapping[str, Any]], seed: int) -> str:
+def rewritten(study: Study, entries: Mapping[str, Mapping[str, Any]], seed: int, text: str | None = None) -> str:
     """Text of a study with other entries and another seed, comments kept.
 
     Parameters
@@ -163,6 +163,8 @@ def rewritten(study: Study, entries: Mapping[str, Mapping[str, Any]], seed: int)
         Pattern to keys of its entry.
     seed : int
         Seed of the sampling.
+    text : str, optional
+        Text of the study with other changes; that of the study unless given.
 
     Returns
     -------
@@ -174,7 +176,8 @@ def rewritten(study: Study, entries: Mapping[str, Mapping[str, Any]], seed: int)
     InputError
         See `rewriting.with_keys`.
     """
-    data = tomllib.loads(study.text)
+    text = study.text if text is None else text
+    data = tomllib.loads(text)
     every = list(fits.entries(data["tolerances"], study.fit))
     changes: dict[tuple[int | str, ...], dict[str, Any]] = {("sampling",): {"seed": seed}}
     for entry in every:
@@ -188,7 +191,7 @@ def rewritten(study: Study, entries: Mapping[str, Mapping[str, Any]], seed: int)
             changes["joint", "contact"] = dict(study.fit.diameters)
         else:
             changes["joint",] = {"contact": study.fit.diameters}
-    return rewriting.with_keys(study.text, changes, f"{study.name}.toml")
+    return rewriting.with_keys(text, changes, f"{study.name}.toml")
 
 
 REPLACED_KEYS = {

@@ -15,7 +15,7 @@ from tolstat.campaign import what_if as sets
 from tolstat.common.loads import ANY_LIMIT, FloatArray
 from tolstat.display import text
 from tolstat.display.table import Row, Rows
-from tolstat.questions.shares import ChangedJoints, Estimate, check_sample, sample_of, with_ends
+from tolstat.questions.shares import NEGLIGIBLE, ChangedJoints, Estimate, check_sample, sample_of, with_ends
 from tolstat.store.view import View
 from tolstat.study import Study, scaling, widths
 from tolstat.study.costs import Cost
@@ -23,8 +23,6 @@ from tolstat.study.costs import of as prices_of
 from tolstat.study.tolerances.correlation import Group
 from tolstat.study.widths import COARSER, EXACT, FINER, HALF, STEPS
 
-NEGLIGIBLE = 0.1
-"""Difference of two lines that does not matter for their order, relative to the share of the joints as drawn."""
 ENDS = ("", "_lower", "_upper")
 """Ends of the keys of an estimate and its interval."""
 INDICES = tuple(f"{name}{word}{end}" for name in ("", "above_") for word in ("alone", "in_all") for end in ENDS)

@@ -1,216 +1,327 @@
-"""Tolerance allocation: the cheapest tolerances that keep loads below limits, estimated from the joints drawn.
+"""Tolerance allocation: the cheapest steps of tolerances that keep loads below limits, searched on the same joints.
 
-Each joint is weighted with the likelihood ratio of other tolerances (`reweight`). The search stays in the region where
-enough joints remain effective. It uses half of the joints; the other half serves as an independent check of the choice.
+A design has one step for each line of a drawing, counted from its finest tolerance. Designs are compared joint by
+joint. A choice among many designs by the same joints is optimistic, so `allocate` judges it by joints that the search
+has not seen, at a level that holds for all looks at these.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from contextlib import suppress
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.analysis import reweight
 from tolstat.analysis.binomial import clopper_pearson
-from tolstat.analysis.weighted import Split
-from tolstat.common.late import optimize
+from tolstat.common.late import special
 from tolstat.common.loads import FloatArray
 
-FEWEST = 10
-"""Minimum number of joints above each limit for a search that aims at the estimated shares."""
-REGION = 0.3
-"""Minimum share of the joints that is effective, in expectation, within the search region."""
+EXACT = -1
+"""Step of a line without any error."""
+MEASURABLE = 0.05
+"""Level of the test (McNemar 1947) of whether a step changes the share of joints above a limit."""
+ROUNDS, LOOKS = 3, 4
+"""Number of designs that are checked at most, and of looks at each, every one at twice as many joints."""
+LOOK_CONFIDENCE = 1.0 - 0.05 / (ROUNDS * LOOKS)
+"""Confidence of an interval at a look: all of them hold together with 95 %."""
+POWER = 1.28
+"""Standard deviations below the target that the search aims at, so that nine checks in ten confirm it."""
+
+Design = tuple[int, ...]
+Mask = NDArray[np.bool_]
+Above = Callable[[Sequence[Design]], "list[Mask] | None"]
+
+
+class Unknown(Exception):
+    """Designs whose joints are not simulated."""
 
 
 class Problem(NamedTuple):
-    """Objective, constraints and bounds of a search.
+    """What is searched.
 
     Attributes
     ----------
-    log_ratios : callable
-        Maps factors on the tolerances, (g,), to the logarithm of new over old density of each joint, (n,).
-    log_spread : callable
-        Maps factors to the logarithm of the mean square of that ratio under the old tolerances (1 plus Pearson's
-        chi-squared divergence): n joints have n over that mean square effective ones. It is exact, because the weights
-        of a sample underestimate it where no joint was drawn.
-    usable : callable
-        Maps factors to whether shares can be estimated from these joints, see `reweight.Ratios.usable`.
-    above : ndarray of bool, shape (n, c)
-        Which joints are above each of c limits.
+    costs : sequence of ndarray
+        Cost of each line at each of its steps, from the finest to the coarsest.
+    drawn : tuple of int
+        Steps as drawn.
+    above : callable
+        Maps designs to which of the same joints are above each limit, (n, c) each; None where that is not known.
     targets : ndarray, shape (c,)
         Shares that must not be exceeded.
-    cost : callable
-        Maps factors to their cost.
-    lower, upper : ndarray, shape (g,)
-        Bounds of the factors.
-    iid : bool
-        Whether the joints are independent samples.
-    confidence : float
-        Confidence level of the intervals.
+    aims : ndarray, shape (c,)
+        Shares that the search goes below, see `aim`.
     """
 
-    log_ratios: Callable[[FloatArray], FloatArray]
-    log_spread: Callable[[FloatArray], float]
-    usable: Callable[[FloatArray], bool]
-    above: NDArray[np.bool_]
+    costs: Sequence[FloatArray]
+    drawn: Design
+    above: Above
     targets: FloatArray
-    cost: Callable[[FloatArray], float]
-    lower: FloatArray
-    upper: FloatArray
-    iid: bool = True
-    confidence: float = 0.95
+    aims: FloatArray
+
+    def cost(self, design: Design) -> float:
+        """Cost of all lines; infinite for an exact one."""
+        return float(sum(np.inf if i == EXACT else c[i] for c, i in zip(self.costs, design, strict=True)))
+
+    def events(self, *designs: Design) -> list[Mask]:
+        """Which joints of each design are above each limit.
+
+        Raises
+        ------
+        Unknown
+            When that is not known.
+        """
+        found = self.above(designs) if designs else []
+        if found is None:
+            raise Unknown
+        return found
+
+    def meets(self, above: Mask) -> bool:
+        """Whether the shares do not exceed the aims."""
+        return bool((above.mean(axis=0) <= self.aims).all())
 
 
-class Choice(NamedTuple):
-    """Result of a search.
+class Step(NamedTuple):
+    """A step of a search.
 
     Attributes
     ----------
-    factors : ndarray, shape (g,)
-        Factors on the tolerances.
-    aim : str
-        What does not exceed the targets. ``interval``: the upper ends of the intervals; ``estimate``: the estimated
-        shares; ``step``: neither is feasible in the search region, and the factors give the lowest shares there.
+    what : str
+        ``as drawn``, ``all exact``, ``narrower``, ``wider``.
+    line : int
+        Number of the line that changes; -1 for none.
+    design : tuple of int
+        The design after it.
+    cost : float
+        Its cost.
+    above : ndarray of bool, shape (n, c)
+        Which joints of the search are above each limit.
     """
 
-    factors: FloatArray
-    aim: str
+    what: str
+    line: int
+    design: Design
+    cost: float
+    above: Mask
 
 
-def search(problem: Problem) -> Choice:
-    """Find the cheapest factors in the region where enough joints remain effective.
+class Search:
+    """Search for the cheapest design that meets the targets.
 
-    Sequential quadratic programming (Kraft 1988) on the logarithms of the factors, started at the present tolerances
-    and at those with the lowest shares. The region has at least `reweight.LEAST_ESS` effective joints; the required
-    share is raised, up to 0.9, while the weights of the choice are not `usable`.
+    First lines become narrower, each time by the step with the best gain in share per cost, then wider where that costs
+    no share that can be measured, then, one step at a time, wherever the aims are still met. A line whose exact case
+    changes nothing is not made narrower unless all others are at their finest step.
+
+    Attributes
+    ----------
+    path : list of Step
+        Steps so far.
+    state : str
+        ``found``; ``impossible``, where even exact lines exceed a target; ``exhausted``, where all lines have their
+        finest step; ``open`` where designs are not simulated yet.
+    active : list of int
+        Lines whose exact case changes a share.
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem, self.path, self.active, self.state = problem, list[Step](), list[int](), "open"
+        with suppress(Unknown):
+            self.state = self._run()
+
+    @property
+    def design(self) -> Design:
+        """The design of the last step that has no exact line."""
+        return next(step.design for step in reversed(self.path) if EXACT not in step.design)
+
+    @property
+    def above(self) -> Mask:
+        """Which joints of that design are above each limit."""
+        return next(step.above for step in reversed(self.path) if EXACT not in step.design)
+
+    def narrow(self) -> bool:
+        """Take the step that gains most share per cost; returns whether there is one."""
+        problem, design = self.problem, self.design
+        able = [i for i, step in enumerate(design) if step > 0]
+        able = [i for i in able if i in self.active] or able
+        steps = [_moved(design, i, design[i] - 1) for i in able]
+        masks = problem.events(*steps)
+        if not steps:
+            return False
+        cost = problem.cost(design)
+        gains = [self._height(self.above) - self._height(mask) for mask in masks]
+        rates = [gain / max(problem.cost(step) - cost, 1e-12) for gain, step in zip(gains, steps, strict=True)]
+        best = int(np.argmax(rates))
+        self._add("narrower", able[best], steps[best], masks[best])
+        return True
+
+    def _run(self) -> str:
+        problem, drawn = self.problem, self.problem.drawn
+        (above,) = problem.events(drawn)
+        self._add("as drawn", -1, drawn, above)
+        if not problem.meets(above):
+            exact = (EXACT,) * len(drawn)
+            (least,) = problem.events(exact)
+            self._add("all exact", -1, exact, least)
+            lower, _ = clopper_pearson(least.sum(axis=0), len(least), LOOK_CONFIDENCE)
+            if (lower > problem.targets).any():
+                return "impossible"
+            alone = problem.events(*(_moved(drawn, i, EXACT) for i in range(len(drawn))))
+            self.active = [i for i, mask in enumerate(alone) if differ(above, mask)]
+            while not problem.meets(self.above):
+                if not self.narrow():
+                    return "exhausted"
+        for i in (i for i in range(len(drawn)) if i not in self.active):
+            self._widen_for_nothing(i)
+        self._widen()
+        return "found"
+
+    def _widen_for_nothing(self, i: int) -> None:
+        """Widen a line as far as the aims are met, and the shares do not measurably rise."""
+        design, before = self.design, self.above
+        found: tuple[int, Mask] | None = None
+        low, high = design[i], len(self.problem.costs[i]) - 1
+        middle = high  # often the coarsest step is as good
+        while low < high:
+            (above,) = self.problem.events(_moved(design, i, middle))
+            if self.problem.meets(above) and not differ(above, before):
+                low, found = middle, (middle, above)
+            else:
+                high = middle - 1
+            middle = (low + high + 1) // 2
+        if found is not None:
+            self._add("wider", i, _moved(design, i, found[0]), found[1])
+
+    def _widen(self) -> None:
+        """Widen lines one step at a time while the aims are met, first the one that saves most per share.
+
+        What a step costs in share is taken from the last step of its line: a step is simulated when its turn comes.
+        """
+        problem, least = self.problem, 1.0 / len(self.above)
+        able = [i for i, step in enumerate(self.design) if step + 1 < len(problem.costs[i])]
+        masks = problem.events(*(_moved(self.design, i, self.design[i] + 1) for i in able))
+        now = self._height(self.above)
+        losses = {i: self._height(mask) - now for i, mask in zip(able, masks, strict=True) if problem.meets(mask)}
+        while losses:
+            design, now = self.design, self._height(self.above)
+            savings = {i: problem.costs[i][design[i]] - problem.costs[i][design[i] + 1] for i in losses}
+            best = max(losses, key=lambda i: savings[i] / max(losses[i], least))
+            step = _moved(design, best, design[best] + 1)
+            (mask,) = problem.events(step)
+            losses[best] = self._height(mask) - now
+            if problem.meets(mask):
+                self._add("wider", best, step, mask)
+            if not problem.meets(mask) or step[best] + 1 == len(problem.costs[best]):
+                del losses[best]  # a line that is too wide stays so as others become wider
+
+    def _height(self, above: Mask) -> float:
+        """Sum of the shares above the limits, relative to their targets."""
+        return float((above.mean(axis=0) / self.problem.targets).sum())
+
+    def _add(self, what: str, line: int, design: Design, above: Mask) -> None:
+        self.path.append(Step(what, line, design, self.problem.cost(design), above))
+
+
+def _moved(design: Design, line: int, step: int) -> Design:
+    return (*design[:line], step, *design[line + 1 :])
+
+
+def differ(a: Mask, b: Mask) -> bool:
+    """Whether more joints are above some limit in `a` than in `b`, (n, c), measurably, by McNemar's exact test."""
+    only_a, only_b = (a & ~b).sum(axis=0), (b & ~a).sum(axis=0)
+    # as many or more of the joints above on one side only are above in a
+    p = special.bdtr(only_b + 0.0, np.maximum(only_a + only_b, 1), 0.5)
+    return bool(((p < MEASURABLE) & (only_a > only_b)).any())
+
+
+def sizes(targets: FloatArray, most: int) -> list[int]:
+    """Numbers of joints of a search and of the looks of a check, each twice the one before; the first is the search's.
+
+    A share as large as the least target has 40 joints above the limit at the first.
+    """
+    first = min(max(1024, 2 ** int(np.ceil(np.log2(40.0 / float(np.min(targets)))))), most)
+    return list(dict.fromkeys(min(first * 2**k, most) for k in range(LOOKS)))
+
+
+def aim(target: float, n: int) -> float:
+    """Share whose check by `n` joints confirms the target nine times in ten."""
+    counts = np.arange(0, int(target * n) + 1)
+    _, upper = clopper_pearson(np.ceil(counts + POWER * np.sqrt(counts)), n, LOOK_CONFIDENCE)
+    enough = np.flatnonzero(upper < target)
+    return float(counts[enough[-1]]) / n if enough.size and enough[-1] > 0 else 0.5 / n
+
+
+class Look(NamedTuple):
+    """A look at the joints of a check.
+
+    Attributes
+    ----------
+    after : int
+        Number of steps of the search at the design that is checked.
+    n : int
+        Number of joints.
+    share, lower, upper : ndarray, shape (c,)
+        Shares above the limits, with intervals that hold together for all looks.
+    state : str
+        ``holds``, ``misses``, or ``open``.
+    """
+
+    after: int
+    n: int
+    share: FloatArray
+    lower: FloatArray
+    upper: FloatArray
+    state: str
+
+
+class Outcome(NamedTuple):
+    """Result of search and check.
+
+    Attributes
+    ----------
+    search : Search
+        The search, with the steps that failed checks have asked for.
+    looks : list of Look
+        All looks.
+    state : str
+        ``impossible``; ``holds``, ``misses`` or ``open``, of the last look; ``open``, too, where joints are missing.
+    """
+
+    search: Search
+    looks: list[Look]
+    state: str
+
+
+def allocate(problem: Problem, fresh: Callable[[Design, int, int], Mask | None], looks: Sequence[int]) -> Outcome:
+    """Search, then check the design by joints that the search has not seen, and narrow it where that fails.
 
     Parameters
     ----------
     problem : Problem
-        Objective, constraints and bounds.
-
-    Returns
-    -------
-    Choice
-        The factors, and the constraint that they meet.
+        What is searched.
+    fresh : callable
+        Design, number of the round, number of joints -> which of these are above each limit, (n, c); other joints in
+        each round, none of them those of the search. None where that is not known.
+    looks : sequence of int
+        Numbers of joints of the looks of a round, at most `LOOKS`. A round ends where the interval of a look lies on
+        one side of the targets; there are at most `ROUNDS`.
     """
-    share = max(REGION, reweight.LEAST_ESS / len(problem.above))
-    while not problem.usable((choice := _within(problem, share)).factors) and share < 0.9:
-        share = min(1.5 * share, 0.9)
-    return choice
-
-
-def _within(problem: Problem, share: float) -> Choice:
-    """Search where at least `share` of the joints is effective."""
-    lowest = _lowest(problem, share)
-    starts = [np.zeros(len(problem.lower)), lowest]
-    enough = not problem.iid or problem.above.sum(axis=0).min() >= FEWEST
-    aims = ["interval"] * problem.iid + ["estimate"] * bool(enough)
-    for aim in aims:
-        feasible = [x for x in (_cheapest(problem, share, aim, start) for start in starts) if x is not None]
-        if feasible:
-            return Choice(np.exp(min(feasible, key=lambda x: problem.cost(np.exp(x)))), aim)
-    return Choice(np.exp(lowest), "step")
-
-
-def _room(problem: Problem, x: FloatArray, share: float) -> float:
-    """Constraint of the region: logarithm of the effective share over `share`, not negative inside."""
-    return float(np.clip(-problem.log_spread(np.exp(x)) - np.log(share), -30.0, 30.0))
-
-
-def _cheapest(problem: Problem, share: float, aim: str, start: FloatArray) -> FloatArray | None:
-    """Logarithms of the cheapest factors that meet the constraints; None if none are found."""
-    scale = problem.cost(np.ones(len(start)))
-
-    def room(x: FloatArray) -> FloatArray:
-        over = np.log(problem.targets / np.maximum(_shares(problem, x, aim), 1e-12))
-        return np.append(over, _room(problem, x, share))
-
-    x = _minimise(lambda x: problem.cost(np.exp(x)) / scale, room, problem, start)
-    return x if (room(x) >= -1e-6).all() else None
-
-
-def _lowest(problem: Problem, share: float) -> FloatArray:
-    """Logarithms of the factors in the region that minimise the largest ratio of share to target."""
-
-    def height(x: FloatArray) -> float:
-        shares = _shares(problem, x, "estimate") + 0.5 / len(problem.above)
-        return float(np.log(shares / problem.targets).max())
-
-    start = np.zeros(len(problem.lower))
-    x = _minimise(height, lambda x: np.atleast_1d(_room(problem, x, share)), problem, start)
-    while _room(problem, x, share) < -1e-6:  # SLSQP may end outside: shrink towards the present tolerances
-        x = 0.9 * x
-    return x
-
-
-def _minimise(
-    what: Callable[[FloatArray], float], room: Callable[[FloatArray], FloatArray], problem: Problem, start: FloatArray
-) -> FloatArray:
-    low, high = np.log(problem.lower), np.log(problem.upper)
-    settings: Any = {"method": "SLSQP", "options": {"maxiter": 60, "ftol": 1e-5, "eps": 1e-4}}
-    constraint = {"type": "ineq", "fun": room}
-    settings |= {"bounds": optimize.Bounds(low, np.maximum(high, low + 1e-9)), "constraints": constraint}
-    result = optimize.minimize(what, np.clip(start, low, high), **settings)
-    return np.asarray(np.clip(result.x, low, high), dtype=float)
-
-
-def _shares(problem: Problem, x: FloatArray, aim: str) -> FloatArray:
-    """Share of the joints above each limit, or its upper end for ``interval``."""
-    logs = problem.log_ratios(np.exp(x))
-    if np.isneginf(logs.max()):  # none of the joints is possible with these tolerances, so that they tell nothing
-        return np.ones(problem.above.shape[1])
-    ratios = np.exp(logs - logs.max())
-    splits = [Split.by(column, ratios) for column in problem.above.T]
-    if aim == "estimate":
-        return np.array([split.share[0] for split in splits])
-    return np.array([split.interval(problem.confidence)[1][0] for split in splits])
-
-
-def joints_needed(share: float, ess: float, target: float, confidence: float = 0.95) -> float:
-    """Factor on the number of joints with which an interval lies below a target, if the share is as estimated.
-
-    Parameters
-    ----------
-    share : float
-        Estimate.
-    ess : float
-        Effective number of joints behind the estimate.
-    target : float
-        Share that the upper end must be below.
-    confidence : float
-        Confidence level of the interval.
-
-    Returns
-    -------
-    float
-        Factor, a power of two; inf where the estimate itself is not below the target.
-
-    Examples
-    --------
-    >>> joints_needed(share=0.002, ess=1000, target=0.01)
-    1.0
-    >>> joints_needed(share=0.008, ess=1000, target=0.01)
-    16.0
-    """
-    factors = 2.0 ** np.arange(0, 24)
-    upper = clopper_pearson(share * ess * factors, ess * factors, confidence)[1]
-    enough = np.flatnonzero(upper < target)
-    return float(factors[enough[0]]) if enough.size and share < target else np.inf
-
-
-def halves(units: NDArray[np.intp], most: int) -> Sequence[NDArray[np.intp]]:
-    """Split joints: every second independent unit, at most `most` joints, for the search; all others for the check.
-
-    Parameters
-    ----------
-    units : ndarray of int, shape (n,)
-        Unit of each joint, see `Design.units`.
-    most : int
-        Maximum number of joints for the search.
-    """
-    rows = np.arange(units.size)
-    chosen = rows[units % 2 == 0][:most]
-    return chosen, np.setdiff1d(rows, chosen, assume_unique=True)
+    search, taken = Search(problem), list[Look]()
+    state = "open" if search.state in ("found", "exhausted") else search.state
+    with suppress(Unknown):
+        for number in range(ROUNDS if state == "open" and search.state != "open" else 0):
+            for n in looks:
+                mask = fresh(search.design, number, n)
+                if mask is None:
+                    return Outcome(search, taken, "open")
+                count = mask.sum(axis=0)
+                lower, upper = clopper_pearson(count, n, LOOK_CONFIDENCE)
+                is_below, is_above = (upper < problem.targets).all(), (lower > problem.targets).any()
+                state = "holds" if is_below else "misses" if is_above else "open"
+                taken.append(Look(len(search.path), n, count / n, lower, upper, state))
+                if state != "open":
+                    break
+            if state == "holds" or number + 1 == ROUNDS or not search.narrow():
+                break
+    return Outcome(search, taken, state)

@@ -1,304 +1,342 @@
-"""The cheapest tolerances with which a campaign keeps its limits, estimated from its own joints."""
+"""The cheapest tolerances with which the joints of a campaign keep their limits, found by simulating them."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+import time
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import lru_cache, partial
 from pathlib import Path
 from shlex import quote
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tolstat import sampling
-from tolstat.analysis import allocation, reweight
-from tolstat.analysis.prediction import DELIVERY
-from tolstat.analysis.reweight import Ratios
-from tolstat.analysis.sample import CONFIDENCE, Sample
+from tolstat.analysis import allocation, binomial
+from tolstat.analysis.allocation import EXACT, Design, Mask, Problem
 from tolstat.campaign import stop_rule
+from tolstat.campaign import what_if as sets
+from tolstat.campaign.pool import kept_workers
 from tolstat.campaign.stop_rule import Statement
+from tolstat.campaign.what_if import Change
+from tolstat.campaign.work import Work
 from tolstat.common.columns import holds
 from tolstat.common.errors import Fault, InputError, gather, raise_all
-from tolstat.common.loads import ANY_LIMIT, FloatArray, split, unit_text
-from tolstat.common.tables import Status
-from tolstat.common.units import DISPLAY_UNITS
+from tolstat.common.loads import split, unit_text
 from tolstat.display import text
-from tolstat.display.answer import Answer, Column, Document, Listing, Part, Row, Rows, Sentence, Table
-from tolstat.display.options import Costs, Delivery, Opt
+from tolstat.display.answer import Answer, Column, Listing, Part, Row, Rows, Sentence, Table
+from tolstat.display.options import Budget, Costs, Opt
 from tolstat.questions import shares
-from tolstat.store import error_budget
+from tolstat.questions.shares import ChangedJoints, Simulation, check_sample, own_joints, study_documents
+from tolstat.store import Writer
 from tolstat.store.view import View
-from tolstat.study import Study, axes, scaling, selection
+from tolstat.store.what_if import Altered
+from tolstat.study import changes, ladder, scaling, selection, widths
 from tolstat.study import costs as prices
-from tolstat.study.costs import Cost
-from tolstat.study.scaling import Tolerance
-from tolstat.study.tolerances.density_ratio import Exact, exact, log_ratios, of_error
-from tolstat.study.tolerances.distributions import Distribution, Normal
-from tolstat.study.tolerances.zone_laws import Rayleigh
+from tolstat.study.ladder import Ladder
 
+TITLE = "The cheapest tolerances"
 EXAMPLE = 'write --target "P(cross1.F > 700 N) < 0.001"'
-DIGITS = 3
-"""Significant digits of the tolerances proposed."""
-SEARCH_CONFIDENCE = 0.999
-"""Confidence level of the search: higher than the 0.95 of the final check, so that the check mostly confirms it."""
-MAX_SEARCHED = 50_000
-"""Maximum number of joints used in the search; all others are used in the final check."""
-MIN_CHANGE = 5e-3
-"""Smallest relative change of a tolerance that is proposed."""
-WITHHELD = ("estimate", "lower", "upper", "next_lower", "next_upper")
-"""Keys of the table ``limits`` that are NaN where the weights of the joints are unreliable."""
+MOST = 65_536
+"""Default of the largest number of joints of a design."""
+BUDGET_S = 600.0
+"""Default time limit, s."""
+Targets = Annotated[list[str], Opt("RULE", name="target")]
+Keep = Annotated[list[str] | None, Opt("PATTERN")]
+Most = Annotated[int, Opt("N", least=1024)]
 
 
-def _width(row: Row, key: str) -> str:
-    unit, factor = DISPLAY_UNITS.get(row["unit"], (row["unit"], 1.0))
-    return scaling.marked(row["mark"], f"{factor * row[key]:.4g} {unit}".rstrip())
+def _costs(row: Row) -> str:
+    return f"{row['cost']:.4g}" if math.isfinite(row["cost"]) else "-"
 
 
-TOLERANCES = (
-    Column("tolerance", shares.word("tolerance")),
-    Column("errors", shares.word("errors"), rank=1),
-    Column("before", lambda row: _width(row, "before")),
-    Column("proposed", lambda row: _width(row, "proposed")),
-    Column("factor", lambda row: f"{row['factor']:.3g}"),
+LINES = (
+    Column("tolerance", shares.word("tolerance"), words=True),
+    Column("features", shares.word("features"), rank=1),
+    Column("before", shares.word("before"), words=True),
+    Column("proposed", shares.word("proposed"), words=True),
     Column("cost before", lambda row: f"{row['cost_before']:.4g}"),
-    Column("cost", lambda row: f"{row['cost']:.4g}"),
+    Column("cost", _costs),
 )
 """Columns of the table ``tolerances``."""
-LIMITS = (
-    Column("target", lambda row: row["limit"].replace("N*m", unit_text("N*m"))),
-    Column("before", shares.share("before")),
-    Column("proposed", shares.share("estimate")),
-    Column("95 % interval", shares.shares("lower", "upper")),
-    Column("ppm", lambda row: text.ppm(row["estimate"]), rank=2),
-    Column("above in delivery", text.delivery, rank=3),
-    Column("counts as joints", lambda row: f"{row['ess']:.0f}" if row["usable"] else "-", rank=1),
-)
-"""Columns of the table ``limits``."""
-
-
-Entries = dict[str, dict[str, Any]]
-"""Keys of entries of ``[tolerances]`` by pattern."""
-_Judged = tuple[str, float, Sequence[NDArray[np.bool_]]]
-"""A statement or `ANY_LIMIT`, its target, and which joints are above, see `_above`."""
 
 
 class _Request(NamedTuple):
-    """What is asked for: statements to be kept; tolerances that may change, and their costs."""
+    """What is asked for: statements to be kept, lines that may change, and largest number of joints of a design."""
 
     statements: list[Statement]
-    tolerances: list[Tolerance]
-    costs: list[Cost]
+    ladders: list[Ladder]
+    most: int
 
     @property
-    def columns(self) -> list[str]:
-        """Columns of the errors that the tolerances are for."""
-        return [column for t in self.tolerances for name in t.names for column in axes.columns_of(name)]
+    def targets(self) -> np.ndarray[Any, np.dtype[np.float64]]:
+        """Share that each statement allows."""
+        return np.array([statement.bound for statement in self.statements])
+
+    @property
+    def looks(self) -> list[int]:
+        """Numbers of joints of the looks of a check; the first is that of the search."""
+        return allocation.sizes(self.targets, self.most)
 
 
-def allocate(
-    view: View,
-    targets: Annotated[list[str], Opt("RULE", name="target")],
-    costs: Costs = None,
-    keep: Annotated[list[str] | None, Opt("PATTERN")] = None,
-    delivery: Delivery = DELIVERY,
-) -> Answer:
-    """Propose the cheapest tolerances that meet the targets.
+def allocate(view: View, targets: Targets, costs: Costs = None, keep: Keep = None, most: Most = MOST) -> Answer:
+    """Find the cheapest tolerances that meet the targets.
 
-    Each entry of [tolerances] is multiplied by one factor. One half of the joints in FILE, reweighted to other
-    tolerances, selects the factors; the other half checks them. A joint without a valid load counts as above the level.
+    Simulates the same joints with other tolerances. First lines of the drawing become narrower, step by step, each time
+    the one that gains most share for its cost; then lines wider where that costs no yield. A step is the next grade of
+    ISO 286 or class of ISO 2768, or a preferred number (R10). The result is simulated anew with joints of other seeds,
+    until the upper end of its interval is below the target, or it is known that it misses. All joints are kept in FILE.
+    To go on after an interruption, run the same command again.
 
-    Gives factor and cost of each tolerance, the share of joints above each level with its 95 % interval, the changed
-    entries as TOML, and a verdict: "holds", or "needs new runs" if the joints in FILE do not suffice. With --out DIR,
-    writes also a study with the proposed tolerances and another seed, STEM_allocate.toml, to be run next.
+    Gives the path of the search, the tolerances with their costs, and the share in the new joints. With --out, writes
+    the study with the proposed tolerances and a seed that has not been used.
 
     Example: tolstat allocate iso2768_f.h5 --target "P(any limit) < 0.1"
 
     Parameters
     ----------
     view : View
-        A campaign of joints drawn from tolerances.
+        A campaign whose joints are drawn from tolerances.
     targets : list of str
         Largest share of joints above a level: "P(cross*.F > 700 N) < 0.001"; repeatable.
     costs : Path, optional
-        Cost of each tolerance, TOML or CSV (see tolstat docs allocate); default: cost inversely proportional to the
-        tolerance.
+        Cost of each tolerance, TOML or CSV (see tolstat docs allocate); default: 1 per feature, inversely proportional
+        to the tolerance.
     keep : list of str, optional
         Errors whose tolerances do not change, such as "pin*.diameter"; repeatable; default: none.
-    delivery : int
-        Number of joints of the next delivery, for the prediction interval of those above a limit.
+    most : int
+        Largest number of joints of a design, 65 536 unless given.
 
     Returns
     -------
     Answer
-        Table ``tolerances``, one row per tolerance that may change: ``tolerance`` (pattern), ``errors`` (how many),
-        ``unit``, ``mark`` (what widths are: ``±`` half the band, ``⌀`` or ``wide`` size of the zone), ``before`` and
-        ``proposed`` (widths, SI), ``factor``, ``cost_before``, ``cost``. Those of the operating point, the material,
-        measured parts and correlated errors are not changed.
+        Table ``path``, one row per step of search and check: ``step``, ``what`` (``as drawn``, ``all exact``,
+        ``narrower``, ``wider``, ``check``), ``line``, ``before``, ``after``, ``cost`` (of all lines), ``n`` joints and
+        their ``share`` above the level of the first target, of further ones ``share_2`` and so on, of a check with
+        ``_lower`` and ``_upper``. Table ``tolerances``, one row per line that may change: ``tolerance`` (pattern),
+        ``features`` (how many), ``before``, ``proposed``, ``cost_before``, ``cost``.
 
-        Table ``limits``, one row per target, and `ANY_LIMIT` for a joint above any of several (its target is NaN),
-        from joints that the search did not use: ``limit``, ``target``, ``before`` (share of all joints as drawn),
-        ``estimate``, ``lower``, ``upper`` (with the numerical error near the limit where ``numerical``, that is, where
-        it is known), ``next_lower``, ``next_upper`` (prediction interval for the joints above in the next delivery),
-        ``ess``, ``usable``. Numbers are NaN if not ``usable``.
-
-        Facts: ``holds`` (the check confirms the proposal), ``verdict``, ``aim`` (see `analysis.allocation.Choice`),
-        ``effective`` (joints that those of the check count as), ``joints_needed`` (joints of the proposed study that
-        would show that it holds; inf if it is not expected to), ``entries`` (keys of the changed entries by pattern).
+        Facts: ``state`` (``holds``, ``misses``, ``open``: more joints or time would tell, ``impossible``: exact lines
+        miss, too, ``exhausted``: no finer step is left), ``holds``, ``misses_by`` (how far the upper end is above the
+        target; NaN without a check), ``cost_before``, ``cost``, ``joints`` of the check, ``entries`` (keys of the
+        changed entries by pattern), ``verdict``.
 
     Raises
     ------
     InputError
-        With every fault of limits, costs and names.
+        With every fault of targets, costs and names.
+    NotApplicable
+        When the file holds no joint of a search for these targets; `simulate` adds them.
     StoreError
-        When the file's joints are not drawn from tolerances, are drawn in groups, or are too few.
-
-    Examples
-    --------
-    >>> with tolstat.open(path) as store:
-    ...     answer = tolstat.allocate(store.view(), ["P(cross1.F > 700 N) < 0.08"])
-    >>> {row["tolerance"]: round(row["factor"], 1) for row in answer.tables["tolerances"].rows}
-    {'pin4.tilt_t': 1.0, 'pin[12].offset_t': 0.8}
+        When the file's joints are not drawn from tolerances, or differ in weight.
     """
-    view.check_drawn()
-    view.check("mean")
-    if view.study.groups:
-        remedy = 'give the file of a study with sampling.method = "random"'
-        reason = "holds joints that share errors with others, so that one half of them is no check of the other"
-        raise shares.unusable(view, reason, remedy)
-    request = _read_request(view, targets, costs, keep or ())
-    done = np.flatnonzero(view.status != Status.PENDING)
-    events = [_above(view, statement, done) for statement in request.statements]
-    searched, checked = allocation.halves(view.design.units(view.n)[done], MAX_SEARCHED)
-    if len(checked) < 4 * reweight.LEAST_ESS:
-        remedy = f"run {8 * reweight.LEAST_ESS} joints or more"
-        raise shares.unusable(view, f"has {len(done)} joints simulated", remedy)
-    choice = _search(view, request, np.column_stack([event[0][searched] for event in events]), done[searched])
-    entries = {
-        t.pattern: t.scaled(float(f), DIGITS)
-        for t, f in zip(request.tolerances, choice.factors, strict=True)
-        if abs(f - 1) > MIN_CHANGE
-    }
-    study, changed = (
-        view.study,
-        [(t, t.distribution(entries[t.pattern])) for t in request.tolerances if t.pattern in entries],
-    )
-    new = {name: law for t, law in changed for name in t.names}
-    logs = [
-        log_ratios(new, study.tolerances, study.copula, partial(sampling.values, study, errors), len(errors))
-        for errors in view.error_blocks(request.columns)
-    ]
-    exact_ratio = exact((law, study.tolerances[name]) for name, law in new.items())
-    ratios = _ratios(np.concatenate(logs)[done[checked]], exact_ratio)
-    judged: list[_Judged] = [(s.text, s.bound, event) for s, event in zip(request.statements, events, strict=True)]
-    if len(events) > 1:  # with both ends of the numerical error where it is known of all
-        judged.append((ANY_LIMIT, np.nan, [np.any(ends, axis=0) for ends in zip(*events, strict=False)]))
-    limits = [_limit(view, statement, checked, ratios, delivery) for statement in judged]
-    figures = [(row["estimate"], row["ess"], row["target"]) for row in limits[: len(events)]]
-    needed = ratios.effective * max(allocation.joints_needed(*figure, CONFIDENCE) for figure in figures)
-    limits = [row if row["usable"] else row | dict.fromkeys(WITHHELD, np.nan) for row in limits]
-    holds, verdict = _verdict(limits[: len(events)], ratios, needed)
-    facts = {"holds": holds, "verdict": verdict, "aim": choice.aim, "effective": ratios.effective}
-    facts |= {"joints_needed": needed, "entries": entries}
-    return Answer("allocate", "Tolerances proposed", _parts(view, _tolerances(request, entries), limits, facts), facts)
-
-
-class DensityRatios:
-    """Logarithms of new over old density of joints; terms of the factors used last are kept.
-
-    Parameters
-    ----------
-    study : Study
-        Study that the joints were drawn for.
-    tolerances : sequence of Tolerance
-        Tolerances that the factors scale.
-    errors : ndarray, shape (n,)
-        Errors of the joints, a table with the columns that the tolerances are for.
-    """
-
-    def __init__(self, study: Study, tolerances: Sequence[Tolerance], errors: NDArray[np.void]) -> None:
-        self._tolerances = tolerances
-        self._values = [[sampling.values(study, errors, name) for name in t.names] for t in tolerances]
-        self._old = [t.distribution(t.entry) for t in tolerances]
-        self._old_density = [self._log_density(i, old) for i, old in enumerate(self._old)]
-        keep = lru_cache(maxsize=4 * len(tolerances))
-        self._log_ratio = keep(lambda i, f: self._log_density(i, self._scaled(i, f)) - self._old_density[i])
-        self._exact = keep(lambda i, f: of_error(self._scaled(i, f), self._old[i]))
-
-    def log_ratios(self, factors: FloatArray) -> FloatArray:
-        """Logarithms of the ratios for tolerances scaled by factors, (n,)."""
-        return np.asarray(sum(self._log_ratio(i, float(f)) for i, f in enumerate(factors)))
-
-    def exact(self, factors: FloatArray) -> Exact:
-        """Exact numbers of the ratio for tolerances scaled by factors; a tolerance may have several errors."""
-        each = [self._exact(i, float(f)) for i, f in enumerate(factors)]
-        terms = [len(t.names) * np.array(exact) for t, exact in zip(self._tolerances, each, strict=True)]
-        return Exact(*np.sum(terms, axis=0).tolist())
-
-    def _scaled(self, i: int, factor: float) -> Distribution:
-        old, t = self._old[i], self._tolerances[i]
-        # as the scaled entry gives it, but without parsing
-        if isinstance(old, Normal):
-            mean = old.mean if t.fixed is None else t.fixed + factor * (old.mean - t.fixed)
-            return replace(old, mean=mean, sigma=factor * old.sigma)
-        if isinstance(old, Rayleigh) and old.upper is None:
-            return replace(old, sigma=factor * old.sigma)
-        return t.distribution(t.scaled(factor))
-
-    def _log_density(self, i: int, distribution: Distribution) -> FloatArray:
-        return np.asarray(sum(distribution.logpdf(values) for values in self._values[i]))
-
-
-def _parts(view: View, tolerances: Rows, limits: Rows, facts: Row) -> list[Part]:
-    """Tables, the changed entries, and sentences."""
-    entries = facts["entries"]
+    request = _read_request(view, targets, costs, keep or (), most)
+    run = _Run(view, request, view.altered)
+    if not run.search.path or (len(run.search.path) == 1 and run.search.state == "open"):
+        words = " ".join(f"--target {quote(target)}" for target in targets)
+        remedy = f"simulate them: tolstat allocate {quote(str(view.path))} {words}"
+        raise shares.inapplicable(view, "holds no joints of a search for these targets", remedy)
+    state, verdict, misses_by = _verdict(view, run)
+    path, lines = _path(run), _lines(run)
+    chosen = list(zip(request.ladders, run.search.design, strict=True))
+    rungs = (own.rungs[step] for own, step in chosen)
+    entries = {pattern: dict(keys) for rung in rungs for pattern, keys in rung.entries.items()}
+    before, after = (sum(row[key] for row in lines) for key in ("cost_before", "cost"))
+    facts = {"state": state, "holds": state == "holds", "misses_by": misses_by, "cost_before": before, "cost": after}
+    facts |= {"joints": run.looks[-1].n if run.looks else 0, "entries": entries, "verdict": verdict}
+    heads = [statement.text.replace("N*m", unit_text("N*m")) for statement in request.statements]
     parts: list[Part] = [
-        Table("tolerances", "Tolerances and their costs", TOLERANCES, tolerances),
-        Table("limits", "Shares of the joints above the levels, before and as proposed", LIMITS, limits),
+        Sentence(verdict, "lead"),
+        Table("path", "The path: each step, its cost, and the share simulated", _columns(heads), path),
+        Table("tolerances", "Tolerances and their costs", LINES, lines),
     ]
     if entries:
         parts.append(Listing("[tolerances]", "\n".join(scaling.line(*item) for item in entries.items())))
-    before, after = (sum(row[key] for row in tolerances) for key in ("cost_before", "cost"))
     parts.append(Sentence(f"total cost {before:.4g} -> {after:.4g} ({100 * (after / before - 1):+.1f} %)"))
-    parts.append(Sentence(facts["verdict"]))
-    if not all(row["numerical"] for row in limits):
-        parts.append(Sentence(error_budget.command(view.path)))
-    parts.append(Sentence(f"next, with --out DIR: tolstat run {quote(f'DIR/{view.path.stem}_allocate.toml')}"))
-    # with another seed: a check must not use the joints of the search
-    study = scaling.rewritten(view.study, entries, view.study.sampling.seed + 1)
-    return [*parts, Document(".toml", lambda _: study)]
+    parts.append(Sentence("intervals hold together for all looks of the check with 95 %, without the numerical error"))
+    documents = study_documents(view.study, ladder.text_of(view.study, chosen, run.unused_seed))
+    return Answer("allocate", TITLE, [*parts, *documents], facts)
 
 
-def _verdict(limits: Rows, ratios: Ratios, needed: float) -> tuple[bool, str]:
-    """Whether the final check confirms the proposal, and a sentence on it, or on why it needs new runs."""
-    figures = f"{ratios.values.size} joints in the check count as {ratios.effective:.0f}"
-    usable = all(row["usable"] for row in limits)
-    if usable and all(row["upper"] < row["target"] for row in limits):
-        return True, f"holds: the upper ends of the intervals are below the targets ({figures})"
-    if not usable:
-        return False, f"needs new runs: the weights of the joints are unreliable ({figures})"
-    if all(row["estimate"] < row["target"] for row in limits):
-        joints = f"about {needed:.0f} joints of the proposed study would show it"
-        return False, f"needs new runs: expected to hold, {joints} ({figures})"
-    step = "a step towards the targets; run the proposed study and allocate again"
-    return False, f"needs new runs: {step} ({figures})"
+class _Run:
+    """Search and check of a request, as far as the joints that a file holds tell them.
+
+    Parameters
+    ----------
+    view, request : View, _Request
+        The campaign and what is asked for.
+    altered : dict
+        Joints of the file; replaced by those that `simulate` returns.
+    simulate : callable, optional
+        Simulates changes; returns the joints of the file after it.
+    """
+
+    def __init__(
+        self,
+        view: View,
+        request: _Request,
+        altered: dict[str, Altered],
+        simulate: Callable[[Sequence[Change], str], dict[str, Altered]] | None = None,
+    ) -> None:
+        self.view, self.request, self._altered, self._simulate = view, request, altered, simulate
+        n, targets = request.looks[-1], request.targets
+        self.problem = Problem(
+            costs=[np.array([own.cost(k) for k in range(len(own.rungs))]) for own in request.ladders],
+            drawn=tuple(own.drawn for own in request.ladders),
+            above=lambda designs: self._above(designs, view.study.sampling.seed, request.looks[0]),
+            targets=targets,
+            aims=np.array([allocation.aim(float(target), n) for target in targets]),
+        )
+        self.search, self.looks, self.state = allocation.allocate(self.problem, self._fresh, request.looks)
+
+    @property
+    def unused_seed(self) -> int:
+        """Seed that neither the search nor a check has used."""
+        return int(self.view.study.sampling.seed) + allocation.ROUNDS + 1
+
+    def _fresh(self, design: Design, number: int, n: int) -> Mask | None:
+        """Joints of a seed that no design before had."""
+        found = self._above([design], self.view.study.sampling.seed + 1 + number, n)
+        return None if found is None else found[0]
+
+    def _above(self, designs: Sequence[Design], seed: int, n: int) -> list[Mask] | None:
+        """Which of the first joints of a seed are above each level with some designs; simulated if they can be."""
+        wanted = [self._change(design, seed, n) for design in designs]
+        if self._simulate is not None:
+            stage = "search" if seed == self.view.study.sampling.seed else f"check, seed {seed}"
+            self._altered = self._simulate(wanted, stage)
+        columns = []
+        for statement in self.request.statements:
+            joints = ChangedJoints(self.view, statement.limit, self._altered)
+            abouts = [change.about for change in wanted]
+            loads = [joints.base if about["kind"] == sets.AS_DRAWN else joints.of(about) for about in abouts]
+            known = [values for values in loads if values is not None and len(values) >= n]
+            if len(known) < len(wanted):
+                return None
+            columns.append([~(values[:n] <= joints.level) for values in known])  # above, too, without a valid load
+        return [np.column_stack(each) for each in zip(*columns, strict=True)]
+
+    def _change(self, design: Design, seed: int, n: int) -> Change:
+        """Joints of a design; of the campaign as drawn those that it lacks."""
+        study, ladders = self.view.study, self.request.ladders
+        exact = [own.line for own, step in zip(ladders, design, strict=True) if step == EXACT]
+        if len(exact) == 1:
+            return sets.stepped(study, exact[0], widths.EXACT, range(n))
+        if exact:
+            laws = {name: law for line in exact for name, law in widths.changed(study, line, widths.EXACT).items()}
+            changed = replace(study, tolerances=study.tolerances | laws)
+            return sets.with_study(study, changed, "all lines exact", range(n))
+        if (design, seed) == (self.problem.drawn, study.sampling.seed):
+            return sets.as_drawn(study, range(min(own_joints(self.view), n), n))
+        changed = changes.read(study, ladder.text_of(study, list(zip(ladders, design, strict=True)), seed))
+        return sets.with_study(study, changed, self.words(design), range(n))
+
+    def words(self, design: Design) -> str:
+        """Design in words: what differs from the drawing."""
+        pairs = zip(self.request.ladders, design, strict=True)
+        return ", ".join(f"{own.line.label} {own.rungs[k].words}" for own, k in pairs if k != own.drawn) or "as drawn"
 
 
-def _ratios(logs: NDArray[np.float64], exact: Exact) -> Ratios:
-    return Ratios(np.exp(logs), exact.mean_square, exact.unbounded, float(np.exp(exact.largest)))
+def _path(run: _Run) -> list[dict[str, Any]]:
+    """Rows of the table ``path``."""
+    rows: list[dict[str, Any]] = []
+    checks = {look.after: look for look in run.looks}  # the last one of each design
+    none, before = {"line": "-", "before": "-", "after": "-"}, run.problem.drawn
+    for number, step in enumerate(run.search.path, start=1):
+        row = {"step": len(rows), "what": step.what} | none
+        if step.line >= 0:
+            own = run.request.ladders[step.line]
+            words = (own.rungs[design[step.line]].words for design in (before, step.design))
+            row |= dict(zip(none, (own.line.label, *words), strict=True))
+        before = before if EXACT in step.design else step.design
+        rows.append(row | {"cost": step.cost, "n": len(step.above)} | _shares(step.above.mean(axis=0)))
+        if (look := checks.get(number)) is not None:
+            row = {"step": len(rows), "what": "check"} | none | {"cost": step.cost, "n": look.n}
+            rows.append(row | _shares(look.share, look.lower, look.upper))
+    return rows
 
 
-def _read_request(view: View, targets: Sequence[str], costs: Path | None, keep: Sequence[str]) -> _Request:
+def _shares(*ends: np.ndarray[Any, np.dtype[np.float64]]) -> dict[str, float]:
+    """Keys and values of the shares above the level of each target, with the ends of their intervals if known."""
+    each = ends if len(ends) > 1 else (*ends, np.full_like(ends[0], np.nan), np.full_like(ends[0], np.nan))
+    keys = ["share" if j == 0 else f"share_{j + 1}" for j in range(len(ends[0]))]
+    return {k: v for j, key in enumerate(keys) for k, v in shares.with_ends(key, [end[j] for end in each]).items()}
+
+
+def _columns(heads: Sequence[str]) -> list[Column]:
+    """Columns of the table ``path``: one for the share of each target."""
+    keys = ["share", *(f"share_{j}" for j in range(2, len(heads) + 1))]
+    names = ["share, %"] if len(heads) == 1 else [f"{head}, %" for head in heads]
+    return [
+        Column("step", shares.word("step")),
+        Column("what", shares.word("what")),
+        Column("line", shares.word("line"), words=True),
+        Column("from", shares.word("before"), words=True),
+        Column("to", shares.word("after"), words=True),
+        Column("cost", _costs),
+        Column("joints", shares.word("n"), rank=1),
+        *(shares.estimated(name, key) for name, key in zip(names, keys, strict=True)),
+    ]
+
+
+def _lines(run: _Run) -> Rows:
+    """Rows of the table ``tolerances``."""
+    rows = []
+    for own, step in zip(run.request.ladders, run.search.design, strict=True):
+        row = {"tolerance": own.line.label, "features": own.features, "before": own.rungs[own.drawn].words}
+        row |= {"proposed": own.rungs[step].words}
+        rows.append(row | {"cost_before": own.cost(own.drawn), "cost": own.cost(step)})
+    return rows
+
+
+def _verdict(view: View, run: _Run) -> tuple[str, str, float]:
+    """State, sentence on it, and how far the upper end is above its target."""
+    statements, file = run.request.statements, quote(str(view.path))
+    if run.search.state == "impossible":
+        least = run.search.path[1].above
+        worst = int(np.argmax(least.mean(axis=0) / run.problem.targets))
+        share = text.percent(float(least[:, worst].mean()))
+        head = f"No tolerance suffices: with all lines exact {share} of the joints miss {statements[worst].text}"
+        return "impossible", f"{head}. {_others(view, statements[worst], file)}", math.nan
+    if not run.looks:
+        return (
+            run.state,
+            "The search is not finished: the same command goes on, a longer --budget goes further.",
+            math.nan,
+        )
+    look = run.looks[-1]
+    worst = int(np.argmax(look.upper / run.problem.targets))
+    low, high = float(look.lower[worst]), float(look.upper[worst])
+    misses_by = high - float(run.problem.targets[worst])
+    share = f"{text.percent(float(look.share[worst]))} ({text.span(low, high)}) of {look.n} joints of another seed"
+    goal = statements[worst].text.replace("N*m", unit_text("N*m"))
+    if look.state == "holds":
+        return "holds", f"Holds: {share}, which the search has not seen, are above: {goal}.", misses_by
+    why = f"Misses {goal} by {text.percent(misses_by)}" if look.state == "misses" else f"Open, {goal}"
+    needed = binomial.needed(float(look.share[worst]), float(run.problem.targets[worst]), allocation.LOOK_CONFIDENCE)
+    more = f"; {needed:.0f} joints would tell: --most" if look.state == "open" and needed > look.n else ""
+    none = "; no finer step is left" if run.search.state == "exhausted" else ""
+    return look.state, f"{why}: {share} are above; upper end {text.percent(high)}{more}{none}.", misses_by
+
+
+def _others(view: View, statement: Statement, file: str) -> str:
+    """What else than tolerances would keep a limit: values of what is assumed."""
+    joints = ChangedJoints(view, statement.limit, view.altered)
+    found = [(joints.share(loads), about["label"]) for about, loads in joints.changes(sets.JOINT)]
+    would = [f"{label} ({text.percent(share[0])})" for share, label in found if share[0] < statement.bound]
+    return f"What else would: {', '.join(would) or f'tolstat assumptions {file} --run tells'}."
+
+
+def _read_request(view: View, targets: Sequence[str], costs: Path | None, keep: Sequence[str], most: int) -> _Request:
     """Read targets, costs and names, and report their faults together."""
-    study = view.study
-    faults: list[Fault] = []
-    statements: list[Statement] = []
+    check_sample(view, "difference", whole=True)
+    if view.store.variants:
+        raise shares.unusable(view, "holds several joints", "give the file of a study with tolerances and one joint")
+    study, faults, statements = view.study, list[Fault](), list[Statement]()
     for target in targets:
         with gather(faults):
             statements.append(stop_rule.parse(target, view.limits, "", "--target", EXAMPLE))
-            loads = statements[-1].limit.loads
-            lacking = [name for name in loads if not holds(view.columns, split(name)[0])]
+            lacking = [name for name in statements[-1].limit.loads if not holds(view.columns, split(name)[0])]
             if lacking:
                 kept = f"give one of: {', '.join(view.kept_loads)}"
                 faults.append(Fault("--target", f"the file does not keep {', '.join(lacking)}", kept))
@@ -308,64 +346,62 @@ def _read_request(view: View, targets: Sequence[str], costs: Path | None, keep: 
         if not names:
             faults.append(Fault("--keep", f"{pattern!r} selects no error that the study scatters", "see [tolerances]"))
         kept_names |= set(names)
-    every = scaling.tolerances(study)
-    each: list[Cost] = []
+    every, found = scaling.tolerances(study), list[Ladder]()
     with gather(faults):
-        each = prices.of(every, costs)
+        found = ladder.ladders(study, every, prices.of(every, costs))
     raise_all(faults)
-    pairs = zip(every, each, strict=True)
-    free = [(t, cost) for t, cost in pairs if cost.reach[0] < cost.reach[1] and not kept_names & set(t.names)]
+    free = [own for own in found if len(own.rungs) > 1 and not kept_names & set(own.line.names)]
     if not free:
-        remedy = "name some in --costs, or leave --keep out; measured, lognormal and correlated errors stay as they are"
+        remedy = "name some in --costs, or leave --keep out; measured and lognormal errors stay as they are"
         raise InputError([Fault("--costs", "leaves no tolerance that may change", remedy)])
-    return _Request(statements, [t for t, _ in free], [cost for _, cost in free])
+    return _Request(statements, free, most)
 
 
-def _above(view: View, statement: Statement, done: NDArray[np.intp]) -> list[NDArray[np.bool_]]:
-    """Which joints are above the level in any load of a statement, or have no valid load, (n,).
+def simulate(
+    path: Path,
+    work: Work,
+    targets: Targets,
+    costs: Costs = None,
+    keep: Keep = None,
+    most: Most = MOST,
+    budget: Budget = BUDGET_S,
+) -> list[Path]:
+    """Search for the cheapest tolerances, simulate what a file lacks of it, and keep the loads in the file.
 
-    Where the numerical error near the limit is known, also with both of its ends.
+    Parameters
+    ----------
+    path : Path
+        Result file of a campaign whose joints are drawn from tolerances.
+    work : Work
+        Workers, progress and messages.
+    targets, costs, keep, most
+        As in `allocate`.
+    budget : float
+        Time limit, with unit s, min or h; 10 min unless given.
+
+    Returns
+    -------
+    list of Path
+        The file.
+
+    Raises
+    ------
+    InputError
+        With every fault of targets, costs and names.
+    StoreError
+        When the file cannot be used.
     """
-    load, level = view.load_of(statement.limit), statement.limit.level
-    loads = (load, *(error_budget.near(view, load) or ()))
-    return [(~end.is_valid | (end.values > level))[done] for end in loads]
+    begin = time.monotonic()
+    with Writer.open(path) as store, kept_workers():
+        view = View(store)
+        request = _read_request(view, targets, costs, keep or (), most)
+        loads = [name for statement in request.statements for name in statement.limit.loads]
+        simulation = Simulation(store, view, work, loads)
 
+        def more(wanted: Sequence[Change], stage: str) -> dict[str, Altered]:
+            simulation.run(wanted, stage, f"{stage}: ", begin + budget)
+            return simulation.altered
 
-def _search(view: View, request: _Request, above: NDArray[np.bool_], samples: NDArray[np.intp]) -> allocation.Choice:
-    """Choose the factors by some of the samples; `above` tells which of these are above each limit."""
-    ratios = DensityRatios(view.study, request.tolerances, view.errors(samples, request.columns))
-    reach = np.array([cost.reach for cost in request.costs])
-    problem = allocation.Problem(
-        log_ratios=ratios.log_ratios,
-        log_spread=lambda factors: ratios.exact(factors).mean_square,
-        usable=lambda factors: _ratios(ratios.log_ratios(factors), ratios.exact(factors)).usable,
-        above=above,
-        targets=np.array([statement.bound for statement in request.statements]),
-        cost=lambda factors: sum(cost.at(float(f)) for cost, f in zip(request.costs, factors, strict=True)),
-        lower=reach[:, 0],
-        upper=np.where([t.widens for t in request.tolerances], reach[:, 1], 1.0),
-        iid=view.design.has_interval("reweighting"),
-        confidence=SEARCH_CONFIDENCE,
-    )
-    return allocation.search(problem)
-
-
-def _limit(view: View, judged: _Judged, checked: NDArray[np.intp], ratios: Ratios, delivery: int) -> dict[str, Any]:
-    """One row of the table ``limits``; `checked` are the joints of the check."""
-    name, target, above = judged
-    samples = [Sample.of(end[checked], np.full(checked.size, Status.OK), view.design) for end in above]
-    share, (lower, upper), predicted = shares.reweighted(samples, ratios, 0.5, delivery)
-    row = {"limit": name, "target": target, "before": float(above[0].mean()), "estimate": share.estimate}
-    row |= {"lower": lower, "upper": upper} | predicted
-    return row | {"ess": share.support.ess, "usable": share.support.usable, "numerical": len(above) > 1}
-
-
-def _tolerances(request: _Request, entries: Entries) -> list[dict[str, Any]]:
-    """Rows of the table ``tolerances``."""
-    rows = []
-    for t, cost in zip(request.tolerances, request.costs, strict=True):
-        width = scaling.width(entries.get(t.pattern, t.entry), t.site)
-        row = {"tolerance": t.pattern, "errors": len(t.names), "unit": t.site.unit, "mark": t.mark}
-        row |= {"before": t.width, "proposed": width, "factor": width / t.width}
-        rows.append(row | {"cost_before": cost.at(1.0), "cost": cost.at(width / t.width)})
-    return rows
+        _Run(view, request, simulation.altered, more)
+        work.tell(f"simulated {simulation.simulated} joints in {time.monotonic() - begin:.0f} s")
+    return [path]

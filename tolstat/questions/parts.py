@@ -142,10 +142,10 @@ def _parts(view: View, costs: Costs) -> tuple[Panel, Table, Table]:
 def _prices(tolerances: Sequence[scaling.Tolerance], costs: Costs) -> dict[str, float]:
     """Cost of the tolerances of each part, as they are."""
     prices = dict.fromkeys(PARTS, 0.0)
-    for tolerance, cost in zip(tolerances, cost_tables.of(tolerances, costs), strict=True):
-        for name, entry in zip(tolerance.names, cost.entries, strict=True):
-            if (part := gauges.part_of(name)) in prices:
-                prices[part] += cost._replace(entries=(entry,)).at(1.0)
+    for cost in cost_tables.of(tolerances, costs):
+        for feature in cost.entries:
+            if (part := gauges.part_of(feature)) in prices:
+                prices[part] += cost.of(feature, 1.0)
     return prices
 
 

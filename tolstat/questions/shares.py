@@ -144,8 +144,9 @@ def study_documents(study: Study, changed: str) -> list[Document]:
     joint = joint_beside(study)
 
     def of(path: Path) -> str:
-        own = {("joint",): {"base": f"{path.stem}{JOINT_FILE}"}} if joint else {}
-        return with_keys(placed(changed, study.path, path), own, path.name)
+        text_of_study = placed(changed, study.path, path)
+        base = {"base": f"{path.stem}{JOINT_FILE}"}
+        return with_keys(text_of_study, {("joint",): base}, path.name) if joint else text_of_study
 
     return [Document(".toml", of), *([Document(JOINT_FILE, lambda _: joint)] if joint else [])]
 

@@ -14,7 +14,6 @@ from tolstat.common.strict import did_you_mean
 from tolstat.study import rewriting, selection
 from tolstat.study.study import Study
 from tolstat.study.tolerances import fits, kinds, zones
-from tolstat.study.tolerances.density_ratio import unbounded
 from tolstat.study.tolerances.distributions import Distribution
 from tolstat.study.tolerances.entry import Site, Toleranced, ToleranceEntry
 from tolstat.study.tolerances.zones import ZoneEntry
@@ -99,11 +98,6 @@ class Tolerance(NamedTuple):
         """Distribution that `entry` gives each of the quantities."""
         read = kinds.entry(dict(entry), self.site, "scaled", ("tolerances", self.pattern))
         return next(iter(read.quantities(self.site).values()))
-
-    @property
-    def widens(self) -> bool:
-        """Whether the tolerance may become wider: not if it is bounded, nor if it refines a position."""
-        return unbounded(self.distribution(self.entry)) and not self.site.shared
 
 
 def tolerances(study: Study) -> list[Tolerance]:

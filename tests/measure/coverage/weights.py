@@ -1,4 +1,4 @@
-"""Experiments on joints counted by other weights: other tolerances, allocation, measured parts."""
+"""Experiments on joints counted by other weights: other tolerances, measured parts."""
 
 from __future__ import annotations
 
@@ -7,11 +7,10 @@ from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import brentq
 from scipy.stats import chi2, norm
 
 from tests.measure.coverage.trial import Asked, Experiment, Found, Law, Rng, found, fresh_share, sample_of
-from tolstat.analysis import allocation, known_share, process, reweight
+from tolstat.analysis import known_share, process, reweight
 from tolstat.analysis.known_share import Mixture
 from tolstat.analysis.process import Known, Sums
 from tolstat.analysis.reweight import Ratios
@@ -21,8 +20,6 @@ from tolstat.study.tolerances import density_ratio
 from tolstat.study.tolerances.distributions import Normal
 
 ERRORS = 10
-GROUPS, EACH = 2, 4
-"""Groups of errors whose tolerances are allocated, and errors in each."""
 ENTRIES = 2
 """Entries of the tolerances, each with a process and measured parts of its own."""
 TOLERANCES = 0.2
@@ -68,9 +65,6 @@ def experiments() -> Iterator[Experiment]:
     for load in loads():
         for factor, n in ((0.8, 256), (0.8, 1024), (1.1, 1024), (1.1, 4096), (1.15, 4096), (1.3, 4096)):
             yield _reweighted(load, factor, n)
-    for name in _TOYS:
-        for n in (2048, 4096):
-            yield _allocated(name, n)
     for load in loads():
         for parts, n, share in PARTS:
             yield _known(load, parts, n, share)
@@ -116,51 +110,6 @@ def _reweighted(load: Load, factor: float, n: int) -> Experiment:
         ]
 
     return Experiment(tuple(asked), once)
-
-
-class _Toy(NamedTuple):
-    """A load of eight errors, and its share above a level by the factor of each error."""
-
-    of: Callable[[FloatArray], FloatArray]
-    share: Callable[[FloatArray, float], float]
-
-
-_TOYS = {
-    "sum": _Toy(lambda x: x.sum(axis=1), lambda f, level: float(norm.sf(level / np.sqrt((f**2).sum())))),
-    "largest": _Toy(lambda x: x.max(axis=1), lambda f, level: float(1.0 - np.prod(norm.cdf(level / f)))),
-    "largest modulus": _Toy(
-        lambda x: np.abs(x).max(axis=1), lambda f, level: float(1.0 - np.prod(1.0 - 2.0 * norm.sf(level / f)))
-    ),
-}
-
-
-def _allocated(name: str, n: int, target: float = 0.02, drawn: float = 0.04) -> Experiment:
-    """Halve the share above a limit at the least cost; a proposal that is said to hold, and does not, is a miss."""
-    toy = _TOYS[name]
-    level = float(brentq(lambda x: toy.share(np.ones(GROUPS * EACH), x) - drawn, 0.1, 30.0))
-
-    def once(rng: Rng) -> list[Found]:
-        x = rng.standard_normal((n, GROUPS * EACH))
-        above, squares = toy.of(x) > level, (x**2).reshape(n, GROUPS, EACH).sum(axis=2)
-        searched, checked = allocation.halves(np.arange(n), n)
-        of_search = squares[searched]
-        problem = allocation.Problem(
-            log_ratios=lambda f: _log_ratios(of_search, f, EACH),
-            log_spread=lambda f: _exact(f, EACH).mean_square,
-            usable=lambda f: _ratios(of_search, f, EACH).usable,
-            above=above[searched, None],
-            targets=np.array([target]),
-            cost=lambda f: float((1.0 / f).sum()),
-            lower=np.full(GROUPS, 0.5),
-            upper=np.full(GROUPS, 1.2),
-            confidence=0.999,
-        )
-        factors = allocation.search(problem).factors
-        own = reweight.share_above(sample_of(above[checked]), _ratios(squares[checked], factors, EACH), 0.5)
-        holds = own.support.usable and own.upper < target
-        return [Found(-np.inf, target, toy.share(np.repeat(factors, EACH), level), holds)]
-
-    return Experiment((Asked("allocation holds", f"{name} of 8 errors, {drawn:g} to {target:g}", n),), once)
 
 
 def _known(load: Load, parts: int, n: int, share: float) -> Experiment:

@@ -27,7 +27,7 @@ COMMANDS = (
         "time-above",
         "sorting",
     ),
-    *("reweight", "allocate", "compare", "shafts", "rare", "selective", "export", "docs", "cache"),
+    *("change", "reweight", "allocate", "compare", "shafts", "rare", "selective", "export", "docs", "cache"),
 )
 
 
@@ -123,6 +123,7 @@ MAIN = Campaign(
             "sorting iso2768_f.h5",
             "lots iso2768_f.h5",
             "reweight iso2768_f.h5 --set pin1.offset_t.cpk=1.2",
+            "change iso2768_f.h5 --set pin1.offset_t.cpk=1.2",
             "allocate iso2768_f.h5 --target 'P(any limit) < 0.1'",
             "replay iso2768_f.h5 --row 900",
             "report iso2768_f.h5 --point cruise",

@@ -97,10 +97,6 @@ SORTING = Campaign(
         ],
         "reweight": forms("reweight sorting.h5 --set 'pin*.tilt_[tz].cpk=0.6' --set 'hole*.diameter.cpk=1.2'"),
         "reweight_out": ["reweight sorting.h5 --set 'pin*.tilt_[tz].cpk=0.6' --out changed"],
-        "allocate": [
-            *forms("shape: allocate sorting.h5 --target 'P(any limit) < 0.2'"),
-            "shape: allocate sorting.h5 --target 'P(cross*.T > 60 N*m) < 0.05' --keep 'pin*.diameter' --out new",
-        ],
         "time_above": [
             *forms("time-above sorting.h5"),
             "time-above sorting.h5 --by cross1.T --level '30 N*m' --curves --out above",
@@ -157,5 +153,22 @@ WHAT_IF = Campaign(
             "report selective.h5 --accept '50 %'",
         ],
         "kept": ["extend selective.h5 --n 250 --no-report", "causes selective.h5"],
+    },
+)
+CHANGE = Campaign(
+    "change",
+    [cheap("iso2768_f"), "run iso2768_f.toml --n 200 --no-report"],
+    {
+        "change": [
+            *forms("change iso2768_f.h5 --set '*.tilt_*.cpk=1.2' --most 200"),
+            "change iso2768_f.h5 --set joint.contact.clearance='0.15 mm' --set 'operation.alpha=12 deg' --most 200 "
+            "--accept '5 %' --out changed.toml",
+            "change iso2768_f.h5 --set 'pin*.offset_e=none' --most 400 --out changed",
+            "change iso2768_f.h5 --set sampling.seed=3 --set pin1=2 --set pin*.offset_x.cpk=1",
+        ],
+        "allocate": [
+            *forms("allocate iso2768_f.h5 --target 'P(any limit) < 0.2' --keep 'pin*.*' --keep 'hole*.offset_*'"),
+            "allocate iso2768_f.h5 --target 'P(any limit) < 0.2' --keep 'pin*.*' --keep 'hole*.offset_*' --out next.toml",
+        ],
     },
 )

@@ -168,7 +168,7 @@ CHANGE = Campaign(
         ],
         "allocate": [
             *forms("allocate iso2768_f.h5 --target 'P(any limit) < 0.2' --keep 'pin*.*' --keep 'hole*.offset_*'"),
-            "allocate iso2768_f.h5 --target 'P(any limit) < 0.2' --keep 'pin*.*' --keep 'hole*.offset_*' --out next.toml",
+            "allocate iso2768_f.h5 --target 'P(any limit) < 0.2' --keep 'pin*.*' --keep 'hole*.offset_*' --out a.toml",
         ],
     },
 )

@@ -136,25 +136,24 @@ def allocate(view: View, targets: Targets, costs: Costs = None, keep: Keep = Non
         words = " ".join(f"--target {quote(target)}" for target in targets)
         remedy = f"simulate them: tolstat allocate {quote(str(view.path))} {words}"
         raise shares.inapplicable(view, "holds no joints of a search for these targets", remedy)
-    state, verdict, misses_by = _verdict(view, run)
-    path, lines = _path(run), _lines(run)
+    (state, verdict, misses_by), lines = _verdict(view, run), _lines(run)
     chosen = list(zip(request.ladders, run.search.design, strict=True))
-    rungs = (own.rungs[step] for own, step in chosen)
-    entries = {pattern: dict(keys) for rung in rungs for pattern, keys in rung.entries.items()}
+    entries = {pattern: dict(keys) for own, k in chosen for pattern, keys in own.rungs[k].entries.items()}
     before, after = (sum(row[key] for row in lines) for key in ("cost_before", "cost"))
     facts = {"state": state, "holds": state == "holds", "misses_by": misses_by, "cost_before": before, "cost": after}
     facts |= {"joints": run.looks[-1].n if run.looks else 0, "entries": entries, "verdict": verdict}
     heads = [statement.text.replace("N*m", unit_text("N*m")) for statement in request.statements]
     parts: list[Part] = [
         Sentence(verdict, "lead"),
-        Table("path", "The path: each step, its cost, and the share simulated", _columns(heads), path),
+        Table("path", "The path: each step, its cost, and the share simulated", _columns(heads), _path(run)),
         Table("tolerances", "Tolerances and their costs", LINES, lines),
     ]
     if entries:
         parts.append(Listing("[tolerances]", "\n".join(scaling.line(*item) for item in entries.items())))
     parts.append(Sentence(f"total cost {before:.4g} -> {after:.4g} ({100 * (after / before - 1):+.1f} %)"))
     parts.append(Sentence("intervals hold together for all looks of the check with 95 %, without the numerical error"))
-    documents = study_documents(view.study, ladder.text_of(view.study, chosen, run.unused_seed))
+    unused = view.study.sampling.seed + allocation.ROUNDS + 1  # by the search and by any check
+    documents = study_documents(view.study, ladder.text_of(view.study, chosen, unused))
     return Answer("allocate", TITLE, [*parts, *documents], facts)
 
 
@@ -179,20 +178,14 @@ class _Run:
         simulate: Callable[[Sequence[Change], str], dict[str, Altered]] | None = None,
     ) -> None:
         self.view, self.request, self._altered, self._simulate = view, request, altered, simulate
-        n, targets = request.looks[-1], request.targets
         self.problem = Problem(
             costs=[np.array([own.cost(k) for k in range(len(own.rungs))]) for own in request.ladders],
             drawn=tuple(own.drawn for own in request.ladders),
             above=lambda designs: self._above(designs, view.study.sampling.seed, request.looks[0]),
-            targets=targets,
-            aims=np.array([allocation.aim(float(target), n) for target in targets]),
+            targets=request.targets,
+            aims=np.array([allocation.aim(float(bound), request.looks[-1]) for bound in request.targets]),
         )
         self.search, self.looks, self.state = allocation.allocate(self.problem, self._fresh, request.looks)
-
-    @property
-    def unused_seed(self) -> int:
-        """Seed that neither the search nor a check has used."""
-        return int(self.view.study.sampling.seed) + allocation.ROUNDS + 1
 
     def _fresh(self, design: Design, number: int, n: int) -> Mask | None:
         """Joints of a seed that no design before had."""
@@ -283,8 +276,8 @@ def _lines(run: _Run) -> Rows:
     """Rows of the table ``tolerances``."""
     rows = []
     for own, step in zip(run.request.ladders, run.search.design, strict=True):
-        row = {"tolerance": own.line.label, "features": own.features, "before": own.rungs[own.drawn].words}
-        row |= {"proposed": own.rungs[step].words}
+        words = {"before": own.rungs[own.drawn].words, "proposed": own.rungs[step].words}
+        row = {"tolerance": own.line.label, "features": own.features} | words
         rows.append(row | {"cost_before": own.cost(own.drawn), "cost": own.cost(step)})
     return rows
 
@@ -348,7 +341,7 @@ def _read_request(view: View, targets: Sequence[str], costs: Path | None, keep: 
         kept_names |= set(names)
     every, found = scaling.tolerances(study), list[Ladder]()
     with gather(faults):
-        found = ladder.ladders(study, every, prices.of(every, costs))
+        found += ladder.ladders(study, every, prices.of(every, costs))
     raise_all(faults)
     free = [own for own in found if len(own.rungs) > 1 and not kept_names & set(own.line.names)]
     if not free:
@@ -389,7 +382,7 @@ def simulate(
     InputError
         With every fault of targets, costs and names.
     StoreError
-        When the file cannot be used.
+        When the file cannot be used, or lacks joints and was made by other code.
     """
     begin = time.monotonic()
     with Writer.open(path) as store, kept_workers():

@@ -144,9 +144,8 @@ def study_documents(study: Study, changed: str) -> list[Document]:
     joint = joint_beside(study)
 
     def of(path: Path) -> str:
-        text_of_study = placed(changed, study.path, path)
-        base = {"base": f"{path.stem}{JOINT_FILE}"}
-        return with_keys(text_of_study, {("joint",): base}, path.name) if joint else text_of_study
+        here, base = placed(changed, study.path, path), {"base": f"{path.stem}{JOINT_FILE}"}
+        return with_keys(here, {("joint",): base}, path.name) if joint else here
 
     return [Document(".toml", of), *([Document(JOINT_FILE, lambda _: joint)] if joint else [])]
 
@@ -364,6 +363,7 @@ class Simulation:
 
         if not (missing := lacking()):
             return 0
+        sets.check_code(self._store)
         needed, left, points = self.seconds * missing, end - time.monotonic(), ", ".join(self._asked.points)
         cost = f"about {clock(needed)} on {self._workers} processes"
         cost += f", of which {clock(max(left, 0.0))} are left" if needed > left else ""

@@ -10,11 +10,15 @@ from pathlib import Path
 import pytest
 
 import tolstat
-from tests.questions.test_allocate import TWO
 from tests.questions.test_causes import TEXT, made
 from tests.questions.test_reweight import campaign
+from tests.support import synthetic
 
 ROOT = Path(__file__).parent.parent
+TWO = synthetic.STUDY.replace("n = 60", "n = 12000").replace(
+    '"pin*.offset_t" =', '"pin4.tilt_t" = { plus_minus = "1 deg", distribution = "uniform" }\n"pin[12].offset_t" ='
+)
+"""Two pins whose offsets make the load, and a tilt that does not."""
 ON_ARRAYS = sorted(
     path.stem for path in (ROOT / "tolstat" / "analysis").glob("*.py") if ">>> " in path.read_text("utf-8")
 )
@@ -60,7 +64,7 @@ def examples(tmp_path_factory):
     fewer = campaign(folder, TWO.replace("n = 12000", "n = 500"), "fewer")
     known = made(folder, TEXT.replace("3000", "600"))
     return {
-        **{name: {"path": two} for name in ("questions.allocate", "questions.reweight", "report.answer")},
+        **{name: {"path": two} for name in ("questions.reweight", "report.answer")},
         "questions.compare": {"path": two, "other": fewer},
         "questions.causes.errors": {"path": known},
     }
@@ -69,7 +73,6 @@ def examples(tmp_path_factory):
 @pytest.mark.parametrize(
     "module",
     [
-        "questions.allocate",
         "questions.reweight",
         "questions.compare",
         "questions.causes.errors",

@@ -73,6 +73,14 @@ def test_every_study_that_is_written_runs_from_another_folder(
     assert study.load(far / "named.toml").joint == study.load(first).joint
 
 
+def test_a_result_file_elsewhere_names_its_study(first: Path, tmp_path: Path) -> None:
+    file, out = tmp_path / "results" / "own.h5", tmp_path / "far" / "changed.toml"
+    tolstat.run(tolstat.load(first), file, workers=1)
+    call("change", file, "--study", first, "--set", "pin1.tilt_t=none", "--most", 128, "--workers", 1, "--out", out)
+    assert not list(out.parent.glob("*_joint.toml"))
+    assert study.load(out).joint == study.load(first).joint
+
+
 @pytest.mark.parametrize("lost", ["gone", "edited"])
 def test_a_joint_file_that_is_not_there_is_written_beside_the_study(first: Path, tmp_path: Path, lost: str) -> None:
     plan, joint = study.load(first), first.with_name("own_joint.toml")

@@ -73,7 +73,10 @@ Report = Annotated[bool, Opt(help="Print the report at the end and write its fil
 Folder = Annotated[Path | None, Opt("DIR", help="Write tables as CSV and pictures to this folder, created if missing.")]
 FolderOrStudy = Annotated[
     Path | None,
-    Opt("DIR|STUDY", help="Write tables as CSV and the study to this folder, or with a name in .toml the study alone."),
+    Opt(
+        "DIR|STUDY.toml",
+        help="Write tables as CSV and the study to this folder, or with a name in .toml the study alone.",
+    ),
 ]
 Budget = Annotated[float, Opt("TIME", unit="s")]
 Settings = Annotated[list[str], Opt("KEY=VALUE", name="set")]

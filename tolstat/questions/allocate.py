@@ -386,7 +386,7 @@ def simulate(
     """
     begin = time.monotonic()
     with Writer.open(path) as store, kept_workers():
-        view = View(store)
+        view = View(store, work.study_file)
         request = _read_request(view, targets, costs, keep or (), most)
         loads = [name for statement in request.statements for name in statement.limit.loads]
         simulation = Simulation(store, view, work, loads)

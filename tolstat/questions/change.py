@@ -113,14 +113,6 @@ def change(view: View, settings: Settings, accepted: Accepted = math.nan) -> Ans
         When the file holds no joints with this change; `simulate` adds them.
     StoreError
         When the joints are not drawn from tolerances, or differ in weight.
-
-    Examples
-    --------
-    >>> with tolstat.open(path) as store:
-    ...     try:
-    ...         answer = tolstat.change(store.view(), ["pin1.offset_t.plus_minus=0.05 mm"])
-    ...     except NotApplicable:
-    ...         answer = None
     """
     asked = _Asked(view, settings)
     joints = ChangedJoints(view, view.decisive, view.altered)
@@ -269,7 +261,7 @@ def simulate(
     """
     begin = time.monotonic()
     with Writer.open(path) as store, kept_workers():
-        view = View(store)
+        view = View(store, work.study_file)
         asked, own = _Asked(view, settings), own_joints(view)
         simulation = Simulation(store, view, work, view.limits or ("",))
         n = min(own if LEAST <= own <= most else FIRST, most)

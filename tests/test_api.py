@@ -11,8 +11,13 @@ import pytest
 
 import tolstat
 from tests.questions.test_causes import TEXT, made
+from tests.support import synthetic
 
 ROOT = Path(__file__).parent.parent
+TWO = synthetic.STUDY.replace("n = 60", "n = 12000").replace(
+    '"pin*.offset_t" =', '"pin4.tilt_t" = { plus_minus = "1 deg", distribution = "uniform" }\n"pin[12].offset_t" ='
+)
+"""Two pins whose offsets make the load, and a tilt that does not."""
 ON_ARRAYS = sorted(
     path.stem for path in (ROOT / "tolstat" / "analysis").glob("*.py") if ">>> " in path.read_text("utf-8")
 )

@@ -331,7 +331,18 @@ def test_an_option_means_the_same_in_all_commands():
         assert len(meaning[name]) == 1, (name, meaning[name])
     assert meaning["--by"] == {"LOAD"}
     assert meaning["--json"] == {""}
-    assert meaning["--out"] <= {"CSV", "FILE", "DIR", "STUDY", "OUT", "PICTURE", "JSON", "DIR|PAGE.html", ""}
+    assert meaning["--out"] <= {
+        "CSV",
+        "FILE",
+        "DIR",
+        "STUDY",
+        "OUT",
+        "PICTURE",
+        "JSON",
+        "DIR|PAGE.html",
+        "DIR|STUDY.toml",
+        "",
+    }
 
 
 def test_completion_knows_the_commands_and_loads_nothing_heavy():

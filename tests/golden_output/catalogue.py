@@ -22,7 +22,7 @@ COMMANDS = (
         "bearing-life",
         "orders",
     ),
-    *("compare", "shafts", "rare", "export", "docs", "cache"),
+    *("change", "allocate", "compare", "shafts", "rare", "export", "docs", "cache"),
 )
 
 
@@ -114,6 +114,8 @@ MAIN = Campaign(
             "causes iso2768_f.h5 --by cross1.X",
             "fatigue iso2768_f.h5",
             "bearing-life iso2768_f.h5",
+            "change iso2768_f.h5 --set sampling.seed=3 --set pin1.offset_x.cpk=1",
+            "allocate iso2768_f.h5 --target 'P(cross1.X > 1 N) < 0.1'",
             "replay iso2768_f.h5 --row 900",
             "report iso2768_f.h5 --point cruise",
             "report iso2768_f.h5 --accept '300 %'",

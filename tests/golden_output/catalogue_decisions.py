@@ -126,3 +126,20 @@ WHAT_IF = Campaign(
         "kept": ["extend iso2768_f.h5 --n 250 --no-report", "causes iso2768_f.h5"],
     },
 )
+CHANGE = Campaign(
+    "change",
+    [cheap("iso2768_f"), "run iso2768_f.toml --n 200 --no-report"],
+    {
+        "change": [
+            *forms("change iso2768_f.h5 --set '*.tilt_*.cpk=1.2' --most 200"),
+            "change iso2768_f.h5 --set joint.contact.clearance='0.15 mm' --set 'operation.alpha=12 deg' --most 200 "
+            "--accept '5 %' --out changed.toml",
+            "change iso2768_f.h5 --set 'pin*.offset_e=none' --most 400 --out changed",
+            "change iso2768_f.h5 --set sampling.seed=3 --set pin1=2 --set pin*.offset_x.cpk=1",
+        ],
+        "allocate": [
+            *forms("allocate iso2768_f.h5 --target 'P(any limit) < 0.2' --keep 'pin*.*' --keep 'hole*.offset_*'"),
+            "allocate iso2768_f.h5 --target 'P(any limit) < 0.2' --keep 'pin*.*' --keep 'hole*.offset_*' --out a.toml",
+        ],
+    },
+)

@@ -8,7 +8,7 @@ from tests.golden_output import catalogue_decisions as catalogue
 from tests.golden_output.catalogue import Campaign, cases
 from tests.golden_output.conftest import Check
 
-CAMPAIGNS = (catalogue.DECIDED, catalogue.RARE, catalogue.WHAT_IF)
+CAMPAIGNS = (catalogue.DECIDED, catalogue.RARE, catalogue.WHAT_IF, catalogue.CHANGE)
 
 
 @pytest.mark.slow

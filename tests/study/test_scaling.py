@@ -1,14 +1,10 @@
 """Tolerances with the sign of their width; tolerances changed by settings, and the study written with them."""
 
-import numpy as np
 import pytest
 
 from tests.support import synthetic
-from tolstat import sampling, study
-from tolstat.common.errors import InputError
+from tolstat import study
 from tolstat.study import scaling
-from tolstat.study.scaling import changed, rewritten_with
-from tolstat.study.tolerances.distributions import Normal
 
 ENTRIES = {
     '"pin1.offset_t" = { plus_minus = "0.1 mm", distribution = "normal" }': "±0.1 mm",
@@ -28,52 +24,45 @@ def test_a_width_is_half_a_band_a_diameter_or_the_distance_of_two_planes(tmp_pat
     assert scaling.marked(tolerance.mark, f"{1e3 * tolerance.width:.4g} mm") == shown
 
 
-FIT = 'fit = { basic = "76 mm", code = "H7/f7", distribution = "normal", cpk = 1.0 }'
+def _loaded(folder, text, name="one"):
+    source = folder / f"{name}.toml"
+    source.write_text(text, encoding="utf-8")
+    return study.load(source)
 
 
-def load(folder, text=synthetic.STUDY, name="plan"):
-    path = folder / f"{name}.toml"
-    path.write_text(text, encoding="utf-8")
-    return study.load(path)
+def test_a_mean_off_centre_moves_with_its_band(tmp_path):
+    mean = '"pin*.offset_t" = { plus_minus = "0.1 mm", mean = "0.045 mm", distribution = "normal", cpk = 0.8 }\n#'
+    (tolerance,) = scaling.tolerances(_loaded(tmp_path, synthetic.STUDY.replace('"pin*.offset_t" =', mean)))
+    for factor in (0.25, 0.8, 2.0):
+        found = tolerance.distribution(tolerance.scaled(factor))
+        assert (found.mean, found.sigma) == pytest.approx((factor * 4.5e-5, factor * 5.5e-5 / 2.4))
 
 
-def test_settings_replace_keys_of_the_errors_they_select(tmp_path):
-    plan = load(tmp_path)
-    found = changed(plan, ["pin*.offset_t.plus_minus=0.05 mm", "pin2.offset_t.cpk = 1.5"])
-    assert found["pin1.offset_t"] == Normal(0.0, pytest.approx(5e-5 / 3))
-    assert found["pin2.offset_t"] == Normal(0.0, pytest.approx(5e-5 / 4.5))
-    general = changed(plan, ["pin1.offset_t.iso2768=m", "pin1.offset_t.nominal=10 mm"] * 2)
-    assert general["pin1.offset_t"] == Normal(0.0, pytest.approx(2e-4 / 3))
-    assert plan.tolerances["pin1.offset_t"] == Normal(0.0, pytest.approx(1e-4 / 3))
-
-
-def test_every_fault_of_the_settings_is_told_once(tmp_path):
-    bad = ["pin1.tilt_t.cpk=2", "nonsense", "pin[123].offset_t.plus_minus=0.1", "pin4.offset_t.colour=red"]
-    with pytest.raises(InputError) as found:
-        changed(load(tmp_path), bad)
-    text = str(found.value)
-    assert "selects no error that has a tolerance" in text
-    assert "is not a setting" in text
-    assert text.count("0.1 has no unit") == 1
-    assert "colour" in text
-
-
-@pytest.mark.parametrize(
-    "setting", ["pin1.offset_t.plus_minus=0.09 mm", "pin*.offset_t.plus_minus=0.09 mm", "pin[12].offset_t.cpk=2"]
-)
-def test_the_study_written_has_the_changed_tolerances_and_the_same_seed(tmp_path, setting):
-    old = load(tmp_path)
-    new = load(tmp_path, rewritten_with(old, [setting]), "new")
-    assert new.tolerances == changed(old, [setting])
-    assert (new.sampling, new.limits) == (old.sampling, old.limits)
-    fresh, drawn = sampling.draw(new), sampling.draw(old)
-    ratio = new.tolerances["pin1.offset_t"].sigma / old.tolerances["pin1.offset_t"].sigma
-    np.testing.assert_allclose(fresh["pin1.offset_t"], ratio * drawn["pin1.offset_t"])
-
-
-def test_the_study_written_parts_a_fit(tmp_path):
-    text = synthetic.STUDY.replace("[tolerances]", "[tolerances]\n" + f"{FIT}")
-    old = load(tmp_path, text)
-    new = load(tmp_path, rewritten_with(old, ["hole1.diameter.plus_minus=5 um"]), "new")
-    assert new.tolerances == changed(old, ["hole1.diameter.plus_minus=5 um"])
-    assert new.joint.contact == old.joint.contact
+def test_entries_are_scaled_about_the_middle_and_texts_keep_their_comments(tmp_path):
+    text = synthetic.STUDY.replace(
+        '"pin*.offset_t" =',
+        '"pin*.tilt_t" = { iso2768 = "f", nominal = "20 mm", distribution = "normal" }\n'
+        "# above nominal\n"
+        '"hole*.diameter" = { lower = "0 mm", upper = "30 um", peak = "10 um", distribution = "triangular" }\n'
+        'hole1.offset_radial = { sigma = "0.03 mm", distribution = "rayleigh" }\n'
+        '"pin*.offset_t" =',
+    ).replace("seed = 2021\n", "")
+    plan = _loaded(tmp_path, text)
+    tilt, hole, radial, offset = scaling.tolerances(plan)
+    assert tilt.scaled(0.5, 3)["plus_minus"] == "0.25 deg"
+    # a limit at zero stays there, as that of H7
+    assert hole.scaled(0.5) == hole.entry | {"upper": "15.0 um", "peak": "5.0 um"}
+    hole = hole._replace(entry=hole.entry | {"lower": "-10 um"})
+    assert hole.scaled(0.5) == hole.entry | {"lower": "0.0 um", "upper": "20.0 um"}
+    hole = hole._replace(entry=hole.entry | {"lower": "0 mm"})
+    assert radial.width == pytest.approx(9e-5)
+    new = scaling.rewritten(plan, {t.pattern: t.scaled(0.5) for t in (hole, radial)}, 7)
+    assert "# above nominal" in new
+    again = _loaded(tmp_path, new, "again")
+    assert again.sampling.seed == 7
+    changed = {name for name, d in again.tolerances.items() if d.describe() != plan.tolerances[name].describe()}
+    assert changed == {*hole.names, *radial.names}
+    table = text.replace('"pin*.offset_t" = {', '[tolerances."pin*.offset_t"]\n')
+    table = table.replace('", distribution = "normal", cpk = 1.0 }', '"\ndistribution = "normal"')
+    new = scaling.rewritten(_loaded(tmp_path, table, "table"), {offset.pattern: offset.scaled(0.5)}, 1)
+    assert _loaded(tmp_path, new, "new").tolerances["pin1.offset_t"].sigma == pytest.approx(0.5e-4 / 3)

@@ -1,4 +1,4 @@
-"""Simulate joints of a campaign's seed with other tolerances or keys of the joint, and keep their loads in the file."""
+"""Simulate joints of a campaign's seed with other tolerances or other keys, and keep their loads in the file."""
 
 from __future__ import annotations
 
@@ -26,11 +26,12 @@ from tolstat.store.recorded import settings
 from tolstat.store.what_if import Altered
 from tolstat.study import Study, axes, widths
 from tolstat.study.assumptions import with_value
+from tolstat.study.changes import differing
 from tolstat.study.points import at
 from tolstat.study.tolerances.correlation import Group
 
-WIDTH, FIT, EXCHANGE, JOINT, AS_DRAWN = "width", "fit", "exchange", "joint", "as drawn"
-"""Kinds of sets: a line with another width, with another fit, with the errors of another joint; other keys; nothing."""
+WIDTH, FIT, EXCHANGE, JOINT, STUDY, AS_DRAWN = "width", "fit", "exchange", "joint", "study", "as drawn"
+"""Kinds of sets: a line with another width, fit, errors of another joint; other keys of the joint; of the study."""
 BLOCK = 128
 """Number of joints that a worker takes at a time: enough to keep the lanes busy, and 0.2 s on the main job."""
 SLOW_S = 60.0
@@ -47,7 +48,7 @@ class Change(NamedTuple):
     about : dict
         See `Altered.about`.
     study : Study
-        The study as changed: its tolerances and its nominal joint.
+        The study as changed: its tolerances, its nominal joint, its operating points.
     draw : callable
         Range of consecutive joints -> their errors, table ERROR.
     numbers : range
@@ -101,6 +102,18 @@ def with_joint(study: Study, keys: Mapping[str, Any], numbers: range) -> Change:
     return Change(about_joint(study, keys), changed, partial(_draw, changed), numbers)
 
 
+def about_study(study: Study, changed: Study, label: str) -> dict[str, Any]:
+    """Return `Altered.about` of samples of a changed study; the label says the change in words."""
+    keys = {"differs": differing(study, changed)}
+    return {"kind": STUDY, "label": label, "seed": changed.sampling.seed} | keys
+
+
+def with_study(study: Study, changed: Study, label: str, numbers: range) -> Change:
+    """Joint i is sample i of a changed study, `study.changes.read`, drawn with its seed."""
+    drawn = widths.applied(changed, {})
+    return Change(about_study(study, changed, label), drawn, partial(_draw, drawn), numbers)
+
+
 def as_drawn(study: Study, numbers: range) -> Change:
     """Further samples of the campaign, or samples at random of one that is not: nothing is changed."""
     about = {"kind": AS_DRAWN, "label": "no line", "seed": study.sampling.seed}
@@ -143,7 +156,7 @@ def options_of(study: Study, store: Writer) -> Options:
 
 def seconds_per_joint(study: Study, options: Options, joints: int, points: Sequence[str]) -> float:
     """Time of a joint at all these points in one process, s, from the first samples; kernels must be ready."""
-    pilot = list(_blocks(study, options, [as_drawn(study, range(joints))], points))
+    pilot = list(_blocks(options, [as_drawn(study, range(joints))], points))
     with closing(pool.map_blocks(work_beside(Options()), pilot, 1)) as done:
         spent = sum(result.seconds for _, result in done if isinstance(result, Timed))
     return (spent or SLOW_S * joints) / joints
@@ -186,7 +199,7 @@ def simulate(
     names = asked.names(study)
     todo = [change._replace(numbers=lacking) for change in wanted if (lacking := missing(in_file, change, names))]
     table = _Table(todo, asked, names)
-    blocks = _blocks(study, options_of(study, store), todo, asked.points)
+    blocks = _blocks(options_of(study, store), todo, asked.points)
     done = pool.map_blocks(work_beside(Options()), blocks, workers, stop)
     counts, saved = Counts(table.status.size, 0, 0, 0), time.monotonic()
     progress(counts)
@@ -247,9 +260,10 @@ class _Table:
         return grown
 
 
-def _blocks(study: Study, options: Options, todo: Sequence[Change], points: Sequence[str]) -> Iterator[Block]:
-    operations, begin = {point: study.at(point).operation for point in points}, 0
+def _blocks(options: Options, todo: Sequence[Change], points: Sequence[str]) -> Iterator[Block]:
+    begin = 0
     for _, changed, draw, numbers in todo:
+        operations = {point: changed.at(point).operation for point in points}
         for first in range(0, len(numbers), BLOCK):
             part = numbers[first : first + BLOCK]
             slots, errors = np.arange(begin + first, begin + first + len(part)), draw(part)

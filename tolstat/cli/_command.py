@@ -5,7 +5,8 @@ is their `Opt`. A parameter that is true by default can be switched off: ``--rep
 
 The first parameters of a question say what its command reads: a `View` is FILE, two are A and B, ``*views`` are several
 files. Where the question's file has a function ``simulate(source, work, ...)``, its first parameter says what is
-simulated: a `Study` is STUDY, whose campaigns the answer is about, a path is FILE, behind ``--run``; it may be either.
+simulated: a `Study` is STUDY, whose campaigns the answer is about, a path is FILE, behind ``--run`` unless the question
+simulates ``at_once``; it may be either.
 
 Exit codes: 0 success (failed and unsettled joints are results); 1 internal error, dead worker processes, or results
 that `replay` does not reproduce; 2 input that cannot be used; 128 + N stopped by signal N (130 after Ctrl-C).
@@ -242,10 +243,11 @@ def function_of(question: Question) -> Callable[..., None]:
         sources: list[Path] = named[0] if reads == "views" else named
         stem = f"{'_'.join(path.stem for path in sources[:2])}_{question.name}"
         point, study_file, out = arguments.get("point") or "", arguments.get("study_file"), arguments["out"]
+        only_study = question.study and out is not None and out.suffix == ".toml"
         if out is not None:
-            check_target(out / stem)
+            check_target(out if only_study else out / stem, *sources)
         is_study = simulate is not None and sources[0].suffix == ".toml"
-        if simulate is not None and (is_study or arguments.get("run")):
+        if simulate is not None and (is_study or question.at_once or arguments.get("run")):
             what: Any = sources[0]
             if is_study:
                 what = studies.load(sources[0])
@@ -266,8 +268,9 @@ def function_of(question: Question) -> Callable[..., None]:
                 answer = answer_of(*seen, **{p.name: arguments[p.name] for p in options_of_answer})
             deliver(answer, arguments["wide"], arguments["as_json"])
             if out is not None:
-                write_files(answer, out / stem)
+                write_files(answer, out.with_suffix("") if only_study else out / stem, only_study)
 
+    out_option = options.FolderOrStudy if question.study else options.Results if takes_study else options.Folder
     texts = entries(inspect.getdoc(simulate) or "") | entries(inspect.getdoc(answer_of) or "")
     command: Any = run
     command.__name__, command.__doc__ = question.name, prose(inspect.getdoc(answer_of) or "")
@@ -278,9 +281,9 @@ def function_of(question: Question) -> Callable[..., None]:
     for name, (annotation, default, applies) in {
         "point": (options.Point, None, reads != "pair"),
         "study_file": (options.OtherStudy, None, reads not in ("pair", "study")),
-        "run": (options.Run, False, into_file),
+        "run": (options.Run, False, into_file and not question.at_once),
         "workers": (options.Workers, None, simulate is not None),
-        "out": (options.Results if takes_study else options.Folder, None, True),
+        "out": (out_option, None, True),
         "wide": (options.Wide, False, True),
         "as_json": (options.AsJson, False, True),
     }.items():

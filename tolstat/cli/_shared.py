@@ -160,10 +160,10 @@ def deliver(answer: Answer, wide: bool, as_json: bool = False) -> None:
                 say(part.text)
 
 
-def write_files(answer: Answer, stem: Path) -> None:
-    """Write the files of an answer, see `Answer.write`, and tell their names."""
+def write_files(answer: Answer, stem: Path, documents: bool = False) -> None:
+    """Write the files of an answer, see `Answer.write`, or its documents alone, and tell their names."""
     with progress("files"):
-        files = answer.write(stem)
+        files = answer.write_documents(stem) if documents else answer.write(stem)
     for path in files:
         say(f"wrote {path}")
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -26,10 +26,18 @@ __all__ += ["has_unresolved", "of_shares", "plain"]
 
 @dataclass(frozen=True)
 class Document:
-    """Text of a file that `Answer.write` writes, such as a study with other tolerances; `ending` ends its name."""
+    """File that `Answer.write` writes, such as a study with other tolerances.
+
+    Attributes
+    ----------
+    ending : str
+        Ends its name.
+    text : callable
+        Path of the file -> its text: names of other files in it start from its folder.
+    """
 
     ending: str
-    text: str
+    text: Callable[[Path], str]
 
 
 @dataclass(frozen=True)
@@ -121,8 +129,14 @@ class Answer:
             elif isinstance(part, Sheet):
                 files += style.save(part.draw(), stem.with_name(f"{stem.name}_{part.name}"))
             elif isinstance(part, Document):
-                files.append(text.write(part.text, stem.with_name(f"{stem.name}{part.ending}")))
+                path = stem.with_name(f"{stem.name}{part.ending}")
+                files.append(text.write(part.text(path), path))
         return files
+
+    def write_documents(self, stem: Path) -> list[Path]:
+        """Write the documents alone, see `write`."""
+        documents = [part for part in self.parts if isinstance(part, Document)]
+        return replace(self, parts=documents).write(stem)
 
     def _repr_html_(self) -> str:
         from tolstat.display import html

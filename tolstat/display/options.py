@@ -71,6 +71,15 @@ OtherStudy = Annotated[
 Workers = Annotated[int | None, Opt("W", least=1, help="Number of worker processes; default: one per core.")]
 Report = Annotated[bool, Opt(help="Print the report at the end and write its files.")]
 Folder = Annotated[Path | None, Opt("DIR", help="Write tables as CSV and pictures to this folder, created if missing.")]
+FolderOrStudy = Annotated[
+    Path | None,
+    Opt(
+        "DIR|STUDY.toml",
+        help="Write tables as CSV and the study to this folder, or with a name in .toml the study alone.",
+    ),
+]
+Budget = Annotated[float, Opt("TIME", unit="s")]
+Settings = Annotated[list[str], Opt("KEY=VALUE", name="set")]
 Results = Annotated[
     Path | None,
     Opt(

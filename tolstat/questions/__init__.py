@@ -38,6 +38,10 @@ class Question(NamedTuple):
         File or folder of this package, if not named as the question.
     counted : bool
         Whether the JSON of all statistics has it.
+    at_once : bool
+        Whether its command simulates what is missing without ``--run``.
+    study : bool
+        Whether it writes a study.
     """
 
     name: str
@@ -46,6 +50,8 @@ class Question(NamedTuple):
     page: str = ""
     file: str = ""
     counted: bool = False
+    at_once: bool = False
+    study: bool = False
 
     def functions(self) -> tuple[Callable[..., Answer], Callable[..., list[Path]] | None]:
         """The function that answers the question, and the one that simulates for it, if any."""
@@ -90,6 +96,8 @@ QUESTIONS = (
     Question("histograms", "", "Draw histograms of the loads, and of the errors drawn.", "folded"),
     Question("modes", "", "Compute the shares of the revolution in which pins touch.", "folded", "joints"),
     Question("accuracy", "", "Give the numerical error of the loads, from checks of joints.", "folded", "joints", True),
+    Question("change", "Decide", "Simulate a change of the study on the same joints.", at_once=True, study=True),
+    Question("allocate", "Decide", "Find the cheapest tolerances that meet the targets.", at_once=True, study=True),
     Question("compare", "Decide", "Compare the exceedances and loads of two campaigns."),
     Question("rare", "Decide", "Estimate a rare exceedance by subset simulation."),
 )

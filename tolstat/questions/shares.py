@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,21 +20,27 @@ from tolstat.campaign.what_if import Change
 from tolstat.campaign.work import Work
 from tolstat.common.cores import available_cores
 from tolstat.common.errors import Fault, NotApplicable, StoreError
-from tolstat.common.loads import ANY_LIMIT, FloatArray, split
+from tolstat.common.loads import ANY_LIMIT, FloatArray, Limit, split
 from tolstat.common.tables import Status
 from tolstat.display import text
+from tolstat.display.answer import Document
 from tolstat.display.progress import clock
 from tolstat.display.table import Column, Row, has
 from tolstat.solver.compilation import warm_up
 from tolstat.store import Writer, error_budget, what_if
 from tolstat.store.view import View
 from tolstat.store.what_if import Altered
+from tolstat.study import Study
+from tolstat.study.placing import joint_beside, placed
 from tolstat.study.points import at, names_of
+from tolstat.study.rewriting import with_keys
 
 WIDEST = 0.5
 """Total interval of a yield, or its bounds without one, from which on it says too little for a verdict."""
 TAIL_STARTS_AT = 0.9
 """Share of the joints below the tail, for a load without a limit."""
+NEGLIGIBLE = 0.1
+"""Difference of two shares that does not matter, relative to the share of the joints as drawn."""
 PILOT = 64
 """Number of joints whose time is measured before others are simulated."""
 ORIGIN = {
@@ -43,6 +50,8 @@ ORIGIN = {
 }
 """Where `revolutions.Revolutions` have their loads from, in words."""
 NO_INTERVALS = "no intervals: they hold for independent samples only"
+JOINT_FILE = "_joint.toml"
+"""End of the name of a joint file that is written beside a study."""
 Cell = Callable[[Row], str]
 Estimate = tuple[float, float, float]
 """An estimate, and the ends of its interval."""
@@ -122,6 +131,17 @@ def inapplicable(view: View, reason: str, remedy: str) -> NotApplicable:
 def unusable(view: View, reason: str, remedy: str) -> StoreError:
     """Make the error of a file that cannot be used for a question."""
     return StoreError(str(Fault(str(view.path), reason, remedy)))
+
+
+def study_documents(study: Study, changed: str) -> list[Document]:
+    """Study of a changed text, and the file of its joint where that has to be written, as they run where they lie."""
+    joint = joint_beside(study)
+
+    def of(path: Path) -> str:
+        here, base = placed(changed, study.path, path), {"base": f"{path.stem}{JOINT_FILE}"}
+        return with_keys(here, {("joint",): base}, path.name) if joint else here
+
+    return [Document(".toml", of), *([Document(JOINT_FILE, lambda _: joint)] if joint else [])]
 
 
 def check_sample(view: View) -> None:
@@ -215,8 +235,8 @@ class ChangedJoints:
     ----------
     view : View
         A campaign whose joints are drawn from tolerances.
-    by : str
-        A load, or ``"any limit"``.
+    by : str or Limit
+        A load, ``"any limit"``, or a limit of one's own.
     altered : mapping
         Changes by their digest, as `View.altered`.
 
@@ -230,15 +250,25 @@ class ChangedJoints:
         Load of the joints as drawn, from sample 0 on, NaN without a valid one: the campaign's, then fresh ones.
     """
 
-    def __init__(self, view: View, by: str, altered: Mapping[str, Altered]) -> None:
-        self.load, self._study, self._altered = view.load(by), view.study, altered
-        self.level = tail_level(self.load)
-        levels = view.limits if by == ANY_LIMIT else {by: 1.0}
+    def __init__(self, view: View, by: str | Limit, altered: Mapping[str, Altered]) -> None:
+        self._study, self._altered = view.study, altered
+        if isinstance(by, Limit):
+            self.load, self.level = view.load_of(by), by.level
+            ratios = zip(by.loads, by.levels, strict=True)
+            levels = {name: 1.0 if by.has_one_level else level for name, level in ratios}
+        else:
+            self.load = view.load(by)
+            self.level, levels = tail_level(self.load), view.limits if by == ANY_LIMIT else {by: 1.0}
         self._parts = [(names_at_points(view, name), level) for name, level in levels.items()]
         n = own_joints(view)
         self.base, more = self.load.values[:n], altered.get(what_if.key(sets.as_drawn(view.study, range(0)).about))
         if more is not None and more.first <= n < more.end and (loads := self._of(more)) is not None:
             self.base = np.concatenate([self.base, loads[n - more.first :]])
+
+    def of(self, about: Mapping[str, Any]) -> FloatArray | None:
+        """Load of the joints of a change, as `changes` yields it; None where the file holds none of them."""
+        change = self._altered.get(what_if.key(about))
+        return None if change is None or change.first else self._of(change)
 
     def _of(self, altered: Altered) -> FloatArray | None:
         if not all(altered.holds(names) for names, _ in self._parts):
@@ -270,6 +300,11 @@ class ChangedJoints:
         a = a[: len(b)]
         change = difference.shares(sample_of(a), sample_of(b), [self.level], paired=True, confidence=confidence)
         return float(change.estimate[0]), float(change.outer_lower[0]), float(change.outer_upper[0])
+
+    def tells(self, values: FloatArray, confidence: float = 0.95) -> bool:
+        """Whether it is known what a change does: its difference excludes zero, or is less than `NEGLIGIBLE`."""
+        _, low, high = self.difference(self.base, values, confidence)
+        return not low <= 0.0 <= high or max(-low, high) <= NEGLIGIBLE * self.share(self.base)[0]
 
 
 class Simulation:
@@ -319,6 +354,7 @@ class Simulation:
 
         if not (missing := lacking()):
             return 0
+        sets.check_code(self._store)
         needed, left, points = self.seconds * missing, end - time.monotonic(), ", ".join(self._asked.points)
         cost = f"about {clock(needed)} on {self._workers} processes"
         cost += f", of which {clock(max(left, 0.0))} are left" if needed > left else ""

@@ -20,6 +20,8 @@ from tolstat.store.writer import Writer
 
 LOG = logging.getLogger("tolstat.store")
 GROUP = "what_if"
+COMMANDS = (("causes", " --run"), ("assumptions", " --run"), ("change", " ..."), ("allocate", " ..."))
+"""Commands that simulate changes."""
 DATASETS = {
     "sample": ("i8", "1", "number of the sample; of an exchange, of the pair of samples 2 i and 2 i + 1"),
     "load": (h5py.string_dtype(), "1", "name of the load, of several operating points with that of the point"),
@@ -35,8 +37,8 @@ class Altered(NamedTuple):
     Attributes
     ----------
     about : dict
-        The change, as JSON values: ``kind`` (``width``, ``fit``, ``exchange``, ``joint`` or ``as drawn``), ``label``,
-        ``seed``, and what determines the errors, or the ``keys`` of the joint.
+        The change, as JSON values: ``kind`` (``width``, ``fit``, ``exchange``, ``joint``, ``study`` or ``as drawn``),
+        ``label``, ``seed``, and what determines the errors, ``keys`` of the joint, or what ``differs`` in the study.
     first : int
         Sample of the first joint; of an exchange, the number of the first pair.
     names : tuple of str
@@ -77,7 +79,8 @@ def read(store: Reader) -> dict[str, Altered]:
     altered, lost = _read(store)
     if lost:
         sets = "1 change" if lost == 1 else f"{lost} changes"
-        remedy = f"simulate them again: tolstat causes {store.path} --run, tolstat assumptions {store.path} --run"
+        commands = (f"tolstat {name} {store.path}{end}" for name, end in COMMANDS)
+        remedy = f"simulate them again: {', '.join(commands)}"
         found = f"the joints of {sets} of what_if are damaged and left out"
         LOG.warning("warning: %s", Fault(str(store.path), found, remedy))
     return altered

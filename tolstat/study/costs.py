@@ -1,4 +1,4 @@
-"""Cost of a tolerance as a reciprocal power, with coefficients from TOML or CSV.
+"""Cost of a tolerance of a feature as a reciprocal power, with coefficients from TOML or CSV.
 
 A tolerance t costs c(t) = fixed + (cost - fixed) (at / t)^power. The power 1 is the reciprocal model of Chase and
 Greenwood (1988, Design issues in mechanical tolerance analysis), 2 that of Spotts (1973), any other Sutherland and
@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from io import StringIO
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
@@ -24,12 +24,12 @@ from tolstat.study import selection
 from tolstat.study.scaling import Tolerance
 from tolstat.study.tolerances.entry import Positive
 
-REACH = (0.25, 4.0)
+REACH = (0.1, 4.0)
 """Smallest and largest factor on a tolerance that are considered."""
 
 
 class CostEntry(Strict):
-    """Cost of the tolerance of one error."""
+    """Cost of a tolerance of one feature: a pin, a hole, or a pair of holes."""
 
     cost: Annotated[units.Number, Field(ge=0)] = Field(default=1.0, examples=[4.0])
     """cost of the tolerance `at`, in any currency"""
@@ -56,31 +56,36 @@ class CostEntry(Strict):
 
 
 class Cost(NamedTuple):
-    """Cost of one tolerance of the drawing as a function of its factor: the sum over the errors it applies to.
+    """Cost of one tolerance of the drawing as a function of its factor: the sum over the features it applies to.
 
     Attributes
     ----------
     width : float
         Tolerance at factor 1, SI.
-    entries : tuple of CostEntry
-        One entry per error.
+    entries : dict of str to CostEntry
+        Entry of each feature: a position zone of four pins is four, not eight for their offsets.
     """
 
     width: float
-    entries: tuple[CostEntry, ...]
+    entries: Mapping[str, CostEntry]
 
     def at(self, factor: float) -> float:
         """Cost of the tolerance made `factor` times as wide."""
-        t = self.width * factor
-        return float(sum(e.fixed + (e.cost - e.fixed) * ((e.at or self.width) / t) ** e.power for e in self.entries))
+        return sum(self.of(feature, factor) for feature in self.entries)
+
+    def of(self, feature: str, factor: float) -> float:
+        """Cost of the tolerance of one feature, made `factor` times as wide."""
+        e, t = self.entries[feature], self.width * factor
+        return float(e.fixed + (e.cost - e.fixed) * ((e.at or self.width) / t) ** e.power)
 
     @property
     def reach(self) -> tuple[float, float]:
-        """Smallest and largest factor that all errors allow, within `REACH`; (1, 1) if the tolerance is kept."""
-        if any(e.keep for e in self.entries):
+        """Smallest and largest factor that all features allow, within `REACH`; (1, 1) if the tolerance is kept."""
+        entries = self.entries.values()
+        if any(e.keep for e in entries):
             return 1.0, 1.0
-        least = max([REACH[0], *(e.least / self.width for e in self.entries if e.least is not None)])
-        most = min([REACH[1], *(e.most / self.width for e in self.entries if e.most is not None)])
+        least = max([REACH[0], *(e.least / self.width for e in entries if e.least is not None)])
+        most = min([REACH[1], *(e.most / self.width for e in entries if e.most is not None)])
         return min(least, 1.0), max(most, 1.0)
 
     @property
@@ -101,8 +106,9 @@ def of(tolerances: Sequence[Tolerance], path: Path | None = None) -> list[Cost]:
         Tolerances of the study.
     path : Path, optional
         TOML file whose keys are names or patterns of errors and whose entries are `CostEntry`, or CSV file with a
-        column ``tolerance`` of such names and the entries' keys as further columns. Tolerances of errors that the file
-        does not name are kept. Without a file each tolerance costs 1 per error, and 1 / f if made f times as wide.
+        column ``tolerance`` of such names and the entries' keys as further columns. A feature is named by one of the
+        errors of its tolerance or by all; tolerances of features that the file does not name are kept. Without a file
+        each tolerance costs 1 per feature, and 1 / f if made f times as wide.
 
     Returns
     -------
@@ -115,7 +121,7 @@ def of(tolerances: Sequence[Tolerance], path: Path | None = None) -> list[Cost]:
         With every fault of the file.
     """
     if path is None:
-        return [Cost(t.width, (CostEntry(),) * len(t.names)) for t in tolerances]
+        return [Cost(t.width, dict.fromkeys(features(t), CostEntry())) for t in tolerances]
     table = _read_csv(path) if path.suffix == ".csv" else strict.read_toml(path)
     units_of = {name: t.site for t in tolerances for name in t.names}
     costs: dict[str, CostEntry] = {}
@@ -132,14 +138,33 @@ def of(tolerances: Sequence[Tolerance], path: Path | None = None) -> list[Cost]:
     if faults:
         toml = path.suffix != ".csv"
         raise InputError(strict.with_lines(faults, str(path), read_input(path)) if toml else faults)
-    unchanged = CostEntry(cost=0.0, keep=True)
-    read = [Cost(t.width, tuple(costs.get(name, unchanged) for name in t.names)) for t in tolerances]
+    read = [Cost(t.width, _of_features(t, costs, str(path), faults)) for t in tolerances]
+    raise_all(faults)
     raise_all(
         Fault(f"{path}: {tolerance.pattern}", "costs more than a number can hold", "give a smaller cost, at or power")
         for tolerance, cost in zip(tolerances, read, strict=True)
         if not cost.is_finite
     )
     return read
+
+
+def features(tolerance: Tolerance) -> list[str]:
+    """Features that a tolerance applies to: pins, holes, pairs of holes."""
+    return list(dict.fromkeys(name.partition(".")[0] for name in tolerance.names))
+
+
+def _of_features(
+    tolerance: Tolerance, costs: Mapping[str, CostEntry], place: str, faults: list[Fault]
+) -> dict[str, CostEntry]:
+    """Entry of each feature of a tolerance; several errors of it may have one entry only."""
+    found: dict[str, CostEntry] = {}
+    for name in tolerance.names:
+        feature = name.partition(".")[0]
+        entry = costs.get(name)
+        if entry is not None and found.setdefault(feature, entry) != entry:
+            remedy = "give one for all errors of the tolerance: it is one width on the drawing"
+            faults.append(Fault(f"{place}: {tolerance.pattern}", f"has two costs for {feature}", remedy))
+    return {feature: found.get(feature, CostEntry(cost=0.0, keep=True)) for feature in features(tolerance)}
 
 
 def _read_csv(path: Path) -> dict[str, dict[str, Any]]:

@@ -47,7 +47,7 @@ def with_settings(text: str, settings: Sequence[str]) -> str:
         if section not in SETTABLE:
             allowed = f"set keys of {', '.join(SETTABLE)}; edit the study for others"
             raise input_error(place, f"is in section {section!r}", allowed)
-        text = _set(text, [section, *path], given(value), place)
+        text = with_path(text, [section, *path], given(value), place)
     return text
 
 
@@ -74,7 +74,7 @@ def given(value: str) -> Any:
         return value.strip()
 
 
-def _set(text: str, path: Sequence[str], value: Any, place: str) -> str:
+def with_path(text: str, path: Sequence[str], value: Any, place: str) -> str:
     """Set a key at a dotted path, in the innermost of the tables around it that the text has."""
     inner: Any = tomllib.loads(text)
     if path[0] not in inner:

@@ -99,11 +99,6 @@ class Tolerance(NamedTuple):
         read = kinds.entry(dict(entry), self.site, "scaled", ("tolerances", self.pattern))
         return next(iter(read.quantities(self.site).values()))
 
-    @property
-    def widens(self) -> bool:
-        """Whether the tolerance may become wider: not if it refines a position."""
-        return not self.site.shared
-
 
 def tolerances(study: Study) -> list[Tolerance]:
     """Entries of a study that can be scaled, in its order; not those of operating point and material.
@@ -151,7 +146,7 @@ def line(pattern: str, entry: Mapping[str, Any]) -> str:
     return f"{json.dumps(pattern)} = {rewriting.inline(entry)}"
 
 
-def rewritten(study: Study, entries: Mapping[str, Mapping[str, Any]], seed: int) -> str:
+def rewritten(study: Study, entries: Mapping[str, Mapping[str, Any]], seed: int, text: str | None = None) -> str:
     """Text of a study with other entries and another seed, comments kept.
 
     Parameters
@@ -162,6 +157,8 @@ def rewritten(study: Study, entries: Mapping[str, Mapping[str, Any]], seed: int)
         Pattern to keys of its entry.
     seed : int
         Seed of the sampling.
+    text : str, optional
+        Text of the study with other changes; that of the study unless given.
 
     Returns
     -------
@@ -173,7 +170,8 @@ def rewritten(study: Study, entries: Mapping[str, Mapping[str, Any]], seed: int)
     InputError
         See `rewriting.with_keys`.
     """
-    data = tomllib.loads(study.text)
+    text = study.text if text is None else text
+    data = tomllib.loads(text)
     every = list(fits.entries(data["tolerances"], study.fit))
     changes: dict[tuple[int | str, ...], dict[str, Any]] = {("sampling",): {"seed": seed}}
     for entry in every:
@@ -187,7 +185,7 @@ def rewritten(study: Study, entries: Mapping[str, Mapping[str, Any]], seed: int)
             changes["joint", "contact"] = dict(study.fit.diameters)
         else:
             changes["joint",] = {"contact": study.fit.diameters}
-    return rewriting.with_keys(study.text, changes, f"{study.name}.toml")
+    return rewriting.with_keys(text, changes, f"{study.name}.toml")
 
 
 REPLACED_KEYS = {

@@ -15,6 +15,7 @@ from tolstat.common.late import tomlkit
 from tolstat.common.loads import FloatArray
 from tolstat.common.strict import read_text
 from tolstat.study import signals, starter
+from tolstat.study.placing import placed
 
 NEEDED = ("time", "torque", "speed", "alpha")
 """Columns of the signal."""
@@ -245,4 +246,4 @@ def text(cycle: DutyCycle, source: Path, path: Path, base: Path | None = None) -
         sequence = {"points": tomlkit.string(visits, multiline=True), "revolutions": float(f"{cycle.turns:.6g}")}
         document.setdefault("fatigue", tomlkit.table())["sequence"] = sequence
     head = f"# Operating points, their shares and the order of their visits are from {source.name}.\n"
-    return head + document.as_string()
+    return placed(head + document.as_string(), base or path, path)

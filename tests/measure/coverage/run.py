@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tests.measure.coverage import causes, derived, pairs, rare, shares
+from tests.measure.coverage import allocated, causes, derived, pairs, rare, shares
 from tests.measure.coverage.statistics import CONTROL, STATISTICS
 from tests.measure.coverage.trial import Asked, Experiment, Found, Row, laws, sample_of
 from tolstat.common.errors import Fault, InputError
@@ -58,6 +58,7 @@ def experiments() -> tuple[Experiment, ...]:
     return (
         *shares.experiments(),
         *derived.experiments(),
+        *allocated.experiments(),
         *rare.experiments(),
         *pairs.experiments(),
         *causes.experiments(),

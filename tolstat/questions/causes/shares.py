@@ -15,16 +15,13 @@ from tolstat.campaign import what_if as sets
 from tolstat.common.loads import ANY_LIMIT, FloatArray
 from tolstat.display import text
 from tolstat.display.table import Row, Rows
-from tolstat.questions.shares import ChangedJoints, Estimate, check_sample, sample_of, with_ends
+from tolstat.questions.shares import NEGLIGIBLE, ChangedJoints, Estimate, check_sample, sample_of, with_ends
 from tolstat.store.view import View
 from tolstat.study import Study, scaling, widths
-from tolstat.study.costs import Cost
 from tolstat.study.costs import of as prices_of
 from tolstat.study.tolerances.correlation import Group
 from tolstat.study.widths import COARSER, EXACT, FINER, HALF, STEPS
 
-NEGLIGIBLE = 0.1
-"""Difference of two lines that does not matter for their order, relative to the share of the joints as drawn."""
 ENDS = ("", "_lower", "_upper")
 """Ends of the keys of an estimate and its interval."""
 INDICES = tuple(f"{name}{word}{end}" for name in ("", "above_") for word in ("alone", "in_all") for end in ENDS)
@@ -233,17 +230,24 @@ class Joints(ChangedJoints):
 def _with_costs(study: Study, rows: list[dict[str, Any]], table: Path) -> list[dict[str, Any]]:
     """Rows with the cost of the line after the step, and what that is more than as drawn."""
     tolerances = scaling.tolerances(study)
-    prices = {
-        name: Cost(cost.width, (entry,))
-        for tolerance, cost in zip(tolerances, prices_of(tolerances, table), strict=True)
-        for name, entry in zip(tolerance.names, cost.entries, strict=True)
-        if not entry.keep
-    }
+    costs = prices_of(tolerances, table)
+    tolerance_of = {name: k for k, tolerance in enumerate(tolerances) for name in tolerance.names}
     for row in rows:
-        factors = widths.factors(study, Group(row["line"], row["names"]), row["step"])
-        is_known = all(name in prices and factor > 0.0 for name, factor in factors.items())
-        cost = sum(prices[name].at(factor) for name, factor in factors.items()) if is_known else np.nan
-        row |= {"cost": cost, "extra_cost": cost - (sum(prices[name].at(1.0) for name in factors) if is_known else 0.0)}
+        by_feature: dict[tuple[int, str], float] = {}  # several errors of a feature are one width on the drawing
+        for name, factor in widths.factors(study, Group(row["line"], row["names"]), row["step"]).items():
+            key = tolerance_of.get(name, -1), name.partition(".")[0]
+            by_feature[key] = min(factor, by_feature.get(key, np.inf))
+        is_known = all(
+            k >= 0 and factor > 0.0 and not costs[k].entries[feature].keep
+            for (k, feature), factor in by_feature.items()
+        )
+        cost, drawn = (
+            sum(costs[k].of(feature, factor if changed else 1.0) for (k, feature), factor in by_feature.items())
+            if is_known
+            else np.nan
+            for changed in (True, False)
+        )
+        row |= {"cost": cost, "extra_cost": cost - drawn}
     return rows
 
 

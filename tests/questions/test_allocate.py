@@ -1,0 +1,229 @@
+"""Tolerances allocated by simulated joints: the path, the check, what is refused, and what is written."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from tests.questions.test_change import TEXT, made, share_of
+from tests.support.two_errors import stand_in
+from tolstat import study
+from tolstat.campaign import blocks
+from tolstat.campaign.work import Work
+from tolstat.cli import app
+from tolstat.common.errors import InputError, NotApplicable
+from tolstat.questions import allocate as question
+from tolstat.store import ResultFile
+from tolstat.study import costs, ladder, scaling
+
+TARGET = "P(cross1.F > 700 N) < 0.1"
+WHOLE = TEXT.replace(
+    "[sampling]", '"hole*.diameter" = { lower = "0 mm", upper = "0.030 mm", distribution = "uniform" }\n[sampling]'
+)
+"""Tilts matter much, offsets little, diameters not at all."""
+
+
+@pytest.fixture(autouse=True)
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The stand-in takes the place of the solver, in this process."""
+    monkeypatch.setattr(blocks, "simulate_rows", stand_in)
+    monkeypatch.setattr("tolstat.questions.shares.warm_up", lambda: None)
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Campaign with a finished search; not to be written."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(blocks, "simulate_rows", stand_in)
+        patch.setattr("tolstat.questions.shares.warm_up", lambda: None)
+        path = made(tmp_path_factory.mktemp("allocate"), WHOLE)
+        simulated(path)
+    return path
+
+
+def simulated(path: Path, targets: tuple[str, ...] = (TARGET,), **options: Any) -> str:
+    told = [""]
+    question.simulate(path, Work(workers=1, tell=told.append), list(targets), **options)
+    return told[-1]
+
+
+def answer(path: Path, targets: tuple[str, ...] = (TARGET,), **options: Any) -> Any:
+    with ResultFile.open(path) as store:
+        return question.allocate(store.view(), list(targets), **options)
+
+
+def scales(plan: study.Study) -> tuple[float, float]:
+    """Deviations of tilt and offset relative to those as drawn."""
+    drawn = study.load(Path("drawn.toml"), text=TEXT)
+    names = "pin1.tilt_t", "pin2.offset_z"
+    of = [plan.tolerances[name].moments.deviation / drawn.tolerances[name].moments.deviation for name in names]
+    return of[0], of[1]
+
+
+def test_the_study_written_keeps_the_target_by_the_law(done: Path, tmp_path: Path) -> None:
+    found = answer(done)
+    found.write_documents(tmp_path / "next")
+    plan = study.load(tmp_path / "next.toml")
+    assert share_of(1.0, 1.0) > 0.1 > share_of(*scales(plan))
+    assert (found.facts["state"], found.facts["holds"]) == ("holds", True)
+    assert found.facts["misses_by"] < 0.0
+    assert plan.sampling.seed not in {3, 4, 5, 6}
+    rows = {row["tolerance"]: row for row in found.tables["tolerances"].rows}
+    assert rows["hole*.diameter"]["proposed"] == "±0.05 mm"  # does nothing, and is as wide as it may be
+    assert found.facts["cost"] == pytest.approx(sum(row["cost"] for row in rows.values()))
+    assert rows["pin*.tilt_t"]["features"] == 4
+
+
+def test_the_path_has_a_row_for_each_step_and_the_check(done: Path) -> None:
+    rows = answer(done).tables["path"].rows
+    assert [row["step"] for row in rows] == list(range(len(rows)))
+    assert [row["what"] for row in rows[:3]] == ["as drawn", "all exact", "narrower"]
+    assert rows[-1]["what"] == "check"
+    assert rows[-1]["share_upper"] < 0.1
+    assert rows[2]["line"] == "pin*.tilt_t"
+    assert (rows[2]["before"], rows[2]["after"]) == ("±0.5 deg", "±0.4 deg")
+    assert rows[1]["share"] == 0.0
+    assert np.isinf(rows[1]["cost"])
+
+
+def test_asking_again_reads_the_file_and_an_end_of_time_is_gone_on_from(done: Path, tmp_path: Path) -> None:
+    assert simulated(done).startswith("simulated 0 joints")
+    path = made(tmp_path, WHOLE)
+    with pytest.raises(NotApplicable, match="simulate them: tolstat allocate"):
+        answer(path)
+    assert simulated(path, budget=1e-9).startswith("simulated 0 joints")
+    calls = []
+
+    def stopping(params: Any, *options: Any, **named: Any) -> Any:
+        calls.append(len(params))
+        if len(calls) > 60:
+            raise KeyboardInterrupt
+        return stand_in(params, *options, **named)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(blocks, "simulate_rows", stopping)
+        with pytest.raises(KeyboardInterrupt):
+            simulated(path)
+    part = answer(path)
+    assert part.facts["state"] == "open"
+    assert "the same command goes on" in part.facts["verdict"]
+    simulated(path)
+    assert answer(path).values() == answer(done).values()
+
+
+def test_costs_decide_between_lines_and_what_they_do_not_name_is_kept(tmp_path: Path) -> None:
+    table = tmp_path / "costs.csv"
+    table.write_text("tolerance,cost,fixed,power,most\npin*.tilt_t,2,1,1,\npin*.offset_z,1,,2,0.2 mm\n")
+    path = made(tmp_path, WHOLE)
+    simulated(path, costs=table)
+    rows = {row["tolerance"]: row for row in answer(path, costs=table).tables["tolerances"].rows}
+    assert list(rows) == ["pin*.tilt_t", "pin*.offset_z"]
+    assert rows["pin*.tilt_t"]["cost_before"] == pytest.approx(8.0)  # four pins
+
+
+def test_a_target_that_no_tolerance_meets_is_told_first(tmp_path: Path) -> None:
+    path = made(
+        tmp_path, WHOLE.replace('"hole*', '"operation.torque" = { std = "10 N*m", distribution = "normal" }\n"hole*')
+    )
+    told = simulated(path)
+    found = answer(path)
+    assert found.facts["state"] == "impossible"
+    assert found.facts["verdict"].startswith("No tolerance suffices: with all lines exact ")
+    assert "tolstat assumptions" in found.facts["verdict"]
+    assert told.startswith("simulated 1648 joints")  # 624 more as drawn, and 1024 of exact lines
+    assert [row["what"] for row in found.tables["path"].rows] == ["as drawn", "all exact"]
+
+
+def test_two_targets_have_a_share_each(tmp_path: Path) -> None:
+    path, targets = made(tmp_path, WHOLE), (TARGET, "P(cross*.F > 720 N) < 0.05")
+    simulated(path, targets)
+    found = answer(path, targets)
+    check = found.tables["path"].rows[-1]
+    assert check["share_upper"] < 0.1
+    assert check["share_2_upper"] < 0.05
+
+
+def test_faults_of_targets_costs_and_names_are_told_together(done: Path, tmp_path: Path) -> None:
+    table = tmp_path / "costs.toml"
+    table.write_text('"pin*.tilt_t" = { cost = 1, fixed = 2 }\n"pin*.offset_z" = { least = "1 deg" }\npin9.x = {}\n')
+    bad = ("P(cros1.F > 7 N) < 0.1", "P(cross1.F > 700 mm) < 2", "often", "P(psi > 1) < 0.1")
+    with pytest.raises(InputError) as told:
+        answer(done, bad, costs=table, keep=["pin7.*"])
+    for words in (
+        "did you mean 'cross1.F'",
+        "'700 mm' cannot be",
+        "2 is not between",
+        "not a rule",
+        "fixed is larger",
+        "pin9",
+    ):
+        assert words in str(told.value)
+    assert "selects no error" in str(told.value)
+    with pytest.raises(InputError, match="no tolerance that may change"):
+        answer(done, keep=["pin*.offset_z", "pin*.tilt_t", "hole*.diameter"])
+    table.write_text('"pin1.tilt_t" = { cost = 1 }\n', encoding="utf-8")
+    with pytest.raises(InputError, match="no tolerance that may change"):  # the other pins have no cost
+        answer(done, costs=table)
+
+
+def test_cost_is_of_a_feature_and_a_reciprocal_power(tmp_path: Path) -> None:
+    plan = study.load(Path("made.toml"), text=TEXT.replace('"pin*.tilt_t"', '"pin*.tilt_[tz]"'))
+    tilt, offset = scaling.tolerances(plan)
+    assert costs.of([tilt])[0].at(0.5) == pytest.approx(8.0)  # four pins, not eight errors
+    table = tmp_path / "costs.toml"
+    table.write_text('"pin*.offset_z" = { cost = 3, fixed = 1, at = "0.3 mm", power = 2, least = "0.05 mm" }\n')
+    cost = costs.of([offset], table)[0]
+    assert cost.at(0.5) == pytest.approx(4 * (1 + 2 * (0.3 / 0.075) ** 2))
+    assert cost.reach == (pytest.approx(1.0 / 3.0), costs.REACH[1])
+    table.write_text('"pin*.tilt_t" = { cost = 3 }\n"pin*.tilt_z" = { cost = 4 }\n', encoding="utf-8")
+    with pytest.raises(InputError, match="has two costs for pin1"):
+        costs.of([tilt], table)
+
+
+def test_steps_are_those_of_a_drawing() -> None:
+    fit = '[tolerances]\nfit = { basic = "76 mm", code = "H8/e8", distribution = "normal", cpk = 1.0 }\n'
+    plan = study.load(Path("made.toml"), text=TEXT.replace("[tolerances]\n", fit))
+    tolerances = scaling.tolerances(plan)
+    by_line = {own.line.label: own for own in ladder.ladders(plan, tolerances, costs.of(tolerances))}
+    offset, fitted = by_line["pin*.offset_z"], by_line["fit H8/e8"]
+    near = [offset.rungs[offset.drawn + k].words for k in (-2, -1, 0, 1, 2)]
+    assert near == ["±0.1 mm", "±0.125 mm", "±0.15 mm", "class m (±0.3 mm)", "±0.4 mm"]
+    assert [fitted.rungs[fitted.drawn + k].words for k in (-1, 0, 1)] == ["H7/e7", "H8/e8", "H9/e9"]
+    assert fitted.features == 8
+    text = ladder.text_of(plan, [(offset, offset.drawn + 1), (fitted, fitted.drawn - 1)], 9)
+    written = study.load(Path("made.toml"), text=text)
+    assert written.fit is not None
+    assert (written.fit.entry.code, written.sampling.seed) == ("H7/e7", 9)
+    assert '"pin*.offset_z" = { iso2768 = "m", nominal = "72.8 mm"' in text
+    costs_of_steps = [offset.cost(k) for k in range(len(offset.rungs))]
+    assert costs_of_steps == sorted(costs_of_steps, reverse=True)
+
+
+@pytest.mark.parametrize(
+    ("value", "finer", "coarser"), [(0.5, 0.4, 0.63), (0.15, 0.125, 0.2), (1.0, 0.8, 1.25), (30, 25, 40)]
+)
+def test_preferred_numbers(value: float, finer: float, coarser: float) -> None:
+    assert ladder.preferred(value, -1) == pytest.approx(finer)
+    assert ladder.preferred(value, 1) == pytest.approx(coarser)
+
+
+def test_command_prints_path_and_toml_and_writes_a_study(done: Path, tmp_path: Path) -> None:
+    command = ["allocate", str(done), "--target", TARGET, "--workers", "1"]
+    out = tmp_path / "next"
+    shown = CliRunner().invoke(app, [*command, "--out", str(out)])
+    assert shown.exit_code == 0, shown.stderr
+    assert shown.stdout.startswith("Holds: ")
+    assert '"pin*.tilt_t" = { ' in shown.stdout
+    assert sorted(path.name for path in out.iterdir()) == [
+        f"made_allocate{end}" for end in (".toml", "_path.csv", "_tolerances.csv")
+    ]
+    found = json.loads(CliRunner().invoke(app, [*command, "--json"]).stdout)
+    assert found["facts"]["holds"] is True
+    refused = CliRunner().invoke(app, ["allocate", str(done), "--target", "P(cross1.F > 700 N) = 1"])
+    assert refused.exit_code == 2
+    assert "write --target" in refused.stderr

@@ -1,0 +1,232 @@
+"""Change keys of a study for ``tolstat change``: tolerances by pattern, joint, operating point, fixed errors.
+
+A change is made in the text of the study, so that the study that is simulated is the one that is written.
+"""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from tolstat.common import units
+from tolstat.common.errors import Fault, InputError, collected, gather, input_error
+from tolstat.common.strict import did_you_mean
+from tolstat.joint import varied
+from tolstat.joint.model import leaves
+from tolstat.study import rewriting, scaling, selection, widths
+from tolstat.study.assumptions import with_value
+from tolstat.study.file import BESIDE_FIT, SECTIONS, load
+from tolstat.study.scaling import REPLACED_KEYS
+from tolstat.study.selection import TOLERANCED
+from tolstat.study.study import Study
+from tolstat.study.tolerances import fits
+
+SETTABLE = ("joint", "operation", "errors")
+"""Sections whose keys are changed, beside ``tolerances``, whose name is left out."""
+EXAMPLE = 'write --set "*.tilt_*.cpk=1.2", --set joint.contact.law=sliced or --set "operation.alpha=12 deg"'
+NONE = "none"
+"""Value that takes an error out of the tolerances."""
+OTHERS = f"{', '.join(SETTABLE)} and tolerances change the joints; edit the study for others, and run it"
+NAMES = 2
+"""Number of parts of the name of an error: ``pin1.tilt_t``."""
+
+
+def with_settings(study: Study, settings: Sequence[str]) -> str:
+    """Text of a study with some keys changed; comments and seed are kept.
+
+    Parameters
+    ----------
+    study : Study
+        The study.
+    settings : sequence of str
+        Key and value as in TOML, quotes may be left out. ``"pin*.offset_t.plus_minus=0.05 mm"``: name or pattern of
+        errors and key of their tolerances; a band given one way replaces a band given another way, and ``cpk`` replaces
+        ``std``. ``"pin*.tilt_t=none"`` takes errors out of the tolerances, a table in place of ``none`` is their new
+        entry. ``"fit.code=H7/e7"``; ``"joint.contact.clearance=0.15 mm"``, ``"operation.alpha=12 deg"``, of several
+        operating points ``"operation.start.alpha=12 deg"``; ``"errors.pin1.tilt_t=0.1 deg"``. Later ones override.
+
+    Returns
+    -------
+    str
+        TOML. An entry whose settings are for some of its errors only becomes one entry for each of its errors.
+
+    Raises
+    ------
+    InputError
+        With every fault of the settings; see `rewriting.with_keys`.
+    """
+    text, entries = study.text, _Entries(study)
+    with collected() as faults:
+        for setting in settings:
+            place = f"--set {setting!r}"
+            with gather(faults):
+                path, value = _parsed(setting, place)
+                if path[0] in SETTABLE:
+                    text = _set(text, path, value, place)
+                elif path[0] == fits.KEY and len(path) == NAMES:
+                    text = rewriting.with_keys(text, {fits.PATH: {path[1]: value}}, place)
+                else:
+                    entries.set(path, value, place)
+    return entries.written(text)
+
+
+def keys_of_joint(text: str, study: Study) -> dict[str, Any]:
+    """Dotted keys of ``[joint]`` of a text that differ from those of the study's, and their values."""
+    old, new = (leaves(tomllib.loads(each)["joint"]) for each in (study.text, text))
+    return {key: value for key, value in new.items() if old.get(key) != value}
+
+
+def read(study: Study, text: str) -> Study:
+    """Study of a changed text, on the joint in hand: its file need not be there any more.
+
+    Raises
+    ------
+    InputError
+        With every fault; their place begins with ``--set``.
+    """
+    try:
+        return _read(study, text)
+    except InputError as error:
+        own = f"{study.path}: "
+        places = (f"--set: {f.place.removeprefix(own)}" if f.place.startswith(own) else f.place for f in error.faults)
+        pairs = zip(places, error.faults, strict=True)
+        raise InputError([Fault(place, f.found, f.remedy) for place, f in pairs]) from error
+
+
+def _read(study: Study, text: str) -> Study:
+    joint, keys = study.joint, keys_of_joint(text, study)
+    if "base" in keys:
+        raise input_error("--set joint.base", "is another joint", "run a study of its own, and compare both files")
+    by_fit = [f"contact.{key}" for key in (*study.fit.diameters, "clearance")] if study.fit is not None else []
+    still = study.fit is not None and fits.KEY in tomllib.loads(text)["tolerances"]
+    if still and (twice := [key for key in by_fit if key in keys]):
+        raise InputError([Fault(f"--set joint.{key}", *BESIDE_FIT) for key in twice])
+    if keys and not keys.keys() <= set(by_fit):
+        joint = with_value(study, keys).joint
+    changed = load(study.path, study.sampling.n, text, joint)
+    if changed.fit is not None and (study.fit is None or changed.fit.diameters != study.fit.diameters):
+        diameters = {f"contact.{key}": units.to_si(value, "m") for key, value in changed.fit.diameters.items()}
+        changed = load(study.path, study.sampling.n, text, varied(joint, diameters))
+    if len(changed.points) > len(study.points):  # the campaign is at one of several points
+        every = load(study.path, study.sampling.n, study.text, study.joint).points
+        number = [point.operation for point in every].index(study.operation)
+        changed = changed.at(changed.points[number].name)
+    return changed
+
+
+def differing(study: Study, changed: Study) -> dict[str, Any]:
+    """Dotted keys of what determines the joints that differ from the study's, with their JSON values; None if gone."""
+    old, new = (json.loads(json.dumps(widths.applied(each, {}).identity())) for each in (study, changed))
+    keys = sorted(key for key in old.keys() | new.keys() if old.get(key) != new.get(key))
+    return {key: new.get(key) for key in keys if not key.startswith("sampling.")}
+
+
+def _parsed(setting: str, place: str) -> tuple[list[str], Any]:
+    """Parts of the key of a setting, without ``tolerances``, and its value."""
+    name, equals, value = setting.partition("=")
+    path = [part.strip() for part in name.split(".")]
+    if not (equals and value.strip() and all(path)) or (len(path) < NAMES and path[0] not in SECTIONS):
+        raise input_error(place, "is not a setting", EXAMPLE)
+    if path[0] == "tolerances":
+        path = path[1:]
+    elif path[0] in SECTIONS and path[0] not in SETTABLE:
+        raise input_error(place, f"is in section {path[0]!r}, which changes no joint", OTHERS)
+    elif len(path) < NAMES:
+        raise input_error(place, "is not a setting", EXAMPLE)
+    if not path:
+        raise input_error(place, "is not a setting", EXAMPLE)
+    return path, rewriting.given(value)
+
+
+def _set(text: str, path: Sequence[str], value: Any, place: str) -> str:
+    """Set a key of the joint, of an operating point or of a fixed error."""
+    section = tomllib.loads(text).get(path[0])
+    if path[0] == "operation" and isinstance(section, list):
+        names = [str(point.get("name")) for point in section]
+        if len(path) <= NAMES or path[1] not in names:
+            remedy = f"write --set operation.POINT.KEY=VALUE with one of {', '.join(names)}"
+            raise input_error(place, "names no operating point", remedy)
+        table: tuple[int | str, ...] = ("operation", names.index(path[1]))
+        return rewriting.with_keys(text, {table: {".".join(path[2:]): value}}, place)
+    if path[0] == "errors":
+        pattern = ".".join(path[1:])
+        for entry in selection.entries(section or {}, "errors"):
+            if entry.pattern == pattern:
+                return rewriting.with_keys(text, {entry.path[:-1]: {str(entry.path[-1]): value}}, place)
+        return rewriting.with_path(text, ["errors", pattern], value, place)
+    return rewriting.with_path(text, path, value, place)
+
+
+class _Entries:
+    """Entries of ``[tolerances]`` that are being changed: keys of the entry of each error or zone, by its name."""
+
+    def __init__(self, study: Study) -> None:
+        self._study = study
+        self._patterns = {entry.pattern: [site.name for site, _ in entry.models] for entry in study.entries}
+        self._keys = {site.name: dict(entry.keys) for entry in study.entries for site, _ in entry.models}
+        self._touched: set[str] = set()
+        self._new: dict[str, dict[str, Any]] = {}
+
+    def set(self, path: Sequence[str], value: Any, place: str) -> None:
+        """Change a key of some errors, or their whole entry."""
+        pattern, key = ".".join(path[:NAMES]), path[NAMES:]
+        known: Iterable[str] = self._keys if key or value == NONE else TOLERANCED
+        names = selection.select(pattern, known)
+        if not names:
+            found = "selects no error that has a tolerance" if key or value == NONE else "selects nothing"
+            raise input_error(place, found, did_you_mean(pattern, list(known)))
+        self._touched |= set(names)
+        if key:
+            for name in names:
+                self._keys[name] = _with_key(self._keys[name], key, value)
+        elif value == NONE or isinstance(value, Mapping):
+            for name in names:
+                self._keys.pop(name, None)
+            self._new = {other: keys for other, keys in self._new.items() if other != pattern}
+            if value != NONE:
+                self._new[pattern] = dict(value)
+        else:
+            raise input_error(place, f"{value!r} is no entry of [tolerances]", EXAMPLE)
+
+    def written(self, text: str) -> str:
+        """Text with the changed entries."""
+        alike: dict[str, dict[str, Any]] = {}
+        parted: list[str] = []
+        for pattern, names in self._patterns.items():
+            if self._touched & set(names):
+                each = [self._keys.get(name) for name in names]
+                is_alike = each[0] is not None and all(other == each[0] for other in each)
+                alike[pattern] = dict(each[0] or {}) if is_alike else _keys_of(self._study, pattern)
+                parted += [] if is_alike else [pattern]
+        if alike.keys() & {fits.HOLE, fits.PIN} and _fit(text) != _fit(self._study.text):
+            raise input_error("--set fit", "is given beside tolerances of diameters", "leave one of the two out")
+        if alike:
+            text = scaling.rewritten(self._study, alike, self._study.sampling.seed, text)
+        paths = {entry.pattern: entry.path for entry in fits.entries(tomllib.loads(text)["tolerances"], None)}
+        changes: dict[tuple[int | str, ...], dict[str, Any]] = {("tolerances",): {}}
+        for pattern in parted:
+            *table, key = paths[pattern]
+            changes.setdefault(tuple(table), {})[str(key)] = None
+            left = (name for name in self._patterns[pattern] if name in self._keys)
+            changes["tolerances",] |= {name: self._keys[name] for name in left}
+        changes["tolerances",] |= self._new
+        return rewriting.with_keys(text, changes, f"{self._study.name}.toml")
+
+
+def _fit(text: str) -> Any:
+    return tomllib.loads(text)["tolerances"].get(fits.KEY)
+
+
+def _keys_of(study: Study, pattern: str) -> dict[str, Any]:
+    return next(dict(entry.keys) for entry in study.entries if entry.pattern == pattern)
+
+
+def _with_key(entry: Mapping[str, Any], path: Sequence[str], value: Any) -> dict[str, Any]:
+    """Entry with a key, or a key of a table in it, and without those that it replaces."""
+    key, *inner = path
+    if inner:
+        table = entry.get(key)
+        return dict(entry) | {key: _with_key(table if isinstance(table, Mapping) else {}, inner, value)}
+    return {k: v for k, v in entry.items() if k not in REPLACED_KEYS.get(key, ())} | {key: value}

@@ -1,0 +1,91 @@
+"""Text of a study for another folder: the joint file and the measured data that it names stay the same files."""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from tolstat.common.errors import InputError
+from tolstat.joint import reading
+from tolstat.study import rewriting
+from tolstat.study.study import Study
+
+Keys = tuple[int | str, ...]
+
+
+def placed(text: str, source: Path, target: Path) -> str:
+    """Text of a study as it runs from another folder.
+
+    Parameters
+    ----------
+    text : str
+        TOML.
+    source, target : Path
+        Study whose folder its relative paths start from, and the study that it becomes.
+
+    Returns
+    -------
+    str
+        TOML. Paths that were relative are relative to the folder of `target`, or absolute where there is no such path,
+        as on another drive.
+
+    Raises
+    ------
+    InputError
+        See `rewriting.with_keys`.
+    """
+    changes: dict[Keys, dict[str, Any]] = {}
+    for path, name in _files(tomllib.loads(text)):
+        if not Path(name).is_absolute():
+            changes.setdefault(path[:-1], {})[str(path[-1])] = _between(source.parent / name, target.parent)
+    return rewriting.with_keys(text, changes, str(target)) if changes else text
+
+
+def joint_beside(study: Study) -> str:
+    """Joint file of a study whose own one is not there, or is another one by now; empty where it need not be written.
+
+    A result file has its joint, and the name of the joint's file, but not the folder of the study.
+    """
+    keys = tomllib.loads(study.text)["joint"]
+    keys = keys if study.fit is None else {**keys, "contact": keys.get("contact", {}) | study.fit.diameters}
+    try:
+        joint = reading.load(keys["base"], keys, str(study.path), study.path.parent)
+    except InputError:
+        joint = None
+    if joint is not None and joint.given() == study.joint.given():
+        return ""
+    head = f"# The joint of {study.name}.toml, with the keys that this study sets.\n"
+    return head + rewriting.as_text(study.joint.given("json"))
+
+
+def _between(path: Path, folder: Path) -> str:
+    """Path from a folder to a file, with slashes."""
+    try:
+        return Path(os.path.relpath(path.absolute(), folder.absolute())).as_posix()
+    except ValueError:  # on another drive
+        return path.absolute().as_posix()
+
+
+def _files(data: Mapping[str, Any]) -> Iterator[tuple[Keys, str]]:
+    """Key path and name of each file that a study names: of joints, measured parts and measured signals."""
+    for path, value in _leaves(data, ()):
+        is_joint = path[-1] == "base" and path[-2:-1] == ("joint",) and isinstance(value, str)
+        named = is_joint and (value.endswith(".toml") or len(Path(value).parts) > 1)
+        if named or (path[-1] == "file" and isinstance(value, str)):
+            yield path, value
+
+
+def _leaves(value: Any, path: Keys) -> Iterator[tuple[Keys, Any]]:
+    """Key path and value of all that is no table."""
+    if isinstance(value, Mapping):
+        items: Any = value.items()
+    elif isinstance(value, list) and any(isinstance(item, Mapping) for item in value):
+        items = enumerate(value)
+    else:
+        yield path, value
+        return
+    for key, inner in items:
+        yield from _leaves(inner, (*path, key))

@@ -42,7 +42,6 @@ def read(monkeypatch):
         ("capability",),
         ("causes", "--by", "psi"),
         ("reweight", "--set", "pin*.offset_t.plus_minus=0.09 mm"),
-        ("allocate", "--target", "P(cross1.F > 700 N) < 0.1"),
         ("export", "--statistics", "all.json"),
     ],
 )

@@ -66,9 +66,7 @@ STATISTICS = {
         "`report`, with `known_from`", ABOUT, "joints that do not support 2.5 % of the likely processes"
     ),
     "share, parts left out": Statistic("`report`, without `known_from`", NONE, "as importance sampling"),
-    "share, other tolerances": Statistic(
-        "`reweight`, `allocate`", ABOUT, "large density ratios; few effective joints on a side"
-    ),
+    "share, other tolerances": Statistic("`reweight`", ABOUT, "large density ratios; few effective joints on a side"),
     "quantile, other tolerances": Statistic("`reweight`", ABOUT, "as shares, at both ends"),
     "allocation holds": Statistic("`allocate`: the verdict", "97.5 %", "shares that do not show it"),
     "difference of shares": Statistic("`compare`", ABOUT),

@@ -19,6 +19,7 @@ from tolstat.cli import LISTED, app
 COMMANDS = list(LISTED)
 STUDY = (ROOT / "studies" / "iso2768_f.toml").read_text(encoding="utf-8")
 SHORT = {
+    "allocate": ("--most", "1024"),
     "rare": ("--n", "20", "--p0", "0.5", "--repeats", "1"),
     "verify": ("--joints", "1"),
 }

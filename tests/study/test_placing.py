@@ -59,13 +59,16 @@ def test_every_study_that_is_written_runs_from_another_folder(
     tolstat.run(tolstat.load(first), file, workers=1)
     call("change", file, "--set", "pin*.offset_t.cpk=1.2", "--most", 128, "--workers", 1, "--out", far)
     call("change", file, "--set", "pin*.offset_t.cpk=1.2", "--most", 128, "--workers", 1, "--out", far / "named.toml")
+    allocate = ("allocate", file, "--target", "P(any limit) < 0.9", "--most", 1024, "--workers", 1)
+    call(*allocate, "--out", far / "allocated.toml")
     call("spectrum", ROOT / "studies" / "drive_cycle.csv", "--base", first, "--out", far / "cycle.toml")
     call("new", far / "fresh", "--joint", "own")
     elsewhere = tmp_path / "elsewhere"
     elsewhere.mkdir()
     monkeypatch.chdir(elsewhere)
     written = sorted(path.name for path in far.glob("*.toml"))
-    assert written == ["cycle.toml", "fresh.toml", "fresh_joint.toml", "named.toml", "own_change.toml"]
+    studies = ["allocated.toml", "cycle.toml", "fresh.toml", "fresh_joint.toml", "named.toml", "own_change.toml"]
+    assert written == studies
     for name in written:
         if not name.endswith("joint.toml"):
             study.load(far / name)

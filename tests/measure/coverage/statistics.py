@@ -50,6 +50,7 @@ STATISTICS = {
     "next delivery, lots": Statistic("`report`, `capability`", ABOUT, "fewer than 30 lots"),
     "load that never repeats": Statistic("`report`: total interval", ABOUT, "fewer than 16 revolutions"),
     "rare share, subsets": Statistic("`rare`", ABOUT, "limits that are not reached: an upper end only"),
+    "allocation holds": Statistic("`allocate`: the verdict", "97.5 %", "shares that do not show it"),
     "difference of shares": Statistic("`compare`", ABOUT),
     "change of a share, what if": Statistic("`causes --run`", ABOUT),
     "difference of quantiles": Statistic("`compare`", ABOUT, "few joints: infinite ends"),

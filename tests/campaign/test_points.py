@@ -148,7 +148,7 @@ def test_a_duty_cycle_of_one_file_is_that_of_a_file_for_each_point(tmp_path, who
               for p, t, s in zip(POINTS, times, speeds, strict=True)]  # fmt: skip
     run(fake(tuple(points), joint=fakes.Dump(load("cirelli2021", {}, "test").given("json"))), path)
     with ResultFile.open(path) as store:
-        view, chosen = store.view(), ["cross1.F_t", "fork2.T"]
+        view, chosen = store.view(), ["cross1.F_t", "fork2.T_e"]
         one = load_cycles([view], names=chosen, samples=3)
         several = load_cycles(view.parts, [0.5 / 1.9, 0.6 / 1.9, 0.8 / 1.9], chosen, samples=3)
         np.testing.assert_array_equal(one.status, view.status[:3])

@@ -34,7 +34,7 @@ def draw(ax: Axes) -> None:
 def answer() -> Answer:
     table = Table("loads", "Largest loads", COLUMNS, ROWS, {"largest": "N"}, seen=ROWS[:1])
     panels = Panels([Panel("curve", "A curve", "A line", draw)])
-    parts = [Sentence("One load is known.", "lead"), table, panels, Sentence("n: joints"), Document(".toml", "n = 1\n")]
+    parts = [Sentence("One load is known.", "lead"), table, panels, Sentence("n: joints"), Document(".toml", lambda path: f"n = 1  # {path.name}\n")]
     return Answer("known", "What is known", parts, {"share": np.inf, "names": ("a", "b")})
 
 
@@ -71,7 +71,7 @@ def test_files_hold_every_row_and_no_formula(answer: Answer, tmp_path: Path) -> 
     ]
     assert files[0].read_text("utf-8") == "load,largest,n\ncross1.F,700.25,3\n'=F,,0\n"
     assert "A curve" in files[2].read_text("utf-8")
-    assert files[3].read_text("utf-8") == "n = 1\n"
+    assert files[3].read_text("utf-8") == "n = 1  # file_known.toml\n"
 
 
 def test_frame_has_the_rows_by_name(answer: Answer) -> None:

@@ -23,7 +23,10 @@ second the step error, up to which that holds (docs/notes/steps.md)."""
 
 @njit
 def is_near(body, point, axis, R):
-    """Whether the axis of a pin or hole, vectors `point` and `axis`, is near its ideal one; a NaN is not."""
+    """Whether the axis of a pin or hole, vectors `point` and `axis`, is near its ideal one at the distance `R` from O.
+
+    A NaN is not.
+    """
     return dot(point, point) <= (MAX_SHIFT * R) ** 2 and dot(axis, row(TRIAD[body], 0)) >= math.cos(MAX_TILT)
 
 

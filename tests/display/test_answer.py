@@ -34,7 +34,8 @@ def draw(ax: Axes) -> None:
 def answer() -> Answer:
     table = Table("loads", "Largest loads", COLUMNS, ROWS, {"largest": "N"}, seen=ROWS[:1])
     panels = Panels([Panel("curve", "A curve", "A line", draw)])
-    parts = [Sentence("One load is known.", "lead"), table, panels, Sentence("n: joints"), Document(".toml", lambda path: f"n = 1  # {path.name}\n")]
+    study = Document(".toml", lambda path: f"n = 1  # {path.name}\n")
+    parts = [Sentence("One load is known.", "lead"), table, panels, Sentence("n: joints"), study]
     return Answer("known", "What is known", parts, {"share": np.inf, "names": ("a", "b")})
 
 

@@ -30,6 +30,7 @@ from tolstat.questions.fatigue.counting import of_slots
 from tolstat.questions.fatigue.loads import SHOWN, channels, pylife_frame
 from tolstat.solver import histories
 from tolstat.store import ResultFile
+from tolstat.study import load
 from tolstat.study.fatigue import Fatigue, of_text
 from tolstat.study.rewriting import as_text
 
@@ -261,6 +262,12 @@ def test_a_spectrum_made_from_a_signal_counts_the_same(tmp_path):
             np.testing.assert_allclose(found, rainflow_damage(store, *where, line), rtol=1e-9)
 
 
+def test_a_sequence_with_fewer_revolutions_than_visits_is_refused():
+    text = SEQUENCE.format(alpha="1 deg", histories="none").replace("revolutions = 1e4", "revolutions = 4")
+    with pytest.raises(InputError, match=r"sequence\.revolutions: 1 visits of straight, whose share of 4 .* is 0\.8\n"):
+        load(Path("sequence.toml"), text=text)
+
+
 def test_starts_count_for_lines_of_loads(campaign):
     with ResultFile.open(campaign()) as store:
         steady = fatigue.load_cycles([store.view()], names=["cross1.F_t", "fork1.F_z"])
@@ -342,9 +349,9 @@ def test_channels_are_selected_by_patterns():
     found = {fault.place: (fault.found, fault.remedy) for fault in error.value.faults}
     unsigned = "has no sign: its cycles are not those of the load"
     directions = 'fork1.F_e, fork1.F_t, fork1.F_z, or "fork1.F at 30 deg", "fork1.F at worst"'
-    assert found["channel: fork1.F"] == (f"fork1.F {unsigned}", f"write {directions}")
-    assert found["channel: output.axial"] == (f"output.axial {unsigned}", "write output.f_z")
-    assert found["channel: pin1.contact"][0] == found["channel: input.drive at worst"][0] == "selects nothing"
+    assert found["--by: fork1.F"] == (f"fork1.F {unsigned}", f"write {directions}")
+    assert found["--by: output.axial"] == (f"output.axial {unsigned}", "write output.f_z")
+    assert found["--by: pin1.contact"][0] == found["--by: input.drive at worst"][0] == "selects nothing"
     assert len(found) == 5
 
 

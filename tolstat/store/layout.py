@@ -266,8 +266,8 @@ AXES: dict[str, tuple[tuple[str, ...], str]] = {
     "shaft": (SHAFTS, "shaft"),
     "shaft_component": (SHAFT_LOADS.components, "force f (N) and moment m (N m) about O, in axes that do not turn"),
     "load": (tuple(kind.key for kind in MEASURING), "force and torque"),
-    "channel": (_names(BUSHING_LOADS), "load whose cycles are counted: component or modulus"),
-    "shaft_channel": (_names(SHAFT_LOADS), "load of a shaft whose cycles are counted: component or modulus"),
+    "channel": (_names(BUSHING_LOADS), "load whose cycles are counted: a component"),
+    "shaft_channel": (_names(SHAFT_LOADS), "load of a shaft whose cycles are counted: a component"),
     "of_cycle": (("range", "mean"), "range and mean of a cycle"),
 }
 """Names along an axis of a history, and what they name, by axis."""

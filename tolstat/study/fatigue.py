@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
@@ -18,7 +18,7 @@ from tolstat.common.errors import gather, input_error
 from tolstat.common.load_kinds import BUSHINGS
 from tolstat.common.notation import schema_of_positive, schema_of_quantity
 from tolstat.common.strict import Strict, did_you_mean, dotted, read_section, read_toml, refuse
-from tolstat.study.selection import Assignments, Entry, Reading, entries, quantity, resolve, select
+from tolstat.study.selection import Assignments, Entry, Reading, entries, quantity, select, suggestion
 
 Positive = Annotated[units.Number, AfterValidator(units.positive)]
 Exponent = Annotated[units.Number, Field(ge=1, le=30)]
@@ -291,10 +291,14 @@ def read(file: Reading) -> Fatigue:
     visits = tuple(settings.sequence.points.split()) if settings.sequence else ()
     if unknown := sorted(set(visits) - set(names)) if names else []:
         file.fault("fatigue.sequence.points", f"no operating point {unknown[0]!r}", did_you_mean(unknown[0], names))
+    _check_visits(file, visits, settings.sequence)
     for entry in entries(of_channels if isinstance(of_channels, Mapping) else {}, "fatigue", "line"):
         with gather(file.faults):
             selected = counted_names(entry, file.place)
             claims.claim(entry, selected)
+            if len(kinds := sorted({unit_of(name) for name in selected})) > 1:
+                found = f"selects quantities of different kinds ({', '.join(kinds)})"
+                raise input_error(f"{file.place}: {dotted(entry.path)}", found, "write one entry for each kind")
             line = file.model(LineEntry, entry.value, *entry.path)
             size = Entry(entry.pattern, (*entry.path, "S0"), line.S0)
             value = quantity(size, unit_of(selected[0]), file.place)
@@ -320,6 +324,21 @@ def read(file: Reading) -> Fatigue:
     )
 
 
+def _check_visits(file: Reading, visits: Sequence[str], sequence: SequenceEntry | None) -> None:
+    """Note operating points that have fewer revolutions in the sequence than visits."""
+    points = file.points or ()
+    rates = np.array([point.share * abs(point.operation.speed) for point in points])
+    if sequence is None or not np.isfinite(rates).all():
+        return
+    for point, turns in zip(points, sequence.revolutions * rates / (rates.sum() or 1.0), strict=True):
+        if (visited := visits.count(point.name)) > turns * (1.0 + 1e-6):
+            found = (
+                f"{visited} visits of {point.name} in {turns:.3g} revolutions, its share of {sequence.revolutions:g}"
+            )
+            remedy = "a visit is at least one revolution: give more of them, or fewer visits"
+            file.fault("fatigue.sequence.revolutions", found, remedy)
+
+
 def counted_names(entry: Entry, place: str) -> list[str]:
     """Names that an entry selects of what cycles are counted of: components, or directions of a force or moment.
 
@@ -333,21 +352,23 @@ def counted_names(entry: Entry, place: str) -> list[str]:
     Raises
     ------
     InputError
-        When it selects nothing, quantities of different units, or a modulus.
+        When it selects nothing, or a modulus.
     """
     plane, at, direction = (part.strip() for part in entry.pattern.partition(" at "))
-    where = f"{place}: {dotted(entry.path)}"
+    where, names = f"{place}: {dotted(entry.path)}", PLANES if at else COMPONENTS
+    selected = select(plane, names)
+    unsigned = [channel for name in select(plane, CHANNELS) if (channel := CHANNELS[name]).is_modulus]
+    if not selected and unsigned and not at:
+        found = f"{unsigned[0].name} has no sign: its cycles are not those of the load"
+        raise input_error(where, found, _signed(unsigned[0]))
+    if not selected:
+        raise input_error(where, "selects nothing", suggestion(plane, list(names)))
     if not at:
-        unsigned = [channel for name in select(plane, CHANNELS) if (channel := CHANNELS[name]).is_modulus]
-        if unsigned and not select(plane, COMPONENTS):
-            found = f"{unsigned[0].name} has no sign: its cycles are not those of the load"
-            raise input_error(where, found, _signed(unsigned[0]))
-        return resolve(entry, {name: signal.unit for name, signal in COMPONENTS.items()}, place)
-    names = resolve(entry._replace(pattern=plane), {name: CHANNELS[name].unit for name in PLANES}, place)
+        return selected
     if direction != WORST:
         angle = quantity(entry._replace(value=direction), "rad", place)
         direction = f"{math.degrees(angle):.9g} deg"
-    return [f"{name} at {direction}" for name in names]
+    return [f"{name} at {direction}" for name in selected]
 
 
 def _signed(modulus: Channel) -> str:

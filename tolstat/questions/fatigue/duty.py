@@ -66,9 +66,14 @@ class Joints:
         shares = ", ".join(f"{percent(share)} at {name}" for name, share in self.duty)
         if len(self.duty) < 2:
             return []
-        between = "not counted are cycles between the points: the study gives no [fatigue.sequence]"
+        reason = "the study gives no [fatigue.sequence]"
+        if self.settings.visits:
+            reason = "[fatigue.sequence] is of the operating points of one study"
+        between = f"not counted are cycles between the points: {reason}"
         if self.visits:
             between = f"cycles between the points: {len(self.visits)} visits in {self.settings.turns:g} revolutions"
+            if missed := [name for p, (name, _) in enumerate(self.duty) if p not in self.visits]:
+                between += f"; none of {', '.join(missed)}"
         return [f"over a duty cycle: {shares}, shares of the revolutions", between]
 
     @property
@@ -117,16 +122,16 @@ def members(views: Sequence[View], shares: Sequence[float] | None) -> tuple[Sequ
     StoreError
         When a file holds joints that are no sample of a production.
     """
-    if any(len(view.parts) > 1 for view in views):
+    if several := [view for view in views if len(view.parts) > 1]:
         remedy = "" if shares is None else "leave --share out: the study gives share in [[operation]]"
         remedy = "give this file alone, or files with one operating point each" if len(views) > 1 else remedy
         if remedy:
-            raise InputError([Fault(str(views[0].path), "has several operating points", remedy)])
+            raise InputError([Fault(str(several[0].path), "has several operating points", remedy)])
         views, shares = views[0].parts, views[0].shares_of_revolutions.tolist()
     shares = [1.0] if shares is None else shares
     if len(shares) != len(views) or min(shares, default=0.0) <= 0 or abs(sum(shares) - 1) > 1e-6:
         problem = f"{list(shares)} for {len(views)} files"
-        raise InputError([Fault("shares", problem, "give a positive share for each file; their sum is 1")])
+        raise InputError([Fault("--share", problem, "give a positive share for each file; their sum is 1")])
     names, first = [column.name for column in ERROR_FIELDS], views[0]
     for view in views:
         view.check("mean")

@@ -42,7 +42,7 @@ def channels(patterns: Sequence[str]) -> tuple[str, ...]:
     names, faults, order = dict[str, None](), list[Fault](), list(COMPONENTS)
     for pattern in patterns:
         with gather(faults):
-            names |= dict.fromkeys(counted_names(Entry(pattern, (pattern,), None), "channel"))
+            names |= dict.fromkeys(counted_names(Entry(pattern, (pattern,), None), "--by"))
     raise_all(faults)
     return tuple(sorted(names, key=lambda name: order.index(name) if name in COMPONENTS else len(order)))
 

@@ -327,13 +327,6 @@ def test_single_diameters_of_a_fit_change_their_width(tmp_path):
     np.testing.assert_allclose(ends, [-0.63 * 23e-6, 0.63 * 23e-6])  # F8 at 76 mm: +30 to +76 um
 
 
-def test_density_of_a_rescaled_distribution(tmp_path):
-    plan = loaded(tmp_path)
-    own = widths.changed(plan, line(plan, "pin*.tilt_t"), HALF)["pin1.tilt_t"]
-    x = np.linspace(*own.ppf(np.array([1e-9, 1 - 1e-9])), 20001)
-    assert np.trapezoid(np.exp(own.logpdf(x)), x) == pytest.approx(1.0, abs=1e-6)
-
-
 def test_exchanged_joints_have_the_line_of_their_partner(tmp_path):
     plan = loaded(tmp_path)
     base = sampling.draw(plan)[plan.first_sample :]

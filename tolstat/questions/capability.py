@@ -104,7 +104,7 @@ def capability(
     if not view.limits or view.method in ("sweep", "cases"):
         remedy = 'give the result file of a study with [limits] and sampling.method "random", "sobol" or "lhs"'
         raise shares.inapplicable(view, "has no limits, or its joints are no random sample", remedy)
-    view.check("index")
+    view.check()
     rows = limit_rows(view, delivery=delivery)
     parts: list[Part] = [Table("limits", "Against each limit, and all of them together", LIMITS, rows)]
     parts += of_lots(view, delivery)
@@ -120,7 +120,7 @@ def capability(
 
 def capability_on_page(view: View, asked: Asked) -> Answer:
     """Capability against the limits, if there are any, and rare loads of the leading loads."""
-    if not (view.sampled and view.count(*VALID)) or view.design.refuses("index"):
+    if not (view.sampled and view.count(*VALID)) or view.design.refuses():
         raise NotApplicable
     parts = list(capability(view).parts) if view.limits else []
     rare = [row for name in view.leading for row in return_rows(view, name, ON_PAGE)]

@@ -153,7 +153,7 @@ def check_sample(view: View) -> None:
         Joints are not drawn from tolerances, or are a part of the campaign's. The hint names what can be used.
     """
     view.check_drawn()
-    view.check("difference")
+    view.check()
     if not view.store.whole:
         remedy = "merge all slices first: tolstat merge SLICE... --out FILE"
         raise unusable(view, "holds a part of the campaign only", remedy)
@@ -186,6 +186,14 @@ def _good(view: View, name: str, confidence: float, delivery: int) -> Mapping[st
 def counts(above: Exceedance) -> dict[str, int]:
     """Columns of a table: numbers of joints, of those without a valid load, and of those above a level."""
     return {"n": above.n, "n_failed": above.n_failed, "n_unsettled": above.n_unsettled, "count": above.count}
+
+
+def side_of(interval: Sequence[float], accepted: float) -> str:
+    """``yes`` if an interval lies below the accepted share, ``no`` above it, ``open``; empty if one is unknown."""
+    low, high = interval
+    if math.isnan(accepted) or math.isnan(low):
+        return ""
+    return "yes" if high <= accepted else "no" if low > accepted else "open"
 
 
 class Yield(NamedTuple):
@@ -379,7 +387,7 @@ def tail_level(load: Sample) -> float:
 
 def own_joints(view: View) -> int:
     """Number of samples of the campaign, from the first, that serve as joints as drawn: none of them pending."""
-    if not view.design.has_interval("difference"):
+    if not view.design.independent:
         return 0
     waiting = np.flatnonzero(view.status == Status.PENDING)
     return int(waiting[0]) if waiting.size else view.n

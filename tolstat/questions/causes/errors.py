@@ -160,7 +160,7 @@ def causes_on_page(view: View, asked: Asked) -> Answer:
         raise NotApplicable
     each: list[Indices] = []
     with asked.noting("causes are left out"):
-        view.check("index")
+        view.check()
         loads = view.loads(view.leading)
         jobs = [partial(indices, view, load.name, load.long_tailed, JOINTS) for load in loads]
         tried = mapped([partial(_tried, job) for job in jobs], min(asked.processes, 2))
@@ -298,7 +298,7 @@ def indices(
         When the file has too few valid joints, or joints that are not drawn from tolerances.
     """
     view.check_drawn()
-    view.check("index")
+    view.check()
     load = view.load(by)
     if joints is not None:
         load = load.only(np.arange(min(joints, view.n)))
@@ -320,7 +320,7 @@ def indices(
 
 def _of_samples(view: View, load: Sample, logarithm: bool, confidence: float) -> tuple[list[str], Parts, float]:
     """Names, estimates and variance from joints that are all drawn from the same tolerances."""
-    study, independent = view.study, view.design.has_interval("index")
+    study, independent = view.study, view.design.independent
     samples = np.flatnonzero(load.is_valid)
     values = load.values[samples]
     if values.size < MIN_JOINTS:

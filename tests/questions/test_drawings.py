@@ -272,22 +272,6 @@ def test_joint_file_study_and_result_file_are_drawn(here, given):
     assert len(ids) == len(set(ids))
 
 
-def test_row_prints_the_errors_of_the_file(here):
-    path = synthetic.store(here)
-    done = call(path, "--row", 17)
-    assert done.exit_code == 0, done.stderr
-    assert (here / "row17.svg").read_text(encoding="utf-8").startswith("<?xml")
-    lines = {line.split()[0]: line.split()[1:] for line in done.stdout.splitlines()[1:]}
-    with ResultFile.open(path) as store:
-        errors = store.errors(slice(17, 18))
-        shown = answer.read(path, 17)
-    assert shown[3] == errors
-    for name in (*PINS, *HOLES):
-        assert float(lines[name][1]) == pytest.approx(1e3 * errors[f"{name}.offset_t"][0], abs=5e-5)
-        assert float(lines[name][5]) == pytest.approx(1e3 * errors[f"{name}.diameter"][0], abs=5e-5)
-    assert max(map(len, done.stdout.splitlines())) <= 80
-
-
 @pytest.mark.parametrize(
     ("args", "said"),
     [

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 import shutil
 from functools import partial
@@ -30,7 +29,7 @@ from tolstat.common.errors import InputError, NotApplicable, StoreError
 from tolstat.common.loads import LOADS
 from tolstat.common.tables import Status
 from tolstat.display import text
-from tolstat.display.answer import Asked, Panels, Sentence, Table
+from tolstat.display.answer import Asked, Sentence
 from tolstat.display.progress import Display
 from tolstat.joint import perturb
 from tolstat.questions.causes import lines as question
@@ -563,31 +562,6 @@ def test_an_order_is_settled_by_pairs_or_by_differences_that_do_not_matter():
     assert shares.is_settled([near, far], base, 1.0)
     assert shares.is_settled([near, base], base, 1.0)
     assert not shares.is_settled([rng.normal(size=200), rng.normal(size=200)], base, 1.0)
-
-
-@pytest.mark.usefixtures("quick")
-def test_command_and_page(path, monkeypatch):
-    def run(*arguments):
-        return CliRunner().invoke(app, ["causes", str(path), *arguments])
-
-    shown = run("--top", "2")
-    assert "--run" in shown.stderr
-    assert f"tolstat causes {path.name} --run; then this page again: tolstat report" in lead(on_page(path))
-    monkeypatch.setattr("tolstat.questions.shares.available_cores", lambda: 1)
-    shown = run("--run", "--budget", "1 min", "--top", "2", "--workers", "1")
-    assert shown.exit_code == 0, shown.output
-    assert "lines, 400 joints of each change" in shown.stderr
-    assert shown.stdout.startswith("cross1.F > 700 N in ")
-    assert "\n\nScatter of cross1.F over all joints, not of exceeding a limit, by error\nerror " in shown.stdout
-    table = shown.stdout[: shown.stdout.index("\n\nPart of each line")].splitlines()
-    assert max(map(len, table)) <= 80
-    told = json.loads(run("--json").stdout)
-    assert told["facts"]["lines"]["load"] == told["facts"]["load"] == "cross1.F"
-    assert len(told["tables"]["lines"]["rows"]) == 12
-    answer = on_page(path, 0.01)
-    assert [type(block) for block in answer.blocks()] == [Sentence, Panels, Table, Table, *[Sentence] * 3]
-    assert "Halving a single line is not enough: halving the tilt tolerance of the pins" in lead(answer)
-    assert run("--each", "error").exit_code == 2
 
 
 def on_page(path, accepted=np.nan):

@@ -1,7 +1,6 @@
 """Drawings of a joint: drawn places against the kernel's axes, senses of errors against `perturb`, the command."""
 
 import re
-import shutil
 from itertools import combinations
 
 import matplotlib as mpl
@@ -256,20 +255,6 @@ def test_drawings_in_the_documents_are_up_to_date(here, name, options):
     assert len(kept[1]) > 10
     for outline, points in made[1].items():
         assert points == pytest.approx(kept[1][outline], abs=0.05), outline
-
-
-@pytest.mark.parametrize("given", ["cirelli2021", "joint.toml", "small.toml", "small.h5"])
-def test_joint_file_study_and_result_file_are_drawn(here, given):
-    synthetic.store(here)
-    shutil.copy(ROOT / "data" / "joints" / "cirelli2021.toml", here / "joint.toml")
-    done = call(given, "--out", "new/joint.svg")
-    assert done.exit_code == 0, done.stderr
-    assert "cross.R          72.82 mm" in done.stdout
-    assert max(map(len, done.stdout.splitlines())) <= 80
-    assert done.stderr == "wrote new/joint.svg\n"
-    ids = re.findall(r' id="([^"]*)"', (here / "new" / "joint.svg").read_text(encoding="utf-8"))
-    assert {"front.pin1", "side.arm4", "cross1", "fork4"} <= set(ids)
-    assert len(ids) == len(set(ids))
 
 
 @pytest.mark.parametrize(

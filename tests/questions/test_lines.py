@@ -8,10 +8,7 @@ from functools import partial
 
 import h5py
 import numpy as np
-import pandas as pd
 import pytest
-from matplotlib.figure import Figure
-from matplotlib.markers import CARETLEFT
 from scipy.stats import norm
 from typer.testing import CliRunner
 
@@ -612,21 +609,6 @@ def test_of_several_limits_verdict_command_and_page_are_about_all_together(tmp_p
     ]
     assert shown[0].stdout == shown[1].stdout
     assert shown[0].stdout.startswith("At least one limit exceeded in 22.2 % ")
-
-
-def test_whiskers_and_bands_are_the_intervals_of_the_table(changed):
-    with ResultFile.open(changed) as store:
-        found = shares.evaluate(store.view(), "cross1.F")
-    table = pd.DataFrame(found.by_line)
-    ax = Figure().subplots()
-    question._tornado(found, 0.01).draw(ax)
-    half = table.loc[table["half"] > 0.01].iloc[0]
-    drawn = [line.get_xdata() for line in ax.lines if len(line.get_xdata()) == 2]
-    assert any(np.allclose(x, [half["half_lower"], half["half_upper"]]) for x in drawn)
-    floor, marks = ax.get_xlim()[0], [line for line in ax.lines if line.get_marker() == CARETLEFT]
-    beyond = [(table[name] < floor).sum() for name in ("half_lower", "coarser_lower", "exact")]
-    assert [line.get_xdata()[0] for line in marks] == [floor] * sum(beyond)
-    assert sum(beyond) > 0
 
 
 TWO = TEXT.replace("[operation]", '[[operation]]\nname = "cruise"').replace(

@@ -215,12 +215,6 @@ def test_numbers_need_neither_pandas_nor_matplotlib(tmp_path):
     assert len(json.loads(done.stdout)["tables"]) == 3
 
 
-def test_report_of_a_file_that_has_just_been_made(tmp_path):
-    made = reports.build(synthetic.store(tmp_path, simulated=0))
-    assert "0 joints" in made.notes
-    assert [file.name for file in made.files[:2]] == ["small_exceedance.png", "small_exceedance.svg"]
-
-
 @pytest.mark.slow
 def test_report_without_limits_prints_quantiles(tmp_path):
     plain = synthetic.STUDY.partition("[limits]")[0]

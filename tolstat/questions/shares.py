@@ -14,7 +14,7 @@ import numpy as np
 from tolstat.analysis import binomial, difference
 from tolstat.analysis.estimates import Exceedance
 from tolstat.analysis.prediction import DELIVERY
-from tolstat.analysis.sample import Sample, total_interval
+from tolstat.analysis.sample import CONFIDENCE, Sample, total_interval
 from tolstat.campaign import what_if as sets
 from tolstat.campaign.what_if import Change
 from tolstat.campaign.work import Work
@@ -167,20 +167,20 @@ def grouped(reasons: Iterable[tuple[str, str]]) -> str:
     return "; ".join(f"{', '.join(names)}: {reason}" for reason, names in loads.items())
 
 
-def good(view: View, name: str = ANY_LIMIT, confidence: float = 0.95, delivery: int = DELIVERY) -> Mapping[str, Any]:
+def good(view: View, name: str = ANY_LIMIT, delivery: int = DELIVERY) -> Mapping[str, Any]:
     """Yield, joints above in a million and in the next delivery: the keys of `capability.limit_rows` but indices."""
-    return view.kept(("good", name, confidence, delivery), lambda: _good(view, name, confidence, delivery))
+    return view.kept(("good", name, delivery), lambda: _good(view, name, delivery))
 
 
-def _good(view: View, name: str, confidence: float, delivery: int) -> Mapping[str, Any]:
+def _good(view: View, name: str, delivery: int) -> Mapping[str, Any]:
     load = view.load(name)
     assert load.limit is not None
-    loads, above = error_budget.with_error(view, load), load.above(load.limit, confidence)
+    loads, above = error_budget.with_error(view, load), load.above(load.limit)
     row = {"load": load.name, "unit": load.unit, "limit": load.limit, **counts(above)}
-    share, low, high = above.estimate, *total_interval(loads, load.limit, confidence)
+    share, low, high = above.estimate, *total_interval(loads, load.limit, CONFIDENCE)
     row |= with_ends("good", (1.0 - share, 1.0 - high, 1.0 - low))
     row |= with_ends("ppm", (1e6 * share, 1e6 * low, 1e6 * high))
-    return row | error_budget.delivery(loads, load.limit, delivery, confidence)
+    return row | error_budget.delivery(loads, load.limit, delivery, CONFIDENCE)
 
 
 def counts(above: Exceedance) -> dict[str, int]:

@@ -321,6 +321,8 @@ def test_a_finished_file_of_other_code_is_shown_and_an_unfinished_one_refused(wh
     assert run_to_end(plan, path) == found
     done = CliRunner().invoke(app, ["rare", str(path)])
     assert done.exit_code == 0, done.stderr
+    refused = CliRunner().invoke(app, ["rare", str(path), "--n", "300"])
+    assert (refused.exit_code, "--n: is about a simulation" in refused.stderr) == (2, True)
     with h5py.File(path, "r+") as file:
         file["results/status"][3] = Status.PENDING
     done = CliRunner().invoke(app, ["rare", str(path), "--run"])

@@ -29,7 +29,6 @@ from tolstat.common.tables import Options
 from tolstat.display import progress
 from tolstat.solver import compilation, simulation
 from tolstat.store import ResultFile, Writer
-from tolstat.store.recorded import differing_keys
 
 
 def datasets(path: Path) -> dict[str, bytes]:
@@ -288,15 +287,6 @@ def test_another_version_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPa
         fakes.run(fakes.Study(), tmp_path / "a.h5", 1)
 
 
-def test_differing_keys_names_missing_ones() -> None:
-    lines = differing_keys({"a": 1, "b": [1, 2], "c": 3}, {"b": [1, 2], "c": 4, "d": None})
-    assert lines == [
-        "a: 1 in the file, nothing in the study",
-        "c: 3 in the file, 4 in the study",
-        "d: nothing in the file, None in the study",
-    ]
-
-
 @pytest.mark.slow
 def test_a_bug_in_every_joint_comes_through(tmp_path: Path) -> None:
     with pytest.raises(ZeroDivisionError):
@@ -343,13 +333,6 @@ def test_workers_and_block_must_be_positive(tmp_path: Path) -> None:
         fakes.run(fakes.Study(), tmp_path / "a.h5", workers=0, block=-1)
     assert [fault.place for fault in caught.value.faults] == ["workers", "block"]
     assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize(("n", "workers"), [(1, 1), (1, 2), (513, 2), (100_000, 64), (9, 3)])
-def test_first_block(n: int, workers: int) -> None:
-    size = execution.Pace(n, workers, None).size
-    assert 1 <= size <= execution.MAX_BLOCK
-    assert size == 1 or n // size >= execution.MIN_BLOCKS_PER_WORKER * workers
 
 
 REAL_STUDY = (

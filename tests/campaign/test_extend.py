@@ -14,11 +14,10 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 from tests.campaign.test_campaign import datasets
 from tests.support import damage, fakes, synthetic
-from tolstat import cli, sampling
+from tolstat import sampling
 from tolstat import study as studies
 from tolstat.campaign import extend
 from tolstat.campaign import run as campaign
@@ -295,28 +294,6 @@ def test_rows_of_a_slice_are_those_of_the_campaign(tmp_path: Path, make: Make) -
         assert (store.rows, store.n, store.campaign_rows, store.whole) == (range(5, 20), 15, 61, False)
         assert store.to_pandas().index.tolist() == list(range(5, 20))
         assert store.errors().tobytes() == sampling.draw(study)[5:20].tobytes()
-
-
-@pytest.mark.slow
-def test_commands(tmp_path: Path, make: Make, monkeypatch: pytest.MonkeyPatch) -> None:
-    study = make(60)
-    fakes.replace_functions(monkeypatch, **STAND_IN)
-    monkeypatch.chdir(tmp_path)
-
-    def call(*words: str, code: int = 0) -> str:
-        done = CliRunner().invoke(cli.app, words)
-        assert done.exit_code == code, done.output
-        assert done.stdout == ""
-        return done.stderr
-
-    for rows in ("0:20", "20:61"):
-        call("run", "small.toml", "--rows", rows, "--out", f"{rows[:2]}.h5", "--workers", "1", "--no-report")
-    assert "61 joints" in call("merge", "0:.h5", "20.h5", "--out", "c.h5")
-    assert "extended to 80 joints" in call("extend", "c.h5", "--n", "80", "--no-report", "--workers", "1")
-    whole = run(studies.load(study.path, n=80), tmp_path / "whole.h5", check=True)
-    assert datasets(tmp_path / "c.h5") == datasets(whole)
-    assert "hint: write --rows 5000:10000" in call("run", "small.toml", "--rows", "7:5", code=2)
-    assert "does not exist" in call("merge", "x.h5", "--out", "d.h5", code=2)
 
 
 @pytest.mark.slow

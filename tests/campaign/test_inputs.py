@@ -16,25 +16,8 @@ def read(values):
     return columns_of(values, NEEDED, OTHERS, "names")
 
 
-def records(frame):
-    return frame.to_records(index=False)
-
-
 def mapping(frame):
     return {name: frame[name].tolist() for name in frame}
-
-
-@pytest.mark.parametrize("as_table", [pd.DataFrame, records, mapping])
-@pytest.mark.parametrize("order", [NEEDED, NEEDED[::-1], [NEEDED[1], NEEDED[2], NEEDED[0]]])
-def test_names_go_before_positions(as_table, order):
-    columns = read(as_table(FRAME[order]))
-    assert np.column_stack([columns[name] for name in NEEDED]).tobytes() == X.tobytes()
-    assert set(columns) == set(NEEDED)
-
-
-def test_an_array_goes_by_position():
-    assert [column.tolist() for column in read(X).values()] == X.T.tolist()
-    assert list(read(X)) == NEEDED
 
 
 def test_other_columns_are_read_where_they_are():

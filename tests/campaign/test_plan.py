@@ -6,13 +6,12 @@ import dataclasses
 import json
 from pathlib import Path
 
-import h5py
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from tests.campaign.test_campaign import datasets
-from tests.support import exceedance, fakes, reports, synthetic
+from tests.support import exceedance, fakes, synthetic
 from tests.support.synthetic import HEAD
 from tolstat import cli, study
 from tolstat.analysis import binomial
@@ -21,7 +20,7 @@ from tolstat.campaign import run as campaign
 from tolstat.common.errors import InputError
 from tolstat.common.loads import LOADS, Limit
 from tolstat.common.tables import Options, Status
-from tolstat.store import ResultFile, Writer
+from tolstat.store import ResultFile
 
 RULE = "P(cross1.F > 0.5 N) width < 0.4"
 """Nearly one in five of the fake joints is unresolved, and counts at both ends of the interval."""
@@ -139,47 +138,6 @@ def test_until_is_for_independent_samples(tmp_path: Path) -> None:
     loaded = study.load(tmp_path / "s.toml")
     with pytest.raises(InputError, match=r"sampling\.method is 'sobol': .* independent samples"):
         stop_rule.run_until(loaded, tmp_path / "a.h5", stop_rule.parse(RULE, {}), lambda row: None)
-
-
-@pytest.mark.slow
-def test_the_report_says_that_the_campaign_was_stopped(tmp_path: Path) -> None:
-    path = synthetic.store(tmp_path, simulated=40)
-    look = stop_rule.Look(39, 0, 4, 0.1, 0.02, 0.25)
-    with Writer.open(path) as store:
-        store.change(stop=stop_rule.Outcome(True, look, [20, 39, 60]).record(stop_rule.parse(RULE, {})))
-    notes = reports.build(path).notes
-    assert f"stopped by {RULE} at 39 joints: 95 % interval 0.02000 to 0.25000, valid after any number of looks" in notes
-    assert "share 0.10000, biased high if few joints are above (11 % of itself with 10)" in notes
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("few_looks")
-def test_run_until_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from tests.campaign.test_extend import STAND_IN
-
-    fakes.replace_functions(monkeypatch, **STAND_IN)
-    monkeypatch.chdir(tmp_path)
-    Path("s.toml").write_text(synthetic.STUDY.replace("n = 60", "n = 400"), encoding="utf-8")
-    words = ["run", "s.toml", "--until", RULE, "--workers", "1", "--no-report"]
-    done = CliRunner().invoke(cli.app, words)
-    assert done.exit_code == 0, done.output
-    assert f"{RULE}: reached with" in done.stderr
-    assert "biased high if few joints are above" in done.stderr
-    with h5py.File("s.h5") as file:
-        taken = json.loads(file["metadata"][()])["stop"]["looks"]
-    assert taken == binomial.looks(400)[: len(taken)]
-    done = CliRunner().invoke(cli.app, ["extend", "s.h5", "--n", "500"])
-    assert done.exit_code == 0, done.output
-    with h5py.File("s.h5") as file:
-        assert json.loads(file["metadata"][()])["stop"] == {"reached": False, "looks": taken}
-    done = CliRunner().invoke(cli.app, [*words, "--rows", "0:9"])
-    assert done.exit_code == 2
-
-
-@pytest.mark.parametrize(("share", "n"), [(0.95, 59), (0.99, 299), (0.999, 2995)])
-def test_wilks(share: float, n: int) -> None:
-    assert binomial.wilks(share) == n
-    assert 1 - share**n >= 0.95 > 1 - share ** (n - 1)
 
 
 @pytest.fixture
@@ -305,12 +263,3 @@ def test_start_and_report_take_longer_on_a_slower_machine(small: study.Study, mo
         assert found[1][stage] == pytest.approx(3.0 * found[0][stage])
     monkeypatch.undo()
     assert plan._loop() > 0.0
-
-
-def test_plan_command(small: study.Study) -> None:
-    done = CliRunner().invoke(cli.app, ["plan", str(small.path), "--n", "2000", "--pilot", "4"])
-    assert done.exit_code == 0
-    assert "joints: 2001\nrandom numbers a joint: 4\npilot: 4 joints, 0 failed" in done.stdout
-    assert "joints for a load that 99.9 % stay below, with 95 % confidence: 2995" in done.stdout
-    done = CliRunner().invoke(cli.app, ["plan", str(small.path), "--json", "--pilot", "4"])
-    assert json.loads(done.stdout)["limits"][0]["load"] == "cross1.F"

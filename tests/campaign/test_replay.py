@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from scipy import stats
 from typer.testing import CliRunner
 
 from tests.support import damage, synthetic
@@ -22,8 +21,6 @@ from tolstat.common.files import data_dir
 from tolstat.common.tables import PARAM, Options, Simulation, Status
 from tolstat.questions.causes.worst import joint_rows, largest_errors
 from tolstat.store import ResultFile, Writer, recorded
-from tolstat.study.tolerances import distributions
-from tolstat.study.tolerances.zone_laws import Rayleigh
 
 HEAD = """
 [joint]
@@ -137,30 +134,6 @@ def test_pending_rows_are_refused(file: Path, tmp_path: Path) -> None:
         replay.replay(store, 2)
 
 
-DISTRIBUTIONS = [
-    (distributions.Normal(0.1, 0.02), stats.norm(0.1, 0.02)),
-    (distributions.TruncatedNormal(0.0, 1.0, -2.0, 3.0), stats.truncnorm(-2.0, 3.0)),
-    (distributions.Uniform(-1.0, 2.0), stats.uniform(-1.0, 3.0)),
-    (distributions.Triangular(0.0, 2.0, 0.5), stats.triang(0.25, 0.0, 2.0)),
-    (distributions.LogNormal(0.0, distributions.Normal(0.0, 0.5)), stats.lognorm(0.5)),
-    (distributions.Beta(2.0, 5.0, 0.0, 1.0), stats.beta(2.0, 5.0)),
-    (Rayleigh(1.5), stats.rayleigh(scale=1.5)),
-]
-
-
-@pytest.mark.parametrize(("ours", "theirs"), DISTRIBUTIONS)
-def test_scores_have_the_probability_of_the_error(ours: distributions.Distribution, theirs: object) -> None:
-    z = np.array([-5.0, -3.0, -1.0, -0.1, 0.0, 0.4, 2.0, 3.5, 5.0])
-    values = theirs.ppf(stats.norm.cdf(z))
-    np.testing.assert_allclose(distributions.score(ours, values), z, atol=2e-9)
-
-
-def test_score_of_a_measured_value_is_the_middle_of_its_step() -> None:
-    measured = distributions.Measured.of([1.0, 2.0, 2.0, 7.0])
-    expected = stats.norm.ppf([1 / 8, 1 / 2, 7 / 8])
-    np.testing.assert_allclose(distributions.score(measured, np.array([1.0, 2.0, 7.0])), expected, atol=1e-9)
-
-
 def test_the_tail_is_told_with_its_errors(tmp_path: Path) -> None:
     text = synthetic.STUDY.replace(
         "[sampling]", '"hole2.offset_radial" = { sigma = "0.1 mm", distribution = "rayleigh" }\n[sampling]'
@@ -201,25 +174,6 @@ def test_the_tail_of_a_subset_simulation_is_told_too(tmp_path: Path) -> None:
         assert [joint["row"] for joint in joint_rows(view, "cross1.F", 1)] == [np.argmax(results["F_max"][:, 0])]
         with pytest.raises(StoreError, match="no random sample"):
             view.load("cross1.F")
-
-
-def test_worst_command(tmp_path: Path) -> None:
-    path = synthetic.store(tmp_path)
-    done = CliRunner().invoke(cli.app, ["worst", str(path), "--by", "fork1.T", "--top", "3"])
-    assert done.exit_code == 0
-    lines = done.stdout.splitlines()
-    assert lines[0].split() == ["load", "largest", "row", "largest", "errors,", "in", "σ"]
-    assert len(lines) == 4
-    assert f"tolstat replay {path} --row {lines[1].split()[4]} --out trace.csv" in " ".join(done.stderr.split())
-    done = CliRunner().invoke(cli.app, ["worst", str(path), "--by", "fork1.T", "--json"])
-    found = json.loads(done.stdout)
-    joints = found["tables"]["joints"]["rows"]
-    assert len(joints) == 10
-    assert {name for name, _ in largest_errors(joints[0])} == {f"pin{i}.offset_t" for i in (1, 2, 3, 4)}
-    plan = study.load(tmp_path / "small.toml")
-    row = joints[0]["row"]
-    drawn = sampling.draw(plan, range(row, row + 1))["pin2.offset_t"][0]
-    assert joints[0]["pin2.offset_t"] == pytest.approx(drawn / (1e-4 / 3), abs=1e-9)
 
 
 def test_a_load_that_is_zero_without_errors_has_no_change():

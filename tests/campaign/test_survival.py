@@ -21,7 +21,6 @@ from tests.support import fakes
 from tolstat.campaign import pool
 from tolstat.campaign import run as campaign
 from tolstat.campaign.block import without_simulation
-from tolstat.campaign.blocks import MAX_BLOCK, Pace
 from tolstat.campaign.pool import WorkerDied
 from tolstat.campaign.remedy import Retry, parse_retry
 from tolstat.common.counts import Counts
@@ -332,35 +331,3 @@ def test_what_auto_chose_holds_for_joints_that_are_simulated_again() -> None:
     assert (again.fidelity, again.steps_per_rev, again.newton_max_iter) == (Fidelity.QUASISTATIC, 60, 40)
     again = parse_retry("crashed", ["solver.fidelity=dynamic"], study).chosen(chosen).options
     assert again == Options()
-
-
-def paced(pace: Pace, each_s: float, write_s: float, blocks: int, available: int = 10**9) -> list[int]:
-    """Sizes of blocks whose joints take `each_s` and which take `write_s` to write."""
-    sizes = []
-    for _ in range(blocks):
-        sizes.append(pace.take(available))
-        pace.note(sizes[-1], sizes[-1] * each_s, write_s)
-    return sizes
-
-
-def test_blocks_grow_until_writing_them_costs_little() -> None:
-    assert paced(Pace(10**6, 2, None), 1e-3, 0.043, 9)[-1] == 1000  # a second, of which writing is 4 %
-    assert paced(Pace(10**6, 2, None), 2e-3, 0.1, 9)[-1] == 1000  # two seconds, for 5 %
-    assert paced(Pace(10**6, 32, None), 5e-3, 0.04, 9)[-1] == 1024  # writing takes a quarter of the parent's time
-    assert paced(Pace(10**6, 2, None), 1e-5, 0.043, 9)[-1] == MAX_BLOCK
-    assert paced(Pace(10**6, 2, None), 0.5, 0.043, 9)[-1] == 2  # slow joints: a kill costs no more
-    assert paced(Pace(10**6, 2, None), 1e-3, 5.0, 9)[-1] == MAX_BLOCK  # eight seconds at most
-    assert paced(Pace(10**6, 2, 7), 1e-3, 0.043, 9) == [7] * 9
-    assert paced(Pace(10**6, 2, None), 1e-3, 0.043, 9, available=50) == [50] * 9
-
-
-def test_the_last_blocks_are_smaller_and_none_is_left_out() -> None:
-    pace, left, sizes = Pace(9000, 2, None), 9000, []
-    while left:
-        sizes.append(pace.take(left))
-        left -= sizes[-1]
-        pace.note(sizes[-1], 1e-3 * sizes[-1], 0.04)
-    assert sum(sizes) == 9000
-    assert max(sizes) == 1000
-    assert max(sizes[-4:]) == 250
-    assert len(sizes) < 25

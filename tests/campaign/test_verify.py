@@ -272,33 +272,6 @@ def test_checks_that_fail_are_counted_and_not_measured(tmp_path):
     assert accuracy.by_kind(question.errors(found)[question.TOTAL])[:, 0] == pytest.approx([0.0, 0.2])
 
 
-@pytest.mark.slow
-def test_command_checks_the_joints_of_a_file(tmp_path):
-    plan_path, path, out = written(tmp_path), tmp_path / "real.h5", tmp_path / "out.csv"
-    campaign.run(study.load(plan_path, n=4), path, workers=1)
-    done = call("verify", path, "--joints", 2, "--seed", 5, "--json", "--out", out)
-    assert done.exit_code == 0, done.stderr
-    found = json.loads(done.stdout)
-    facts, tables = found["facts"], found["tables"]
-    assert len(facts["rows"]) == 2
-    assert list(facts["checks"]) == list(verify.ALL_CHECKS)
-    errors = {(row["load"], row["error"]): row for name in tables for row in tables[name]["rows"]}
-    assert errors["F", "reference"]["joints"] == 2
-    assert errors["cross1.T", "half_step"]["worst"] > 0
-    table = pd.read_csv(out)
-    assert len(table) == 2 * len(verify.ALL_CHECKS) * len(accuracy.OBSERVABLES)
-    with ResultFile.open(path) as store:
-        kept = verification.read(store)
-        assert kept is not None
-        assert (kept.seed, kept.rows.tolist()) == (5, facts["rows"])
-        part = table[(table["check"] == "reference") & (table["load"] == "fork2.T")]
-        assert part["campaign"].tolist() == store.results()["T_max"][kept.rows, 5].tolist()
-        assert part["value"].tolist() == kept.checks["reference"].results["T_max"][:, 5].tolist()
-    lines = call("verify", plan_path, "--joints", 1).stdout.splitlines()
-    assert lines[0].split() == ["load", "error", "joints", "median", "95", "%", "below", "worst"]
-    assert len(lines) == 1 + len(LOAD_KINDS) * (len(verify.ALL_CHECKS) + 1)
-
-
 def test_parameters_and_settings_come_back_from_the_file_alone(tmp_path):
     text = REAL.partition("[tolerances]")[0] + (
         '[sampling]\nmethod = "cases"\n[[case]]\nname = "a"\nerrors.hole4.offset_t = "0.1 mm"\n'

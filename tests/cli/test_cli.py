@@ -9,23 +9,19 @@ import sys
 from pathlib import Path
 from types import SimpleNamespace
 
-import numpy as np
 import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
-import tolstat
 from tests.support import fakes, synthetic
 from tolstat import cli
 from tolstat.campaign import run as campaign
 from tolstat.campaign.pool import WorkerDied
 from tolstat.cli import LISTED
-from tolstat.common.columns import ERROR_COLUMNS, RESULT_COLUMNS
 from tolstat.common.load_kinds import BUSHINGS
 from tolstat.common.tables import Simulation, Status
 from tolstat.display import text
 from tolstat.store import ResultFile
-from tolstat.store.result_file import OPERATING
 
 COMMANDS = tuple(LISTED)
 HEAVY = {"numpy", "numba", "pandas", "pint", "matplotlib", "h5py", "scipy"}
@@ -75,17 +71,6 @@ def test_every_command_has_help_with_every_option_explained(command):
     assert set(re.findall(r"--[\w-]+", example)) <= set(re.findall(r"--[\w-]+", options))
 
 
-def test_help_lists_the_commands_in_order_each_with_its_whole_summary():
-    shown = call("--help").stdout
-    groups = shown[shown.index("Plan:") :]
-    listed = re.findall(r"^  ([a-z-]+)  +([A-Z].*[.])$", groups, flags=re.MULTILINE)
-    assert tuple(name for name, _ in listed) == COMMANDS
-    headings = re.findall(r"^(\w[\w ]*):$", groups, flags=re.MULTILINE)
-    assert headings == [*cli.PLAIN]
-    assert max(map(len, shown.splitlines())) <= 80
-    assert "..." not in groups
-
-
 @pytest.mark.parametrize("command", COMMANDS)
 def test_the_line_of_a_command_in_the_help_is_the_first_of_its_docstring(command):
     summary = inspect.getdoc(cli.function_of(command)).partition("\n")[0]
@@ -101,11 +86,6 @@ def test_help_is_light():
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stderr.strip() == "[]"
     assert "Monte Carlo" in done.stdout
-
-
-def test_version_and_module_entry():
-    done = shell("--version")
-    assert (done.returncode, done.stdout, done.stderr) == (0, f"tolstat {tolstat.__version__}\n", "")
 
 
 @pytest.mark.parametrize("args", [["--help"], ["run", "--help"], ["bogus"]])
@@ -180,57 +160,6 @@ def test_status_of_a_file_in_any_state(tmp_path, simulated, pending):
     assert bool(shares) == (simulated != 0)
 
 
-def test_export_has_a_row_for_every_joint_and_units_in_the_second_line(tmp_path):
-    path, out = synthetic.store(tmp_path, synthetic.WHOLE, simulated=50, failed=3), tmp_path / "all.csv"
-    done = call("export", path, "--csv", out)
-    assert (done.exit_code, done.stdout) == (0, "")
-    table = pd.read_csv(out, header=[0, 1], index_col=0)
-    assert list(table.columns) == [(c.name, c.unit) for c in (*ERROR_COLUMNS, *OPERATING, *RESULT_COLUMNS)]
-    assert list(table.index) == list(range(1, 61))
-    with ResultFile.open(path) as store:
-        errors, results = store.errors()[1:], store.results()[1:]
-    assert np.array_equal(table["pin1.offset_t", "m"], errors["pin1.offset_t"])
-    assert np.array_equal(table["cross1.F_max", "N"][:49], results["F_max"][:49, 0], equal_nan=True)
-    assert (table["status", "1"][49:] == "pending").all()
-    assert table["cross1.F_max", "N"][49:].isna().all()
-    assert call("export", path, "--csv", "-").stdout == out.read_text(encoding="utf-8")
-
-
-CASES = (
-    synthetic.STUDY.partition("[tolerances]")[0]
-    + """
-[sampling]
-method = "cases"
-[[case]]
-name = "a"
-errors.hole4.offset_t = "0.1 mm"
-[[variant]]
-name = "plain"
-[[variant]]
-name = "clearance"
-points = 2
-vary.contact.D_P = { from = "76.0 mm", to = "75.6 mm" }
-"""
-)
-
-
-def test_export_of_listed_joints_says_first_what_each_is(tmp_path):
-    out = tmp_path / "all.csv"
-    call("export", synthetic.store(tmp_path, CASES), "--csv", out)
-    table = pd.read_csv(out, header=[0, 1], index_col=0)
-    names = ["case", "variant", "family", "group"]
-    assert list(table.columns[:5]) == [*((name, "1") for name in names), (ERROR_COLUMNS[0].name, "m")]
-    assert table.columns[-1] == (RESULT_COLUMNS[-1].name, RESULT_COLUMNS[-1].unit)
-    with ResultFile.open(tmp_path / "small.h5") as store:
-        assert list(store.to_pandas().columns[:4]) == names
-        assert table[names].to_numpy().tolist() == [
-            [store.case_names[joint["case"]], joint["variant"], store.variants[joint["variant"]].family, joint["group"]]
-            for joint in store.design()
-        ]
-    assert set(table["family", "1"]) == {"plain", "clearance"}
-    assert (table["case", "1"] == "a").equals(table["hole4.offset_t", "m"] == 1e-4)
-
-
 def test_missing_folders_are_made_for_files_and_not_inside_a_file(tmp_path):
     path, new = synthetic.store(tmp_path), tmp_path / "new" / "folder"
     assert call("export", path, "--csv", new / "all.csv").exit_code == 0
@@ -248,38 +177,6 @@ def test_export_into_a_pipe_that_closes_early(tmp_path):
     done = subprocess.run(command, shell=True, capture_output=True, text=True, check=False)
     assert done.stdout.startswith("row,pin1.offset_e")
     assert "Traceback" not in done.stderr
-
-
-@pytest.mark.slow
-def test_report_prints_the_table_and_names_the_files_on_stderr(tmp_path):
-    path = synthetic.store(tmp_path)
-    done = call("report", path)
-    assert done.exit_code == 0
-    sentence, table = done.stdout.split("\n\n", 1)
-    assert re.fullmatch(
-        r"[\d.]+ % of the joints keep all 7 limits \(\d+ of 60; total interval [\d.]+ \.\. [\d.]+ %\); "
-        r"mounting and contact law not varied: tolstat assumptions small\.h5 --run\. "
-        r"Shafts rigid along their axes; contact law mode\.",
-        sentence.replace("\n", " "),
-    )
-    assert table.startswith("Joints above each limit\nload")
-    assert [line.split()[0] for line in table.splitlines()[2:]] == [
-        "cross1.F", "fork1.T", "fork2.T", "fork3.T", "fork4.T", "pin1.contact", "psi"
-    ]  # fmt: skip
-    assert f"wrote {tmp_path / 'small_exceedance.png'}" in done.stderr
-
-
-@pytest.mark.slow
-def test_report_creates_its_output_folder(tmp_path):
-    folder = tmp_path / "new" / "folder"
-    done = call("report", synthetic.store(tmp_path), "--out", folder)
-    assert done.exit_code == 0, done.stderr
-    assert (folder / "small_exceedance.csv").is_file()
-    for file, target, word in (("none.h5", "other", "does not exist"), ("small.h5", "small.toml", "is no folder")):
-        done = call("report", tmp_path / file, "--out", tmp_path / target)
-        assert done.exit_code == 2
-        assert word in done.stderr
-    assert not (tmp_path / "other").exists()
 
 
 @pytest.mark.parametrize("simulated", [0, 40])
@@ -359,22 +256,6 @@ def test_completion_knows_the_commands_and_loads_nothing_heavy():
     assert done.stderr.strip() == "[]"
 
 
-@pytest.mark.slow
-def test_run_ends_with_the_report_and_resumes(study):
-    done = call("run", study, "--workers", 1)
-    assert done.exit_code == 0, done.stderr
-    verdict, mounting, _, _, head, *_ = done.stdout.splitlines()
-    assert verdict.startswith("No verdict")
-    assert mounting == "Shafts rigid along their axes; contact law mode."
-    assert head.startswith("load")
-    assert "small.h5: 61 joints, 0 failed, 0 not settled" in done.stderr
-    assert done.stderr.endswith("next: tolstat report small.h5 --out small.html\n")
-    with ResultFile.open("small.h5") as store:
-        assert store.complete
-    again = call("run", study, "--workers", 1)
-    assert (again.exit_code, again.stdout) == (0, done.stdout)
-
-
 def test_run_says_why_joints_have_no_load_and_how_to_try_again(study, monkeypatch):
     """As `run` sees a finished campaign with two kinds of joints without a load."""
     path = synthetic.store(study.parent, failed=3, unsettled=1)
@@ -395,27 +276,12 @@ def test_run_says_why_joints_have_no_load_and_how_to_try_again(study, monkeypatc
     assert told[7] == "next: tolstat report small.h5 --out small.html"
 
 
-def test_run_with_fewer_joints_into_another_file_without_report(study, tmp_path):
-    done = call("run", study, "--n", 5, "--out", "five.h5", "--workers", 1, "--no-report")
-    assert (done.exit_code, done.stdout) == (0, "")
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["five.h5", "small.toml"]
-
-
 @pytest.mark.parametrize(("option", "checks"), [("--verify", True), ("--no-verify", False)])
 def test_run_checks_the_numerical_error_by_default(study, monkeypatch, option, checks):
     told, run = [], campaign.run
     monkeypatch.setattr(campaign, "run", lambda *a, check=True, **k: told.append(check) or run(*a, **k))
     assert call("run", study, "--workers", 1, "--no-report", option).exit_code == 0
     assert told == [checks]
-
-
-def test_run_refuses_the_file_of_another_study(study):
-    call("run", study, "--n", 5, "--workers", 1, "--no-report")
-    study.write_text(synthetic.STUDY.replace("seed = 2021", "seed = 1"), encoding="utf-8")
-    done = call("run", study, "--n", 5, "--workers", 1)
-    assert done.exit_code == 2
-    assert "sampling.seed: 2021 in the file, 1 in the study" in done.stderr
-    assert "hint: give another file: --out OTHER.h5" in done.stderr
 
 
 @pytest.mark.slow
@@ -486,18 +352,6 @@ def case(tmp_path):
     path = tmp_path / "case.toml"
     path.write_text(synthetic.STUDY.partition("[tolerances]")[0], encoding="utf-8")
     return path
-
-
-def test_simulate_prints_json_or_text_and_writes_the_trace(case, tmp_path, monkeypatch):
-    made = simulated("ok", 1.5)
-    monkeypatch.setattr("tolstat.campaign.replay.simulate_case", lambda _: made)
-    done = call("simulate", case, "--json", "--out", tmp_path / "trace.csv")
-    assert done.exit_code == 0, done.stderr
-    assert json.loads(done.stdout) == made.summary()
-    assert (tmp_path / "trace.csv").read_text() == "theta,tau\n0.0,1.0\n180.0,0.30000000000000004\n"
-    lines = call("simulate", case).stdout.splitlines()
-    assert lines[0] == "status: ok"
-    assert lines[-1].split() == ["fork4", "N", "1.5", "1", "+50.0", "%"]
 
 
 def test_simulate_of_a_joint_that_fails_is_data_with_a_warning(case, monkeypatch):

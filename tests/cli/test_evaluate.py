@@ -30,12 +30,6 @@ def test_columns_in_any_order_and_units(tmp_path):
     assert others == ["row"]
 
 
-def test_an_error_that_the_study_does_not_draw_is_read(tmp_path):
-    si, others = table(tmp_path, "pin1.tilt_z,material.E_factor,pin1.tilt_t,pin1.offset_t\ndeg,,deg,um\n90,1,0,0\n")
-    assert si["pin1.tilt_z"].tolist() == [np.pi / 2]
-    assert others == []
-
-
 def test_faults_come_at_once_with_their_lines(tmp_path):
     text = "pin1.tilt_t,pin1.offset_t,pin1.offset_t\nN,mm,mm\n0.1,x,1\n1,2\n\nnan,1,1\n"
     with pytest.raises(InputError) as caught:

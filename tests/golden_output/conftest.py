@@ -9,12 +9,18 @@ from pathlib import Path
 import pytest
 
 from tests.golden_output import compare
-from tests.golden_output.catalogue import MADE, Campaign
+from tests.golden_output.catalogue import MADE, Campaign, cases
 from tests.golden_output.transcript import studies, transcript
 
 GOLDEN = Path(__file__).parent.parent / "golden" / "output"
 
 Check = Callable[[Campaign, str], str]
+
+
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """Give the test of `same` a case for each golden file of the campaigns of its module."""
+    if "campaign" in metafunc.fixturenames:
+        metafunc.parametrize(("campaign", "name"), cases(*metafunc.module.CAMPAIGNS))
 
 
 @pytest.fixture(scope="session")

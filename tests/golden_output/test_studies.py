@@ -1,18 +1,6 @@
 """What commands say about the other studies."""
 
-from __future__ import annotations
-
-import pytest
-
 from tests.golden_output import catalogue_studies as catalogue
-from tests.golden_output.catalogue import Campaign, cases
-from tests.golden_output.conftest import Check
+from tests.golden_output.same import test_output_is_that_of_the_golden_file as test_output_is_that_of_the_golden_file
 
 CAMPAIGNS = (catalogue.SWEEP, catalogue.BORED, catalogue.OVERNIGHT)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("campaign", "name"), cases(*CAMPAIGNS))
-def test_output_is_that_of_the_golden_file(campaign: Campaign, name: str, check: Check) -> None:
-    difference = check(campaign, name)
-    assert not difference, difference

@@ -1,18 +1,6 @@
 """What commands say about a campaign that has pending joints, about slices, and about what was merged from them."""
 
-from __future__ import annotations
-
-import pytest
-
 from tests.golden_output import catalogue
-from tests.golden_output.catalogue import Campaign, cases
-from tests.golden_output.conftest import Check
+from tests.golden_output.same import test_output_is_that_of_the_golden_file as test_output_is_that_of_the_golden_file
 
 CAMPAIGNS = (catalogue.PENDING, catalogue.SLICED)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("campaign", "name"), cases(*CAMPAIGNS))
-def test_output_is_that_of_the_golden_file(campaign: Campaign, name: str, check: Check) -> None:
-    difference = check(campaign, name)
-    assert not difference, difference

@@ -22,7 +22,6 @@ from tolstat.solver.simulation import simulate_rows
 
 RPM = np.pi / 30
 RATTLE = {"alpha": np.radians(30), "speed": 1000 * RPM, "torque": 5.0}
-CLEARANCE_20_UM = {f"pin{i}__diameter": 1.6e-4 for i in (1, 2, 3, 4)}
 
 
 def make_trail(steps_per_rev: int, kept: int) -> Trail:

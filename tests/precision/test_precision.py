@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import sys
-from typing import get_args
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from studies.precision import page, run, runs, setup
 from studies.precision import points as table
-from studies.precision.integrators import Code
+from studies.precision import run, runs, setup
 from studies.precision.measuring import choose
 from studies.precision.runs import TRUTH, Run
-from tests.report.test_report import overlapping, texts
 from tests.support.environment import ROOT
 from tests.support.loads import largest_loads
 from tolstat.common.errors import InputError
@@ -112,11 +109,6 @@ def test_every_fault_of_a_comparison_is_told(tmp_path):
     assert len(caught.value.faults) >= 3
 
 
-def test_figure_has_a_look_for_every_code():
-    assert set(page.OTHERS) == set(get_args(Code))
-    assert len(set(page.OTHERS.values())) == len(page.OTHERS)
-
-
 @pytest.mark.slow
 def test_the_program_writes_page_table_and_figure(tmp_path, monkeypatch, capsys):
     short = tmp_path / "numbers.md"
@@ -147,21 +139,3 @@ def test_the_program_writes_page_table_and_figure(tmp_path, monkeypatch, capsys)
     assert "old" not in inserted
     assert inserted.startswith("before\n<!-- precision")
     assert inserted.endswith("-->\nafter\n")
-
-
-def test_figure_marks_failures_and_halvings_and_says_units():
-    figure = page.figure(*table.build(RUNS), "made up")
-    assert len(figure.axes) == 3
-    assert {ax.get_xscale() for ax in figure.axes} | {ax.get_yscale() for ax in figure.axes} == {"log"}
-    said = texts(figure)
-    assert said.count("core time a joint [ms]") == 3
-    assert {"tolstat A", "the truth's own error", "36", "180"} <= set(said)
-    assert overlapping(figure) == []
-    main = figure.axes[0]
-    rings = [line for line in main.lines if line.get_marker() == "o" and line.get_markerfacecolor() == "none"]
-    assert [list(line.get_xdata()) for line in rings if len(line.get_xdata())] == [[2.0]]
-    crosses = [line for line in main.lines if line.get_marker() == "x" and len(line.get_xdata())]
-    assert [(list(line.get_xdata()), list(line.get_ydata())) for line in crosses] == [
-        ([50.0], [pytest.approx(1e-4)]),
-        ([900.0], [2.0]),
-    ]

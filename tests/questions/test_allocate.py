@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 from tests.questions.test_change import TEXT, made, share_of
 from tests.support.two_errors import stand_in
 from tolstat import study
 from tolstat.campaign import blocks
 from tolstat.campaign.work import Work
-from tolstat.cli import app
 from tolstat.common.errors import InputError, NotApplicable
 from tolstat.questions import allocate as question
 from tolstat.store import ResultFile
@@ -210,20 +207,3 @@ def test_steps_are_those_of_a_drawing() -> None:
 def test_preferred_numbers(value: float, finer: float, coarser: float) -> None:
     assert ladder.preferred(value, -1) == pytest.approx(finer)
     assert ladder.preferred(value, 1) == pytest.approx(coarser)
-
-
-def test_command_prints_path_and_toml_and_writes_a_study(done: Path, tmp_path: Path) -> None:
-    command = ["allocate", str(done), "--target", TARGET, "--workers", "1"]
-    out = tmp_path / "next"
-    shown = CliRunner().invoke(app, [*command, "--out", str(out)])
-    assert shown.exit_code == 0, shown.stderr
-    assert shown.stdout.startswith("Holds: ")
-    assert '"pin*.tilt_t" = { ' in shown.stdout
-    assert sorted(path.name for path in out.iterdir()) == [
-        f"made_allocate{end}" for end in (".toml", "_path.csv", "_tolerances.csv")
-    ]
-    found = json.loads(CliRunner().invoke(app, [*command, "--json"]).stdout)
-    assert found["facts"]["holds"] is True
-    refused = CliRunner().invoke(app, ["allocate", str(done), "--target", "P(cross1.F > 700 N) = 1"])
-    assert refused.exit_code == 2
-    assert "write --target" in refused.stderr

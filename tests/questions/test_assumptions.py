@@ -6,7 +6,6 @@ from functools import cache, partial
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import tolstat
 from tests.support import synthetic
@@ -15,15 +14,12 @@ from tolstat.analysis.binomial import clopper_pearson
 from tolstat.campaign import blocks
 from tolstat.campaign import what_if as sets
 from tolstat.campaign.work import Work
-from tolstat.cli import app
 from tolstat.common.errors import InputError, NotApplicable, StoreError
 from tolstat.common.tables import RESULT, Simulation, Status
-from tolstat.display.answer import Asked
 from tolstat.joint import perturb
 from tolstat.questions.assumptions import answer as run
 from tolstat.questions.assumptions import sentences, variations
-from tolstat.questions.assumptions.answer import assumptions_on_page
-from tolstat.questions.assumptions.variations import ALL, BETTER, evaluate
+from tolstat.questions.assumptions.variations import BETTER, evaluate
 from tolstat.report import headline
 from tolstat.solver import stationary
 from tolstat.store import ResultFile, Writer, what_if
@@ -411,26 +407,6 @@ def test_what_the_shop_must_hold_has_the_capability_of_zones_too(tmp_path):
     zone = '"pin*.position" = { zone = "⌀0.1 mm", over = "22 mm", distribution = "normal" }\n"pin*.offset_e"'
     with ResultFile.open(made(tmp_path, TEXT.replace('"pin*.offset_z"', zone))) as store:
         assert "Cp 1 in 1 tolerance and Cpk 1 in 1 tolerance." in sentences.shop(store.view())
-
-
-def test_the_command_prints_shares_changes_and_what_the_shop_holds(varied):
-    path = varied(slides=-60.0, arm=4.0)
-    done = CliRunner().invoke(app, ["assumptions", str(path), "--accept", "5 %"])
-    assert done.exit_code == 0, done.output
-    assert "find out how the shaft is held." in done.stdout.replace("\n", " ")
-    assert "Moves nothing that 600 joints show: place of the cross bushings." in done.stdout.replace("\n", " ")
-    assert "What the shop must hold: Cpk 1 in 1 tolerance." in done.stdout.replace("\n", " ")
-    with ResultFile.open(path) as store:
-        answer = tolstat.assumptions(store.view(), 0.05)
-        page = assumptions_on_page(store.view(), Asked(path, 0.05))
-    assert answer.facts["stands_on"]["turned_by"] == ["shaft slides"]
-    assert [part for part in page.parts if getattr(part, "name", "") == "assumptions"]
-    assert {row["name"] for row in answer.tables["assumptions"].rows} == {
-        "mounting",
-        "arm length",
-        "place of the cross bushings",
-        ALL,
-    }
 
 
 @pytest.mark.parametrize(

@@ -14,12 +14,11 @@ from tests.support import synthetic, views
 from tolstat import joint
 from tolstat.analysis.binomial import clopper_pearson, needed
 from tolstat.common.columns import RESULT_COLUMNS
-from tolstat.common.errors import InputError, NotApplicable, StoreError
+from tolstat.common.errors import InputError, StoreError
 from tolstat.common.load_kinds import PINS
 from tolstat.common.tables import Mode, Status
 from tolstat.display import text
 from tolstat.display.answer import Asked, Sentence, Table
-from tolstat.display.blocks import Panels
 from tolstat.joint import Operation
 from tolstat.questions.bearing_life import answer as question
 from tolstat.questions.bearing_life.lives import LOADED, PLACES, below_rows, lives_of
@@ -231,10 +230,6 @@ def test_half_of_the_joints_failed_gives_no_verdict():
     assert question.BELOW[2].cell(tolstat.bearing_life(made).tables["below_required"].rows[-1]) == "-"
 
 
-def test_all_joints_failed_gives_no_verdict():
-    assert said(view(failed=200))[0].startswith("No verdict: 200 of 200 joints have no life")
-
-
 @pytest.mark.parametrize("alpha", [0.0, np.radians(6.2), -np.radians(3)])
 def test_below_half_the_critical_amplitude_there_is_no_rating(alpha):
     made = view(alpha=alpha)
@@ -298,13 +293,6 @@ def test_no_verdict_on_the_required_life():
     assert question.life_verdicts(views.view(joint=joint.load("cirelli2021", {}, "x.toml").given("json"))) == []
 
 
-def test_a_verdict_names_the_points_with_small_swings():
-    (found,) = question.life_verdicts(swinging(cruise=10.0, climb=30.0), 0.1)
-    assert [note.split(":")[0] for note in found.notes] == [
-        "at cruise, 50 % of the time, every joint swings by less than 12.4 deg to either side"
-    ]
-
-
 def test_reliability_and_lubrication_shorten_the_life():
     plain, strict = (lives_of(view(joint=held(**more))) for more in ({}, {"reliability": 0.99, "a_iso": 0.8}))
     np.testing.assert_allclose(strict.hours, 0.25 * 0.8 * plain.hours)
@@ -336,39 +324,6 @@ def test_without_independent_joints_there_are_no_intervals():
     table = below(lives_of(view(method="sobol")))
     assert table[["lower", "upper", "total_lower", "total_upper"]].isna().all(axis=None)
     assert "interval" not in said(view(method="sobol"))[0]
-
-
-def test_the_page_and_the_json():
-    made = view()
-    blocks = question.bearing_life_on_page(made, Asked(made.path)).blocks()
-    assert isinstance(blocks[0], Sentence)
-    assert blocks[0].text.endswith("do not reach the required 8000000 h.")
-    assert sum(isinstance(block, Panels) for block in blocks) == 1
-    found = tolstat.bearing_life(made).values()
-    assert found["facts"]["symbol"] == "L10"
-    assert {name: len(table["rows"]) for name, table in found["tables"].items()} == {
-        "lives": 15, "below_required": 5, "loads": 12, "contacts": 5
-    }  # fmt: skip
-    assert found["tables"]["lives"]["units"]["estimate"] == "h"
-    without = views.view(joint=joint.load("cirelli2021", {}, "x.toml").given("json"))
-    with pytest.raises(NotApplicable, match="joint without bearings"):
-        question.bearing_life_on_page(without, Asked(without.path))
-
-
-def test_the_command_writes_all_tables_and_the_picture(tmp_path):
-    from tests.cli.test_cli import call
-
-    study = STUDY.replace("[sampling]", '[limits]\n"cross1.F" = "700 N"\n[sampling]')
-    path = synthetic.store(tmp_path, study)
-    done = call("bearing-life", path, "--out", tmp_path / "out")
-    assert done.exit_code == 0, done.stderr
-    assert done.stdout.count("\n\n") == 4
-    assert "do not reach the required 20000 h." in " ".join(done.stdout.split())
-    stem = f"{path.stem}_bearing_life"
-    names = [f"{stem}_{table}.csv" for table in ("lives", "below_required", "loads", "contacts")]
-    names += [f"{stem}_lives.{ending}" for ending in ("png", "svg")]
-    assert {file.name for file in (tmp_path / "out").iterdir()} == set(names)
-    assert len(pd.read_csv(tmp_path / "out" / names[0])) == 15
 
 
 def test_the_bearing_is_that_of_the_study_given_in_place_of_the_stored_one(tmp_path):

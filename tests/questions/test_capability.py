@@ -5,10 +5,10 @@ from statistics import fmean, stdev
 import numpy as np
 import pytest
 from scipy.special import nctdtr
-from scipy.stats import betabinom, lognorm, norm, normaltest, t
+from scipy.stats import lognorm, norm, normaltest, t
 
 from tests.support.views import view
-from tolstat.analysis import binomial, capability, prediction
+from tolstat.analysis import binomial, capability
 from tolstat.analysis.design import Listed
 from tolstat.analysis.sample import Sample
 from tolstat.common.loads import ANY_LIMIT
@@ -198,11 +198,3 @@ def test_normality_is_tested_as_by_scipy(n):
     for load in (rng.normal(size=n), rng.exponential(size=n), 700.0 + rng.uniform(size=n)):
         found = capability_of(load, [Status.OK] * n, 800.0).normal_p
         assert found == pytest.approx(normaltest(load).pvalue, rel=1e-10)
-
-
-@pytest.mark.parametrize("counts", [(1, 1, 20, 7), (5, 9, 100, 200), (4000, 4100, 20_000, 3000), (99, 100, 100, 50)])
-def test_prediction_is_from_quantiles_of_the_beta_binomial_distribution(counts):
-    least, most, n, number = counts
-    low, high = prediction.of_counts(*counts)
-    assert low == betabinom.ppf(0.025, number, least, n - least + 1)
-    assert high == (betabinom.ppf(0.975, number, most + 1, n - most) if most < n else number)

@@ -1,21 +1,18 @@
 """Commands `causes` and `capability` on a campaign whose causes are known."""
 
-import json
 from contextlib import suppress
 from shlex import quote
 
 import numpy as np
-import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
-from tests.support import exceedance, synthetic
+from tests.support import synthetic
 from tests.support.cells import body
 from tolstat.analysis import sensitivity
 from tolstat.cli import app
 from tolstat.common.errors import NotApplicable
-from tolstat.common.loads import ANY_LIMIT
-from tolstat.common.tables import SIMULATED, Simulation, Status
+from tolstat.common.tables import SIMULATED, Simulation
 from tolstat.display.answer import Asked, Sentence, Table
 from tolstat.display.text import value
 from tolstat.questions import QUESTIONS, Question
@@ -87,19 +84,6 @@ def test_of_many_joints_the_first_are_taken_and_all_of_a_thin_tail(path, monkeyp
     assert any("first 1000 joints" in part.text for part in found.parts if isinstance(part, Sentence))
 
 
-def test_command_prints_the_first_errors_and_json_has_all(path):
-    done = run("causes", path, "--top", 2)
-    assert done.exit_code == 0
-    lines = done.stdout.splitlines()
-    assert [line.split()[0] for line in lines] == ["error", "pin1.offset_t", "pin2.offset_z"]
-    assert "*" in lines[1]
-    assert "2995 joints, 5 without a valid load" in done.stderr
-    assert "of the logarithm" in run("causes", path, "--logarithm").stderr
-    found = json.loads(run("causes", path, "--by", "psi", "--json").stdout)
-    assert len(found["tables"]["errors"]["rows"]) == 8
-    assert found["facts"]["unit"] == "1"
-
-
 def test_shares_in_all_are_offered_until_they_are_simulated(path, monkeypatch):
     with ResultFile.open(path) as store:
         known = store.view()
@@ -143,16 +127,6 @@ def test_what_has_no_causes_is_refused(tmp_path, path):
         assert done.exit_code == 2
         assert text in done.stderr
         assert "hint:" in done.stderr
-
-
-def test_of_the_first_samples_only_these_count(path):
-    with ResultFile.open(path) as store:
-        found, rows = module.indices(store.view(), "cross1.F", joints=1000)
-        errors, loads = store.errors()[1:1001], store.results()["F_max"][1:1001, 0]
-    assert [found[key] for key in ("joints", "used", "without_load")] == [1000, 1000, 0]
-    assert found["above"] == np.sum(loads > found["level"])
-    x = np.column_stack([errors[row["error"]] for row in rows])
-    np.testing.assert_allclose([row["first"] for row in rows], sensitivity.first_order(x, loads).estimate)
 
 
 PAGE = synthetic.STUDY.replace("n = 60", "n = 400").replace("40 N*m", "18 N*m").replace("offset_t", "offset_[tz]")
@@ -206,36 +180,6 @@ def test_page_leaves_out_what_a_file_cannot_tell(tmp_path):
         synthetic.store(tmp_path, name="no_valid_joint", failed=40, unsettled=20),
     ):
         assert shown(path)[:2] == ({}, [])
-
-
-def test_capability_of_each_limit_and_of_all_together(path):
-    with ResultFile.open(path) as store:
-        known = store.view()
-        table = capability(known).frame("limits").set_index("load")
-        loads = known.loads(list(known.limits))
-    assert list(table.index) == [*known.limits, ANY_LIMIT]
-    share = exceedance.exceedance(known.load("cross1.F").values, known.status, known.limits["cross1.F"])
-    assert table.loc["cross1.F", "ppm"] == pytest.approx(1e6 * share.estimate)
-    above = pd.DataFrame({load.name: load.values > load.limit for load in loads})
-    assert table.loc[ANY_LIMIT, "count"] == above[known.status == Status.OK].any(axis=1).sum()
-    assert table.loc[ANY_LIMIT, "good"] <= table["good"].min()
-    assert (table["ppm_lower"] <= table["ppm"]).all()
-    assert (table["ppm"] < table["ppm_upper"]).all()
-
-
-@pytest.mark.slow
-def test_capability_command_prints_indices_and_return_loads(path):
-    done = run("capability", path, "--one-in", 1000, "--one-in", 1e6)
-    assert done.exit_code == 0
-    assert "any limit" in done.stdout
-    assert "one in N" in done.stdout
-    for text in ("no Cp", "5 of 3000 joints without a valid load", "lower ends of Cpk need 3244", "not normal"):
-        assert text in done.stderr
-    found = json.loads(run("capability", path, "--one-in", 1000, "--json").stdout)
-    row = found["tables"]["one_in"]["rows"][0]
-    assert row["lower"] < row["estimate"]
-    assert row["upper"] is None  # of 2995 joints three are above
-    assert row["bound_upper"] is None  # five lost joints of 3000 alone may be one in 1000
 
 
 def test_capability_without_limits_and_one_joint_in_one_are_refused(tmp_path):

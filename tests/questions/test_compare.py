@@ -1,9 +1,6 @@
 """Two campaigns side by side: coverage of the differences, and a known difference found joint by joint."""
 
-import json
-
 import numpy as np
-import pandas as pd
 import pytest
 from scipy.stats import binomtest, norm, ttest_ind, ttest_rel
 from typer.testing import CliRunner
@@ -178,25 +175,6 @@ def test_other_seeds_are_not_paired(tmp_path):
     row = answer.frame("shares").set_index("load").loc["cross1.F"]
     assert row["lower"] < row["estimate"] < row["upper"]
     assert np.isnan(row["p"])
-
-
-@pytest.mark.slow
-def test_command_prints_tables_and_writes_files(tmp_path):
-    a, b = campaign(tmp_path, "a"), campaign(tmp_path, "b", factor=1.1)
-    done = run("compare", a, b, "--by", "cross1.F", "--out", tmp_path / "out")
-    assert done.exit_code == 0
-    assert "cross1.F > 700 N" in done.stdout
-    assert "400 pairs of joints" in done.stderr
-    assert "the studies are the same" in done.stderr
-    assert "2 joints without a valid load" in done.stderr
-    pictures = [f"cross1-F{what}.{end}" for what in ("", "-difference") for end in ("png", "svg")]
-    names = [f"a_b_compare_{what}" for what in (*pictures, "loads.csv", "shares.csv", "switched.csv")]
-    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == sorted(names)
-    switched = pd.read_csv(tmp_path / "out" / "a_b_compare_switched.csv").query("load == 'cross1.F'")
-    tables = json.loads(run("compare", a, b, "--json").stdout)["tables"]
-    (shares, *_), (loads, *_) = tables["shares"]["rows"], tables["loads"]["rows"]
-    assert shares["only_b"] == len(switched) > 0
-    assert loads["estimate"] == pytest.approx(loads["b"] - loads["a"])
 
 
 @pytest.mark.slow

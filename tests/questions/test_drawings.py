@@ -1,7 +1,6 @@
 """Drawings of a joint: drawn places against the kernel's axes, senses of errors against `perturb`, the command."""
 
 import re
-import shutil
 from itertools import combinations
 
 import matplotlib as mpl
@@ -256,36 +255,6 @@ def test_drawings_in_the_documents_are_up_to_date(here, name, options):
     assert len(kept[1]) > 10
     for outline, points in made[1].items():
         assert points == pytest.approx(kept[1][outline], abs=0.05), outline
-
-
-@pytest.mark.parametrize("given", ["cirelli2021", "joint.toml", "small.toml", "small.h5"])
-def test_joint_file_study_and_result_file_are_drawn(here, given):
-    synthetic.store(here)
-    shutil.copy(ROOT / "data" / "joints" / "cirelli2021.toml", here / "joint.toml")
-    done = call(given, "--out", "new/joint.svg")
-    assert done.exit_code == 0, done.stderr
-    assert "cross.R          72.82 mm" in done.stdout
-    assert max(map(len, done.stdout.splitlines())) <= 80
-    assert done.stderr == "wrote new/joint.svg\n"
-    ids = re.findall(r' id="([^"]*)"', (here / "new" / "joint.svg").read_text(encoding="utf-8"))
-    assert {"front.pin1", "side.arm4", "cross1", "fork4"} <= set(ids)
-    assert len(ids) == len(set(ids))
-
-
-def test_row_prints_the_errors_of_the_file(here):
-    path = synthetic.store(here)
-    done = call(path, "--row", 17)
-    assert done.exit_code == 0, done.stderr
-    assert (here / "row17.svg").read_text(encoding="utf-8").startswith("<?xml")
-    lines = {line.split()[0]: line.split()[1:] for line in done.stdout.splitlines()[1:]}
-    with ResultFile.open(path) as store:
-        errors = store.errors(slice(17, 18))
-        shown = answer.read(path, 17)
-    assert shown[3] == errors
-    for name in (*PINS, *HOLES):
-        assert float(lines[name][1]) == pytest.approx(1e3 * errors[f"{name}.offset_t"][0], abs=5e-5)
-        assert float(lines[name][5]) == pytest.approx(1e3 * errors[f"{name}.diameter"][0], abs=5e-5)
-    assert max(map(len, done.stdout.splitlines())) <= 80
 
 
 @pytest.mark.parametrize(

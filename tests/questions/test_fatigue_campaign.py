@@ -10,20 +10,16 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from matplotlib.figure import Figure
 
 import tolstat
 from tests.questions.test_fatigue import needs
-from tests.support import synthetic
-from tests.support.cells import body
 from tests.support.environment import ROOT
 from tolstat.analysis.cycles import Line, damage, equivalent_load, moment
 from tolstat.common.channels import signals_of, unit_of
 from tolstat.common.errors import InputError, NotApplicable
 from tolstat.common.tables import SIMULATED
 from tolstat.display.answer import Asked
-from tolstat.display.blocks import Panels, Sentence
-from tolstat.display.table import Table
+from tolstat.display.blocks import Panels
 from tolstat.questions.fatigue import loads as fatigue
 from tolstat.questions.fatigue.answer import fatigue_on_page, life_verdicts
 from tolstat.questions.fatigue.counting import of_slots
@@ -466,39 +462,6 @@ def test_spectra_fall_and_four_are_drawn(campaign):
     assert set(table["cycles"]) <= {round(row["cycles"]) for row in fatigue.spectrum(thirds, "fork1.F_z")}
     assert [name[:4] for name in fatigue.leading(fatigue.equivalent_loads(loading))] == ["cros", "cros", "fork", "fork"]
     assert fatigue.most_loaded(fatigue.equivalent_loads(loading))[-1].startswith("fork4.T_")
-
-
-def test_the_section_shows_what_is_loaded_most(campaign, tmp_path):
-    asked = Asked(tmp_path / "c.h5")
-    with ResultFile.open(campaign()) as store:
-        answer = fatigue_on_page(store.view(), asked)
-        spectra, loads, damages, note = answer.blocks()
-        leading = spectra.panels[2].title.split(":")[0]
-        ax = Figure().add_subplot()
-        spectra.panels[2].draw(ax)
-        store.study_text = store.study_text.replace("exponents = [4]", "exponents = [0]")
-        with pytest.raises(NotApplicable):
-            fatigue_on_page(store.view(), asked)
-    assert isinstance(spectra, Panels)
-    assert [panel.key.split("-")[1][:-1] for panel in spectra.panels] == ["cross", "cross", "fork", "fork"]
-    assert ax.get_ylabel() == f"range of {leading} [N]"
-    shares = [f"{share} % of the joints stay below" for share in (50, 90, 99)]
-    assert ax.get_legend_handles_labels()[1] == ["nominal joint", *shares, "95 % band"]
-    loading = load_cycles([campaign()])
-    table = answer.frame("loads")
-    assert table.equals(pd.DataFrame(fatigue.equivalent_loads(loading)))
-    own = table[table["channel"] == leading].set_index("share")
-    assert isinstance(loads, Table)
-    row = next(row for row in body(loads) if row[0] == f"{leading}, m = 4")
-    assert row[1:5] == [f"{x:.4g} N" for x in (own["nominal"][0.5], *own["estimate"])]
-    assert (len(body(loads)), len(damages.rows), body(damages)[0][4]) == (4, 9, f"0 of {loading.valid.sum()}")
-    assert isinstance(note, Sentence)
-    assert note.text.startswith(f"{loading.valid.sum()} of 12 joints settled; loads are ranges: 1e+06 cycles of them")
-    assert [text.split(":")[0] for text in asked.notes] == ["load cycles are left out"]
-    for path in (campaign("none"), synthetic.store(tmp_path, synthetic.SWEEP, "sweep")):
-        with ResultFile.open(path) as store, pytest.raises(NotApplicable):
-            fatigue_on_page(store.view(), asked)
-    assert len(asked.notes) == 1
 
 
 def test_a_slice_of_a_campaign_has_the_rows_of_the_campaign(campaign, tmp_path):

@@ -11,23 +11,18 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from matplotlib.figure import Figure
 
 import tolstat
-from tests.support.cells import body
 from tests.support.synthetic import store as store_of
 from tolstat.analysis import strength
 from tolstat.analysis.cycles import Cycles
 from tolstat.analysis.design import Independent
-from tolstat.common.errors import InputError, NotApplicable
+from tolstat.common.errors import InputError
 from tolstat.common.load_kinds import BUSHINGS
 from tolstat.common.tables import Status
 from tolstat.display import text
-from tolstat.display.answer import Asked
-from tolstat.display.blocks import Panels
-from tolstat.display.table import Table
 from tolstat.questions.fatigue import counting, parts
-from tolstat.questions.fatigue.answer import _notes_on_parts, _verdict, fatigue_on_page, life_verdicts
+from tolstat.questions.fatigue.answer import _notes_on_parts, _verdict, life_verdicts
 from tolstat.questions.fatigue.counting import Counted
 from tolstat.questions.fatigue.duty import ANY, Joints, members, settings_of
 from tolstat.questions.fatigue.parts import load_stresses
@@ -402,23 +397,6 @@ def test_every_fault_of_the_points_is_told():
         of_text("[fatigue]\npoint = 3", "a.toml")
 
 
-def test_the_command_prints_a_row_a_point(campaign):
-    from tests.cli.test_cli import call
-
-    done = call("fatigue", campaign("none"))
-    assert done.exit_code == 0, done.stderr
-    lines = done.stdout.splitlines()
-    assert [line.split("  ")[0] for line in lines] == ["point", *NAMES, ANY]
-    assert max(map(len, lines)) <= 80
-    assert "with 10000 starts" in done.stderr
-    assert "amage-equivalent" not in done.stdout
-    rows = parts.part_failures(stresses([campaign("none")]))
-    found = json.loads(call("fatigue", campaign("none"), "--json").stdout)
-    assert list(found["tables"]) == ["points"]
-    assert found["tables"]["points"]["units"]["S_D"] == "Pa"
-    assert [row["estimate"] for row in found["tables"]["points"]["rows"]] == [row["estimate"] for row in rows]
-
-
 @pytest.mark.slow
 def test_the_command_prints_loads_below_the_parts(campaign):
     from tests.cli.test_cli import call
@@ -437,20 +415,3 @@ def test_a_study_without_points_says_so(campaign, tmp_path):
         store.study_text = store.study_text.split("[fatigue]")[0]
         with pytest.raises(InputError, match="names no point of a part\n  hint: add"):
             load_stresses([store.view()])
-
-
-def test_the_page_shows_parts_before_loads(campaign, tmp_path):
-    with ResultFile.open(campaign("none")) as store:
-        with pytest.raises(NotApplicable):
-            fatigue_on_page(store.view(), Asked(tmp_path / "a.h5"))
-        found = fatigue_on_page(store.view(), Asked(tmp_path / "a.h5", replay=1000))
-    panels, table, *notes = found.blocks()
-    assert isinstance(panels, Panels)
-    assert isinstance(table, Table)
-    assert [row[0] for row in body(table)] == [*NAMES, ANY]
-    assert notes[0].text.startswith(f"{stresses([campaign('none')]).valid.sum()} of 12 joints settled")
-    ax = Figure().add_subplot()
-    panels.panels[0].draw(ax)
-    (curve, _) = ax.get_lines()
-    assert np.all(np.diff(curve.get_ydata()) >= 0)
-    assert curve.get_xdata()[0] < 1e9 < curve.get_xdata()[-1]

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import re
 import shutil
 from functools import partial
 
 import h5py
 import numpy as np
-import pandas as pd
 import pytest
-from matplotlib.figure import Figure
-from matplotlib.markers import CARETLEFT
 from scipy.stats import norm
 from typer.testing import CliRunner
 
@@ -30,7 +26,7 @@ from tolstat.common.errors import InputError, NotApplicable, StoreError
 from tolstat.common.loads import LOADS
 from tolstat.common.tables import Status
 from tolstat.display import text
-from tolstat.display.answer import Asked, Panels, Sentence, Table
+from tolstat.display.answer import Asked, Sentence
 from tolstat.display.progress import Display
 from tolstat.joint import perturb
 from tolstat.questions.causes import lines as question
@@ -327,13 +323,6 @@ def test_single_diameters_of_a_fit_change_their_width(tmp_path):
     np.testing.assert_allclose(ends, [-0.63 * 23e-6, 0.63 * 23e-6])  # F8 at 76 mm: +30 to +76 um
 
 
-def test_density_of_a_rescaled_distribution(tmp_path):
-    plan = loaded(tmp_path)
-    own = widths.changed(plan, line(plan, "pin*.tilt_t"), HALF)["pin1.tilt_t"]
-    x = np.linspace(*own.ppf(np.array([1e-9, 1 - 1e-9])), 20001)
-    assert np.trapezoid(np.exp(own.logpdf(x)), x) == pytest.approx(1.0, abs=1e-6)
-
-
 def test_exchanged_joints_have_the_line_of_their_partner(tmp_path):
     plan = loaded(tmp_path)
     base = sampling.draw(plan)[plan.first_sample :]
@@ -572,31 +561,6 @@ def test_an_order_is_settled_by_pairs_or_by_differences_that_do_not_matter():
     assert not shares.is_settled([rng.normal(size=200), rng.normal(size=200)], base, 1.0)
 
 
-@pytest.mark.usefixtures("quick")
-def test_command_and_page(path, monkeypatch):
-    def run(*arguments):
-        return CliRunner().invoke(app, ["causes", str(path), *arguments])
-
-    shown = run("--top", "2")
-    assert "--run" in shown.stderr
-    assert f"tolstat causes {path.name} --run; then this page again: tolstat report" in lead(on_page(path))
-    monkeypatch.setattr("tolstat.questions.shares.available_cores", lambda: 1)
-    shown = run("--run", "--budget", "1 min", "--top", "2", "--workers", "1")
-    assert shown.exit_code == 0, shown.output
-    assert "lines, 400 joints of each change" in shown.stderr
-    assert shown.stdout.startswith("cross1.F > 700 N in ")
-    assert "\n\nScatter of cross1.F over all joints, not of exceeding a limit, by error\nerror " in shown.stdout
-    table = shown.stdout[: shown.stdout.index("\n\nPart of each line")].splitlines()
-    assert max(map(len, table)) <= 80
-    told = json.loads(run("--json").stdout)
-    assert told["facts"]["lines"]["load"] == told["facts"]["load"] == "cross1.F"
-    assert len(told["tables"]["lines"]["rows"]) == 12
-    answer = on_page(path, 0.01)
-    assert [type(block) for block in answer.blocks()] == [Sentence, Panels, Table, Table, *[Sentence] * 3]
-    assert "Halving a single line is not enough: halving the tilt tolerance of the pins" in lead(answer)
-    assert run("--each", "error").exit_code == 2
-
-
 def on_page(path, accepted=np.nan):
     with ResultFile.open(path) as store:
         return question.lines_on_page(store.view(), Asked(path, accepted=accepted))
@@ -645,21 +609,6 @@ def test_of_several_limits_verdict_command_and_page_are_about_all_together(tmp_p
     ]
     assert shown[0].stdout == shown[1].stdout
     assert shown[0].stdout.startswith("At least one limit exceeded in 22.2 % ")
-
-
-def test_whiskers_and_bands_are_the_intervals_of_the_table(changed):
-    with ResultFile.open(changed) as store:
-        found = shares.evaluate(store.view(), "cross1.F")
-    table = pd.DataFrame(found.by_line)
-    ax = Figure().subplots()
-    question._tornado(found, 0.01).draw(ax)
-    half = table.loc[table["half"] > 0.01].iloc[0]
-    drawn = [line.get_xdata() for line in ax.lines if len(line.get_xdata()) == 2]
-    assert any(np.allclose(x, [half["half_lower"], half["half_upper"]]) for x in drawn)
-    floor, marks = ax.get_xlim()[0], [line for line in ax.lines if line.get_marker() == CARETLEFT]
-    beyond = [(table[name] < floor).sum() for name in ("half_lower", "coarser_lower", "exact")]
-    assert [line.get_xdata()[0] for line in marks] == [floor] * sum(beyond)
-    assert sum(beyond) > 0
 
 
 TWO = TEXT.replace("[operation]", '[[operation]]\nname = "cruise"').replace(

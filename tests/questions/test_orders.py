@@ -1,10 +1,8 @@
 """Orders of the shafts' loads: quantiles by NumPy and SciPy, closed form of the ideal joint, known orbits, the page."""
 
-import json
 import warnings
 
 import numpy as np
-import pandas as pd
 import pytest
 from scipy.stats import binom
 from typer.testing import CliRunner
@@ -12,13 +10,11 @@ from typer.testing import CliRunner
 import tolstat
 from tests.support import synthetic
 from tolstat import cli, sampling, study
-from tolstat.common.errors import StoreError
 from tolstat.common.load_kinds import ORDERS, SHAFTS
 from tolstat.common.loads import LOADS
 from tolstat.common.tables import Options, Simulation
 from tolstat.display import drawing
 from tolstat.display.answer import Asked
-from tolstat.display.blocks import Panels
 from tolstat.questions import orders as module
 from tolstat.questions.orders import orders
 from tolstat.report import page
@@ -249,18 +245,6 @@ def test_the_page_shows_orders_where_the_study_asks_for_loads_of_the_shafts(tmp_
     assert bool(left_out) == (asked and not kept)  # the study keeps no amplitudes
 
 
-def test_panels_are_of_each_quantity_and_shaft(slow):
-    with ResultFile.open(slow[1]) as store:
-        parts = orders(store.view(), orbits=True).parts
-    panels = next(part for part in parts if isinstance(part, Panels)).panels
-    quantities = ["input-lateral", "output-lateral", "input-moment", "output-moment", "input-drive", "psi"]
-    assert [panel.key for panel in panels] == [
-        *(f"amplitude-{name}" for name in quantities),
-        "orbit-input",
-        "orbit-output",
-    ]
-
-
 def test_a_slice_without_the_nominal_joint_is_drawn_without_warnings(invented):
     with ResultFile.open(invented) as store:
         rows = orders(store.view()).tables["amplitudes"].rows
@@ -269,24 +253,3 @@ def test_a_slice_without_the_nominal_joint_is_drawn_without_warnings(invented):
         warnings.simplefilter("error")
         for panel in module._amplitude_panels(without):
             assert "<svg" in drawing.svg(panel)[0]
-
-
-def test_command_prints_a_table_writes_files_and_refuses_files_without_amplitudes(slow, tmp_path):
-    done = run(slow[1], "--orbits", "--out", tmp_path / "out")
-    assert done.exit_code == 0, done.stderr
-    assert max(map(len, done.stdout.splitlines())) <= 80
-    assert [line.split()[0] for line in done.stdout.splitlines()[1:]][:5] == [
-        *(f"input.lateral_{n}x" for n in ORDERS),
-        "output.lateral_1x",
-    ]
-    orbits = pd.read_csv(tmp_path / "out" / "full_orders_orbits.csv")
-    assert orbits.groupby(["shaft", "near"]).size().eq(SAMPLES).all()
-    files = {file.name.removeprefix("full_orders_") for file in (tmp_path / "out").iterdir()}
-    assert {name for name in files if name.endswith(".csv")} == {"amplitudes.csv", "orbits.csv"}
-    assert {"amplitude-input-lateral.svg", "amplitude-psi.png", "orbit-output.svg"} < files
-    found = json.loads(run(slow[1], "--json").stdout)
-    table = pd.read_csv(tmp_path / "out" / "full_orders_amplitudes.csv")
-    assert [row["q95"] for row in found["tables"]["amplitudes"]["rows"]] == table["q95"].tolist()
-    few = synthetic.store(tmp_path, synthetic.WHOLE.replace("[limits]", f"[output]\nresults = [{OTHERS}]\n[limits]"))
-    with ResultFile.open(few) as store, pytest.raises(StoreError, match="no amplitudes of orders"):
-        orders(store.view())

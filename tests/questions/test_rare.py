@@ -286,35 +286,6 @@ def test_a_file_of_another_question_or_other_loads_is_refused(tmp_path, whole):
 
 
 @pytest.mark.slow
-def test_command_goes_on_with_its_file_and_other_statistics_refuse_it(tmp_path, whole):
-    _, (found, levels), path = whole
-    done = CliRunner().invoke(app, ["rare", str(path), "--json"])
-    assert done.exit_code == 0, done.stderr
-    said = json.loads(done.stdout)
-    assert said["facts"]["probability"] == found["probability"]
-    assert len(said["tables"]["levels"]["rows"]) == len(levels)
-    assert said["tables"]["seeds"]["rows"][0]["ancestors"] == found["ancestors"]
-    assert any("failed or not settled" in sentence["text"] for sentence in said["sentences"])
-    table = CliRunner().invoke(app, ["rare", str(path)])
-    assert "P(cross1.F > 950 N) = " in table.stdout
-    assert "of 100 joints of level 0" in table.stdout
-    assert "--near" in table.stderr
-    for command in (["report"], ["capability"]):
-        refused = CliRunner().invoke(app, [command[0], str(path), *command[1:]])
-        assert refused.exit_code == 2
-        assert "tolstat rare" in refused.stderr
-    assert json.loads(CliRunner().invoke(app, ["status", "--json", str(path)]).stdout)["exceedance"] == []
-    refused = CliRunner().invoke(app, ["rare", str(path), "--n", "300"])
-    assert (refused.exit_code, "--n: is about a simulation" in refused.stderr) == (2, True)
-    written = CliRunner().invoke(app, ["rare", str(path), "--out", str(tmp_path / "out")])
-    assert written.exit_code == 0, written.stderr
-    assert {file.name for file in (tmp_path / "out").iterdir()} == {
-        "whole_rare_levels.csv",
-        "whole_rare_seeds.csv",
-    }
-
-
-@pytest.mark.slow
 def test_a_study_of_several_operating_points_is_simulated_at_one_of_them(tmp_path):
     before, after = PLAN.split("[operation]")
     own, rest = after.split("[", 1)
@@ -350,6 +321,8 @@ def test_a_finished_file_of_other_code_is_shown_and_an_unfinished_one_refused(wh
     assert run_to_end(plan, path) == found
     done = CliRunner().invoke(app, ["rare", str(path)])
     assert done.exit_code == 0, done.stderr
+    refused = CliRunner().invoke(app, ["rare", str(path), "--n", "300"])
+    assert (refused.exit_code, "--n: is about a simulation" in refused.stderr) == (2, True)
     with h5py.File(path, "r+") as file:
         file["results/status"][3] = Status.PENDING
     done = CliRunner().invoke(app, ["rare", str(path), "--run"])

@@ -8,12 +8,10 @@ import pytest
 from tests.support import synthetic
 from tests.support.synthetic import HEAD
 from tolstat import study
-from tolstat.common.errors import InputError
 from tolstat.common.tables import Simulation
 from tolstat.questions.causes.errors import causes
 from tolstat.store import View, Writer
 from tolstat.study import scaling
-from tolstat.study.scaling import changed
 
 ENTRIES = (
     HEAD
@@ -28,31 +26,11 @@ ENTRIES = (
 n = 20000
 """
 )
-NARROWER = [
-    *("pin[12].position.zone=⌀0.09 mm", "hole[12].perpendicularity.zone=⌀0.04 mm"),
-    *("output_holes.position.zone=dia 0.09 mm", "output_holes.coaxiality.zone=⌀0.018 mm"),
-    "pin3.angularity.zone=0.036 mm",
-]
 
 
 def load(folder, text=ENTRIES):
     (folder / "plan.toml").write_text(text, encoding="utf-8")
     return study.load(folder / "plan.toml")
-
-
-@pytest.mark.parametrize(
-    ("setting", "found"),
-    [
-        ("pin1.position.over=30 mm", "another shape"),
-        ("hole1.position.zone=⌀0.09 mm", "shares its room"),
-        ("hole1.perpendicularity.zone=⌀0.2 mm", "larger than the position's zone"),
-        ("pin3.angularity.about=t", "another shape"),
-        ("pin1.position.zone=0.09 mm", "must say that it is a diameter"),
-    ],
-)
-def test_changes_to_another_shape_are_refused(tmp_path, setting, found):
-    with pytest.raises(InputError, match=found):
-        changed(load(tmp_path), [setting])
 
 
 def test_zones_are_scaled_as_written(tmp_path):

@@ -1,6 +1,5 @@
 """The verdict on campaigns built to mislead: the same sentence in page, text and JSON, no more than the file tells."""
 
-import json
 import re
 
 import numpy as np
@@ -229,16 +228,6 @@ def test_joints_that_would_decide_count_those_without_a_result():
     assert needed(2 / 200, 0.02) > needed(0.0, 0.02)
     near = exceedance.limit_rows(view(failed=1, limits={"cross1.F": 2000.0}))[0]
     assert headline._deciding(near, 0.003) == "no number of joints would decide it"
-
-
-def test_the_command_line_takes_an_accepted_share(tmp_path):
-    path = interfering(tmp_path)
-    done = CliRunner().invoke(app, ["report", str(path), "--accept", "1 %"])
-    assert done.exit_code == 0
-    assert done.stdout.startswith("No verdict: 59 % of the joints have no result (36 of 61).\n")
-    told = CliRunner().invoke(app, ["export", str(path), "--statistics", "-", "--accept", "1 %"])
-    assert json.loads(told.stdout)["verdict"]["answer"] == "no verdict"
-    assert CliRunner().invoke(app, ["export", str(path), "--csv", "-", "--accept", "1 %"]).exit_code == 2
 
 
 @pytest.mark.parametrize(("method", "told"), [("sobol", True), ("lhs", True), ("random", False)])

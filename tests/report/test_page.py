@@ -399,26 +399,6 @@ def test_a_sweep_has_its_loads_against_the_swept_value(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "asked"),
-    [
-        (["--out", "p.html", "--accept", "5 %", "--replay", "0"], ("p.html", 0.05, 0)),
-        (["--out", "p.htm", "--accept", "100 ppm", "--replay", "7"], ("p.htm", 1e-4, 7)),
-    ],
-)
-def test_command_asks_for_a_page(path, tmp_path, monkeypatch, arguments, asked):
-    calls = []
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(page, "write_page", lambda *given: calls.append(given) or tmp_path / "written")
-    monkeypatch.setattr("tolstat.solver.compilation.announce", lambda: None)
-    done = CliRunner().invoke(app, ["report", str(path), *arguments])
-    assert (done.exit_code, done.stdout) == (0, "")
-    assert "wrote" in done.stderr
-    _, out, accepted, again, *_ = calls[0]
-    assert (str(out), again) == (asked[0], asked[2])
-    assert accepted == pytest.approx(asked[1])
-
-
-@pytest.mark.parametrize(
     ("arguments", "said"),
     [
         (["--out", "gone/p.html", "--accept", "much"], "is not a share"),

@@ -216,36 +216,6 @@ def test_numbers_need_neither_pandas_nor_matplotlib(tmp_path):
 
 
 @pytest.mark.slow
-def test_report_of_a_random_view(tmp_path):
-    path = synthetic.store(tmp_path, failed=2)
-    made = reports.build(path)
-    names = [f"small_{what}" for what in ("exceedance.png", "exceedance.svg", "exceedance.csv")]
-    names += ["small_quantiles.csv", "small_limits.csv"]
-    assert [file.name for file in made.files] == names
-    assert all(file.parent == tmp_path and file.stat().st_size > 500 for file in made.files)
-    assert made.table.splitlines()[0].startswith("67.2 % of the joints keep all 7 limits (39 of 58 with a valid load;")
-    assert made.table.splitlines()[1] == "Shafts rigid along their axes; contact law mode."
-    assert made.table.splitlines()[4].split()[:4] == ["load", "limit", "nominal", "above"]
-    assert len(made.table.splitlines()) == 4 + 1 + 7
-    assert "60 joints (random sampling), 2 failed, 0 not settled" in made.notes
-    limits = pd.read_csv(tmp_path / "small_limits.csv")
-    assert list(limits["n"]) == [60] * 7  # the nominal joint is not among them
-    assert (tmp_path / "small_exceedance.png").read_bytes().startswith(b"\x89PNG")
-
-
-@pytest.mark.slow
-def test_report_of_a_campaign_under_way_counts_what_is_pending(tmp_path):
-    made = reports.build(synthetic.store(tmp_path, simulated=31))
-    assert "30 joints (random sampling), 0 failed, 0 not settled, 30 still pending" in made.notes
-
-
-def test_report_of_a_file_that_has_just_been_made(tmp_path):
-    made = reports.build(synthetic.store(tmp_path, simulated=0))
-    assert "0 joints" in made.notes
-    assert [file.name for file in made.files[:2]] == ["small_exceedance.png", "small_exceedance.svg"]
-
-
-@pytest.mark.slow
 def test_report_without_limits_prints_quantiles(tmp_path):
     plain = synthetic.STUDY.partition("[limits]")[0]
     made = reports.build(synthetic.store(tmp_path, plain))

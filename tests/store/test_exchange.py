@@ -1,44 +1,19 @@
 """Campaigns handed to other programs: statistics as JSON, Parquet and xarray where they are installed."""
 
-import json
-
-import h5py
 import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
-from tests.questions.test_causes import made
 from tests.support import synthetic
 from tolstat import cli
 from tolstat.common.columns import ERROR_COLUMNS
 from tolstat.common.errors import InputError, StoreError
-from tolstat.common.loads import SHOWN_LOADS
-from tolstat.questions.capability import capability
-from tolstat.questions.exceedance.answer import exceedance
 from tolstat.report import answer as reports
 from tolstat.store import ResultFile, result_file
 
 
 def export(*arguments):
     return CliRunner().invoke(cli.app, ["export", *map(str, arguments)])
-
-
-def test_json_has_all_statistics_as_the_reports_have_them(tmp_path):
-    path, out = made(tmp_path, synthetic.STUDY.replace("n = 60", "n = 300")), tmp_path / "all.json"
-    done = export(path, "--statistics", out)
-    assert done.exit_code == 0
-    found = json.loads(out.read_text(encoding="utf-8"))
-    with ResultFile.open(path) as store:
-        view = store.view()
-        tables = (("exceedance", exceedance(view).frame("limits")), ("capability", capability(view).frame("limits")))
-        assert found["provenance"]["versions"] == store.versions
-    assert found["joints"] == {"ok": 295, "not_settled": 2, "newton_failed": 3}
-    for key, table in tables:
-        told = pd.DataFrame(found[key]["tables"]["limits"]["rows"]).astype(table.dtypes.to_dict())
-        pd.testing.assert_frame_equal(
-            told, table.replace([float("inf"), -float("inf")], float("nan")), check_exact=False
-        )
-    assert len(found["exceedance"]["tables"]["quantiles"]["rows"]) == 4 * len(SHOWN_LOADS)
 
 
 def test_statistics_are_of_a_sample(tmp_path):
@@ -69,17 +44,6 @@ def test_tables_are_written_block_by_block(tmp_path, monkeypatch):
         found.columns = found.columns.get_level_values(0)
         with ResultFile.open(source) as store:
             pd.testing.assert_frame_equal(found, store.to_pandas(nominal=True), check_dtype=False, check_names=False)
-
-
-def test_damage_is_found_before_anything_goes_to_standard_output(tmp_path, monkeypatch):
-    monkeypatch.setattr(result_file, "AT_ONCE", 7)
-    path = synthetic.store(tmp_path)
-    with h5py.File(path, "r+") as file:
-        file["errors/pin1.offset_t"][50] += 1e-6
-    done = export(path, "--csv", "-")
-    assert done.exit_code == 2
-    assert "errors/pin1.offset_t of rows 0:61 does not match its checksum" in done.stderr
-    assert not done.stdout
 
 
 def test_parquet_has_columns_units_and_rows(tmp_path):

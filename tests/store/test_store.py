@@ -313,24 +313,6 @@ def test_other_sources_of_the_same_version_are_refused(tmp_path: Path, monkeypat
             fakes.run(fakes.Study(), path, 1, check=True)
 
 
-def test_wrong_blocks_are_bugs(tmp_path: Path, study: fakes.Study) -> None:
-    rows = np.arange(3)
-    part = simulation(study, rows)
-    with new_store(tmp_path / "a.h5", study) as store:
-        with pytest.raises(ValueError, match="each row of a block needs"):
-            store.write(rows[:2], part)
-        with pytest.raises(ValueError, match="each row of a block needs"):
-            store.write(rows, Simulation(part.results, {}))
-        with pytest.raises(ValueError, match="each row of a block needs"):
-            store.write(rows, Simulation(part.results, part.histories | {"mode": np.zeros((3, 2), np.uint8)}))
-        part.results["status"][1] = Status.PENDING
-        with pytest.raises(ValueError, match="not pending"):
-            store.write(rows, part)
-        assert store.pending().size == 12
-        with pytest.raises(StoreError, match="holds no histories 'heat'"):
-            store.histories("heat")
-
-
 DOCUMENTS = [format_tables.FORMAT, format_tables.MODEL, format_tables.SCHEMA]
 
 

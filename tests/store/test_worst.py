@@ -6,9 +6,8 @@ import pytest
 from tests.support import synthetic, views
 from tests.support.cells import body, head
 from tolstat.common.tables import Status
-from tolstat.display.answer import Asked
 from tolstat.questions.causes.worst import _largest, joint_rows
-from tolstat.questions.exceedance.answer import exceedance, exceedance_on_page, limits_on_page
+from tolstat.questions.exceedance.answer import exceedance
 from tolstat.report import page
 from tolstat.report.headline import headline
 from tolstat.solver import stationary
@@ -124,20 +123,6 @@ def test_a_limit_of_all_points_holds_at_each(view):
     assert view.load("cross1.F at one").limit == 700.0
     assert view.load("cross1.F at two").limit == 900.0
     assert view.load("fork1.T").limit is None
-
-
-def test_the_page_names_points(tables):
-    limits = {"cross1.F": 700.0, "fork1.T at one": 50.0, "fork1.T at two": 50.0}
-    view = views.at_points(tables, limits)
-    (panels, _, at_each, *_) = limits_on_page(view, Asked(view.path)).blocks()
-    assert head(at_each) == ["load", "limit", "one", "two"]
-    assert any("largest load over all of them" in text.text for text in panels.beside)
-    found = exceedance_on_page(view, Asked(view.path)).blocks()
-    leading = found[0].panels
-    assert [panel.key for panel in leading if " " in panel.key] == []
-    (torque,) = [panel.reads for panel in leading if panel.reads[0].startswith("fork1.T at ")]
-    assert f"fork2.T{torque[0].removeprefix('fork1.T')}" in torque
-    assert {"fork1.T at one", "fork1.T at two"} < found[2].curves.keys()
 
 
 def test_the_page_names_a_point_without_a_valid_joint(tables):

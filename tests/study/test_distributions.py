@@ -119,11 +119,10 @@ def test_ppf_inverts_scipys_distribution_function(dist: Distribution, scipy_dist
 
 
 @pytest.mark.parametrize(("dist", "scipy_dist"), PAIRS)
-def test_distribution_function_and_density_are_scipys(dist: Distribution, scipy_dist: stats.rv_continuous) -> None:
+def test_distribution_function_is_scipys(dist: Distribution, scipy_dist: stats.rv_continuous) -> None:
     low, high = dist.ppf(np.array([1e-6, 1 - 1e-6]))
     x = np.concatenate([np.linspace(low, high, 40), [-30.0, low - 1.0, high + 1.0, 30.0]])  # ends of densities differ
     np.testing.assert_allclose(dist.cdf(x), scipy_dist.cdf(x), rtol=1e-9, atol=1e-14)
-    np.testing.assert_allclose(dist.logpdf(x), scipy_dist.logpdf(x), rtol=1e-9, atol=1e-14)
 
 
 @pytest.mark.parametrize(("dist", "scipy_dist"), PAIRS)
@@ -146,7 +145,7 @@ def test_share_outside_a_band(dist: Distribution, scipy_dist: stats.rv_continuou
 def test_distribution_function_inverts_ppf(band: tuple[float, float], share: float) -> None:
     u = np.linspace(1e-3, 0.999, 50)
     for dist in each_kind(*band, share):
-        if not dist.discrete:
+        if not isinstance(dist, distributions.Measured):
             position = np.spacing(np.abs(dist.ppf(u))).max() / (band[1] - band[0])  # a digit of the value
             np.testing.assert_allclose(dist.cdf(dist.ppf(u)), u, rtol=1e-9, atol=1e3 * position)
 
@@ -184,7 +183,6 @@ def test_measured_parts_count_up_to_and_including_a_value() -> None:
     np.testing.assert_allclose(
         distributions.score(dist, np.array([0.0, 1.0, 2.0, 3.0])), [-9.0, *stats.norm.ppf([1 / 8, 1 / 2, 7 / 8])]
     )
-    np.testing.assert_allclose(np.exp(dist.logpdf(np.array([2.0, 3.0, 2.5]))), [0.5, 0.25, 0.0])
 
 
 def test_accepted_and_rescaled_distributions_follow_from_others() -> None:
@@ -217,13 +215,6 @@ def test_measured_draws_each_value_equally_often() -> None:
     np.testing.assert_array_equal(dist.ppf(np.array([1e-9, 0.25, 0.26, 0.5, 0.75, 0.76, 1.0])), [1, 1, 2, 2, 2, 3, 3])
     assert dist.describe() == distributions.Measured.of([1.0, 2.0, 2.0, 3.0]).describe()
     assert dist.describe() != distributions.Measured.of([1.0, 2.0, 3.0, 3.0]).describe()
-
-
-def test_densities_of_rejected_radii() -> None:
-    inside, cut = np.array([0.1, 0.9]), Rayleigh(0.7, 1.0)
-    np.testing.assert_allclose(cut.logpdf(inside), Rayleigh(0.7).logpdf(inside) - np.log(stats.rayleigh.cdf(1 / 0.7)))
-    assert cut.logpdf(np.array([1.1, -0.1])).tolist() == [-np.inf, -np.inf]
-    assert cut.cdf(np.array([-0.1, 1.0, 1.1])) == pytest.approx([0.0, 1.0, 1.0])
 
 
 def test_each_kind_describes_itself() -> None:

@@ -14,7 +14,6 @@ from tolstat import joint, sampling, study
 from tolstat.campaign import plan
 from tolstat.common.errors import InputError
 from tolstat.study import scaling
-from tolstat.study.scaling import changed
 from tolstat.study.starter import joint_text
 from tolstat.study.tolerances import distributions, fits, iso
 
@@ -113,12 +112,6 @@ def test_drawn_clearances_lie_within_the_zones() -> None:
     assert clearance[0] == pytest.approx(30e-6, rel=1e-9)
     assert ((clearance > 15e-6) & (clearance < 45e-6)).all()
     assert np.ptp(clearance) > 5e-6
-
-
-def test_a_fit_is_two_tolerances_for_changes() -> None:
-    found = changed(load(H7_F7), ["hole*.diameter.cpk=2.0"])
-    assert found["hole2.diameter"] == distributions.Normal(0.0, 2.5e-6)
-    assert found["pin2.diameter"] == distributions.Normal(0.0, 5e-6)
 
 
 @pytest.mark.parametrize("contact", ["", 'contact.law = "uniform"', '[joint.contact]\nlaw = "uniform"'])

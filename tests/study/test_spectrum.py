@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import runpy
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,10 +11,7 @@ from typer.testing import CliRunner
 from tests.conftest import ROOT
 from tests.study.test_signals import write
 from tolstat import study
-from tolstat.analysis import cycles
 from tolstat.cli import app
-from tolstat.questions.fatigue.loads import load_cycles
-from tolstat.store import ResultFile
 from tolstat.study import spectrum as spectra
 
 SIGNAL = ROOT / "studies" / "drive_cycle.csv"
@@ -117,35 +113,6 @@ def test_nothing_is_written_of_a_signal_or_a_base_with_faults(tmp_path):
     assert done.exit_code == 2
     assert "no operating point 'drive'" in done.stderr
     assert not path.exists()
-
-
-@pytest.mark.slow
-def test_signal_to_study_to_page_to_fatigue(tmp_path, monkeypatch):
-    """Welds of the duty cycle in the made signal, with few joints; without the sequence they are damaged less."""
-    monkeypatch.chdir(tmp_path)
-    text = (ROOT / "studies" / "duty_cycle.toml").read_text().replace('"cross*.F at drive" = "2.5 kN"\n', "")
-    (tmp_path / "base.toml").write_text(text + '\n[solver]\nfidelity = "quasistatic"\nsteps_per_rev = 36\n')
-    call = CliRunner().invoke
-    for command in (
-        ["spectrum", str(SIGNAL), "--out", "cycle.toml", "--base", "base.toml"],
-        ["run", "cycle.toml", "--n", "6", "--workers", "1", "--no-verify"],
-        ["report", "cycle.h5", "--out", "cycle.html"],
-        ["fatigue", "cycle.h5", "--by", "cross1.F_t", "--json"],
-    ):
-        done = call(app, command)
-        assert done.exit_code == 0, (command, done.stderr)
-    assert "Fatigue" in (tmp_path / "cycle.html").read_text()
-    with ResultFile.open(tmp_path / "cycle.h5") as file:
-        view = file.view()
-        with_sequence = load_cycles([view], names=("cross1.F_t",))
-        visited = set(with_sequence.settings.visits)
-    assert len(visited) > 6
-    sums = cycles.moment(with_sequence.cycles, 3.0)
-    alone = replace(with_sequence.settings, visits=())
-    monkeypatch.setattr("tolstat.questions.fatigue.duty.settings_of", lambda *_: alone)
-    with ResultFile.open(tmp_path / "cycle.h5") as file:
-        without = cycles.moment(load_cycles([file.view()], names=("cross1.F_t",)).cycles, 3.0)
-    assert (sums > without).all()
 
 
 def test_the_signal_of_studies_is_made_by_the_script(tmp_path, monkeypatch):

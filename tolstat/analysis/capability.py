@@ -134,7 +134,7 @@ def _normal(sample: Sample, limit: float, confidence: float) -> Estimate[float]:
     middle, upper, high = np.quantile(valid, (0.5, 0.75, 0.95))
     if n >= FEWEST_MOMENTS and high - middle > LONGEST_TAIL * (upper - middle):
         return NONE
-    if n < FEWEST_MOMENTS or not sample.design.has_interval("index"):
+    if n < FEWEST_MOMENTS or not sample.design.independent:
         return NONE._replace(estimate=index)
     scores, z = (valid - mean) / valid.std(), 3.0 * index
     skewness, kurtosis = (scores**3).mean(), (scores**4).mean()
@@ -149,7 +149,7 @@ def _of_quantiles(sample: Sample, limit: float, confidence: float) -> Estimate[f
     each = 0.5 * (1.0 + confidence)
     middle, high = (sample.quantile(share, each) for share in (0.5, REFERENCE))
     index = float(_index(limit, middle.estimate, high.estimate))
-    if not sample.design.has_interval("index"):
+    if not sample.design.independent:
         return NONE._replace(estimate=index)
     if not middle.upper < high.lower:
         return Estimate(index, -np.inf, np.inf)

@@ -18,9 +18,6 @@ from tolstat.analysis.binomial import clopper_pearson, half_width
 from tolstat.analysis.estimates import Column, Estimate
 from tolstat.common.loads import FloatArray
 
-Claim = Literal["share", "quantile", "mean", "difference", "index", "band", "delivery"]
-"""What is estimated from joints. An index is one of capability or of sensitivity, or a number of joints needed; a band
-holds for a whole curve."""
 FEW = 20
 """Number of joints on a side of a level below which an interval over units contains that of independent joints, too."""
 SAMPLE = 'give the file of a study with sampling.method "random", "sobol" or "lhs"'
@@ -35,8 +32,10 @@ class Design:
     ----------
     is_sample : bool
         Whether the joints are a sample of a production.
-    claims : frozenset of str
-        Claims that have an interval.
+    has_intervals : bool
+        Whether shares and quantiles have intervals.
+    independent : bool
+        Whether the joints are independent of each other: then every estimate has an interval.
     interval : str
         Name of the interval of a share.
     covers : str
@@ -53,7 +52,8 @@ class Design:
     """
 
     is_sample: bool = True
-    claims: ClassVar[frozenset[Claim]] = frozenset()
+    has_intervals: ClassVar[bool] = False
+    independent: ClassVar[bool] = False
     interval: str = ""
     covers: str = "no intervals: Clopper–Pearson holds for independent samples only"
     of_quantiles: ClassVar[str] = "of order statistics"
@@ -85,17 +85,14 @@ class Design:
         """Return the design of some of the joints; by default the same."""
         return self
 
-    def refuses(self, claim: Claim) -> tuple[str, str] | None:
-        """Return why the joints give no estimate of a claim, and the remedy, of file ``{path}``; None if they do."""
+    def refuses(self) -> tuple[str, str] | None:
+        """Return why the joints give no estimate, and the remedy, of file ``{path}``; None if they do."""
         return None
 
-    def without_interval(self, claim: Claim) -> str:
+    def without_interval(self, claim: Literal["share", "mean"]) -> str:
         """Return why an estimate has no interval, with the remedy; empty if it has one."""
-        return "" if claim in self.claims else f"the joints depend on each other: a {claim} has no interval"
-
-    def has_interval(self, claim: Claim) -> bool:
-        """Whether a claim has an interval."""
-        return claim in self.claims
+        has_interval = self.has_intervals if claim == "share" else self.independent
+        return "" if has_interval else f"the joints depend on each other: a {claim} has no interval"
 
     def units(self, n: int) -> NDArray[np.intp]:
         """Number of the unit of each of n joints, (n,): units are independent of each other."""
@@ -120,17 +117,15 @@ class Design:
         lower, upper : float
             Whole numbers, ends included; NaN without an interval.
         """
-        if "delivery" not in self.claims:
-            return np.nan, np.nan
         at, half = np.array([level]), prediction.half(confidence)
         low, high = self.shares(lower, at, half).lower[0], self.shares(upper, at, half).upper[0]
         return prediction.of_share(float(low), float(high), number, confidence)
 
 
 class Independent(Design):
-    """Joints drawn one by one from the tolerances: every claim has an interval."""
+    """Joints drawn one by one from the tolerances."""
 
-    claims = frozenset(("share", "quantile", "mean", "difference", "index", "band", "delivery"))
+    has_intervals = independent = True
     interval = "Clopper–Pearson's"
     covers = "bands: pointwise 95 % Clopper–Pearson intervals of the settled joints"
 
@@ -148,7 +143,7 @@ class Independent(Design):
 
 
 class Listed(Design):
-    """Joints that depend on each other, so that no claim has an interval.
+    """Joints that depend on each other, so that no estimate has an interval.
 
     Parameters
     ----------
@@ -160,7 +155,7 @@ class Listed(Design):
         self._method = method
         self.is_sample = method in (*WITHOUT_INTERVAL, "random")
 
-    def refuses(self, claim: Claim) -> tuple[str, str] | None:
+    def refuses(self) -> tuple[str, str] | None:
         """See `Design.refuses`."""
         if self._method == "subset":
             remedy = "print its probability: tolstat rare {path}"
@@ -169,7 +164,7 @@ class Listed(Design):
             return "holds joints that are no sample of a production", SAMPLE
         return None
 
-    def without_interval(self, claim: Claim) -> str:
+    def without_interval(self, claim: Literal["share", "mean"]) -> str:
         """See `Design.without_interval`."""
         return without_interval(self._method) or super().without_interval(claim)
 
@@ -187,7 +182,7 @@ class Replicated(Design):
         Sampling method.
     """
 
-    claims = frozenset(("share", "quantile", "delivery"))
+    has_intervals = True
     of_quantiles = "over replicates"
     ranks_at_once = 2000
     innermost = True  # ends of shares are wider where few joints are above
@@ -207,56 +202,16 @@ class Replicated(Design):
         above, joints = counts_by_group(x, self._blocks, levels)
         estimate = self.estimate(x, levels)
         with np.errstate(invalid="ignore"):
-            each = _students_t(above / joints[:, None], confidence, 0.0, 1.0)
-        lower = np.fmin(each.lower, np.nan_to_num(estimate, nan=0.0))
-        upper = np.fmax(each.upper, np.nan_to_num(estimate, nan=1.0))
+            each = above / joints[:, None]
+        half = half_width(confidence, len(each) - 1) * each.std(axis=0, ddof=1) / np.sqrt(len(each))
+        mean = each.mean(axis=0)
+        lower = np.fmin(np.maximum(mean - half, 0.0), np.nan_to_num(estimate, nan=0.0))
+        upper = np.fmax(np.minimum(mean + half, 1.0), np.nan_to_num(estimate, nan=1.0))
         return or_independent(Estimate(estimate, lower, upper), x, levels, confidence)
 
     def only(self, joints: NDArray[np.intp] | NDArray[np.bool_]) -> Design:
         """See `Design.only`: parts of replicates are no replicates."""
         return Listed(self._method)
-
-
-def over_replicates(
-    estimates: ArrayLike, confidence: float = 0.95, least: float = -np.inf, most: float = np.inf
-) -> Estimate[FloatArray]:
-    """Student's t interval of the expectation of an estimator, from independent replicates (Owen 2013, 17.4).
-
-    The expectation is the true value for shares and means, which are unbiased. A quantile of few joints is biased, and
-    more replicates do not reduce the bias. With few replicates of a skew distribution the coverage is too low.
-
-    Parameters
-    ----------
-    estimates : array_like, shape (r, ...)
-        Any statistics of each of r >= 2 replicates, each with its own seed and the same number of joints.
-    confidence : float
-        Confidence level of each interval by itself.
-    least, most : float
-        Bounds of the quantity, such as 0 and 1 for shares.
-
-    Returns
-    -------
-    Estimate of ndarray, shape (...)
-        Mean of the replicates and its interval.
-
-    Raises
-    ------
-    ValueError
-        When there are fewer than two replicates, or they agree in every digit, as replicates of one seed do.
-    """
-    values = np.asarray(estimates, dtype=float)
-    n = len(values) if values.ndim else 0
-    if n < 2:
-        raise ValueError(f"{n} replicates: give two or more, of different sampling.seed")
-    if n * values[0].size > 2 and (values == values[0]).all() and not np.isin(values[0], (least, most)).all():
-        raise ValueError("the replicates are all equal: give campaigns of different sampling.seed")
-    return _students_t(values, confidence, least, most)
-
-
-def _students_t(values: FloatArray, confidence: float, least: float, most: float) -> Estimate[FloatArray]:
-    n, mean = len(values), values.mean(axis=0)
-    half = half_width(confidence, n - 1) * values.std(axis=0, ddof=1) / np.sqrt(n)
-    return Estimate(mean, np.maximum(mean - half, least), np.minimum(mean + half, most))
 
 
 def without_interval(method: str) -> str:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tolstat.analysis.binomial import clopper_pearson, half_width
-from tolstat.analysis.design import Claim, Design
+from tolstat.analysis.design import Design
 from tolstat.analysis.estimates import Column, Estimate, Quantile
 from tolstat.analysis.sample import Sample
 from tolstat.common.late import special
@@ -116,7 +116,7 @@ def shares(a: Sample, b: Sample, levels: ArrayLike, paired: bool, confidence: fl
         for x, y in ((a.value, b.value), (a.upper, b.lower), (a.lower, b.upper))
     )
     p = np.full(level.shape, np.nan)
-    if paired and _have_interval(a.design, b.design, "difference"):
+    if paired and a.design.independent and b.design.independent:
         only_a, only_b = fields[3:5]
         p = np.minimum(2.0 * special.bdtr(np.minimum(only_a, only_b) + 0.0, np.maximum(only_a + only_b, 1), 0.5), 1.0)
     return ShareDifference._make((*fields, p, least[5], most[5], least[6], most[7]))
@@ -149,7 +149,7 @@ def quantiles(a: Sample, b: Sample, share: float, paired: bool, confidence: floa
     of_a, of_b = (side.quantile(share, confidence) for side in (a, b))
     estimate = of_b.estimate - of_a.estimate
     lower, upper = np.nan, np.nan
-    known = _have_interval(a.design, b.design, "difference" if paired else "quantile")
+    known = all(side.design.independent if paired else side.design.has_intervals for side in (a, b))
     if known and paired and min(share, 1.0 - share) * x.size >= BEYOND:
         tail = 0.5 * (1.0 - confidence)
         resampled = np.quantile(_resampled(x, y, share), [tail, 1.0 - tail], method="inverted_cdf")
@@ -183,7 +183,7 @@ def means(a: Sample, b: Sample, paired: bool, confidence: float = 0.95) -> Diffe
     a, b = _valid(a, b, paired)
     x, y = a.values, b.values
     of_a, of_b = float(x.mean()), float(y.mean())
-    if not _have_interval(a.design, b.design, "difference") or min(x.size, y.size) < 2:
+    if not (a.design.independent and b.design.independent) or min(x.size, y.size) < 2:
         return Difference(of_a, of_b, of_b - of_a, np.nan, np.nan)
     if paired:
         error, degrees = float(np.std(y - x, ddof=1) / np.sqrt(x.size)), x.size - 1.0
@@ -194,10 +194,6 @@ def means(a: Sample, b: Sample, paired: bool, confidence: float = 0.95) -> Diffe
         degrees = parts.sum() ** 2 / inverse if inverse else x.size + y.size - 2.0
     half = float(half_width(confidence, degrees)) * error
     return Difference(of_a, of_b, of_b - of_a, of_b - of_a - half, of_b - of_a + half)
-
-
-def _have_interval(a: Design, b: Design, claim: Claim) -> bool:
-    return a.has_interval(claim) and b.has_interval(claim)
 
 
 def _valid(a: Sample, b: Sample, paired: bool) -> tuple[Sample, Sample]:
@@ -222,7 +218,7 @@ def _pairs(x: Column, y: Column, a: Design, b: Design, level: FloatArray, confid
     with np.errstate(divide="ignore", invalid="ignore"):  # multinomial counts: negatively correlated
         correlation = -np.nan_to_num(np.sqrt(p * q / ((1.0 - p) * (1.0 - q))))
     lower, upper = _recovered((q - lower_q, upper_q - q), (p - lower_p, upper_p - p), correlation)
-    if not _have_interval(a, b, "difference"):
+    if not (a.independent and b.independent):
         lower = upper = np.full(level.shape, np.nan)
     shares = Column(of_a).above(level) / n, Column(of_b).above(level) / n
     return *shares, n, only_a, only_b, q - p, q - p - lower, q - p + upper

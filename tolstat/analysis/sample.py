@@ -223,7 +223,7 @@ class Sample:
     def _interval(self, share: float, confidence: float) -> tuple[float, float]:
         """Ends of the interval of a quantile."""
         loads, n = self.valid, self.value.n
-        if not self.design.has_interval("quantile"):
+        if not self.design.has_intervals:
             return np.nan, np.nan
         below = np.append(np.nextafter(loads[:1], -np.inf), loads[:-1])
 

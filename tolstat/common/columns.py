@@ -109,8 +109,6 @@ SUBSET_FIELDS = (
     Field("level", "1", "level of the subset simulation: 0 is drawn from the tolerances, -1 the nominal joint", "i4"),
     Field("parent", "1", "row of the joint whose errors were moved to give these; -1 at level 0", "i8"),
 )
-DRAWN_FIELDS: dict[str, tuple[Field, ...]] = {"subset": SUBSET_FIELDS}
-"""Columns of the table by sampling method; other methods have no such table."""
 SUBSET = dtype_of(SUBSET_FIELDS)
 
 METHODS = {
@@ -132,4 +130,4 @@ def drawn_columns(sampling: Mapping[str, Any]) -> tuple[Column, ...]:
     sampling : mapping
         The attribute ``sampling`` of a result file.
     """
-    return flat(DRAWN_FIELDS.get(sampling["method"], ()))
+    return flat(SUBSET_FIELDS) if sampling["method"] == "subset" else ()

@@ -128,7 +128,7 @@ def allocate(view: View, targets: Targets, costs: Costs = None, keep: Keep = Non
     NotApplicable
         When the file holds no joint of a search for these targets; `simulate` adds them.
     StoreError
-        When the file's joints are not drawn from tolerances, or differ in weight.
+        When the file's joints are not drawn from tolerances.
     """
     request = _read_request(view, targets, costs, keep or (), most)
     run = _Run(view, request, view.altered)

@@ -104,8 +104,8 @@ def capability(
     if not view.limits or view.method in ("sweep", "cases"):
         remedy = 'give the result file of a study with [limits] and sampling.method "random", "sobol" or "lhs"'
         raise shares.inapplicable(view, "has no limits, or its joints are no random sample", remedy)
-    view.check("index")
-    rows = limit_rows(view, delivery=delivery)
+    view.check()
+    rows = limit_rows(view, delivery)
     parts: list[Part] = [Table("limits", "Against each limit, and all of them together", LIMITS, rows)]
     parts += of_lots(view, delivery)
     notes = [Sentence(note) for note in (*_notes(rows), error_budget.unknown(view)) if note]
@@ -120,7 +120,7 @@ def capability(
 
 def capability_on_page(view: View, asked: Asked) -> Answer:
     """Capability against the limits, if there are any, and rare loads of the leading loads."""
-    if not (view.sampled and view.count(*VALID)) or view.design.refuses("index"):
+    if not (view.sampled and view.count(*VALID)) or view.design.refuses():
         raise NotApplicable
     parts = list(capability(view).parts) if view.limits else []
     rare = [row for name in view.leading for row in return_rows(view, name, ON_PAGE)]
@@ -131,15 +131,13 @@ def capability_on_page(view: View, asked: Asked) -> Answer:
     return Answer("capability", "Capability and rare loads" if view.limits else "Rare loads", parts)
 
 
-def limit_rows(view: View, confidence: float = 0.95, delivery: int = DELIVERY) -> Rows:
+def limit_rows(view: View, delivery: int = DELIVERY) -> Rows:
     """Capability against each limit, and against all limits together.
 
     Parameters
     ----------
     view : View
         A campaign of a study with limits.
-    confidence : float
-        Confidence level of the intervals.
     delivery : int
         Number of joints of the next delivery.
 
@@ -156,8 +154,8 @@ def limit_rows(view: View, confidence: float = 0.95, delivery: int = DELIVERY) -
     """
     rows = []
     for load in view.loads([*view.limits, ANY_LIMIT]):
-        row = dict(shares.good(view, load.name, confidence, delivery))
-        index = indices.of_sample(load, row["limit"], confidence)
+        row = dict(shares.good(view, load.name, delivery))
+        index = indices.of_sample(load, row["limit"])
         both = shares.with_ends("cpk", index.cpk) | shares.with_ends("cpk_normal", index.cpk_normal)
         if shares.unresolved_matter(row):
             both = dict.fromkeys(both, np.nan)
@@ -186,7 +184,7 @@ def of_lots(view: View, delivery: int = DELIVERY) -> list[Part]:
         return []
     rows = []
     for load in view.loads([*view.limits, ANY_LIMIT]):
-        good = shares.good(view, load.name, delivery=delivery)
+        good = shares.good(view, load.name, delivery)
         above, joints = view.design.counts(load.value, [good["limit"]])
         of_lot = above[joints > 0, 0] / joints[joints > 0]
         if len(of_lot) < LEAST:
@@ -199,7 +197,7 @@ def of_lots(view: View, delivery: int = DELIVERY) -> list[Part]:
     return [Table("lots", "Which share of a lot is above each limit", LOTS, rows), Sentence(words)]
 
 
-def return_rows(view: View, name: str, one_in: Sequence[float], confidence: float = 0.95) -> Rows:
+def return_rows(view: View, name: str, one_in: Sequence[float]) -> Rows:
     """Return loads, "1 in N joints": quantiles, as far as the joints reach.
 
     Parameters
@@ -210,8 +208,6 @@ def return_rows(view: View, name: str, one_in: Sequence[float], confidence: floa
         Load.
     one_in : sequence of float
         Numbers of joints N, above one.
-    confidence : float
-        Confidence level of the intervals.
 
     Returns
     -------
@@ -222,7 +218,7 @@ def return_rows(view: View, name: str, one_in: Sequence[float], confidence: floa
     """
     load, rows = view.load(name), []
     for number in one_in:
-        found = load.quantile(1.0 - 1.0 / number, confidence)._asdict()
+        found = load.quantile(1.0 - 1.0 / number)._asdict()
         reached = number <= load.valid.size
         row: dict[str, Any] = {"load": name, "unit": load.unit, "one_in": number}
         rows.append(row | {key: found[key] if reached else math.nan for key in FIGURES})

@@ -20,6 +20,7 @@ from tolstat.common.loads import ANY_LIMIT, FloatArray, unit_text
 from tolstat.display import text
 from tolstat.display.answer import Answer, Column, Part, Row, Sentence, Table
 from tolstat.display.options import Accepted, Budget, Opt, Settings
+from tolstat.display.verdict import WORDS
 from tolstat.questions.shares import (
     ChangedJoints,
     Simulation,
@@ -28,6 +29,7 @@ from tolstat.questions.shares import (
     inapplicable,
     own_joints,
     sample_of,
+    side_of,
     study_documents,
     unusable,
     with_ends,
@@ -112,7 +114,7 @@ def change(view: View, settings: Settings, accepted: Accepted = math.nan) -> Ans
     NotApplicable
         When the file holds no joints with this change; `simulate` adds them.
     StoreError
-        When the joints are not drawn from tolerances, or differ in weight.
+        When the joints are not drawn from tolerances.
     """
     asked = _Asked(view, settings)
     joints = ChangedJoints(view, view.decisive, view.altered)
@@ -131,8 +133,9 @@ def change(view: View, settings: Settings, accepted: Accepted = math.nan) -> Ans
     if rows:
         first = rows[0]
         facts |= {f"yield_{when}": 1.0 - first[when] for when in ("before", "after")}
-        sides = [side_of((first[f"{when}_lower"], first[f"{when}_upper"]), accepted) for when in ("before", "after")]
-        facts |= {"verdict_before": sides[0] or None, "verdict_after": sides[1] or None}
+        ends = [(first[f"{when}_lower"], first[f"{when}_upper"]) for when in ("before", "after")]
+        sides = [WORDS.get(side_of(interval, accepted)) for interval in ends]
+        facts |= {"verdict_before": sides[0], "verdict_after": sides[1]}
         facts |= {"turns": set(sides) == {"kept", "not kept"}}
         parts += [Sentence(line, "lead") for line in _sentences(view, first, sides, accepted)]
         parts.append(Table("limits", "Share of the joints above each limit, before and after", LIMITS, rows))
@@ -190,15 +193,7 @@ def _pairs(joints: ChangedJoints, asked: _Asked) -> tuple[FloatArray, FloatArray
     return joints.base[:n], values[:n]
 
 
-def side_of(interval: Sequence[float], accepted: float) -> str:
-    """``kept`` if an interval lies below the accepted share, ``not kept`` above it, else ``open``; empty if none is."""
-    low, high = interval
-    if math.isnan(accepted):
-        return ""
-    return "kept" if high <= accepted else "not kept" if low > accepted else "open"
-
-
-def _sentences(view: View, row: Row, sides: Sequence[str], accepted: float) -> list[str]:
+def _sentences(view: View, row: Row, sides: Sequence[str | None], accepted: float) -> list[str]:
     """What the change does to the share above the limits, and to the verdict."""
     before, after = (_with_interval(row, when) for when in ("before", "after"))
     event = "at least one limit" if row["load"] == ANY_LIMIT else text.limit(row)

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.analysis import difference
-from tolstat.analysis.design import Claim
 from tolstat.analysis.sample import Sample
 from tolstat.common.columns import DRAWN
 from tolstat.common.counts import Counts
@@ -57,8 +56,8 @@ class Sides(NamedTuple):
     @property
     def has_intervals(self) -> bool:
         """Whether differences of shares have intervals."""
-        claim: Claim = "difference" if self.paired else "share"
-        return all(view.design.has_interval(claim) for view in self.views)
+        designs = [view.design for view in self.views]
+        return all(design.independent if self.paired else design.has_intervals for design in designs)
 
     @property
     def rows(self) -> NDArray[np.intp]:

@@ -197,11 +197,11 @@ def their_errors(view: View) -> Rows:
     bad = np.isin(view.status[samples], (*FAILED, *UNSETTLED))
     if min(int(bad.sum()), int((~bad).sum())) < ranks.FEWEST:
         return []
-    if view.method == "sweep" or view.design.refuses("difference"):
+    if view.method == "sweep" or view.design.refuses():
         return []
     scores = sampling.normal_scores(view.study, view.errors(samples))
     scores = {name: column for name, column in scores.items() if np.ptp(column) > 0}
-    tail = ranks.tail(np.column_stack(list(scores.values())), bad, iid=view.design.has_interval("difference"))
+    tail = ranks.tail(np.column_stack(list(scores.values())), bad, iid=view.design.independent)
     columns = {"error": np.array(list(scores))}
     for key, part in tail._asdict().items():
         columns |= {key: part.estimate, f"{key}_lower": part.lower, f"{key}_upper": part.upper, f"{key}_p": part.p}

@@ -97,7 +97,7 @@ def shafts(view: View) -> Answer:
         When the joints are no sample of a production.
     """
     pair = _places(view)
-    view.check("index")
+    view.check()
     parts: list[Part] = []
     if names := list(dict.fromkeys((*pair.first.limits, *pair.second.limits))):
         rows = [_limit(pair, name) for name in (*names, ANY_LIMIT)]

@@ -14,7 +14,7 @@ import numpy as np
 from tolstat.analysis import binomial, difference
 from tolstat.analysis.estimates import Exceedance
 from tolstat.analysis.prediction import DELIVERY
-from tolstat.analysis.sample import Sample, total_interval
+from tolstat.analysis.sample import CONFIDENCE, Sample, total_interval
 from tolstat.campaign import what_if as sets
 from tolstat.campaign.what_if import Change
 from tolstat.campaign.work import Work
@@ -153,7 +153,7 @@ def check_sample(view: View) -> None:
         Joints are not drawn from tolerances, or are a part of the campaign's. The hint names what can be used.
     """
     view.check_drawn()
-    view.check("difference")
+    view.check()
     if not view.store.whole:
         remedy = "merge all slices first: tolstat merge SLICE... --out FILE"
         raise unusable(view, "holds a part of the campaign only", remedy)
@@ -167,25 +167,33 @@ def grouped(reasons: Iterable[tuple[str, str]]) -> str:
     return "; ".join(f"{', '.join(names)}: {reason}" for reason, names in loads.items())
 
 
-def good(view: View, name: str = ANY_LIMIT, confidence: float = 0.95, delivery: int = DELIVERY) -> Mapping[str, Any]:
+def good(view: View, name: str = ANY_LIMIT, delivery: int = DELIVERY) -> Mapping[str, Any]:
     """Yield, joints above in a million and in the next delivery: the keys of `capability.limit_rows` but indices."""
-    return view.kept(("good", name, confidence, delivery), lambda: _good(view, name, confidence, delivery))
+    return view.kept(("good", name, delivery), lambda: _good(view, name, delivery))
 
 
-def _good(view: View, name: str, confidence: float, delivery: int) -> Mapping[str, Any]:
+def _good(view: View, name: str, delivery: int) -> Mapping[str, Any]:
     load = view.load(name)
     assert load.limit is not None
-    loads, above = error_budget.with_error(view, load), load.above(load.limit, confidence)
+    loads, above = error_budget.with_error(view, load), load.above(load.limit)
     row = {"load": load.name, "unit": load.unit, "limit": load.limit, **counts(above)}
-    share, low, high = above.estimate, *total_interval(loads, load.limit, confidence)
+    share, low, high = above.estimate, *total_interval(loads, load.limit, CONFIDENCE)
     row |= with_ends("good", (1.0 - share, 1.0 - high, 1.0 - low))
     row |= with_ends("ppm", (1e6 * share, 1e6 * low, 1e6 * high))
-    return row | error_budget.delivery(loads, load.limit, delivery, confidence)
+    return row | error_budget.delivery(loads, load.limit, delivery, CONFIDENCE)
 
 
 def counts(above: Exceedance) -> dict[str, int]:
     """Columns of a table: numbers of joints, of those without a valid load, and of those above a level."""
     return {"n": above.n, "n_failed": above.n_failed, "n_unsettled": above.n_unsettled, "count": above.count}
+
+
+def side_of(interval: Sequence[float], accepted: float) -> str:
+    """``yes`` if an interval lies below the accepted share, ``no`` above it, ``open``; empty if one is unknown."""
+    low, high = interval
+    if math.isnan(accepted) or math.isnan(low):
+        return ""
+    return "yes" if high <= accepted else "no" if low > accepted else "open"
 
 
 class Yield(NamedTuple):
@@ -379,7 +387,7 @@ def tail_level(load: Sample) -> float:
 
 def own_joints(view: View) -> int:
     """Number of samples of the campaign, from the first, that serve as joints as drawn: none of them pending."""
-    if not view.design.has_interval("difference"):
+    if not view.design.independent:
         return 0
     waiting = np.flatnonzero(view.status == Status.PENDING)
     return int(waiting[0]) if waiting.size else view.n

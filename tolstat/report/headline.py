@@ -102,7 +102,7 @@ def _sentence(view: View, row: table.Row, accepted: float, answer: str, standing
     elif answer == "yes":
         words = f"at most {most} exceed {limit} ({share}, {interval}){behind}"
     else:
-        if answer == "open" and view.design.has_interval("index"):
+        if answer == "open" and view.design.independent:
             words += f"; {_deciding(row, accepted)}"
         words += f". {behind}" if behind else ""
     return value, words + _not_varied(view, standing)
@@ -126,7 +126,7 @@ def _without_errors(view: View) -> str:
 
 def tells_yield(view: View) -> bool:
     """Whether the share of the joints that keep all limits can be told: of joints that count equally, with a load."""
-    return view.design.refuses("index") is None and bool(view.count(*VALID))
+    return view.design.refuses() is None and bool(view.count(*VALID))
 
 
 def _decisive(view: View, records: Sequence[table.Row]) -> table.Row:

@@ -20,16 +20,15 @@ from numpy.typing import NDArray
 from tolstat.common import tables
 from tolstat.common.columns import (
     DESIGN_COLUMNS,
-    DRAWN_FIELDS,
     ERROR_COLUMNS,
     OPTIONAL_FIELDS,
+    SUBSET,
     Column,
     drawn_columns,
     kept_columns,
 )
 from tolstat.common.counts import Counts, Session
 from tolstat.common.errors import Fault, StoreError
-from tolstat.common.fields import dtype_of
 from tolstat.common.tables import Status
 from tolstat.joint import Operation
 from tolstat.store import layout, metadata
@@ -304,8 +303,7 @@ class Reader:
         if not columns:
             remedy = "give the result file of tolstat rare"
             raise store_error(self.path, "has no record of how its joints were drawn", remedy)
-        dtype = dtype_of(DRAWN_FIELDS[self.sampling["method"]])
-        return self._table("origin", columns, dtype, slots, dtype.names or ())
+        return self._table("origin", columns, SUBSET, slots, SUBSET.names or ())
 
     def histories(self, name: str, slots: NDArray[np.intp] | None = None) -> NDArray[Any]:
         """Read the histories of one kind.

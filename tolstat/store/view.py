@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tolstat.analysis import accuracy
-from tolstat.analysis.design import SAMPLE, Claim, Design
+from tolstat.analysis.design import SAMPLE, Design
 from tolstat.analysis.estimates import frozen
 from tolstat.analysis.sample import Sample, largest_of
 from tolstat.common.columns import METHODS, holds
@@ -181,7 +181,7 @@ class View:
         """
         if name not in self._loads:
             if self.method == "subset":
-                self.check("share")
+                self.check()
             if name == ANY_LIMIT and self.limits:
                 return self._loads.setdefault(name, self.together)
             view, plain = self.narrowed(name)
@@ -303,9 +303,9 @@ class View:
         """Whether the joints are a sample of a production, not a grid or a design."""
         return self.design.is_sample
 
-    def check(self, claim: Claim) -> None:
-        """Raise a `StoreError` if the joints give no estimate of a claim."""
-        refusal = self.design.refuses(claim)
+    def check(self) -> None:
+        """Raise a `StoreError` if the joints give no estimate."""
+        refusal = self.design.refuses()
         if refusal is not None:
             found, remedy = refusal
             raise store_error(self.path, found, remedy.format(path=self.path))

@@ -9,7 +9,6 @@ the same scores as those of the study.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -65,18 +64,6 @@ class Rescaled(Distribution):
         if self.factor == 0.0:
             return np.where(off >= 0.0, 1.0, 0.0)
         return self.every.cdf(self.middle + off / self.factor)
-
-    def logpdf(self, x: Array) -> Array:
-        """See `Distribution.logpdf`."""
-        off = x - self.middle
-        if self.factor == 0.0:
-            return np.where(off == 0.0, 0.0, -np.inf)
-        return self.every.logpdf(self.middle + off / self.factor) - (0.0 if self.discrete else math.log(self.factor))
-
-    @property
-    def discrete(self) -> bool:
-        """See `Distribution.discrete`."""
-        return self.factor == 0.0 or self.every.discrete
 
     def describe(self) -> dict[str, Any]:
         """See `Distribution.describe`."""

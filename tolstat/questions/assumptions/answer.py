@@ -21,6 +21,7 @@ from tolstat.common.errors import Fault, NotApplicable, gather, raise_all
 from tolstat.display import drawing, style, text
 from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, Sentence, Table
 from tolstat.display.options import Accepted, Opt
+from tolstat.display.verdict import WORDS
 from tolstat.questions.assumptions import sentences, variations
 from tolstat.questions.shares import Simulation, estimated, inapplicable, own_joints, unusable, word
 from tolstat.store import Writer
@@ -36,7 +37,7 @@ COLUMNS = (
     estimated("change, %", "change", form="+.1f"),
     Column(
         "verdict",
-        lambda row: sentences.KEPT.get(row["side"]) or str(row["side"]),
+        lambda row: WORDS.get(row["side"], ""),
         shown=lambda rows: any(r["side"] for r in rows),
         words=True,
         rank=1,
@@ -127,7 +128,7 @@ def bars(standing: variations.Standing) -> Panel:
     """Share as drawn, then with each value that moves it, on one axis with the accepted share."""
     (share, lower, upper), accepted, rows, labels = standing.drawn, standing.accepted, standing.moving, [DRAWN]
     for row in rows:
-        label = f"{row['label']}: {sentences.KEPT[row['side']]}" if row["turns"] else str(row["label"])
+        label = f"{row['label']}: {WORDS[row['side']]}" if row["turns"] else str(row["label"])
         labels.append(label.replace(" (", "\n(") if len(label) > _LONGEST else label)
 
     def draw(ax: Axes) -> None:

@@ -10,14 +10,13 @@ import numpy as np
 
 from tolstat.analysis import binomial
 from tolstat.display import table, text
+from tolstat.display.verdict import WORDS
 from tolstat.questions.assumptions.variations import ALL, AXIAL, SHAFT, Standing, widths, written
 from tolstat.store.recorded import mentions
 from tolstat.store.view import View
 from tolstat.study.measured import left_open
 from tolstat.study.widths import COARSER, HALF
 
-KEPT = {"yes": "kept", "no": "not kept"}
-"""Sides of the accepted share in words."""
 KEYS_OF_PARTS = ("known_from", "law")
 """Keys of an entry of ``[tolerances]`` that is known from measured parts."""
 _NAMED = 2
@@ -40,8 +39,8 @@ def turned(standing: Standing) -> tuple[str, str]:
     names = [row for row in rows if row["name"] != ALL] or standing.moving
     nouns = {row["name"]: _noun(row) for row in names if row["name"] != ALL}
     remedy = f"more joints do not decide it; find out {_listed(list(nouns.values())[:_NAMED])}"
-    first = f"{KEPT[standing.side]} as drawn ({text.percent(standing.drawn[0])})"
-    return first, f"{KEPT[rows[0]['side']]} {shown}: {remedy}"
+    first = f"{WORDS[standing.side]} as drawn ({text.percent(standing.drawn[0])})"
+    return first, f"{WORDS[rows[0]['side']]} {shown}: {remedy}"
 
 
 def more(standing: Standing, file: str) -> str:
@@ -89,11 +88,11 @@ def of_variations(standing: Standing | None, answer: str) -> str:
     if not answer:
         return f"In {n} variations of what is assumed: {text.span(1.0 - max(shares), 1.0 - min(shares))}"
     sides = []
-    for side, word in KEPT.items():
+    for side in ("yes", "no"):
         decided = [row for row in rows if row["side"] == side]
         if alone := [row for row in decided if row["name"] != ALL] or decided:
             far = max(alone, key=lambda row: abs(row["change"]))
-            sides.append(f"{word} in {len(decided)} ({text.percent(far['share'])} {_condition(far['label'])})")
+            sides.append(f"{WORDS[side]} in {len(decided)} ({text.percent(far['share'])} {_condition(far['label'])})")
     return f"Of {n} variations of what is assumed: {', '.join(sides) or 'open in all'}"
 
 
@@ -163,7 +162,7 @@ def shop(view: View) -> str:
 
 def values(standing: Standing) -> dict[str, Any]:
     """JSON values: ``answer`` with what is assumed, numbers of variations and joints, what turns the verdict."""
-    answer = "open" if standing.turning or standing.side == "open" else KEPT.get(standing.side)
+    answer = "open" if standing.turning or standing.side == "open" else WORDS.get(standing.side)
     known = sorted((row for row in standing.rows if not np.isnan(row["share"])), key=lambda row: float(row["share"]))
     ends = [{"label": row["label"], "share": row["share"]} for row in known]
     return {

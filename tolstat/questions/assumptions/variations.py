@@ -14,7 +14,7 @@ from tolstat.campaign import what_if as sets
 from tolstat.common.errors import InputError, TolstatError
 from tolstat.common.loads import FloatArray
 from tolstat.display.table import Row, Rows
-from tolstat.questions.shares import ChangedJoints, Estimate, check_sample, own_joints, unusable, with_ends
+from tolstat.questions.shares import ChangedJoints, Estimate, check_sample, own_joints, side_of, unusable, with_ends
 from tolstat.store import error_budget
 from tolstat.store import what_if as kept
 from tolstat.store.view import View
@@ -256,14 +256,6 @@ def widths(view: View) -> dict[str, list[tuple[str, float, str]]]:
             share = _share(joints.base, joints.level) + change
             shares.setdefault(about["step"], []).append((about["label"], max(share, 0.0), about["words"]))
     return shares
-
-
-def side_of(interval: Sequence[float], accepted: float) -> str:
-    """``yes`` if an interval lies below the accepted share, ``no`` above it, ``open``; empty if one is unknown."""
-    low, high = interval
-    if np.isnan(accepted) or np.isnan(low):
-        return ""
-    return "yes" if high <= accepted else "no" if low > accepted else "open"
 
 
 class _Joints(ChangedJoints):

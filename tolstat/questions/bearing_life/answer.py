@@ -261,7 +261,7 @@ def _notes(lives: Lives, contacts: Rows) -> Iterator[str]:
         yield f"{lives.unrated} of {lives.valid} joints have no rating: {_why_unrated(lives, 'each of them')}"
     if lives.load_error > 0.0:
         yield f"numerical error of an equivalent load: {text.percent(lives.load_error)}, in the total interval"
-    if not lives.view.design.has_interval("quantile"):
+    if not lives.view.design.has_intervals:
         yield shares.NO_INTERVALS
 
 
@@ -271,7 +271,7 @@ def _draw(ax: Axes, lives: Lives) -> None:
     table = rate.curve(np.unique(rate.valid))[::-1]
     x, floor = 1.0 / table["level"], 0.5 / float(table["n"][0])
     curve = [table[name].clip(floor, 1.0) for name in ("estimate", "outer_lower", "outer_upper")]
-    drawing.curves(ax, x, {"": curve}, bands=int(lives.view.design.has_interval("quantile")), step="pre")
+    drawing.curves(ax, x, {"": curve}, bands=int(lives.view.design.has_intervals), step="pre")
     style.share_axis(ax, floor)
     nominal = float(lives.nominal_hours[-1])
     ends = [life for life in (x.min(), x.max(), nominal, lives.required) if math.isfinite(life)]

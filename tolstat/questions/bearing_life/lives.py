@@ -118,7 +118,7 @@ def lives_of(view: View) -> Lives:
     InputError
         When the view has several operating points, and the study does not give their shares of the time.
     """
-    view.check("quantile")
+    view.check()
     bearing, duty, stores = _bearing(view), view.shares_of_time, [part.store for part in view.parts]
     loads = np.stack([store.results(slice(None), ("equivalent_load",))["equivalent_load"] for store in stores])
     operation = [recorded.operating_points(store) for store in stores]

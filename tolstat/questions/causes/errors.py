@@ -160,7 +160,7 @@ def causes_on_page(view: View, asked: Asked) -> Answer:
         raise NotApplicable
     each: list[Indices] = []
     with asked.noting("causes are left out"):
-        view.check("index")
+        view.check()
         loads = view.loads(view.leading)
         jobs = [partial(indices, view, load.name, load.long_tailed, JOINTS) for load in loads]
         tried = mapped([partial(_tried, job) for job in jobs], min(asked.processes, 2))
@@ -268,9 +268,7 @@ def _tornado(of_errors: Indices) -> Panel:
     return Panel(key, title, description, draw, (drawing.WIDTH, height), rows=names)
 
 
-def indices(
-    view: View, by: str, logarithm: bool = False, joints: int | None = None, confidence: float = 0.95
-) -> Indices:
+def indices(view: View, by: str, logarithm: bool = False, joints: int | None = None) -> Indices:
     """Estimate what each error contributes to a load.
 
     Parameters
@@ -283,8 +281,6 @@ def indices(
         Decompose the variance of the load's logarithm: for a load whose variance a few joints dominate.
     joints : int, optional
         Number of samples to use, from the first; by default all.
-    confidence : float
-        Confidence level of all intervals.
 
     Returns
     -------
@@ -298,11 +294,11 @@ def indices(
         When the file has too few valid joints, or joints that are not drawn from tolerances.
     """
     view.check_drawn()
-    view.check("index")
+    view.check()
     load = view.load(by)
     if joints is not None:
         load = load.only(np.arange(min(joints, view.n)))
-    names, parts, variance = _of_samples(view, load, logarithm, confidence)
+    names, parts, variance = _of_samples(view, load, logarithm)
     first: Any = parts["first"]
     valid, level = load.valid, shares.tail_level(load)
     facts = {"load": load.name, "unit": load.unit, "logarithm": logarithm, "joints": valid.size}
@@ -318,9 +314,9 @@ def indices(
     return Indices(facts, sorted(shares.rows_of(columns), key=lambda row: -row["first"]))
 
 
-def _of_samples(view: View, load: Sample, logarithm: bool, confidence: float) -> tuple[list[str], Parts, float]:
+def _of_samples(view: View, load: Sample, logarithm: bool) -> tuple[list[str], Parts, float]:
     """Names, estimates and variance from joints that are all drawn from the same tolerances."""
-    study, independent = view.study, view.design.has_interval("index")
+    study, independent = view.study, view.design.independent
     samples = np.flatnonzero(load.is_valid)
     values = load.values[samples]
     if values.size < MIN_JOINTS:
@@ -336,15 +332,15 @@ def _of_samples(view: View, load: Sample, logarithm: bool, confidence: float) ->
     response = (_logarithm(load.name, values) if logarithm else values)[:MAX_JOINTS]
     parts: dict[str, NamedTuple] = {}
     if study.copula.names:
-        first = sensitivity.first_order(x, response, confidence, independent)
+        first = sensitivity.first_order(x, response, iid=independent)
     else:
-        first, parts["total"] = sensitivity.first_and_total(x, response, confidence, independent)
+        first, parts["total"] = sensitivity.first_and_total(x, response, iid=independent)
     above = values > shares.tail_level(load)
     if ranks.FEWEST <= above.sum() <= above.size - ranks.FEWEST:
         chosen = np.sort(np.concatenate([np.flatnonzero(side)[:MAX_JOINTS] for side in (above, ~above)]))
         scores = sampling.normal_scores(study, view.errors(samples[chosen], columns))
         z = np.column_stack([scores[name] for name in names])
-        parts |= ranks.tail(z, above[chosen], confidence, independent)._asdict()
+        parts |= ranks.tail(z, above[chosen], iid=independent)._asdict()
     return names, parts | {"first": first}, float(first.variance)
 
 

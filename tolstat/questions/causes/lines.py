@@ -127,7 +127,7 @@ def lines(view: View, by: Load = None, accepted: Accepted = math.nan, costs: Cos
 def lines_on_page(view: View, asked: Asked) -> Answer:
     """What each line would change for all limits together; without such joints, the command that simulates them."""
     applies = view.sampled and view.limits and view.store.whole and view.count(*VALID)
-    if not applies or view.design.refuses("difference"):
+    if not applies or view.design.refuses():
         raise NotApplicable
     changed = shares.evaluate(view, view.decisive)
     if changed is not None:

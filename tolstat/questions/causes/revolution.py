@@ -98,7 +98,7 @@ def over_angle(view: View, loads: Sequence[str], joints: int = JOINTS) -> list[P
         quantiles = np.asarray(np.quantile(values, SPREAD, axis=0, method="inverted_cdf"))
         band = Band(name, found.angles, drawn, quantiles)
         panels.append(_panel(band))
-        index = sensitivity.first_order(x, values[:, band.peak], iid=view.design.has_interval("index"))
+        index = sensitivity.first_order(x, values[:, band.peak], iid=view.design.independent)
         peaks.append(_at_peak(band, list(errors), index))
     how = f"Over the input angle: the first {len(samples)} settled joints, {ORIGIN[found.origin]}."
     if found.apart:
@@ -111,7 +111,7 @@ def begin_replay(view: View, asked: Asked) -> None:
     """Begin to simulate again the joints whose loads over the input angle the page shows; see `revolutions.ahead`."""
     with suppress(TolstatError):  # the questions say what is wrong
         view.check_drawn()
-        view.check("index")
+        view.check()
         loads, (nominal, samples) = followed(view, view.leading), _evaluated(view, asked.replay)
         if loads and len(samples) >= MIN_JOINTS and not revolutions.held(view.store, histories_of(loads)):
             revolutions.ahead(view.store, np.concatenate([nominal, view.slots(samples)]), asked.processes)

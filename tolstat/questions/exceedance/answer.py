@@ -164,7 +164,7 @@ def quantiles(view: View) -> Answer:
     if not (view.method != "sweep" and view.shown_loads and view.count(*VALID)):
         raise shares.inapplicable(view, "has no sample of valid loads", "simulate more joints")
     title = f"Quantiles with 95 % intervals {view.design.of_quantiles}, and one-sided tolerance limits (Wilks)"
-    title = title if view.design.has_interval("quantile") else "Quantiles"
+    title = title if view.design.has_intervals else "Quantiles"
     return Answer("quantiles", "Quantiles", [_quantiles(view, title, True)])
 
 
@@ -240,7 +240,7 @@ def _beyond(view: View) -> str:
 
 def _how(view: View, accepted: float) -> Iterator[str]:
     """Paragraphs on what the picture shows, and what decides."""
-    if not view.design.has_interval("share"):
+    if not view.design.has_intervals:
         yield "Points: share of the joints with a valid load. Grey: with failed and unsettled joints below and above."
         yield text.sentence(view.design.without_interval("share"))
         return

@@ -56,7 +56,7 @@ def _group_panel(view: View, group: str, kind: Kind) -> Panel:
         high, _ = _draw(ax, loads)
         unit = drawing.loads_axis(ax.xaxis, max((x.limit for x in loads.values() if x.limit), default=high), kind.unit)
         ax.set(xlabel=f"x: largest |{kind.symbol}| over the revolution [{unit}]", ylabel="share of joints above x")
-        if view.design.has_interval("share"):
+        if view.design.has_intervals:
             end = max(curve(load, DRAWN_LEVELS)["outer_upper"][-1] for load in loads.values())
             look: Any = {"color": style.FAINT, "lw": 1.1, "ls": (0.0, (1.0, 2.0)), "zorder": 1.5}
             ax.axhline(end, **look, label="upper end where none exceeds x")
@@ -137,7 +137,7 @@ def leading_panel(view: View, name: str) -> Panel:
     others = [other for other in view.bushing_loads if other != plain and plain in view.bushing_loads]
     others = [f"{other}{name.removeprefix(plain)}" for other in others if LOADS[other].kind == LOADS[plain].kind]
     switches = [("others", "other bushings, without bands (cross solid, fork dashed)")] if others else []
-    if view.design.has_interval("band"):
+    if view.design.independent:
         switches.append(("curve-band", "95 % band for the whole curve (DKW)"))
     description = "no joint with a valid result"
     if load.valid.size:
@@ -150,7 +150,7 @@ def leading_panel(view: View, name: str) -> Panel:
             drawing.empty(ax, "no joint with a valid result")
             return
         high, floor = _draw(ax, {0: load}, [other for other in view.loads(others) if other.valid.size])
-        if view.design.has_interval("band"):
+        if view.design.independent:
             table, half = curve(load, DRAWN_LEVELS), simultaneous(load.valid.size)
             for end in (table["bound_upper"] + half, table["bound_lower"] - half):
                 line = _step(ax, table, end, floor, color=style.INK, lw=0.9, ls=(0.0, (4.0, 2.0)))

@@ -285,7 +285,7 @@ def _notes_on_parts(stressed: Counted, rows: Rows) -> Iterator[str]:
     yield from _lines(settings.points)
     if rows[-1]["point"] == ANY:
         yield f"{ANY}: the joint fails with its first part; strengths of two points are independent"
-    if not stressed.design.has_interval("mean"):
+    if not stressed.design.independent:
         yield "no intervals: they hold for independent samples only"
     if stressed.apart > MAX_APART:
         yield _apart(stressed)
@@ -299,7 +299,7 @@ def _notes_on_loads(loading: Counted, rows: Rows) -> Iterator[str]:
     yield from loading.duty_in_words
     if loading.apart > MAX_APART:
         yield _apart(loading)
-    if not loading.design.has_interval("quantile"):
+    if not loading.design.has_intervals:
         yield "no intervals: order statistics hold for independent samples only"
     lacking = max((row["lacking"] for row in rows), default=0.0)
     if lacking > MAX_LACKING:
@@ -328,7 +328,7 @@ def _draw_failures(ax: Axes, stressed: Counted, life: float) -> None:
     service = stressed.settings.revolutions
     first, last = sorted([service, life if math.isfinite(life) and life > 0 else service])
     numbers = np.geomspace(first / 10**DECADES, last * 10**DECADES, POINTS)
-    curve, has_band = parts.failures_over_life(stressed, numbers.tolist()), stressed.design.has_interval("mean")
+    curve, has_band = parts.failures_over_life(stressed, numbers.tolist()), stressed.design.independent
     share, lower, upper = np.array([(at.estimate, at.outer_lower, at.outer_upper) for at in curve]).T
     drawing.curves(ax, numbers, {"": (share, lower, upper)}, bands=int(has_band))
     ax.axvline(service, color=style.INK, lw=1, ls="--")
@@ -358,7 +358,7 @@ def _draw_spectrum(ax: Axes, loading: Counted, channel: str) -> None:
         low, high = (np.maximum(y, 0.1 * floor) for y in (lower, top))
         curves[f"{100 * share:g} % of the joints stay below"] = estimate, low, high
     ax.step(x, nominal, where="pre", color=style.INK, lw=1, label="nominal joint")
-    has_bands = loading.design.has_interval("quantile")
+    has_bands = loading.design.has_intervals
     drawing.curves(ax, x, curves, bands=len(curves) if has_bands else 0, step="pre")
     shown = max([row["cycles"] for row in rows if row["estimate"] > floor], default=0.0) / loading.settings.revolutions
     ax.set(xscale="log", yscale="log", ylim=(floor, 2.0 * max(ceiling, floor)))

@@ -134,7 +134,7 @@ def members(views: Sequence[View], shares: Sequence[float] | None) -> tuple[Sequ
         raise InputError([Fault("--share", problem, "give a positive share for each file; their sum is 1")])
     names, first = [column.name for column in ERROR_FIELDS], views[0]
     for view in views:
-        view.check("mean")
+        view.check()
     for view in views[1:]:
         if view.n != first.n or not all(
             np.array_equal(errors[name], other[name])

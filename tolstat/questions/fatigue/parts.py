@@ -128,7 +128,7 @@ def failures(
     """
     done = stressed.status != Status.PENDING
     n_failed, n_without = int(np.isin(stressed.status, FAILED).sum()), int((done & ~stressed.valid).sum())
-    has_interval = stressed.design.has_interval("mean")
+    has_interval = stressed.design.independent
     return strength.failures(_chances(points, lives)[done], n_failed, n_without - n_failed, confidence, has_interval)
 
 
@@ -173,7 +173,7 @@ def _damage(stressed: Counted, p: int, joints: Evaluated, nominal: Evaluated) ->
 
 def _life(stressed: Counted, points: Sequence[Evaluated]) -> dict[str, float]:
     """Revolutions after which a share `SHARE` of the parts has failed, with the ends of an interval."""
-    some, ends = stressed.valid.any(), stressed.design.has_interval("mean")
+    some, ends = stressed.valid.any(), stressed.design.independent
     shares: dict[str, tuple[bool, Callable[[float], float]]] = {
         "life": (True, lambda lives: float(np.nanmean(_chances(points, lives)))),
         "life_lower": (ends, lambda lives: failures(stressed, points, lives).outer_upper),

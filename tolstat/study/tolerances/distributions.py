@@ -1,4 +1,4 @@
-"""Distributions of errors: distribution functions and their inverses, densities, moments, normal scores."""
+"""Distributions of errors: distribution functions and their inverses, moments, normal scores."""
 
 from __future__ import annotations
 
@@ -55,12 +55,12 @@ class Distribution(ABC):
         """
 
     @abstractmethod
-    def logpdf(self, x: Array) -> Array:
-        """Logarithm of the density at `x`, SI, elementwise; of a discrete distribution of the probability."""
-
-    @abstractmethod
     def cdf(self, x: Array) -> Array:
         """Return the probability of values up to and including `x`, SI, elementwise."""
+
+    def rank(self, x: Array) -> Array:
+        """Return the probability of smaller values than `x`, and half that of `x` itself, elementwise."""
+        return self.cdf(x)
 
     @property
     def moments(self) -> Moments:
@@ -80,11 +80,6 @@ class Distribution(ABC):
         share = below + (1.0 - up_to)
         return share if share > NEGLIGIBLE else 0.0
 
-    @property
-    def discrete(self) -> bool:
-        """Whether the distribution is discrete, so that `logpdf` gives logarithms of probabilities."""
-        return False
-
     def describe(self) -> dict[str, Any]:
         """Kind and parameters, as JSON values: everything that determines the values drawn; by default all fields."""
         return {"distribution": type(self).__name__.lower(), **asdict(self)}
@@ -97,11 +92,6 @@ class Distribution(ABC):
 def share_between(a: float | Array, b: float | Array) -> Array:
     """Probability of normal scores from a to b, elementwise; from the nearer tail, which keeps digits."""
     return np.where(np.asarray(a) > 0, special.ndtr(-a) - special.ndtr(-b), special.ndtr(b) - special.ndtr(a))
-
-
-def _within(lower: float, upper: float, x: Array, density: Array) -> Array:
-    """Logarithmic density where x is in the band, -inf elsewhere."""
-    return np.where((x >= lower) & (x <= upper), density, -np.inf)
 
 
 @dataclass(frozen=True)
@@ -118,10 +108,6 @@ class Normal(Distribution):
     def cdf(self, x: Array) -> Array:
         """See `Distribution.cdf`."""
         return np.asarray(special.ndtr((x - self.mean) / self.sigma))
-
-    def logpdf(self, x: Array) -> Array:
-        """See `Distribution.logpdf`."""
-        return -0.5 * ((x - self.mean) / self.sigma) ** 2 - math.log(self.sigma) - 0.5 * math.log(2 * math.pi)
 
     @property
     def moments(self) -> Moments:
@@ -162,10 +148,6 @@ class TruncatedNormal(Distribution):
         z = np.clip((x - self.mean) / self.sigma, a, b)
         return share_between(a, z) / share
 
-    def logpdf(self, x: Array) -> Array:
-        """See `Distribution.logpdf`."""
-        return _within(self.lower, self.upper, x, Normal(self.mean, self.sigma).logpdf(x) - math.log(self._span[2]))
-
     def openturns(self, ot: Any) -> Any:
         """See `Distribution.openturns`."""
         return ot.TruncatedNormal(self.mean, self.sigma, self.lower, self.upper)
@@ -185,10 +167,6 @@ class Uniform(Distribution):
     def cdf(self, x: Array) -> Array:
         """See `Distribution.cdf`."""
         return np.clip((x - self.lower) / (self.upper - self.lower), 0.0, 1.0)
-
-    def logpdf(self, x: Array) -> Array:
-        """See `Distribution.logpdf`."""
-        return _within(self.lower, self.upper, x, np.full_like(x, -math.log(self.upper - self.lower)))
 
     def openturns(self, ot: Any) -> Any:
         """See `Distribution.openturns`."""
@@ -218,13 +196,6 @@ class Triangular(Distribution):
         above = 1.0 - (self.upper - x) ** 2 / (width * (fall or 1.0))
         return np.where(x < self.peak, below, above)
 
-    def logpdf(self, x: Array) -> Array:
-        """See `Distribution.logpdf`."""
-        with np.errstate(divide="ignore", invalid="ignore"):
-            rising, falling = (x - self.lower) / (self.peak - self.lower), (self.upper - x) / (self.upper - self.peak)
-            height = np.log(np.where(x < self.peak, rising, np.where(x > self.peak, falling, 1.0)))
-        return _within(self.lower, self.upper, x, height + math.log(2.0 / (self.upper - self.lower)))
-
     def openturns(self, ot: Any) -> Any:
         """See `Distribution.openturns`."""
         return ot.Triangular(self.lower, self.peak, self.upper)
@@ -245,12 +216,6 @@ class LogNormal(Distribution):
         """See `Distribution.cdf`."""
         above = x > self.threshold
         return np.where(above, self.log.cdf(np.log(np.where(above, x - self.threshold, 1.0))), 0.0)
-
-    def logpdf(self, x: Array) -> Array:
-        """See `Distribution.logpdf`."""
-        above = x > self.threshold
-        y = np.log(np.where(above, x - self.threshold, 1.0))
-        return np.where(above, self.log.logpdf(y) - y, -np.inf)
 
     def openturns(self, ot: Any) -> Any:
         """See `Distribution.openturns`."""
@@ -278,13 +243,6 @@ class Beta(Distribution):
         """See `Distribution.cdf`."""
         t = np.clip((x - self.lower) / (self.upper - self.lower), 0.0, 1.0)
         return np.asarray(special.betainc(self.a, self.b, t))
-
-    def logpdf(self, x: Array) -> Array:
-        """See `Distribution.logpdf`."""
-        width = self.upper - self.lower
-        t = np.clip((x - self.lower) / width, 0.0, 1.0)
-        power = special.xlogy(self.a - 1, t) + special.xlog1py(self.b - 1, -t)
-        return _within(self.lower, self.upper, x, np.asarray(power - special.betaln(self.a, self.b) - math.log(width)))
 
     def openturns(self, ot: Any) -> Any:
         """See `Distribution.openturns`."""
@@ -324,16 +282,9 @@ class Measured(Distribution):
         """See `Distribution.cdf`."""
         return np.asarray(np.searchsorted(self.values, x, "right") / self.values.size)
 
-    def logpdf(self, x: Array) -> Array:
-        """See `Distribution.logpdf`."""
-        count = np.searchsorted(self.values, x, "right") - np.searchsorted(self.values, x, "left")
-        with np.errstate(divide="ignore"):
-            return np.asarray(np.log(count / self.values.size))
-
-    @property
-    def discrete(self) -> bool:
-        """See `Distribution.discrete`."""
-        return True
+    def rank(self, x: Array) -> Array:
+        """See `Distribution.rank`."""
+        return 0.5 * (self.cdf(x) + np.searchsorted(self.values, x, "left") / self.values.size)
 
     def expect(self, function: Callable[[Array], Array]) -> float:
         """See `Distribution.expect`; of the sample."""
@@ -346,12 +297,6 @@ class Measured(Distribution):
     def openturns(self, ot: Any) -> Any:
         """See `Distribution.openturns`."""
         return ot.UserDefined(self.values[:, None].tolist())
-
-
-def probability(distribution: Distribution, values: Array) -> Array:
-    """Probability of smaller values, elementwise; of a discrete distribution and half that of the value itself."""
-    up_to = distribution.cdf(values)
-    return up_to - 0.5 * np.exp(distribution.logpdf(values)) if distribution.discrete else up_to
 
 
 def score(distribution: Distribution, values: Array) -> Array:
@@ -372,7 +317,7 @@ def score(distribution: Distribution, values: Array) -> Array:
     """
     if isinstance(distribution, Normal):  # from the values: a probability near 1 has few digits of its tail
         return np.clip((values - distribution.mean) / distribution.sigma, -9.0, 9.0)
-    return np.clip(special.ndtri(probability(distribution, values)), -9.0, 9.0)
+    return np.clip(special.ndtri(distribution.rank(values)), -9.0, 9.0)
 
 
 def sigma_of(lower: float, upper: float, mean: float, cpk: float) -> float:

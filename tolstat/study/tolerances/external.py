@@ -88,12 +88,6 @@ class ScipyLaw(Distribution):
         share = self.whole.cdf(x) - below if below < 0.5 else self.whole.sf(self.ends[0]) - self.whole.sf(x)
         return np.asarray(np.clip(share / self.share, 0.0, 1.0))
 
-    def logpdf(self, x: Array) -> Array:
-        """See `Distribution.logpdf`."""
-        x = np.asarray(x) / self.unit
-        inside = (x >= self.ends[0]) & (x <= self.ends[1])
-        return np.where(inside, self.whole.logpdf(x) - math.log(self.unit * self.share), -np.inf)
-
     def describe(self) -> dict[str, Any]:
         """See `Distribution.describe`."""
         band = {key: end for key, end in (("lower", self.lower), ("upper", self.upper)) if end is not None}

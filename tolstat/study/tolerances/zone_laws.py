@@ -14,9 +14,6 @@ from tolstat.common.late import special
 from tolstat.study.axes import Bonus
 from tolstat.study.tolerances.distributions import Array, Distribution, score
 
-ROUNDING = 1.0 + 1e-9
-"""A radius computed back from errors may exceed the zone's by rounding."""
-
 
 @dataclass(frozen=True)
 class Rayleigh(Distribution):
@@ -43,13 +40,6 @@ class Rayleigh(Distribution):
         radius = np.clip(x, 0.0, self.upper)
         return -np.expm1(-0.5 * (radius / self.sigma) ** 2) / self._share
 
-    def logpdf(self, x: Array) -> Array:
-        """See `Distribution.logpdf`."""
-        inside = (x >= 0) & (x <= (math.inf if self.upper is None else self.upper * ROUNDING))
-        with np.errstate(divide="ignore"):
-            radius = np.log(np.where(inside, x, 0.0))
-        return radius - 0.5 * (x / self.sigma) ** 2 - 2 * math.log(self.sigma) - math.log(self._share)
-
 
 @dataclass(frozen=True)
 class Disc(Distribution):
@@ -64,12 +54,6 @@ class Disc(Distribution):
     def cdf(self, x: Array) -> Array:
         """See `Distribution.cdf`."""
         return np.clip(x / self.upper, 0.0, 1.0) ** 2
-
-    def logpdf(self, x: Array) -> Array:
-        """See `Distribution.logpdf`."""
-        inside = (x >= 0) & (x <= self.upper * ROUNDING)
-        with np.errstate(divide="ignore"):
-            return np.log(np.where(inside, 2.0 * x, 0.0)) - 2.0 * math.log(self.upper)
 
 
 def plane_scores(distribution: Distribution, vector: Array) -> Array:
@@ -168,10 +152,6 @@ class Accepted(Distribution):
         """See `Distribution.cdf`."""
         z, among, _ = self._table
         return np.asarray(special.ndtr(np.interp(score(self.every, x), z, among)))
-
-    def logpdf(self, x: Array) -> Array:
-        """See `Distribution.logpdf`."""
-        return self.every.logpdf(x) + np.log(self.bonus.accepted(x)) - math.log(self.share)
 
     def describe(self) -> dict[str, Any]:
         """See `Distribution.describe`."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from tolstat import study
 from tolstat.campaign import blocks
 from tolstat.campaign.work import Work
 from tolstat.common.errors import InputError, NotApplicable
+from tolstat.display.answer import Listing
 from tolstat.questions import allocate as question
 from tolstat.store import ResultFile
 from tolstat.study import costs, ladder, scaling
@@ -74,6 +76,19 @@ def test_the_study_written_keeps_the_target_by_the_law(done: Path, tmp_path: Pat
     assert rows["hole*.diameter"]["proposed"] == "±0.05 mm"  # does nothing, and is as wide as it may be
     assert found.facts["cost"] == pytest.approx(sum(row["cost"] for row in rows.values()))
     assert rows["pin*.tilt_t"]["features"] == 4
+
+
+def test_the_entries_printed_are_those_of_the_study_written(tmp_path: Path) -> None:
+    fit = '[tolerances]\nfit = { basic = "76 mm", code = "H7/f7", distribution = "normal" }\n'
+    path = made(tmp_path, TEXT.replace("[tolerances]\n", fit))
+    simulated(path)
+    found = answer(path)
+    found.write_documents(tmp_path / "next")
+    (printed,) = (tomllib.loads(part.text) for part in found.parts if isinstance(part, Listing))
+    written = tomllib.loads((tmp_path / "next.toml").read_text())["tolerances"]
+    drawn = tomllib.loads(study.load(tmp_path / "made.toml").text)["tolerances"]
+    assert printed == {key: entry for key, entry in written.items() if entry != drawn[key]}
+    assert printed["fit"]["code"] == "H10/f10"  # diameters do nothing
 
 
 def test_the_path_has_a_row_for_each_step_and_the_check(done: Path) -> None:

@@ -138,7 +138,7 @@ def allocate(view: View, targets: Targets, costs: Costs = None, keep: Keep = Non
         raise shares.inapplicable(view, "holds no joints of a search for these targets", remedy)
     (state, verdict, misses_by), lines = _verdict(view, run), _lines(run)
     chosen = list(zip(request.ladders, run.search.design, strict=True))
-    entries = {pattern: dict(keys) for own, k in chosen for pattern, keys in own.rungs[k].entries.items()}
+    entries = ladder.entries_of(chosen)
     before, after = (sum(row[key] for row in lines) for key in ("cost_before", "cost"))
     facts = {"state": state, "holds": state == "holds", "misses_by": misses_by, "cost_before": before, "cost": after}
     facts |= {"joints": run.looks[-1].n if run.looks else 0, "entries": entries, "verdict": verdict}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -33,15 +34,12 @@ class Rung(NamedTuple):
     factors : tuple of float
         How many times as wide each tolerance of the line is as on the drawing.
     entries : dict
-        Keys of the entry of each tolerance that changes, by its pattern.
-    code : str
-        Code of the fit, of a line that is one.
+        Keys of the entry of each tolerance that changes, by its pattern; of a fit by ``fit``.
     """
 
     words: str
     factors: tuple[float, ...]
     entries: Mapping[str, Mapping[str, Any]]
-    code: str = ""
 
 
 class Ladder(NamedTuple):
@@ -96,11 +94,15 @@ def ladders(study: Study, tolerances: Sequence[Tolerance], costs: Sequence[Cost]
 
 def text_of(study: Study, chosen: Sequence[tuple[Ladder, int]], seed: int) -> str:
     """Text of a study with each of some lines at one of its rungs, and another seed."""
-    rungs = [ladder.rungs[step] for ladder, step in chosen if step != ladder.drawn]
-    entries = {pattern: keys for rung in rungs for pattern, keys in rung.entries.items()}
-    text = scaling.rewritten(study, entries, seed)
-    codes = [rung.code for rung in rungs if rung.code]
-    return rewriting.with_keys(text, {fits.PATH: {"code": codes[0]}}, f"{study.name}.toml") if codes else text
+    entries = entries_of(chosen)
+    text, fit = scaling.rewritten(study, entries, seed), entries.get(fits.KEY)
+    return text if fit is None else rewriting.with_keys(text, {fits.PATH: fit}, f"{study.name}.toml")
+
+
+def entries_of(chosen: Sequence[tuple[Ladder, int]]) -> dict[str, dict[str, Any]]:
+    """Keys of each changed entry of ``[tolerances]`` by its pattern, with each of some lines at one of its rungs."""
+    rungs = [ladder.rungs[step] for ladder, step in chosen]
+    return {pattern: dict(keys) for rung in rungs for pattern, keys in rung.entries.items()}
 
 
 def _rungs(tolerance: Tolerance, reach: float, side: int) -> Iterator[Rung]:
@@ -140,7 +142,7 @@ def _of_fit(study: Study, both: Sequence[tuple[Tolerance, Cost]]) -> Ladder:
     assert study.fit is not None
     tolerances, costs = zip(*both, strict=True)
     entry = study.fit.entry
-    drawn = iso.parse(entry.code)
+    drawn, written = iso.parse(entry.code), tomllib.loads(study.text)["tolerances"][fits.KEY]
 
     def rungs(side: int) -> Iterator[Rung]:
         code = drawn
@@ -161,9 +163,9 @@ def _of_fit(study: Study, both: Sequence[tuple[Tolerance, Cost]]) -> Ladder:
             reached = all(c.reach[0] <= f <= c.reach[1] for c, f in zip(costs, factors, strict=True))
             if zones.least < 0.0 or not reached:
                 return
-            yield Rung(str(code), factors, {}, str(code))
+            yield Rung(str(code), factors, {fits.KEY: written | {"code": str(code)}})
 
     finer = list(rungs(-1))[::-1]
-    every = (*finer, Rung(entry.code, (1.0, 1.0), {}, entry.code), *rungs(1))
+    every = (*finer, Rung(entry.code, (1.0, 1.0), {}), *rungs(1))
     line = next(line for line in widths.lines(study) if entry.code in line.label)
     return Ladder(line, tolerances, costs, every, len(finer))

@@ -141,7 +141,8 @@ def width(entry: Mapping[str, Any], site: Site) -> float:
 
 def line(pattern: str, entry: Mapping[str, Any]) -> str:
     """Entry as a line of a study file."""
-    return f"{json.dumps(pattern)} = {rewriting.inline(entry)}"
+    key = pattern if pattern.isidentifier() else json.dumps(pattern)
+    return f"{key} = {rewriting.inline(entry)}"
 
 
 def rewritten(study: Study, entries: Mapping[str, Mapping[str, Any]], seed: int, text: str | None = None) -> str:

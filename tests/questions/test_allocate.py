@@ -145,10 +145,28 @@ def test_a_target_that_no_tolerance_meets_is_told_first(tmp_path: Path) -> None:
     told = simulated(path)
     found = answer(path)
     assert found.facts["state"] == "impossible"
-    assert found.facts["verdict"].startswith("No tolerance suffices: with all lines exact ")
+    assert found.facts["verdict"].startswith("No tolerance suffices: with all other lines exact ")
+    assert found.facts["kept"] == ["operation.torque"]
+    assert found.values()["sentences"][2]["text"] == "Kept as drawn: operation.torque."
     assert "tolstat assumptions" in found.facts["verdict"]
     assert told.startswith("simulated 1648 joints")  # 624 more as drawn, and 1024 of exact lines
     assert [row["what"] for row in found.tables["path"].rows] == ["as drawn", "all exact"]
+
+
+def test_lines_with_a_common_lot_and_correlated_ones_are_varied_too(tmp_path: Path) -> None:
+    lot = 'cpk = 1.0, lot = { share = 0.3, shared = true } }\n"pin*.offset_z"'
+    text = WHOLE.replace('cpk = 1.0 }\n"pin*.offset_z"', lot)
+    path = made(tmp_path, text + '[[correlation]]\nbetween = ["pin*.offset_z"]\nrho = 0.5\n')
+    simulated(path)
+    found = answer(path)
+    assert found.facts["state"] == "holds"
+    assert found.facts["kept"] == []
+    assert {row["tolerance"] for row in found.tables["tolerances"].rows} >= {"pin*.tilt_t", "pin*.offset_z"}
+    assert found.tables["path"].rows[1]["share"] == 0.0  # all lines exact
+    found.write_documents(tmp_path / "next")
+    drawn, written = (study.load(tmp_path / f"{name}.toml") for name in ("made", "next"))
+    assert np.array_equal(drawn.copula.matrix, written.copula.matrix)
+    assert "pin*.tilt_t" in found.facts["entries"]
 
 
 def test_two_targets_have_a_share_each(tmp_path: Path) -> None:

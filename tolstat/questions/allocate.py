@@ -62,10 +62,11 @@ LINES = (
 
 
 class _Request(NamedTuple):
-    """What is asked for: statements to be kept, lines that may change, and largest number of joints of a design."""
+    """What is asked for: statements to be met, lines that may change, labels of others, most joints of a design."""
 
     statements: list[Statement]
     ladders: list[Ladder]
+    kept: list[str]
     most: int
 
     @property
@@ -119,7 +120,7 @@ def allocate(view: View, targets: Targets, costs: Costs = None, keep: Keep = Non
         Facts: ``state`` (``holds``, ``misses``, ``open``: more joints or time would tell, ``impossible``: exact lines
         miss, too, ``exhausted``: no finer step is left), ``holds``, ``misses_by`` (how far the upper end is above the
         target; NaN without a check), ``cost_before``, ``cost``, ``joints`` of the check, ``entries`` (keys of the
-        changed entries by pattern), ``verdict``.
+        changed entries by pattern), ``kept`` (lines that may not change), ``verdict``.
 
     Raises
     ------
@@ -141,16 +142,18 @@ def allocate(view: View, targets: Targets, costs: Costs = None, keep: Keep = Non
     entries = ladder.entries_of(chosen)
     before, after = (sum(row[key] for row in lines) for key in ("cost_before", "cost"))
     facts = {"state": state, "holds": state == "holds", "misses_by": misses_by, "cost_before": before, "cost": after}
-    facts |= {"joints": run.looks[-1].n if run.looks else 0, "entries": entries, "verdict": verdict}
+    facts |= {"joints": run.looks[-1].n if run.looks else 0, "verdict": verdict}
+    facts |= {"entries": entries, "kept": request.kept}
     heads = [statement.text.replace("N*m", unit_text("N*m")) for statement in request.statements]
+    notes = [f"Total cost {before:.4g} -> {after:.4g} ({100 * (after / before - 1):+.1f} %)."]
+    notes += [f"Kept as drawn: {', '.join(request.kept)}."] if request.kept else []
     parts: list[Part] = [
-        Sentence(verdict, "lead"),
+        *(Sentence(line, "lead") for line in (verdict, *notes)),
         Table("path", "The path: each step, its cost, and the share simulated", _columns(heads), _path(run)),
         Table("tolerances", "Tolerances and their costs", LINES, lines),
     ]
     if entries:
-        parts.append(Listing("[tolerances]", "\n".join(scaling.line(*item) for item in entries.items())))
-    parts.append(Sentence(f"total cost {before:.4g} -> {after:.4g} ({100 * (after / before - 1):+.1f} %)"))
+        parts.append(Listing("[tolerances]", "\n".join(map(scaling.line, entries, entries.values()))))
     parts.append(Sentence("intervals hold together for all looks of the check with 95 %, without the numerical error"))
     unused = view.study.sampling.seed + allocation.ROUNDS + 1  # by the search and by any check
     documents = study_documents(view.study, ladder.text_of(view.study, chosen, unused))
@@ -217,8 +220,7 @@ class _Run:
             return sets.stepped(study, exact[0], widths.EXACT, range(n))
         if exact:
             laws = {name: law for line in exact for name, law in widths.changed(study, line, widths.EXACT).items()}
-            changed = replace(study, tolerances=study.tolerances | laws)
-            return sets.with_study(study, changed, "all lines exact", range(n))
+            return sets.with_study(study, replace(study, tolerances=study.tolerances | laws), "all exact", range(n))
         if (design, seed) == (self.problem.drawn, study.sampling.seed):
             return sets.as_drawn(study, range(min(own_joints(self.view), n), n))
         changed = changes.read(study, ladder.text_of(study, list(zip(ladders, design, strict=True)), seed))
@@ -289,14 +291,12 @@ def _verdict(view: View, run: _Run) -> tuple[str, str, float]:
         least = run.search.path[1].above
         worst = int(np.argmax(least.mean(axis=0) / run.problem.targets))
         share = text.percent(float(least[:, worst].mean()))
-        head = f"No tolerance suffices: with all lines exact {share} of the joints miss {statements[worst].text}"
+        every = "all other lines" if run.request.kept else "all lines"
+        head = f"No tolerance suffices: with {every} exact {share} of the joints miss {statements[worst].text}"
         return "impossible", f"{head}. {_others(view, statements[worst], file)}", math.nan
     if not run.looks:
-        return (
-            run.state,
-            "The search is not finished: the same command goes on, a longer --budget goes further.",
-            math.nan,
-        )
+        unfinished = "The search is not finished: the same command goes on, a longer --budget goes further."
+        return run.state, unfinished, math.nan
     look = run.looks[-1]
     worst = int(np.argmax(look.upper / run.problem.targets))
     low, high = float(look.lower[worst]), float(look.upper[worst])
@@ -347,7 +347,7 @@ def _read_request(view: View, targets: Sequence[str], costs: Path | None, keep: 
     if not free:
         remedy = "name some in --costs, or leave --keep out; measured and lognormal errors stay as they are"
         raise InputError([Fault("--costs", "leaves no tolerance that may change", remedy)])
-    return _Request(statements, free, most)
+    return _Request(statements, free, ladder.kept(study, free), most)
 
 
 def simulate(

@@ -92,6 +92,12 @@ def ladders(study: Study, tolerances: Sequence[Tolerance], costs: Sequence[Cost]
     return found
 
 
+def kept(study: Study, free: Sequence[Ladder]) -> list[str]:
+    """Labels of the lines of a study that are not among those that may change."""
+    every = dict.fromkeys(widths.label(study, entry) for entry in study.entries)
+    return [label for label in every if label not in {own.line.label for own in free}]
+
+
 def text_of(study: Study, chosen: Sequence[tuple[Ladder, int]], seed: int) -> str:
     """Text of a study with each of some lines at one of its rungs, and another seed."""
     entries = entries_of(chosen)

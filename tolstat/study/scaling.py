@@ -101,9 +101,8 @@ class Tolerance(NamedTuple):
 def tolerances(study: Study) -> list[Tolerance]:
     """Entries of a study that can be scaled, in its order; not those of operating point and material.
 
-    Left out are entries with correlated errors, which cannot be scaled independently; the position of an axis whose
-    direction has a zone, too: that zone must stay the smaller one, and bounds where the middle is; and positions with a
-    bonus with their diameters.
+    Left out are the position of an axis whose direction has a zone, too: that zone must stay the smaller one, and
+    bounds where the middle is; and positions with a bonus with their diameters.
     """
     scalable = []
     for entry in study.entries:
@@ -111,7 +110,7 @@ def tolerances(study: Study) -> list[Tolerance]:
         of_parts = not site.name.startswith(("operation.", "material."))
         refined = any(place.shared and place.name.endswith(".position") for place, _ in entry.models)
         refined |= any(study.has_bonus(place.name) for place, _ in entry.models)
-        if of_parts and not refined and model.scales and not set(entry.names) & set(study.copula.names):
+        if of_parts and not refined and model.scales:
             scalable.append(
                 Tolerance(entry.pattern, entry.names, dict(entry.keys), site, width(entry.keys, site), mark(model))
             )

@@ -76,9 +76,14 @@ def lines(study: Study) -> list[Group]:
     names_of: dict[str, tuple[str, ...]] = {}
     for entry in study.entries:
         if _free(study, entry):
-            label = _fit_label(study) if _is_of_fit(study, entry) else entry.pattern
-            names_of[label] = (*names_of.get(label, ()), *entry.names)
-    return [Group(label, names) for label, names in names_of.items()]
+            line = label(study, entry)
+            names_of[line] = (*names_of.get(line, ()), *entry.names)
+    return [Group(line, names) for line, names in names_of.items()]
+
+
+def label(study: Study, entry: Toleranced) -> str:
+    """Label of the line that an entry is: its pattern, or the fit that it belongs to."""
+    return _fit_label(study) if _is_of_fit(study, entry) else entry.pattern
 
 
 def features(study: Study) -> list[Group]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -84,6 +85,44 @@ def test_the_study_simulated_is_the_one_written(settings: list[str]) -> None:
     text = changes.with_settings(plan, settings)
     assert changes.read(plan, text).identity() == study.load(Path("made.toml"), text=text).identity()
     assert changes.differing(plan, changes.read(plan, text))
+
+
+BOTH = '"cirelli2021"\ncontact = { D_H = "76.3 mm", D_P = "76 mm" }'
+
+
+@pytest.mark.parametrize(
+    "bearing",
+    [
+        BOTH,
+        '"cirelli2021"\ncontact.D_H = "76.3 mm"\ncontact.D_P = "76 mm"',
+        '"cirelli2021"\n[joint.contact]\nD_H = "76.3 mm"\nD_P = "76 mm"',
+    ],
+)
+@pytest.mark.parametrize(
+    ("settings", "third"),
+    [
+        (["joint.contact.clearance=0.05 mm"], "D_P"),
+        (["joint.contact.clearance=0.05 mm", "joint.contact.D_P=76 mm"], "D_H"),
+        (["joint.contact.clearance=0.05 mm", "joint.contact.law=sliced"], "D_P"),
+    ],
+)
+def test_the_third_of_a_bearing_is_not_written_either(settings: list[str], third: str, bearing: str) -> None:
+    plan = loaded(TEXT.replace('"cirelli2021"', bearing))
+    text = changes.with_settings(plan, settings)
+    other, written = changes.read(plan, text), study.load(Path("made.toml"), text=text)
+    assert other.identity() == written.identity()
+    assert third not in tomllib.loads(text)["joint"]["contact"]
+    assert written.joint.contact.clearance == pytest.approx(5e-5)
+
+
+def test_a_table_that_leaves_out_keys_of_the_study_is_refused() -> None:
+    with pytest.raises(InputError, match=r"leaves out contact.D_H, which the study sets\n  hint: set each key"):
+        changed('joint.contact={ clearance = "0.05 mm" }', text=TEXT.replace('"cirelli2021"', BOTH))
+
+
+def test_a_key_given_twice_is_refused_by_both_settings() -> None:
+    with pytest.raises(InputError, match=r"'tolerances.fit.code=H7/f6': sets the key of --set 'fit.code=H7/e8' again"):
+        changed("fit.code=H7/e8", "tolerances.fit.code=H7/f6", text=FIT)
 
 
 def test_another_fit_changes_the_diameters_of_the_joint() -> None:

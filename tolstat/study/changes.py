@@ -14,9 +14,10 @@ from tolstat.common import units
 from tolstat.common.errors import Fault, InputError, collected, gather, input_error
 from tolstat.common.strict import did_you_mean
 from tolstat.joint import varied
-from tolstat.joint.model import leaves
+from tolstat.joint.derived import replaced
+from tolstat.joint.model import leaves, merged
+from tolstat.joint.reading import with_keys
 from tolstat.study import rewriting, scaling, selection, widths
-from tolstat.study.assumptions import with_value
 from tolstat.study.file import BESIDE_FIT, SECTIONS, load
 from tolstat.study.scaling import REPLACED_KEYS
 from tolstat.study.selection import TOLERANCED
@@ -45,31 +46,52 @@ def with_settings(study: Study, settings: Sequence[str]) -> str:
         errors and key of their tolerances; a band given one way replaces a band given another way, and ``cpk`` replaces
         ``std``. ``"pin*.tilt_t=none"`` takes errors out of the tolerances, a table in place of ``none`` is their new
         entry. ``"fit.code=H7/e7"``; ``"joint.contact.clearance=0.15 mm"``, ``"operation.alpha=12 deg"``, of several
-        operating points ``"operation.start.alpha=12 deg"``; ``"errors.pin1.tilt_t=0.1 deg"``. Later ones override.
+        operating points ``"operation.start.alpha=12 deg"``; ``"errors.pin1.tilt_t=0.1 deg"``. Later
+        ones override patterns of earlier ones.
 
     Returns
     -------
     str
-        TOML. An entry whose settings are for some of its errors only becomes one entry for each of its errors.
+        TOML. An entry whose settings are for some of its errors only becomes one entry for each of its errors. Keys of
+        the joint that give way to those set, such as the third of a bearing, are removed.
 
     Raises
     ------
     InputError
         With every fault of the settings; see `rewriting.with_keys`.
     """
-    text, entries = study.text, _Entries(study)
+    text, entries, places = study.text, _Entries(study), dict[tuple[str, ...], str]()
     with collected() as faults:
         for setting in settings:
             place = f"--set {setting!r}"
             with gather(faults):
                 path, value = _parsed(setting, place)
+                if (other := places.setdefault(tuple(path), place)) is not place:
+                    raise input_error(place, f"sets the key of {other} again", "remove one of the two")
                 if path[0] in SETTABLE:
                     text = _set(text, path, value, place)
                 elif path[0] == fits.KEY and len(path) == NAMES:
                     text = rewriting.with_keys(text, {fits.PATH: {path[1]: value}}, place)
                 else:
                     entries.set(path, value, place)
+        with gather(faults):
+            text = _without_replaced(study, text, places)
     return entries.written(text)
+
+
+def _without_replaced(study: Study, text: str, paths: Iterable[tuple[str, ...]]) -> str:
+    """Text without the keys of the joint that give way to those set: the third of a bearing, the other section."""
+    old, new = (leaves(tomllib.loads(each)["joint"]) for each in (study.text, text))
+    changed = {key for key, value in new.items() if old.get(key) != value}
+    given = changed | {".".join(path[1:]) for path in paths if path[0] == "joint"}
+    away = replaced(given, old)
+    if lost := sorted(old.keys() - new.keys() - away):
+        found = f"leaves out {', '.join(lost)}, which the study sets"
+        raise input_error("--set joint", found, "set each key by itself: --set joint.contact.law=sliced")
+    for key in away & new.keys():
+        *tables, name = key.split(".")
+        text = rewriting.with_keys(text, {("joint", *tables): {name: None}}, f"--set joint.{key}")
+    return text
 
 
 def keys_of_joint(text: str, study: Study) -> dict[str, Any]:
@@ -104,7 +126,9 @@ def _read(study: Study, text: str) -> Study:
     if still and (twice := [key for key in by_fit if key in keys]):
         raise InputError([Fault(f"--set joint.{key}", *BESIDE_FIT) for key in twice])
     if keys and not keys.keys() <= set(by_fit):
-        joint = with_value(study, keys).joint
+        over = {key: value for key, value in tomllib.loads(text)["joint"].items() if key != "base"}
+        over = merged(over, {"contact": study.fit.diameters}) if still and study.fit is not None else over
+        joint = with_keys(joint.given("json"), {}, over, f"{study.path}: joint")
     changed = load(study.path, study.sampling.n, text, joint)
     if changed.fit is not None and (study.fit is None or changed.fit.diameters != study.fit.diameters):
         diameters = {f"contact.{key}": units.to_si(value, "m") for key, value in changed.fit.diameters.items()}

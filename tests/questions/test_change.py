@@ -199,6 +199,14 @@ def test_asking_again_reads_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert re.search(r"^cross1\.F > 700 N ", first.stdout, flags=re.MULTILINE)
 
 
+def test_a_value_in_another_unit_is_not_simulated_again(tmp_path: Path) -> None:
+    path = made(tmp_path)
+    assert simulated(path, ["pin*.offset_z.plus_minus=0.08 mm"], most=400).startswith("simulated 400 joints")
+    again = ["pin*.offset_z.plus_minus=80 um"]
+    assert simulated(path, again, most=400) == ""
+    assert answer(path, again).facts["n"] == 400
+
+
 def test_an_interrupted_change_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path, calls = made(tmp_path), list[int]()
 

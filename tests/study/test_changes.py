@@ -155,6 +155,27 @@ def test_what_differs_is_named_whatever_the_sampling() -> None:
     assert set(gone.values()) == {None}
 
 
+@pytest.mark.parametrize(
+    ("same", "other", "alike"),
+    [
+        (
+            "pin*.offset_[tz].plus_minus=100 um",
+            "pin*.offset_[tz].plus_minus=80 um",
+            "pin*.offset_[tz].plus_minus=0.08mm",
+        ),
+        ("errors.pin2.tilt_z=6 arcmin", "errors.pin2.tilt_z=12 arcmin", "errors.pin2.tilt_z=0.2 deg"),
+        ("joint.pin.l=36400 um", "joint.pin.l=36 mm", "joint.pin.l=36000 um"),
+    ],
+)
+def test_a_value_in_another_unit_is_the_same(same: str, other: str, alike: str) -> None:
+    plan = loaded(TEXT.replace('"cirelli2021"', '"cirelli2021"\npin.l = "36.4 mm"'))
+    found = [
+        changes.differing(plan, changes.read(plan, changes.with_settings(plan, [s]))) for s in (same, other, alike)
+    ]
+    assert found[0] == {}
+    assert found[1] == found[2] != {}
+
+
 def test_every_fault_of_the_settings_is_told() -> None:
     settings = [
         "pin1",

@@ -70,7 +70,8 @@ class Altered(NamedTuple):
 
 
 def key(about: Mapping[str, Any]) -> str:
-    """Digest of a change: the name of its set in the file."""
+    """Digest of a change: the name of its set in the file. The words for what differs in a study do not count."""
+    about = {name: value for name, value in about.items() if name != "label" or "differs" not in about}
     return hashlib.sha256(json.dumps(about, sort_keys=True, allow_nan=False).encode()).hexdigest()[:16]
 
 

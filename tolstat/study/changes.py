@@ -6,6 +6,7 @@ A change is made in the text of the study, so that the study that is simulated i
 from __future__ import annotations
 
 import json
+import re
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
@@ -30,6 +31,10 @@ EXAMPLE = 'write --set "*.tilt_*.cpk=1.2", --set joint.contact.law=sliced or --s
 NONE = "none"
 """Value that takes an error out of the tolerances."""
 OTHERS = f"{', '.join(SETTABLE)} and tolerances change the joints; edit the study for others, and run it"
+DIGITS = 10
+"""Significant digits of numbers that are compared: conversions of units agree in more."""
+NUMBER = re.compile(r"\d+\.\d+(?:e[-+]\d+)?|\d+e[-+]\d+")
+"""A number in JSON, or in a text there that is a quantity."""
 NAMES = 2
 """Number of parts of the name of an error: ``pin1.tilt_t``."""
 
@@ -141,10 +146,18 @@ def _read(study: Study, text: str) -> Study:
 
 
 def differing(study: Study, changed: Study) -> dict[str, Any]:
-    """Dotted keys of what determines the joints that differ from the study's, with their JSON values; None if gone."""
-    old, new = (json.loads(json.dumps(widths.applied(each, {}).identity())) for each in (study, changed))
+    """Dotted keys of what determines the joints that differ from the study's, with their JSON values; None if gone.
+
+    Numbers have `DIGITS` significant digits, so that values that differ in their unit only are the same.
+    """
+    texts = (json.dumps(widths.applied(each, {}).identity()) for each in (study, changed))
+    old, new = (json.loads(NUMBER.sub(_rounded, text)) for text in texts)
     keys = sorted(key for key in old.keys() | new.keys() if old.get(key) != new.get(key))
     return {key: new.get(key) for key in keys if not key.startswith("sampling.")}
+
+
+def _rounded(number: re.Match[str]) -> str:
+    return str(float(f"{float(number[0]):.{DIGITS}g}"))
 
 
 def _parsed(setting: str, place: str) -> tuple[list[str], Any]:

@@ -174,6 +174,11 @@ def test_with_an_accepted_share_it_looks_until_the_verdict_is_known(tmp_path: Pa
     assert lead[-1] == "The verdict turns: not kept before, kept after (5 % accepted)."
     stays = answer(path, accepted=0.5).values()["sentences"][2]["text"]
     assert stays == "The verdict does not turn: kept before, kept after (50 % accepted)."
+    with ResultFile.open(path) as store:
+        at = tolstat.change(store.view(), NARROW).facts["yield_before"]
+    known = answer(path, accepted=1.0 - at).values()["sentences"][2]["text"]
+    assert known.startswith("Kept with the change, open as drawn (")
+    assert known.endswith(" accepted): the joints do not tell whether the verdict turns.")
 
 
 def test_asking_again_reads_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -205,6 +210,16 @@ def test_a_value_in_another_unit_is_not_simulated_again(tmp_path: Path) -> None:
     again = ["pin*.offset_z.plus_minus=80 um"]
     assert simulated(path, again, most=400) == ""
     assert answer(path, again).facts["n"] == 400
+
+
+def test_files_are_written_before_the_answer_is_printed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def ended(*_: Any) -> None:
+        raise BrokenPipeError
+
+    monkeypatch.setattr("tolstat.cli._command.deliver", ended)
+    done = call("change", made(tmp_path), "--set", "pin*.tilt_t.cpk=2", "--workers", 1, "--out", tmp_path / "x.toml")
+    assert isinstance(done.exception, BrokenPipeError)
+    assert "cpk = 2" in (tmp_path / "x.toml").read_text()
 
 
 def test_an_interrupted_change_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -160,10 +160,14 @@ def deliver(answer: Answer, wide: bool, as_json: bool = False) -> None:
                 say(part.text)
 
 
-def write_files(answer: Answer, stem: Path, documents: bool = False) -> None:
-    """Write the files of an answer, see `Answer.write`, or its documents alone, and tell their names."""
+def write_files(answer: Answer, stem: Path, documents: bool = False) -> list[Path]:
+    """Write the files of an answer, see `Answer.write`, or its documents alone; returns them."""
     with progress("files"):
-        files = answer.write_documents(stem) if documents else answer.write(stem)
+        return answer.write_documents(stem) if documents else answer.write(stem)
+
+
+def tell_files(files: Iterable[Path]) -> None:
+    """Tell the names of files that were written."""
     for path in files:
         say(f"wrote {path}")
 

@@ -21,6 +21,7 @@ from tolstat.cli._shared import (
     print_table,
     progress,
     say,
+    tell_files,
     wrapped,
     write,
     write_files,
@@ -338,7 +339,7 @@ def report(
             return
         if note := library.recorded.note_on_mounting(view.store):
             say(f"note: {note}")
-        write_files(answer, stem)
+        tell_files(write_files(answer, stem))
 
 
 def _page(file: Path, out: Path, accepted: float, again: int | None, point: str, full: bool, brief: bool) -> None:

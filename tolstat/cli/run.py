@@ -12,7 +12,17 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from tolstat.cli import _library as library
-from tolstat.cli._shared import deliver, print_json, print_study_notes, progress, say, work, wrapped, write_files
+from tolstat.cli._shared import (
+    deliver,
+    print_json,
+    print_study_notes,
+    progress,
+    say,
+    tell_files,
+    work,
+    wrapped,
+    write_files,
+)
 from tolstat.common.errors import Fault, InputError, gather, raise_all
 from tolstat.common.files import check_target
 from tolstat.display.options import AsJson, Joints, Opt, OtherStudy, Report, ResultPath, StudyPath, Wide, Workers
@@ -249,7 +259,7 @@ def conclude(path: Path, report: bool, wide: bool, study_file: str = "STUDY") ->
             with progress("report"):
                 answer = library.reports.report(store.view())
             deliver(answer, wide)
-            write_files(answer, path.with_suffix(""))
+            tell_files(write_files(answer, path.with_suffix("")))
         without_load = library.remedy.reasons(store, {at.point or "": at.status() for at in store.each()})
         for reason in without_load:
             say(reason.text)

@@ -203,10 +203,14 @@ def _sentences(view: View, row: Row, sides: Sequence[str | None], accepted: floa
     lines = [f"{after} of the joints {exceed} with the change, {before} before: {difference_in_words}."]
     lines.append(f"Yield {text.percent(1.0 - row['before'])} before, {text.percent(1.0 - row['after'])} after.")
     if sides[0]:
+        share = f"({text.percent(accepted)} accepted)"
         verb = "The verdict turns" if set(sides) == {"kept", "not kept"} else "The verdict does not turn"
         if "open" in sides:
-            verb = "The joints do not tell whether the verdict turns"
-        lines.append(f"{verb}: {sides[0]} before, {sides[1]} after ({text.percent(accepted)} accepted).")
+            known_first = sorted(zip(sides, ("as drawn", "with the change"), strict=True), key=lambda s: s[0] == "open")
+            told = ", ".join(f"{side} {when}" for side, when in known_first)
+            lines.append(f"{told[0].upper()}{told[1:]} {share}: the joints do not tell whether the verdict turns.")
+        else:
+            lines.append(f"{verb}: {sides[0]} before, {sides[1]} after {share}.")
     return lines
 
 

@@ -176,6 +176,16 @@ def test_a_value_in_another_unit_is_the_same(same: str, other: str, alike: str) 
     assert found[1] == found[2] != {}
 
 
+def test_a_pattern_selects_entries_too_and_the_words_say_what_changes() -> None:
+    zones = '"pin*.position" = { ZONE }\n"*_holes.position" = { ZONE }\n'
+    zones = zones.replace("ZONE", 'zone = "⌀0.1 mm", over = "22 mm", distribution = "normal"')
+    head, _, rest = TEXT.partition("[tolerances]")
+    plan = loaded(f"{head}[tolerances]\n{zones}\n[sampling]{rest.partition('[sampling]')[2]}")
+    text = changes.with_settings(plan, ["*.position.zone=⌀0.08 mm", "errors.pin1.tilt_t=1 deg"])
+    said = "changed: pin*.position.zone ⌀0.1 mm → ⌀0.08 mm, *_holes.position.zone ⌀0.1 mm → ⌀0.08 mm"
+    assert changes.words(plan, text) == f"{said}; new: errors.pin1.tilt_t"
+
+
 def test_every_fault_of_the_settings_is_told() -> None:
     settings = [
         "pin1",

@@ -141,6 +141,7 @@ def change(view: View, settings: Settings, accepted: Accepted = math.nan) -> Ans
         parts.append(Table("limits", "Share of the joints above each limit, before and after", LIMITS, rows))
     parts.append(Table("loads", "Largest loads, before and after", LOADS, quantiles))
     notes = [f"{n} joints compared one by one; 95 % intervals without the numerical error, not corrected for the looks"]
+    notes.insert(0, changes.words(view.study, asked.text))
     if not facts["settled"]:
         notes.append("the difference is not settled: a larger --most or a longer --budget goes on")
     documents = study_documents(view.study, asked.text)

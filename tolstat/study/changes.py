@@ -9,6 +9,7 @@ import json
 import re
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
+from fnmatch import fnmatchcase
 from typing import Any
 
 from tolstat.common import units
@@ -103,6 +104,28 @@ def keys_of_joint(text: str, study: Study) -> dict[str, Any]:
     """Dotted keys of ``[joint]`` of a text that differ from those of the study's, and their values."""
     old, new = (leaves(tomllib.loads(each)["joint"]) for each in (study.text, text))
     return {key: value for key, value in new.items() if old.get(key) != value}
+
+
+def words(study: Study, text: str) -> str:
+    """What a text changes: keys with their values before and after, entries that are gone, and new ones."""
+    old, new = (_flat(tomllib.loads(each)) for each in (study.text, text))
+    values = [f"{key} {old[key]} → {value}" for key, value in new.items() if key in old and old[key] != value]
+    gone, added = (list(dict.fromkeys(_shown(key) for key in a.keys() - b.keys())) for a, b in ((old, new), (new, old)))
+    found = {"changed": values, "without": sorted(gone), "new": sorted(added)}
+    return "; ".join(f"{word}: {', '.join(items)}" for word, items in found.items() if items)
+
+
+def _flat(data: Mapping[str, Any]) -> dict[str, Any]:
+    """Values of the sections that are changed by dotted key, without ``tolerances``."""
+    points = data["operation"]
+    points = {str(point["name"]): point for point in points} if isinstance(points, list) else points
+    sections = {key: data.get(key, {}) for key in SETTABLE} | {"operation": points}
+    return leaves(sections) | leaves(data["tolerances"])
+
+
+def _shown(key: str) -> str:
+    """Key of the joint or the operation; of a tolerance its entry."""
+    return key if key.partition(".")[0] in SETTABLE else ".".join(key.split(".")[:NAMES])
 
 
 def read(study: Study, text: str) -> Study:
@@ -211,6 +234,8 @@ class _Entries:
         pattern, key = ".".join(path[:NAMES]), path[NAMES:]
         known: Iterable[str] = self._keys if key or value == NONE else TOLERANCED
         names = selection.select(pattern, known)
+        if key or value == NONE:
+            names += [name for name in self._of_entries(pattern) if name in self._keys and name not in names]
         if not names:
             found = "selects no error that has a tolerance" if key or value == NONE else "selects nothing"
             raise input_error(place, found, did_you_mean(pattern, list(known)))
@@ -226,6 +251,13 @@ class _Entries:
                 self._new[pattern] = dict(value)
         else:
             raise input_error(place, f"{value!r} is no entry of [tolerances]", EXAMPLE)
+
+    def _of_entries(self, pattern: str) -> list[str]:
+        """Names of the entries whose own pattern a pattern selects: ``*_holes.position`` by ``*.position``."""
+        feature, _, key = pattern.partition(".")
+        parts = {of_entry: of_entry.partition(".") for of_entry in self._patterns}
+        chosen = [of_entry for of_entry, (own, _, its) in parts.items() if its == key and fnmatchcase(own, feature)]
+        return [name for of_entry in chosen for name in self._patterns[of_entry]]
 
     def written(self, text: str) -> str:
         """Text with the changed entries."""

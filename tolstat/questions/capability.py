@@ -47,7 +47,7 @@ LOTS = (
     Column("load", shares.word("load")),
     Column("limit", shares.limit),
     Column("median lot", shares.share("median")),
-    Column("one lot in ten", lambda row: f"> {text.percent(row['high'])}"),
+    Column("one lot in ten", lambda row: f"{'≥ ' if row['high'] else ''}{text.percent(row['high'])}"),
     Column("worst lot", shares.share("worst")),
     Column("above in delivery", text.delivery),
 )
@@ -231,10 +231,8 @@ def _beyond(view: View, rows: Rows) -> Iterator[Sentence]:
         name, study = rows[0]["load"], f"{view.store.study_name}.toml"
         level = view.load(name).limit
         limit = f"{name} > {'LEVEL' if level is None else text.value(level, view.load(name).unit)}"
-        yield Sentence(
-            f"one in more than {view.load(name).valid.size} joints is beyond these joints; how rare a load is that "
-            f'none of them has: tolstat rare {study} --limit "{limit}"'
-        )
+        yield Sentence(f"one in more than {view.load(name).valid.size} joints is beyond these joints")
+        yield Sentence(f'loads that none of them has: tolstat rare {study} --limit "{limit}"')
 
 
 def _notes(rows: Rows) -> Iterator[str]:

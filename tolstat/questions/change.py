@@ -65,10 +65,10 @@ LIMITS = (
 """Columns of the table ``limits``."""
 LOADS = (
     Column("load", word("load")),
-    Column("of the joints below", lambda row: f"{100.0 * row['share']:g} %"),
+    Column("share below", lambda row: f"{100.0 * row['share']:g} %"),
     Column("before", lambda row: text.value(row["before"], row["unit"])),
     Column("after", lambda row: text.value(row["after"], row["unit"])),
-    Column("shift (95 % interval)", _shift),
+    Column("shift", _shift),
 )
 """Columns of the table ``loads``."""
 

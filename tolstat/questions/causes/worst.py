@@ -21,7 +21,7 @@ from tolstat.store.view import View
 
 ON_PAGE = 8
 """Number of worst joints of each load on the page."""
-ERRORS = 3
+ERRORS = 2
 """Number of errors of each joint that people see."""
 KEYS = ("load", "unit", "row", "value", "point", "status")
 """Keys of a row that are no errors."""
@@ -80,8 +80,8 @@ def _answer(view: View, loads: Sequence[str], n: int) -> Answer:
     parts: list[Part] = [Table("joints", f"Joints with the largest {', '.join(loads)}", columns, rows)]
     if rows:
         at = f" --point {quote(rows[0]['point'])}" if rows[0]["point"] else ""
-        command = f"tolstat replay {quote(str(view.path))} --row {rows[0]['row']}{at} --out trace.csv"
-        parts.append(Sentence(f"to simulate the first one again: {command}"))
+        command = f"tolstat replay {quote(str(view.path))} --row {rows[0]['row']}{at}"
+        parts.append(Sentence(f"the first one again: {command}"))
     return Answer("worst", "The worst joints", parts)
 
 

@@ -263,13 +263,13 @@ def _columns(heads: Sequence[str]) -> list[Column]:
     keys = ["share", *(f"share_{j}" for j in range(2, len(heads) + 1))]
     names = ["share, %"] if len(heads) == 1 else [f"{head}, %" for head in heads]
     return [
-        Column("step", shares.word("step"), rank=3),
+        Column("step", shares.word("step"), rank=2),
         Column("what", shares.word("what")),
         Column("line", shares.word("line"), words=True),
-        Column("from", shares.word("before"), words=True),
+        Column("from", shares.word("before"), words=True, rank=4),
         Column("to", shares.word("after"), words=True),
-        Column("cost", _costs, rank=2),
-        Column("joints", shares.word("n"), rank=1),
+        Column("cost", _costs, rank=1),
+        Column("joints", shares.word("n"), rank=3),
         *(shares.estimated(name, key) for name, key in zip(names, keys, strict=True)),
     ]
 

@@ -232,7 +232,7 @@ def _beyond(view: View, rows: Rows) -> Iterator[Sentence]:
         level = view.load(name).limit
         limit = f"{name} > {'LEVEL' if level is None else text.value(level, view.load(name).unit)}"
         yield Sentence(f"one in more than {view.load(name).valid.size} joints is beyond these joints")
-        yield Sentence(f'loads that none of them has: tolstat rare {study} --limit "{limit}"')
+        yield Sentence(f'rarer ones: tolstat rare {study} --limit "{limit}"')
 
 
 def _notes(rows: Rows) -> Iterator[str]:

@@ -16,7 +16,7 @@ from tests.questions.test_fatigue import needs
 from tests.support.environment import ROOT
 from tolstat.analysis.cycles import Line, damage, equivalent_load, moment
 from tolstat.common.channels import signals_of, unit_of
-from tolstat.common.errors import InputError, NotApplicable
+from tolstat.common.errors import InputError, NotApplicable, StoreError
 from tolstat.common.tables import SIMULATED
 from tolstat.display.answer import Asked
 from tolstat.display.blocks import Panels
@@ -387,6 +387,20 @@ def test_the_frame_for_pylife_holds_every_cycle(campaign):
     np.testing.assert_array_equal(one["range"], here.ranges[3, 0][here.ranges[3, 0] > 0])
     np.testing.assert_array_equal(one["mean"], here.means[3, 0][here.ranges[3, 0] > 0])
     assert set(one["unit"]) == {"N"}
+
+
+def test_joints_that_are_listed_are_exported_but_not_estimated(campaign, tmp_path):
+    source, out = tmp_path / "sweep.toml", tmp_path / "sweep.h5"
+    text = STUDY.format(histories="cycles", alpha=15, seed=1)
+    head, tail = text.partition("[tolerances]")[0], text.partition("[output]")[2]
+    sweep = '[sampling]\nmethod = "sweep"\n[sweep]\n"pin1.offset_t" = { from = "0 mm", to = "0.1 mm", points = 3 }\n'
+    source.write_text(f"{head}{sweep}[output]{tail}", encoding="utf-8")
+    tolstat.run(tolstat.load(source), out, workers=1)
+    with ResultFile.open(out) as store:
+        frame = pylife_frame(store.view(), ["cross1.F_t"])
+        with pytest.raises(StoreError, match="no sample of a production"):
+            tolstat.fatigue(store.view())
+    assert frame["joint"].nunique() == 3
 
 
 def test_the_lines_of_the_document_read_the_export(campaign, tmp_path, monkeypatch):

@@ -271,17 +271,19 @@ def cycles(loads: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
         By name of `cycle_specs`, for each history: ``cycles`` (components, KEPT, 2), N and N m, and ``cycle_count``
         (components,). NaN and 0 when a load is not finite.
     """
-    described, counted = cycle_specs(), dict[str, NDArray[Any]]()
-    finite = all(np.isfinite(values).all() for values in loads.values())
+    described, kept, end = cycle_specs(), dict[str, NDArray[Any]](), 0
+    counted = None
+    if all(np.isfinite(values).all() for values in loads.values()):
+        counted = count(loads, tuple(COMPONENTS.values()))
     for history in LOAD_HISTORIES:
         names = [f"{history.prefix}{name}" for name in ("cycles", "cycle_count")]
         table, number = (described[name].blank(1)[0] for name in names)
-        if finite:
-            own = tuple(signal for signal in COMPONENTS.values() if signal.history == history)
-            ranges, means, number[...] = count(loads, own)
+        begin, end = end, end + len(number)
+        if counted is not None:
+            ranges, means, number[...] = (each[begin:end] for each in counted)
             table[...] = np.stack([ranges, means], axis=-1)
-        counted |= dict(zip(names, (table, number), strict=True))
-    return counted
+        kept |= dict(zip(names, (table, number), strict=True))
+    return kept
 
 
 def count(

@@ -325,13 +325,13 @@ def read(file: Reading) -> Fatigue:
 
 
 def _check_visits(file: Reading, visits: Sequence[str], sequence: SequenceEntry | None) -> None:
-    """Note operating points that have fewer revolutions in the sequence than visits."""
+    """Note operating points that have fewer revolutions in the sequence than visits; both are rounded in studies."""
     points = file.points or ()
     rates = np.array([point.share * abs(point.operation.speed) for point in points])
     if sequence is None or not np.isfinite(rates).all():
         return
     for point, turns in zip(points, sequence.revolutions * rates / (rates.sum() or 1.0), strict=True):
-        if (visited := visits.count(point.name)) > turns * (1.0 + 1e-6):
+        if (visited := visits.count(point.name)) > 1.001 * turns:
             found = (
                 f"{visited} visits of {point.name} in {turns:.3g} revolutions, its share of {sequence.revolutions:g}"
             )

@@ -143,6 +143,8 @@ def fatigue(
     StoreError
         When the joints of a file are no sample of a production.
     """
+    for view in views:
+        view.check()
     settings = section(views[0])
     has_cycles = all(part.store.history_specs for view in views for part in view.parts)
     shown_parts: list[Part] = []
@@ -164,6 +166,7 @@ def fatigue_on_page(view: View, asked: Asked) -> Answer:
     shown_parts: list[Part] = []
     if view.method != "sweep" and view.count(Status.OK):
         with asked.noting("load cycles are left out"):
+            view.check()
             settings = section(view)
             joints = JOINTS if held(view.store) else min(asked.replay, JOINTS)
             if settings.points and joints:
@@ -202,6 +205,7 @@ def life_verdicts(view: View, accepted: float = math.nan, samples: int = JOINTS)
     settings = section(view)
     if not (settings.points or settings.lines) or not settings_of(*members([view], None)).required:
         return []
+    view.check()
     verdicts = []
     if settings.points and (joints := JOINTS if held(view.store) else min(samples, JOINTS)):
         stressed = parts.load_stresses([view], samples=joints)

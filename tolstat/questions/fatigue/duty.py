@@ -73,7 +73,7 @@ class Joints:
         if self.visits:
             between = f"cycles between the points: {len(self.visits)} visits in {self.settings.turns:g} revolutions"
             if missed := [name for p, (name, _) in enumerate(self.duty) if p not in self.visits]:
-                between += f"; none of {', '.join(missed)}"
+                between += f"; no visit of {', '.join(missed)}"
         return [f"over a duty cycle: {shares}, shares of the revolutions", between]
 
     @property
@@ -119,8 +119,6 @@ def members(views: Sequence[View], shares: Sequence[float] | None) -> tuple[Sequ
     ------
     InputError
         When the shares are not shares or not known, or the campaigns have different joints.
-    StoreError
-        When a file holds joints that are no sample of a production.
     """
     if several := [view for view in views if len(view.parts) > 1]:
         remedy = "" if shares is None else "leave --share out: the study gives share in [[operation]]"
@@ -133,8 +131,6 @@ def members(views: Sequence[View], shares: Sequence[float] | None) -> tuple[Sequ
         problem = f"{list(shares)} for {len(views)} files"
         raise InputError([Fault("--share", problem, "give a positive share for each file; their sum is 1")])
     names, first = [column.name for column in ERROR_FIELDS], views[0]
-    for view in views:
-        view.check()
     for view in views[1:]:
         if view.n != first.n or not all(
             np.array_equal(errors[name], other[name])

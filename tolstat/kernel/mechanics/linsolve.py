@@ -270,8 +270,8 @@ def solve(q, work):
         hub = minus_transposed_product(hub, m, PIN_HUB + p, of_pin)
         put_six(x, 6 * pin, of_pin)
         if ARM_OF_PIN[p] >= 2:
-            of_psi -= dot(edge(e, OF_PSI, arm), of_arm) + dot(edge(e, OF_PSI, pin), of_pin)
-            of_s -= dot(edge(e, OF_S, arm), of_arm) + dot(edge(e, OF_S, pin), of_pin)
+            of_psi = of_psi - dot(edge(e, OF_PSI, arm), of_arm) - dot(edge(e, OF_PSI, pin), of_pin)
+            of_s = of_s - dot(edge(e, OF_S, arm), of_arm) - dot(edge(e, OF_S, pin), of_pin)
     of_psi -= dot(edge(e, OF_PSI, HUB), hub)
     of_s -= dot(edge(e, OF_S, HUB), hub)
     s = corner[OF_S, OF_S] * (of_s - corner[OF_PSI, OF_S] * of_psi)
@@ -282,11 +282,11 @@ def solve(q, work):
     for p in range(4):
         pin, arm = PIN + p, ARM + ARM_OF_PIN[p]
         of_pin = minus_product(symmetric_product(m, pin, six(x, 6 * pin)), m, PIN_HUB + p, hub)
-        of_arm = symmetric_product(m, arm, six(x, 6 * arm))
         if ARM_OF_PIN[p] >= 2:
             of_pin = less(less(of_pin, psi, edge(e, OF_PSI, pin)), s, edge(e, OF_S, pin))
+        of_arm = minus_product(symmetric_product(m, arm, six(x, 6 * arm)), m, ARM_PIN + p, of_pin)
+        if ARM_OF_PIN[p] >= 2:
             of_arm = less(less(of_arm, psi, edge(e, OF_PSI, arm)), s, edge(e, OF_S, arm))
-        of_arm = minus_product(of_arm, m, ARM_PIN + p, of_pin)
         put_six(x, 6 * pin, of_pin)
         put_six(x, 6 * arm, of_arm)
     for body in range(N_LUMPS):

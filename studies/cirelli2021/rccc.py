@@ -43,7 +43,6 @@ from studies.cirelli2021.rccc_statics import INPUT_PIN, OUTPUT_PIN, Lines, outpu
 from tolstat.joint import Joint, Operation, ideal, perturb
 from tolstat.joint.material import Array
 from tolstat.joint.perturbation import PIN_TRIADS
-from tolstat.kernel.mechanics.topology import ARM_OF_PIN
 
 CLOSED = 1e-12
 """A loop is closed when all components of its gap are below this, in rad and in units of ``cross.R``."""
@@ -292,10 +291,10 @@ def solve(
 
 
 def _side(row: NDArray[np.void], number: int) -> Side:
-    pin, arm = number - 1, int(ARM_OF_PIN[number - 1])
+    pin = number - 1
     e = PIN_TRIADS[pin, 0]
     centre = float(row["R"][0]) * e
-    pin_point, hole_point = centre + row["pin_point"][0, pin], centre + row["hole_point"][0, arm]
+    pin_point, hole_point = centre + row["pin_point"][0, pin], centre + row["hole_point"][0, pin]
     return Side(number, float(e.sum()), pin_point, row["pin_axis"][0, pin], hole_point, row["hole_axis"][0, arm])
 
 

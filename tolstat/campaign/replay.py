@@ -104,7 +104,7 @@ class CaseResult(NamedTuple):
         columns: dict[str, NDArray[Any]] = {
             "theta": theta,
             "tau": tau,
-            "Psi": (tau - ideal.speed_ratio(turned, self.params["alpha"][0])) / tau,
+            "Psi": (tau - ideal.speed_ratio(turned, self.params["alpha"][0, 0])) / tau,
         }
         columns |= _components(BUSHING_LOADS, histories)
         for p, pin in enumerate(PINS):

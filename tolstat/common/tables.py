@@ -15,8 +15,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tolstat.common.fields import PARAM_FIELDS, Field, dtype_of
+from tolstat.common.cardan import CARDAN
+from tolstat.common.fields import Field, dtype_of
 from tolstat.common.load_kinds import JOINT, LOAD_KINDS, OVER, PINS
+from tolstat.common.mechanism import numbering
+from tolstat.common.parameters import param_fields
 
 SCHEMA_VERSION = 12
 """Version of the result file: raise it with every change of its layout, and so of the fields of errors and results."""
@@ -323,7 +326,15 @@ LEDGER_FIELDS = (
 
 DESIGN = dtype_of(DESIGN_FIELDS)
 ERROR = dtype_of(ERROR_FIELDS)
-PARAM = dtype_of(PARAM_FIELDS)
+PARAM = dtype_of(param_fields(CARDAN))
+
+
+def blank_params(n: int) -> NDArray[np.void]:
+    """Return `n` rows of PARAM that hold the numbers of the mechanism, and zeros."""
+    params = np.zeros(n, PARAM)
+    for name, values in numbering(CARDAN).items():
+        params[name] = values
+    return params
 
 
 def _layouts() -> tuple[np.dtype[np.void], np.dtype[np.void]]:

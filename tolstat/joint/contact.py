@@ -14,7 +14,7 @@ import numpy as np
 from pydantic import Field, ValidationInfo, field_validator
 
 from tolstat.common import units
-from tolstat.common.fields import MAX_STATIONS
+from tolstat.common.parameters import MAX_STATIONS
 from tolstat.common.strict import Strict, refuse
 from tolstat.common.units import NOT_NEGATIVE, Damping, Diameter, QuadraticStiffness
 from tolstat.joint.bearing import Bearing, fit_needles

@@ -10,9 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tolstat.common.cardan import CARDAN
 from tolstat.common.errors import Fault, InputError
 from tolstat.joint.material import Array
 
+ARM = CARDAN.lump_kinds.index("arm")
 NO_CLOSED_FORM = (
     "'ideal' does not hold with an axial force on an output shaft that is not rigid: its joint carries none",
     'write fidelity = "quasistatic", or leave the axial force out',
@@ -68,11 +70,11 @@ def reversal_torque(params: NDArray[np.void]) -> Array:
     ndarray, shape (n,)
         N m.
     """
-    inertia = params["Js"] + 2 * (params["arm_mass"] * params["R"] ** 2 + params["arm_inertia"][:, 2])
+    inertia = params["Js"][:, 0] + 2 * (params["mass"][:, ARM] * params["R"] ** 2 + params["inertia"][:, ARM, 2])
     if (params["n_orders"] > 0).any():
         return _reversal_with_orders(params, inertia)
     theta = np.linspace(0, np.pi, 361)
-    sine, cosine = np.sin(params["alpha"])[:, None], np.cos(params["alpha"])[:, None]
+    sine, cosine = np.sin(params["alpha"]), np.cos(params["alpha"])
     with np.errstate(divide="ignore", invalid="ignore"):  # an angle of 90 deg is outside the model
         steepest = np.abs(cosine * sine**2 * np.sin(2 * theta) / (1 - (sine * np.cos(theta)) ** 2) ** 2).max(axis=1)
     return np.asarray(inertia * params["omega"] ** 2 * steepest)
@@ -109,7 +111,7 @@ def input_motion(phase: ArrayLike, params: NDArray[np.void]) -> tuple[Array, Arr
 def _reversal_with_orders(params: NDArray[np.void], inertia: Array) -> Array:
     """`reversal_torque` of joints with orders; `inertia` of the output shaft and its arms, kg m^2, (n,)."""
     theta, slope, bend, torque = input_motion(np.linspace(0, 2 * np.pi, 721), params)
-    alpha = params["alpha"][:, None]
+    alpha = params["alpha"]
     with np.errstate(divide="ignore", invalid="ignore"):
         bending = steepness(theta, alpha) * slope**2 + speed_ratio(theta, alpha) * bend
         turning = params["omega"][:, None] ** 2 * bending
@@ -165,14 +167,13 @@ def loads(theta: ArrayLike, par: NDArray[np.void]) -> tuple[Array, Array]:
     InputError
         See `check`.
     """
-    from tolstat.kernel.mechanics.ideal_loads import ideal_loads
-    from tolstat.kernel.mechanics.topology import N_DOF
-    from tolstat.kernel.mechanics.work import WORK
+    from tolstat.kernel.mechanics.cardan.ideal_loads import ideal_loads
+    from tolstat.kernel.mechanics.work import work_dtype
 
     check(par)
     angles = np.atleast_1d(np.asarray(theta, float))
     row: Any = par.view(np.recarray)[0]
-    work, at_rest = np.zeros(1, WORK).view(np.recarray)[0], np.zeros(N_DOF)
+    work, at_rest = np.zeros(1, work_dtype()).view(np.recarray)[0], np.zeros(CARDAN.dof)
     load, contact = np.empty((angles.size, 8, 6)), np.empty((angles.size, 4))
     for i, angle in enumerate(angles):
         ideal_loads(angle, at_rest, row, work)

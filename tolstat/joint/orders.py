@@ -23,7 +23,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from tolstat.common import units
-from tolstat.common.fields import MAX_ORDERS
+from tolstat.common.parameters import MAX_ORDERS
 from tolstat.common.strict import Strict, refuse
 from tolstat.joint import ideal
 from tolstat.joint.material import Array
@@ -281,7 +281,7 @@ def _second_joint(
     partner: Partner, params: NDArray[np.void], theta: Array, slope: Array, bend: Array
 ) -> tuple[Array, Array, Array]:
     """Speed ratio of the ideal joint after this one, its output speed over the mean input speed, its acceleration."""
-    alpha = params["alpha"][:, None]
+    alpha = params["alpha"]
     ratio, steepness = ideal.speed_ratio(theta, alpha), ideal.steepness(theta, alpha)
     angle = ideal.output_angle(theta, alpha) + 0.5 * np.pi + partner.offset
     turning, bending = ratio * slope, steepness * slope**2 + ratio * bend

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Annotated, Any
 
 import numpy as np
@@ -11,29 +11,37 @@ from pydantic import AfterValidator, Field, GetJsonSchemaHandler, model_validato
 from pydantic_core import CoreSchema
 
 from tolstat.common import units
-from tolstat.common.fields import MAX_STATIONS
+from tolstat.common.cardan import ARM_QUARTERS, PIN_QUARTERS
+from tolstat.common.cardan import HOLE_OF_PIN as NUMBER_OF_HOLE
 from tolstat.common.load_kinds import PINS
 from tolstat.common.loads import split
+from tolstat.common.parameters import MAX_STATIONS
 from tolstat.common.strict import Strict
-from tolstat.common.tables import ERROR, FACTORS, HOLES, PARAM
+from tolstat.common.tables import ERROR, FACTORS, HOLES, blank_params
 from tolstat.joint import material, orders
 from tolstat.joint.contact import Contact
 from tolstat.joint.material import Array
 from tolstat.joint.model import Joint
 from tolstat.joint.orders import Partner, add_partner, check_misalignment
 from tolstat.joint.sections import Arm, Bushing, Pin
-from tolstat.kernel.mechanics.topology import ARM, ARM_OF_PIN, PIN, TRIAD
 
 Table = NDArray[np.void]
 
 
-PIN_TRIADS: Array = TRIAD[PIN : PIN + 4]
+def _triads(quarters: Sequence[int]) -> Array:
+    """Rows e, t, z of triads after quarter turns about z, (n, 3, 3)."""
+    e = np.array([(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (-1.0, 0.0, 0.0), (0.0, -1.0, 0.0)])[list(quarters)]
+    z = np.tile((0.0, 0.0, 1.0), (len(e), 1))
+    return np.stack([e, np.cross(z, e), z], axis=1)
+
+
+PIN_TRIADS: Array = _triads(PIN_QUARTERS)
 """Rows e, t, z of pins 1 to 4 in axes of the cross frame C; shape (4, 3, 3)."""
 
-HOLE_OF_PIN: dict[str, str] = {pin: HOLES[arm] for pin, arm in zip(PINS, ARM_OF_PIN, strict=True)}
+HOLE_OF_PIN: dict[str, str] = {pin: HOLES[hole - 1] for pin, hole in zip(PINS, NUMBER_OF_HOLE, strict=True)}
 """Hole in which each pin turns."""
 
-ARM_TRIADS: Array = TRIAD[ARM : ARM + 4]
+ARM_TRIADS: Array = _triads(ARM_QUARTERS)
 """Rows e, t, z of arms 1, 2 (input frame I) and 3, 4 (output frame F); shape (4, 3, 3)."""
 
 
@@ -125,11 +133,11 @@ def perturb(joint: Joint, operation: Operation, errors: Table) -> Table:
     ndarray, shape (n,), dtype PARAM
         Row i holds the parameters of joint i.
     """
-    params = np.zeros(len(errors), PARAM)
+    params = blank_params(len(errors))
     for name, value in _constants(joint).items():
         params[name] = value
     point = operating(operation, errors)
-    params["alpha"], params["omega"], params["torque"] = point["alpha"], point["speed"], point["torque"]
+    params["alpha"][:, 0], params["omega"], params["torque"] = point["alpha"], point["speed"], point["torque"]
     if joint.shaft.slides:
         params["F_a"] = point["axial_force"]
     swings = [errors[f"operation.{name}_swing"] for name in ("speed", "torque")]
@@ -138,17 +146,17 @@ def perturb(joint: Joint, operation: Operation, errors: Table) -> Table:
     if operation.partner is not None:
         add_partner(operation.partner, params)
     factor = errors["material.E_factor"]
-    for name in ("k_cross", "k_fork", "station_k1", "station_k2", "station_k3"):
+    params["k"] *= factor[:, None, None]
+    for name in ("station_k1", "station_k2", "station_k3"):
         params[name] *= factor[:, None]
     with np.errstate(invalid="ignore"):  # a negative modulus gives NaN, which the kernel reports
-        for name in ("c_cross", "c_fork"):
-            params[name] *= np.sqrt(factor)[:, None]
-    for i in range(4):
-        params["pin_point"][:, i], params["pin_axis"][:, i] = _axis(errors, PINS[i], PIN_TRIADS[i])
-        params["hole_point"][:, i], params["hole_axis"][:, i] = _axis(errors, HOLES[i], ARM_TRIADS[i])
-        hole = errors[f"{HOLE_OF_PIN[PINS[i]]}.diameter"]
-        pin, clearance = errors[f"{PINS[i]}.diameter"], errors[f"{PINS[i]}.clearance"]
-        params["clearance"][:, i] = _clearance(joint.contact, hole, pin, clearance)
+        params["c"] *= np.sqrt(factor)[:, None, None]
+    for i, (name, number) in enumerate(zip(PINS, NUMBER_OF_HOLE, strict=True)):
+        hole = HOLES[number - 1]
+        params["pin_point"][:, i], params["pin_axis"][:, i] = _axis(errors, name, PIN_TRIADS[i])
+        params["hole_point"][:, i], params["hole_axis"][:, i] = _axis(errors, hole, ARM_TRIADS[number - 1])
+        deviations = (errors[f"{hole}.diameter"], errors[f"{name}.diameter"], errors[f"{name}.clearance"])
+        params["clearance"][:, i] = _clearance(joint.contact, *deviations)
     return params
 
 
@@ -156,20 +164,21 @@ def _constants(joint: Joint) -> dict[str, Any]:
     """Parameters that do not depend on the errors, at factor 1 on E."""
     contact, shaft, stations = joint.contact, joint.shaft, joint.contact.springs(joint.bearing)
     unused = (0, MAX_STATIONS - len(stations.s))
+    R, r_b, l_f = joint.cross.R, joint.cross.r_b, joint.arm.l_f
+    of_cross = _bushing_damping(joint.k_cross, joint.pin, joint.bushing)
+    of_fork = _bushing_damping(joint.k_fork, joint.arm, joint.bushing)
     return {
-        "R": joint.cross.R,
-        "r_b": joint.cross.r_b,
-        "l_f": joint.arm.l_f,
-        "hub_mass": joint.hub.mass,
-        "hub_inertia": joint.hub.inertia,
-        "pin_mass": joint.pin.mass,
-        "pin_inertia": joint.pin.inertia,
-        "arm_mass": joint.arm.mass,
-        "arm_inertia": joint.arm.inertia,
-        "k_cross": joint.k_cross,
-        "k_fork": joint.k_fork,
-        "c_cross": _bushing_damping(joint.k_cross, joint.pin, joint.bushing),
-        "c_fork": _bushing_damping(joint.k_fork, joint.arm, joint.bushing),
+        "R": R,
+        "mass": [joint.hub.mass, joint.pin.mass, joint.arm.mass],
+        "inertia": [joint.hub.inertia, joint.pin.inertia, joint.arm.inertia],
+        "at": [(0.0, 0.0, 0.0), (R, 0.0, 0.0), (R, 0.0, 0.0)],
+        "k": [joint.k_cross, joint.k_fork, joint.k_fork],
+        "c": [of_cross, of_fork, of_fork],
+        "marker": [
+            [(r_b - R, 0.0, 0.0), (r_b, 0.0, 0.0)],
+            [(0.0, 0.0, -l_f), (R, 0.0, -l_f)],
+            [(0.0, 0.0, l_f), (R, 0.0, l_f)],
+        ],
         "Js": shaft.Js,
         "slides": shaft.slides,
         "m_s": shaft.mass if shaft.slides else 0.0,
@@ -224,8 +233,8 @@ def _clearance(contact: Contact, hole: Array, pin: Array, deviation: Array) -> A
 
 PIN_OF_LOAD = {
     name: pin
-    for pin, arm in enumerate(ARM_OF_PIN, 1)
-    for name in (f"cross{pin}.F", f"fork{arm + 1}.F", f"pin{pin}.contact")
+    for pin, hole in enumerate(NUMBER_OF_HOLE, 1)
+    for name in (f"cross{pin}.F", f"fork{hole}.F", f"pin{pin}.contact")
 }
 """Pin of each load that is its force; the three of a pin differ by the inertia of its lumped bodies alone."""
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from tolstat.common.channels import LOAD_HISTORIES
 from tolstat.common.cores import available_cores
-from tolstat.common.tables import PARAM, RESULT, Fidelity, Options
+from tolstat.common.tables import RESULT, Fidelity, Options, blank_params
 from tolstat.solver import histories, refinement, simulation
 
 LOG = logging.getLogger("tolstat")
@@ -28,7 +28,7 @@ def announce() -> None:
 
 def _outside_model(torque_reverses: bool = False) -> NDArray[np.void]:
     """Parameters of a joint with negative clearance, whose simulation ends at once."""
-    params = np.zeros(1, PARAM)
+    params = blank_params(1)
     params["clearance"] = -1.0
     if torque_reverses:
         params["omega"], params["alpha"], params["Js"] = 1.0, 0.1, 1.0
@@ -51,7 +51,7 @@ KERNELS: dict[str, Callable[[Options], object]] = {
     "lockstep.one_at_a_time": partial(_simulate, 1),
     "explicit.explicit": _explicit,
     "explicit.count_steps": lambda options: simulation.explicit_steps(_outside_model(torque_reverses=True), options),
-    "starts.write_starts": lambda options: simulation.starts(np.zeros(1, PARAM).view(np.recarray), options),
+    "starts.write_starts": lambda options: simulation.starts(blank_params(1).view(np.recarray), options),
     "ideal.ideal_revolution": partial(_simulate, 1),
     "rainflow.count_joint": lambda options: histories.cycles(
         {history.name: np.zeros((2, *history.shape)) for history in LOAD_HISTORIES}

@@ -88,8 +88,7 @@ def first_order(params: NDArray[np.void], options: Options, from_start: bool = F
     """
     from tolstat.kernel.integrators import first_order as kernel
     from tolstat.kernel.mechanics.loads import N_INSTANT
-    from tolstat.kernel.mechanics.topology import N_DOF
-    from tolstat.kernel.mechanics.work import WORK
+    from tolstat.kernel.mechanics.work import work_dtype
     from tolstat.kernel.revolution.orders import write_orders
     from tolstat.kernel.revolution.settle import make_samples, sample
     from tolstat.kernel.simd.jit import compiled_entry
@@ -107,8 +106,8 @@ def first_order(params: NDArray[np.void], options: Options, from_start: bool = F
     else:
         options = options._replace(start=int(Start.STATIC))  # the torque ramp has ended
 
-    n = 2 * N_DOF
-    works, scratch = np.zeros(1, WORK), np.empty((3, n))
+    n = 2 * AT_REST.size
+    works, scratch = np.zeros(1, work_dtype()), np.empty((3, n))
     work = works.view(np.recarray)[0]
     fast_rate = compiled_entry(kernel.rate_of_row, t0, y0, params, options, works, y0)
     fast_jacobian = compiled_entry(kernel.jacobian_of_row, t0, y0, params, options, works, scratch, scratch)
@@ -131,7 +130,7 @@ def first_order(params: NDArray[np.void], options: Options, from_start: bool = F
         out.largest[:N_INSTANT] = samples.loads.max(axis=0)
         return np.array(out.largest)
 
-    scale = np.repeat([LENGTH, VELOCITY], N_DOF)
+    scale = np.repeat([LENGTH, VELOCITY], AT_REST.size)
     return FirstOrder(rate, jacobian, t0, y0, period, scale, largest, settled)
 
 

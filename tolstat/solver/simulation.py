@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.common import tables
+from tolstat.common.cardan import CARDAN
+from tolstat.common.mechanism import numbering
 from tolstat.common.tables import RESULT, SIMULATED, Fidelity, Options, Simulation, Start, Status
 from tolstat.joint import ideal
 from tolstat.solver import refinement, stationary
@@ -34,7 +36,7 @@ MOST_ALONE = 3
 UNIFORM_REVS = 4
 """Revolutions with uniform steps of a joint that explicit steps suit: what uniform steps resolve settles sooner."""
 
-AT_REST = np.zeros(56)
+AT_REST = np.zeros(CARDAN.dof)
 """Unknowns of the ideal pose, or velocities of a joint at rest."""
 NO_BLOCKS = np.zeros((0, 0), tables.KERNEL_RESULT).view(np.recarray)
 """Empty statistics of single revolutions, if they are not needed."""
@@ -191,12 +193,13 @@ def run_lanes(queue: Queue, options: Options) -> NDArray[np.int64]:
 def lanes_for(queue: Queue, options: Options, width: int) -> Batch:
     """Lanes for the joints of a queue, with what all of these share."""
     batch = lanes(options, width)
-    batch.par.n_stations, batch.par.n_orders = queue.rows.n_stations[0], queue.rows.n_orders[0]
+    for name in ("n_stations", "n_orders", *numbering(CARDAN)):
+        batch.par[name] = queue.rows[name][0]
     return batch
 
 
 def equilibrium(params: NDArray[np.void], options: Options) -> NDArray[np.float64]:
-    """Unknowns of a joint, (1,), in static equilibrium at the input angle zero, (56,)."""
+    """Unknowns of a joint, (1,), in static equilibrium at the input angle zero, (dof,)."""
     from tolstat.kernel.lanes.lockstep import START_ONLY
     from tolstat.kernel.revolution.settle import make_samples
 
@@ -221,7 +224,7 @@ def _ideal(
 
 
 def starts(rows: NDArray[np.void], options: Options) -> NDArray[np.float64]:
-    """Where the search for the start of each joint begins, (n, 56), see `kernel.revolution.starts`.
+    """Where the search for the start of each joint begins, (n, dof), see `kernel.revolution.starts`.
 
     The kernel is not called, and so not compiled, for joints with negative clearance alone: these end at once.
     """

@@ -1,7 +1,6 @@
 """The joint as a first-order system, y = (q, q'), for third-party integrators: rate, Jacobian."""
 
 from tolstat.kernel.mechanics.dynamics import acceleration
-from tolstat.kernel.mechanics.topology import N_DOF
 from tolstat.kernel.mechanics.vector import copy
 from tolstat.kernel.simd.jit import njit
 
@@ -24,9 +23,10 @@ def rate(t, y, par, options, work, out):
     out : ndarray, shape (112,)
         Written: y'.
     """
-    for i in range(N_DOF):
-        out[i] = y[N_DOF + i]
-    acceleration(t, y[:N_DOF], y[N_DOF:], par, options, work, out[N_DOF:])
+    dof = work.solution.shape[0]
+    for i in range(dof):
+        out[i] = y[dof + i]
+    acceleration(t, y[:dof], y[dof:], par, options, work, out[dof:])
 
 
 @njit
@@ -35,12 +35,13 @@ def jacobian(t, y, par, options, work, column, out):
     base, moved, there = column[0], column[1], column[2]
     rate(t, y, par, options, work, base)
     copy(y, moved)
-    for j in range(2 * N_DOF):
-        moved[j] = y[j] + (POSITION_STEP if j < N_DOF else VELOCITY_STEP)
+    dof = work.solution.shape[0]
+    for j in range(2 * dof):
+        moved[j] = y[j] + (POSITION_STEP if j < dof else VELOCITY_STEP)
         step = moved[j] - y[j]
         rate(t, moved, par, options, work, there)
         moved[j] = y[j]
-        for i in range(2 * N_DOF):
+        for i in range(2 * dof):
             out[i, j] = (there[i] - base[i]) / step
 
 

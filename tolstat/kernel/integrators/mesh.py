@@ -18,7 +18,6 @@ from tolstat.kernel.codes import FORCE, LAST_ITERATION_BELOW, TOLERANCE, TORQUE
 from tolstat.kernel.integrators import trbdf2
 from tolstat.kernel.mechanics.dynamics import mass_of
 from tolstat.kernel.mechanics.scale import set_weight, stiffness, typical_force
-from tolstat.kernel.mechanics.topology import N_LUMPS, PSI, S
 from tolstat.kernel.simd.jit import njit
 
 CELLS = 720
@@ -48,7 +47,8 @@ def load_error(h, par, motion):
     torque = 1 / (motion.memory[TOLERANCE] * motion.memory[TORQUE])
     worst = 0.0 * force
     k = 0.0 * force
-    for body in range(N_LUMPS):
+    lumps, rotations = par.lump_kind.shape[0], par.Js.shape[0]
+    for body in range(lumps):
         mass, inertia = mass_of(body, par)
         k, k_turn = stiffness(body, par)
         mean_inertia = (inertia[0] + inertia[1] + inertia[2]) / 3
@@ -57,10 +57,13 @@ def load_error(h, par, motion):
             error_q, error_v = trbdf2.errors(6 * body + j, h, motion)
             kind = 0 if j < 3 else 2
             worst = max(worst, max(factors[kind] * abs(error_q), factors[kind + 1] * abs(error_v)))
-    error_q, error_v = trbdf2.errors(PSI, h, motion)
-    worst = max(worst, max(force * k * par.R * abs(error_q), force * math.sqrt(k * par.Js) * abs(error_v)))
-    error_q, error_v = trbdf2.errors(S, h, motion)
-    return max(worst, max(force * k * abs(error_q), force * math.sqrt(k * par.m_s) * abs(error_v)))
+    for u in range(motion.q.shape[0] - 6 * lumps):
+        error_q, error_v = trbdf2.errors(6 * lumps + u, h, motion)
+        arm = par.R if u < rotations else 1.0
+        inertia_of_shaft = par.Js[u] if u < rotations else par.m_s
+        by_rate = force * math.sqrt(k * inertia_of_shaft)
+        worst = max(worst, max(force * k * arm * abs(error_q), by_rate * abs(error_v)))
+    return worst
 
 
 @njit

@@ -12,19 +12,6 @@ from tolstat.kernel.mechanics.bushing import accumulate, markers
 from tolstat.kernel.mechanics.dynamics import mass_of
 from tolstat.kernel.mechanics.scale import typical_force
 from tolstat.kernel.mechanics.spring import elastic, has_needles, penetration
-from tolstat.kernel.mechanics.topology import (
-    ARM,
-    ARM_OF_PIN,
-    BUSHING_BASE,
-    BUSHING_LUMP,
-    HUB,
-    INPUT_SHAFT,
-    N_BODIES,
-    N_LUMPS,
-    OUTPUT_SHAFT,
-    PIN,
-    TRIAD,
-)
 from tolstat.kernel.mechanics.triad import from_triad, to_triad
 from tolstat.kernel.mechanics.vector import add, cross, row, scale, sub
 from tolstat.kernel.simd.jit import njit
@@ -51,7 +38,7 @@ def press_on(h, stiffness, damping):
 
 
 @njit
-def connect(one, other, on_one, on_other, along, about, work):
+def connect(one, other, on_one, on_other, along, about, par, work):
     """Add the forces between points of two bodies that move by ``work.vel`` and ``work.spin`` to ``work.force``.
 
     Parameters
@@ -62,14 +49,14 @@ def connect(one, other, on_one, on_other, along, about, work):
         The points, m, from the bodies' reference points, in axes of their ideal frame.
     along, about : tuple of 3 float
         Factors of displacement (N/m) and rotation (N m) along e, t, z of body `one`.
-    work : record of WORK
-        Scratch.
+    par, work : records of PARAM and WORK
+        The joint; scratch.
     """
     here = add(row(work.vel, one), cross(row(work.spin, one), on_one))
     there = add(row(work.vel, other), cross(row(work.spin, other), on_other))
-    d, phi = to_triad(one, sub(here, there)), to_triad(one, sub(row(work.spin, one), row(work.spin, other)))
-    f = from_triad(one, (along[0] * d[0], along[1] * d[1], along[2] * d[2]))
-    torque = from_triad(one, (about[0] * phi[0], about[1] * phi[1], about[2] * phi[2]))
+    d, phi = to_triad(one, sub(here, there), par), to_triad(one, sub(row(work.spin, one), row(work.spin, other)), par)
+    f = from_triad(one, (along[0] * d[0], along[1] * d[1], along[2] * d[2]), par)
+    torque = from_triad(one, (about[0] * phi[0], about[1] * phi[1], about[2] * phi[2]), par)
     accumulate(work.force, one, f, add(cross(on_one, f), torque))
     accumulate(work.force, other, scale(-1.0, f), scale(-1.0, add(cross(on_other, f), torque)))
 
@@ -77,76 +64,97 @@ def connect(one, other, on_one, on_other, along, about, work):
 @njit
 def multiply(h, depth, par, work):
     """Multiply ``work.vel``, ``work.spin`` by h^2/4 K + h C, stations at `depth` (m), into ``work.force``."""
-    for body in range(N_BODIES):
+    for body in range(work.force.shape[0]):
         for k in range(6):
             work.force[body, k] = 0.0
-    for i in range(8):
-        lump, base = BUSHING_LUMP[i], BUSHING_BASE[i]
+    for i in range(work.load.shape[0]):
+        lump, base, kind = par.bushing_lump[i], par.bushing_base[i], par.bushing_kind[i]
         on_lump, on_base = markers(i, par)
-        k, c = (par.k_cross, par.c_cross) if base == HUB else (par.k_fork, par.c_fork)
+        k, c = par.k[kind], par.c[kind]
         along = press_on(h, k[0], c[0]), press_on(h, k[1], c[1]), press_on(h, k[2], c[2])
         about = press_on(h, k[3], c[3]), press_on(h, k[4], c[4]), press_on(h, k[5], c[5])
-        connect(lump, base, on_lump, on_base, along, about, work)
-    for pin in range(4):
-        body = PIN + pin
+        connect(lump, base, on_lump, on_base, along, about, par, work)
+    for pin in range(par.pin.shape[0]):
+        body = par.pin[pin]
         for j in range(par.n_stations):
             _, slope = elastic(j, depth, par.clearance[pin], has_needles(par), par)
             across = press_on(h, slope, max(par.c_d, par.c_t) * par.station_weight[j])
-            at = scale(par.station_s[j], row(TRIAD[body], 0))
-            connect(body, ARM + ARM_OF_PIN[pin], at, at, (0.0, across, across), (0.0, 0.0, 0.0), work)
+            at = from_triad(body, (par.station_s[j], 0.0, 0.0), par)
+            connect(body, par.hole[pin], at, at, (0.0, across, across), (0.0, 0.0, 0.0), par, work)
 
 
 @njit
 def eigenvalue(h, depth, par, work):
     """Largest eigenvalue of M^-1 (h^2/4 K + h C) for steps `h` (s) and stations pressed to `depth` (m)."""
-    for body in range(N_BODIES):
+    lumps, bodies = par.lump_kind.shape[0], work.force.shape[0]
+    for body in range(bodies):
         for k in range(3):
             work.vel[body, k] = work.spin[body, k] = 0.0
-    for body in range(N_LUMPS):
+    for body in range(lumps):
         for k in range(3):  # any motion without a symmetry
             work.vel[body, k] = 0.5 + (7 * k + 3 * body) % 5
             work.spin[body, k] = (0.5 + (5 * k + 4 * body) % 7) / par.R
-    work.spin[OUTPUT_SHAFT, 2] = 1 / par.R
-    work.vel[OUTPUT_SHAFT, 2] = par.slides
-    axial_mass = par.m_s if par.slides > 0 else 1.0
+    for shaft in range(par.turn.shape[0]):
+        if par.turn[shaft] >= 0:
+            work.spin[lumps + shaft, 2] = 1 / par.R
+        if par.slide[shaft] >= 0:
+            work.vel[lumps + shaft, 2] = par.slides
     largest = 0.0
     for _ in range(ITERATIONS):
         multiply(h, depth, par, work)
-        work_done = work.spin[OUTPUT_SHAFT, 2] * work.force[OUTPUT_SHAFT, 5]
-        energy = par.Js * work.spin[OUTPUT_SHAFT, 2] ** 2
-        work.spin[OUTPUT_SHAFT, 2] = work.force[OUTPUT_SHAFT, 5] / par.Js
-        along = work.vel[OUTPUT_SHAFT, 2]
-        force = par.slides * (work.force[OUTPUT_SHAFT, 2] + press_on(h, par.k_a, par.c_a) * along)
-        work_done += along * force
-        energy += axial_mass * along * along
-        work.vel[OUTPUT_SHAFT, 2] = force / axial_mass
-        for body in range(N_LUMPS):
+        work_done, energy = move_shafts(h, par, work)
+        for body in range(lumps):
             mass, inertia = mass_of(body, par)
-            turning = to_triad(body, row(work.spin, body))
-            torque = to_triad(body, (work.force[body, 3], work.force[body, 4], work.force[body, 5]))
+            turning = to_triad(body, row(work.spin, body), par)
+            torque = to_triad(body, (work.force[body, 3], work.force[body, 4], work.force[body, 5]), par)
             for k in range(3):
                 x, y = work.vel[body, k], work.force[body, k]
                 work_done += x * y + turning[k] * torque[k]
                 energy += mass * x * x + inertia[k] * turning[k] * turning[k]
                 work.vel[body, k] = y / mass
             faster = (torque[0] / inertia[0], torque[1] / inertia[1], torque[2] / inertia[2])
-            faster = from_triad(body, faster)
+            faster = from_triad(body, faster, par)
             for k in range(3):
                 work.spin[body, k] = faster[k]
         largest = work_done / energy
         size = 1 / largest
-        for body in range(N_BODIES):
+        for body in range(bodies):
             for k in range(3):
                 work.vel[body, k], work.spin[body, k] = size * work.vel[body, k], size * work.spin[body, k]
-                if body == INPUT_SHAFT:
-                    work.spin[body, k] = 0.0
     return largest
 
 
 @njit
+def move_shafts(h, par, work):
+    """Replace the velocities of the shafts by those that the forces of `multiply` give; return work and energy."""
+    lumps = par.lump_kind.shape[0]
+    work_done = energy = 0.0
+    for u in range(par.Js.shape[0]):
+        torque = speed = 0.0
+        for shaft in range(par.turn.shape[0]):
+            if par.turn[shaft] == u:
+                speed = work.spin[lumps + shaft, 2]
+                torque += work.force[lumps + shaft, 5]
+        work_done += speed * torque
+        energy += par.Js[u] * speed**2
+        for shaft in range(par.turn.shape[0]):
+            if par.turn[shaft] == u:
+                work.spin[lumps + shaft, 2] = torque / par.Js[u]
+    axial_mass = par.m_s if par.slides > 0 else 1.0
+    for shaft in range(par.slide.shape[0]):
+        if par.slide[shaft] >= 0:
+            along = work.vel[lumps + shaft, 2]
+            force = par.slides * (work.force[lumps + shaft, 2] + press_on(h, par.k_a, par.c_a) * along)
+            work_done += along * force
+            energy += axial_mass * along * along
+            work.vel[lumps + shaft, 2] = force / axial_mass
+    return work_done, energy
+
+
+@njit
 def widest(par):
-    """Largest clearance (m) of the four pins."""
-    return max(par.clearance[0], par.clearance[1], par.clearance[2], par.clearance[3])
+    """Largest clearance (m) of the pins."""
+    return par.clearance.max()
 
 
 @njit

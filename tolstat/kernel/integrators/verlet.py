@@ -8,7 +8,6 @@ the two-step Adams-Bashforth formula. The roots of its characteristic polynomial
 eigenvalue of M^-1 (h^2/4 K + h C) is below 1 (Jury's criterion); at 1, one root is -1.
 """
 
-from tolstat.kernel.mechanics.topology import N_DOF
 from tolstat.kernel.simd.jit import njit
 
 
@@ -16,7 +15,7 @@ from tolstat.kernel.simd.jit import njit
 def predict(h, motion):
     """Write q at the end of a step `h` (s), the velocity for the forces there to `v`, and that at half time to `v0`."""
     half = 0.5 * h
-    for i in range(N_DOF):
+    for i in range(motion.q.shape[0]):
         change = half * motion.a[i]
         middle = motion.v[i] + change
         motion.q[i] = motion.q[i] + h * middle
@@ -27,5 +26,5 @@ def predict(h, motion):
 def correct(h, motion):
     """Write the velocity at the end of a step `h` (s) from the accelerations there."""
     half = 0.5 * h
-    for i in range(N_DOF):
+    for i in range(motion.q.shape[0]):
         motion.v[i] = motion.v0[i] + half * motion.a[i]

@@ -4,13 +4,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from tolstat.common.cardan import CARDAN
 from tolstat.common.tables import PARAM, Options
 from tolstat.kernel.codes import MEMORY
 from tolstat.kernel.lanes.lane_memory import aligned_zeros, lane_dtype
 from tolstat.kernel.mechanics.loads import N_INSTANT
 from tolstat.kernel.mechanics.scale import set_weight, typical_force
-from tolstat.kernel.mechanics.topology import N_DOF
-from tolstat.kernel.mechanics.work import FACTORS, WORK
+from tolstat.kernel.mechanics.work import factors_dtype, work_dtype
 from tolstat.kernel.revolution.peaks import PEAKS
 from tolstat.kernel.revolution.resolve import Pasts, make_pasts
 from tolstat.kernel.revolution.settle import make_samples
@@ -18,12 +18,8 @@ from tolstat.kernel.revolution.trail import make_notes
 from tolstat.kernel.simd.jit import njit
 from tolstat.kernel.simd.lane import WIDTH
 
-MOTION = np.dtype(
-    [(name, "f8", N_DOF) for name in ("q", "v", "a", "q0", "v0", "a0", "q1", "v1", "a1", "aux")]
-    + [(name, "f8", N_DOF) for name in ("residual", "weight", "ahead")]
-    + [("memory", "f8", MEMORY)]
-)
-"""Motion of a joint, in the unknowns.
+POINTS = ("q", "v", "a", "q0", "v0", "a0", "q1", "v1", "a1", "aux", "residual", "weight", "ahead")
+"""Motion of a joint, in the unknowns: fields of a batch's ``motion``, beside ``memory``.
 
 - ``q``, ``v``, ``a``: trial point; ``q0``, ``v0``, ``a0``: last accepted point; ``q1``, ``v1``, ``a1``: the one before
 - ``aux``: acceleration at the first stage of a part; at input angles, the third last solution
@@ -88,7 +84,7 @@ class Queue(NamedTuple):
 
     rows: np.recarray  # (n,) PARAM
     words: np.ndarray  # (n, words) the same memory as doubles
-    starts: np.ndarray  # (n, 56) where the search for each joint's start begins, see `revolution.starts`
+    starts: np.ndarray  # (n, dof) where the search for each joint's start begins, see `revolution.starts`
     left: np.ndarray  # (n,) work still allowed to each joint, in Newton iterations; reduced by that done
     samples: np.recarray  # (n, steps_per_rev) SAMPLE: the last revolution of each joint; not written if empty
     blocks: np.recarray  # (n, revolutions) KERNEL_RESULT, revolution r at r modulo their number; not written if empty
@@ -98,13 +94,14 @@ class Queue(NamedTuple):
 def make_batch(options: Options, width: int = WIDTH) -> Batch:
     """Allocate `width` lanes."""
     control = np.dtype([(name, "f8") for name in NUMBERS] + [(name, "i8", width) for name in INTEGERS])
+    of_motion = np.dtype([(name, "f8", CARDAN.dof) for name in POINTS] + [("memory", "f8", MEMORY)])
     pars = aligned_zeros(1, lane_dtype(PARAM, width)).view(np.recarray)
-    layouts = [lane_dtype(dtype, width) for dtype in (WORK, FACTORS, MOTION, control, PEAKS)]
+    layouts = [lane_dtype(dtype, width) for dtype in (work_dtype(), factors_dtype(), of_motion, control, PEAKS)]
     work, tangent, motion, state, peaks = (aligned_zeros(1, layout).view(np.recarray)[0] for layout in layouts)
     words = pars.view(np.float64).view(np.ndarray)
     samples, fine = make_samples(width, options.steps_per_rev), np.zeros((width, 3, N_INSTANT))
     notes, pasts = make_notes(width), make_pasts(width, options)
-    scratch = np.zeros(1, WORK).view(np.recarray)[0]
+    scratch = np.zeros(1, work_dtype()).view(np.recarray)[0]
     return Batch(
         pars[0], words, _word_index(width), work, tangent, motion, state, peaks, samples, fine, notes, pasts, scratch
     )
@@ -138,7 +135,7 @@ def put_joint(lane, words, batch):
 @njit
 def put_start(lane, par, q, control, motion):
     """Put the joint `par` to rest at the unknowns `q` in a lane, and reset its counters."""
-    for i in range(N_DOF):
+    for i in range(motion.q.shape[0]):
         motion.q0[i, lane] = motion.q1[i, lane] = q[i]
         motion.v0[i, lane] = motion.a0[i, lane] = motion.v1[i, lane] = motion.aux[i, lane] = 0.0
     set_weight(typical_force(par), par, motion.weight[:, lane])
@@ -161,7 +158,7 @@ def start_newton(lane, cv, ca, control, motion):
 
     `cv` (1/s) and `ca` (1/s^2) are dv/dq and da/dq of the iteration.
     """
-    for i in range(N_DOF):
+    for i in range(motion.q.shape[0]):
         motion.q[i, lane] = motion.q0[i, lane]
         motion.v[i, lane] = motion.a[i, lane] = 0.0
     control.cv[lane], control.ca[lane] = cv, ca
@@ -173,5 +170,5 @@ def empty(lane, batch):
     """Mark a lane as empty."""
     motion, control = batch.motion, batch.control
     control.live[lane] = control.fresh[lane] = control.passed[lane] = 0.0
-    for i in range(N_DOF):  # no NaN: it would send all lanes through the branch for large rotations
+    for i in range(motion.q.shape[0]):  # no NaN: it would send all lanes through the branch for large rotations
         motion.q[i, lane] = motion.v[i, lane] = motion.a[i, lane] = 0.0

@@ -30,7 +30,6 @@ from tolstat.kernel.lanes.equilibrium import (
     relax,
     start_relaxing,
 )
-from tolstat.kernel.mechanics.topology import N_DOF, PSI
 from tolstat.kernel.revolution.closeup import count_in
 from tolstat.kernel.revolution.outcome import check_settled
 from tolstat.kernel.revolution.quasistatic import angle_time
@@ -64,7 +63,7 @@ least one. Inertia then sets in on a joint that moves almost as it will when set
 @njit
 def accept_unknowns(lane, motion):
     """Accept the unknowns of the trial point of a lane."""
-    for i in range(N_DOF):
+    for i in range(motion.q.shape[0]):
         motion.q0[i, lane] = motion.q[i, lane]
 
 
@@ -93,7 +92,7 @@ def start_motion(lane, par, options, control, motion):
         control.phase[lane] = ANGLE
         set_angle(lane, 0, par, options, control)
     else:
-        for i in range(N_DOF):
+        for i in range(motion.q.shape[0]):
             motion.q1[i, lane] = motion.q0[i, lane]
         control.phase[lane], control.factorised[lane], control.k[lane] = STEP, 0.0, 1
         control.level[lane] = 0
@@ -203,7 +202,8 @@ def finish_angle(lane, par, lanes, options, control, motion, samples, out):
     control.steps[lane] += 1
     control.passed[lane] = 1.0
     record(k, lane, lanes[0], lanes[1], samples)
-    samples[k % n].tau = motion.q[PSI, lane]
+    psi = 6 * par.lump_kind.shape[0] + par.Js.shape[0] - 1
+    samples[k % n].tau = motion.q[psi, lane]
     if k == n:
         k = 0
         control.done[lane] += 1
@@ -285,7 +285,7 @@ def start_cells(lane, par, options, control, motion, past):
 def start_cell(lane, c, options, control, motion, past):
     """Set up cell `c` in a lane that is at the end of the previous cell."""
     cell, before = past.mesh[c % past.mesh.size], past.mesh[(c - 1) % past.mesh.size]
-    for i in range(N_DOF):
+    for i in range(motion.q.shape[0]):
         past.begun[0, i], past.begun[1, i] = motion.q0[i, lane], motion.v0[i, lane]
         past.begun[2, i] = motion.a0[i, lane]
     control.k[lane], control.origin[lane] = c, (c - 1) * control.grid[lane]
@@ -311,7 +311,7 @@ def reject_cell(lane, options, control, motion, past):
     control.factorised[lane] = control.passed[lane] = motion.memory[STAGED_STEP, lane] = 0.0
     if control.level[lane] > options.max_halvings:
         return NEWTON_FAILED
-    for i in range(N_DOF):
+    for i in range(motion.q.shape[0]):
         motion.q0[i, lane], motion.v0[i, lane] = past.begun[0, i], past.begun[1, i]
         motion.a0[i, lane] = past.begun[2, i]
     start_parts(lane, options, control, past)
@@ -346,7 +346,7 @@ def part(lane, par, lanes, options, control, motion, samples, fine, past, out):
 def finish_cell(lane, par, lanes, options, control, motion, samples, past, out):
     """Complete a cell, record the grid point at its end if there is one, and continue; return values as of `part`."""
     c, turns, status, goes_on = control.k[lane], past.turns, NOT_SETTLED, True
-    for i in range(N_DOF):
+    for i in range(motion.q.shape[0]):
         motion.q0[i, lane], motion.v0[i, lane] = motion.q[i, lane], motion.v[i, lane]
         motion.a0[i, lane] = motion.a[i, lane]
     refused = control.level[lane] > control.began[lane]

@@ -8,7 +8,6 @@ bounded, and the simulation continues from the last iterate.
 """
 
 from tolstat.kernel.lanes.batch import RELAX, start_newton
-from tolstat.kernel.mechanics.topology import N_DOF
 from tolstat.kernel.simd.jit import njit
 
 CV_STATIC = 1e-200
@@ -45,7 +44,7 @@ def relax(lane, control, motion):
         control.factorised[lane] = 0.0
         if control.level[lane] > FROM_GUESS:
             return False
-        for i in range(N_DOF):
+        for i in range(motion.q.shape[0]):
             motion.q0[i, lane] = 0.0
         start_relaxing(lane, FROM_ZERO, control)
     control.phase[lane] = RELAX

@@ -14,7 +14,6 @@ from tolstat.kernel.lanes.lane_memory import as_lanes
 from tolstat.kernel.lanes.lockstep import end_joint
 from tolstat.kernel.mechanics.dynamics import acceleration
 from tolstat.kernel.mechanics.loads import complete_loads
-from tolstat.kernel.mechanics.topology import N_DOF
 from tolstat.kernel.revolution.explicit import (
     begin_explicit,
     begin_revolution,
@@ -74,13 +73,13 @@ def load_explicit_joint(lane, joint, steps, options, batch, queue, past):
     par, start, control, motion, out = queue.rows[joint], past.begun, batch.control, batch.motion, queue.results[joint]
     if out.status != NOT_SETTLED:
         return
-    for i in range(N_DOF):
+    for i in range(start.shape[1]):
         start[0, i] = 0.0 if options.start == RAMP else queue.starts[joint, i]
         start[1, i] = 0.0
     acceleration(0.0, start[0], start[1], par, options, batch.scratch, start[2])
     put_joint(lane, queue.words[joint], batch)
     put_start(lane, par, start[0], control, motion)
-    for i in range(N_DOF):
+    for i in range(start.shape[1]):
         motion.q[i, lane], motion.v[i, lane], motion.a[i, lane] = start[0, i], start[1, i], start[2, i]
     control.joint[lane] = joint
     control.iterations[lane], control.factorisations[lane] = out.newton_iterations, out.factorisations
@@ -113,7 +112,7 @@ def arrive(lane, par, lanes, left, options, batch, samples, past, out):
         control.steps[lane] += control.count[lane]
         out.failed_step = k
         return NEWTON_FAILED, False
-    force = largest_at_an_end(lane, lanes[2])
+    force = largest_at_an_end(par.pin.shape[0], lane, lanes[2])
     if not is_stable(force, point[0], turns):
         control.steps[lane] += control.count[lane]
         control.halvings[lane] += 1

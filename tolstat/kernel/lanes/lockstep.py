@@ -39,7 +39,6 @@ from tolstat.kernel.lanes.lane_memory import as_lanes
 from tolstat.kernel.lanes.rounds import begin, classify_lanes, correct, refactorise
 from tolstat.kernel.mechanics.dynamics import residual
 from tolstat.kernel.mechanics.loads import complete_loads, write_loads
-from tolstat.kernel.mechanics.topology import N_DOF
 from tolstat.kernel.revolution.closeup import STEPS as STEPS_AGAIN
 from tolstat.kernel.revolution.closeup import divide, on_a_peak, recall, switches
 from tolstat.kernel.revolution.outcome import (
@@ -176,7 +175,7 @@ def load_joint(lane, joint, options, batch, queue):
     control.origin[lane], control.grid[lane] = 0.0, grid_step(par, options)
     control.t[lane] = 0.0 if options.fidelity == DYNAMIC else angle_time(0, options.steps_per_rev, par)
     if options.fidelity == DYNAMIC and options.start == RAMP:
-        for i in range(N_DOF):
+        for i in range(start.shape[0]):
             motion.q0[i, lane], motion.a0[i, lane] = 0.0, start[i]
         if options.max_revs == START_ONLY:
             end_joint(lane, NOT_SETTLED, -1, options.steps_per_rev, options, batch, queue)
@@ -247,7 +246,7 @@ def lockstep(options, patience, batch, queue, tally):
             tally[2] += 1
             control.before = where(stale, now, control.before)
             failed, moving = failed | (stale & ~good), moving | (stale & good)
-        failed = failed | correct(moving, solved, tangent, motion, control)
+        failed = failed | correct(moving, solved, par, tangent, motion, control)
         solved = solved | last
         if controlled and any_of(solved & (control.stage > 0)):
             control.error = load_error(control.h, par, motion)
@@ -290,7 +289,7 @@ def lockstep(options, patience, batch, queue, tally):
                         lane, rows[joint], lanes, options, controls, motions, batch.fine[lane], results[joint]
                     )
             if options.max_revs == START_ONLY and controls.phase[lane] in (STEP, PART):
-                for i in range(N_DOF):
+                for i in range(queue.starts.shape[1]):
                     queue.starts[joint, i] = motions.q0[i, lane]
                 end_joint(lane, NOT_SETTLED, -1, options.steps_per_rev, options, batch, queue)
             elif not goes_on:

@@ -21,7 +21,6 @@ from tolstat.kernel.lanes.batch import CHECK, STEP
 from tolstat.kernel.lanes.equilibrium import CA_REGULAR, CV_REGULAR, CV_STATIC, ENOUGH, FAR
 from tolstat.kernel.mechanics.linsolve import factorise, solve
 from tolstat.kernel.mechanics.tangent import assemble
-from tolstat.kernel.mechanics.topology import N_DOF, N_LUMPS
 from tolstat.kernel.revolution.quasistatic import extrapolate, keep
 from tolstat.kernel.simd.jit import njit
 from tolstat.kernel.simd.lane import retain, where
@@ -42,7 +41,7 @@ def begin_steps(begins, passed, motion, control):
     h = control.h
     coefficients = bdf2.formula(h, motion.memory[H_OLD], motion.memory[TRAPEZOIDAL])
     known, massless = motion.memory[AHEAD] > 0, motion.memory[MASSLESS] > 0
-    for i in range(N_DOF):
+    for i in range(motion.q.shape[0]):
         q, v, a, q0, v0 = motion.q[i], motion.v[i], motion.a[i], motion.q0[i], motion.v0[i]
         before = retain(passed, q0, motion.q1[i]), retain(passed, v0, motion.v1[i])
         last = retain(passed, q, q0), retain(passed, v, v0), retain(passed, a, motion.a0[i])
@@ -61,7 +60,7 @@ def begin_parts(begins, passed, motion, control):
     """Accept the last part where it passed; predict the trial point of a stage where one begins (TR-BDF2)."""
     coefficients, later = trbdf2.formula(control.h, motion.memory[STAGED_STEP]), control.stage > 0
     at_second = begins & later
-    for i in range(N_DOF):
+    for i in range(motion.q.shape[0]):
         q, v, a = motion.q[i], motion.v[i], motion.a[i]
         last = retain(passed, q, motion.q0[i]), retain(passed, v, motion.v0[i]), retain(passed, a, motion.a0[i])
         motion.q0[i], motion.v0[i], motion.a0[i] = last
@@ -80,7 +79,7 @@ def begin_angles(begins, passed, motion, control):
     """Accept the last angle where it passed; predict the trial point of the next one where one begins."""
     keep(passed, motion)
     extrapolate(begins, control.steps, motion)
-    for i in range(N_DOF):
+    for i in range(motion.q.shape[0]):
         motion.v[i], motion.a[i] = where(begins, 0.0, motion.v[i]), where(begins, 0.0, motion.a[i])
     control.cv, control.ca = where(begins, CV_STATIC, control.cv), where(begins, 0.0, control.ca)
 
@@ -104,7 +103,7 @@ def begin(options, motion, control):
 def scaled_size(motion):
     """Largest weighted residual; NaN if any residual is NaN."""
     size = total = 0.0
-    for i in range(N_DOF):
+    for i in range(motion.q.shape[0]):
         weighted = abs(motion.residual[i]) * motion.weight[i]
         size, total = max(size, weighted), total + weighted
     return where(total == total, size, total)  # the sum detects NaN; a NaN-safe maximum is slower
@@ -140,15 +139,17 @@ def classify_lanes(options, par, motion, control):
 @njit
 def keep_tangent(mask, new, old):
     """Copy a factorised tangent in the lanes of the mask, from `new`, a record of WORK, to `old`, one of FACTORS."""
+    lumps = new.edge.shape[1]
     for b in range(new.block.shape[0]):
         for i in range(6):
-            for j in range(i if b < N_LUMPS else 0, 6):
+            for j in range(i if b < lumps else 0, 6):
                 old.block[b, i, j] = retain(mask, new.block[b, i, j], old.block[b, i, j])
-    for unknown in range(2):
-        for lump in range(N_LUMPS):
+    border = new.corner.shape[0]
+    for unknown in range(border):
+        for lump in range(lumps):
             for i in range(6):
                 old.edge[unknown, lump, i] = retain(mask, new.edge[unknown, lump, i], old.edge[unknown, lump, i])
-        for other in range(unknown, 2):
+        for other in range(unknown, border):
             old.corner[unknown, other] = retain(mask, new.corner[unknown, other], old.corner[unknown, other])
 
 
@@ -158,7 +159,7 @@ def refactorise(mask, control, par, work, tangent):
     static = control.cv == CV_STATIC
     cv, ca = where(static, CV_REGULAR, control.cv), where(control.ca > 0, control.ca, CA_REGULAR)
     assemble(cv, ca, where(static, 0.0, control.cv), par, work)
-    good = factorise(work)
+    good = factorise(par, work)
     keep_tangent(mask, work, tangent)
     control.factorised = where(mask, control.cv, control.factorised)
     control.t_tangent = where(mask, control.t, control.t_tangent)
@@ -167,18 +168,18 @@ def refactorise(mask, control, par, work, tangent):
 
 
 @njit
-def correct(moving, solved, tangent, motion, control):
+def correct(moving, solved, par, tangent, motion, control):
     """Apply Newton's correction in the lanes of `moving`; return in which of them an equilibrium has diverged.
 
     The lanes of `solved` that have a tangent are corrected, too, without being evaluated again: the prediction of the
     next steps multiplies what is left of the residual by up to 15. Their loads stay those of the last evaluation.
     """
     mask = moving | (solved & (control.factorised == control.cv) & (control.phase >= STEP))
-    for i in range(N_DOF):
+    for i in range(motion.q.shape[0]):
         tangent.solution[i] = -motion.residual[i]
-    solve(motion.q, tangent)
+    solve(motion.q, par, tangent)
     step = largest = 0.0 * control.cv
-    for i in range(N_DOF):
+    for i in range(motion.q.shape[0]):
         change = where(mask, tangent.solution[i], 0.0)
         motion.q[i] = retain(mask, motion.q[i] + change, motion.q[i])
         motion.v[i] = retain(mask, motion.v[i] + control.cv * change, motion.v[i])

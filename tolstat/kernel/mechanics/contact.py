@@ -10,9 +10,8 @@ import math
 from tolstat.common.load_kinds import INNER, OUTER, RESULTANT
 from tolstat.common.tables import Mode as ContactMode
 from tolstat.kernel.mechanics.bushing import accumulate
-from tolstat.kernel.mechanics.motion import to_arm, to_cross, velocity_in
+from tolstat.kernel.mechanics.motion import to_hole, to_pin, velocity_in
 from tolstat.kernel.mechanics.spring import elastic, has_needles
-from tolstat.kernel.mechanics.topology import ARM, ARM_OF_PIN, FRAME, PIN
 from tolstat.kernel.mechanics.vector import add, axpy, choose, cross, dot, row, scale, sub, turn
 from tolstat.kernel.mechanics.work import (
     DAMPING,
@@ -50,20 +49,19 @@ def smooth_step_slope(x):
 @njit
 def locate(pin, par, work):
     """Write position, normal, penetration and velocity of each station of `pin` to ``work.station[pin]``."""
-    body, arm = PIN + pin, ARM + ARM_OF_PIN[pin]
-    frame = FRAME[arm]
-    axis = turn(work.rot, arm, row(par.hole_axis, ARM_OF_PIN[pin]))
-    centre = add(row(work.pos, arm), turn(work.rot, arm, row(par.hole_point, ARM_OF_PIN[pin])))
+    body, hole, hinge = par.pin[pin], par.hole[pin], par.hinge[pin]
+    axis = turn(work.rot, hole, row(par.hole_axis, pin))
+    centre = add(row(work.pos, hole), turn(work.rot, hole, row(par.hole_point, pin)))
     origin = turn(work.rot, body, row(par.pin_point, pin))
     direction = turn(work.rot, body, row(par.pin_axis, pin))
     for j in range(par.n_stations):
         lever = axpy(par.station_s[j], direction, origin)
-        # the station and its velocity relative to the arm's ideal frame, in axes of that frame
-        point = to_arm(frame, add(row(work.pos, body), lever), work)
-        velocity = to_arm(frame, add(row(work.vel, body), cross(row(work.spin, body), lever)), work)
-        velocity = velocity_in(frame, velocity, point, work)
-        arm_lever = sub(point, row(work.pos, arm))
-        velocity = sub(velocity, add(row(work.vel, arm), cross(row(work.spin, arm), arm_lever)))
+        # the station and its velocity relative to the hole's ideal frame, in axes of that frame
+        point = to_hole(hinge, add(row(work.pos, body), lever), par, work)
+        velocity = to_hole(hinge, add(row(work.vel, body), cross(row(work.spin, body), lever)), par, work)
+        velocity = velocity_in(hinge, velocity, point, par, work)
+        hole_lever = sub(point, row(work.pos, hole))
+        velocity = sub(velocity, add(row(work.vel, hole), cross(row(work.spin, hole), hole_lever)))
 
         d = sub(point, centre)
         gap = axpy(-dot(d, axis), axis, d)
@@ -119,8 +117,8 @@ def classify(pin, par, work):
 
 @njit
 def contact_load(pin, par, work):
-    """Add the contact forces of `pin` to pin and arm; write ``work.contact[pin]`` and ``work.mode[pin]``."""
-    body, arm = PIN + pin, ARM + ARM_OF_PIN[pin]
+    """Add the contact forces of `pin` to pin and hole; write ``work.contact[pin]`` and ``work.mode[pin]``."""
+    body, hole, hinge = par.pin[pin], par.hole[pin], par.hinge[pin]
     locate(pin, par, work)
     press(pin, par, work)
     total = (0.0, 0.0, 0.0)
@@ -132,11 +130,11 @@ def contact_load(pin, par, work):
         n = (station[NORMAL], station[NORMAL + 1], station[NORMAL + 2])
         m = (station[TANGENT], station[TANGENT + 1], station[TANGENT + 2])
         point = (station[POINT], station[POINT + 1], station[POINT + 2])
-        f_arm = axpy(station[FORCE], n, scale(drag, m))
-        total = add(total, f_arm)
-        accumulate(work.force, arm, f_arm, cross(sub(point, row(work.pos, arm)), f_arm))
-        f_pin = scale(-1.0, to_cross(FRAME[arm], f_arm, work))
-        lever = sub(to_cross(FRAME[arm], point, work), row(work.pos, body))
+        f_hole = axpy(station[FORCE], n, scale(drag, m))
+        total = add(total, f_hole)
+        accumulate(work.force, hole, f_hole, cross(sub(point, row(work.pos, hole)), f_hole))
+        f_pin = scale(-1.0, to_pin(hinge, f_hole, par, work))
+        lever = sub(to_pin(hinge, point, par, work), row(work.pos, body))
         accumulate(work.force, body, f_pin, cross(lever, f_pin))
     work.contact[pin, OUTER] = work.station[pin, 0, FORCE]
     work.contact[pin, INNER] = work.station[pin, par.n_stations - 1, FORCE]

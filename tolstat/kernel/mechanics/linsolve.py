@@ -1,24 +1,22 @@
-"""Direct solution of the tangent system by block elimination along the joint's structure.
+"""Direct solution of the tangent system by block elimination along the mechanism's structure.
 
-Four chains pin - arm are connected to the hub; the arms of the output fork also to psi and s of the output shaft. Arms
-are eliminated into pins and shaft, pins into hub and shaft; of hub and shaft, the hub first, then psi, then s. The
-matrix is symmetric: blocks below the diagonal, and entries below the diagonal of a block on it, are not stored. Each
-6 x 6 block on the diagonal is inverted: a product with the inverse is six independent sums, while substitutions are one
-long chain of dependent operations. Every diagonal has bushing stiffness, so the blocks are inverted without pivoting; a
-zero or NaN determinant is reported. A shaft that is held has 1 on the diagonal of s and zeros beside it.
+Lumps are eliminated in the order of a plan (`common.elimination`), then the unknowns of shafts, the border. Of a Cardan
+joint arms are eliminated into pins and shaft, pins into hub and shaft; of hub and shaft, the hub first, then psi, then
+s. The matrix is symmetric: blocks below the diagonal, and entries below the diagonal of a block on it, are not stored.
+Each 6 x 6 block on the diagonal is inverted: a product with the inverse is six independent sums, while substitutions
+are one long chain of dependent operations. Every diagonal has bushing stiffness, so the blocks are inverted without
+pivoting; a zero or NaN determinant is reported. A shaft that is held has 1 on the diagonal of s and zeros beside it.
 """
 
 from tolstat.kernel.mechanics import vector
 from tolstat.kernel.mechanics.rotation import unspin
-from tolstat.kernel.mechanics.topology import ARM, ARM_OF_PIN, HUB, N_LUMPS, PIN, PSI, S
-from tolstat.kernel.mechanics.work import ARM_PIN, OF_PSI, OF_S, PIN_HUB
 from tolstat.kernel.simd.jit import njit
 from tolstat.kernel.simd.lane import fma, reciprocal
 
 
 @njit
 def six(x, i):
-    """Entries `i` to `i` + 5 of the vector `x`, shape (56,)."""
+    """Entries `i` to `i` + 5 of the vector `x`, shape (n,)."""
     return (x[i], x[i + 1], x[i + 2], x[i + 3], x[i + 4], x[i + 5])
 
 
@@ -30,7 +28,7 @@ def put_six(x, i, a):
 
 @njit
 def edge(e, of, body):
-    """Column of the unknown `of` of the output shaft, rows of a lump; `e`: shape (2, 9, 6)."""
+    """Column of the shafts' unknown `of`, rows of a lump; `e`: shape (unknowns, lumps, 6)."""
     return (e[of, body, 0], e[of, body, 1], e[of, body, 2], e[of, body, 3], e[of, body, 4], e[of, body, 5])
 
 
@@ -197,98 +195,103 @@ def invert(m, b):
 
 
 @njit
-def eliminate(lump, following, between, m):
-    """Eliminate `lump`: invert its block, multiply matrix `between` by the inverse, and reduce the block `following`.
+def eliminate(step, m, par):
+    """Eliminate the lump of a step: invert its block, multiply those beside it by the inverse, reduce what follows.
 
-    `between` has rows of the lump and columns of the one that follows; `m`: all blocks, shape (n, 6, 6). Returns
-    whether the block is regular and finite.
+    `m`: all blocks, shape (n, 6, 6). Returns whether the block is regular and finite.
     """
+    lump, first = par.step_lump[step], par.step_first[step]
     regular = invert(m, lump)
-    for j in range(5, -1, -1):  # columns up to j are still those before the product
-        solved = symmetric_product(m, lump, column(m, between, j))
-        for i in range(j + 1):
-            m[following, i, j] -= dot(column(m, between, i), solved)
-        put_column(m, between, j, solved)
+    for y in range(par.step_first[step + 1] - 1, first - 1, -1):  # earlier ones are still those before the product
+        between, following = par.between[y], par.following[y]
+        for j in range(5, -1, -1):  # and so are columns up to j
+            solved = symmetric_product(m, lump, column(m, between, j))
+            for i in range(j + 1):
+                m[following, i, j] -= dot(column(m, between, i), solved)
+            for z in range(par.target_first[y], par.target_first[y + 1]):
+                other, target = par.between[first + z - par.target_first[y]], par.target[z]
+                for i in range(6):
+                    m[target, i, j] -= dot(column(m, other, i), solved)
+            put_column(m, between, j, solved)
     return regular
 
 
 @njit
-def reduce_corner(lump, work):
-    """Multiply the columns psi and s of a lump by the inverse of its block, and reduce the corner."""
+def eliminate_border(step, par, work):
+    """Reduce the columns of the shafts' unknowns by the lump of a step, multiply its own by the inverse."""
     m, e, corner = work.block, work.edge, work.corner
-    of_psi, of_s = edge(e, OF_PSI, lump), edge(e, OF_S, lump)
-    by_psi, by_s = symmetric_product(m, lump, of_psi), symmetric_product(m, lump, of_s)
-    corner[OF_PSI, OF_PSI] -= dot(of_psi, by_psi)
-    corner[OF_PSI, OF_S] -= dot(of_psi, by_s)
-    corner[OF_S, OF_S] -= dot(of_s, by_s)
-    put_edge(e, OF_PSI, lump, by_psi)
-    put_edge(e, OF_S, lump, by_s)
+    lump, begin, end = par.step_lump[step], par.column_first[step], par.column_first[step + 1]
+    for x in range(begin, end):
+        unknown = par.column[x]
+        for y in range(par.step_first[step], par.step_first[step + 1]):
+            of_following = edge(e, unknown, par.following[y])
+            reduced = minus_transposed_product(of_following, m, par.between[y], edge(e, unknown, lump))
+            put_edge(e, unknown, par.following[y], reduced)
+    for x in range(end - 1, begin - 1, -1):
+        unknown = par.column[x]
+        solved = symmetric_product(m, lump, edge(e, unknown, lump))
+        for z in range(begin, x + 1):
+            corner[par.column[z], unknown] -= dot(edge(e, par.column[z], lump), solved)
+        put_edge(e, unknown, lump, solved)
 
 
 @njit
-def factorise(work):
-    """Factorise the tangent in place: eliminate arms, pins, hub, and psi; return where it is regular and finite."""
+def factorise(par, work):
+    """Factorise the tangent in place; return where it is regular and finite."""
     m, e, corner = work.block, work.edge, work.corner
     regular = True
     none = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    put_edge(e, OF_PSI, HUB, none)
-    put_edge(e, OF_S, HUB, none)
-    for p in range(4):
-        pin, arm = PIN + p, ARM + ARM_OF_PIN[p]
-        regular = regular & eliminate(arm, pin, ARM_PIN + p, m) & eliminate(pin, HUB, PIN_HUB + p, m)
-        if ARM_OF_PIN[p] < 2:  # input fork
-            continue
-        for unknown in (OF_PSI, OF_S):
-            put_edge(e, unknown, pin, none)  # read back, the zeros have the precision of the tangent
-            of_pin = minus_transposed_product(edge(e, unknown, pin), m, ARM_PIN + p, edge(e, unknown, arm))
-            of_hub = minus_transposed_product(edge(e, unknown, HUB), m, PIN_HUB + p, of_pin)
-            put_edge(e, unknown, pin, of_pin)
-            put_edge(e, unknown, HUB, of_hub)
-        reduce_corner(arm, work)
-        reduce_corner(pin, work)
-    regular = regular & invert(m, HUB)
-    reduce_corner(HUB, work)
-    pivot = reciprocal(corner[OF_PSI, OF_PSI])
-    factor = corner[OF_PSI, OF_S] * pivot
-    last = reciprocal(corner[OF_S, OF_S] - factor * corner[OF_PSI, OF_S])
-    corner[OF_PSI, OF_PSI], corner[OF_PSI, OF_S], corner[OF_S, OF_S] = pivot, factor, last
-    return regular & (abs(pivot) < 1e300) & (abs(last) < 1e300)
+    for x in range(par.filled.shape[0]):
+        put_edge(e, par.filled[x, 0], par.filled[x, 1], none)
+    for step in range(par.step_lump.shape[0]):
+        regular = regular & eliminate(step, m, par)
+        eliminate_border(step, par, work)
+    border = corner.shape[0]
+    for i in range(border):
+        pivot = reciprocal(corner[i, i])
+        regular = regular & (abs(pivot) < 1e300)
+        for j in range(border - 1, i, -1):
+            factor = corner[i, j] * pivot
+            for k in range(i + 1, j + 1):
+                corner[k, j] -= factor * corner[i, k]
+            corner[i, j] = factor
+        corner[i, i] = pivot
+    return regular
 
 
 @njit
-def solve(q, work):
+def solve(q, par, work):
     """Solve the factorised system for ``work.solution``, in place; the result is an increment of the unknowns.
 
-    Increments of attitude are converted to increments of the rotation vectors in `q`, shape (56,).
+    Increments of attitude are converted to increments of the rotation vectors in `q`, shape (n,).
     """
     x, m, e, corner = work.solution, work.block, work.edge, work.corner
-    hub, of_psi, of_s = six(x, 0), x[PSI], x[S]
-    for p in range(4):
-        pin, arm = PIN + p, ARM + ARM_OF_PIN[p]
-        of_arm = six(x, 6 * arm)
-        of_pin = minus_transposed_product(six(x, 6 * pin), m, ARM_PIN + p, of_arm)
-        hub = minus_transposed_product(hub, m, PIN_HUB + p, of_pin)
-        put_six(x, 6 * pin, of_pin)
-        if ARM_OF_PIN[p] >= 2:
-            of_psi = of_psi - dot(edge(e, OF_PSI, arm), of_arm) - dot(edge(e, OF_PSI, pin), of_pin)
-            of_s = of_s - dot(edge(e, OF_S, arm), of_arm) - dot(edge(e, OF_S, pin), of_pin)
-    of_psi -= dot(edge(e, OF_PSI, HUB), hub)
-    of_s -= dot(edge(e, OF_S, HUB), hub)
-    s = corner[OF_S, OF_S] * (of_s - corner[OF_PSI, OF_S] * of_psi)
-    psi = corner[OF_PSI, OF_PSI] * of_psi - corner[OF_PSI, OF_S] * s
-    x[PSI], x[S] = psi, s
-    hub = less(less(symmetric_product(m, HUB, hub), psi, edge(e, OF_PSI, HUB)), s, edge(e, OF_S, HUB))
-    put_six(x, 0, hub)
-    for p in range(4):
-        pin, arm = PIN + p, ARM + ARM_OF_PIN[p]
-        of_pin = minus_product(symmetric_product(m, pin, six(x, 6 * pin)), m, PIN_HUB + p, hub)
-        if ARM_OF_PIN[p] >= 2:
-            of_pin = less(less(of_pin, psi, edge(e, OF_PSI, pin)), s, edge(e, OF_S, pin))
-        of_arm = minus_product(symmetric_product(m, arm, six(x, 6 * arm)), m, ARM_PIN + p, of_pin)
-        if ARM_OF_PIN[p] >= 2:
-            of_arm = less(less(of_arm, psi, edge(e, OF_PSI, arm)), s, edge(e, OF_S, arm))
-        put_six(x, 6 * pin, of_pin)
-        put_six(x, 6 * arm, of_arm)
-    for body in range(N_LUMPS):
-        i = 6 * body + 3
+    lumps, border = par.step_lump.shape[0], corner.shape[0]
+    shafts = 6 * lumps
+    for step in range(lumps):
+        lump = par.step_lump[step]
+        of_lump = six(x, 6 * lump)
+        for y in range(par.step_first[step], par.step_first[step + 1]):
+            i = 6 * par.following[y]
+            put_six(x, i, minus_transposed_product(six(x, i), m, par.between[y], of_lump))
+        for z in range(par.column_first[step], par.column_first[step + 1]):
+            x[shafts + par.column[z]] -= dot(edge(e, par.column[z], lump), of_lump)
+    for i in range(border):
+        for j in range(i + 1, border):
+            x[shafts + j] -= corner[i, j] * x[shafts + i]
+    for i in range(border - 1, -1, -1):
+        value = corner[i, i] * x[shafts + i]
+        for j in range(i + 1, border):
+            value = value - corner[i, j] * x[shafts + j]
+        x[shafts + i] = value
+    for step in range(lumps - 1, -1, -1):
+        lump = par.step_lump[step]
+        of_lump = symmetric_product(m, lump, six(x, 6 * lump))
+        for y in range(par.step_first[step], par.step_first[step + 1]):
+            of_lump = minus_product(of_lump, m, par.between[y], six(x, 6 * par.following[y]))
+        for z in range(par.column_first[step], par.column_first[step + 1]):
+            of_lump = less(of_lump, x[shafts + par.column[z]], edge(e, par.column[z], lump))
+        put_six(x, 6 * lump, of_lump)
+    for lump in range(lumps):
+        i = 6 * lump + 3
         x[i], x[i + 1], x[i + 2] = unspin((q[i], q[i + 1], q[i + 2]), (x[i], x[i + 1], x[i + 2]))

@@ -8,7 +8,6 @@ import math
 import numpy as np
 
 from tolstat.common.load_kinds import CONTACTS, LOAD_KINDS, SPAN, measure_of
-from tolstat.kernel.mechanics.topology import INPUT_SHAFT, PSI
 from tolstat.kernel.mechanics.vector import row
 from tolstat.kernel.simd.jit import njit
 from tolstat.kernel.simd.lane import where
@@ -59,14 +58,14 @@ def shaft_load(shaft, par, work):
     Parameters
     ----------
     shaft : int
-        0 input shaft, 1 output shaft.
+        Its number among the shafts.
     par, work
         As in `write_loads`.
     """
-    body = INPUT_SHAFT + shaft
+    body = par.lump_kind.shape[0] + shaft
     x, y, z = row(work.force, body)
     m_x, m_y, m_z = work.force[body, 3], work.force[body, 4], work.force[body, 5]
-    if shaft == 1:
+    if par.slide[shaft] >= 0:
         s, rate = work.pos[body, 2], work.vel[body, 2]
         z = where(par.slides > 0, par.k_a * s + par.c_a * rate - par.F_a, z)
         m_x, m_y = m_x - s * y, m_y + s * x
@@ -89,18 +88,20 @@ def write_loads(v, par, work):
         Holds bushing loads, contact forces, and the resultants on the shafts.
     """
     loads, speed = work.loads, work.drive[0]
-    tau = (work.shaft[0] + v[PSI]) / speed
-    work.output[0], work.output[1] = tau, v[PSI] / (speed * tau)
-    for b in range(8):
+    output = work.force.shape[0] - 1
+    rate = v[6 * par.lump_kind.shape[0] + par.Js.shape[0] - 1]
+    tau = (work.frame_w[par.frame[output], 2] + rate) / speed
+    work.output[0], work.output[1] = tau, rate / (speed * tau)
+    for b in range(work.load.shape[0]):
         for kind in range(2):
             i = 3 * kind
             x, y, z = work.load[b, i], work.load[b, i + 1], work.load[b, i + 2]
             loads[(FORCES, TORQUES)[kind] + b] = x * x + y * y + z * z
-    for pin in range(4):
+    for pin in range(work.contact.shape[0]):
         for i in range(len(CONTACTS)):
             loads[CONTACT_FORCES + len(CONTACTS) * pin + i] = work.contact[pin, i]
     loads[SPEED_ERROR] = abs(work.output[1])
-    for shaft in range(2):
+    for shaft in range(work.shafts.shape[0]):
         f, m = shaft_load(shaft, par, work)
         loads[AXIAL + shaft] = abs(f[2])
         loads[LATERAL + shaft] = f[0] * f[0] + f[1] * f[1]
@@ -118,8 +119,9 @@ def complete_loads(par, work):
     for i in range(N_INSTANT):
         if MODULUS[i]:
             work.loads[i] = math.sqrt(work.loads[i])
-    for shaft in range(2):
-        cosine, sine = work.turned[shaft, 0], work.turned[shaft, 1]
+    for shaft in range(work.shafts.shape[0]):
+        member = par.frame[par.lump_kind.shape[0] + shaft]
+        cosine, sine = work.turned[member, 0], work.turned[member, 1]
         first = 0
         for x, y, z in shaft_load(shaft, par, work):
             work.shafts[shaft, first] = cosine * x - sine * y

@@ -1,18 +1,9 @@
-"""Ideal motion of the frames I, C and F (docs/model.md, "Frames"); the unknowns are deviations from it."""
+"""Ideal motion of the members (docs/model.md, "Frames"); the unknowns are deviations from it."""
 
-import math
-
-from tolstat.kernel.mechanics.topology import FRAME_C, FRAME_F, FRAME_I
+from tolstat.common.mechanism import DRIVEN, HELD, X, Y
+from tolstat.kernel.mechanics.cardan.motion import write_joints
 from tolstat.kernel.mechanics.trigonometry import sine_cosine
 from tolstat.kernel.simd.jit import njit
-
-
-@njit
-def speed_ratio(theta, alpha):
-    """Speed ratio of the ideal joint, d theta_o / d theta (Cirelli et al. 2021, eq. 2)."""
-    sa, ca = sine_cosine(alpha)
-    _, ct = sine_cosine(theta)
-    return ca / (1 - (sa * ct) ** 2)
 
 
 @njit
@@ -47,7 +38,7 @@ def drive_and_load(phase, par):
 
 @njit
 def ideal_motion(phase, par, work):
-    """Write the frames' angular velocities and accelerations, and the rotations between the frames, to `work`.
+    """Write the members' angular velocities and accelerations, and the rotations between them, to `work`.
 
     Parameters
     ----------
@@ -56,65 +47,79 @@ def ideal_motion(phase, par, work):
     par : record of PARAM
         The joint.
     work : record of WORK
-        Its ``frame_w``, ``frame_dw``, ``relative``, ``shaft``, ``turned`` and ``drive`` are
-        written.
+        Its ``frame_w``, ``frame_dw``, ``relative``, ``turned`` and ``drive`` are written.
     """
     theta, slope, bend, torque = drive_and_load(phase, par)
     omega, domega = par.omega * slope, par.omega * par.omega * bend
-    work.drive[0], work.drive[1] = omega, torque
-    sa, ca = sine_cosine(par.alpha)
-    st, ct = sine_cosine(theta)
-    # output fork relative to cross: sin(gamma) = sin(alpha) cos(theta); with secant = 1 / cos(gamma) and
-    # cross relative to input fork: tan(beta) = tan(alpha) sin(theta), cos(beta) = cos(alpha) / cos(gamma)
-    sg = sa * ct
-    secant = 1 / math.sqrt(1 - sg * sg)
-    secant2 = secant * secant
-    cg, dg = (1 - sg * sg) * secant, -sa * st * omega * secant
-    cb, sb = ca * secant, sa * st * secant
-    db = omega * sa * ca * ct * secant2
-    ddb = sa * ca * secant2 * (domega * ct - omega * omega * st * (1 + 2 * sg * sg * secant2))
-    # output shaft, eq. (2) and its time derivative
-    dto = omega * ca * secant2
-    ddto = ca * secant2 * (domega - 2 * omega * omega * sa * sa * ct * st * secant2)
-
-    w, dw = work.frame_w, work.frame_dw
-    w[FRAME_I, 0], w[FRAME_I, 1], w[FRAME_I, 2] = 0.0, 0.0, omega
-    dw[FRAME_I, 0], dw[FRAME_I, 1], dw[FRAME_I, 2] = 0.0, 0.0, domega
-    w[FRAME_C, 0], w[FRAME_C, 1], w[FRAME_C, 2] = db, omega * sb, omega * cb
-    dw[FRAME_C, 0] = ddb
-    dw[FRAME_C, 1], dw[FRAME_C, 2] = omega * cb * db + domega * sb, domega * cb - omega * sb * db
-    w[FRAME_F, 0], w[FRAME_F, 1], w[FRAME_F, 2] = 0.0, 0.0, dto
-    dw[FRAME_F, 0], dw[FRAME_F, 1], dw[FRAME_F, 2] = 0.0, 0.0, ddto
-
-    work.relative[FRAME_I, 0], work.relative[FRAME_I, 1], work.relative[FRAME_I, 2] = cb, sb, db
-    work.relative[FRAME_F, 0], work.relative[FRAME_F, 1], work.relative[FRAME_F, 2] = cg, -sg, -dg
-    work.shaft[0], work.shaft[1] = dto, ddto
-    work.turned[0, 0], work.turned[0, 1] = ct, st
-    work.turned[1, 0], work.turned[1, 1] = ca * ct * secant, st * secant
+    work.drive[0], work.drive[1], work.drive[2] = omega, domega, torque
+    for member in range(par.motion.shape[0]):
+        if par.motion[member] == HELD:
+            set_turning(member, (1.0 + 0.0 * theta, 0.0 * theta), (0.0 * theta, 0.0 * theta), work)
+        elif par.motion[member] == DRIVEN:
+            s, c = sine_cosine(theta)
+            set_turning(member, (c, s), (omega, domega), work)
+    joints = par.cardan.shape[0]
+    if joints > 0:
+        write_joints(theta, par, work)
+    for hinge in range(2 * joints, par.hinge_axis.shape[0]):
+        pin, hole = par.hinge_pin[hinge], par.hinge_hole[hinge]
+        c, s, c0, s0 = work.turned[pin, 0], work.turned[pin, 1], work.turned[hole, 0], work.turned[hole, 1]
+        work.relative[hinge, 0], work.relative[hinge, 1] = c * c0 + s * s0, s * c0 - c * s0
+        work.relative[hinge, 2] = work.frame_w[pin, 2] - work.frame_w[hole, 2]
 
 
 @njit
-def to_arm(frame, a, work):
-    """Components in axes of a fork's frame, I or F, of a vector in axes of C."""
-    c, s = work.relative[frame, 0], work.relative[frame, 1]
-    if frame == FRAME_I:
+def set_turning(member, turned, motion, work):
+    """Write a member that turns about z.
+
+    Parameters
+    ----------
+    member : int
+        Its number.
+    turned : tuple of float
+        Cosine and sine of its angle.
+    motion : tuple of float
+        Its angular velocity (rad/s) and acceleration (rad/s^2).
+    work : record of WORK
+        Written.
+    """
+    work.turned[member, 0], work.turned[member, 1] = turned
+    for k in range(2):
+        work.frame_w[member, k] = work.frame_dw[member, k] = 0.0
+    work.frame_w[member, 2], work.frame_dw[member, 2] = motion
+
+
+@njit
+def to_hole(hinge, a, par, work):
+    """Components in axes of a hinge's hole of a vector in axes of its pin; both are members' frames."""
+    c, s, axis = work.relative[hinge, 0], work.relative[hinge, 1], par.hinge_axis[hinge]
+    if axis == X:
         return (a[0], c * a[1] - s * a[2], s * a[1] + c * a[2])
-    return (c * a[0] + s * a[2], a[1], c * a[2] - s * a[0])
+    if axis == Y:
+        return (c * a[0] + s * a[2], a[1], c * a[2] - s * a[0])
+    return (c * a[0] - s * a[1], s * a[0] + c * a[1], a[2])
 
 
 @njit
-def to_cross(frame, a, work):
-    """Components in axes of C of a vector in axes of a fork's frame, I or F."""
-    c, s = work.relative[frame, 0], work.relative[frame, 1]
-    if frame == FRAME_I:
+def to_pin(hinge, a, par, work):
+    """Components in axes of a hinge's pin of a vector in axes of its hole."""
+    c, s, axis = work.relative[hinge, 0], work.relative[hinge, 1], par.hinge_axis[hinge]
+    if axis == X:
         return (a[0], c * a[1] + s * a[2], c * a[2] - s * a[1])
-    return (c * a[0] - s * a[2], a[1], s * a[0] + c * a[2])
+    if axis == Y:
+        return (c * a[0] - s * a[2], a[1], s * a[0] + c * a[2])
+    return (c * a[0] + s * a[1], c * a[1] - s * a[0], a[2])
 
 
 @njit
-def velocity_in(frame, velocity, point, work):
-    """Velocity relative to `frame`, I or F, of what moves with `velocity` in C at `point`; all in axes of `frame`."""
-    w = work.relative[frame, 2]
-    if frame == FRAME_I:
+def velocity_in(hinge, velocity, point, par, work):
+    """Velocity relative to the hole's frame of what moves with `velocity` in the pin's; all in axes of the hole's.
+
+    `point`: where it is, m.
+    """
+    w, axis = work.relative[hinge, 2], par.hinge_axis[hinge]
+    if axis == X:
         return (velocity[0], velocity[1] - w * point[2], velocity[2] + w * point[1])
-    return (velocity[0] + w * point[2], velocity[1], velocity[2] - w * point[0])
+    if axis == Y:
+        return (velocity[0] + w * point[2], velocity[1], velocity[2] - w * point[0])
+    return (velocity[0] - w * point[1], velocity[1] + w * point[0], velocity[2])

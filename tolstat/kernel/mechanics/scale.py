@@ -2,7 +2,7 @@
 
 import math
 
-from tolstat.kernel.mechanics.topology import ARM, N_LUMPS, PSI, S
+from tolstat.kernel.mechanics.dynamics import mass_of
 from tolstat.kernel.simd.jit import njit
 from tolstat.kernel.simd.lane import pick
 
@@ -16,28 +16,30 @@ def typical_force(par):
     torque = abs(par.torque)
     for i in range(par.n_orders):
         torque += math.hypot(par.torque_order[i, 0], par.torque_order[i, 1])
-    return max(torque / (2 * par.R), par.pin_mass * par.omega**2 * par.R, SMALLEST_FORCE)
+    mass, _ = mass_of(par.pin[0], par)
+    return max(torque / (2 * par.R), mass * par.omega**2 * par.R, SMALLEST_FORCE)
 
 
 @njit
 def stiffness(body, par):
-    """Mean stiffness (N/m, N m/rad) of the bushing that holds a lump; for the hub, that of a pin's bushing."""
-    k = par.k_cross if body < ARM else par.k_fork
+    """Mean stiffness (N/m, N m/rad) of the bushing that holds a lump; of a hub, that of a bushing that it holds."""
+    k = par.k[par.held_by[body]]
     return (k[0] + k[1] + k[2]) / 3, (k[3] + k[4] + k[5]) / 3
 
 
 @njit
 def mean_clearance(lane, par):
-    """Mean radial clearance of the four pins, m; at least the penetration over which contact damping rises."""
+    """Mean radial clearance of the pins, m; at least the penetration over which contact damping rises."""
     total = 0.0
-    for pin in range(4):
+    pins = par.pin.shape[0]
+    for pin in range(pins):
         total += pick(par.clearance[pin], lane)
-    return max(0.25 * total, pick(par.delta_d, lane))
+    return max(total / pins, pick(par.delta_d, lane))
 
 
 @njit
 def centring_stiffness(lane, par):
-    """Axial stiffness (N/m) by which loaded pins, centred in round holes, hold an output shaft; 0 if it is rigid.
+    """Axial stiffness (N/m) by which loaded pins, centred in round holes, hold a shaft; 0 if it is rigid.
 
     A pin that a force presses across a clearance is centred in the hole by the force over the clearance; both pins of
     an axis act together, and the two axes one after the other: T_r / (2 (R + s_0) c), s_0 the outermost station's s.
@@ -60,10 +62,11 @@ def axial_decay(par):
 
 @njit
 def set_weight(force, par, weight):
-    """Write the weights of residuals to `weight`, (56,): 1 / `force` (1/N), for torques 1 / (`force` R)."""
-    for body in range(N_LUMPS):
+    """Write the weights of residuals to `weight`, (n,): 1 / `force` (1/N), for torques 1 / (`force` R)."""
+    lumps, rotations = par.lump_kind.shape[0], par.Js.shape[0]
+    for body in range(lumps):
         for k in range(3):
             weight[6 * body + k] = 1 / force
             weight[6 * body + 3 + k] = 1 / force / par.R
-    weight[PSI] = 1 / force / par.R
-    weight[S] = 1 / force
+    for i in range(6 * lumps, weight.shape[0]):
+        weight[i] = 1 / force / par.R if i < 6 * lumps + rotations else 1 / force

@@ -6,32 +6,16 @@ motion of pins and hub together changes no cross bushing load. Neglected terms, 
 beside it: rotation of the loads with the bodies, gyroscopic terms (2 Omega / cv of the inertia), and rates of levers.
 """
 
-from tolstat.kernel.mechanics.bushing import markers
+from tolstat.kernel.mechanics.bushing import is_lump, markers
 from tolstat.kernel.mechanics.dynamics import mass_of
-from tolstat.kernel.mechanics.motion import to_cross
-from tolstat.kernel.mechanics.topology import (
-    ARM,
-    ARM_OF_PIN,
-    BUSHING_BASE,
-    BUSHING_LUMP,
-    FRAME,
-    HUB,
-    N_LUMPS,
-    OUTPUT_SHAFT,
-    PIN,
-    QUARTERS,
-)
+from tolstat.kernel.mechanics.motion import to_pin
 from tolstat.kernel.mechanics.vector import add, axpy, cross, of_column, row, scale, sub, turn
 from tolstat.kernel.mechanics.work import (
-    ARM_PIN,
     DAMPING,
     DELTA,
     FILM,
     FORCE,
     NORMAL,
-    OF_PSI,
-    OF_S,
-    PIN_HUB,
     POINT,
     RHO,
     SLOPE,
@@ -43,20 +27,23 @@ from tolstat.kernel.simd.lane import any_of, fma, where
 
 
 @njit
-def clear(work):
-    """Set to zero what parts add to: blocks of lumps, of pins and their arms, and the corner."""
-    for b in range(PIN_HUB):
-        for i in range(6):
-            for j in range(i if b < N_LUMPS else 0, 6):
-                work.block[b, i, j] = 0.0
-    for unknown in (OF_PSI, OF_S):
-        work.corner[unknown, OF_PSI] = work.corner[unknown, OF_S] = 0.0
+def clear(par, work):
+    """Set to zero what parts add to: blocks of lumps, of pairs, of lumps joined by elimination, and the corner."""
+    lumps, pairs = par.lump_kind.shape[0], par.pin.shape[0]
+    for b in range(work.block.shape[0]):
+        if b < lumps + pairs or b >= par.first_filled:
+            for i in range(6):
+                for j in range(i if b < lumps else 0, 6):
+                    work.block[b, i, j] = 0.0
+    for unknown in range(work.corner.shape[0]):
+        for other in range(work.corner.shape[0]):
+            work.corner[unknown, other] = 0.0
 
 
 @njit
-def spread(matrices, i, body, k):
+def spread(matrices, i, body, k, par):
     """Columns of R diag(k) R^T, R being matrix `i` of `matrices`; `k`: along the triad of `body`."""
-    x, y = (k[1], k[0]) if QUARTERS[body] % 2 == 1 else (k[0], k[1])
+    x, y = (k[1], k[0]) if par.quarters[body] % 2 == 1 else (k[0], k[1])
     columns = of_column(matrices, i, 0), of_column(matrices, i, 1), of_column(matrices, i, 2)
     return (
         _spread_column(columns, (x * columns[0][0], y * columns[1][0], k[2] * columns[2][0])),
@@ -137,7 +124,7 @@ def inertia_tangent(body, ca, par, work):
     mass, inertia = mass_of(body, par)
     for j in range(3):
         work.block[body, j, j] += ca * mass
-    put_symmetric(work.block, body, 3, spread(work.rot, body, body, scale(ca, inertia)))
+    put_symmetric(work.block, body, 3, spread(work.rot, body, body, scale(ca, inertia), par))
 
 
 @njit
@@ -147,35 +134,38 @@ def bushing_tangent(i, cv, par, work):
     a and b are that sum for displacements and for rotations in axes of the frame. A small rotation of lump or base also
     displaces the marker by rotation x lever: its columns, and by symmetry its rows, have that displacement times a.
     """
-    base, lump = BUSHING_BASE[i], BUSHING_LUMP[i]
-    k, c = (par.k_cross, par.c_cross) if base == HUB else (par.k_fork, par.c_fork)
+    base, lump, kind = par.bushing_base[i], par.bushing_lump[i], par.bushing_kind[i]
+    k, c = par.k[kind], par.c[kind]
     on_lump, _ = markers(i, par)
     lever = turn(work.rot, lump, on_lump)
     base_lever = sub(add(row(work.pos, lump), lever), row(work.pos, base))
-    a = spread(work.rot, base, lump, (fma(cv, c[0], k[0]), fma(cv, c[1], k[1]), fma(cv, c[2], k[2])))
-    b = spread(work.rot, base, lump, (fma(cv, c[3], k[3]), fma(cv, c[4], k[4]), fma(cv, c[5], k[5])))
+    a = spread(work.rot, base, lump, (fma(cv, c[0], k[0]), fma(cv, c[1], k[1]), fma(cv, c[2], k[2])), par)
+    b = spread(work.rot, base, lump, (fma(cv, c[3], k[3]), fma(cv, c[4], k[4]), fma(cv, c[5], k[5])), par)
     by_lump, by_base = turning(a, lever), turning(a, base_lever)
     block = work.block
     put_symmetric(block, lump, 0, a)
     put(block, lump, 0, 3, by_lump)
     put_symmetric(block, lump, 3, plus(b, crossed(lever, by_lump)))
     between = plus(b, crossed(lever, by_base))
-    if base == HUB:
-        put_symmetric(block, HUB, 0, a)
-        put(block, HUB, 0, 3, by_base)
-        put_symmetric(block, HUB, 3, plus(b, crossed(base_lever, by_base)))
-        pin_hub = PIN_HUB + lump - PIN
-        set_negative(block, pin_hub, 0, 0, a)
-        set_negative(block, pin_hub, 0, 3, by_base)
-        set_negative(block, pin_hub, 3, 0, transposed(by_lump))
-        set_negative(block, pin_hub, 3, 3, between)
-    elif base == OUTPUT_SHAFT:  # its unknowns are rotation about z and, where it slides, displacement along z
+    if is_lump(base, par):
+        put_symmetric(block, base, 0, a)
+        put(block, base, 0, 3, by_base)
+        put_symmetric(block, base, 3, plus(b, crossed(base_lever, by_base)))
+        joined = par.bushing_block[i]
+        set_negative(block, joined, 0, 0, a)
+        set_negative(block, joined, 0, 3, by_base)
+        set_negative(block, joined, 3, 0, transposed(by_lump))
+        set_negative(block, joined, 3, 3, between)
+        return
+    rotation, slide = par.turn[base - par.lump_kind.shape[0]], par.slide[base - par.lump_kind.shape[0]]
+    if rotation >= 0:
+        connect_shaft(rotation, lump, by_base[2], between[2], work.edge)
+        work.corner[rotation, rotation] += b[2][2] + cross(base_lever, by_base[2])[2]
+    if slide >= 0:
         slides = par.slides
-        connect_shaft(OF_PSI, lump, by_base[2], between[2], work.edge)
-        connect_shaft(OF_S, lump, scale(slides, a[2]), scale(slides, transposed(by_lump)[2]), work.edge)
-        work.corner[OF_PSI, OF_PSI] += b[2][2] + cross(base_lever, by_base[2])[2]
-        work.corner[OF_PSI, OF_S] += slides * by_base[2][2]
-        work.corner[OF_S, OF_S] += slides * a[2][2]
+        connect_shaft(slide, lump, scale(slides, a[2]), scale(slides, transposed(by_lump)[2]), work.edge)
+        work.corner[rotation, slide] += slides * by_base[2][2]
+        work.corner[slide, slide] += slides * a[2][2]
 
 
 @njit
@@ -187,34 +177,33 @@ def connect_shaft(unknown, arm, f, torque, edge):
 
 
 @njit
-def _directions(pin, j, work):
-    """Write d(displacements of a station along n and m) / d(pin, arm) to ``work.vectors``."""
-    body, arm = PIN + pin, ARM + ARM_OF_PIN[pin]
-    frame = FRAME[arm]
+def _directions(pin, j, par, work):
+    """Write d(displacements of a station along n and m) / d(pin, hole) to ``work.vectors``."""
+    body, hole, hinge = par.pin[pin], par.hole[pin], par.hinge[pin]
     station = work.station[pin, j]
     point = (station[POINT], station[POINT + 1], station[POINT + 2])
-    lever = sub(to_cross(frame, point, work), row(work.pos, body))
-    arm_lever = sub(point, row(work.pos, arm))
+    lever = sub(to_pin(hinge, point, par, work), row(work.pos, body))
+    hole_lever = sub(point, row(work.pos, hole))
     for k, first in ((0, NORMAL), (1, TANGENT)):
         u = (station[first], station[first + 1], station[first + 2])
-        u_pin = to_cross(frame, u, work)
-        about_pin, about_arm = cross(lever, u_pin), cross(arm_lever, u)
+        u_pin = to_pin(hinge, u, par, work)
+        about_pin, about_hole = cross(lever, u_pin), cross(hole_lever, u)
         for i in range(3):
             work.vectors[k, i], work.vectors[k, 3 + i] = u_pin[i], about_pin[i]
-            work.vectors[k, 6 + i], work.vectors[k, 9 + i] = -u[i], -about_arm[i]
+            work.vectors[k, 6 + i], work.vectors[k, 9 + i] = -u[i], -about_hole[i]
 
 
 @njit
-def _add_dyads(pin, n, by_n, m, by_m, work):
-    """Add `n` `by_n`^T + `m` `by_m`^T to the blocks of a pin and its arm; (12,): the pin's six, the arm's six."""
-    body, arm, back = PIN + pin, ARM + ARM_OF_PIN[pin], ARM_PIN + pin
+def _add_dyads(pin, n, by_n, m, by_m, par, work):
+    """Add `n` `by_n`^T + `m` `by_m`^T to the blocks of a pin and its hole; (12,): the pin's six, the hole's six."""
+    body, hole, back = par.pin[pin], par.hole[pin], par.lump_kind.shape[0] + pin
     block = work.block
     for i in range(6):
         for j in range(6):
             block[back, i, j] = fma(m[6 + i], by_m[j], fma(n[6 + i], by_n[j], block[back, i, j]))
         for j in range(i, 6):
             block[body, i, j] = fma(m[i], by_m[j], fma(n[i], by_n[j], block[body, i, j]))
-            block[arm, i, j] = fma(m[6 + i], by_m[6 + j], fma(n[6 + i], by_n[6 + j], block[arm, i, j]))
+            block[hole, i, j] = fma(m[6 + i], by_m[6 + j], fma(n[6 + i], by_n[6 + j], block[hole, i, j]))
 
 
 @njit
@@ -234,11 +223,11 @@ def contact_tangent(pin, cv, par, work):
         by_rho = where(touching, 1 / station[RHO], 0.0)
         nn = station[SLOPE] + cv * station[DAMPING]
         mm = station[FORCE] * by_rho + station[FILM] * (cv - station[V_NORMAL] * by_rho)
-        _directions(pin, j, work)
+        _directions(pin, j, par, work)
         n, m = work.vectors[0], work.vectors[1]
         for i in range(12):
             by_n[i], by_m[i] = nn * n[i], mm * m[i]
-        _add_dyads(pin, n, by_n, m, by_m, work)
+        _add_dyads(pin, n, by_n, m, by_m, par, work)
 
 
 @njit
@@ -256,13 +245,16 @@ def assemble(cv, ca, cv_axial, par, work):
     work : record of WORK
         Bodies and stations are read; the blocks of the tangent are written.
     """
-    clear(work)
-    for body in range(N_LUMPS):
+    clear(par, work)
+    for body in range(par.lump_kind.shape[0]):
         inertia_tangent(body, ca, par, work)
-    for i in range(8):
+    for i in range(work.load.shape[0]):
         bushing_tangent(i, cv, par, work)
-    for pin in range(4):
+    for pin in range(work.contact.shape[0]):
         contact_tangent(pin, cv, par, work)
-    work.corner[OF_PSI, OF_PSI] += ca * par.Js
+    rotations = par.Js.shape[0]
+    for u in range(rotations):
+        work.corner[u, u] += ca * par.Js[u]
     support = ca * par.m_s + cv_axial * par.c_a + par.k_a
-    work.corner[OF_S, OF_S] += where(par.slides > 0, support, 1.0)
+    for u in range(rotations, work.corner.shape[0]):
+        work.corner[u, u] += where(par.slides > 0, support, 1.0)

@@ -1,13 +1,12 @@
-"""Components along the bodies' triads (e, t, z): frame axes after quarter turns about z, so nothing is multiplied."""
+"""Components along the lumps' triads (e, t, z): frame axes after quarter turns about z, so nothing is multiplied."""
 
-from tolstat.kernel.mechanics.topology import QUARTERS
 from tolstat.kernel.simd.jit import njit
 
 
 @njit
-def to_triad(body, a):
+def to_triad(body, a, par):
     """Components along e, t and z of a vector in axes of the body's frame."""
-    quarters = QUARTERS[body]
+    quarters = par.quarters[body]
     x, y = a[0], a[1]
     if quarters % 2 == 1:
         x, y = y, -x
@@ -17,9 +16,9 @@ def to_triad(body, a):
 
 
 @njit
-def from_triad(body, a):
+def from_triad(body, a, par):
     """Components in axes of the body's frame of a vector given along e, t and z."""
-    quarters = QUARTERS[body]
+    quarters = par.quarters[body]
     x, y = a[0], a[1]
     if quarters % 2 == 1:
         x, y = -y, x

@@ -5,65 +5,79 @@ compiler. (With some thirty arrays in a NamedTuple instead, every call copied th
 took five times as long.) All 6 x 6 blocks lie in one array: a kernel is compiled once for each shape.
 """
 
+from functools import cache
+
 import numpy as np
 
-from tolstat.common.fields import MAX_STATIONS
+from tolstat.common.cardan import CARDAN
+from tolstat.common.mechanism import blocks_of
+from tolstat.common.parameters import MAX_STATIONS
 from tolstat.kernel.mechanics.loads import N_INSTANT
-from tolstat.kernel.mechanics.topology import N_BODIES, N_DOF, N_LUMPS
 
 # columns of work.station
 POINT, NORMAL, TANGENT = 0, 3, 6
 RHO, DELTA, V_NORMAL, V_TANGENT, FORCE, SLOPE, DAMPING, FILM = 9, 10, 11, 12, 13, 14, 15, 16
 N_STATION = 17
 
-ARM_PIN, PIN_HUB = N_LUMPS, N_LUMPS + 4
-"""First matrix of each kind in ``work.block``, after those of the lumps: rows of the arm that holds pin p, columns of
-the pin; rows of pin p, columns of the hub. Those below the diagonal are their transposes."""
-OF_PSI, OF_S = 0, 1
 
-FIELDS = {
-    "frame_w": (3, 3),  # angular velocity of I, C, F in their own axes
-    "frame_dw": (3, 3),  # its derivative
-    "relative": (3, 3),  # of C relative to I (about x), -, F (about y): cosine and sine of the angle, its rate
-    "drive": (2,),  # angular velocity of the input shaft; resisting torque, without the ramp at the start
-    "shaft": (2,),  # ideal speed and acceleration of the output shaft
-    "turned": (2, 2),  # cosine and sine of the angle theta of the input, and theta_o of the output shaft
-    "pos": (N_BODIES, 3),  # X + u
-    "vel": (N_BODIES, 3),  # u'
-    "rot": (N_BODIES, 3, 3),  # exp(phi x)
-    "series": (N_LUMPS, 3),  # `rotation.coefficients` of its rotation vector
-    "spin": (N_BODIES, 3),  # angular velocity relative to the ideal frame
-    "force": (N_BODIES, 6),  # force, torque about the reference point
-    "load": (8, 6),  # bushing loads on the lump, in the base marker's (e, t, z)
-    "contact": (4, 3),  # normal force at the outer and inner end station of each pin, resultant of all its stations
-    "mode": (4,),  # contact mode of each pin
-    "output": (2,),  # speed ratio of the output shaft and its error Psi, eq. (13)
-    "loads": (N_INSTANT,),  # as `loads.write_loads` writes them
-    "shafts": (2, 6),  # force and moment about O on input and output shaft, in axes that do not turn
-    "station": (4, MAX_STATIONS, N_STATION),  # contact stations, see the column numbers above
-    "block": (N_LUMPS + 8, 6, 6),  # matrices of the tangent, those of lumps above the diagonal; factorised in place
-    "edge": (2, N_LUMPS, 6),  # its columns psi and s, rows of the output arms; of their pins and the hub: fill-in
-    "corner": (2, 2),  # its rows and columns psi and s; factorised in place
-    "vectors": (2, 12),  # d(displacements of a station along n and m) / d(pin, arm)
-    "by_n": (12,),  # scratch of contact_tangent: d(forces of that station along n and m) / d(pin, arm)
-    "by_m": (12,),
-    "solution": (N_DOF,),  # right-hand side, then solution, of the linear system
-}
-"""State of the bodies at one instant, the loads between them, and the tangent's blocks.
+@cache
+def work_fields(mechanism):
+    """Shapes of the fields of a work record: the bodies at one instant, the loads between them, and the tangent.
 
-All vectors of a body are in axes of its ideal frame.
-"""
+    All vectors of a body are in axes of its ideal frame.
+    """
+    members, lumps, shafts = len(mechanism.members), len(mechanism.lumps), len(mechanism.shafts)
+    bodies, pairs, border = lumps + shafts, len(mechanism.pairs), len(mechanism.unknowns)
+    return {
+        "frame_w": (members, 3),  # angular velocity of each member in its own axes
+        "frame_dw": (members, 3),  # its derivative
+        "relative": (len(mechanism.hinges), 3),  # pin's member in the hole's: cosine, sine of the angle, its rate
+        "drive": (3,),  # angular velocity and acceleration of the input; resisting torque, without the ramp
+        "turned": (members, 2),  # of those that turn about z: cosine and sine of their angle
+        "pos": (bodies, 3),  # X + u
+        "vel": (bodies, 3),  # u'
+        "rot": (bodies, 3, 3),  # exp(phi x)
+        "series": (lumps, 3),  # `rotation.coefficients` of its rotation vector
+        "spin": (bodies, 3),  # angular velocity relative to the ideal frame
+        "force": (bodies, 6),  # force, torque about the reference point
+        "load": (len(mechanism.bushings), 6),  # bushing loads on the lump, in the base marker's (e, t, z)
+        "contact": (pairs, 3),  # normal force at the outer and inner end station of each pin, resultant of all
+        "mode": (pairs,),  # contact mode of each pin
+        "output": (2,),  # speed ratio of the output shaft and its error Psi, eq. (13)
+        "loads": (N_INSTANT,),  # as `loads.write_loads` writes them
+        "shafts": (shafts, 6),  # force and moment about O on each shaft, in axes that do not turn
+        "station": (pairs, MAX_STATIONS, N_STATION),  # contact stations, see the column numbers above
+        "block": (blocks_of(mechanism), 6, 6),  # matrices of the tangent, factorised in place; rows of what goes first
+        "edge": (border, lumps, 6),  # its columns of the shafts' unknowns, rows of the lumps
+        "corner": (border, border),  # its rows and columns of these; factorised in place
+        "vectors": (2, 12),  # d(displacements of a station along n and m) / d(pin, hole)
+        "by_n": (12,),  # scratch of contact_tangent: d(forces of that station along n and m) / d(pin, hole)
+        "by_m": (12,),
+        "solution": (mechanism.dof,),  # right-hand side, then solution, of the linear system
+    }
+
 
 SINGLE = ("block", "edge", "corner", "vectors", "by_n", "by_m", "solution")
 """Fields in single precision, those of the tangent: its age leaves more of a residual than rounding does."""
-WORK = np.dtype([(name, np.float32 if name in SINGLE else np.float64, shape) for name, shape in FIELDS.items()])
-FACTORS = np.dtype([(name, np.float32, FIELDS[name]) for name in ("block", "edge", "corner", "solution")])
-"""A factorised tangent in use."""
 
 
-def make_work():
+@cache
+def work_dtype(mechanism=CARDAN):
+    """Type of a work record."""
+    fields = work_fields(mechanism).items()
+    return np.dtype([(name, np.float32 if name in SINGLE else np.float64, shape) for name, shape in fields])
+
+
+@cache
+def factors_dtype(mechanism=CARDAN):
+    """Type of a factorised tangent in use."""
+    fields = work_fields(mechanism)
+    return np.dtype([(name, np.float32, fields[name]) for name in ("block", "edge", "corner", "solution")])
+
+
+def make_work(mechanism=CARDAN):
     """Allocate the work record of a process, filled with NaN to expose values that are read before they are written."""
-    work = np.zeros(1, WORK).view(np.recarray)[0]
-    for name in FIELDS:
+    work = np.zeros(1, work_dtype(mechanism)).view(np.recarray)[0]
+    for name in work_fields(mechanism):
         work[name][...] = np.nan
     return work

@@ -10,6 +10,7 @@ They count among the largest and smallest loads; the recorded samples stay as th
 import math
 
 from tolstat.kernel.codes import H_OLD, LAST_ITERATION_BELOW, TRAPEZOIDAL
+from tolstat.kernel.mechanics.dynamics import mass_of
 from tolstat.kernel.mechanics.loads import (
     DECIDING,
     INTERPOLATED,
@@ -20,7 +21,6 @@ from tolstat.kernel.mechanics.loads import (
     size_of,
 )
 from tolstat.kernel.mechanics.scale import stiffness
-from tolstat.kernel.mechanics.topology import N_DOF, PIN
 from tolstat.kernel.revolution.settle import grid_step, peak
 from tolstat.kernel.simd.jit import njit
 
@@ -45,7 +45,7 @@ the trapezoidal rule takes: they are so short that it takes off all but a hundre
 def switches(s, samples):
     """Whether any contact station opened or closed between samples `s - 1` and `s`."""
     switched = False
-    for pin in range(4):
+    for pin in range(samples[s].pressed.shape[0]):
         switched |= samples[s].pressed[pin] != samples[s - 1].pressed[pin]
     return switched
 
@@ -101,7 +101,7 @@ def recall(s, lane, par, options, samples, motion):
     `motion`: record of MOTION. Accelerations are those of BDF2's formula for equal steps.
     """
     h, here, before, first = grid_step(par, options), samples[s], samples[s - 1], samples[s - 2]
-    for i in range(N_DOF):
+    for i in range(motion.q.shape[0]):
         motion.q0[i, lane], motion.v0[i, lane] = here.q[i], here.v[i]
         motion.q1[i, lane], motion.v1[i, lane] = before.q[i], before.v[i]
         motion.a0[i, lane] = (3 * here.v[i] - 4 * before.v[i] + first.v[i]) / (2 * h)
@@ -117,7 +117,8 @@ def divide(lane, par, options, control, motion):
     h, parts = grid_step(par, options), options.peak_substeps
     if control.left[lane] <= 0:
         parts = max(1, parts // FEWER)
-    resolved = h / parts <= LONGEST * math.sqrt(par.pin_mass / stiffness(PIN, par)[0])
+    pin = par.pin[0]
+    resolved = h / parts <= LONGEST * math.sqrt(mass_of(pin, par)[0] / stiffness(pin, par)[0])
     control.until[lane], control.grid[lane] = parts, h / parts
     motion.memory[TRAPEZOIDAL, lane] = resolved
     motion.memory[LAST_ITERATION_BELOW, lane] = LAST_ITERATION_FACTOR * options.newton_tol if resolved else 0.0

@@ -10,7 +10,6 @@ import math
 from tolstat.kernel.integrators.stability import largest_force, steps_for
 from tolstat.kernel.integrators.verlet import correct, predict
 from tolstat.kernel.mechanics.dynamics import acceleration
-from tolstat.kernel.mechanics.topology import N_DOF
 from tolstat.kernel.revolution.peaks import follow
 from tolstat.kernel.revolution.resolve import SETTLING, begin_turns
 from tolstat.kernel.simd.jit import njit
@@ -47,7 +46,7 @@ def begin_explicit(steps, par, options, work, past):
 def begin_revolution(point, before, par, work, past):
     """Keep `point` (q, v, a) at the start of a revolution; `before`: steps of the last one."""
     turns = past.turns
-    for i in range(N_DOF):
+    for i in range(past.begun.shape[1]):
         past.begun[0, i], past.begun[1, i], past.begun[2, i] = point[0][i], point[1][i], point[2][i]
     if steps_of(turns) != before:
         turns.bearable = largest_force(steps_of(turns), par, work)
@@ -57,7 +56,7 @@ def begin_revolution(point, before, par, work, past):
 def is_stable(force, q, turns):
     """Whether the steps were stable so far; `force`: largest one of an end station, N."""
     good = force <= turns.bearable
-    for i in range(N_DOF):
+    for i in range(q.shape[0]):
         good = good and abs(q[i]) < 1
     return good
 
@@ -84,7 +83,7 @@ def repeat_finer(force, point, par, options, work, past):
     turns.since = turns.revolution
     turns.limit = max(turns.limit, turns.revolution + SETTLING)
     turns.bearable = largest_force(steps_of(turns), par, work)
-    for i in range(N_DOF):
+    for i in range(past.begun.shape[1]):
         point[0][i], point[1][i], point[2][i] = past.begun[0, i], past.begun[1, i], past.begun[2, i]
     return True
 

@@ -7,7 +7,7 @@ import numpy as np
 from tolstat.common.tables import MAX_ITERATIONS, MAX_SHIFT, MAX_TILT
 from tolstat.kernel.codes import DYNAMIC, NEWTON_FAILED, NOT_SETTLED, OK
 from tolstat.kernel.mechanics.loads import DECIDING, N_AVERAGED, N_LOADS
-from tolstat.kernel.mechanics.topology import ARM, PIN, TRIAD
+from tolstat.kernel.mechanics.triad import from_triad
 from tolstat.kernel.mechanics.vector import dot, row
 from tolstat.kernel.revolution.settle import ALL_LOADS, closure_error, step_error
 from tolstat.kernel.revolution.trail import closure_trend, note_closure, with_slow_decay
@@ -22,24 +22,25 @@ second the step error, up to which that holds (docs/notes/steps.md)."""
 
 
 @njit
-def is_near(body, point, axis, R):
-    """Whether the axis of a pin or hole, vectors `point` and `axis`, is near its ideal one at the distance `R` from O.
-
-    A NaN is not.
-    """
-    return dot(point, point) <= (MAX_SHIFT * R) ** 2 and dot(axis, row(TRIAD[body], 0)) >= math.cos(MAX_TILT)
+def is_near(body, point, axis, par):
+    """Whether the axis of a pin or hole, vectors `point` and `axis`, is near its ideal one; a NaN is not."""
+    e = from_triad(body, (1.0, 0.0, 0.0), par)
+    return dot(point, point) <= (MAX_SHIFT * par.R) ** 2 and dot(axis, e) >= math.cos(MAX_TILT)
 
 
 @njit
 def inside_model(par):
     """Whether a joint lies within the scope of the model; written so that NaN does not."""
-    good = abs(par.alpha) < 0.5 * math.pi and 0 < abs(par.omega) < 1e300 and abs(par.torque) < 1e300
+    good = 0 < abs(par.omega) < 1e300 and abs(par.torque) < 1e300
+    for joint in range(par.alpha.shape[0]):
+        good = good and abs(par.alpha[joint]) < 0.5 * math.pi
     swing = 0.0
     for i in range(par.n_orders):
         swing += par.order[i] * math.hypot(par.speed_order[i, 0], par.speed_order[i, 1])
         good = good and math.hypot(par.torque_order[i, 0], par.torque_order[i, 1]) < 1e300
     good = good and swing < 1
-    good = good and par.k_cross[0] > 0 and par.k_fork[0] > 0
+    for kind in range(par.k.shape[0]):
+        good = good and par.k[kind, 0] > 0
     good = good and par.needle_b >= 0
     bears = False
     for j in range(par.n_stations):
@@ -47,10 +48,10 @@ def inside_model(par):
         good = good and (par.needle_b > 0 or par.station_k3[j] == 0)
         bears = bears or par.station_k2[j] > 0 or par.station_k3[j] > 0
     good = good and bears
-    for pin in range(4):
+    for pin in range(par.pin.shape[0]):
         good = good and 0 <= par.clearance[pin] <= MAX_SHIFT * par.R
-        good = good and is_near(PIN + pin, row(par.pin_point, pin), row(par.pin_axis, pin), par.R)
-        good = good and is_near(ARM + pin, row(par.hole_point, pin), row(par.hole_axis, pin), par.R)
+        good = good and is_near(par.pin[pin], row(par.pin_point, pin), row(par.pin_axis, pin), par)
+        good = good and is_near(par.hole[pin], row(par.hole_point, pin), row(par.hole_axis, pin), par)
     return good
 
 
@@ -66,8 +67,8 @@ def clear_results(out):
         out.largest[i] = nan
     for i in range(N_AVERAGED):
         out.average[i] = out.range[i] = nan
-    for pin in range(4):
-        for k in range(4):
+    for pin in range(out.mode_share.shape[0]):
+        for k in range(out.mode_share.shape[1]):
             out.mode_share[pin, k] = nan
         out.equivalent_load[pin] = nan
 

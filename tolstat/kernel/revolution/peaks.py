@@ -68,10 +68,10 @@ def forget(mask, peaks):
 
 
 @njit
-def largest_at_an_end(lane, peaks):
-    """Largest contact force of any end station, N."""
+def largest_at_an_end(pins, lane, peaks):
+    """Largest contact force of any end station of all `pins`, N."""
     largest = 0.0
-    for pin in range(4):
+    for pin in range(pins):
         first = CONTACT_FORCES + len(CONTACTS) * pin
         largest = max(largest, pick(peaks.top[first + OUTER], lane), pick(peaks.top[first + INNER], lane))
     return largest

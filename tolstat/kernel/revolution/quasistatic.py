@@ -10,10 +10,10 @@ where pseudo-transient continuation leads from there.
 
 import math
 
+from tolstat.kernel.mechanics.cardan.motion import ideal_ratio
 from tolstat.kernel.codes import AHEAD
 from tolstat.kernel.mechanics.loads import SPEED_ERROR
-from tolstat.kernel.mechanics.motion import drive_and_load, speed_ratio
-from tolstat.kernel.mechanics.topology import N_DOF
+from tolstat.kernel.mechanics.motion import drive_and_load
 from tolstat.kernel.simd.jit import njit
 from tolstat.kernel.simd.lane import where
 
@@ -41,7 +41,7 @@ def extrapolate(begins, known, motion):
         ``q0``, ``q1``, ``aux`` and ``a1`` hold the last to the fourth last solution; ``q`` is written.
     """
     cubic, square = (known > 3) & (motion.memory[AHEAD] > 0), known > 2
-    for i in range(N_DOF):
+    for i in range(motion.q.shape[0]):
         by_four = 4 * (motion.q0[i] + motion.aux[i]) - 6 * motion.q1[i] - motion.a1[i]
         by_three = 3 * (motion.q0[i] - motion.q1[i]) + motion.aux[i]
         guess = where(cubic, by_four, where(square, by_three, motion.q0[i]))
@@ -55,7 +55,7 @@ def keep(solved, motion):
     ``motion.memory[AHEAD]`` becomes 1 if four angles predicted this solution better than three, else 0.
     """
     by_three = by_four = 0.0 * motion.q[0]
-    for i in range(N_DOF):
+    for i in range(motion.q.shape[0]):
         third = motion.q[i] - 3 * (motion.q0[i] - motion.q1[i]) - motion.aux[i]
         by_three += abs(third)
         by_four += abs(third - (motion.q0[i] - 3 * (motion.q1[i] - motion.aux[i]) - motion.a1[i]))
@@ -81,6 +81,6 @@ def speed_ratios(par, samples):
         theta, slope, _, _ = drive_and_load(math.copysign(2 * math.pi * s / n, par.omega), par)
         error = (ahead - before) * by_sample / slope
         before = here
-        samples[s].tau = speed_ratio(theta, par.alpha) + error
+        samples[s].tau = ideal_ratio(theta, par) + error
         samples[s].psi = error / samples[s].tau
         samples[s].loads[SPEED_ERROR] = abs(samples[s].psi)

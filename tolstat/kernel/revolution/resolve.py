@@ -10,12 +10,12 @@ from typing import NamedTuple
 import numpy as np
 
 from tolstat.common import tables
+from tolstat.common.cardan import CARDAN
 from tolstat.common.tables import KERNEL_RESULT, Options
 from tolstat.kernel.codes import NOT_FINITE, NOT_SETTLED, OK, STAGED_STEP, TOLERANCE
 from tolstat.kernel.integrators.mesh import CELL, cells_of, forget_mesh, refine_mesh, set_scale
-from tolstat.kernel.mechanics.loads import FORCES, N_AVERAGED, N_DECIDING, N_INSTANT, TORQUES
+from tolstat.kernel.mechanics.loads import N_AVERAGED, N_DECIDING, N_INSTANT, OF_FORCES, OF_TORQUES, size_of
 from tolstat.kernel.mechanics.scale import SMALLEST_FORCE, typical_force
-from tolstat.kernel.mechanics.topology import N_DOF
 from tolstat.kernel.revolution.closeup import extend
 from tolstat.kernel.revolution.settle import BUSHINGS_ONLY, closure_error, summarise
 from tolstat.kernel.revolution.trail import (
@@ -75,7 +75,7 @@ class Past(NamedTuple):
     trail: Trail
     turns: np.record  # TURNS
     extremes: np.recarray  # (2,) KERNEL_RESULT: largest and smallest loads of the current cell and revolution
-    begun: np.ndarray  # (3, N_DOF) q, v, a at the start of the current cell
+    begun: np.ndarray  # (3, dof) q, v, a at the start of the current cell
     mesh: np.recarray  # (cells,) CELL
 
 
@@ -101,7 +101,7 @@ def make_pasts(joints: int, options: Options) -> Pasts:
     extremes = np.zeros((joints, 2), KERNEL_RESULT).view(np.recarray)
     cells = options.steps_per_rev * cells_of(options.steps_per_rev)
     mesh = np.zeros((joints, cells), CELL).view(np.recarray)
-    return Pasts(*trails, turns, extremes, np.zeros((joints, 3, N_DOF)), mesh)
+    return Pasts(*trails, turns, extremes, np.zeros((joints, 3, CARDAN.dof)), mesh)
 
 
 def revolutions_kept(options: Options) -> int:
@@ -253,7 +253,7 @@ def after_revolution(par, options, samples, past, out):
     turns.revolution += 1
     statistics = keep_revolution(par, samples, past.extremes[1], trail, last)
     out.revolutions = turns.revolution
-    force, torque = statistics.largest[FORCES : FORCES + 8].max(), statistics.largest[TORQUES : TORQUES + 8].max()
+    force, torque = size_of(OF_FORCES, statistics.largest), size_of(OF_TORQUES, statistics.largest)
     if not (force < 1e300 and torque < 1e300):
         return NOT_FINITE, False
     turns.force, turns.torque = max(force, SMALLEST_FORCE), max(torque, SMALLEST_FORCE * par.R)

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from tolstat.common.cardan import CARDAN
 from tolstat.kernel.mechanics.dynamics import forces
 from tolstat.kernel.mechanics.loads import (
     DECIDING,
@@ -21,7 +22,6 @@ from tolstat.kernel.mechanics.loads import (
     write_loads,
 )
 from tolstat.kernel.mechanics.scale import centring_stiffness, stiffness
-from tolstat.kernel.mechanics.topology import ARM, HUB, N_DOF, N_LUMPS, OUTPUT_SHAFT
 from tolstat.kernel.mechanics.vector import larger
 from tolstat.kernel.mechanics.work import FORCE
 from tolstat.kernel.revolution.bearing import write_equivalent_loads
@@ -41,8 +41,8 @@ SAMPLE = np.dtype(
         ("psi", "f8"),  # its error, eq. (13)
         ("mode", "u1", (4,)),
         ("pressed", "u2", (4,)),  # bit j: station j of the pin carries a force
-        ("q", "f8", (N_DOF,)),  # m, rad
-        ("v", "f8", (N_DOF,)),  # per s
+        ("q", "f8", (CARDAN.dof,)),  # m, rad
+        ("v", "f8", (CARDAN.dof,)),  # per s
     ],
     align=True,
 )
@@ -104,7 +104,7 @@ def record(k, lane, par, work, samples):
     sample = samples[k % samples.size]
     fetch(samples[(k + 2) % samples.size])
     sample.tau, sample.psi = pick(work.output[0], lane), pick(work.output[1], lane)
-    s = pick(work.pos[OUTPUT_SHAFT, 2], lane)
+    s = pick(work.pos[work.pos.shape[0] - 1, 2], lane)
     shift = centring_stiffness(lane, par) * abs(s - sample.s)
     for measure in range(N_MEASURES):
         change = shift if measure == OF_FORCES else 0.0
@@ -119,13 +119,13 @@ def record(k, lane, par, work, samples):
     sample.s = s
     for i in OTHERS:
         sample.loads[i] = pick(work.loads[i], lane)
-    for b in range(8):
+    for b in range(work.load.shape[0]):
         for i in range(6):
             sample.components[b, i] = pick(work.load[b, i], lane)
-    for shaft in range(2):
+    for shaft in range(work.shafts.shape[0]):
         for i in range(6):
             sample.shafts[shaft, i] = pick(work.shafts[shaft, i], lane)
-    for pin in range(4):
+    for pin in range(work.mode.shape[0]):
         sample.mode[pin] = int(pick(work.mode[pin], lane))
         sample.pressed[pin] = pressed(pin, lane, par, work)
 
@@ -147,9 +147,9 @@ def predict_increment(k, q, v, ahead, samples):
     ----------
     k : int
         Number of the grid point, counted from the start.
-    q, v : ndarray, shape (56,)
+    q, v : ndarray, shape (dof,)
         Unknowns (m, rad) and velocities (per s).
-    ahead : ndarray, shape (56,)
+    ahead : ndarray, shape (dof,)
         Written: predicted increment of q.
     samples : ndarray of SAMPLE, shape (n,)
         The last revolution; written.
@@ -163,12 +163,12 @@ def predict_increment(k, q, v, ahead, samples):
     here, following = samples[k % n], samples[(k + 1) % n]
     before = samples[(k - 1) % n], samples[(k - 2) % n], samples[(k - 3) % n], samples[(k - 4) % n]
     if k > n:
-        for i in range(N_DOF):
+        for i in range(ahead.shape[0]):
             ahead[i] = following.q[i] - here.q[i]
-    for i in range(N_DOF):
+    for i in range(ahead.shape[0]):
         here.q[i], here.v[i] = q[i], v[i]
     if k <= n:
-        for i in range(N_DOF):
+        for i in range(ahead.shape[0]):
             ahead[i] = 4 * here.q[i] - 10 * before[0].q[i] + 10 * before[1].q[i] - 5 * before[2].q[i] + before[3].q[i]
     return 1.0 if k >= 5 else 0.0
 
@@ -223,15 +223,14 @@ def lowest(values):
 
 
 @njit
-def third_differences(s, first, last, samples):
-    """Largest third differences at sample `s` of displacements (m) and rotations (rad), lumps `first` to `last` - 1."""
+def third_differences(s, body, samples):
+    """Largest third differences at sample `s` of displacements (m) and rotations (rad) of a lump."""
     q0, q1, q2, q3 = samples[s - 3].q, samples[s - 2].q, samples[s - 1].q, samples[s].q
     shift = turn = 0.0
-    for body in range(first, last):
-        for i in range(6 * body, 6 * body + 3):
-            j = i + 3
-            by_shift, by_turn = abs(q3[i] - q0[i] - 3 * (q2[i] - q1[i])), abs(q3[j] - q0[j] - 3 * (q2[j] - q1[j]))
-            shift, turn = by_shift if by_shift > shift else shift, by_turn if by_turn > turn else turn
+    for i in range(6 * body, 6 * body + 3):
+        j = i + 3
+        by_shift, by_turn = abs(q3[i] - q0[i] - 3 * (q2[i] - q1[i])), abs(q3[j] - q0[j] - 3 * (q2[j] - q1[j]))
+        shift, turn = by_shift if by_shift > shift else shift, by_turn if by_turn > turn else turn
     return shift, turn
 
 
@@ -249,9 +248,9 @@ def step_error(par, samples):
     total = 0.0
     for s in range(samples.size):
         by_shift = by_turn = 0.0
-        for first, last in ((HUB, ARM), (ARM, N_LUMPS)):
-            k, k_turn = stiffness(first, par)
-            shift, turn = third_differences(s, first, last, samples)
+        for body in range(par.lump_kind.shape[0]):
+            k, k_turn = stiffness(body, par)
+            shift, turn = third_differences(s, body, samples)
             by_shift, by_turn = max(by_shift, k * shift), max(by_turn, k_turn * turn)
         total += max(by_shift / force, by_turn / torque)
     return 2 / 9 * total / samples.size
@@ -274,8 +273,8 @@ def summarise(par, samples, out):
             out.largest[i] = 0.0
             for s in range(n):
                 out.largest[i] = max(out.largest[i], samples[s].loads[i])
-    for pin in range(4):
-        for mode in range(4):
+    for pin in range(out.mode_share.shape[0]):
+        for mode in range(out.mode_share.shape[1]):
             count = 0
             for s in range(n):
                 count += samples[s].mode[pin] == mode
@@ -290,15 +289,16 @@ def sample(times, states, par, work, samples):
 
     Parameters
     ----------
-    times, states : ndarray, shapes (m,) and (m, 112)
+    times, states : ndarray, shapes (m,) and (m, 2 dof)
         The solution, s; m and rad, per s.
     par, work : records of PARAM and WORK
         The joint; scratch.
     samples : ndarray of SAMPLE, shape (m,)
         Written.
     """
+    dof = work.solution.shape[0]
     for k in range(times.size):
-        forces(times[k], states[k, :N_DOF], states[k, N_DOF:], par, work)
-        write_loads(states[k, N_DOF:], par, work)
+        forces(times[k], states[k, :dof], states[k, dof:], par, work)
+        write_loads(states[k, dof:], par, work)
         complete_loads(par, work)
         record(k, 0, par, work, samples)

@@ -5,7 +5,7 @@ The lock-step does not compute it, so that it has no equations of motion for pla
 
 from tolstat.kernel.codes import DYNAMIC, RAMP
 from tolstat.kernel.mechanics.dynamics import acceleration
-from tolstat.kernel.mechanics.guess import rigid_guess
+from tolstat.kernel.mechanics.cardan.guess import rigid_guess
 from tolstat.kernel.revolution.outcome import inside_model
 from tolstat.kernel.revolution.quasistatic import angle_time
 from tolstat.kernel.simd.jit import njit
@@ -23,9 +23,9 @@ def write_starts(rows, options, work, at_rest, starts):
         Numerical settings.
     work : record of WORK
         Scratch.
-    at_rest : ndarray, shape (56,)
+    at_rest : ndarray, shape (dof,)
         Zeros.
-    starts : ndarray, shape (n, 56)
+    starts : ndarray, shape (n, dof)
         Written, except for joints outside the model; m and rad, or m/s^2 and rad/s^2.
     """
     ramp = options.fidelity == DYNAMIC and options.start == RAMP

@@ -182,10 +182,10 @@ def combine(last, count, trail, out):
             out.average[i], out.range[i] = total / count, top - low
     out.mode_share[:] = 0.0
     for r in range(last - count + 1, last + 1):
-        for pin in range(4):
-            for mode in range(4):
+        for pin in range(out.mode_share.shape[0]):
+            for mode in range(out.mode_share.shape[1]):
                 out.mode_share[pin, mode] += trail.revolution[r % capacity].mode_share[pin, mode] / count
-    for pin in range(4):
+    for pin in range(out.mode_share.shape[0]):
         total = 0.0
         for r in range(last - count + 1, last + 1):
             total += trail.revolution[r % capacity].equivalent_load[pin] ** LIFE_EXPONENT

@@ -13,13 +13,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tolstat.common.cardan import HOLE_OF_PIN
 from tolstat.common.load_kinds import PINS
 from tolstat.common.tables import HOLES
 from tolstat.display.answer import Axes, Panel, Rows
 from tolstat.display.drawing import WIDTH
 from tolstat.display.style import COLOURS, INK, patches
 from tolstat.joint import Joint, Operation, nominal_errors, perturb, perturbation
-from tolstat.kernel.mechanics.topology import ARM_OF_PIN
 
 Array = NDArray[np.float64]
 Place = Array | tuple[float, float]
@@ -95,12 +95,12 @@ def pairs(joint: Joint, errors: NDArray[np.void]) -> list[Pair]:
     """
     par = perturb(joint, Operation.model_construct(alpha=0.0, speed=1.0, torque=0.0), errors)[0]
     pairs_of_joint = []
-    for i, arm in enumerate(ARM_OF_PIN):
-        t, u = perturbation.PIN_TRIADS[i], perturbation.ARM_TRIADS[arm]
+    for i, number in enumerate(HOLE_OF_PIN):
+        hole, t, u = HOLES[number - 1], perturbation.PIN_TRIADS[i], perturbation.ARM_TRIADS[number - 1]
         thick = joint.contact.D_P + float(errors[f"{PINS[i]}.diameter"][0])
         pin = Feature(PINS[i], thick, t @ par["pin_point"][i], t @ par["pin_axis"][i])
         wide = thick + 2.0 * float(par["clearance"][i])
-        pairs_of_joint.append((pin, Feature(HOLES[arm], wide, u @ par["hole_point"][arm], u @ par["hole_axis"][arm])))
+        pairs_of_joint.append((pin, Feature(hole, wide, u @ par["hole_point"][i], u @ par["hole_axis"][i])))
     return pairs_of_joint
 
 
@@ -108,7 +108,7 @@ def positive(joint: Joint, kind: str) -> Pair:
     """Pin 1 and hole 4, both with a positive error of one kind, large enough to be drawn as it is."""
     unit, errors = 0.5 * (joint.contact.D_P + joint.contact.z), nominal_errors(1)
     sizes = {"offset": 0.26 * unit, "tilt": np.radians(15.0), "diameter": 0.4 * unit}
-    for name in (PINS[0], HOLES[ARM_OF_PIN[0]]):
+    for name in (PINS[0], HOLES[HOLE_OF_PIN[0] - 1]):
         errors[f"{name}.{kind}"] = sizes[kind.partition("_")[0]]
     return pairs(joint, errors)[0]
 
@@ -140,7 +140,7 @@ def views(joint: Joint, alpha: float, marked: Collection[str] = ()) -> tuple[Pan
         Names such as ``"cross1"``, ``"pin3"``, ``"output"``.
     """
     cross, shafts = "The cross, seen from the output shaft", "Both shafts"
-    names = ", ".join(f"pin {k + 1} in the hole of arm {arm + 1}" for k, arm in enumerate(ARM_OF_PIN))
+    names = ", ".join(f"pin {k + 1} in the hole of arm {hole}" for k, hole in enumerate(HOLE_OF_PIN))
     names += f"; misalignment {np.degrees(alpha):.4g} degrees."
     names += f" Marked: {', '.join(sorted(marked))}." if marked else ""
     front, side = partial(_front, joint=joint, marked=marked), partial(_side, joint=joint, alpha=alpha, marked=marked)
@@ -220,7 +220,7 @@ def _pins(ax: Axes, joint: Joint, pins: Iterable[int], view: Array, key: str) ->
     _strip(ax, (-root * X, root * X), (-root, root), CROSS)
     _centre_line(ax, -1.08 * end * Y, 1.08 * end * Y)
     for k in pins:
-        e, arm, name = view @ perturbation.PIN_TRIADS[k, 0], ARM_OF_PIN[k], f"{key}.pin{k + 1}"
+        e, arm, name = view @ perturbation.PIN_TRIADS[k, 0], HOLE_OF_PIN[k] - 1, f"{key}.pin{k + 1}"
         upright, colour = abs(e[1]) > 0.5, INPUT if arm < 2 else OUTPUT
         _strip(ax, (min(root, low) * e, low * e), (-neck, neck), CROSS)
         _strip(ax, (low * e, end * e), (-pin, pin), CROSS, gid=name)

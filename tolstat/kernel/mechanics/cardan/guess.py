@@ -1,21 +1,25 @@
-"""Initial guess for the equilibrium: a rigid cross in rigid forks, placed so that all four pins just touch.
+"""Initial guess for the equilibrium: rigid crosses in rigid forks, placed so that all four pins of each just touch.
 
 An output shaft that may slide moves along its axis first, so that the pins of the input and of the output fork have the
 same displacement across the plane of the cross: without axial force loaded pins centre it there. In the plane of the
 cross, a rotation and a displacement of the cross and a rotation of the output shaft bring the four
 pins into contact. Across that plane, the cross tilts and moves so that the pins are centred, up to a part of their
-displacements that a rigid cross cannot remove, of the same size for all pins. Rotations are small.
+displacements that a rigid cross cannot remove, of the same size for all pins. Rotations are small. A joint behind
+another one is turned with the shaft between them.
+
+Joint k has the pairs from 4 k on, those of the output fork first, the bushings from 8 k on, and the shafts 2 k and
+2 k + 1.
 """
 
 import math
 
 from tolstat.kernel.mechanics.contact import locate
 from tolstat.kernel.mechanics.dynamics import set_bodies
-from tolstat.kernel.mechanics.motion import ideal_motion, to_cross
+from tolstat.kernel.mechanics.motion import ideal_motion, to_pin
 from tolstat.kernel.mechanics.scale import centring_stiffness, mean_clearance
 from tolstat.kernel.mechanics.spring import penetration
-from tolstat.kernel.mechanics.topology import ARM, ARM_OF_PIN, FRAME, FRAME_F, HUB, PIN, PSI, TRIAD, S
-from tolstat.kernel.mechanics.vector import add, axpy, cross, dot, row, scale
+from tolstat.kernel.mechanics.triad import from_triad
+from tolstat.kernel.mechanics.vector import add, cross, dot, row, scale
 from tolstat.kernel.mechanics.work import NORMAL, RHO
 from tolstat.kernel.simd.jit import njit
 
@@ -25,12 +29,12 @@ LEAST = 0.1
 
 
 @njit
-def offset(pin, j, work):
+def offset(pin, j, par, work):
     """Displacement (m) of station `j` in its hole, from `locate`, along the pin's t and along z of the cross."""
     station = work.station[pin, j]
     n = (station[NORMAL], station[NORMAL + 1], station[NORMAL + 2])
-    d = scale(station[RHO], to_cross(FRAME[ARM + ARM_OF_PIN[pin]], n, work))
-    return dot(d, row(TRIAD[PIN + pin], 1)), d[2]
+    d = scale(station[RHO], to_pin(par.hinge[pin], n, par, work))
+    return dot(d, from_triad(par.pin[pin], (0.0, 1.0, 0.0), par)), d[2]
 
 
 @njit
@@ -40,7 +44,7 @@ def travel_to_contact(pin, side, across, par, work):
     Parameters
     ----------
     pin : int
-        Pin, 0 to 3.
+        Number of the pair.
     side : float
         1 for contact in the direction of t, -1 for the opposite one.
     across : float
@@ -53,12 +57,12 @@ def travel_to_contact(pin, side, across, par, work):
     tuple of float
         Displacement and distance of the station from O, m.
     """
-    load = abs(work.drive[1]) / (2 * par.R)
+    load = abs(work.drive[2]) / (2 * par.R)
     best, radius = 0.0, 0.0
     for j in (0, par.n_stations - 1):
         reach = par.clearance[pin] + par.delta_d + penetration(load, j, par.clearance[pin], par)
         reach = max(math.sqrt(max(reach * reach - across * across, 0.0)), LEAST * reach)
-        along, _ = offset(pin, j, work)
+        along, _ = offset(pin, j, par, work)
         want, r = side * reach - along, par.R + par.station_s[j]
         if radius == 0 or side * want / r < side * best / radius:
             best, radius = want, r
@@ -67,54 +71,82 @@ def travel_to_contact(pin, side, across, par, work):
 
 @njit
 def rigid_guess(t, at_rest, par, work, q):
-    """Write the guess of the unknowns at time `t` (s) to `q`; `at_rest`: zeros, (56,); `work` is scratch."""
+    """Write the guess of the unknowns at time `t` (s) to `q`; `at_rest`: zeros, (n,); `work` is scratch."""
     q[:] = 0.0
     ideal_motion(par.omega * t, par, work)
+    for joint in range(par.cardan.shape[0]):
+        place_joint(joint, at_rest, par, work, q)
+
+
+@njit
+def place_joint(joint, at_rest, par, work, q):
+    """Write the unknowns of a joint to `q`, in which those of the joints before it stand."""
+    first, shafts, output = 4 * joint, 6 * par.lump_kind.shape[0], 2 * joint + 1
+    shift_along = 0.0
     locate_all(q, at_rest, par, work)
-    if par.slides > 0:
-        q[S] = shift_along_axis(par, work)
-        for body in (ARM + 2, ARM + 3):
-            q[6 * body + 2] = q[S]
+    if par.slide[output] >= 0 and par.slides > 0:
+        shift_along = shift_along_axis(joint, par, work)
+        q[shafts + par.slide[output]] = shift_along
+        for pin in (first, first + 1):
+            q[6 * par.hole[pin] + 2] = shift_along
         locate_all(q, at_rest, par, work)
-    z0, z1, z2, z3 = middle(0, par, work), middle(1, par, work), middle(2, par, work), middle(3, par, work)
+    z0, z1 = middle(first, par, work), middle(first + 1, par, work)
+    z2, z3 = middle(first + 2, par, work), middle(first + 3, par, work)
     about_x, about_y = -(z0 - z1) / (2 * par.R), (z2 - z3) / (2 * par.R)
     up = -0.25 * (z0 + z1 + z2 + z3)
     across = 0.25 * abs(z0 + z1 - z2 - z3)
 
-    forward = math.copysign(1.0, work.drive[1])
-    want2, r2 = travel_to_contact(2, -forward, across, par, work)
-    want3, r3 = travel_to_contact(3, -forward, across, par, work)
+    forward = math.copysign(1.0, work.drive[2])
+    want2, r2 = travel_to_contact(first + 2, -forward, across, par, work)
+    want3, r3 = travel_to_contact(first + 3, -forward, across, par, work)
     turn_in = (want2 + want3) / (r2 + r3)
-    want0, r0 = travel_to_contact(0, forward, across, par, work)
-    want1, r1 = travel_to_contact(1, forward, across, par, work)
+    want0, r0 = travel_to_contact(first, forward, across, par, work)
+    want1, r1 = travel_to_contact(first + 1, forward, across, par, work)
     turn_out = (want0 + want1) / (r0 + r1)
     shift = (r0 * turn_out - want0, want2 - r2 * turn_in, up)
-    psi = (turn_in - turn_out) / work.relative[FRAME_F, 0]
+    psi = (turn_in - turn_out) / work.relative[2 * joint + 1, 0]
     turned = (about_x, about_y, turn_in)
-    for body in range(HUB, ARM):
-        distance = 0.0 if body == HUB else par.R
-        put_body(q, body, add(shift, cross(turned, scale(distance, row(TRIAD[body], 0)))), turned)
-    for body in (ARM + 2, ARM + 3):
-        put_body(q, body, axpy(psi * par.R, row(TRIAD[body], 1), scale(q[S], Z)), scale(psi, Z))
-    q[PSI] = psi
+    before = par.turn[2 * joint]
+    if before >= 0:
+        member = par.cardan[joint]
+        by_input = q[shafts + before] / work.frame_w[member, 2]
+        turned = add(turned, scale(by_input, row(work.frame_w, member + 1)))
+        psi += by_input * work.frame_w[member + 2, 2]
+        turn_fork(first + 2, q[shafts + before], 0.0, par, q)
+    hub = par.bushing_base[8 * joint]
+    put_body(q, hub, shift, turned)
+    for pin in range(first, first + 4):
+        at = from_triad(par.pin[pin], (par.R, 0.0, 0.0), par)
+        put_body(q, par.pin[pin], add(shift, cross(turned, at)), turned)
+    turn_fork(first, psi, shift_along, par, q)
+    q[shafts + par.turn[output]] = psi
+
+
+@njit
+def turn_fork(pin, psi, s, par, q):
+    """Write the unknowns of a fork's arms, the holes of `pin` and the next, that is turned by `psi`, shifted by `s`."""
+    for hole in (par.hole[pin], par.hole[pin + 1]):
+        put_body(q, hole, add(from_triad(hole, (0.0, psi * par.R, 0.0), par), scale(s, Z)), scale(psi, Z))
 
 
 @njit
 def locate_all(q, v, par, work):
     """Write bodies and stations of all pins at the unknowns `q` and velocities `v`."""
     set_bodies(q, v, par, work)
-    for pin in range(4):
+    for pin in range(par.pin.shape[0]):
         locate(pin, par, work)
 
 
 @njit
-def shift_along_axis(par, work):
+def shift_along_axis(joint, par, work):
     """Displacement s (m) of an output shaft that may slide: where the pins centre it, but for axial force and support.
 
     The stations of all pins are as `locate` wrote them at s = 0.
     """
-    apart = middle(0, par, work) + middle(1, par, work) - middle(2, par, work) - middle(3, par, work)
-    centred = 0.5 * apart / work.relative[FRAME_F, 0]
+    first = 4 * joint
+    of_output = middle(first, par, work) + middle(first + 1, par, work)
+    apart = of_output - middle(first + 2, par, work) - middle(first + 3, par, work)
+    centred = 0.5 * apart / work.relative[2 * joint + 1, 0]
     stiffness = centring_stiffness(0, par) + par.k_a
     if stiffness == 0:
         return centred
@@ -127,7 +159,7 @@ def middle(pin, par, work):
     """Displacement (m) of `pin` along z of the cross, mean over its stations."""
     total = 0.0
     for j in range(par.n_stations):
-        total += offset(pin, j, work)[1]
+        total += offset(pin, j, par, work)[1]
     return total / par.n_stations
 
 

@@ -16,22 +16,11 @@ import math
 
 from tolstat.common.load_kinds import INNER, OUTER, RESULTANT
 from tolstat.common.tables import Mode
+from tolstat.kernel.mechanics.cardan.motion import CROSS, OUTPUT
 from tolstat.kernel.mechanics.bushing import accumulate, markers
 from tolstat.kernel.mechanics.dynamics import body_inertia, set_bodies
-from tolstat.kernel.mechanics.motion import ideal_motion, to_arm
-from tolstat.kernel.mechanics.topology import (
-    ARM,
-    ARM_OF_PIN,
-    BUSHING_BASE,
-    BUSHING_LUMP,
-    FRAME,
-    FRAME_F,
-    N_BODIES,
-    N_LUMPS,
-    PIN,
-    TRIAD,
-)
-from tolstat.kernel.mechanics.triad import to_triad
+from tolstat.kernel.mechanics.motion import ideal_motion, to_hole
+from tolstat.kernel.mechanics.triad import from_triad, to_triad
 from tolstat.kernel.mechanics.vector import add, cross, row, scale, sub
 from tolstat.kernel.simd.jit import njit
 
@@ -52,17 +41,18 @@ def moving_moments(par, work):
     Writes the resultant force and torque that each lump needs for its motion to ``work.force``; `touch` subtracts the
     contact forces from it.
     """
-    on_cross, on_shaft = ZERO, par.Js * work.shaft[1]
-    for body in range(N_BODIES):
+    output = par.cardan[0] + OUTPUT
+    on_cross, on_shaft = ZERO, par.Js[0] * work.frame_dw[output, 2]
+    for body in range(work.force.shape[0]):
         for k in range(6):
             work.force[body, k] = 0.0
-    for body in range(N_LUMPS):
+    for body in range(par.lump_kind.shape[0]):
         f, torque = body_inertia(body, (ZERO, ZERO), par, work)
         accumulate(work.force, body, f, torque)
         about = add(torque, cross(row(work.pos, body), f))
-        if body < ARM:
+        if par.frame[body] == par.cardan[0] + CROSS:
             on_cross = add(on_cross, about)
-        elif FRAME[body] == FRAME_F:
+        elif par.frame[body] == output:
             on_shaft += about[2]
     return on_cross, on_shaft
 
@@ -75,7 +65,7 @@ def ideal_loads(phase, at_rest, par, work):
     ----------
     phase : float
         Mean input angle omega t, rad.
-    at_rest : ndarray, shape (56,)
+    at_rest : ndarray, shape (n,)
         Zeros.
     par : record of PARAM
         The joint; its errors and clearances are not used.
@@ -86,10 +76,10 @@ def ideal_loads(phase, at_rest, par, work):
     set_bodies(at_rest, at_rest, par, work)
     radius = contact_radius(par)
     moment, torque = moving_moments(par, work)
-    cos_gamma, sin_gamma = work.relative[FRAME_F, 0], -work.relative[FRAME_F, 1]
-    output = (work.drive[1] + torque + moment[0] * sin_gamma) / cos_gamma
+    cos_gamma, sin_gamma = work.relative[1, 0], -work.relative[1, 1]
+    output = (work.drive[2] + torque + moment[0] * sin_gamma) / cos_gamma
     for pin in range(4):
-        e, t = row(TRIAD[PIN + pin], 0), row(TRIAD[PIN + pin], 1)
+        e, t = from_triad(par.pin[pin], (1.0, 0.0, 0.0), par), from_triad(par.pin[pin], (0.0, 1.0, 0.0), par)
         # moments of the contact forces about O: output pins -output about z and M_x about x, input pins the rest
         couple = -output if pin < 2 else output + moment[2]
         along_t = couple / (2 * radius)
@@ -115,14 +105,14 @@ def touch(pin, radius, force, par, work):
     par, work : records of PARAM and WORK
         The joint; ``contact``, ``mode`` and ``force`` are written.
     """
-    arm = ARM + ARM_OF_PIN[pin]
+    hole = par.hole[pin]
     size = math.sqrt(force[0] ** 2 + force[1] ** 2 + force[2] ** 2)
     work.contact[pin, OUTER] = work.contact[pin, RESULTANT] = size
     work.contact[pin, INNER] = 0.0
     work.mode[pin] = ONE_POINT if size > 0 else NONE
-    on_arm = to_arm(FRAME[arm], force, work)
-    for body, off in ((PIN + pin, scale(-1.0, force)), (arm, on_arm)):
-        lever = scale(radius - par.R, row(TRIAD[body], 0))
+    on_hole = to_hole(par.hinge[pin], force, par, work)
+    for body, off in ((par.pin[pin], scale(-1.0, force)), (hole, on_hole)):
+        lever = from_triad(body, (radius - par.R, 0.0, 0.0), par)
         accumulate(work.force, body, off, cross(lever, off))
 
 
@@ -132,12 +122,12 @@ def carry(i, par, work):
 
     Its opposite acts on the base.
     """
-    lump, base = BUSHING_LUMP[i], BUSHING_BASE[i]
+    lump, base = par.bushing_lump[i], par.bushing_base[i]
     lever, on_base = markers(i, par)
     f = row(work.force, lump)
     torque = sub((work.force[lump, 3], work.force[lump, 4], work.force[lump, 5]), cross(lever, f))
     off = scale(-1.0, f)
     accumulate(work.force, base, off, add(cross(on_base, off), scale(-1.0, torque)))
-    f, torque = to_triad(lump, f), to_triad(lump, torque)
+    f, torque = to_triad(lump, f, par), to_triad(lump, torque, par)
     for k in range(3):
         work.load[i, k], work.load[i, 3 + k] = f[k], torque[k]

@@ -1,0 +1,242 @@
+"""What a mechanism is: its members, lumps, bushings and pairs as data (docs/model.md, "A mechanism").
+
+Kernels know no mechanism: they read its numbers, `numbering`, from the parameters of each joint, and the sizes of their
+records follow from it. `common.cardan` has the Cardan joint.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tolstat.common import elimination
+
+Integers = NDArray[np.int64]
+
+HELD, DRIVEN, CLOSED_FORM = range(3)
+"""How a member moves: not at all; about its z as the input does; as the closed form of a Cardan joint says."""
+X, Y, Z = range(3)
+"""Axis of the frame of a hole's member, about which the pin's member turns in it."""
+
+
+class Member(NamedTuple):
+    """Rigid link of the ideal mechanism, with the frame that the deviations of its lumps refer to.
+
+    Attributes
+    ----------
+    name : str
+        For the reader.
+    motion : int
+        `HELD`, `DRIVEN` or `CLOSED_FORM`.
+    about_z : bool
+        Whether its frame turns about its own z and its origin is at rest.
+    """
+
+    name: str
+    motion: int
+    about_z: bool = False
+
+
+class Lump(NamedTuple):
+    """Rigid body with six unknowns.
+
+    Attributes
+    ----------
+    name : str
+        Of a pin or hole, name of its errors: ``pin1.offset_t``.
+    member : str
+        Whose ideal frame it deviates from.
+    kind : str
+        Lumps of one kind have the same mass, inertia and distance of the reference point.
+    quarters : int
+        Quarter turns about z that take the member's axes to the triad (e, t, z).
+    """
+
+    name: str
+    member: str
+    kind: str
+    quarters: int = 0
+
+
+class Shaft(NamedTuple):
+    """Body without unknowns of its own: prescribed, or with a rotation about its z, or a displacement along it, too.
+
+    Attributes
+    ----------
+    name : str
+        Place of its loads: ``input``.
+    member : str
+        Whose frame it moves in.
+    turns, slides : str
+        Names of the unknowns psi and s; empty where it has none. Shafts with the same unknown are one body.
+    """
+
+    name: str
+    member: str
+    turns: str = ""
+    slides: str = ""
+
+
+class Bushing(NamedTuple):
+    """Elastic connection of a lump with its base, both of one member.
+
+    Attributes
+    ----------
+    name : str
+        Place of its loads: ``cross1``.
+    lump, base : str
+        A lump; a lump or a shaft.
+    kind : str
+        Bushings of one kind have the same stiffness, damping and markers.
+    """
+
+    name: str
+    lump: str
+    base: str
+    kind: str
+
+
+class Hinge(NamedTuple):
+    """Rotation of a pin's member relative to a hole's about an axis through the origin of both.
+
+    Attributes
+    ----------
+    name : str
+        For the reader.
+    pin, hole : str
+        The members. Those of Cardan joints come first: of each, cross in input, then cross in output.
+    axis : int
+        `X`, `Y` or `Z` of both members.
+    """
+
+    name: str
+    pin: str
+    hole: str
+    axis: int
+
+
+class Pair(NamedTuple):
+    """Pin in a hole, by the names of their lumps, and the hinge between their members."""
+
+    pin: str
+    hole: str
+    hinge: str
+
+
+class Mechanism(NamedTuple):
+    """A mechanism.
+
+    Attributes
+    ----------
+    name : str
+        Name in studies and result files.
+    members, lumps, shafts, bushings, hinges, pairs : tuple
+        Its parts. Shafts are numbered after the lumps: both are bodies.
+    unknowns : tuple of str
+        Unknowns of shafts, after six of each lump: rotations first.
+    cardan : tuple of str
+        First member of each Cardan joint, followed by its cross and its output; each is driven by the one before.
+    """
+
+    name: str
+    members: tuple[Member, ...]
+    lumps: tuple[Lump, ...]
+    shafts: tuple[Shaft, ...]
+    bushings: tuple[Bushing, ...]
+    hinges: tuple[Hinge, ...]
+    pairs: tuple[Pair, ...]
+    unknowns: tuple[str, ...] = ()
+    cardan: tuple[str, ...] = ()
+
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        """Names of lumps and shafts."""
+        return tuple(body.name for body in (*self.lumps, *self.shafts))
+
+    @property
+    def lump_kinds(self) -> tuple[str, ...]:
+        """Kinds of lumps, each once."""
+        return tuple(dict.fromkeys(lump.kind for lump in self.lumps))
+
+    @property
+    def bushing_kinds(self) -> tuple[str, ...]:
+        """Kinds of bushings, each once."""
+        return tuple(dict.fromkeys(bushing.kind for bushing in self.bushings))
+
+    @property
+    def rotations(self) -> tuple[str, ...]:
+        """Those of `unknowns` that are rotations."""
+        return tuple(name for name in self.unknowns if any(shaft.turns == name for shaft in self.shafts))
+
+    @property
+    def dof(self) -> int:
+        """Number of unknowns."""
+        return 6 * len(self.lumps) + len(self.unknowns)
+
+
+@cache
+def numbering(mechanism: Mechanism) -> dict[str, Integers]:
+    """What kernels read of a mechanism: numbers from 0, by name; -1 where there is none.
+
+    Returns
+    -------
+    dict of str to ndarray of int
+        Fields of PARAM; see the code, and `elimination.plan`.
+    """
+    body = {name: i for i, name in enumerate(mechanism.bodies)}
+    member = {one.name: i for i, one in enumerate(mechanism.members)}
+    hinge = {one.name: i for i, one in enumerate(mechanism.hinges)}
+    unknown = {name: i for i, name in enumerate(mechanism.unknowns)}
+    lumps, pairs = len(mechanism.lumps), len(mechanism.pairs)
+    kinds = [mechanism.bushing_kinds.index(bushing.kind) for bushing in mechanism.bushings]
+    edges = {(body[pair.hole], body[pair.pin]): lumps + i for i, pair in enumerate(mechanism.pairs)}
+    blocks = []
+    for bushing in mechanism.bushings:
+        joined = body[bushing.lump], body[bushing.base]
+        if joined[1] < lumps:
+            edges[joined] = lumps + len(edges)
+        blocks.append(edges.get(joined, -1))
+    shafts = {shaft.name: shaft for shaft in mechanism.shafts}
+    borders = [
+        (unknown[name], body[bushing.lump])
+        for bushing in mechanism.bushings
+        if bushing.base in shafts
+        for name in (shafts[bushing.base].turns, shafts[bushing.base].slides)
+        if name
+    ]
+    held = {bushing.lump: kind for bushing, kind in zip(mechanism.bushings, kinds, strict=True)}
+    bases = {bushing.base: kind for bushing, kind in zip(mechanism.bushings, kinds, strict=True)}
+    numbers: dict[str, object] = {
+        "frame": [member[part.member] for part in (*mechanism.lumps, *mechanism.shafts)],
+        "quarters": [lump.quarters for lump in mechanism.lumps] + [0] * len(shafts),
+        "lump_kind": [mechanism.lump_kinds.index(lump.kind) for lump in mechanism.lumps],
+        "held_by": [held[lump.name] if lump.name in held else bases[lump.name] for lump in mechanism.lumps],
+        "motion": [one.motion for one in mechanism.members],
+        "about_z": [one.about_z for one in mechanism.members],
+        "turn": [unknown.get(shaft.turns, -1) for shaft in mechanism.shafts],
+        "slide": [unknown.get(shaft.slides, -1) for shaft in mechanism.shafts],
+        "bushing_lump": [body[bushing.lump] for bushing in mechanism.bushings],
+        "bushing_base": [body[bushing.base] for bushing in mechanism.bushings],
+        "bushing_kind": kinds,
+        "bushing_block": blocks,
+        "pin": [body[pair.pin] for pair in mechanism.pairs],
+        "hole": [body[pair.hole] for pair in mechanism.pairs],
+        "hinge": [hinge[pair.hinge] for pair in mechanism.pairs],
+        "hinge_pin": [member[one.pin] for one in mechanism.hinges],
+        "hinge_hole": [member[one.hole] for one in mechanism.hinges],
+        "hinge_axis": [one.axis for one in mechanism.hinges],
+        "first_filled": lumps + len(edges),
+        "cardan": [member[name] for name in mechanism.cardan],
+    }
+    planned = elimination.plan(lumps, edges, borders)
+    return {name: np.array(values, np.int64) for name, values in numbers.items()} | planned
+
+
+def blocks_of(mechanism: Mechanism) -> int:
+    """Number of 6 x 6 blocks of the tangent: of lumps, pairs, bushings between lumps, and those filled in."""
+    numbers = numbering(mechanism)
+    used = np.concatenate([numbers["between"], numbers["target"], [len(mechanism.lumps) - 1]])
+    return int(used.max()) + 1

@@ -1,0 +1,64 @@
+"""Parameters of one joint for the kernel: the fields of the table PARAM."""
+
+from __future__ import annotations
+
+from tolstat.common.fields import Field
+from tolstat.common.mechanism import Mechanism, numbering
+
+MAX_STATIONS = 16
+"""Maximum number of contact stations of a pin."""
+MAX_ORDERS = 48
+"""Maximum number of different orders of speed and torque: 16 of each, and those that come from a partner joint."""
+
+
+def param_fields(mechanism: Mechanism) -> tuple[Field, ...]:
+    """Fields of PARAM; those of pins and holes are indexed by pair, other fields by kind of lump or bushing."""
+    joints, pairs = len(mechanism.cardan), len(mechanism.pairs)
+    lumps, bushings = len(mechanism.lump_kinds), len(mechanism.bushing_kinds)
+    return (
+        Field("alpha", "rad", "misalignment of each Cardan joint", shape=(joints,)),
+        Field("ahead", "rad", "angle of its input fork ahead of the output fork that drives it", shape=(joints,)),
+        Field("omega", "rad/s", "mean angular velocity of the input shaft"),
+        Field("torque", "N*m", "mean resisting torque T"),
+        Field("n_orders", "1", "number of orders", "i8"),
+        Field("order", "1", "cycles of each order in a revolution of the input", shape=(MAX_ORDERS,)),
+        Field("speed_order", "rad", "factors of cosine and sine of each order in theta", shape=(MAX_ORDERS, 2)),
+        Field("torque_order", "N*m", "factors of cosine and sine of each order in T_r", shape=(MAX_ORDERS, 2)),
+        Field("Js", "kg*m^2", "inertia of each shaft that turns", shape=(len(mechanism.rotations),)),
+        Field("slides", "1", "1 where the output shaft may move along its axis, 0 where it is held rigidly"),
+        Field("m_s", "kg", "mass that moves along the axis of the output shaft"),
+        Field("k_a", "N/m", "axial stiffness of the shafts' bearings; 0: free"),
+        Field("c_a", "N*s/m", "axial damping of the output shaft"),
+        Field("F_a", "N", "axial force on the output shaft, away from the joint"),
+        Field("R", "m", "typical length: distance of the pins' and arms' reference points from O"),
+        Field("mass", "kg", "mass of a lump", shape=(lumps,)),
+        Field("inertia", "kg*m^2", "inertia of a lump about e, t, z", shape=(lumps, 3)),
+        Field("at", "m", "reference point of a lump in its member, along e, t, z", shape=(lumps, 3)),
+        Field("k", "N/m, N*m/rad", "bushing stiffness: force e, t, z, torque e, t, z", shape=(bushings, 6)),
+        Field("c", "N*s/m, N*m*s/rad", "bushing damping, same order", shape=(bushings, 6)),
+        Field(
+            "marker",
+            "m",
+            "marker of a bushing from the reference points of lump and base, along e, t, z of the lump",
+            shape=(bushings, 2, 3),
+        ),
+        Field("c_d", "N*s/m", "normal contact damping"),
+        Field("c_t", "N*s/m", "tangential contact damping (lubricant film)"),
+        Field("delta_d", "m", "penetration over which contact damping rises"),
+        Field("n_stations", "1", "contact stations per pin", "i8"),
+        Field("station_s", "m", "signed distance of each station from P along the pin, falling", shape=(MAX_STATIONS,)),
+        Field("station_k1", "N/m^2", "quadratic coefficient of each station's force", shape=(MAX_STATIONS,)),
+        Field("station_k2", "N/m", "linear coefficient of each station's force", shape=(MAX_STATIONS,)),
+        Field("station_k3", "N/m^(9/8)", "coefficient of each station's needles", shape=(MAX_STATIONS,)),
+        Field("station_weight", "1", "weight of each station's damping and film", shape=(MAX_STATIONS,)),
+        Field("needle_b", "1", "share b of the clearance in the force of needles; 0: no needles"),
+        Field("clearance", "m", "radial clearance c of each pin", shape=(pairs,)),
+        Field("pin_point", "m", "P less the pin's reference point, in axes of its member", shape=(pairs, 3)),
+        Field("pin_axis", "1", "direction of the pin axis, in axes of its member", shape=(pairs, 3)),
+        Field("hole_point", "m", "hole centre less the hole's reference point, in axes of its member", shape=(pairs, 3)),
+        Field("hole_axis", "1", "direction of the hole axis, in axes of its member", shape=(pairs, 3)),
+        *(
+            Field(name, "1", "number of the mechanism", "i8", values.shape)
+            for name, values in numbering(mechanism).items()
+        ),
+    )

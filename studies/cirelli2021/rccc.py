@@ -295,7 +295,7 @@ def _side(row: NDArray[np.void], number: int) -> Side:
     e = PIN_TRIADS[pin, 0]
     centre = float(row["R"][0]) * e
     pin_point, hole_point = centre + row["pin_point"][0, pin], centre + row["hole_point"][0, pin]
-    return Side(number, float(e.sum()), pin_point, row["pin_axis"][0, pin], hole_point, row["hole_axis"][0, arm])
+    return Side(number, float(e.sum()), pin_point, row["pin_axis"][0, pin], hole_point, row["hole_axis"][0, pin])
 
 
 def _in_pin(pose: Pose, side: Side, load: Array) -> Array:

@@ -39,10 +39,10 @@ def cardan(name: str = "cardan") -> Mechanism:
             *(Lump(f"pin{i}", "cross", "pin", PIN_QUARTERS[i - 1]) for i in pins),
             *(Lump(f"hole{i}", fork[i], "arm", ARM_QUARTERS[i - 1]) for i in arms),
         ),
-        shafts=(Shaft("input", "input"), Shaft("output", "output", "psi", "s")),
+        shafts=(Shaft("input", "input", driven=True), Shaft("output", "output", "psi", "s")),
         bushings=(
-            *(Bushing(f"cross{i}", f"pin{i}", "hub", "cross") for i in pins),
-            *(Bushing(f"fork{i}", f"hole{i}", fork[i], f"{fork[i]} fork") for i in arms),
+            *(Bushing(f"cross{i}", f"pin{i}", "hub", "cross", "cross") for i in pins),
+            *(Bushing(f"fork{i}", f"hole{i}", fork[i], f"{fork[i]} fork", "fork") for i in arms),
         ),
         hinges=(Hinge("input", "cross", "input", X), Hinge("output", "cross", "output", Y)),
         pairs=tuple(Pair(f"pin{i}", f"hole{k}", fork[k]) for i, k in enumerate(HOLE_OF_PIN, 1)),

@@ -7,10 +7,16 @@ from it. `kernel.mechanics.loads` computes its values.
 from __future__ import annotations
 
 import math
+from functools import cache
 from itertools import accumulate
 from typing import Any, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
+from tolstat.common.cardan import CARDAN
 from tolstat.common.fields import Field
+from tolstat.common.mechanism import Mechanism
 
 
 class Place(NamedTuple):
@@ -19,39 +25,29 @@ class Place(NamedTuple):
     Attributes
     ----------
     name : str
-        What stands before the symbol in the name of a load; empty for the whole joint.
-    view : str
-        View of the joint that shows it, ``"front"`` or ``"side"``.
+        What stands before the symbol in the name of a load; empty for the whole mechanism.
     group : str
         Places of one group are shown together, ``"cross"``.
     """
 
     name: str
-    view: str
     group: str
 
 
-PLACES = {
-    place.name: place
-    for place in (
-        *(Place(f"cross{i}", "front", "cross") for i in (1, 2, 3, 4)),
-        *(Place(f"fork{i}", "side", "fork") for i in (1, 2, 3, 4)),
-        *(Place(f"pin{i}", "front", "pin") for i in (1, 2, 3, 4)),
-        Place("input", "side", "shaft"),
-        Place("output", "side", "shaft"),
-        Place("", "side", "joint"),
-    )
-}
-"""Registry of the places of loads, by name."""
+@cache
+def places(mechanism: Mechanism) -> dict[str, Place]:
+    """Places of the loads of a mechanism, by name."""
+    found = [
+        *(Place(bushing.name, bushing.group) for bushing in mechanism.bushings),
+        *(Place(pair.pin, "pin") for pair in mechanism.pairs),
+        *(Place(shaft.name, "shaft") for shaft in mechanism.shafts),
+        Place("", "joint"),
+    ]
+    return {place.name: place for place in found}
+
+
 JOINT = ("",)
-"""Place of loads of the whole joint."""
-
-
-def _places(*groups: str) -> tuple[str, ...]:
-    return tuple(place.name for place in PLACES.values() if place.group in groups)
-
-
-BUSHINGS, PINS, SHAFTS = _places("cross", "fork"), _places("pin"), _places("shaft")
+"""Place of loads of the whole mechanism."""
 CONTACTS = ("outer", "inner", "resultant")
 """Contact forces of a pin: normal force of its outermost and of its innermost station, and the resultant of all."""
 OUTER, INNER, RESULTANT = range(3)
@@ -79,8 +75,8 @@ class Kind(NamedTuple):
     orders : tuple of int
         Orders of the input speed whose amplitudes are loads of their own: ``psi_1x``. Amplitudes belong to a whole
         revolution; kinds with orders come last in the registry.
-    measure : str
-        Key of the kind whose largest value errors and changes of the load are relative to; empty for its own.
+    measure : Kind, optional
+        Kind whose largest value errors and changes of the load are relative to; by default itself.
     decides : bool
         Whether it decides when a joint has settled, where it is looked at closer, and how fine its steps are.
     shown : bool
@@ -103,7 +99,7 @@ class Kind(NamedTuple):
     places: tuple[str, ...] = JOINT
     parts: tuple[str, ...] = ()
     orders: tuple[int, ...] = ()
-    measure: str = ""
+    measure: Kind | None = None
     decides: bool = False
     shown: bool = False
     averaged: bool = False
@@ -159,9 +155,6 @@ class Kind(NamedTuple):
 OVER = "over the revolutions that count"
 ORDERS = (1, 2, 3, 4)
 """Multiples of the input speed whose amplitudes are loads."""
-_BUSHING: dict[str, Any] = {"places": BUSHINGS, "decides": True, "shown": True, "averaged": True, "modulus": True}
-_SHAFT: dict[str, Any] = {"places": SHAFTS, "decides": True}
-_ACROSS = _SHAFT | {"modulus": True}
 _ROOT = "bending moment at the root of pin or arm"
 _FORCE = f"modulus of the bushing force {OVER}"
 _TORQUE = f"modulus of the {_ROOT} (torque of the bushing) {OVER}"
@@ -171,42 +164,116 @@ _AXIAL = f"force along the shaft, of a sliding output shaft that on its bearing,
 _LATERAL = f"force across the shaft {OVER}"
 _MOMENT = f"bending moment of the shaft about the joint's centre {OVER}"
 _DRIVE = f"torque about the input shaft {OVER}"
-LOAD_KINDS = (
-    Kind("F", "F", "bushing force", "N", _FORCE, components=("F_e", "F_t", "F_z"), **_BUSHING),
-    Kind("T", "T", _ROOT, "N*m", _TORQUE, components=("T_e", "T_t", "T_z"), **_BUSHING),
-    Kind("contact", "contact", "contact force", "N", _CONTACT, PINS, CONTACTS),
-    Kind("psi", "psi", "|Psi|", "1", _PSI, interpolated=False),
-    Kind("axial", "axial", "axial force", "N", _AXIAL, measure="F", components=("f_z",), **_SHAFT),
-    Kind("lateral", "lateral", "lateral force", "N", _LATERAL, measure="F", components=("f_x", "f_y"), **_ACROSS),
-    Kind("moment", "moment", "bending moment", "N*m", _MOMENT, measure="T", components=("m_x", "m_y"), **_ACROSS),
-    Kind("drive", "drive", "driving torque", "N*m", _DRIVE, ("input",), measure="T", decides=True, components=("m_z",)),
-    *(
-        Kind(
-            f"{symbol}_orders",
-            symbol,
-            f"amplitude of the {noun}",
-            unit,
-            f"amplitude of the {noun} at multiples of the input speed, in axes that do not turn, of any revolution",
-            places,
-            orders=ORDERS,
-            measure=measure,
+
+
+@cache
+def kinds(mechanism: Mechanism) -> dict[str, Kind]:
+    """Kinds of the loads of a mechanism by key, in the order of reports and of kernels."""
+    bushings = tuple(bushing.name for bushing in mechanism.bushings)
+    pins, shafts = tuple(pair.pin for pair in mechanism.pairs), tuple(shaft.name for shaft in mechanism.shafts)
+    driven = tuple(shaft.name for shaft in mechanism.shafts if shaft.driven)
+    bushing: dict[str, Any] = {"decides": True, "shown": True, "averaged": True, "modulus": True}
+    F = Kind("F", "F", "bushing force", "N", _FORCE, bushings, components=("F_e", "F_t", "F_z"), **bushing)
+    T = Kind("T", "T", _ROOT, "N*m", _TORQUE, bushings, components=("T_e", "T_t", "T_z"), **bushing)
+    psi = Kind("psi", "psi", "|Psi|", "1", _PSI, interpolated=False)
+    of_force: dict[str, Any] = {"unit": "N", "measure": F, "decides": True}
+    of_moment: dict[str, Any] = {"unit": "N*m", "measure": T, "decides": True}
+    across = {"places": shafts, "modulus": True}
+    found = [
+        F,
+        T,
+        Kind("contact", "contact", "contact force", "N", _CONTACT, pins, CONTACTS),
+        psi,
+        Kind("axial", "axial", "axial force", meaning=_AXIAL, places=shafts, components=("f_z",), **of_force),
+        Kind("lateral", "lateral", "lateral force", meaning=_LATERAL, components=("f_x", "f_y"), **of_force, **across),
+        Kind("moment", "moment", "bending moment", meaning=_MOMENT, components=("m_x", "m_y"), **of_moment, **across),
+        Kind("drive", "drive", "driving torque", meaning=_DRIVE, places=driven, components=("m_z",), **of_moment),
+    ]
+    of_orders = (
+        ("lateral", "lateral force", "N", shafts, F),
+        ("moment", "bending moment", "N*m", shafts, T),
+        ("drive", "driving torque", "N*m", driven, T),
+        ("psi", "speed error Psi", "1", JOINT, psi),
+    )
+    for symbol, noun, unit, where, measure in of_orders:
+        meaning = (
+            f"amplitude of the {noun} at multiples of the input speed, in axes that do not turn, of any revolution"
         )
-        for symbol, noun, unit, places, measure in (
-            ("lateral", "lateral force", "N", SHAFTS, "F"),
-            ("moment", "bending moment", "N*m", SHAFTS, "T"),
-            ("drive", "driving torque", "N*m", ("input",), "T"),
-            ("psi", "speed error Psi", "1", JOINT, "psi"),
-        )
-    ),
-)
-"""Registry of the kinds, in the order of reports."""
-KIND = {kind.key: kind for kind in LOAD_KINDS}
-"""Kinds by key."""
-_ENDS = [*accumulate((kind.size for kind in LOAD_KINDS), initial=0)]
-SPAN = {kind.key: slice(_ENDS[i], _ENDS[i + 1]) for i, kind in enumerate(LOAD_KINDS)}
-"""Elements of each kind in arrays with the values of all loads, kind after kind."""
+        key, noun = f"{symbol}_orders", f"amplitude of the {noun}"
+        found.append(Kind(key, symbol, noun, unit, meaning, where, orders=ORDERS, measure=measure))
+    return {kind.key: kind for kind in found}
+
+
+@cache
+def spans(mechanism: Mechanism) -> dict[str, slice]:
+    """Elements of each kind in arrays with the values of all loads, kind after kind, by key."""
+    ends = [*accumulate((kind.size for kind in kinds(mechanism).values()), initial=0)]
+    return {key: slice(ends[i], ends[i + 1]) for i, key in enumerate(kinds(mechanism))}
+
+
+@cache
+def load_numbers(mechanism: Mechanism) -> dict[str, NDArray[np.int64]]:
+    """What kernels read of the loads of a mechanism.
+
+    Returns
+    -------
+    dict of str to ndarray of int
+        ``begin``: (kinds,) first element of each kind. ``modulus``, ``interpolated``: (n,) of each load at one instant,
+        whether kernels write its square, and whether a largest value between samples is interpolated. ``measured``:
+        (measures, 2) first and last + 1 of the loads that changes are relative to, forces and torques. ``deciding``:
+        loads that decide on settling, closer look and steps; those compared with measure m are number
+        ``of_measure[m, 0]`` to ``of_measure[m, 1]`` - 1 of them, first those that measure. ``others``: those at one
+        instant that do not decide.
+    """
+    by_key, span = kinds(mechanism), spans(mechanism)
+    instant = [kind for kind in by_key.values() if not kind.orders]
+    sizes = [kind.size for kind in instant]
+    measured = list(dict.fromkeys(measure_of(kind).key for kind in instant if kind.decides))
+    deciding, bounds = [], [0]
+    for key in measured:
+        alike = [kind.key for kind in instant if kind.decides and measure_of(kind).key == key]
+        deciding += [i for name in alike for i in range(span[name].start, span[name].stop)]
+        bounds.append(len(deciding))
+    numbers: dict[str, Any] = {
+        "begin": [span[key].start for key in by_key],
+        "modulus": np.repeat([kind.modulus for kind in instant], sizes),
+        "interpolated": np.repeat([kind.interpolated for kind in instant], sizes),
+        "measured": [(span[key].start, span[key].stop) for key in measured],
+        "of_measure": np.array([bounds[:-1], bounds[1:]]).T,
+        "deciding": deciding,
+        "others": np.setdiff1d(np.arange(sum(sizes)), deciding),
+    }
+    return {name: np.array(values, np.int64) for name, values in numbers.items()}
+
+
+class Sizes(NamedTuple):
+    """Numbers of loads: of all; of those at one instant; of those that have mean and range; that decide.
+
+    All but the last come first in arrays with the values of all loads.
+    """
+
+    loads: int
+    instant: int
+    averaged: int
+    deciding: int
+
+
+def sizes(mechanism: Mechanism) -> Sizes:
+    """Numbers of the loads of a mechanism."""
+    all_kinds = kinds(mechanism).values()
+    return Sizes(
+        sum(kind.size for kind in all_kinds),
+        sum(kind.size for kind in all_kinds if not kind.orders),
+        sum(kind.size for kind in all_kinds if kind.averaged),
+        len(load_numbers(mechanism)["deciding"]),
+    )
 
 
 def measure_of(kind: Kind) -> Kind:
     """Kind whose largest value errors and changes of a load are relative to."""
-    return KIND[kind.measure] if kind.measure else kind
+    return kind.measure or kind
+
+
+PLACES, KIND, SPAN = places(CARDAN), kinds(CARDAN), spans(CARDAN)
+LOAD_KINDS = tuple(KIND.values())
+BUSHINGS, PINS, SHAFTS = KIND["F"].places, KIND["contact"].places, KIND["axial"].places

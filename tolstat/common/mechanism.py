@@ -72,12 +72,15 @@ class Shaft(NamedTuple):
         Whose frame it moves in.
     turns, slides : str
         Names of the unknowns psi and s; empty where it has none. Shafts with the same unknown are one body.
+    driven : bool
+        Whether the torque about it is a load: it drives what is behind it.
     """
 
     name: str
     member: str
     turns: str = ""
     slides: str = ""
+    driven: bool = False
 
 
 class Bushing(NamedTuple):
@@ -91,12 +94,15 @@ class Bushing(NamedTuple):
         A lump; a lump or a shaft.
     kind : str
         Bushings of one kind have the same stiffness, damping and markers.
+    group : str
+        Bushings of one group are shown together: ``fork``.
     """
 
     name: str
     lump: str
     base: str
     kind: str
+    group: str
 
 
 class Hinge(NamedTuple):
@@ -178,6 +184,13 @@ class Mechanism(NamedTuple):
 
 
 @cache
+def features(mechanism: Mechanism) -> tuple[str, ...]:
+    """Pins and holes, the lumps that have errors: all pins, then all holes, as the lumps are numbered."""
+    pins, holes = ({getattr(pair, name) for pair in mechanism.pairs} for name in ("pin", "hole"))
+    return tuple(lump.name for names in (pins, holes) for lump in mechanism.lumps if lump.name in names)
+
+
+@cache
 def numbering(mechanism: Mechanism) -> dict[str, Integers]:
     """What kernels read of a mechanism: numbers from 0, by name; -1 where there is none.
 
@@ -190,7 +203,7 @@ def numbering(mechanism: Mechanism) -> dict[str, Integers]:
     member = {one.name: i for i, one in enumerate(mechanism.members)}
     hinge = {one.name: i for i, one in enumerate(mechanism.hinges)}
     unknown = {name: i for i, name in enumerate(mechanism.unknowns)}
-    lumps, pairs = len(mechanism.lumps), len(mechanism.pairs)
+    lumps = len(mechanism.lumps)
     kinds = [mechanism.bushing_kinds.index(bushing.kind) for bushing in mechanism.bushings]
     edges = {(body[pair.hole], body[pair.pin]): lumps + i for i, pair in enumerate(mechanism.pairs)}
     blocks = []
@@ -218,6 +231,7 @@ def numbering(mechanism: Mechanism) -> dict[str, Integers]:
         "about_z": [one.about_z for one in mechanism.members],
         "turn": [unknown.get(shaft.turns, -1) for shaft in mechanism.shafts],
         "slide": [unknown.get(shaft.slides, -1) for shaft in mechanism.shafts],
+        "driven": [i for i, shaft in enumerate(mechanism.shafts) if shaft.driven],
         "bushing_lump": [body[bushing.lump] for bushing in mechanism.bushings],
         "bushing_base": [body[bushing.base] for bushing in mechanism.bushings],
         "bushing_kind": kinds,

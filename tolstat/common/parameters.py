@@ -2,13 +2,25 @@
 
 from __future__ import annotations
 
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
 from tolstat.common.fields import Field
+from tolstat.common.load_kinds import load_numbers
 from tolstat.common.mechanism import Mechanism, numbering
 
 MAX_STATIONS = 16
 """Maximum number of contact stations of a pin."""
 MAX_ORDERS = 48
 """Maximum number of different orders of speed and torque: 16 of each, and those that come from a partner joint."""
+
+
+@cache
+def numbers(mechanism: Mechanism) -> dict[str, NDArray[np.int64]]:
+    """Integers of PARAM: the parts of a mechanism and its loads, as `numbering` and `load_numbers` have them."""
+    return numbering(mechanism) | load_numbers(mechanism)
 
 
 def param_fields(mechanism: Mechanism) -> tuple[Field, ...]:
@@ -55,10 +67,12 @@ def param_fields(mechanism: Mechanism) -> tuple[Field, ...]:
         Field("clearance", "m", "radial clearance c of each pin", shape=(pairs,)),
         Field("pin_point", "m", "P less the pin's reference point, in axes of its member", shape=(pairs, 3)),
         Field("pin_axis", "1", "direction of the pin axis, in axes of its member", shape=(pairs, 3)),
-        Field("hole_point", "m", "hole centre less the hole's reference point, in axes of its member", shape=(pairs, 3)),
+        Field(
+            "hole_point", "m", "hole centre less the hole's reference point, in axes of its member", shape=(pairs, 3)
+        ),
         Field("hole_axis", "1", "direction of the hole axis, in axes of its member", shape=(pairs, 3)),
         *(
             Field(name, "1", "number of the mechanism", "i8", values.shape)
-            for name, values in numbering(mechanism).items()
+            for name, values in numbers(mechanism).items()
         ),
     )

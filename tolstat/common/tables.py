@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from enum import IntEnum
+from functools import cache
 from itertools import chain
 from typing import Any, NamedTuple
 
@@ -17,13 +18,12 @@ from numpy.typing import NDArray
 
 from tolstat.common.cardan import CARDAN
 from tolstat.common.fields import Field, dtype_of
-from tolstat.common.load_kinds import JOINT, LOAD_KINDS, OVER, PINS
-from tolstat.common.mechanism import numbering
-from tolstat.common.parameters import param_fields
+from tolstat.common.load_kinds import JOINT, OVER, Kind, kinds
+from tolstat.common.mechanism import Mechanism, features
+from tolstat.common.parameters import numbers, param_fields
 
 SCHEMA_VERSION = 12
 """Version of the result file: raise it with every change of its layout, and so of the fields of errors and results."""
-HOLES = tuple(f"hole{i}" for i in (1, 2, 3, 4))
 STEPS_PER_ITERATION = 5
 """Number of explicit steps that take the time of a Newton iteration."""
 LIFE_EXPONENT = 10 / 3
@@ -226,10 +226,12 @@ class Simulation(NamedTuple):
     histories: dict[str, np.ndarray[tuple[int, ...], np.dtype[np.generic]]]
 
 
-def _error_fields() -> tuple[Field, ...]:
+def _error_fields(mechanism: Mechanism) -> tuple[Field, ...]:
+    """Manufacturing errors and errors of the operating point: deviations from nominal, zero for the nominal joint."""
     fields = []
-    for feature in PINS + HOLES:
-        kind = "pin" if feature.startswith("pin") else "hole"
+    pins = [pair.pin for pair in mechanism.pairs]
+    for feature in features(mechanism):
+        kind = "pin" if feature in pins else "hole"
         for axis in "etz":
             text = f"position error of the {kind} axis along {axis}"
             fields.append(Field(f"{feature}.offset_{axis}", "m", text))
@@ -245,7 +247,7 @@ def _error_fields() -> tuple[Field, ...]:
             "1",
             "factor on Young's modulus: bushings, their damping, contact coefficients",
         ),
-        *(Field(f"{pin}.clearance", "m", "deviation of the pin's radial clearance in its hole") for pin in PINS),
+        *(Field(f"{pin}.clearance", "m", "deviation of the pin's radial clearance in its hole") for pin in pins),
         Field("operation.axial_force", "N", "deviation of the axial force on the output shaft"),
         Field("operation.speed_swing", "1", "factor on the amplitudes of the orders of the input speed"),
         Field("operation.torque_swing", "1", "factor on the amplitudes of the orders of the resisting torque"),
@@ -253,64 +255,70 @@ def _error_fields() -> tuple[Field, ...]:
     return tuple(fields)
 
 
-ERROR_FIELDS = _error_fields()
-"""Manufacturing errors and errors of the operating point: deviations from nominal, zero for the nominal joint."""
-
 FACTORS = ("material.E_factor", "operation.speed_swing", "operation.torque_swing")
 """Errors that are factors, 1 for the nominal joint."""
 
-RESULT_FIELDS = (
-    Field("status", "1", "see Status", "u1"),
-    Field("settled", "1", "1 when the closure error is below solver.settle_tol", "u1"),
-    Field("closure", "1", "closure error of the last revolution"),
-    Field(
-        "closure_trend",
-        "1",
-        "change of log10(closure) a revolution, fitted to the last revolutions; after refinement 0 if it shows no fall",
-    ),
-    Field("period", "1", "revolutions after which the motion repeats; 0 where it does not or is not known", "u1"),
-    Field("failed_step", "1", "step of the output grid at which the joint failed, from 1; -1 if it did not", "i4"),
-    Field("failed_theta", "rad", "input angle at the start of that step, less whole revolutions"),
-    Field("revolutions", "1", "revolutions integrated, the recorded one included"),
-    Field("steps_per_rev", "1", "steps of the last revolution: others than solver.steps_per_rev if refined", "i4"),
-    Field(
-        "step_error", "1", "mean estimated error of the uniform steps, as a load relative to the largest of its kind"
-    ),
-    Field(
-        "refinement_change",
-        "1",
-        "largest change of a largest load by the last halving of steps, relative to its kind's",
-    ),
-    Field("steps", "1", "steps taken, sub-steps included; quasistatic: angles solved", "i4"),
-    Field("newton_iterations", "1", "Newton iterations", "i4"),
-    Field("halvings", "1", "times that a step was halved; quasistatic: angles that Newton's iteration missed", "i4"),
-    Field("factorisations", "1", "times that the tangent was factorised", "i4"),
-    *(field for kind in LOAD_KINDS if kind.places != JOINT for field in kind.statistics().values()),
-    Field(
-        "mode_share",
-        "1",
-        "share of the revolutions that count in each contact mode",
-        shape=(len(PINS), len(Mode)),
-        columns=tuple(f"{pin}.share_{mode.name.lower()}" for pin in PINS for mode in Mode),
-    ),
-    Field(
-        "equivalent_load",
-        "N",
-        "dynamic equivalent load of the pin's bearing: mean of the resultant contact force with exponent 10/3, "
-        f"weighted by the travel of the pin in its hole, {OVER}",
-        shape=(len(PINS),),
-        columns=tuple(f"{pin}.equivalent_load" for pin in PINS),
-    ),
-    *(field for kind in LOAD_KINDS if kind.places == JOINT for field in kind.statistics().values()),
-    *(field for kind in LOAD_KINDS for field in kind.ends()),
-    Field(
-        "clearance",
-        "m",
-        "radial clearance of the pin in its hole",
-        shape=(len(PINS),),
-        columns=tuple(f"{pin}.radial_clearance" for pin in PINS),
-    ),
-)
+
+def _result_fields(mechanism: Mechanism) -> tuple[Field, ...]:
+    pins, of_loads = tuple(pair.pin for pair in mechanism.pairs), kinds(mechanism).values()
+    return (
+        Field("status", "1", "see Status", "u1"),
+        Field("settled", "1", "1 when the closure error is below solver.settle_tol", "u1"),
+        Field("closure", "1", "closure error of the last revolution"),
+        Field(
+            "closure_trend",
+            "1",
+            "change of log10(closure) a revolution, fitted to the last revolutions; "
+            "after refinement 0 if it shows no fall",
+        ),
+        Field("period", "1", "revolutions after which the motion repeats; 0 where it does not or is not known", "u1"),
+        Field("failed_step", "1", "step of the output grid at which the joint failed, from 1; -1 if it did not", "i4"),
+        Field("failed_theta", "rad", "input angle at the start of that step, less whole revolutions"),
+        Field("revolutions", "1", "revolutions integrated, the recorded one included"),
+        Field("steps_per_rev", "1", "steps of the last revolution: others than solver.steps_per_rev if refined", "i4"),
+        Field(
+            "step_error",
+            "1",
+            "mean estimated error of the uniform steps, as a load relative to the largest of its kind",
+        ),
+        Field(
+            "refinement_change",
+            "1",
+            "largest change of a largest load by the last halving of steps, relative to its kind's",
+        ),
+        Field("steps", "1", "steps taken, sub-steps included; quasistatic: angles solved", "i4"),
+        Field("newton_iterations", "1", "Newton iterations", "i4"),
+        Field(
+            "halvings", "1", "times that a step was halved; quasistatic: angles that Newton's iteration missed", "i4"
+        ),
+        Field("factorisations", "1", "times that the tangent was factorised", "i4"),
+        *(field for kind in of_loads if kind.places != JOINT for field in kind.statistics().values()),
+        Field(
+            "mode_share",
+            "1",
+            "share of the revolutions that count in each contact mode",
+            shape=(len(pins), len(Mode)),
+            columns=tuple(f"{pin}.share_{mode.name.lower()}" for pin in pins for mode in Mode),
+        ),
+        Field(
+            "equivalent_load",
+            "N",
+            "dynamic equivalent load of the pin's bearing: mean of the resultant contact force with exponent 10/3, "
+            f"weighted by the travel of the pin in its hole, {OVER}",
+            shape=(len(pins),),
+            columns=tuple(f"{pin}.equivalent_load" for pin in pins),
+        ),
+        *(field for kind in of_loads if kind.places == JOINT for field in kind.statistics().values()),
+        *(field for kind in of_loads for field in kind.ends()),
+        Field(
+            "clearance",
+            "m",
+            "radial clearance of the pin in its hole",
+            shape=(len(pins),),
+            columns=tuple(f"{pin}.radial_clearance" for pin in pins),
+        ),
+    )
+
 
 DESIGN_FIELDS = (
     Field("variant", "1", "index of the joint's variant in `design` of the metadata", "i4"),
@@ -325,34 +333,55 @@ LEDGER_FIELDS = (
 """Origin of each joint's results."""
 
 DESIGN = dtype_of(DESIGN_FIELDS)
-ERROR = dtype_of(ERROR_FIELDS)
-PARAM = dtype_of(param_fields(CARDAN))
 
 
-def blank_params(n: int) -> NDArray[np.void]:
+class Tables(NamedTuple):
+    """Tables of a mechanism: fields of errors and results, and the types of rows.
+
+    `KERNEL_RESULT` has the same bytes as `RESULT`: ``largest``, ``average`` and ``range`` hold the statistics of all
+    loads, kind after kind as in `load_kinds.spans`, in place of ``F_max``, ``F_mean``, ``F_range`` and so on.
+    """
+
+    error_fields: tuple[Field, ...]
+    result_fields: tuple[Field, ...]
+    ERROR: np.dtype[np.void]
+    PARAM: np.dtype[np.void]
+    RESULT: np.dtype[np.void]
+    KERNEL_RESULT: np.dtype[np.void]
+
+
+@cache
+def tables(mechanism: Mechanism) -> Tables:
+    """Tables of a mechanism."""
+    errors, results = _error_fields(mechanism), _result_fields(mechanism)
+    return Tables(
+        errors, results, dtype_of(errors), dtype_of(param_fields(mechanism)), *_layouts(results, kinds(mechanism))
+    )
+
+
+def blank_params(n: int, mechanism: Mechanism = CARDAN) -> NDArray[np.void]:
     """Return `n` rows of PARAM that hold the numbers of the mechanism, and zeros."""
-    params = np.zeros(n, PARAM)
-    for name, values in numbering(CARDAN).items():
+    params = np.zeros(n, tables(mechanism).PARAM)
+    for name, values in numbers(mechanism).items():
         params[name] = values
     return params
 
 
-def _layouts() -> tuple[np.dtype[np.void], np.dtype[np.void]]:
+def _layouts(fields: tuple[Field, ...], of: Mapping[str, Kind]) -> tuple[np.dtype[np.void], np.dtype[np.void]]:
     """RESULT, and the same bytes with one array for each statistic of all loads."""
     arrays = {"max": "largest", "mean": "average", "range": "range"}
     of_loads = {
-        array: [kind.statistics()[name] for kind in LOAD_KINDS if name in kind.statistics()]
+        array: [kind.statistics()[name] for kind in of.values() if name in kind.statistics()]
         for name, array in arrays.items()
     }
-    others = [field for field in RESULT_FIELDS if not any(field in fields for fields in of_loads.values())]
-    sizes = {array: sum(math.prod(field.shape) for field in fields) for array, fields in of_loads.items()}
+    others = [field for field in fields if not any(field in alike for alike in of_loads.values())]
+    sizes = {array: sum(math.prod(field.shape) for field in alike) for array, alike in of_loads.items()}
     joined = [Field(array, "", "", shape=(size,)) for array, size in sizes.items()]
     return dtype_of([*others, *chain.from_iterable(of_loads.values())]), dtype_of([*others, *joined])
 
 
-RESULT, KERNEL_RESULT = _layouts()
-"""Results of one joint, and how kernels see them: in ``largest``, ``average`` and ``range`` the statistics of all
-loads, kind after kind as in `SPAN`, in place of ``F_max``, ``F_mean``, ``F_range`` and so on."""
+ERROR_FIELDS, RESULT_FIELDS, ERROR, PARAM, RESULT, KERNEL_RESULT = tables(CARDAN)
+HOLES = tuple(lump.name for lump in CARDAN.lumps if lump.name.startswith("hole"))
 
 
 def for_kernels(table: NDArray[np.void]) -> np.recarray[Any, np.dtype[np.void]]:

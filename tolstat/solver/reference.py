@@ -87,7 +87,6 @@ def first_order(params: NDArray[np.void], options: Options, from_start: bool = F
         Its functions share work arrays, and so are not thread-safe.
     """
     from tolstat.kernel.integrators import first_order as kernel
-    from tolstat.kernel.mechanics.loads import N_INSTANT
     from tolstat.kernel.mechanics.work import work_dtype
     from tolstat.kernel.revolution.orders import write_orders
     from tolstat.kernel.revolution.settle import make_samples, sample
@@ -126,8 +125,8 @@ def first_order(params: NDArray[np.void], options: Options, from_start: bool = F
         samples = make_samples(1, len(times))[0]
         sample(times, np.ascontiguousarray(states), par, work, samples)
         out = tables.for_kernels(np.zeros(1, RESULT))[0]
-        write_orders(samples if equal is None else samples[equal], out)
-        out.largest[:N_INSTANT] = samples.loads.max(axis=0)
+        write_orders(par, samples if equal is None else samples[equal], out)
+        out.largest[: samples.loads.shape[1]] = samples.loads.max(axis=0)
         return np.array(out.largest)
 
     scale = np.repeat([LENGTH, VELOCITY], AT_REST.size)

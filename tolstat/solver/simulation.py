@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from tolstat.common import tables
 from tolstat.common.cardan import CARDAN
-from tolstat.common.mechanism import numbering
+from tolstat.common.parameters import numbers
 from tolstat.common.tables import RESULT, SIMULATED, Fidelity, Options, Simulation, Start, Status
 from tolstat.joint import ideal
 from tolstat.solver import refinement, stationary
@@ -193,7 +193,7 @@ def run_lanes(queue: Queue, options: Options) -> NDArray[np.int64]:
 def lanes_for(queue: Queue, options: Options, width: int) -> Batch:
     """Lanes for the joints of a queue, with what all of these share."""
     batch = lanes(options, width)
-    for name in ("n_stations", "n_orders", *numbering(CARDAN)):
+    for name in ("n_stations", "n_orders", *numbers(CARDAN)):
         batch.par[name] = queue.rows[name][0]
     return batch
 
@@ -264,7 +264,7 @@ def hitting(params: NDArray[np.void], options: Options) -> NDArray[np.intp]:
 def _groups(params: NDArray[np.void], among: NDArray[np.bool_], max_size: int) -> Iterator[NDArray[np.intp]]:
     """Yield the indices of joints with equal numbers of contact stations and orders, at most `max_size` at a time."""
     shared = params[["n_stations", "n_orders"]]
-    for numbers in np.unique(shared[among]):
-        rows = np.flatnonzero(among & (shared == numbers))
+    for counts in np.unique(shared[among]):
+        rows = np.flatnonzero(among & (shared == counts))
         for first in range(0, len(rows), max_size):
             yield rows[first : first + max_size]

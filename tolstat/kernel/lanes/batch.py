@@ -5,13 +5,14 @@ from typing import NamedTuple
 import numpy as np
 
 from tolstat.common.cardan import CARDAN
-from tolstat.common.tables import PARAM, Options
+from tolstat.common.load_kinds import sizes
+from tolstat.common.mechanism import Mechanism
+from tolstat.common.tables import Options, tables
 from tolstat.kernel.codes import MEMORY
 from tolstat.kernel.lanes.lane_memory import aligned_zeros, lane_dtype
-from tolstat.kernel.mechanics.loads import N_INSTANT
 from tolstat.kernel.mechanics.scale import set_weight, typical_force
 from tolstat.kernel.mechanics.work import factors_dtype, work_dtype
-from tolstat.kernel.revolution.peaks import PEAKS
+from tolstat.kernel.revolution.peaks import peaks_dtype
 from tolstat.kernel.revolution.resolve import Pasts, make_pasts
 from tolstat.kernel.revolution.settle import make_samples
 from tolstat.kernel.revolution.trail import make_notes
@@ -73,7 +74,7 @@ class Batch(NamedTuple):
     control: np.record
     peaks: np.record
     samples: np.recarray  # (width, steps_per_rev) SAMPLE
-    fine: np.ndarray  # (width, 3, N_INSTANT) loads of the last parts of a closer look, or of a cell, part j at j % 3
+    fine: np.ndarray  # (width, 3, n) loads of the last parts of a closer look, or of a cell, part j at j % 3
     notes: np.recarray  # (width,) NOTES
     pasts: Pasts
     scratch: np.record  # WORK: scratch of an evaluation of one joint
@@ -91,29 +92,34 @@ class Queue(NamedTuple):
     results: np.recarray  # (n,) KERNEL_RESULT
 
 
-def make_batch(options: Options, width: int = WIDTH) -> Batch:
-    """Allocate `width` lanes."""
+def make_batch(options: Options, width: int = WIDTH, mechanism: Mechanism = CARDAN) -> Batch:
+    """Allocate `width` lanes for joints of a mechanism."""
     control = np.dtype([(name, "f8") for name in NUMBERS] + [(name, "i8", width) for name in INTEGERS])
-    of_motion = np.dtype([(name, "f8", CARDAN.dof) for name in POINTS] + [("memory", "f8", MEMORY)])
-    pars = aligned_zeros(1, lane_dtype(PARAM, width)).view(np.recarray)
-    layouts = [lane_dtype(dtype, width) for dtype in (work_dtype(), factors_dtype(), of_motion, control, PEAKS)]
-    work, tangent, motion, state, peaks = (aligned_zeros(1, layout).view(np.recarray)[0] for layout in layouts)
+    motion = np.dtype([(name, "f8", mechanism.dof) for name in POINTS] + [("memory", "f8", MEMORY)])
+    dtypes = work_dtype(mechanism), factors_dtype(mechanism), motion, control, peaks_dtype(mechanism)
+    pars = aligned_zeros(1, lane_dtype(tables(mechanism).PARAM, width)).view(np.recarray)
+    records = (aligned_zeros(1, lane_dtype(dtype, width)).view(np.recarray)[0] for dtype in dtypes)
     words = pars.view(np.float64).view(np.ndarray)
-    samples, fine = make_samples(width, options.steps_per_rev), np.zeros((width, 3, N_INSTANT))
-    notes, pasts = make_notes(width), make_pasts(width, options)
-    scratch = np.zeros(1, work_dtype()).view(np.recarray)[0]
     return Batch(
-        pars[0], words, _word_index(width), work, tangent, motion, state, peaks, samples, fine, notes, pasts, scratch
+        pars[0],
+        words,
+        _word_index(tables(mechanism).PARAM, width),
+        *records,
+        make_samples(width, options.steps_per_rev, mechanism),
+        np.zeros((width, 3, sizes(mechanism).instant)),
+        make_notes(width),
+        make_pasts(width, options, mechanism),
+        np.zeros(1, work_dtype(mechanism)).view(np.recarray)[0],
     )
 
 
-def _word_index(width):
-    """Values of `Batch.word_index`: integers of PARAM are shared by all lanes."""
-    lanes = lane_dtype(PARAM, width)
-    index = np.full(PARAM.itemsize // 8, -1)
-    for name in PARAM.names:
-        if PARAM[name].base == np.float64:
-            first, size = PARAM.fields[name][1] // 8, PARAM[name].itemsize // 8
+def _word_index(dtype, width):
+    """Values of `Batch.word_index` for rows of `dtype`, PARAM: its integers are shared by all lanes."""
+    lanes = lane_dtype(dtype, width)
+    index = np.full(dtype.itemsize // 8, -1)
+    for name in dtype.names:
+        if dtype[name].base == np.float64:
+            first, size = dtype.fields[name][1] // 8, dtype[name].itemsize // 8
             index[first : first + size] = lanes.fields[name][1] // 8 + width * np.arange(size)
     return index
 

@@ -184,7 +184,7 @@ def finish_closeup_part(lane, par, lanes, options, control, motion, fine, out):
     """Record a part of a closer look and set up the next one; return `OK` after the last part of the step."""
     j, part = control.looked[lane], control.grid[lane]
     record_loads(lane, lanes[1], fine[j % 3])
-    count_in(j, fine, out)
+    count_in(j, fine, par, out)
     control.looked[lane] += 1
     control.part[lane] += 1
     if control.part[lane] == control.until[lane]:
@@ -207,7 +207,7 @@ def finish_angle(lane, par, lanes, options, control, motion, samples, out):
     if k == n:
         k = 0
         control.done[lane] += 1
-        out.closure, out.revolutions = closure_error(0, 1, ALL_LOADS, samples), float(control.done[lane])
+        out.closure, out.revolutions = closure_error(0, 1, ALL_LOADS, par, samples), float(control.done[lane])
         if out.closure <= options.settle_tol:
             return OK
         if control.iterations[lane] > MAX_ITERATIONS * n * options.max_revs:
@@ -278,11 +278,11 @@ def start_cells(lane, par, options, control, motion, past):
     """Start error-controlled steps in a lane."""
     begin_mesh(par, options, motion.memory[:, lane], motion.weight[:, lane], past)
     control.grid[lane] = grid_step(par, options) / cells_of(options.steps_per_rev)
-    start_cell(lane, 1, options, control, motion, past)
+    start_cell(lane, 1, par, options, control, motion, past)
 
 
 @njit
-def start_cell(lane, c, options, control, motion, past):
+def start_cell(lane, c, par, options, control, motion, past):
     """Set up cell `c` in a lane that is at the end of the previous cell."""
     cell, before = past.mesh[c % past.mesh.size], past.mesh[(c - 1) % past.mesh.size]
     for i in range(motion.q.shape[0]):
@@ -291,20 +291,20 @@ def start_cell(lane, c, options, control, motion, past):
     control.k[lane], control.origin[lane] = c, (c - 1) * control.grid[lane]
     control.level[lane] = next_level(past.turns.revolution - past.turns.since, cell, before)
     control.began[lane] = control.level[lane]
-    start_parts(lane, options, control, past)
+    start_parts(lane, par, options, control, past)
 
 
 @njit
-def start_parts(lane, options, control, past):
+def start_parts(lane, par, options, control, past):
     """Set up the first part of a cell."""
     control.done[lane] = control.part[lane] = 0
     control.worst[lane] = 0.0
-    clear_extremes(past.extremes[0])
+    clear_extremes(past.extremes[0], par)
     set_stage(lane, 0, options, control)
 
 
 @njit
-def reject_cell(lane, options, control, motion, past):
+def reject_cell(lane, par, options, control, motion, past):
     """Reject a cell and set it up again with parts half as long; return the status."""
     control.halvings[lane] += 1
     control.level[lane] += 1
@@ -314,7 +314,7 @@ def reject_cell(lane, options, control, motion, past):
     for i in range(motion.q.shape[0]):
         motion.q0[i, lane], motion.v0[i, lane] = past.begun[0, i], past.begun[1, i]
         motion.a0[i, lane] = past.begun[2, i]
-    start_parts(lane, options, control, past)
+    start_parts(lane, par, options, control, past)
     return NOT_SETTLED
 
 
@@ -327,10 +327,10 @@ def part(lane, par, lanes, options, control, motion, samples, fine, past, out):
     whole = 1 << options.max_halvings
     control.worst[lane] = max(control.worst[lane], control.error[lane])
     if not control.error[lane] <= 1:
-        status = reject_cell(lane, options, control, motion, past)
+        status = reject_cell(lane, par, options, control, motion, past)
         return status, status == NOT_SETTLED
     record_loads(lane, lanes[1], fine[control.part[lane] % 3])
-    count_in(control.part[lane], fine, past.extremes[0])
+    count_in(control.part[lane], fine, par, past.extremes[0])
     control.steps[lane] += 1
     control.done[lane] += whole >> control.level[lane]
     control.part[lane] += 1
@@ -351,7 +351,7 @@ def finish_cell(lane, par, lanes, options, control, motion, samples, past, out):
         motion.a0[i, lane] = motion.a[i, lane]
     refused = control.level[lane] > control.began[lane]
     note_cell(control.level[lane], refused, control.worst[lane], turns.revolution, past.mesh[c % past.mesh.size])
-    merge_extremes(past.extremes[0], past.extremes[1])
+    merge_extremes(past.extremes[0], par, past.extremes[1])
     cells = past.mesh.size // samples.size
     if c % cells == 0:
         k = c // cells
@@ -362,5 +362,5 @@ def finish_cell(lane, par, lanes, options, control, motion, samples, past, out):
         status, goes_on = after_revolution(par, options, samples, past, out)
         adapt_mesh(halved, par, options, motion.memory[:, lane], motion.weight[:, lane], past)
     if goes_on:
-        start_cell(lane, c + 1, options, control, motion, past)
+        start_cell(lane, c + 1, par, options, control, motion, past)
     return status, goes_on

@@ -112,7 +112,7 @@ def arrive(lane, par, lanes, left, options, batch, samples, past, out):
         control.steps[lane] += control.count[lane]
         out.failed_step = k
         return NEWTON_FAILED, False
-    force = largest_at_an_end(par.pin.shape[0], lane, lanes[2])
+    force = largest_at_an_end(lane, par, lanes[2])
     if not is_stable(force, point[0], turns):
         control.steps[lane] += control.count[lane]
         control.halvings[lane] += 1
@@ -125,7 +125,7 @@ def arrive(lane, par, lanes, left, options, batch, samples, past, out):
     if k < n:
         return NOT_SETTLED, True
     control.steps[lane] += steps
-    write_peaks(lane, lanes[2], past.extremes[1])
+    write_peaks(lane, par, lanes[2], past.extremes[1])
     status, goes_on = after_revolution(par, options, samples, past, out)
     if goes_on:
         begin_revolution(point, steps, par, work, past)

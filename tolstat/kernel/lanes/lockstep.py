@@ -137,7 +137,7 @@ def next_closeup_step(lane, k, looking, par, options, batch, samples, out):
     control, n, h = batch.control, options.steps_per_rev, grid_step(par, options)
     while k <= n:
         switched = k < n and switches(k, samples)
-        rings = k < n and (switched or looking) and on_a_peak(k, samples, out)
+        rings = k < n and (switched or looking) and on_a_peak(k, par, samples, out)
         if rings and not looking:
             forget_steps(lane, control, batch.motion)
             recall(k - 1, lane, par, options, samples, batch.motion)
@@ -268,7 +268,7 @@ def lockstep(options, patience, batch, queue, tally):
             past = Past(trail, pasts.turns[lane], pasts.extremes[lane], pasts.begun[lane], pasts.mesh[lane])
             if (arrived >> lane) & 1 == 0:
                 if phase == PART:
-                    status = reject_cell(lane, options, controls, motions, past)
+                    status = reject_cell(lane, rows[joint], options, controls, motions, past)
                     goes_on = status == NOT_SETTLED
                 else:
                     status = fall_back(lane, rows[joint], options, controls, motions)

@@ -10,9 +10,9 @@ from functools import cache
 import numpy as np
 
 from tolstat.common.cardan import CARDAN
+from tolstat.common.load_kinds import sizes
 from tolstat.common.mechanism import blocks_of
 from tolstat.common.parameters import MAX_STATIONS
-from tolstat.kernel.mechanics.loads import N_INSTANT
 
 # columns of work.station
 POINT, NORMAL, TANGENT = 0, 3, 6
@@ -44,7 +44,7 @@ def work_fields(mechanism):
         "contact": (pairs, 3),  # normal force at the outer and inner end station of each pin, resultant of all
         "mode": (pairs,),  # contact mode of each pin
         "output": (2,),  # speed ratio of the output shaft and its error Psi, eq. (13)
-        "loads": (N_INSTANT,),  # as `loads.write_loads` writes them
+        "loads": (sizes(mechanism).instant,),  # as `loads.write_loads` writes them
         "shafts": (shafts, 6),  # force and moment about O on each shaft, in axes that do not turn
         "station": (pairs, MAX_STATIONS, N_STATION),  # contact stations, see the column numbers above
         "block": (blocks_of(mechanism), 6, 6),  # matrices of the tangent, factorised in place; rows of what goes first

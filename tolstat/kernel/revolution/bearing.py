@@ -23,7 +23,7 @@ def write_equivalent_loads(par, samples, out):
             at_output, at_input = travel(first // PINS_OF_JOINT, theta, slope, par)
             whole_output, whole_input = whole_output + at_output, whole_input + at_input
             for pin in range(first, last):
-                force = samples[s].loads[CONTACT_FORCES + len(CONTACTS) * pin + RESULTANT]
+                force = samples[s].loads[par.begin[CONTACT_FORCES] + len(CONTACTS) * pin + RESULTANT]
                 out.equivalent_load[pin] += (at_output if pin < first + 2 else at_input) * force**LIFE_EXPONENT
         for pin in range(first, last):
             whole = whole_output if pin < first + 2 else whole_input

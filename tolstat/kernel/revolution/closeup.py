@@ -11,15 +11,7 @@ import math
 
 from tolstat.kernel.codes import H_OLD, LAST_ITERATION_BELOW, TRAPEZOIDAL
 from tolstat.kernel.mechanics.dynamics import mass_of
-from tolstat.kernel.mechanics.loads import (
-    DECIDING,
-    INTERPOLATED,
-    N_AVERAGED,
-    N_INSTANT,
-    N_MEASURES,
-    OF_MEASURE,
-    size_of,
-)
+from tolstat.kernel.mechanics.loads import size_of
 from tolstat.kernel.mechanics.scale import stiffness
 from tolstat.kernel.revolution.settle import grid_step, peak
 from tolstat.kernel.simd.jit import njit
@@ -51,13 +43,13 @@ def switches(s, samples):
 
 
 @njit
-def on_a_peak(s, samples, out):
+def on_a_peak(s, par, samples, out):
     """Whether a load that decides has a kink about samples `s - 1` and `s` and is near its largest value there."""
     n = samples.size
-    for measure in range(N_MEASURES):
-        size = size_of(measure, out.largest)
-        for j in range(OF_MEASURE[measure, 0], OF_MEASURE[measure, 1]):
-            i = DECIDING[j]
+    for measure in range(par.of_measure.shape[0]):
+        size = size_of(measure, out.largest, par)
+        for j in range(par.of_measure[measure, 0], par.of_measure[measure, 1]):
+            i = par.deciding[j]
             m0, m1 = samples[s - 2].loads[i], samples[s - 1].loads[i]
             m2, m3, m4 = samples[s].loads[i], samples[(s + 1) % n].loads[i], samples[(s + 2) % n].loads[i]
             kink = max(abs(m3 - m0 - 3 * (m2 - m1)), abs(m4 - m1 - 3 * (m3 - m2)))
@@ -81,14 +73,14 @@ def height(before, here, ahead):
 
 
 @njit
-def count_in(j, fine, out):
+def count_in(j, fine, par, out):
     """Update the extremes in `out` with sample `j` of the finer integration and the peak at sample `j - 1`, if any."""
     here, before, first = fine[j % 3], fine[(j - 1) % 3], fine[(j - 2) % 3]
-    for i in range(N_INSTANT):
+    for i in range(here.shape[0]):
         load = here[i]
-        if j > 1 and INTERPOLATED[i]:
+        if j > 1 and par.interpolated[i] == 1:
             load = max(load, height(first[i], before[i], load))
-        if i < N_AVERAGED:
+        if i < out.average.shape[0]:
             out.largest[i], out.range[i] = extend(load, out.largest[i], out.range[i])
         else:
             out.largest[i] = max(out.largest[i], load)

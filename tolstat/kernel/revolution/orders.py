@@ -7,13 +7,9 @@ amplitude of its cosine. The sense of rotation and the angle of the first sample
 
 import math
 
-from tolstat.common.load_kinds import ORDERS, SPAN
+from tolstat.common.load_kinds import ORDERS
+from tolstat.kernel.mechanics.loads import DRIVE_ORDERS, LATERAL_ORDERS, MOMENT_ORDERS, PSI_ORDERS
 from tolstat.kernel.simd.jit import njit
-
-LATERAL_ORDERS, MOMENT_ORDERS, DRIVE_ORDERS, PSI_ORDERS = (
-    SPAN[f"{key}_orders"].start for key in ("lateral", "moment", "drive", "psi")
-)
-"""First element of each kind."""
 
 
 @njit
@@ -30,30 +26,34 @@ def plus(total, value, c, s):
 
 
 @njit
-def of_order(i, samples, out):
+def of_order(i, par, samples, out):
     """Write all amplitudes of order ``ORDERS[i]`` to a row of KERNEL_RESULT."""
-    n = samples.size
+    n, number = samples.size, len(ORDERS)
     turn_c, turn_s = math.cos(2 * math.pi * ORDERS[i] / n), -math.sin(2 * math.pi * ORDERS[i] / n)
-    c, s = 1.0, 0.0
     none = (0.0, 0.0)
-    fx = fy = mx = my = gx = gy = nx = ny = drive = psi = none  # f, m of the input shaft, g, n of the output shaft
+    for shaft in range(par.turn.shape[0]):
+        c, s = 1.0, 0.0
+        fx = fy = mx = my = mz = none
+        for k in range(n):
+            of = samples[k].shafts[shaft]
+            fx, fy, mx, my = plus(fx, of[0], c, s), plus(fy, of[1], c, s), plus(mx, of[3], c, s), plus(my, of[4], c, s)
+            mz = plus(mz, of[5], c, s)
+            c, s = c * turn_c - s * turn_s, s * turn_c + c * turn_s
+        out.largest[par.begin[LATERAL_ORDERS] + number * shaft + i] = semi_major(fx, fy, n)
+        out.largest[par.begin[MOMENT_ORDERS] + number * shaft + i] = semi_major(mx, my, n)
+        for j in range(par.driven.shape[0]):
+            if par.driven[j] == shaft:
+                out.largest[par.begin[DRIVE_ORDERS] + number * j + i] = semi_major(mz, none, n)
+    c, s = 1.0, 0.0
+    psi = none
     for k in range(n):
-        one, two = samples[k].shafts[0], samples[k].shafts[1]
-        fx, fy, mx, my = plus(fx, one[0], c, s), plus(fy, one[1], c, s), plus(mx, one[3], c, s), plus(my, one[4], c, s)
-        gx, gy, nx, ny = plus(gx, two[0], c, s), plus(gy, two[1], c, s), plus(nx, two[3], c, s), plus(ny, two[4], c, s)
-        drive, psi = plus(drive, one[5], c, s), plus(psi, samples[k].psi, c, s)
+        psi = plus(psi, samples[k].psi, c, s)
         c, s = c * turn_c - s * turn_s, s * turn_c + c * turn_s
-    of_output = len(ORDERS) + i
-    out.largest[LATERAL_ORDERS + i] = semi_major(fx, fy, n)
-    out.largest[LATERAL_ORDERS + of_output] = semi_major(gx, gy, n)
-    out.largest[MOMENT_ORDERS + i] = semi_major(mx, my, n)
-    out.largest[MOMENT_ORDERS + of_output] = semi_major(nx, ny, n)
-    out.largest[DRIVE_ORDERS + i] = semi_major(drive, none, n)
-    out.largest[PSI_ORDERS + i] = semi_major(psi, none, n)
+    out.largest[par.begin[PSI_ORDERS] + i] = semi_major(psi, none, n)
 
 
 @njit
-def write_orders(samples, out):
+def write_orders(par, samples, out):
     """Write the amplitudes of the recorded revolution to a row of KERNEL_RESULT."""
     for i in range(len(ORDERS)):
-        of_order(i, samples, out)
+        of_order(i, par, samples, out)

@@ -6,7 +6,6 @@ import numpy as np
 
 from tolstat.common.tables import MAX_ITERATIONS, MAX_SHIFT, MAX_TILT
 from tolstat.kernel.codes import DYNAMIC, NEWTON_FAILED, NOT_SETTLED, OK
-from tolstat.kernel.mechanics.loads import DECIDING, N_AVERAGED, N_LOADS
 from tolstat.kernel.mechanics.triad import from_triad
 from tolstat.kernel.mechanics.vector import dot, row
 from tolstat.kernel.revolution.settle import ALL_LOADS, closure_error, step_error
@@ -63,9 +62,9 @@ def clear_results(out):
     out.period, out.failed_step = 0, -1
     out.closure = out.closure_trend = out.failed_theta = out.revolutions = nan
     out.step_error = out.refinement_change = nan
-    for i in range(N_LOADS):
+    for i in range(out.largest.shape[0]):
         out.largest[i] = nan
-    for i in range(N_AVERAGED):
+    for i in range(out.average.shape[0]):
         out.average[i] = out.range[i] = nan
     for pin in range(out.mode_share.shape[0]):
         for k in range(out.mode_share.shape[1]):
@@ -77,7 +76,7 @@ def clear_results(out):
 def clear_samples(samples, notes):
     """Reset samples and notes for another joint."""
     for s in range(samples.size):
-        for i in DECIDING:
+        for i in range(samples[s].loads.shape[0]):
             samples[s].loads[i] = np.nan
         samples[s].s = np.nan
     notes.count = 0
@@ -115,12 +114,12 @@ def check_settled(k, iterations, par, options, samples, notes, out):
     out.revolutions = k / n
     if due and n < k < 2 * n and is_smooth(par, samples, out):
         first, last = (k - n) // 2 + 1, k - n + 1
-        closure = closure_error(first, last, ALL_LOADS, samples)
+        closure = closure_error(first, last, ALL_LOADS, par, samples)
         out.closure = with_slow_decay(closure, out.revolutions, par, notes)
         if out.closure <= EARLY_CLOSURE * options.settle_tol:
             return OK
     if due and k >= 2 * n:
-        closure = closure_error(0, n, ALL_LOADS, samples)
+        closure = closure_error(0, n, ALL_LOADS, par, samples)
         note_closure(out.revolutions, closure, notes)
         out.closure = with_slow_decay(closure, out.revolutions, par, notes)
         if out.closure <= options.settle_tol:
@@ -132,7 +131,7 @@ def check_settled(k, iterations, par, options, samples, notes, out):
 def is_finite(out):
     """Whether the statistics of the bushing loads of a joint are finite."""
     good = True
-    for i in range(N_AVERAGED):
+    for i in range(out.average.shape[0]):
         good = good and out.largest[i] < 1e300 and out.average[i] < 1e300
     return good
 

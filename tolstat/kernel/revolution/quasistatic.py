@@ -10,8 +10,8 @@ where pseudo-transient continuation leads from there.
 
 import math
 
-from tolstat.kernel.mechanics.cardan.motion import ideal_ratio
 from tolstat.kernel.codes import AHEAD
+from tolstat.kernel.mechanics.cardan.motion import ideal_ratio
 from tolstat.kernel.mechanics.loads import SPEED_ERROR
 from tolstat.kernel.mechanics.motion import drive_and_load
 from tolstat.kernel.simd.jit import njit
@@ -83,4 +83,4 @@ def speed_ratios(par, samples):
         before = here
         samples[s].tau = ideal_ratio(theta, par) + error
         samples[s].psi = error / samples[s].tau
-        samples[s].loads[SPEED_ERROR] = abs(samples[s].psi)
+        samples[s].loads[par.begin[SPEED_ERROR]] = abs(samples[s].psi)

@@ -5,16 +5,19 @@ again: from the change of the largest loads their error is estimated. A joint th
 limit.
 """
 
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 
 from tolstat.common import tables
 from tolstat.common.cardan import CARDAN
-from tolstat.common.tables import KERNEL_RESULT, Options
+from tolstat.common.load_kinds import sizes
+from tolstat.common.mechanism import Mechanism
+from tolstat.common.tables import Options
 from tolstat.kernel.codes import NOT_FINITE, NOT_SETTLED, OK, STAGED_STEP, TOLERANCE
 from tolstat.kernel.integrators.mesh import CELL, cells_of, forget_mesh, refine_mesh, set_scale
-from tolstat.kernel.mechanics.loads import N_AVERAGED, N_DECIDING, N_INSTANT, OF_FORCES, OF_TORQUES, size_of
+from tolstat.kernel.mechanics.loads import OF_FORCES, OF_TORQUES, size_of
 from tolstat.kernel.mechanics.scale import SMALLEST_FORCE, typical_force
 from tolstat.kernel.revolution.closeup import extend
 from tolstat.kernel.revolution.settle import BUSHINGS_ONLY, closure_error, summarise
@@ -53,20 +56,24 @@ MIN_FALL, MIN_FALL_OVER_SCATTER = 0.1, 10.0
 """Minimum fall of log10(closure) over the revolutions kept that counts as settling, and factor by which it must exceed
 its scatter: closure errors of chaotic joints wander, and fell by four to five times their scatter in some."""
 
-TURNS = np.dtype(
-    [
-        ("revolution", "i8"),  # revolutions completed
-        ("since", "i8"),  # revolutions completed before the steps in use
-        ("limit", "i8"),  # revolutions after which the joint is given up
-        ("halved", "i8"),  # number of times that the steps were halved to estimate their error
-        ("period", "i8"),  # period found with the steps before, revolutions; 0: none
-        ("force", "f8"),  # largest |F| of the last revolution, N; before the first one, an estimate
-        ("torque", "f8"),  # largest |T|, N m
-        ("steps", "i8"),  # explicit steps of a revolution before they were halved
-        ("bearable", "f8"),  # contact force of an end station up to which the steps in use are stable, N
-        ("before", "f8", N_DECIDING),  # largest of the loads that decide with the steps before
-    ]
-)
+
+@cache
+def turns_dtype(mechanism):
+    """Type TURNS: number of the revolution, and what has been found so far."""
+    return np.dtype(
+        [
+            ("revolution", "i8"),  # revolutions completed
+            ("since", "i8"),  # revolutions completed before the steps in use
+            ("limit", "i8"),  # revolutions after which the joint is given up
+            ("halved", "i8"),  # number of times that the steps were halved to estimate their error
+            ("period", "i8"),  # period found with the steps before, revolutions; 0: none
+            ("force", "f8"),  # largest |F| of the last revolution, N; before the first one, an estimate
+            ("torque", "f8"),  # largest |T|, N m
+            ("steps", "i8"),  # explicit steps of a revolution before they were halved
+            ("bearable", "f8"),  # contact force of an end station up to which the steps in use are stable, N
+            ("before", "f8", sizes(mechanism).deciding),  # largest loads that decide, with the steps before
+        ]
+    )
 
 
 class Past(NamedTuple):
@@ -94,14 +101,14 @@ class Pasts(NamedTuple):
     mesh: np.recarray
 
 
-def make_pasts(joints: int, options: Options) -> Pasts:
+def make_pasts(joints: int, options: Options, mechanism: Mechanism = CARDAN) -> Pasts:
     """Allocate for several joints."""
-    trails = make_trails(joints, options.steps_per_rev, revolutions_kept(options))
-    turns = np.zeros(joints, TURNS).view(np.recarray)
-    extremes = np.zeros((joints, 2), KERNEL_RESULT).view(np.recarray)
+    trails = make_trails(joints, options.steps_per_rev, revolutions_kept(options), mechanism)
+    turns = np.zeros(joints, turns_dtype(mechanism)).view(np.recarray)
+    extremes = np.zeros((joints, 2), tables.tables(mechanism).KERNEL_RESULT).view(np.recarray)
     cells = options.steps_per_rev * cells_of(options.steps_per_rev)
     mesh = np.zeros((joints, cells), CELL).view(np.recarray)
-    return Pasts(*trails, turns, extremes, np.zeros((joints, 3, CARDAN.dof)), mesh)
+    return Pasts(*trails, turns, extremes, np.zeros((joints, 3, mechanism.dof)), mesh)
 
 
 def revolutions_kept(options: Options) -> int:
@@ -124,26 +131,27 @@ def begin_turns(par, options, past):
     turns.force = typical_force(par)
     turns.torque = turns.force * par.R
     past.trail.notes.count = 0
-    clear_extremes(past.extremes[1])
+    clear_extremes(past.extremes[1], par)
 
 
 @njit
-def clear_extremes(extremes):
+def clear_extremes(extremes, par):
     """Reset largest and smallest loads."""
-    for i in range(N_INSTANT):
+    for i in range(par.modulus.shape[0]):
         extremes.largest[i] = 0.0
-    for i in range(N_AVERAGED):
+    for i in range(extremes.average.shape[0]):
         extremes.range[i] = -np.inf
 
 
 @njit
-def merge_extremes(extremes, out):
+def merge_extremes(extremes, par, out):
     """Include `extremes` in those of `out`."""
-    for i in range(N_AVERAGED):
+    averaged = out.average.shape[0]
+    for i in range(averaged):
         low = extremes.largest[i] - extremes.range[i]
         top, span = extend(extremes.largest[i], out.largest[i], out.range[i])
         out.largest[i], out.range[i] = top, max(span, top - low)
-    for i in range(N_AVERAGED, N_INSTANT):
+    for i in range(averaged, par.modulus.shape[0]):
         out.largest[i] = max(out.largest[i], extremes.largest[i])
 
 
@@ -155,17 +163,17 @@ def keep_revolution(par, samples, extremes, trail, r):
     """
     statistics = trail.revolution[r % trail.revolution.size]
     summarise(par, samples, statistics)
-    clear_extremes(statistics)
-    merge_extremes(extremes, statistics)
-    clear_extremes(extremes)
+    clear_extremes(statistics, par)
+    merge_extremes(extremes, par, statistics)
+    clear_extremes(extremes, par)
     stride = -(-samples.size // trail.loads.shape[1])
     for s in range(0, samples.size, stride):
-        keep_deciding(samples[s].loads, trail.loads[r % trail.revolution.size, s // stride])
+        keep_deciding(samples[s].loads, par, trail.loads[r % trail.revolution.size, s // stride])
     return statistics
 
 
 @njit
-def find_period(last, closure, tolerance, turns, trail):
+def find_period(last, closure, tolerance, par, turns, trail):
     """Period, in revolutions, of the motion at the end of revolution `last` (from 0); 0 if it does not repeat.
 
     `closure`: error against the revolution before; the motion repeats where such an error is at most `tolerance`.
@@ -176,41 +184,41 @@ def find_period(last, closure, tolerance, turns, trail):
     if known < 2 * LONGEST_PERIOD and turns.period < 2:
         return 0
     for lag in range(2, min(LONGEST_PERIOD, known // 2) + 1):
-        if lag_closure(last, lag, trail) <= tolerance:
+        if lag_closure(last, lag, par, trail) <= tolerance:
             return lag
     return 0
 
 
 @njit
-def halve_steps(period, turns, out):
+def halve_steps(period, par, turns, out):
     """Halve the steps from the next revolution on; keep `period` and the largest loads in `out` for comparison."""
-    keep_deciding(out.largest, turns.before)
+    keep_deciding(out.largest, par, turns.before)
     turns.halved += 1
     turns.since, turns.period = turns.revolution, period
     turns.limit = max(turns.limit, turns.revolution + SETTLING)
 
 
 @njit
-def repeats(last, options, trail, turns, out):
+def repeats(last, par, options, trail, turns, out):
     """Whether a joint repeats after revolution `last` (from 0), and its largest loads are resolved.
 
     Loads that no further halving is allowed for count as resolved; others that are not halve the steps.
     """
-    period = find_period(last, out.closure, max(NEARLY, options.settle_tol), turns, trail)
+    period = find_period(last, out.closure, max(NEARLY, options.settle_tol), par, turns, trail)
     tired = turns.halved == 0 and last + 1 >= PATIENT
     if period == 0 and not tired:
         return False
     combine(last, max(1, period), trail, out)
-    change = largest_change(True, turns.before, out) if turns.halved > 0 else np.nan
+    change = largest_change(True, turns.before, par, out) if turns.halved > 0 else np.nan
     if turns.halved < options.max_refinements and not change <= RESOLVED:
-        halve_steps(period, turns, out)
+        halve_steps(period, par, turns, out)
         return False
-    change_of_bushings = largest_change(False, turns.before, out) if turns.halved > 0 else np.nan
-    period = find_period(last, out.closure, max(ENOUGH * change_of_bushings, options.settle_tol), turns, trail)
+    change_of_bushings = largest_change(False, turns.before, par, out) if turns.halved > 0 else np.nan
+    period = find_period(last, out.closure, max(ENOUGH * change_of_bushings, options.settle_tol), par, turns, trail)
     if period == 0:
         return False
     combine(last, period, trail, out)
-    out.refinement_change = largest_change(True, turns.before, out)
+    out.refinement_change = largest_change(True, turns.before, par, out)
     out.period = period
     out.closure_trend, _ = closure_trend(turns.since, trail.notes)
     return True
@@ -253,22 +261,22 @@ def after_revolution(par, options, samples, past, out):
     turns.revolution += 1
     statistics = keep_revolution(par, samples, past.extremes[1], trail, last)
     out.revolutions = turns.revolution
-    force, torque = size_of(OF_FORCES, statistics.largest), size_of(OF_TORQUES, statistics.largest)
+    force, torque = size_of(OF_FORCES, statistics.largest, par), size_of(OF_TORQUES, statistics.largest, par)
     if not (force < 1e300 and torque < 1e300):
         return NOT_FINITE, False
     turns.force, turns.torque = max(force, SMALLEST_FORCE), max(torque, SMALLEST_FORCE * par.R)
     if last > turns.since:
-        closure = closure_error(0, samples.size, BUSHINGS_ONLY, samples)
+        closure = closure_error(0, samples.size, BUSHINGS_ONLY, par, samples)
         note_closure(turns.revolution, closure, trail.notes)
         out.closure = with_slow_decay(closure, turns.revolution, par, trail.notes)
-        if repeats(last, options, trail, turns, out):
+        if repeats(last, par, options, trail, turns, out):
             return (OK if out.period == 1 else NOT_SETTLED), False
     elif (
         turns.period == 1
         and turns.halved < options.max_refinements
-        and largest_change(True, turns.before, statistics) > FAR
+        and largest_change(True, turns.before, par, statistics) > FAR
     ):
-        halve_steps(1, turns, statistics)
+        halve_steps(1, par, turns, statistics)
     if turns.revolution == turns.limit:
         conclude(trail, turns, out)
         return NOT_SETTLED, False

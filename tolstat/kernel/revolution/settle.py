@@ -1,26 +1,15 @@
 """The recorded revolution: a ring buffer of samples by input angle, and the closure error between revolutions."""
 
 import math
+from functools import cache
 
 import numpy as np
 
 from tolstat.common.cardan import CARDAN
+from tolstat.common.load_kinds import sizes
+from tolstat.common.mechanism import Mechanism
 from tolstat.kernel.mechanics.dynamics import forces
-from tolstat.kernel.mechanics.loads import (
-    DECIDING,
-    INTERPOLATED,
-    MEASURES,
-    N_AVERAGED,
-    N_INSTANT,
-    N_MEASURES,
-    OF_FORCES,
-    OF_MEASURE,
-    OF_TORQUES,
-    OTHERS,
-    complete_loads,
-    size_of,
-    write_loads,
-)
+from tolstat.kernel.mechanics.loads import OF_FORCES, OF_TORQUES, complete_loads, size_of, write_loads
 from tolstat.kernel.mechanics.scale import centring_stiffness, stiffness
 from tolstat.kernel.mechanics.vector import larger
 from tolstat.kernel.mechanics.work import FORCE
@@ -30,32 +19,43 @@ from tolstat.kernel.simd.borrow import fetch
 from tolstat.kernel.simd.jit import njit
 from tolstat.kernel.simd.lane import pick
 
-SAMPLE = np.dtype(
-    [
-        ("components", "f8", (8, 6)),  # of the bushing loads along and about e, t, z; N, N m
-        ("loads", "f8", (N_INSTANT,)),  # kind after kind
-        ("change", "f8", (N_MEASURES, 2)),  # largest change in a revolution: of bushing loads, of all that decide
-        ("s", "f8"),  # displacement of the output shaft along its axis, m
-        ("shafts", "f8", (2, 6)),  # force and moment about O on input and output shaft, in axes that do not turn
-        ("tau", "f8"),
-        ("psi", "f8"),  # its error, eq. (13)
-        ("mode", "u1", (4,)),
-        ("pressed", "u2", (4,)),  # bit j: station j of the pin carries a force
-        ("q", "f8", (CARDAN.dof,)),  # m, rad
-        ("v", "f8", (CARDAN.dof,)),  # per s
-    ],
-    align=True,
-)
-"""Sample k of a revolution belongs to theta = 2 pi k / steps_per_rev."""
+
+@cache
+def sample_dtype(mechanism):
+    """Type SAMPLE; sample k of a revolution belongs to theta = 2 pi k / steps_per_rev."""
+    pins, shafts = len(mechanism.pairs), len(mechanism.shafts)
+    return np.dtype(
+        [
+            ("components", "f8", (len(mechanism.bushings), 6)),  # of bushing loads along and about e, t, z; N, N m
+            ("loads", "f8", (sizes(mechanism).instant,)),  # kind after kind
+            (
+                "change",
+                "f8",
+                (2, 2),
+            ),  # by measure, largest change in a revolution: of bushing loads, of all that decide
+            ("s", "f8"),  # displacement of the output shaft along its axis, m
+            ("shafts", "f8", (shafts, 6)),  # force and moment about O on each shaft, in axes that do not turn
+            ("tau", "f8"),
+            ("psi", "f8"),  # its error, eq. (13)
+            ("mode", "u1", (pins,)),
+            ("pressed", "u2", (pins,)),  # bit j: station j of the pin carries a force
+            ("q", "f8", (mechanism.dof,)),  # m, rad
+            ("v", "f8", (mechanism.dof,)),  # per s
+        ],
+        align=True,
+    )
+
+
 BUSHINGS_ONLY, ALL_LOADS = 0, 1
 """Columns of its ``change``: bushing loads, and s as a force; with them what the shafts carry."""
 
 
-def make_samples(joints: int, steps_per_rev: int) -> np.recarray:
+def make_samples(joints: int, steps_per_rev: int, mechanism: Mechanism = CARDAN) -> np.recarray:
     """Allocate revolutions, shape (joints, steps_per_rev), filled with NaN."""
-    samples = np.zeros((joints, steps_per_rev), SAMPLE)
-    for name in SAMPLE.names:
-        if SAMPLE[name].base.kind == "f":
+    dtype = sample_dtype(mechanism)
+    samples = np.zeros((joints, steps_per_rev), dtype)
+    for name in dtype.names:
+        if dtype[name].base.kind == "f":
             samples[name] = np.nan
     return samples.view(np.recarray)
 
@@ -106,18 +106,18 @@ def record(k, lane, par, work, samples):
     sample.tau, sample.psi = pick(work.output[0], lane), pick(work.output[1], lane)
     s = pick(work.pos[work.pos.shape[0] - 1, 2], lane)
     shift = centring_stiffness(lane, par) * abs(s - sample.s)
-    for measure in range(N_MEASURES):
+    for measure in range(par.of_measure.shape[0]):
         change = shift if measure == OF_FORCES else 0.0
-        first, last = OF_MEASURE[measure, 0], OF_MEASURE[measure, 1]
-        others = first + MEASURES[measure, 1] - MEASURES[measure, 0]
+        first, last = par.of_measure[measure, 0], par.of_measure[measure, 1]
+        others = first + par.measured[measure, 1] - par.measured[measure, 0]
         for j in range(first, others):
-            change = larger(change, replace(DECIDING[j], lane, work, sample))
+            change = larger(change, replace(par.deciding[j], lane, work, sample))
         sample.change[measure, BUSHINGS_ONLY] = change
         for j in range(others, last):
-            change = larger(change, replace(DECIDING[j], lane, work, sample))
+            change = larger(change, replace(par.deciding[j], lane, work, sample))
         sample.change[measure, ALL_LOADS] = change
     sample.s = s
-    for i in OTHERS:
+    for i in par.others:
         sample.loads[i] = pick(work.loads[i], lane)
     for b in range(work.load.shape[0]):
         for i in range(6):
@@ -132,8 +132,8 @@ def record(k, lane, par, work, samples):
 
 @njit
 def record_loads(lane, work, loads):
-    """Write all loads at one instant to `loads`, shape (N_INSTANT,); other arguments as of `record`."""
-    for i in range(N_INSTANT):
+    """Write all loads at one instant to `loads`, shape (n,); other arguments as of `record`."""
+    for i in range(loads.shape[0]):
         loads[i] = pick(work.loads[i], lane)
 
 
@@ -174,18 +174,18 @@ def predict_increment(k, q, v, ahead, samples):
 
 
 @njit
-def closure_error(first, last, column, samples):
+def closure_error(first, last, column, par, samples):
     """Largest change of a load that decides since the revolution before, relative to its measure.
 
     Changes count at samples `first` to `last` - 1; `column`: those of bushing loads, `BUSHINGS_ONLY`, or `ALL_LOADS`.
     """
     worst = 0.0
-    for measure in range(N_MEASURES):
+    for measure in range(par.measured.shape[0]):
         change = largest = 0.0
         for s in range(first, last):
             change = larger(change, samples[s].change[measure, column])
         for s in range(samples.size):
-            largest = max(largest, size_of(measure, samples[s].loads))
+            largest = max(largest, size_of(measure, samples[s].loads, par))
         error = change / largest if largest > 0 else change
         worst = larger(worst, error)
     return worst
@@ -243,8 +243,8 @@ def step_error(par, samples):
     """
     force = torque = 0.0
     for s in range(samples.size):
-        force = max(force, size_of(OF_FORCES, samples[s].loads))
-        torque = max(torque, size_of(OF_TORQUES, samples[s].loads))
+        force = max(force, size_of(OF_FORCES, samples[s].loads, par))
+        torque = max(torque, size_of(OF_TORQUES, samples[s].loads, par))
     total = 0.0
     for s in range(samples.size):
         by_shift = by_turn = 0.0
@@ -260,14 +260,14 @@ def step_error(par, samples):
 def summarise(par, samples, out):
     """Write the statistics of the recorded revolution of the joint `par` to a row of KERNEL_RESULT."""
     n = samples.size
-    for i in range(N_INSTANT):
-        if i < N_AVERAGED:
+    for i in range(par.modulus.shape[0]):
+        if i < out.average.shape[0]:
             top, low = highest(samples.loads[:, i]), lowest(samples.loads[:, i])
             total = 0.0
             for s in range(n):
                 total += samples[s].loads[i]
             out.largest[i], out.average[i], out.range[i] = top, total / n, top - max(low, 0.0)
-        elif INTERPOLATED[i]:
+        elif par.interpolated[i] == 1:
             out.largest[i] = highest(samples.loads[:, i])
         else:
             out.largest[i] = 0.0
@@ -280,7 +280,7 @@ def summarise(par, samples, out):
                 count += samples[s].mode[pin] == mode
             out.mode_share[pin, mode] = count / n
     write_equivalent_loads(par, samples, out)
-    write_orders(samples, out)
+    write_orders(par, samples, out)
 
 
 @njit

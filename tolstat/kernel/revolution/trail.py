@@ -9,17 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tolstat.common.tables import KERNEL_RESULT, LIFE_EXPONENT
-from tolstat.kernel.mechanics.loads import (
-    DECIDING,
-    MEASURES,
-    N_AVERAGED,
-    N_DECIDING,
-    N_LOADS,
-    N_MEASURES,
-    OF_MEASURE,
-    size_of,
-)
+from tolstat.common.cardan import CARDAN
+from tolstat.common.load_kinds import sizes
+from tolstat.common.mechanism import Mechanism
+from tolstat.common.tables import LIFE_EXPONENT, tables
+from tolstat.kernel.mechanics.loads import size_of
 from tolstat.kernel.mechanics.scale import axial_decay
 from tolstat.kernel.mechanics.vector import larger
 from tolstat.kernel.simd.jit import njit
@@ -42,16 +36,18 @@ NOTES = np.dtype([("check", "f8", (MOST_CHECKS, 2)), ("count", "i8")])
 class Trail(NamedTuple):
     """Work arrays; revolution r lies at index r modulo the capacity."""
 
-    loads: np.ndarray  # (capacity, angles, N_DECIDING) loads that decide
+    loads: np.ndarray  # (capacity, angles, n) loads that decide
     revolution: np.ndarray  # (capacity,) record of KERNEL_RESULT: statistics of each revolution
     notes: np.record  # NOTES
 
 
-def make_trails(joints: int, steps_per_rev: int, capacity: int) -> tuple[np.ndarray, np.recarray, np.recarray]:
+def make_trails(
+    joints: int, steps_per_rev: int, capacity: int, mechanism: Mechanism = CARDAN
+) -> tuple[np.ndarray, np.recarray, np.recarray]:
     """Allocate the arrays of several trails, for `capacity` revolutions."""
     angles = -(-steps_per_rev // _stride(steps_per_rev))
-    loads = np.full((joints, capacity, angles, N_DECIDING), np.nan)
-    return loads, np.zeros((joints, capacity), KERNEL_RESULT).view(np.recarray), make_notes(joints)
+    loads = np.full((joints, capacity, angles, sizes(mechanism).deciding), np.nan)
+    return loads, np.zeros((joints, capacity), tables(mechanism).KERNEL_RESULT).view(np.recarray), make_notes(joints)
 
 
 def make_notes(joints: int) -> np.recarray:
@@ -126,14 +122,14 @@ def with_slow_decay(closure, revolutions, par, notes):
 
 
 @njit
-def lag_closure(last, lag, trail):
+def lag_closure(last, lag, par, trail):
     """Closure error of revolution `last` (from 0) against the one `lag` earlier, of bushing loads."""
     capacity, angles = trail.loads.shape[0], trail.loads.shape[1]
     now, before = trail.loads[last % capacity], trail.loads[(last - lag) % capacity]
     worst = 0.0
-    for measure in range(N_MEASURES):
+    for measure in range(par.measured.shape[0]):
         change = largest = 0.0
-        first, number = OF_MEASURE[measure, 0], MEASURES[measure, 1] - MEASURES[measure, 0]
+        first, number = par.of_measure[measure, 0], par.measured[measure, 1] - par.measured[measure, 0]
         for s in range(angles):
             for j in range(first, first + number):
                 change = larger(change, abs(now[s, j] - before[s, j]))
@@ -144,24 +140,24 @@ def lag_closure(last, lag, trail):
 
 
 @njit
-def keep_deciding(loads, deciding):
-    """Copy the loads that decide to `deciding`, (N_DECIDING,)."""
-    for j in range(N_DECIDING):
-        deciding[j] = loads[DECIDING[j]]
+def keep_deciding(loads, par, deciding):
+    """Copy the loads that decide to `deciding`, (n,)."""
+    for j in range(par.deciding.shape[0]):
+        deciding[j] = loads[par.deciding[j]]
 
 
 @njit
-def largest_change(of_all, before, out):
-    """Largest change of a largest load that decides against `before`, (N_DECIDING,), relative to its measure.
+def largest_change(of_all, before, par, out):
+    """Largest change of a largest load that decides against `before`, (n,), relative to its measure.
 
     With `of_all` false, changes of bushing loads count, without what the shafts carry.
     """
     worst = 0.0
-    for measure in range(N_MEASURES):
-        change, size = 0.0, size_of(measure, out.largest)
-        first, last = OF_MEASURE[measure, 0], OF_MEASURE[measure, 1]
-        for j in range(first, last if of_all else first + MEASURES[measure, 1] - MEASURES[measure, 0]):
-            change = max(change, abs(out.largest[DECIDING[j]] - before[j]))
+    for measure in range(par.measured.shape[0]):
+        change, size = 0.0, size_of(measure, out.largest, par)
+        first, last = par.of_measure[measure, 0], par.of_measure[measure, 1]
+        for j in range(first, last if of_all else first + par.measured[measure, 1] - par.measured[measure, 0]):
+            change = max(change, abs(out.largest[par.deciding[j]] - before[j]))
         worst = max(worst, change / size if size > 0 else 0.0)
     return worst
 
@@ -170,15 +166,15 @@ def largest_change(of_all, before, out):
 def combine(last, count, trail, out):
     """Write the statistics over the `count` revolutions up to `last` (from 0) to `out`, a row of KERNEL_RESULT."""
     capacity = trail.revolution.size
-    for i in range(N_LOADS):
+    for i in range(out.largest.shape[0]):
         top, low, total = trail.revolution[last % capacity].largest[i], np.inf, 0.0
         for r in range(last - count + 1, last + 1):
             statistics = trail.revolution[r % capacity]
             top = max(top, statistics.largest[i])
-            if i < N_AVERAGED:
+            if i < out.average.shape[0]:
                 low, total = min(low, statistics.largest[i] - statistics.range[i]), total + statistics.average[i]
         out.largest[i] = top
-        if i < N_AVERAGED:
+        if i < out.average.shape[0]:
             out.average[i], out.range[i] = total / count, top - low
     out.mode_share[:] = 0.0
     for r in range(last - count + 1, last + 1):

@@ -1,7 +1,7 @@
-"""The Cardan joint as a mechanism (docs/model.md, "Parts").
+"""Mechanisms of Cardan joints: the joint, and joints in series (docs/model.md, "Parts").
 
 The hub carries pins 1 to 4; pin 1 turns in the hole of arm 4, pin 2 in arm 3, pin 3 in arm 1, pin 4 in arm 2. Arms 1
-and 2 belong to the input fork, 3 and 4 to the output fork, whose shaft may turn by psi and slide by s.
+and 2 belong to the input fork, 3 and 4 to the output fork. `kernel.mechanics.cardan` counts on the order of the parts.
 """
 
 from tolstat.common.mechanism import (
@@ -23,32 +23,56 @@ HOLE_OF_PIN = (4, 3, 1, 2)
 """Number of the arm in whose hole each pin turns."""
 
 
-def cardan(name: str = "cardan") -> Mechanism:
-    """Return the joint."""
-    pins, arms = range(1, 5), range(1, 5)
+def joint(name: str, prefix: str, input_shaft: Shaft, output_shaft: Shaft) -> Mechanism:
+    """Return a Cardan joint between two shafts; `prefix`: what stands before the names of its parts."""
+    numbers, members = range(1, 5), {part: prefix + part for part in ("input", "cross", "output")}
     fork = {1: "input", 2: "input", 3: "output", 4: "output"}
     return Mechanism(
         name,
-        members=(
-            Member("input", CLOSED_FORM, True),
-            Member("cross", CLOSED_FORM),
-            Member("output", CLOSED_FORM, True),
-        ),
+        members=tuple(Member(member, CLOSED_FORM, part != "cross") for part, member in members.items()),
         lumps=(
-            Lump("hub", "cross", "hub"),
-            *(Lump(f"pin{i}", "cross", "pin", PIN_QUARTERS[i - 1]) for i in pins),
-            *(Lump(f"hole{i}", fork[i], "arm", ARM_QUARTERS[i - 1]) for i in arms),
+            Lump(f"{prefix}hub", members["cross"], "hub"),
+            *(Lump(f"{prefix}pin{i}", members["cross"], "pin", PIN_QUARTERS[i - 1]) for i in numbers),
+            *(Lump(f"{prefix}hole{i}", members[fork[i]], "arm", ARM_QUARTERS[i - 1]) for i in numbers),
         ),
-        shafts=(Shaft("input", "input", driven=True), Shaft("output", "output", "psi", "s")),
+        shafts=(input_shaft, output_shaft),
         bushings=(
-            *(Bushing(f"cross{i}", f"pin{i}", "hub", "cross", "cross") for i in pins),
-            *(Bushing(f"fork{i}", f"hole{i}", fork[i], f"{fork[i]} fork", "fork") for i in arms),
+            *(Bushing(f"{prefix}cross{i}", f"{prefix}pin{i}", f"{prefix}hub", "cross", "cross") for i in numbers),
+            *(
+                Bushing(f"{prefix}fork{i}", f"{prefix}hole{i}", prefix + fork[i], f"{fork[i]} fork", "fork")
+                for i in numbers
+            ),
         ),
-        hinges=(Hinge("input", "cross", "input", X), Hinge("output", "cross", "output", Y)),
-        pairs=tuple(Pair(f"pin{i}", f"hole{k}", fork[k]) for i, k in enumerate(HOLE_OF_PIN, 1)),
-        unknowns=("psi", "s"),
-        cardan=("input",),
+        hinges=(
+            Hinge(members["input"], members["cross"], members["input"], X),
+            Hinge(members["output"], members["cross"], members["output"], Y),
+        ),
+        pairs=tuple(
+            Pair(f"{prefix}pin{i}", f"{prefix}hole{hole}", members[fork[hole]]) for i, hole in enumerate(HOLE_OF_PIN, 1)
+        ),
+        unknowns=tuple(name for name in (output_shaft.turns, output_shaft.slides) if name),
+        cardan=(members["input"],),
     )
 
 
-CARDAN = cardan()
+CARDAN = joint("cardan", "", Shaft("input", "input", driven=True), Shaft("output", "output", "psi", "s"))
+"""The joint: its output shaft may turn by psi and slide by s."""
+
+
+def series(number: int) -> Mechanism:
+    """Return Cardan joints one behind the other: shafts between them, held on their axes, turn by psi1 and so on."""
+    joints = []
+    for i in range(1, number + 1):
+        before = f"psi{i - 1}" if i > 1 else ""
+        ends = (
+            Shaft(f"joint{i}.input", f"joint{i}.input", before, driven=True),
+            Shaft(f"joint{i}.output", f"joint{i}.output", f"psi{i}"),
+        )
+        joints.append(joint("", f"joint{i}.", *ends))
+    parts = ("members", "lumps", "shafts", "bushings", "hinges", "pairs", "unknowns", "cardan")
+    together = {part: sum((getattr(one, part) for one in joints), ()) for part in parts}
+    return Mechanism(f"{number} joints in series", **together)
+
+
+SERIES = series(2)
+"""Two joints in series."""

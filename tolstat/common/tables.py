@@ -384,9 +384,9 @@ ERROR_FIELDS, RESULT_FIELDS, ERROR, PARAM, RESULT, KERNEL_RESULT = tables(CARDAN
 HOLES = tuple(lump.name for lump in CARDAN.lumps if lump.name.startswith("hole"))
 
 
-def for_kernels(table: NDArray[np.void]) -> np.recarray[Any, np.dtype[np.void]]:
+def for_kernels(table: NDArray[np.void], mechanism: Mechanism = CARDAN) -> np.recarray[Any, np.dtype[np.void]]:
     """View of a table RESULT, of any shape, as KERNEL_RESULT."""
-    return table.view(np.ndarray).view(KERNEL_RESULT).view(np.recarray)
+    return table.view(np.ndarray).view(tables(mechanism).KERNEL_RESULT).view(np.recarray)
 
 
 def without_results(n: int, status: Status) -> NDArray[np.void]:

@@ -13,10 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tolstat.common import tables
+from tolstat.common.cardan import CARDAN
 from tolstat.common.load_kinds import LOAD_KINDS, SPAN, measure_of
 from tolstat.common.loads import FloatArray, put_largest
 from tolstat.common.tables import RESULT, SIMULATED, Fidelity, Options, Start, Status
-from tolstat.solver.simulation import AT_REST, equilibrium, simulate_together
+from tolstat.solver.simulation import equilibrium, simulate_together
 
 IntegratorName = Literal["Radau", "BDF", "LSODA"]
 
@@ -105,7 +106,7 @@ def first_order(params: NDArray[np.void], options: Options, from_start: bool = F
     else:
         options = options._replace(start=int(Start.STATIC))  # the torque ramp has ended
 
-    n = 2 * AT_REST.size
+    n = 2 * CARDAN.dof
     works, scratch = np.zeros(1, work_dtype()), np.empty((3, n))
     work = works.view(np.recarray)[0]
     fast_rate = compiled_entry(kernel.rate_of_row, t0, y0, params, options, works, y0)
@@ -129,15 +130,15 @@ def first_order(params: NDArray[np.void], options: Options, from_start: bool = F
         out.largest[: samples.loads.shape[1]] = samples.loads.max(axis=0)
         return np.array(out.largest)
 
-    scale = np.repeat([LENGTH, VELOCITY], AT_REST.size)
+    scale = np.repeat([LENGTH, VELOCITY], CARDAN.dof)
     return FirstOrder(rate, jacobian, t0, y0, period, scale, largest, settled)
 
 
 def _start(params: NDArray[np.void], options: Options) -> FloatArray:
     """Initial state of the solver at time zero, (112,)."""
     if options.start == Start.RAMP:
-        return np.zeros(2 * len(AT_REST))
-    return np.concatenate([equilibrium(params, options), AT_REST])
+        return np.zeros(2 * CARDAN.dof)
+    return np.concatenate([equilibrium(params, options), np.zeros(CARDAN.dof)])
 
 
 def reference_rows(

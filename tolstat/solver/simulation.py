@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from tolstat.common import tables
 from tolstat.common.cardan import CARDAN
+from tolstat.common.mechanism import Mechanism
 from tolstat.common.parameters import numbers
-from tolstat.common.tables import RESULT, SIMULATED, Fidelity, Options, Simulation, Start, Status
+from tolstat.common.tables import SIMULATED, Fidelity, Options, Simulation, Start, Status
 from tolstat.joint import ideal
 from tolstat.solver import refinement, stationary
 from tolstat.solver.histories import Histories, extracted, history_specs
@@ -36,18 +37,18 @@ MOST_ALONE = 3
 UNIFORM_REVS = 4
 """Revolutions with uniform steps of a joint that explicit steps suit: what uniform steps resolve settles sooner."""
 
-AT_REST = np.zeros(CARDAN.dof)
-"""Unknowns of the ideal pose, or velocities of a joint at rest."""
-NO_BLOCKS = np.zeros((0, 0), tables.KERNEL_RESULT).view(np.recarray)
-"""Empty statistics of single revolutions, if they are not needed."""
-
 
 @cache
-def lanes(options: Options, width: int) -> Batch:
+def lanes(options: Options, width: int, mechanism: Mechanism = CARDAN) -> Batch:
     """Work arrays of this process for `width` joints at a time; importing the kernel here spares light commands."""
     from tolstat.kernel.lanes.batch import make_batch
 
-    return make_batch(options, width)
+    return make_batch(options, width, mechanism)
+
+
+def blank_results(shape: int | tuple[int, ...], mechanism: Mechanism) -> Table:
+    """Table RESULT of zeros; as statistics of single revolutions that are not needed, of shape (0, 0)."""
+    return np.zeros(shape, tables.tables(mechanism).RESULT).view(np.recarray)
 
 
 def width_for(joints: int) -> int:
@@ -62,7 +63,11 @@ def width_for(joints: int) -> int:
 
 
 def simulate_rows(
-    params: NDArray[np.void], options: Options, histories: Histories = "none", n_harmonics: int = 16
+    params: NDArray[np.void],
+    options: Options,
+    histories: Histories = "none",
+    n_harmonics: int = 16,
+    mechanism: Mechanism = CARDAN,
 ) -> Simulation:
     """Simulate joints; row i of the result is joint i, and depends on no other row.
 
@@ -76,6 +81,8 @@ def simulate_rows(
         Load histories to keep, see `history_specs`.
     n_harmonics : int
         Highest harmonic kept.
+    mechanism : Mechanism
+        What the joints are.
 
     Returns
     -------
@@ -95,10 +102,12 @@ def simulate_rows(
     left = np.full(len(params), allowed)
 
     def simulate(rows: NDArray[np.intp], settings: Options) -> tuple[NDArray[np.void], NDArray[np.void]]:
-        out, follows = np.zeros(len(rows), RESULT).view(np.recarray), tables.follows_error(settings)
-        blocks = np.zeros((len(rows), settings.max_revs) if follows else (0, 0), RESULT).view(np.recarray)
+        out, follows = blank_results(len(rows), mechanism), tables.follows_error(settings)
+        blocks = blank_results((len(rows), settings.max_revs) if follows else (0, 0), mechanism)
         still_allowed, of_rows = left[rows], steps[rows] if follows else None
-        run = simulate_together(params[rows], settings, still_allowed, bool(specs), out, blocks, of_rows)
+        run = simulate_together(
+            params[rows], settings, still_allowed, bool(specs), out, blocks, of_rows, mechanism=mechanism
+        )
         for i, samples in run:
             if out[i].status in SIMULATED:
                 for name, values in extracted(samples, histories, specs).items():
@@ -106,8 +115,8 @@ def simulate_rows(
         left[rows] = still_allowed
         return out.view(np.ndarray), blocks.view(np.ndarray)
 
-    steps = explicit_steps(params, options)
-    results = np.zeros(len(params), RESULT)
+    steps = explicit_steps(params, options, mechanism)
+    results = np.zeros(len(params), tables.tables(mechanism).RESULT)
     explicit = np.flatnonzero(steps)
     if len(explicit):
         results[explicit], _ = simulate(explicit, options._replace(max_revs=min(options.max_revs, UNIFORM_REVS)))
@@ -127,8 +136,9 @@ def simulate_together(
     left: NDArray[np.int64],
     keep: bool,
     results: NDArray[np.void],
-    blocks: NDArray[np.void] = NO_BLOCKS,
+    blocks: NDArray[np.void] | None = None,
     steps: NDArray[np.int64] | None = None,
+    mechanism: Mechanism = CARDAN,
 ) -> Iterator[tuple[int, NDArray[np.void]]]:
     """Simulate joints in lanes by numbers of contact stations and orders; yield index and samples of each if `keep`.
 
@@ -136,6 +146,7 @@ def simulate_together(
     steps of the first revolution, (n,); joints with 0, all without it, are simulated in lock-step, as are those that
     turn out too stiff for explicit steps.
     """
+    blocks = blank_results((0, 0), mechanism) if blocks is None else blocks
     if options.fidelity == Fidelity.IDEAL:
         yield from _ideal(params, options, keep, results)
         return
@@ -146,43 +157,53 @@ def simulate_together(
 
     steps = np.zeros(len(params), np.int64) if steps is None else steps.copy()
     max_size = max(1, MAX_KEPT_SAMPLES // options.steps_per_rev) if keep else len(params)
-    memory = make_samples(min(max_size, len(params)) if keep else 0, options.steps_per_rev)
+    memory = make_samples(min(max_size, len(params)) if keep else 0, options.steps_per_rev, mechanism)
     for is_explicit in (True, False):
         for here in _groups(params, (steps > 0) == is_explicit, max_size):
             allowed, shape = left[here], (len(here) if len(blocks) else 0, blocks.shape[1])
-            statistics = np.zeros(shape, tables.KERNEL_RESULT).view(np.recarray)
-            queue = make_queue(params[here], options, allowed, memory[: len(here)].view(np.recarray), statistics)
+            statistics = tables.for_kernels(blank_results(shape, mechanism), mechanism)
+            queue = make_queue(
+                params[here], options, allowed, memory[: len(here)].view(np.recarray), statistics, mechanism
+            )
             if is_explicit:
-                run_lanes(queue._replace(left=allowed.copy(), blocks=NO_BLOCKS), options._replace(max_revs=START_ONLY))
+                none = tables.for_kernels(blank_results((0, 0), mechanism), mechanism)
+                alone = queue._replace(left=allowed.copy(), blocks=none)
+                run_lanes(alone, options._replace(max_revs=START_ONLY), mechanism)
                 all_lanes = width_for(WIDTH)  # for a few joints, too: the kernel is compiled for this width alone
-                explicit(steps[here], options, lanes_for(queue, options, all_lanes), queue)
+                explicit(steps[here], options, lanes_for(queue, options, all_lanes, mechanism), queue)
                 steps[here[queue.results.status == Status.NEWTON_FAILED]] = 0
             else:
-                run_lanes(queue, options)
+                run_lanes(queue, options, mechanism)
             left[here] = allowed
-            tables.for_kernels(results)[here] = queue.results
+            tables.for_kernels(results, mechanism)[here] = queue.results
             if len(blocks):
-                tables.for_kernels(blocks)[here] = statistics
+                tables.for_kernels(blocks, mechanism)[here] = statistics
             yield from zip(here.tolist(), memory, strict=False)
 
 
 def make_queue(
-    params: NDArray[np.void], options: Options, left: NDArray[np.int64], samples: Table, blocks: Table
+    params: NDArray[np.void],
+    options: Options,
+    left: NDArray[np.int64],
+    samples: Table,
+    blocks: Table,
+    mechanism: Mechanism,
 ) -> Queue:
     """Make a queue of joints, see `kernel.lanes.batch.Queue`; their starts are computed."""
     from tolstat.kernel.lanes.batch import Queue
 
-    rows, out = np.ascontiguousarray(params).view(np.recarray), np.zeros(len(params), tables.KERNEL_RESULT)
+    rows, out = np.ascontiguousarray(params).view(np.recarray), blank_results(len(params), mechanism)
     words = rows.view(np.float64).view(np.ndarray).reshape(len(rows), -1)
-    return Queue(rows, words, starts(rows, options), left, samples, blocks, out.view(np.recarray))
+    found = starts(rows, options, mechanism)
+    return Queue(rows, words, found, left, samples, blocks, tables.for_kernels(out, mechanism))
 
 
-def run_lanes(queue: Queue, options: Options) -> NDArray[np.int64]:
+def run_lanes(queue: Queue, options: Options, mechanism: Mechanism = CARDAN) -> NDArray[np.int64]:
     """Simulate the joints of a queue in lock-step; return the counts of `kernel.lanes.lockstep.lockstep`."""
     from tolstat.kernel.lanes.lockstep import PATIENCE, lockstep, one_at_a_time
 
     width, tally = width_for(len(queue.rows)), np.zeros(3, np.int64)
-    batch = lanes_for(queue, options, width)
+    batch = lanes_for(queue, options, width, mechanism)
     if width == 1:
         one_at_a_time(options, batch, queue, tally)
     else:
@@ -190,23 +211,25 @@ def run_lanes(queue: Queue, options: Options) -> NDArray[np.int64]:
     return tally
 
 
-def lanes_for(queue: Queue, options: Options, width: int) -> Batch:
+def lanes_for(queue: Queue, options: Options, width: int, mechanism: Mechanism = CARDAN) -> Batch:
     """Lanes for the joints of a queue, with what all of these share."""
-    batch = lanes(options, width)
-    for name in ("n_stations", "n_orders", *numbers(CARDAN)):
+    batch = lanes(options, width, mechanism)
+    for name in ("n_stations", "n_orders", *numbers(mechanism)):
         batch.par[name] = queue.rows[name][0]
     return batch
 
 
-def equilibrium(params: NDArray[np.void], options: Options) -> NDArray[np.float64]:
+def equilibrium(params: NDArray[np.void], options: Options, mechanism: Mechanism = CARDAN) -> NDArray[np.float64]:
     """Unknowns of a joint, (1,), in static equilibrium at the input angle zero, (dof,)."""
     from tolstat.kernel.lanes.lockstep import START_ONLY
     from tolstat.kernel.revolution.settle import make_samples
 
     dynamic = options._replace(fidelity=int(Fidelity.DYNAMIC), start=int(Start.STATIC))
     settings = dynamic._replace(max_revs=START_ONLY)
-    queue = make_queue(params, settings, np.full(1, 2**31), make_samples(0, options.steps_per_rev), NO_BLOCKS)
-    run_lanes(queue, settings)
+    none = tables.for_kernels(blank_results((0, 0), mechanism), mechanism)
+    samples = make_samples(0, options.steps_per_rev, mechanism)
+    queue = make_queue(params, settings, np.full(1, 2**31), samples, none, mechanism)
+    run_lanes(queue, settings, mechanism)
     return np.asarray(queue.starts[0])
 
 
@@ -216,40 +239,42 @@ def _ideal(
     """Evaluate the closed forms of ideal joints; arguments as of `simulate_together`."""
     from tolstat.kernel.revolution.ideal import ideal_revolution
 
-    batch, rows, out = lanes(options, 1), params.view(np.recarray), tables.for_kernels(results)
+    batch, rows, out = lanes(options, 1), params.view(np.recarray), tables.for_kernels(results, CARDAN)
+    at_rest = np.zeros(CARDAN.dof)
     for i in range(len(params)):
-        ideal_revolution(rows[i], options, AT_REST, batch.scratch, batch.samples[0], batch.notes[0], out[i])
+        ideal_revolution(rows[i], options, at_rest, batch.scratch, batch.samples[0], batch.notes[0], out[i])
         if keep:
             yield i, batch.samples[0]
 
 
-def starts(rows: NDArray[np.void], options: Options) -> NDArray[np.float64]:
+def starts(rows: NDArray[np.void], options: Options, mechanism: Mechanism = CARDAN) -> NDArray[np.float64]:
     """Where the search for the start of each joint begins, (n, dof), see `kernel.revolution.starts`.
 
     The kernel is not called, and so not compiled, for joints with negative clearance alone: these end at once.
     """
     from tolstat.kernel.revolution.starts import write_starts
 
-    out = np.zeros((len(rows), AT_REST.size))
+    out, at_rest = np.zeros((len(rows), mechanism.dof)), np.zeros(mechanism.dof)
     if (rows["clearance"] >= 0).all(axis=1).any():
-        write_starts(rows, options, lanes(options, 1).scratch, AT_REST, out)
+        write_starts(rows, options, lanes(options, 1, mechanism).scratch, at_rest, out)
     return out
 
 
-def explicit_steps(params: NDArray[np.void], options: Options) -> NDArray[np.int64]:
+def explicit_steps(params: NDArray[np.void], options: Options, mechanism: Mechanism = CARDAN) -> NDArray[np.int64]:
     """Least stable number of explicit steps a revolution of joints that are refined with them, (n,); 0 for others.
 
     These are joints whose torque reverses, or nearly does, unless a revolution takes too many stable steps: where
     contacts hit, error-controlled steps are hardly longer, and each costs five times as much.
     """
-    steps, these = np.zeros(len(params), np.int64), hitting(params, options)
+    steps = np.zeros(len(params), np.int64)
+    these = hitting(params, options) if len(mechanism.cardan) == 1 else np.zeros(0, np.intp)
     if not len(these):
         return steps
     from tolstat.kernel.lanes.explicit import count_steps
     from tolstat.kernel.revolution.explicit import MOST_STEPS
 
     fewest = np.zeros(len(these), np.int64)
-    count_steps(params[these].view(np.recarray), options, lanes(options, 1).scratch, fewest)
+    count_steps(params[these].view(np.recarray), options, lanes(options, 1, mechanism).scratch, fewest)
     steps[these] = np.where(fewest <= MOST_STEPS, fewest, 0)
     return steps
 

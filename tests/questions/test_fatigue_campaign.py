@@ -244,7 +244,7 @@ def test_a_spectrum_made_from_a_signal_counts_the_same(tmp_path):
     signal.write_text(
         "time [s],torque [N*m],speed [rpm],alpha [deg]\n" + "\n".join(",".join(map(str, r)) for r in rows)
     )
-    assert call("spectrum", signal, "--out", study).exit_code == 0
+    assert call("new", study, "--signal", signal).exit_code == 0
     text = study.read_text(encoding="utf-8").replace('histories = "cycles"', 'histories = "full"')
     text = re.sub(r"\[limits\]\n(?:[^\n\[]+\n)*", "", re.sub(r"\nn = \d+", "\nn = 3", text))
     full.write_text(text, encoding="utf-8")

@@ -23,8 +23,7 @@ from tolstat.common.tables import Status
 from tolstat.display import text
 from tolstat.questions.fatigue import counting, parts
 from tolstat.questions.fatigue.answer import _notes_on_parts, _verdict, life_verdicts
-from tolstat.questions.fatigue.counting import Counted
-from tolstat.questions.fatigue.duty import ANY, Joints, members, settings_of
+from tolstat.questions.fatigue.counting import ANY, Counted, Joints, members, settings_of
 from tolstat.questions.fatigue.parts import load_stresses
 from tolstat.solver import histories
 from tolstat.store import ResultFile

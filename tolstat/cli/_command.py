@@ -28,7 +28,7 @@ from typing import Annotated, Any, get_args, get_origin
 import typer
 
 from tolstat.cli._library import points, stores, studies, units
-from tolstat.cli._shared import deliver, fail, progress, session, tell_files, work, write_files
+from tolstat.cli._shared import deliver, fail, progress, session, work
 from tolstat.common.errors import Fault, InputError, TolstatError, gather, raise_all
 from tolstat.common.files import check_target, reason
 from tolstat.display import options
@@ -266,11 +266,8 @@ def function_of(question: Question) -> Callable[..., None]:
             seen = [store.view(study_file).at(point) for store in opened]
             with progress(question.name):
                 answer = answer_of(*seen, **{p.name: arguments[p.name] for p in options_of_answer})
-            files = []
-            if out is not None:  # first: the reader of a pipe may end early
-                files = write_files(answer, out.with_suffix("") if only_study else out / stem, only_study)
-            deliver(answer, arguments["wide"], arguments["as_json"])
-            tell_files(files)
+            target = out and (out.with_suffix("") if only_study else out / stem)
+            deliver(answer, arguments["wide"], arguments["as_json"], target, only_study)
 
     out_option = options.FolderOrStudy if question.study else options.Results if takes_study else options.Folder
     texts = entries(inspect.getdoc(simulate) or "") | entries(inspect.getdoc(answer_of) or "")

@@ -27,7 +27,7 @@ from tolstat.display import text
 from tolstat.display.answer import Answer, Column, Listing, Part, Row, Rows, Sentence, Table
 from tolstat.display.options import Budget, Costs, Opt
 from tolstat.questions import shares
-from tolstat.questions.shares import ChangedJoints, Simulation, check_sample, own_joints, study_documents
+from tolstat.questions.shares import ChangedJoints, Simulation, own_joints, study_documents
 from tolstat.store import Writer
 from tolstat.store.view import View
 from tolstat.store.what_if import Altered
@@ -322,9 +322,7 @@ def _others(view: View, statement: Statement, file: str) -> str:
 
 def _read_request(view: View, targets: Sequence[str], costs: Path | None, keep: Sequence[str], most: int) -> _Request:
     """Read targets, costs and names, and report their faults together."""
-    check_sample(view)
-    if view.store.variants:
-        raise shares.unusable(view, "holds several joints", "give the file of a study with tolerances and one joint")
+    shares.check_one_joint(view)
     study, faults, statements = view.study, list[Fault](), list[Statement]()
     for target in targets:
         with gather(faults):

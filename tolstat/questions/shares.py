@@ -159,6 +159,13 @@ def check_sample(view: View) -> None:
         raise unusable(view, "holds a part of the campaign only", remedy)
 
 
+def check_one_joint(view: View) -> None:
+    """Refuse what `check_sample` refuses, and a sample of several joints: StoreError."""
+    check_sample(view)
+    if view.store.variants:
+        raise unusable(view, "holds several joints", "give the file of a study with tolerances and one joint")
+
+
 def grouped(reasons: Iterable[tuple[str, str]]) -> str:
     """Words on loads and the reason of each: ``cross1.F, cross2.F: reason; fork1.T: other reason``."""
     loads: dict[str, list[str]] = {}
@@ -186,14 +193,6 @@ def _good(view: View, name: str, delivery: int) -> Mapping[str, Any]:
 def counts(above: Exceedance) -> dict[str, int]:
     """Columns of a table: numbers of joints, of those without a valid load, and of those above a level."""
     return {"n": above.n, "n_failed": above.n_failed, "n_unsettled": above.n_unsettled, "count": above.count}
-
-
-def side_of(interval: Sequence[float], accepted: float) -> str:
-    """``yes`` if an interval lies below the accepted share, ``no`` above it, ``open``; empty if one is unknown."""
-    low, high = interval
-    if math.isnan(accepted) or math.isnan(low):
-        return ""
-    return "yes" if high <= accepted else "no" if low > accepted else "open"
 
 
 class Yield(NamedTuple):

@@ -13,7 +13,7 @@ from tolstat.common.errors import TolstatError
 from tolstat.common.loads import ANY_LIMIT
 from tolstat.common.tables import FAILED, STATUS_TEXT, UNSETTLED, VALID
 from tolstat.display import table, text
-from tolstat.display.verdict import WORDS, Verdict
+from tolstat.display.verdict import WORDS, Verdict, deciding
 from tolstat.questions import joints, shares
 from tolstat.questions.assumptions import sentences, variations
 from tolstat.questions.assumptions.variations import Standing
@@ -65,10 +65,7 @@ def _deciding(row: table.Row, accepted: float) -> str:
         part = (row["n_failed"] + row["n_unsettled"]) / row["n"]
         low = min(low, row["numerical_lower"] * (1.0 - part))
         high = max(high, row["numerical_upper"] * (1.0 - part) + part)
-    if low <= accepted <= high:
-        return "no number of joints would decide it"
-    joints = binomial.needed(high if high < accepted else low, accepted)
-    return f"{f'{text.number(joints)} joints' if joints < 1e7 else 'more than 1e7 joints'} would decide it"
+    return deciding((low, high), accepted, lambda end: binomial.needed(end, accepted))
 
 
 def _judged(view: View, records: Sequence[table.Row], accepted: float, standing: Standing | None) -> Verdict:

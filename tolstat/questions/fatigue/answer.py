@@ -20,8 +20,7 @@ from tolstat.display.options import Delivery, Loads, Opt
 from tolstat.display.style import ticker
 from tolstat.display.table import Column, Row, Rows, by_share, of_shares
 from tolstat.questions.fatigue import counting, loads, parts
-from tolstat.questions.fatigue.counting import Counted
-from tolstat.questions.fatigue.duty import ANY, Joints, members, section, settings_of
+from tolstat.questions.fatigue.counting import ANY, Counted, Joints, members, section, settings_of
 from tolstat.questions.fatigue.loads import SHARES, channels, load_cycles
 from tolstat.store.revolutions import held
 from tolstat.store.view import View

@@ -16,9 +16,8 @@ from tolstat.common.errors import Fault, gather, raise_all
 from tolstat.common.late import pandas as pd
 from tolstat.common.tables import SIMULATED
 from tolstat.display.table import Row, Rows
-from tolstat.questions.fatigue import counting, duty
-from tolstat.questions.fatigue.counting import Counted
-from tolstat.questions.fatigue.duty import ANY, CONFIDENCE, only
+from tolstat.questions.fatigue import counting
+from tolstat.questions.fatigue.counting import ANY, CONFIDENCE, Counted, only
 from tolstat.store.view import View
 from tolstat.study.fatigue import counted_names
 from tolstat.study.selection import Entry
@@ -74,8 +73,8 @@ def load_cycles(
     InputError
         When the shares are not shares or not known, or the campaigns have different joints.
     """
-    views, shares = duty.members(views, shares)
-    joints = duty.joints_of(views, shares, samples)
+    views, shares = counting.members(views, shares)
+    joints = counting.joints_of(views, shares, samples)
     if names is None:
         names = tuple(dict.fromkeys((*SHOWN, *joints.settings.lines)))
     signals = [signal for name in names for signal in signals_of(name)]

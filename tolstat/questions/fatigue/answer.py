@@ -20,7 +20,7 @@ from tolstat.display.options import Delivery, Loads, Opt
 from tolstat.display.style import ticker
 from tolstat.display.table import Column, Row, Rows, by_share, of_shares
 from tolstat.questions.fatigue import counting, loads, parts
-from tolstat.questions.fatigue.counting import ANY, Counted, Joints, members, section, settings_of
+from tolstat.questions.fatigue.counting import ANY, Counted, Joints, section, settings_of
 from tolstat.questions.fatigue.loads import SHARES, channels, load_cycles
 from tolstat.store.revolutions import held
 from tolstat.store.view import View
@@ -92,8 +92,7 @@ DAMAGES = (
 
 
 def fatigue(
-    *views: View,
-    shares: Annotated[list[float] | None, Opt("S", name="share")] = None,
+    view: View,
     by: Loads = None,
     joints: Annotated[int | None, Opt("N", least=1)] = None,
     delivery: Delivery = prediction.DELIVERY,
@@ -105,20 +104,15 @@ def fatigue(
     simulated again. From cycles of load components, or of a force or moment along a direction: quantiles of the
     damage-equivalent load over the joints, and for each S-N line of a load the share of joints whose damage sum exceeds
     1. Without --by, prints the most loaded component of the force and of the moment of each bushing. All settings are
-    those of [fatigue] in the study of the first FILE.
-
-    The operating points of FILE form a duty cycle, by the share of the time that [[operation]] gives each; so do
-    several files, with the same joints at one operating point each.
+    those of [fatigue] in the study of FILE. Its operating points form a duty cycle, by the share of the time that
+    [[operation]] gives each.
 
     Example: tolstat fatigue iso2768_f.h5 --by "cross*.F_t"
 
     Parameters
     ----------
-    *views : View
-        One campaign, whose operating points are the duty cycle if it has several; or the same joints in a campaign for
-        each operating point.
-    shares : list of float, optional
-        Share of the revolutions, once for each FILE in the same order; sum 1; default: 1 for one file.
+    view : View
+        A campaign, whose operating points are the duty cycle if it has several.
     by : list of str, optional
         Component or direction, such as cross1.F_t, "cross*.F_t", "cross1.F at 30 deg" or "cross1.F at worst";
         repeatable; default: components of bushings.
@@ -138,21 +132,20 @@ def fatigue(
     Raises
     ------
     InputError
-        When the shares are not shares or not known, the campaigns have different joints, or nothing is selected.
+        When the shares of the operating points are not known, or nothing is selected.
     StoreError
-        When the joints of a file are no sample of a production.
+        When the joints are no sample of a production.
     """
-    for view in views:
-        view.check()
-    settings = section(views[0])
-    has_cycles = all(part.store.history_specs for view in views for part in view.parts)
+    view.check()
+    settings = section(view)
+    has_cycles = all(part.store.history_specs for part in view.parts)
     shown_parts: list[Part] = []
     duty: Sequence[tuple[str, float]] = ()
     if settings.points:
-        stressed = parts.load_stresses(views, shares or None, joints)
+        stressed = parts.load_stresses(view, joints)
         duty, shown_parts = stressed.duty, _of_parts(stressed, delivery)
     if by or has_cycles or settings.lines or not settings.points:
-        loading = load_cycles(views, shares or None, channels(by) if by else None, joints)
+        loading = load_cycles(view, channels(by) if by else None, joints)
         rows = loads.equivalent_loads(loading)
         shown = [] if by else loads.most_loaded(rows)
         seen = [row for row in rows if not shown or row["channel"] in shown]
@@ -169,10 +162,10 @@ def fatigue_on_page(view: View, asked: Asked) -> Answer:
             settings = section(view)
             joints = JOINTS if held(view.store) else min(asked.replay, JOINTS)
             if settings.points and joints:
-                shown_parts += _of_parts(parts.load_stresses([view], samples=joints), prediction.DELIVERY)
+                shown_parts += _of_parts(parts.load_stresses(view, joints), prediction.DELIVERY)
             joints = _joints_with_lines(view, settings, asked.replay)
             if (settings.lines or view.store.history_specs) and joints:
-                loading = load_cycles([view], samples=joints)
+                loading = load_cycles(view, samples=joints)
                 rows = loads.equivalent_loads(loading)
                 leading = loads.leading(rows)
                 seen = sorted((row for row in rows if row["channel"] in leading), key=lambda r: (r["channel"], r["m"]))
@@ -202,16 +195,16 @@ def life_verdicts(view: View, accepted: float = math.nan, samples: int = JOINTS)
         When a file holds joints that are no sample of a production.
     """
     settings = section(view)
-    if not (settings.points or settings.lines) or not settings_of(*members([view], None)).required:
+    if not (settings.points or settings.lines) or not settings_of(view).required:
         return []
     view.check()
     verdicts = []
     if settings.points and (joints := JOINTS if held(view.store) else min(samples, JOINTS)):
-        stressed = parts.load_stresses([view], samples=joints)
+        stressed = parts.load_stresses(view, joints)
         row = parts.failures_over_life(stressed, [stressed.settings.revolutions])[0]._asdict()
         verdicts.append(_verdict("failures of parts", "have a failed part", row, stressed, accepted))
     if settings.lines and (joints := _joints_with_lines(view, settings, samples)):
-        loading = load_cycles([view], names=tuple(settings.lines), samples=joints)
+        loading = load_cycles(view, tuple(settings.lines), joints)
         sums = loads.damages(loading)[-1]
         verdicts.append(_verdict("damage by loads", "have a damage sum above 1", sums, loading, accepted))
     return verdicts

@@ -1,7 +1,4 @@
-"""Rainflow cycles of the joints of a campaign or a duty cycle, from the file or from their loads over the angle.
-
-Checks that the campaigns of a duty cycle hold the same joints; these have their worst status at its operating points.
-"""
+"""Rainflow cycles of the joints of a campaign or a duty cycle, from the file or from their loads over the angle."""
 
 from __future__ import annotations
 
@@ -15,9 +12,8 @@ from tolstat.analysis import cycles
 from tolstat.analysis.cycles import Cycles, Transitions
 from tolstat.analysis.design import Design
 from tolstat.common.channels import BUSHING_LOADS, COMPONENTS, LOAD_HISTORIES, LoadHistory, Signal
-from tolstat.common.errors import Fault, InputError
 from tolstat.common.loads import FloatArray
-from tolstat.common.tables import ERROR_FIELDS, Status, worst_status
+from tolstat.common.tables import Status
 from tolstat.display.text import percent
 from tolstat.solver import histories
 from tolstat.store import reader, recorded, revolutions
@@ -41,12 +37,11 @@ class Joints:
     design : Design
         How the joints were drawn.
     settings : Fatigue
-        Section ``[fatigue]`` of the study; of the first study if there are several. See `settings_of`.
+        Section ``[fatigue]`` of the study, see `settings_of`.
     total : int
         Number of samples of the campaign, those not evaluated included.
     duty : tuple of (str, float)
-        Operating points, or files of one point without a name, and their shares of the revolutions; one entry with
-        share 1 for a single point.
+        Operating points and their shares of the revolutions; one entry with share 1 for a single point.
     """
 
     status: NDArray[np.uint8]
@@ -71,10 +66,7 @@ class Joints:
         shares = ", ".join(f"{percent(share)} at {name}" for name, share in self.duty)
         if len(self.duty) < 2:
             return []
-        reason = "the study gives no [fatigue.sequence]"
-        if self.settings.visits:
-            reason = "[fatigue.sequence] is of the operating points of one study"
-        between = f"not counted are cycles between the points: {reason}"
+        between = "not counted are cycles between the points: the study gives no [fatigue.sequence]"
         if self.visits:
             between = f"cycles between the points: {len(self.visits)} visits in {self.settings.turns:g} revolutions"
             if missed := [name for p, (name, _) in enumerate(self.duty) if p not in self.visits]:
@@ -109,64 +101,33 @@ class Joints:
         return Transitions(ranges, means, numbers / self.settings.turns, replaced / self.settings.turns)
 
 
-def members(views: Sequence[View], shares: Sequence[float] | None) -> tuple[Sequence[View], list[float]]:
-    """Views of a duty cycle at one operating point each, and their shares of the revolutions with the exact sum 1.
-
-    Parameters
-    ----------
-    views : sequence of View
-        One campaign, whose operating points are the duty cycle if it has several; or the same joints in a campaign for
-        each operating point.
-    shares : sequence of float, optional
-        Share of the revolutions in each of several campaigns.
+def joints_of(view: View, samples: int | None) -> Joints:
+    """First samples of a campaign, whose operating points are the duty cycle if it has several; all without a number.
 
     Raises
     ------
     InputError
-        When the shares are not shares or not known, or the campaigns have different joints.
+        When the shares of the operating points are not known.
     """
-    if several := [view for view in views if len(view.parts) > 1]:
-        remedy = "" if shares is None else "leave --share out: the study gives share in [[operation]]"
-        remedy = "give this file alone, or files with one operating point each" if len(views) > 1 else remedy
-        if remedy:
-            raise InputError([Fault(str(several[0].path), "has several operating points", remedy)])
-        views, shares = views[0].parts, views[0].shares_of_revolutions.tolist()
-    shares = [1.0] if shares is None else shares
-    if len(shares) != len(views) or min(shares, default=0.0) <= 0 or abs(sum(shares) - 1) > 1e-6:
-        problem = f"{list(shares)} for {len(views)} files"
-        raise InputError([Fault("--share", problem, "give a positive share for each file; their sum is 1")])
-    names, first = [column.name for column in ERROR_FIELDS], views[0]
-    for view in views[1:]:
-        if view.n != first.n or not all(
-            np.array_equal(errors[name], other[name])
-            for errors, other in zip(view.error_blocks(names), first.error_blocks(names), strict=True)
-            for name in names
-        ):
-            remedy = "run both studies with the same tolerances, sampling.n and sampling.seed"
-            raise InputError([Fault(str(view.path), f"does not hold the joints of {first.path}", remedy)])
-    total = sum(shares)
-    return views, [share / total for share in shares]
-
-
-def joints_of(views: Sequence[View], shares: Sequence[float], samples: int | None) -> Joints:
-    """First samples of the `members`; all without a number."""
-    first = views[0]
+    several = len(view.parts) > 1
+    shares = view.shares_of_revolutions.tolist() if several else [1.0]
     return Joints(
-        status=worst_status([view.status[:samples] for view in views]),
-        design=first.design if samples is None else first.design.only(np.arange(min(samples, first.n))),
-        settings=settings_of(views, shares),
-        total=first.n,
-        duty=tuple((view.points[0] or view.path.name, share) for view, share in zip(views, shares, strict=True)),
+        status=view.status[:samples],
+        design=view.design if samples is None else view.design.only(np.arange(min(samples, view.n))),
+        settings=settings_of(view),
+        total=view.n,
+        duty=tuple(zip(view.points if several else (view.points[0] or view.path.name,), shares, strict=True)),
     )
 
 
-def settings_of(views: Sequence[View], shares: Sequence[float]) -> Fatigue:
-    """Section ``[fatigue]`` of the first of the `members`, with the service life in revolutions over the duty cycle."""
-    first = views[0]
-    bearing = (first.study.joint if first.study_path else recorded.joint_of(first.store, 0)).bearing
+def settings_of(view: View) -> Fatigue:
+    """Section ``[fatigue]`` of the study of a campaign, with the service life in revolutions over the duty cycle."""
+    bearing = (view.study.joint if view.study_path else recorded.joint_of(view.store, 0)).bearing
     hours = np.nan if bearing is None or bearing.required_life is None else bearing.required_life / HOUR
-    turn = sum(share * 2.0 * np.pi / abs(view.store.operation.speed) for view, share in zip(views, shares, strict=True))
-    return section(first).within(hours, HOUR / turn, str(first.path))
+    shares = view.shares_of_revolutions if len(view.parts) > 1 else (1.0,)
+    turns = (2.0 * np.pi / abs(part.store.operation.speed) for part in view.parts)
+    turn = sum(share * each for share, each in zip(shares, turns, strict=True))
+    return section(view).within(hours, HOUR / turn, str(view.path))
 
 
 def section(view: View) -> Fatigue:
@@ -203,8 +164,7 @@ class Counted(Joints):
 
 
 def count(
-    views: Sequence[View],
-    shares: Sequence[float],
+    view: View,
     joints: Joints,
     signals: Sequence[Signal],
     chosen: NDArray[np.bool_],
@@ -214,10 +174,10 @@ def count(
 
     Parameters
     ----------
-    views, shares : sequence of View, sequence of float
-        The `members`.
+    view : View
+        The campaign.
     joints : Joints
-        Their first n samples.
+        Its first n samples.
     signals : sequence of Signal
         What cycles are counted of. Where a file does not hold it, the joints are simulated again.
     chosen : ndarray of bool, shape (n,)
@@ -225,16 +185,16 @@ def count(
     kept : int
         Maximum number of cycles of a signal at an operating point, the largest ones.
     """
-    both = int(all((view.nominal["status"] == Status.OK).any() for view in views))
+    both = int(all((part.nominal["status"] == Status.OK).any() for part in view.parts))
     rows = np.append(np.zeros(both, np.intp), 1 + np.flatnonzero(chosen))
     parts, apart = list[Cycles](), 0.0
-    for view in views:
-        slots = np.append(view.nominal_slots[:both], view.slots(rows[both:] - 1))
-        part, difference = of_slots(view.store, slots, signals, kept)
+    for at in view.parts:
+        slots = np.append(at.nominal_slots[:both], at.slots(rows[both:] - 1))
+        part, difference = of_slots(at.store, slots, signals, kept)
         parts.append(part.spread(rows, 1 + joints.status.size))
         apart = max(apart, difference)
     low, high = (np.stack([getattr(part, end) for part in parts], axis=2) for end in ("low", "high"))
-    whole = cycles.duty_cycle(parts, shares, joints.transitions(low, high))
+    whole = cycles.duty_cycle(parts, [share for _, share in joints.duty], joints.transitions(low, high))
     whole = whole.with_starts(joints.settings.starts / joints.settings.revolutions)
     return Counted(**vars(joints), cycles=whole.rows(slice(1, None)), nominal=whole.rows(slice(both)), apart=apart)
 

@@ -46,22 +46,13 @@ def channels(patterns: Sequence[str]) -> tuple[str, ...]:
     return tuple(sorted(names, key=lambda name: order.index(name) if name in COMPONENTS else len(order)))
 
 
-def load_cycles(
-    views: Sequence[View],
-    shares: Sequence[float] | None = None,
-    names: Sequence[str] | None = None,
-    samples: int | None = None,
-) -> Counted:
-    """Rainflow cycles of a campaign, or of the same joints at the several operating points of a duty cycle.
+def load_cycles(view: View, names: Sequence[str] | None = None, samples: int | None = None) -> Counted:
+    """Rainflow cycles of a campaign, over the duty cycle of its operating points if it has several.
 
     Parameters
     ----------
-    views : sequence of View
-        One campaign, whose operating points are the duty cycle if it has several; or the same joints in a campaign for
-        each operating point.
-    shares : sequence of float, optional
-        Share of the revolutions in each of several campaigns; the sum is 1. Those of the operating points of one
-        campaign follow from their shares of the time and their speeds, see `View.shares_of_revolutions`.
+    view : View
+        The campaign; shares of the revolutions follow from those of the time, see `View.shares_of_revolutions`.
     names : sequence of str, optional
         Components and directions, see `channels.signals_of`; by default components of bushings and what has an S–N
         line, some 6 kB per joint. Cycles of a joint that has not settled are those of its last revolution.
@@ -71,15 +62,14 @@ def load_cycles(
     Raises
     ------
     InputError
-        When the shares are not shares or not known, or the campaigns have different joints.
+        When the shares of the operating points are not known.
     """
-    views, shares = counting.members(views, shares)
-    joints = counting.joints_of(views, shares, samples)
+    joints = counting.joints_of(view, samples)
     if names is None:
         names = tuple(dict.fromkeys((*SHOWN, *joints.settings.lines)))
     signals = [signal for name in names for signal in signals_of(name)]
-    simulated = np.all([np.isin(view.status[:samples], SIMULATED) for view in views], axis=0)
-    return counting.count(views, shares, joints, signals, simulated)
+    simulated = np.all([np.isin(part.status[:samples], SIMULATED) for part in view.parts], axis=0)
+    return counting.count(view, joints, signals, simulated)
 
 
 def equivalent_loads(loading: Counted) -> Rows:
@@ -232,7 +222,7 @@ def pylife_frame(view: View, names: Sequence[str] | None = None, nominal: bool =
     InputError
         When the shares of the operating points are not known.
     """
-    loading = load_cycles([view], names=names)
+    loading = load_cycles(view, names)
     parts = [(loading.cycles, view.rows(np.arange(view.n)))]
     if nominal:
         parts.insert(0, (loading.nominal, view.store.row(view.nominal_slots)))

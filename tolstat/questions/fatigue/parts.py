@@ -27,19 +27,16 @@ LONGEST = 1e12
 """Lives beyond so many service lives are given as infinite."""
 
 
-def load_stresses(views: Sequence[View], shares: Sequence[float] | None = None, samples: int | None = None) -> Counted:
-    """Stress cycles of a campaign, or of the same joints in several campaigns that make up a duty cycle.
+def load_stresses(view: View, samples: int | None = None) -> Counted:
+    """Stress cycles of a campaign, over the duty cycle of its operating points if it has several.
 
     The stress of each point is formed from the load components at each input angle before cycles are counted. Where a
     file holds no load histories, its joints are simulated again.
 
     Parameters
     ----------
-    views : sequence of View
-        One campaign, or the same joints in several, see `counting.members`. The study of the first has
-        ``[fatigue.point]``.
-    shares : sequence of float, optional
-        Share of the revolutions in each of several campaigns; the sum is 1.
+    view : View
+        The campaign; its study has ``[fatigue.point]``.
     samples : int, optional
         Number of samples, from the first; by default all.
 
@@ -51,16 +48,15 @@ def load_stresses(views: Sequence[View], shares: Sequence[float] | None = None, 
     Raises
     ------
     InputError
-        When the study has no points, the shares are not shares, or the campaigns have different joints.
+        When the study has no points, or the shares of its operating points are not known.
     """
-    views, shares = counting.members(views, shares)
-    joints = counting.joints_of(views, shares, samples)
+    joints = counting.joints_of(view, samples)
     points = joints.settings.points
     if not points:
         remedy = 'add [fatigue.point."NAME"] to the study, and run it again; no joint is simulated anew'
-        raise InputError([Fault(str(views[0].path), "its study names no point of a part", remedy)])
-    every = 1 + max(int(view.store.options["steps_per_rev"]) for view in views) // 2
-    return counting.count(views, shares, joints, stresses_at(points), joints.valid, every)
+        raise InputError([Fault(str(view.path), "its study names no point of a part", remedy)])
+    every = 1 + max(int(part.store.options["steps_per_rev"]) for part in view.parts) // 2
+    return counting.count(view, joints, stresses_at(points), joints.valid, every)
 
 
 def stresses_at(points: Sequence[StressPoint]) -> list[Signal]:

@@ -25,9 +25,9 @@ from tolstat.study.widths import COARSER, EXACT, FINER, HALF, STEPS
 TITLE = "Which line of the drawing to change"
 ON_PAGE = (
     "Each line is an entry of [tolerances]: made half as wide about the middle of its band, exact (in the middle of "
-    "its band), one class finer or coarser where it has a class, else × 0.63 and × 1.6. Whiskers and bands are the "
-    "intervals of the table (upper whisker: half as wide; lower: coarser; band: first line). An arrow at the edge of a "
-    "picture: a share or the end of an interval is smaller than what its axis shows."
+    "its band), one class finer or coarser where it has a class, else × 0.63 and × 1.6. Whiskers are the intervals of "
+    "the table (upper: half as wide; lower: coarser), the band is that of the joints as drawn. An arrow at the edge of "
+    "the picture: a share or the end of an interval is smaller than what its axis shows."
 )
 FITS_ON_PAGE = (
     "Another fit has the next fundamental deviation or grade of ISO 286; none with which a pin may be larger than its "
@@ -39,8 +39,6 @@ _KINDS = {"offset", "tilt", "diameter", "clearance", "position"}
 _SHARES = ("factor", *(f"{name}{end}" for name in ("share", "change") for end in shares.ENDS))
 
 
-CURVES = 4
-"""Number of lines whose curve has a colour; the others are grey."""
 _BARS = {
     COARSER: ("one step coarser", style.COLOURS[1], 0.3, -0.1),
     HALF: ("half as wide", style.COLOURS[0], 0.56, 0.1),
@@ -181,7 +179,7 @@ def _parts(changed: Lines, accepted: float) -> list[Part]:
     title, units = f"Share of the joints with {changed.event}, with", dict.fromkeys(_SHARES, "1")
     parts: list[Part] = [
         Sentence(f"{text.sentence(drawn)} {sentence(changed, accepted) or none}.", "lead"),
-        Panels([_tornado(changed, accepted), *_curves(changed, accepted)]),
+        Panels([_tornado(changed, accepted)]),
         Table("lines", f"{title} one line changed", COLUMNS if by_line else (), rows, units, by_line),
     ]
     if others:
@@ -243,7 +241,9 @@ def _tornado(changed: Lines, accepted: float) -> Panel:
     labels = [f"{row['line']}\n{row['size']}" if row["size"] else str(row["line"]) for row in by_line]
     labels += [f"{row['step']}\nin place of {row['size']}" for row in fits]
     drawn, lower, upper = (changed.facts[name] for name in ("share", "lower", "upper"))
-    floor = _floor(changed, accepted)
+    # the axis begins below all shares that are not zero, and below the accepted share
+    positive = [value for value in (*(row["share"] for row in changed.rows), drawn, accepted) if value > 0.0]
+    floor = float(0.6 * max(min(positive, default=1.0), 0.5 / max(changed.facts["n"], 1)))
 
     def draw(ax: Axes) -> None:
         ax.set_ylim(len(labels) + 0.6, -1.2)  # a row above and one below, for what the vertical lines are
@@ -269,49 +269,3 @@ def _tornado(changed: Lines, accepted: float) -> Panel:
     description = f"As drawn {text.percent(drawn)}. {description}"
     size = drawing.WIDTH, 0.34 * (len(labels) + 2.2) + drawing.BOTTOM + 0.48
     return Panel(f"lines-{changed.facts['load']}", title, description, draw, size, rows=labels)
-
-
-def _curves(changed: Lines, accepted: float) -> Iterator[Panel]:
-    """Share above the level against the width of each line; none without a line whose width is changed."""
-    by_line: dict[str, list[Row]] = {}
-    for row in changed.rows:
-        if np.isfinite(row["factor"]):
-            by_line.setdefault(row["line"], []).append(row)
-    if not by_line:
-        return
-    floor, facts = _floor(changed, accepted), changed.facts
-    drawn = {"factor": 1.0, "share": facts["share"], "share_lower": facts["lower"], "share_upper": facts["upper"]}
-
-    def draw(ax: Axes) -> None:
-        style.share_axis(ax, floor)
-        top = floor
-        for i, (line, rows) in enumerate(by_line.items()):
-            ordered = sorted([*rows, drawn], key=lambda row: row["factor"])
-            x, y, low, high = (np.array([row[name] for row in ordered]) for name in drawn)
-            top, grey = max(top, float(y.max())), i >= CURVES
-            colour, dash = (drawing.GREY, "-") if grey else (style.COLOURS[i], style.DASHES[i])
-            look: dict[str, Any] = {"color": colour, "ls": dash, "lw": 1.0 if grey else 1.6, "marker": "o", "ms": 3.0}
-            ax.plot(x, np.maximum(y, floor), label="the other lines" if grey else line, **look)
-            at_edge = np.full(int((y < floor).sum()), floor)
-            ax.plot(x[y < floor], at_edge, marker=markers.CARETDOWN, ls="", color=colour, ms=5.0, clip_on=False)
-            if i == 0:
-                ax.fill_between(x, np.maximum(low, floor), np.maximum(high, floor), color=colour, alpha=0.18, lw=0)
-        ax.plot(1.0, facts["share"], "D", color=style.INK, ms=6.0, zorder=5)
-        ax.set_ylim(floor, min(1.0, 2.0 * top))
-        if accepted > 0.0:
-            ax.axhline(accepted, label=f"accepted {text.percent(accepted)}", **drawing.ACCEPTED)
-        ax.set(xlabel="width of the line, relative to the drawing", ylabel=f"share above {changed.limit}")
-
-    title, words = "The share against the width of each line", []
-    for line, rows in by_line.items():
-        points = (f"{row['factor']:.3g} {text.percent(row['share'])}" for row in rows)
-        words.append(f"{line}: {', '.join(points)}")
-    yield Panel(f"widths-{facts['load']}", title, "; ".join(words), draw, (drawing.WIDTH, 4.0))
-
-
-def _floor(changed: Lines, accepted: float) -> float:
-    """Lower end of an axis of shares: below all shares that are not zero, and below the accepted share."""
-    least = [
-        value for value in [*(row["share"] for row in changed.rows), changed.facts["share"], accepted] if value > 0.0
-    ]
-    return float(0.6 * max(min(least, default=1.0), 0.5 / max(changed.facts["n"], 1)))

@@ -32,7 +32,6 @@ from tolstat.cli._shared import deliver, fail, progress, session, work
 from tolstat.common.errors import Fault, InputError, TolstatError, gather, raise_all
 from tolstat.common.files import check_target, reason
 from tolstat.display import options
-from tolstat.display.options import Opt
 from tolstat.questions import Question
 
 WHAT = {"1": "a share between 0 and 1", "s": "a time above zero"}
@@ -94,16 +93,16 @@ def flag_of(parameter: Parameter) -> str:
     return f"--{(opt_of(parameter)[1].name or parameter.name).replace('_', '-')}"
 
 
-def opt_of(parameter: Parameter) -> tuple[Any, Opt]:
+def opt_of(parameter: Parameter) -> tuple[Any, options.Opt]:
     """Type and `Opt` of a parameter."""
     annotation = parameter.annotation
     if get_origin(annotation) is not Annotated:
-        return annotation, Opt()
+        return annotation, options.Opt()
     base, *extra = get_args(annotation)
-    return base, next((opt for opt in extra if isinstance(opt, Opt)), Opt())
+    return base, next((opt for opt in extra if isinstance(opt, options.Opt)), options.Opt())
 
 
-def quantity(text: str, opt: Opt, flag: str) -> float:
+def quantity(text: str, opt: options.Opt, flag: str) -> float:
     """Parse the value of an option that has a unit, such as ``"0.1 %"`` or ``"5 min"``; returns SI.
 
     Raises

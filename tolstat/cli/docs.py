@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import sys
 import textwrap
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated
 
@@ -38,17 +37,22 @@ def docs(page: Annotated[str | None, Opt("PAGE")] = None) -> None:
     page : str, optional
         Page or schema to print, such as study; without it: the names of all, with their titles.
     """
+    texts = {name: _plain(file.read_text(encoding="utf-8")) for name, file in pages().items()}
     kinds = {f"{kind}.schema.json": kind for kind in schemas.KINDS}
-    known = pages()
     if page in kinds:
         print_json(schemas.schema(kinds[page]))
+    elif page is not None and page_name(page) in texts:
+        _print_page(texts[page_name(page)])
     elif page is not None:
-        file = known.get(page_name(page))
-        if file is None:
-            raise input_error(page, "is not a page", did_you_mean(page, [*known, *kinds]))
-        _print_page(_plain(file.read_text(encoding="utf-8")))
+        raise input_error(page, "is not a page", did_you_mean(page, [*texts, *kinds]))
     else:
-        _list(known, kinds)
+        titles = {name: text[text.index("# ") + 2 :].partition("\n")[0] for name, text in texts.items()}
+        titles |= {name: f"JSON schema of a {kind}, for editors" for name, kind in kinds.items()}
+        width = max(map(len, titles))
+        for name, title in titles.items():
+            indent = " " * (width + 2)
+            typer.echo(textwrap.fill(title, WIDTH, initial_indent=f"{name:{width}}  ", subsequent_indent=indent))
+        say("next: tolstat docs study")
 
 
 def pages() -> dict[str, Path]:
@@ -61,20 +65,6 @@ def pages() -> dict[str, Path]:
 def page_name(file: str) -> str:
     """Name of a page: that of its file without the ending, as commands are spelt."""
     return file.removesuffix(".md").replace("_", "-")
-
-
-def _list(known: Mapping[str, Path], kinds: Mapping[str, str]) -> None:
-    """Print the names of pages and schemas, and their titles."""
-    titles = dict.fromkeys(known, "")
-    for name, file in known.items():
-        lines = _plain(file.read_text(encoding="utf-8")).splitlines()
-        titles[name] = next(line for line in lines if line.startswith("# "))[2:]
-    titles |= {name: f"JSON schema of a {kind}, for editors" for name, kind in kinds.items()}
-    width = max(map(len, titles))
-    for name, title in titles.items():
-        indent = " " * (width + 2)
-        typer.echo(textwrap.fill(title, WIDTH, initial_indent=f"{name:{width}}  ", subsequent_indent=indent))
-    say("next: tolstat docs study")
 
 
 def _print_page(text: str) -> None:

@@ -17,7 +17,6 @@ from tolstat.display.answer import Answer, Asked, Axes, Column, Panel, Panels, P
 from tolstat.display.options import Accepted, Costs, Load
 from tolstat.display.style import markers
 from tolstat.questions.causes import shares
-from tolstat.questions.causes.shares import INDICES, Lines
 from tolstat.questions.shares import estimated, inapplicable, word
 from tolstat.store.view import View
 from tolstat.study.widths import COARSER, EXACT, FINER, HALF, STEPS
@@ -145,7 +144,7 @@ def advice(view: View, load: str, accepted: float) -> str:
     return "" if changed is None else sentence(changed, accepted)
 
 
-def sentence(changed: Lines, accepted: float = math.nan) -> str:
+def sentence(changed: shares.Lines, accepted: float = math.nan) -> str:
     """Sentence on the line that lowers the share most, half as wide or with another fit; empty if none surely does.
 
     ``Halve the tilt tolerance of the holes (±0.5 deg) and 2.1 % (1.4 to 3 %) exceed the limit``, without full stop.
@@ -171,7 +170,7 @@ def sentence(changed: Lines, accepted: float = math.nan) -> str:
     return f"No single line is enough: {tried}" + ("" if same is None else f", exact {text.percent(same['share'])}")
 
 
-def _parts(changed: Lines, accepted: float) -> list[Part]:
+def _parts(changed: shares.Lines, accepted: float) -> list[Part]:
     n, share, lower, upper = (changed.facts[name] for name in ("n", "share", "lower", "upper"))
     drawn = f"{changed.event} in {text.percent(share)} ({text.span(lower, upper)}) of {n} joints as drawn"
     rows, by_line, others = changed.rows, changed.by_line, changed.other_fits
@@ -188,14 +187,14 @@ def _parts(changed: Lines, accepted: float) -> list[Part]:
         load = "largest load over its limit" if changed.facts["load"] == ANY_LIMIT else changed.facts["load"]
         load = f"log {load}" if changed.facts["logarithmic"] else load
         heads = f"{load}: alone, %", f"{load}: in all, %", "above: alone, %", "above: in all, %"
-        keys = enumerate(zip(heads, INDICES[::3], strict=True))  # no share is beyond 0 and 1
+        keys = enumerate(zip(heads, shares.INDICES[::3], strict=True))  # no share is beyond 0 and 1
         columns = [LINE, *(estimated(head, key, 3 - i, ends=(0.0, 1.0)) for i, (head, key) in keys)]
         title = f"Part of each line in the scatter of the load, and in whether it is above {changed.limit}"
-        parts.append(Table("line_indices", title, columns, changed.indices, dict.fromkeys(INDICES, "1")))
+        parts.append(Table("line_indices", title, columns, changed.indices, dict.fromkeys(shares.INDICES, "1")))
     return [*parts, *map(Sentence, _notes(changed))]
 
 
-def _notes(changed: Lines) -> Iterator[str]:
+def _notes(changed: shares.Lines) -> Iterator[str]:
     """Definitions, and what the table lacks: joints, steps, lines without joints, lines that are not changed."""
     limit, least = changed.limit, dict[str, int]()
     for row in changed.rows:
@@ -232,7 +231,7 @@ def _phrase(row: Row) -> str:
     return f"{kinds.pop()} tolerance of the {' and '.join(sorted(f'{body}s' for body in bodies)[::-1])}"
 
 
-def _tornado(changed: Lines, accepted: float) -> Panel:
+def _tornado(changed: shares.Lines, accepted: float) -> Panel:
     """Share above the level with each line half as wide, exact, and coarser; and with each other fit."""
     by_line, fits = changed.by_line, changed.other_fits
     halves = "; ".join(f"{row['line']} {text.percent(row.get(HALF, np.nan))}" for row in by_line)

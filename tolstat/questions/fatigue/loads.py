@@ -8,7 +8,6 @@ from dataclasses import asdict
 import numpy as np
 
 from tolstat.analysis import cycles, prediction
-from tolstat.analysis.cycles import Cycles
 from tolstat.analysis.sample import Sample
 from tolstat.common import load_kinds, loads
 from tolstat.common.channels import BUSHING_LOADS, COMPONENTS, signals_of, unit_of
@@ -230,7 +229,7 @@ def pylife_frame(view: View, names: Sequence[str] | None = None, nominal: bool =
     return pd.concat(frames, ignore_index=True)
 
 
-def _frame(part: Cycles, rows: np.ndarray[tuple[int], np.dtype[np.intp]]) -> pd.DataFrame:
+def _frame(part: cycles.Cycles, rows: np.ndarray[tuple[int], np.dtype[np.intp]]) -> pd.DataFrame:
     joint, channel, cycle = np.nonzero((part.ranges > 0) & (part.repeats > 0))  # leaves out NaN
     units = [unit_of(name) for name in part.channels]
     return pd.DataFrame(

@@ -54,5 +54,5 @@ def test_shares_so_far_have_the_interval_of_the_joints_design(tmp_path, lot):
     for share in shares:
         assert share["estimate"] is not None
         valid = share["n"] - share["n_failed"] - share["n_unsettled"]
-        independent = clopper_pearson(share["count"], valid)
-        assert ((share["lower"], share["upper"]) == pytest.approx(independent)) == (not lot)
+        independent = [float(end) for end in clopper_pearson(share["count"], valid)]
+        assert ([share["lower"], share["upper"]] == pytest.approx(independent)) == (not lot)

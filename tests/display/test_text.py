@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from tolstat.display import text
-from tolstat.display.text import visible
+from tolstat.display.unseen import visible
 
 
 @pytest.mark.parametrize(

@@ -34,7 +34,7 @@ from tolstat.common.files import atomic_write, make_parent
 from tolstat.common.late import pandas as pd
 from tolstat.display.options import Opt
 from tolstat.display.progress import Display, display
-from tolstat.display.text import visible
+from tolstat.display.unseen import visible
 
 if TYPE_CHECKING:
     from tolstat.joint import Joint

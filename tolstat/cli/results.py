@@ -8,7 +8,7 @@ import time
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, TextIO
+from typing import TYPE_CHECKING, Annotated, Any, TextIO
 
 import typer
 
@@ -22,8 +22,10 @@ from tolstat.common.late import pandas as pd
 from tolstat.display.options import Accepted, AsJson, Opt, Point, ResultPath, Wide, Workers
 from tolstat.display.progress import clock
 
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
 PAGES = (".html", ".htm")
-States = np.ndarray[Any, np.dtype[np.uint8]]
 
 
 def status(file: ResultPath, *, check: bool = False, wide: Wide = False, as_json: AsJson = False) -> None:
@@ -64,7 +66,7 @@ def status(file: ResultPath, *, check: bool = False, wide: Wide = False, as_json
         print_table(table.columns, table.for_people, wide)
 
 
-def _facts(store: library.stores.ResultFile, states: dict[str, States]) -> dict[str, Any]:
+def _facts(store: library.stores.ResultFile, states: dict[str, NDArray[np.uint8]]) -> dict[str, Any]:
     """Study, counts by status, in all and by point, and the pace of the run under way; `states` by point."""
     facts: dict[str, Any] = {"study": store.study_name, "joints": store.n}
     facts |= _counts(library.tables.worst_status(list(states.values())))
@@ -85,7 +87,7 @@ def _facts(store: library.stores.ResultFile, states: dict[str, States]) -> dict[
     return facts
 
 
-def _counts(states: States) -> dict[str, int]:
+def _counts(states: NDArray[np.uint8]) -> dict[str, int]:
     return {state.label: int(np.count_nonzero(states == state)) for state in library.tables.Status}
 
 

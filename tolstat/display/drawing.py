@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from numpy.typing import ArrayLike
 
-from tolstat.display import style, text
+from tolstat.display import style, text, unseen
 from tolstat.display.blocks import Panel
 
 if TYPE_CHECKING:
@@ -129,7 +129,7 @@ def switched(artist: Artist, name: str) -> None:
 
 def _inline(drawn: str, panel: Panel) -> str:
     """Body of an SVG file as an element of the page, whose style sheet has fonts, joins and colours of all pictures."""
-    body = style.with_variables(text.visible(drawn[drawn.index("<svg") :]))
+    body = style.with_variables(unseen.visible(drawn[drawn.index("<svg") :]))
     body = re.sub(r"<metadata>.*?</metadata>|<style.*?</style>", "", body, flags=re.DOTALL)
     body = body.replace("font-family: 'DejaVu Sans'; ", "")
     body = re.sub(r'<path d="[^"]*" style="fill: none"/>', "", body)  # background of figure and axes
@@ -144,7 +144,7 @@ def _inline(drawn: str, panel: Panel) -> str:
     assert box is not None
     spaces = 'xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink"'
     head = f'<svg {spaces} {box[0]} role="img" aria-labelledby="{panel.key}-title {panel.key}-desc">'
-    title, description = (escape(text.visible(words)) for words in (panel.title, panel.description))
+    title, description = (escape(unseen.visible(words)) for words in (panel.title, panel.description))
     texts = f'<title id="{panel.key}-title">{title}</title><desc id="{panel.key}-desc">{description}</desc>'
     return head + texts + body[body.index(">") + 1 :].strip()
 

@@ -17,9 +17,9 @@ from markupsafe import Markup
 import tolstat
 from tolstat.common.cores import mapped
 from tolstat.common.files import atomic_write
-from tolstat.display import drawing, style
+from tolstat.display import drawing, style, unseen
 from tolstat.display.blocks import Block, Decision, Page, Panel, Panels
-from tolstat.display.text import sentence, visible
+from tolstat.display.text import sentence
 
 TEMPLATES = Path(__file__).parent / "templates"
 
@@ -81,7 +81,7 @@ def _data(value: Any) -> Markup:
 
 
 def _shown(value: Any) -> Any:
-    return visible(value) if isinstance(value, str) and not isinstance(value, Markup) else value
+    return unseen.visible(value) if isinstance(value, str) and not isinstance(value, Markup) else value
 
 
 POLICY = (

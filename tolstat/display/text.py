@@ -1,9 +1,8 @@
-"""Values, sentences and tables as text: units, intervals, aligned columns, CSV, characters that cannot be seen."""
+"""Values, sentences and tables as text: units, intervals, aligned columns, CSV."""
 
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterable, Mapping, Sequence
 from csv import writer
 from pathlib import Path
@@ -13,18 +12,6 @@ from tolstat.common import files, loads
 
 LEAST_SHARE = 1e-9
 """Smallest share that is shown: one joint in a billion is beyond what any campaign tells."""
-
-
-_UNSEEN = re.compile(
-    "[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u061c\u200b\u200e\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb\ud800-\udfff"
-    "\U000e0000-\U000e007f]"
-)
-"""Control characters but those that end lines, marks and overrides of the direction of text, tags, surrogates."""
-
-
-def visible(words: str) -> str:
-    """Show characters that cannot be seen or change the direction of text by their code, ``[U+202E]``."""
-    return _UNSEEN.sub(lambda character: f"[U+{ord(character[0]):04X}]", words)
 
 
 def plain(value: Any) -> Any:

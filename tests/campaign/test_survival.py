@@ -33,14 +33,6 @@ from tolstat.study.model import Solver
 LONG = bool(os.environ.get("TOLSTAT_LONG"))
 
 
-@pytest.fixture(scope="module")
-def expected(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
-    """Make the datasets of the fake study, run in one go."""
-    path = tmp_path_factory.mktemp("reference") / "a.h5"
-    fakes.run(fakes.Study(), path, 1)
-    return datasets(path)
-
-
 def assert_same_but(path: Path, expected: dict[str, bytes], rows: list[int]) -> None:
     """Check that a campaign differs from another one in the results of `rows` only."""
     for name, found in datasets(path).items():

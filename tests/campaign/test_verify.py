@@ -9,10 +9,10 @@ from functools import partial
 import numpy as np
 import pandas as pd
 import pytest
-from typer.testing import CliRunner
 
 from tests.support import damage, fakes, synthetic
-from tolstat import cli, joint, sampling, study
+from tests.support.reports import call
+from tolstat import joint, sampling, study
 from tolstat.analysis import accuracy
 from tolstat.campaign import run as campaign
 from tolstat.campaign import verify
@@ -48,10 +48,6 @@ def written(folder, text=REAL):
     path = folder / "real.toml"
     path.write_text(text, encoding="utf-8")
     return path
-
-
-def call(*args):
-    return CliRunner().invoke(cli.app, [str(arg) for arg in args])
 
 
 @pytest.fixture(scope="module")

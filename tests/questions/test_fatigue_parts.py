@@ -13,6 +13,7 @@ import pandas as pd
 import pytest
 
 import tolstat
+from tests.support.reports import call
 from tests.support.synthetic import store as store_of
 from tolstat.analysis import strength
 from tolstat.analysis.cycles import Cycles
@@ -399,8 +400,6 @@ def test_every_fault_of_the_points_is_told():
 
 @pytest.mark.slow
 def test_the_command_prints_loads_below_the_parts(campaign):
-    from tests.cli.test_cli import call
-
     both = call("fatigue", campaign(), "--joints", 6)
     assert both.stdout.startswith("point")
     assert "\nDamage-equivalent loads\nchannel and exponent" in both.stdout

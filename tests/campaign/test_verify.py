@@ -24,14 +24,9 @@ from tolstat.questions.exceedance.answer import exceedance
 from tolstat.store import ResultFile, Writer, metadata, recorded, verification
 from tolstat.store.verification import Check, Verification
 
-REAL = """
-[joint]
-base = "cirelli2021"
-[operation]
-alpha = "25 deg"
-speed = "500 rpm"
-torque = "100 N*m"
-[solver]
+REAL = (
+    synthetic.HEAD.replace("15 deg", "25 deg")
+    + """[solver]
 steps_per_rev = 12
 [tolerances]
 "pin*.offset_t" = { plus_minus = "0.02 mm", distribution = "normal", cpk = 1.0 }
@@ -42,6 +37,7 @@ seed = 3
 [limits]
 "cross*.F" = "640 N"
 """
+)
 
 
 def written(folder, text=REAL):

@@ -13,6 +13,7 @@ import pytest
 
 import tolstat
 from tests.questions.test_fatigue import needs
+from tests.support import synthetic
 from tests.support.environment import ROOT
 from tests.support.reports import call
 from tolstat.analysis.cycles import Line, damage, equivalent_load, moment
@@ -31,14 +32,9 @@ from tolstat.study import load
 from tolstat.study.fatigue import Fatigue, of_text
 from tolstat.study.rewriting import as_text
 
-STUDY = """
-[joint]
-base = "cirelli2021"
-[operation]
-alpha = "{alpha} deg"
-speed = "500 rpm"
-torque = "100 N*m"
-[tolerances]
+SCATTER = (
+    synthetic.HEAD.replace("15", "{alpha}")
+    + """[tolerances]
 "pin*.offset_t" = {{ plus_minus = "0.1 mm", distribution = "normal", cpk = 1.0 }}
 "pin*.diameter" = {{ lower = "-0.1 mm", upper = "0.22 mm", distribution = "uniform" }}
 [sampling]
@@ -46,12 +42,18 @@ n = 12
 seed = {seed}
 [output]
 histories = "{histories}"
-harmonics = 4
+"""
+)
+"""A study to be filled in; not all of its joints have results."""
+STUDY = (
+    SCATTER
+    + """harmonics = 4
 [fatigue]
 exponents = [4]
 revolutions = 1e7
 line."cross*.F_[et]" = {{ m = 5, S0 = "1 kN", N0 = 2e6 }}
 """
+)
 LINE = Line(5.0, 1000.0, 2e6)
 
 

@@ -11,9 +11,9 @@ from types import SimpleNamespace
 
 import pandas as pd
 import pytest
-from typer.testing import CliRunner
 
 from tests.support import fakes, synthetic
+from tests.support.reports import call
 from tolstat import cli
 from tolstat.campaign import run as campaign
 from tolstat.campaign.pool import WorkerDied
@@ -24,11 +24,6 @@ from tolstat.store import ResultFile
 
 COMMANDS = tuple(LISTED)
 HEAVY = {"numpy", "numba", "pandas", "pint", "matplotlib", "h5py", "scipy"}
-
-
-def call(*args):
-    """Run the command in this process."""
-    return CliRunner().invoke(cli.app, [str(arg) for arg in args])
 
 
 def unwrapped(text):

@@ -12,7 +12,9 @@ import pytest
 
 import tolstat
 from tests.questions.test_fatigue import needs
+from tests.support import synthetic
 from tests.support.environment import ROOT
+from tests.support.reports import call
 from tolstat.analysis.cycles import Line, damage, equivalent_load, moment
 from tolstat.common.channels import signals_of, unit_of
 from tolstat.common.errors import InputError, NotApplicable, StoreError
@@ -29,14 +31,9 @@ from tolstat.study import load
 from tolstat.study.fatigue import of_text
 from tolstat.study.rewriting import as_text
 
-STUDY = """
-[joint]
-base = "cirelli2021"
-[operation]
-alpha = "{alpha} deg"
-speed = "500 rpm"
-torque = "100 N*m"
-[tolerances]
+SCATTER = (
+    synthetic.HEAD.replace("15", "{alpha}")
+    + """[tolerances]
 "pin*.offset_t" = {{ plus_minus = "0.1 mm", distribution = "normal", cpk = 1.0 }}
 "pin*.diameter" = {{ lower = "-0.1 mm", upper = "0.22 mm", distribution = "uniform" }}
 [sampling]
@@ -44,12 +41,18 @@ n = 12
 seed = {seed}
 [output]
 histories = "{histories}"
-harmonics = 4
+"""
+)
+"""A study to be filled in; not all of its joints have results."""
+STUDY = (
+    SCATTER
+    + """harmonics = 4
 [fatigue]
 exponents = [4]
 revolutions = 1e7
 line."cross*.F_[et]" = {{ m = 5, S0 = "1 kN", N0 = 2e6 }}
 """
+)
 LINE = Line(5.0, 1000.0, 2e6)
 
 
@@ -233,8 +236,6 @@ def test_a_point_with_a_constant_load_keeps_the_cycles_between_points(tmp_path, 
 
 @needs("rainflow")
 def test_a_spectrum_made_from_a_signal_counts_the_same(tmp_path):
-    from tests.cli.test_cli import call
-
     torque, alpha = np.array([(300, 10), (-300, 10), (100, 0.2), (300, 10), (100, 0.2), (-250, 5)] * 2).T
     seconds = np.arange(0.0, 5.0, 0.1)
     rows = [(s + 5.0 * i, t, 600, a) for i, (t, a) in enumerate(zip(torque, alpha, strict=True)) for s in seconds]
@@ -296,8 +297,6 @@ def test_the_section_may_be_edited_after_the_run(campaign, tmp_path):
 
 
 def test_a_campaign_without_a_valid_joint(tmp_path):
-    from tests.cli.test_cli import call
-
     source, out = tmp_path / "a.toml", tmp_path / "a.h5"
     text = STUDY.format(histories="cycles", alpha=15, seed=1) + '[errors]\npin1.diameter = "0.5 mm"\n'
     source.write_text(text.replace("pin*.diameter", "pin2.diameter"), encoding="utf-8")
@@ -383,8 +382,6 @@ def test_joints_that_are_listed_are_exported_but_not_estimated(campaign, tmp_pat
 
 
 def test_the_lines_of_the_document_read_the_export(campaign, tmp_path, monkeypatch):
-    from tests.cli.test_cli import call
-
     monkeypatch.chdir(tmp_path)
     done = call("export", campaign(), "--pylife", "cycles.csv")
     assert done.exit_code == 0, done.stderr
@@ -421,8 +418,6 @@ def test_pylifes_own_damage(campaign, tmp_path):
 
 @pytest.mark.slow
 def test_command_prints_loads_and_damage(campaign, tmp_path):
-    from tests.cli.test_cli import call
-
     out = tmp_path / "out"
     done = call("fatigue", campaign(), "--out", out)
     assert done.exit_code == 0, done.stderr

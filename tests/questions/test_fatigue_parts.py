@@ -12,6 +12,8 @@ import pandas as pd
 import pytest
 
 import tolstat
+from tests.questions.test_fatigue_campaign import SCATTER
+from tests.support.reports import call
 from tests.support.synthetic import store as store_of
 from tolstat.analysis import strength
 from tolstat.analysis.cycles import Cycles
@@ -28,22 +30,9 @@ from tolstat.solver import histories
 from tolstat.store import ResultFile
 from tolstat.study.fatigue import Fatigue, StressPoint, of_text
 
-STUDY = """
-[joint]
-base = "cirelli2021"
-[operation]
-alpha = "{alpha} deg"
-speed = "500 rpm"
-torque = "100 N*m"
-[tolerances]
-"pin*.offset_t" = {{ plus_minus = "0.1 mm", distribution = "normal", cpk = 1.0 }}
-"pin*.diameter" = {{ lower = "-0.1 mm", upper = "0.22 mm", distribution = "uniform" }}
-[sampling]
-n = 12
-seed = 1
-[output]
-histories = "{histories}"
-[fatigue]
+STUDY = (
+    SCATTER
+    + """[fatigue]
 revolutions = 1e9
 starts = 1e4
 [fatigue.point.weld]
@@ -63,6 +52,7 @@ S_D = "36 MPa"
 T_S = 1.25
 M = 0.3
 """
+)
 POINT = """[[operation]]
 name = "{name}"
 share = {share}
@@ -83,7 +73,7 @@ def campaign(tmp_path_factory):
         source = folder / f"{kind}.toml"
         out = source.with_suffix(".h5")
         if not out.exists():
-            text = STUDY.format(histories=kind.replace("duty", "full"), alpha=15)
+            text = STUDY.format(histories=kind.replace("duty", "full"), alpha=15, seed=1)
             head, _, rest = text.partition("[operation]")
             duty = head + DUTY + rest[rest.index("[tolerances]") :]
             source.write_text(duty if kind == "duty" else text, encoding="utf-8")
@@ -359,7 +349,7 @@ def test_the_service_life_is_the_one_that_bearings_require(tmp_path):
         f'[[operation]]\nname = "{name}"\nshare = "{share} %"\nspeed = "{rpm} rpm"\nalpha = "9 deg"\ntorque = "9 N*m"\n'
         for name, share, rpm in (("drive", 75, 1200), ("climb", 25, 400))
     )
-    head, _, rest = STUDY.format(histories="none", alpha=15).partition("[operation]")
+    head, _, rest = STUDY.format(histories="none", alpha=15, seed=1).partition("[operation]")
     bearing = '[joint.bearing]\nneedles = 32\nrequired_life = "20000 h"\n'
     text = head + bearing + points + "[tolerances]" + rest.partition("[tolerances]")[2]
     for given, expected, life in (
@@ -404,8 +394,6 @@ def test_every_fault_of_the_points_is_told():
 
 @pytest.mark.slow
 def test_the_command_prints_loads_below_the_parts(campaign):
-    from tests.cli.test_cli import call
-
     both = call("fatigue", campaign(), "--joints", 6)
     assert both.stdout.startswith("point")
     assert "\nDamage-equivalent loads\nchannel and exponent" in both.stdout
